@@ -19,12 +19,13 @@ from roboirg.core.errors import (
 )
 from roboirg.evaluation.episode_errors import one_line
 from roboirg.evaluation.play import rollout
-from roboirg.evaluation.play.job_instruction import instruct_job
+from roboirg.evaluation.play.job_instruction import PreparedJob, instruct_job
 from roboirg.evaluation.play.rollout import EpisodeRunner, load_policy, play_episode
 from roboirg.evaluation.play.rollout_result import RolloutResult
 from roboirg.evaluation.play.video_writer import VideoWriter
 from roboirg.evaluation.records.film import VideoOptions
 from roboirg.evaluation.records.record import EventRecord, Job, Record
+from roboirg.tasks.splits import splits
 
 JOB = Job(policy="random", task="PickXtimes", split="test", episode=2, setting="direct")
 
@@ -225,7 +226,7 @@ def test_ctrl_c_is_no_episode_error(stage: Callable[..., RolloutResult]) -> None
 
 def test_the_policys_luck_is_the_same_in_every_setting_and_another_in_every_episode() -> None:
     def luck(**changes: object) -> int:
-        return load_policy(JOB.model_copy(update=changes)).seed  # type: ignore[attr-defined]
+        return load_policy(PreparedJob(JOB.model_copy(update=changes))).seed  # type: ignore[attr-defined]
 
     assert luck() == luck(setting="explicit")
     assert len({luck(), luck(episode=3), luck(policy_seed=1)}) == 3
@@ -386,6 +387,24 @@ class Hearing(PaperPolicy):
 
 
 TURNS = JOB.model_copy(update={"setting": "contextual", "delivery": "turns"})
+
+
+def test_the_episode_of_a_job_is_looked_up_once(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    found: list[tuple[object, ...]] = []
+
+    def look_up(*name: object) -> Any:
+        found.append(name)
+        return kept(*name)
+
+    world, kept = PaperWorld(), splits._episode
+    monkeypatch.setattr(splits, "_episode", look_up)  # below all names that it is imported by
+    for name, made in {"make_env": world, "load_policy": PaperPolicy()}.items():
+        # Both read the episode, as the functions that they replace do.
+        monkeypatch.setattr(rollout, name, lambda one, _, made=made: one.episode and made)
+    assert EpisodeRunner(tmp_path)(JOB).outcome == "success"
+    assert found == [("PickXtimes", "test", 2)]
 
 
 @pytest.mark.parametrize("policy_class", [PaperPolicy, Hearing])

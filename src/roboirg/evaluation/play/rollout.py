@@ -31,6 +31,7 @@ from roboirg.evaluation.hosting.hosted_policy import HostedPolicy
 from roboirg.evaluation.hosting.policy_descriptions import PolicyDescription, describe_here
 from roboirg.evaluation.play.call_guard import CallGuard
 from roboirg.evaluation.play.guarded_loop import GuardedLoop
+from roboirg.evaluation.play.job_instruction import PreparedJob
 from roboirg.evaluation.play.policy_environment import job_needs, make_env
 from roboirg.evaluation.play.prompt_shares import audit_job, too_long_text
 from roboirg.evaluation.play.rollout_result import RolloutResult, make_record, utc_now
@@ -45,7 +46,6 @@ from roboirg.policies.contract.base import Policy, close_policy
 from roboirg.policies.contract.policy_needs import PolicyNeeds
 from roboirg.policies.contract.random_state import episode_policy_seed
 from roboirg.policies.prompt_length.declared_limit import prompt_limit
-from roboirg.tasks.splits.splits import get_episode
 
 PlayJob = Callable[[Job], Record]
 """Function that plays one job. Executors send it to other processes, so it must be picklable."""
@@ -181,24 +181,25 @@ def play_episode(
     """
     if job.wordings is not None:
         open_wordings(job.wordings_file, job.wordings)
-    result = RolloutResult()
+    prepared = PreparedJob(job)
+    result = RolloutResult(prepared=prepared)
     guard = CallGuard(result, policy_timeout_s, is_hosted=hosts is not None)
     policy: Policy | None = None
     try:
         if hosts is not None and needs_host(job.policy_spec):
             with guard.policy("policy's constructor", "policy_load"):
-                seed = _policy_seed(job, seed_secret)
+                seed = _policy_seed(prepared, seed_secret)
                 policy = _load_hosted(job, hosts, result, seed, alone=alone)
         if policy is None:
             guard = CallGuard(result, policy_timeout_s)
             result.policy = describe_here(job.policy_spec)
             with guard.policy("policy's constructor", "policy_load"):
-                policy = load_policy(job, seed_secret)
+                policy = load_policy(prepared, seed_secret)
         with guard.policy("policy's constructor", "policy_load"):
             needs = job_needs(policy, job)
             result.prompt_limit = prompt_limit(needs)
         if refuse_long:
-            _refuse_long_prompt(job, result)
+            _refuse_long_prompt(prepared, result)
         play_with(policy, job, needs, result, guard, writer)
     except EpisodeError as error:
         result.record_error(error.kind, error.cause, error.details)
@@ -232,7 +233,8 @@ def play_with(
     env, broke = None, False
     try:
         with guard.environment("env_reset"):
-            env = make_env(job, needs)
+            result.prepared = result.prepared or PreparedJob(job)
+            env = make_env(result.prepared, needs)
         GuardedLoop(env, policy, job, needs.action_space, result, guard, writer).play()
     except EpisodeError as error:
         broke = error.kind == "environment"
@@ -244,17 +246,19 @@ def play_with(
             env.close()
 
 
-def _refuse_long_prompt(job: Job, result: RolloutResult) -> None:
+def _refuse_long_prompt(prepared: PreparedJob, result: RolloutResult) -> None:
     """Raise an `EpisodeError` if the instruction is longer than what the policy's model reads."""
     if result.prompt_limit is None:
         return
-    if message := too_long_text(*audit_job(job, result.prompt_limit)):
+    audit = audit_job(prepared.job, result.prompt_limit, prepared.instruction)
+    if message := too_long_text(*audit):
         raise EpisodeError("prompt", message, "")
 
 
-def load_policy(job: Job, seed_secret: str = "") -> Policy:
+def load_policy(prepared: PreparedJob, seed_secret: str = "") -> Policy:
     """Return a new policy object, so that no state of an earlier episode remains."""
-    policy = policies.make_policy(job.policy_spec, seed=_policy_seed(job, seed_secret))
+    job = prepared.job
+    policy = policies.make_policy(job.policy_spec, seed=_policy_seed(prepared, seed_secret))
     if callable(take := getattr(policy, "take_job", None)):
         take(job)  # of ours that look up what a person answered
     return policy
@@ -271,9 +275,8 @@ def _load_hosted(
     return policy
 
 
-def _policy_seed(job: Job, secret: str) -> int:
-    episode = get_episode(job.task, job.split, job.episode)
-    return episode_policy_seed(job.policy_seed, episode.seed, secret)
+def _policy_seed(prepared: PreparedJob, secret: str) -> int:
+    return episode_policy_seed(prepared.job.policy_seed, prepared.episode.seed, secret)
 
 
 def _close_policy(policy: Policy, result: RolloutResult, guard: CallGuard) -> None:
