@@ -220,7 +220,7 @@ def _begin_work(
 
 
 def _hang_up(process: _Interpreter, line: socket.socket) -> None:
-    """Close a channel when its process has ended, whoever else has the other end of it."""
+    """Close a channel when its process has ended, even if others have its other end, too."""
     process.wait()
     with line, contextlib.suppress(OSError):
         line.shutdown(socket.SHUT_RDWR)

@@ -109,7 +109,8 @@ class RunCosts(NamedTuple):
 def hosted() -> float:
     """Return steps per second with a policy that answers at once, in a process of its own."""
     with HostPool(HostSettings()) as pool:
-        policy = HostedPolicy(pool.connect(), f"{WavingPolicy.__module__}:{WavingPolicy.__name__}", 0)
+        spec = f"{WavingPolicy.__module__}:{WavingPolicy.__name__}"
+        policy = HostedPolicy(pool.connect(), spec, 0)
         try:
             return steps_per_second(policy)
         finally:

@@ -89,9 +89,7 @@ class HostedEpisode:
         random: its random numbers.
     """
 
-    def __init__(
-        self, call: Call, block: int, ask: AskWorld, read_fields: dict[str, None]
-    ) -> None:
+    def __init__(self, call: Call, block: int, ask: AskWorld, read_fields: dict[str, None]) -> None:
         self._ask, self._read_fields = ask, read_fields
         self._block = map_block(block)
         self.random = RandomState(call.seed)

@@ -69,9 +69,7 @@ class HostedPolicy:
         MissingDependencyError: a package that one of our own policies needs is not installed.
     """
 
-    def __init__(
-        self, hosts: socket.socket, spec: str, seed: int, *, alone: bool = False
-    ) -> None:
+    def __init__(self, hosts: socket.socket, spec: str, seed: int, *, alone: bool = False) -> None:
         self._spec = spec
         self.metadata: dict[str, JsonValue] = {}
         self.waited_s = self.latency_s = 0.0

@@ -9,7 +9,7 @@ import select
 import termios
 import threading
 from collections.abc import Mapping, Sequence
-from typing import Self
+from typing import Any, Self
 
 from roboirg.core.errors import RoboIRGError
 from roboirg.evaluation.hosting.messages import (
@@ -49,19 +49,16 @@ class ChildLostError(Exception):
 class PolicyChild(ChildProcess):
     """A policy process; made by `start`."""
 
-    _changed: threading.Condition
-    _kept: bytearray
-    _dropped: int
-    _is_reading: bool
+    def __init__(self, *channel: Any) -> None:  # noqa: ANN401
+        super().__init__(*channel)
+        self._changed = threading.Condition()
+        self._kept, self._dropped, self._is_reading = bytearray(), 0, False
+        threading.Thread(target=self._read_output, name="policy output", daemon=True).start()
 
     @classmethod
     def start(cls, variables: Mapping[str, str] | None = None) -> Self:
-        """Start a process with environment variables beside those of this one, without a salt."""
-        child = cls.run_module(_MODULE, {**(variables or {}), SALT_VARIABLE: None})
-        child._changed = threading.Condition()
-        child._kept, child._dropped, child._is_reading = bytearray(), 0, False
-        threading.Thread(target=child._read_output, name="policy output", daemon=True).start()
-        return child
+        """Start a process with environment variables besides those of this one, without a salt."""
+        return cls.run_module(_MODULE, {**(variables or {}), SALT_VARIABLE: None})
 
     def exchange(
         self, message: Call | Sequence[Call], block: int | None = None

@@ -78,9 +78,7 @@ class LocalProcesses:
         with open_hosts(play) as connect:
             yield from self._run(jobs, play, connect)
 
-    def _run(
-        self, jobs: Sequence[Job], play: PlayJob, connect: Connect | None
-    ) -> Iterator[Record]:
+    def _run(self, jobs: Sequence[Job], play: PlayJob, connect: Connect | None) -> Iterator[Record]:
         waiting, failed_starts = deque(jobs), 0
         # With a process on every core, more threads in Mesa would not help.
         limit_threads = self.workers >= core_count()
@@ -126,6 +124,8 @@ def choose_executor(workers: int | None, episode_timeout_s: float = NO_TIMEOUT_S
     Raises:
         InvalidValueError: a negative number.
     """
+    if workers is not None and workers < 0:
+        raise InvalidValueError(f"workers is {workers}; it must be at least 0, this process only.")
     if workers == 0:
         return InProcess()
     return LocalProcesses(core_count() if workers is None else workers, episode_timeout_s)

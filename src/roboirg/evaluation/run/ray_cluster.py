@@ -243,8 +243,9 @@ class _RemoteWorker:
             if self._slot is not None:
                 self._slot[1].close()
             connect = None if hosts is None else hosts.connect
-            self._slot = hosts, WorkerSlot(
-                cast("PlayJob", self._play), self._episode_timeout_s, connect
+            self._slot = (
+                hosts,
+                WorkerSlot(cast("PlayJob", self._play), self._episode_timeout_s, connect),
             )
         record = self._slot[1].play(job)
         files = {}

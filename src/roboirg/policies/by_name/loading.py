@@ -161,7 +161,7 @@ def _declaring(spec: str) -> object:
 
 
 def _refuse_undeclared(spec: str, policy: object) -> None:
-    """Raise if a foreign policy, or its class, has ``attach`` although its spec declares nothing."""
+    """Raise if a foreign policy or its class has ``attach``, which its spec does not declare."""
     if not declares_privilege(spec) and is_foreign(spec) and hasattr(policy, "attach"):
         raise InvalidValueError(
             f"Policy {spec!r} has attach(), with which a policy reads the simulator's state; "
