@@ -18,7 +18,8 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from multiprocessing import resource_tracker
 from multiprocessing.connection import Connection
 from multiprocessing.process import BaseProcess
 from pathlib import Path
@@ -114,7 +115,9 @@ class ChildProcess:
         process = context.Process(
             target=_begin_work, args=(os.getpid(), work, theirs, args), daemon=daemon
         )
-        process.start()
+        resource_tracker.ensure_running()  # which would unblock what is blocked below
+        with _without_interrupts():
+            process.start()
         # Only the child may keep this end open: then its death reads as end of file.
         theirs.close()
         return cls(process, ours)
@@ -129,7 +132,7 @@ class ChildProcess:
         """
         ours, theirs = socket.socketpair()
         wanted = {**os.environ, **variables}
-        with theirs:
+        with theirs, _without_interrupts():
             number = theirs.fileno()
             arguments = (str(number), str(os.getpid()), module, json.dumps(sys.path))
             process = _Interpreter(
@@ -212,6 +215,16 @@ def serve(connection: Connection, answer: Callable[[Any], Any]) -> None:
             return
 
 
+@contextlib.contextmanager
+def _without_interrupts() -> Iterator[None]:
+    """Block Ctrl-C here, and in a process that is started, which ignores it as soon as it can."""
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
 def _begin_work(
     parent: int, work: Callable[..., None], connection: Connection, args: tuple[Any, ...]
 ) -> None:
@@ -238,6 +251,7 @@ def _begin(parent: int) -> None:
     """Put this process under the supervision of its parent, and prepare it for its work."""
     # Ctrl-C is for the parent, which decides what to do.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
     os.setpgid(0, 0)  # what it starts can be ended with it
     _prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)  # even if it hangs in native code
