@@ -282,6 +282,15 @@ class Forker(Hostile):
         return super().act(observation)
 
 
+class GuardStopper(Forker):
+    """Stops the process that would end what it leaves."""
+
+    def act(self, observation: Any) -> Any:
+        actions = super().act(observation)
+        os.kill(os.getppid(), signal.SIGSTOP)
+        return actions
+
+
 class Aborter(Forker):
     def act(self, observation: Any) -> Any:
         super().act(observation)

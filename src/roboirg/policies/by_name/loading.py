@@ -165,7 +165,8 @@ def _refuse_undeclared(spec: str, policy: object) -> None:
     if not declares_privilege(spec) and is_foreign(spec) and hasattr(policy, "attach"):
         raise InvalidValueError(
             f"Policy {spec!r} has attach(), with which a policy reads the simulator's state; "
-            f"declare that as {PRIVILEGED + spec!r}, or remove attach()."
+            f"declare that as {PRIVILEGED + spec!r}, in Python with roboirg.Privileged(policy), or "
+            "remove attach()."
         )
 
 
