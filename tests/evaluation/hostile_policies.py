@@ -239,6 +239,13 @@ class Deep300(Deep210):
     levels = 300
 
 
+class Umlauts(Hostile):
+    """Does nothing wrong: its metadata are long only where escapes are counted."""
+
+    def reset(self, instruction: str, demonstration: Any) -> None:
+        self.metadata = {"text": "ä" * 60_000}
+
+
 class NamesServer(Hostile):
     def reset(self, instruction: str, demonstration: Any) -> None:
         self.metadata = {"server": "localhost:1", "version": "2"}

@@ -76,7 +76,8 @@ def policy_metadata(policy: Policy, *, is_ours: bool = True) -> dict[str, JsonVa
 
 def dump_metadata(policy: Policy) -> str:
     """Return the policy's metadata as JSON; raises like `policy_metadata`."""
-    text = json.dumps(dict(getattr(policy, "metadata", {})), allow_nan=False)
+    metadata = dict(getattr(policy, "metadata", {}))
+    text = json.dumps(metadata, allow_nan=False, ensure_ascii=False)
     read_metadata(text, is_ours=True)
     return text
 

@@ -6,5 +6,5 @@
 | `host_pool`, `policy_host` | the supervisor | queues, batches, deadlines, attribution |
 | `policy_child` | the supervisor | one policy process: start, exchange messages, end |
 | `host_process`, `hosted_episode` | the policy's process | carries out the calls; holds no world |
-| `payload` | all | arrays in shared memory, the rest as msgpack; nothing is ever unpickled |
+| `messages` | all | schema of the messages; arrays in shared memory; nothing is ever unpickled |
 """
