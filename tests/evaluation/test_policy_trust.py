@@ -14,7 +14,7 @@ from typing import Any
 import hostile_policies
 import hosting_fakes
 import pytest
-from evaluation_fakes import FakePlay, comparable, small_plan
+from evaluation_fakes import FakePlay, comparable, is_alive, small_plan
 from hosting_fakes import PaperRunner, PaperWorld, paper_plan, paper_runner
 from msgspec.structs import replace
 
@@ -90,13 +90,6 @@ def test_what_a_policy_breaks_is_its_own(
         assert len(log) <= MAX_LOG_BYTES + 1000
     honest = {record.slug for name in names for record in found[f"{name}+1"]}
     assert honest.isdisjoint(logged_slugs(tmp_path / "run"))
-
-
-def is_alive(pid: int) -> bool:
-    try:
-        return "Z" not in Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0]
-    except OSError:
-        return False
 
 
 @pytest.mark.slow

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+import socket
 import threading
 import time
 from collections.abc import Iterator
@@ -15,9 +16,11 @@ from evaluation_fakes import FakePlayer, comparable, is_alive, small_plan, worke
 from hosting_fakes import PatientRunner, paper_plan, paper_runner
 
 from roboirg.core.errors import InvalidValueError, RenderDeviceError, RoboIRGError
+from roboirg.evaluation.hosting.host_pool import HostSettings
+from roboirg.evaluation.hosting.hosted_policy import HostedPolicy
 from roboirg.evaluation.records.store import RECORDS_FILE, read_records
 from roboirg.evaluation.run.executor import InProcess, LocalProcesses
-from roboirg.evaluation.run.ray_cluster import RayCluster
+from roboirg.evaluation.run.ray_cluster import RayCluster, _MachineHosts
 from roboirg.evaluation.run.runner import run_plan
 
 pytestmark = pytest.mark.slow
@@ -141,3 +144,19 @@ def test_a_cluster_that_is_not_there_is_one_sentence(tmp_path: Path) -> None:
 def test_no_workers_is_one_sentence() -> None:
     with pytest.raises(InvalidValueError, match="workers is 0"):
         RayCluster(0)
+
+
+def test_only_who_has_the_key_reaches_the_hosts_of_a_machine() -> None:
+    hosts = _MachineHosts(HostSettings())
+    address = hosts.address()
+    try:
+        with address._replace(key=b"x" * 32).connect() as stranger:
+            assert stranger.recv(1) == b""
+        with socket.socket(socket.AF_UNIX) as idle:
+            idle.connect(address.path)
+            assert idle.recv(1) == b""
+        with address.connect() as line:
+            HostedPolicy(line, "hosting_fakes:Dice", 0).close()
+    finally:
+        hosts.close()
+    assert not Path(address.path).exists()
