@@ -16,6 +16,7 @@ from roboirg import main as cli
 from roboirg.cli import demo_commands
 from roboirg.cli.progress_bar import progress_bars
 from roboirg.cli.run_commands import report_problems
+from roboirg.core.instruction_options import InstructionOptions
 from roboirg.evaluation.plan.stored_plans import read_plan
 from roboirg.evaluation.play.rollout_result import RolloutResult, make_record
 from roboirg.evaluation.records.record import Job
@@ -390,7 +391,13 @@ def test_a_dry_run_checks_what_a_run_checks(
 ) -> None:
     file, other = tmp_path / "file", tmp_path / "other"
     file.write_text("x")
-    job = Job(policy="random", task="PickXtimes", split="test", episode=0, setting="direct")
+    job = Job(
+        policy="random",
+        task="PickXtimes",
+        split="test",
+        episode=0,
+        options=InstructionOptions("direct"),
+    )
     with RecordStore(other) as store:
         result = RolloutResult("success", cause=None, steps=7)
         store.append(replace(make_record(job, result, started_at="now"), language_version="1.1"))

@@ -18,6 +18,7 @@ from selection import slow_but
 import roboirg
 from roboirg.core.actions import ACTION_SPACES
 from roboirg.core.errors import InvalidActionError, InvalidValueError, UnknownNameError
+from roboirg.core.instruction_options import InstructionOptions
 from roboirg.envs.env_options import EnvOptions
 from roboirg.envs.env_settings import EnvSettings
 from roboirg.envs.environment import RoboIRGEnv
@@ -186,7 +187,13 @@ def test_an_environment_without_what_a_policy_looks_at_is_refused(attribute):
 
 
 def test_runs_give_policies_their_action_space():
-    job = Job(policy="random", task="PickXtimes", split="test", episode=2, setting="direct")
+    job = Job(
+        policy="random",
+        task="PickXtimes",
+        split="test",
+        episode=2,
+        options=InstructionOptions("direct"),
+    )
     for space in ACTION_SPACES.values():
         env = make_env(job, PolicyNeeds(cameras=(), actions=space.name))
         assert env.actions == space.name
@@ -367,7 +374,11 @@ def test_policies_are_shown_what_they_ask_for():
     with pytest.raises(InvalidValueError, match=r"needs observe_every=5, but .* has None"):
         play(wrong, policy)
     job = Job(
-        policy=f"{__name__}:Choosy", task="PickXtimes", split="test", episode=2, setting="direct"
+        policy=f"{__name__}:Choosy",
+        task="PickXtimes",
+        split="test",
+        episode=2,
+        options=InstructionOptions("direct"),
     )
     env = make_env(job, PolicyNeeds(cameras=(), demonstration_frames="none", observe_every=5))
     env.max_steps = 20

@@ -14,6 +14,7 @@ from rich.console import Console
 from typer.testing import CliRunner
 
 from roboirg import main
+from roboirg.core.instruction_options import InstructionOptions
 from roboirg.evaluation.analysis.page.details import Strings, details_of
 from roboirg.evaluation.analysis.page.entries import Run, make_entries
 from roboirg.evaluation.analysis.page.run_warnings import run_warnings
@@ -98,10 +99,7 @@ def test_the_table_has_a_row_for_each_cell_and_for_all_tasks(result: MakeResult)
 
 
 def long_record(policy: str, tokens: int | None, **fields: object) -> Record:
-    job = Job(
-        policy=policy, task="PickXtimes", split="test", episode=0, setting="contextual",
-        distractors=16, **fields,
-    )  # fmt: skip
+    job = Job(policy=policy, task="PickXtimes", split="test", episode=0, **fields, options=InstructionOptions("contextual", distractors=16))  # fmt: skip
     limit = None if tokens is None else PromptLimit(tokens, 0, most_tokens, "some.model")
     result = RolloutResult("failure", cause="because", prompt_limit=limit)
     return make_record(job, result, started_at="2026-01-02T03:04:05+00:00")

@@ -16,6 +16,7 @@ from msgspec.structs import replace
 from rich.console import Console
 
 from roboirg.core.errors import UnknownNameError
+from roboirg.core.instruction_options import InstructionOptions
 from roboirg.evaluation.analysis.stats.cells import gather
 from roboirg.evaluation.analysis.stats.rates import change, mean_percent, percent
 from roboirg.evaluation.analysis.tables.paper_tables import is_informative, make_table
@@ -302,7 +303,13 @@ def test_results_of_the_twin_are_marked_and_kept_apart_from_a_robots(result) -> 
         return {"real_trial": {"robot": robot}}
 
     def played(robot: object, outcome: str) -> Record:
-        job = Job(policy="listener", task="PutInBox", split="test", episode=0, setting="explicit")
+        job = Job(
+            policy="listener",
+            task="PutInBox",
+            split="test",
+            episode=0,
+            options=InstructionOptions("explicit"),
+        )
         course = RolloutResult(outcome, cause=None if outcome == "success" else "missed")
         course.policy_metadata = trial(robot)
         record = make_record(job, course, started_at="now")

@@ -3,6 +3,7 @@
 import typer.main
 from msgspec.structs import replace
 
+from roboirg.core.instruction_options import InstructionOptions
 from roboirg.evaluation.plan.plan_maker import make_plan
 from roboirg.evaluation.plan.stored_plans import write_plan
 from roboirg.evaluation.play.rollout_result import RolloutResult, make_record
@@ -27,8 +28,7 @@ def make_run(folder):
     """Write a run of two policies, one of which succeeds, and return its folder."""
     with RecordStore(folder) as store:
         for number in range(6):
-            job = Job(policy="random", task="PickXtimes", split="test", episode=number // 2,
-                      setting="direct")  # fmt: skip
+            job = Job(policy="random", task="PickXtimes", split="test", episode=number // 2, options=InstructionOptions("direct"))  # fmt: skip
             result = RolloutResult("failure", cause="timeout", steps=7)
             if number % 2:
                 job = replace(job, policy="oracle")

@@ -18,6 +18,7 @@ from roboirg.core.errors import (
     MotionPlanningError,
     RenderDeviceError,
 )
+from roboirg.core.instruction_options import InstructionOptions
 from roboirg.evaluation.episode_errors import one_line
 from roboirg.evaluation.play import rollout
 from roboirg.evaluation.play.job_instruction import instruct_job
@@ -28,7 +29,13 @@ from roboirg.evaluation.records.film import VideoOptions
 from roboirg.evaluation.records.record import EventRecord, Job
 from roboirg.evaluation.records.record_codec import encode, read_record
 
-JOB = Job(policy="random", task="PickXtimes", split="test", episode=2, setting="direct")
+JOB = Job(
+    policy="random",
+    task="PickXtimes",
+    split="test",
+    episode=2,
+    options=InstructionOptions("direct"),
+)
 
 
 class PaperSession:
@@ -341,7 +348,13 @@ def test_a_record_has_the_words_that_were_spoken() -> None:
 def test_a_record_tells_a_mirrored_pick_where_the_words_name_a_side(
     setting: str, frame: str, failure: str
 ) -> None:
-    job = Job(policy="p", task="PickXtimes", split="test", episode=18, setting=setting, frame=frame)
+    job = Job(
+        policy="p",
+        task="PickXtimes",
+        split="test",
+        episode=18,
+        options=InstructionOptions(setting, frame=frame),
+    )
     events = [EventRecord(step=9, kind="picked", subject="cube_red")]
     result = RolloutResult(
         "failure", None, "picked up the red cube", elapsed_steps=9, events=events

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from dataclasses import dataclass, fields
 
 ALL_STAGES = (1, 2, 3, 4, 5)
 DEFAULT_DISTRACTOR = "neutral"
@@ -11,7 +11,8 @@ DEFAULT_FRAME = "robot"
 DEFAULT_DELIVERY = "prompt"
 
 
-class InstructionOptions(NamedTuple):
+@dataclass(frozen=True, slots=True)
+class InstructionOptions:
     """The options of an instruction. Equal options give the same words for the same episode.
 
     All but `delivery` select the words.
@@ -41,3 +42,7 @@ class InstructionOptions(NamedTuple):
     frame: str = DEFAULT_FRAME
     wordings: str | None = None
     delivery: str = DEFAULT_DELIVERY
+
+
+OPTION_NAMES = tuple(one.name for one in fields(InstructionOptions))
+"""The names of all options."""

@@ -16,6 +16,7 @@ from roboirg.core.instruction_options import (
     DEFAULT_DISTRACTOR,
     DEFAULT_DISTRACTORS,
     DEFAULT_FRAME,
+    OPTION_NAMES,
     InstructionOptions,
 )
 from roboirg.core.observations import CAMERAS, DemonstrationFrames
@@ -27,7 +28,7 @@ from roboirg.tasks.splits.splits import get_episode, split_size
 MAX_STEPS = 1300
 """Control steps a policy has, as in RoboMME's published experiments."""
 RENDER_MODES = ("rgb_array",)
-RESET_OPTIONS = ("split", "episode", *InstructionOptions._fields)
+RESET_OPTIONS = ("split", "episode", *OPTION_NAMES)
 """Options that `reset` takes: which episode is played, and in which words."""
 
 
@@ -83,7 +84,7 @@ class EnvSettings:
         Raises:
             InvalidValueError: the wording file cannot be read.
         """
-        values = {name: getattr(self, name) for name in InstructionOptions._fields}
+        values = {name: getattr(self, name) for name in OPTION_NAMES}
         words = {"stages": tuple(self.stages), "wordings": open_wordings(self.wordings)}
         return InstructionOptions(**{**values, **words})
 

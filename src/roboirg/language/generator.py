@@ -134,7 +134,7 @@ def _say_outside(
 
     Which command the setting fills is known only then, so it is said again with its phrases.
     """
-    options = request.options._replace(form=form)
+    options = replace(request.options, form=form)
     request = replace(request, options=options, sampler=_sampler(request.episode), filled=[])
     spec = setting.say(request)
     if request.phrases_of is None and request.filled:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import replace
 from typing import NamedTuple
 
 from roboirg.core.episode import Episode
@@ -42,12 +43,12 @@ def expressible_options(
     """
     for name in settings_of(get_task(episode.task)):
         wanted = [
-            InstructionOptions(name, wordings=wordings)._replace(**changes)
+            replace(InstructionOptions(name, wordings=wordings), **changes)
             for changes in all_settings()[name].variants
         ]
         possible = [options for options in wanted if find_refusal(episode, options) is None]
         for form, options in itertools.product(FORMS, possible):
-            yield options._replace(form=form)
+            yield replace(options, form=form)
 
 
 def instructions(
@@ -69,6 +70,6 @@ def instructions(
     for episode in episodes:
         present = [name for name in settings if name in settings_of(get_task(episode.task))]
         for setting, form in itertools.product(present, forms):
-            wanted = options._replace(setting=setting, form=form)
+            wanted = replace(options, setting=setting, form=form)
             if find_refusal(episode, wanted) is None:
                 yield episode, instruct_with(episode, wanted)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from rich.table import Table
 
@@ -124,7 +124,7 @@ def _learned_scores(
     }
     for task in tasks:
         seen = list(split_episodes((task,), (TRAINING_SPLIT,)))
-        plain = options._replace(form="implicit")
+        plain = replace(options, form="implicit")
         explicit = LearnedFloor(list(_told(seen, (EXPLICIT,), plain)))
         for setting in settings:
             tested = [one for one in told if (one[0].task, one[1].setting) == (task, setting)]

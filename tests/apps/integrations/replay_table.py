@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 
 import roboirg
+from roboirg.core.instruction_options import InstructionOptions
 from roboirg.evaluation.play.rollout import play_episode
 from roboirg.evaluation.records.record import Job
 from roboirg.policies import make_policy
@@ -114,10 +115,7 @@ def own_outcomes(spec, meshes=MESHES):
     """Return (task, episode, whether it succeeded, steps) of each episode in our own runner."""
     played = []
     for task, episode in cases():
-        job = Job(
-            policy="replay", spec=spec, task=task, split="test", episode=episode, setting=SETTING,
-            max_steps=MAX_STEPS, meshes=meshes,
-        )  # fmt: skip
+        job = Job(policy="replay", spec=spec, task=task, split="test", episode=episode, max_steps=MAX_STEPS, meshes=meshes, options=InstructionOptions(SETTING))  # fmt: skip
         one = play_episode(job)
         assert one.outcome in ("success", "failure"), one
         played.append((task, episode, one.outcome == "success", one.steps))

@@ -16,6 +16,7 @@ from roboirg.apps.leaderboard.board_rows import BoardRow, PackedRun, board_rows
 from roboirg.apps.leaderboard.pack_checks import CHECKS_FILE, PackCheck, check_pack
 from roboirg.apps.leaderboard.packing import pack_run
 from roboirg.core.errors import InvalidValueError
+from roboirg.core.instruction_options import InstructionOptions
 from roboirg.evaluation.analysis.published import published_rows
 from roboirg.evaluation.plan.plan_file import read_plan_file
 from roboirg.evaluation.plan.plan_maker import make_plan
@@ -41,7 +42,9 @@ def record(
 ) -> Record:
     result = RolloutResult(outcome="success" if won else "failure")
     result.cause = None if won else "it failed"
-    job = Job(policy=policy, task=task, split=split, episode=episode, setting=EXPLICIT)
+    job = Job(
+        policy=policy, task=task, split=split, episode=episode, options=InstructionOptions(EXPLICIT)
+    )
     made = make_record(job, result, started_at="")
     return replace(made, privileged=privileged, attribution=None)
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Iterator
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any, Literal, NamedTuple, get_args
 
@@ -233,7 +233,7 @@ def texts_of(plan: ExportPlan, episode: Episode) -> tuple[TaskText, ...]:
         is_repeated = one.form == "resolved" and "implicit" in plan.forms
         if is_repeated and not all_settings()[one.setting].implicit:
             continue
-        options = plan.options._replace(setting=one.setting, form=one.form)
+        options = replace(plan.options, setting=one.setting, form=one.form)
         said.append(TaskText(options, one.text, row(episode, one) | {"explicit": explicit}))
     return tuple(said)
 

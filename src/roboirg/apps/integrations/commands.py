@@ -40,13 +40,15 @@ def import_results(
 
 
 def _field(text: str) -> tuple[str, str]:
+    from roboirg.core.instruction_options import OPTION_NAMES
     from roboirg.evaluation.records.record import IDENTITY
 
     name, sign, value = text.partition("=")
     if not sign:
         raise InvalidValueError(f"--set {text!r} has no value; write FIELD=VALUE.")
-    if name not in IDENTITY:
-        raise UnknownNameError("field", name, IDENTITY)
+    known = (*IDENTITY, *OPTION_NAMES)
+    if name not in known:
+        raise UnknownNameError("field", name, known)
     return name, value
 
 

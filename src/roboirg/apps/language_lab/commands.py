@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -183,8 +184,8 @@ def score_shortcuts(
                 f"--learned learns from the split {TRAINING_SPLIT}, so --split {split} would test "
                 "it on what it has seen; ask for val or test."
             )
-    options = words.instruction_options()._replace(
-        form=known_name("form", form, FORMS), distractors=distractors
+    options = replace(
+        words.instruction_options(), form=known_name("form", form, FORMS), distractors=distractors
     )
     names, chosen = known_tasks(tasks, options.wordings), known_settings(settings)
     rows = shortcut_rows(names, splits, chosen, options, seeds=seeds, by=grouping, learned=learned)

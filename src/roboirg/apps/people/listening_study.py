@@ -11,6 +11,7 @@ import functools
 import itertools
 from collections import Counter
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Literal, NamedTuple
 
@@ -196,8 +197,7 @@ class ListeningStudy(BaseModel):
             task=task,
             split=TRAINING,
             episode=index,
-            setting=EXPLICIT,
-            wordings=plan.wordings_identity,
+            options=InstructionOptions(EXPLICIT, wordings=plan.wordings_identity),
             wordings_file=plan.wordings,
         )
 
@@ -212,7 +212,7 @@ def _assign(jobs: list[Job], place: int, column: int) -> Job:
 
 def words_of(job: Job) -> tuple[str, str, int, InstructionOptions]:
     """Return what the words of a job depend on, as of an item of the dataset."""
-    return job.task, job.split, job.episode, job.options._replace(delivery=DEFAULT_DELIVERY)
+    return job.task, job.split, job.episode, replace(job.column, delivery=DEFAULT_DELIVERY)
 
 
 def write_listening_study(study: ListeningStudy, folder: Path) -> None:

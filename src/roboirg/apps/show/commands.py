@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -40,7 +41,7 @@ def show(
     from roboirg.tasks.splits.splits import get_episode
 
     found = get_episode(task, split, episode)
-    options = choices.instruction_options()._replace(distractors=distractors)
+    options = replace(choices.instruction_options(), distractors=distractors)
     check_options(options)
     possible, chosen = settings_of(get_task(task)), known_settings(settings)
     shown = [name for name in chosen if name in possible] or chosen
@@ -57,7 +58,7 @@ def _print_words(episode: Episode, settings: Sequence[str], options: Instruction
     from roboirg.language.token_counts import count_tokens
 
     for name in settings:
-        instruction = instruct_with(episode, options._replace(setting=name))
+        instruction = instruct_with(episode, replace(options, setting=name))
         length = counted(count_tokens(instruction.text), "token")
         typer.echo(f"{typer.style(name, bold=True)} ({length}):")
         for utterance in instruction.utterances:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import functools
 from collections.abc import Collection, Mapping
+from dataclasses import replace
 from decimal import Decimal
 from importlib import resources
 from typing import Literal, NamedTuple, get_args
@@ -116,7 +117,7 @@ def published_coverage() -> tuple[CoverageRow, ...]:
 def _options(line: Mapping[str, str]) -> InstructionOptions:
     if "stages" in line:
         stages = tuple(map(int, line["stages"].split(",")))
-        return staged_options()[0]._replace(stages=stages)
+        return replace(staged_options()[0], stages=stages)
     return InstructionOptions(line["setting"])
 
 

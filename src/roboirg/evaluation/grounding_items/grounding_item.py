@@ -12,8 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from roboirg.core.errors import InvalidValueError
-from roboirg.core.instruction_options import DEFAULT_DELIVERY, InstructionOptions
-from roboirg.evaluation.records.record import options_of
+from roboirg.core.instruction_options import DEFAULT_DELIVERY, OPTION_NAMES, InstructionOptions
 from roboirg.util.atomic_write import write_atomically
 
 ITEMS_FILE = "items.jsonl"
@@ -107,8 +106,9 @@ class GroundingItem(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fi
 
     @property
     def options(self) -> InstructionOptions:
-        """The instruction options, without `wordings`, as of records."""
-        return options_of(self)._replace(stages=tuple(self.stages))
+        """The instruction options without `wordings`, as the columns of records."""
+        given = {name: getattr(self, name) for name in OPTION_NAMES}
+        return InstructionOptions(**{**given, "stages": tuple(self.stages), "wordings": None})
 
     def system_prompt(self, kind: QuestionKind) -> str:
         """Return the system prompt of a kind of question."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 import re
 from collections.abc import Iterable, Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, Literal, get_args
 
@@ -286,7 +287,7 @@ class Plan(BaseModel):
                 task=task,
                 split=self.split,
                 episode=episode,
-                **options._replace(wordings=self.wordings_identity)._asdict(),
+                options=replace(options, wordings=self.wordings_identity),
                 wordings_file=self.wordings,
                 policy_seed=seeds[0],
                 max_steps=self.max_steps,
@@ -310,7 +311,7 @@ class Plan(BaseModel):
         chosen = {option: getattr(self, option) for option in rule.reads - {"stages"}}
         for form in self.forms if rule.implicit else (usual.form,):
             for stages in self.stages if "stages" in rule.reads else (usual.stages,):
-                yield usual._replace(form=form, stages=stages, **chosen)
+                yield replace(usual, form=form, stages=stages, **chosen)
 
     def _is_left_out(self, task: str, episode: int, options: InstructionOptions) -> bool:
         """Return whether a harder setting cannot express an episode that its plain one can.
@@ -321,7 +322,7 @@ class Plan(BaseModel):
         if plain is None:
             return False
         found = splits.get_episode(task, self.split, episode)
-        easier = options._replace(setting=plain)
+        easier = replace(options, setting=plain)
         refused = [find_refusal(found, one) is not None for one in (options, easier)]
         return refused == [True, False]
 

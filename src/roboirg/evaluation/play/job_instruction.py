@@ -17,6 +17,6 @@ def instruct_job(job: Job) -> Instruction:
             wording file is missing or has changed.
     """
     episode = splits.get_episode(job.task, job.split, job.episode)
-    if job.wordings is not None:
-        open_wordings(job.wordings_file, job.wordings)
-    return language.instruct_with(episode, job.options._replace(wordings=job.wordings))
+    if job.options.wordings is not None:
+        open_wordings(job.wordings_file, job.options.wordings)
+    return language.instruct_with(episode, job.options)

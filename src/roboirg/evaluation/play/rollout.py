@@ -186,8 +186,8 @@ def play_episode(
         MissingDependencyError: a package has to be installed first.
         InvalidValueError: the job's wording file is missing or has changed.
     """
-    if job.wordings is not None:
-        open_wordings(job.wordings_file, job.wordings)
+    if job.options.wordings is not None:
+        open_wordings(job.wordings_file, job.options.wordings)
     result = RolloutResult()
     guard = CallGuard(result, policy_timeout_s, is_hosted=hosts is not None)
     policy: Policy | None = None
@@ -295,7 +295,7 @@ def _play_to_end(
     """Play the environment's episode with the policy to its end."""
     with guard.environment("env_reset"):
         result.instruction = env.instruction
-        first = SpokenInstruction(env.instruction.turns, job.delivery).prompt
+        first = SpokenInstruction(env.instruction.turns, job.options.delivery).prompt
         if writer is not None:
             writer.caption, writer.longest_caption = first, env.instruction.text
             env.set_frame_hook(writer.add_frame, every=writer.options.every)

@@ -194,7 +194,7 @@ def make_record(
     episode = get_episode(job.task, job.split, job.episode)
     # An episode that failed before its reset has a record with the words it would have had.
     instruction = result.instruction or instruct_job(job)
-    explicit = instruct_job(msgspec.structs.replace(job, setting=EXPLICIT))
+    explicit = instruct_job(job.with_options(setting=EXPLICIT))
     policy = result.policy or _describe(job)
     utterances = _utterances(job, instruction, result)
     prompt, verdict = _audit(job, instruction, utterances, result)
@@ -266,7 +266,7 @@ def _utterances(
 ) -> tuple[UtteranceRecord, ...]:
     """Return the utterances with the steps at which the policy heard them."""
     steps: list[int | None] = [0] * len(instruction.utterances)
-    if job.delivery == TURNS:
+    if job.options.delivery == TURNS:
         steps = [int(one["step"]) for one in result.heard]
     return tuple(
         UtteranceRecord(**asdict(one), step=step)

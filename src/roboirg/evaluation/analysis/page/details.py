@@ -165,7 +165,7 @@ def _conditions(record: Record) -> str:
     parts = [
         f"{record.split} split",
         f"at most {record.max_steps} steps",
-        f"in {words_label(record.wordings)}",
+        f"in {words_label(record.options.wordings)}",
     ]
     parts += [
         f"{name.replace('_', ' ')} {getattr(record, name)}"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import replace
 from typing import NamedTuple
 
 from roboirg.core.errors import UnknownNameError
@@ -43,7 +44,6 @@ class InstructionKey(NamedTuple):
     split: str
     episode: int
     options: InstructionOptions
-    wordings: str | None
     language_version: str
     environment_version: int
 
@@ -66,8 +66,7 @@ class InstructionKey(NamedTuple):
             key.task,
             conditions.split,
             trial.episode,
-            key.options,
-            conditions.wordings,
+            replace(key.options, wordings=conditions.wordings),
             versions.language,
             versions.environment,
         )

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Iterable
+from dataclasses import asdict
 from fractions import Fraction
 
 from roboirg.core.instruction_options import InstructionOptions
@@ -52,7 +53,7 @@ def floor_level(floor: str, jobs: Iterable[Job]) -> Fraction | None:
 
 @functools.lru_cache(maxsize=65_536)
 def _level(floor: str, task: str, split: str, number: int, options: InstructionOptions) -> Fraction:
-    job = Job(policy="", task=task, split=split, episode=number, **options._asdict())
+    job = Job(policy="", task=task, split=split, episode=number, **asdict(options))
     episode, instruction = get_episode(task, split, number), instruct_job(job)
     if floor == CHANCE:
         return right_share(blind_goals(instruction, episode), episode)

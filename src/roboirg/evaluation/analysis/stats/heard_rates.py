@@ -77,7 +77,7 @@ def count_heard(
             policy_run = PolicyRun.of(result)
             if known and policy_run not in known:
                 policy_run = policy_run._replace(run=name)
-            found[CellKey(policy_run, result.task, result.options)].add(result)
+            found[CellKey(policy_run, result.task, result.column)].add(result)
     declared = {key.policy_run for key, one in found.items() if one.unknown < one.episodes}
     return {key: one for key, one in found.items() if key.policy_run in declared}
 

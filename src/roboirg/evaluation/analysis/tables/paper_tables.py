@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import asdict
 from fractions import Fraction
 from typing import Literal, NamedTuple, get_args
 
@@ -249,7 +250,7 @@ def _floor(floor: str, task: str, options: InstructionOptions, cells: Cells) -> 
                 task=task,
                 split=key.policy_run.conditions.split,
                 episode=trial.episode,
-                **options._asdict(),
+                **asdict(options),
             )
             for key, cell in cells.items()
             if (key.task, key.options) == (task, options)
