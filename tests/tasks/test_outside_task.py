@@ -15,7 +15,7 @@ from roboirg.core.conditions import Fact
 from roboirg.core.episode import Goal, Primitive, Scene, SceneObject, Stage
 from roboirg.core.errors import RoboIRGError
 from roboirg.judging import Judge, Status
-from roboirg.language.settings import settings_of
+from roboirg.language.settings import plain_settings, settings_of
 from roboirg.policies import make_policy, play
 from roboirg.tasks.splits import splits
 from roboirg.tasks.splits.splits import get_episode, make_episode
@@ -50,7 +50,10 @@ def test_it_is_found_beside_the_benchmark(task):
     assert tasks.get_task(NAME) is task
     assert tasks.find_tasks([NAME]) == tasks.find_tasks([task.suite]) == (NAME,)
     assert NAME not in tasks.find_tasks(["all"])
-    assert set(settings_of(task)) == {"explicit", "direct", "reasoning", "contextual"}
+    assert plain_settings(task) == ("explicit", "direct", "reasoning", "contextual")
+    assert set(settings_of(task)) - set(plain_settings(task)) == {
+        "direct-rival", "reasoning-open", "contextual-rival"
+    }  # fmt: skip
 
 
 def test_its_scenes_fit_and_its_instructions_are_valid(task):

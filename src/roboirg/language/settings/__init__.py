@@ -48,9 +48,10 @@ def setting_names() -> tuple[str, ...]:
     return tuple(all_settings())
 
 
-def plain_settings() -> tuple[str, ...]:
-    """Return the names that ``all`` means: of every setting but the harder ones."""
-    return tuple(name for name, setting in all_settings().items() if setting.plain is None)
+def plain_settings(task: Task | None = None) -> tuple[str, ...]:
+    """Return the names that ``all`` means: of every setting, or a task's, but the harder ones."""
+    names = setting_names() if task is None else settings_of(task)
+    return tuple(name for name in names if all_settings()[name].plain is None)
 
 
 def settings_of(task: Task) -> tuple[str, ...]:
