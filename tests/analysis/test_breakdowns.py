@@ -186,7 +186,7 @@ def test_only_the_command_s_expressions_count(records: tuple[Record, ...]) -> No
     said = {m.expression for r in records if r.setting == "contextual" for m in r.mentions}
     assert "them" in said - found, "said of the referents in a reinforcement"
     resolved = make_record(
-        replace(PLAN.jobs()[0], setting="contextual", form="resolved"),
+        PLAN.jobs()[0].with_options(setting="contextual", form="resolved"),
         RolloutResult("success", cause=None),
         started_at="now",
     )

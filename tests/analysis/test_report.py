@@ -268,7 +268,7 @@ def test_versions_that_differ_stand_apart() -> None:
 
 def test_words_that_differ_stand_apart_and_are_named() -> None:
     found = next(one for one in records() if one.setting == "direct" and one.form == "implicit")
-    other = replace(found, wordings="mine@1a")
+    other = found.with_options(wordings="mine@1a")
     page = Page(render([found, other]))
     warnings = " ".join(words for _, words in page.warnings)
     assert "Mixed words: our own words, the words of mine@1a." in warnings

@@ -318,7 +318,7 @@ def test_wrong_cameras_of_an_object_are_the_policys_fault(
 
 
 def test_a_record_says_what_is_in_the_words_and_who_cheats() -> None:
-    job = replace(JOB, setting="reasoning", policy="oracle")
+    job = replace(JOB.with_options(setting="reasoning"), policy="oracle")
     record = rollout.make_record(job, RolloutResult("success", cause=None), started_at="now")
     assert record.metadata["pattern"]
     assert record.metadata["templates"]
@@ -328,7 +328,7 @@ def test_a_record_says_what_is_in_the_words_and_who_cheats() -> None:
 
 
 def test_a_record_has_the_words_that_were_spoken() -> None:
-    spoken = instruct_job(replace(JOB, setting="spatial"))
+    spoken = instruct_job(JOB.with_options(setting="spatial"))
     result = RolloutResult("success", cause=None, instruction=spoken)
     record = rollout.make_record(JOB, result, started_at="now")
     assert record.instruction[-1].text == spoken.utterances[-1].text
@@ -369,7 +369,7 @@ class TellingWorld(PaperWorld):
 
     def __init__(self, steps: tuple[int, ...], length: int) -> None:
         super().__init__(length)
-        job = replace(JOB, setting="contextual")
+        job = JOB.with_options(setting="contextual")
         self.instruction = instruct_job(job)
         self.told = list(zip(self.instruction.turns, steps, strict=False))
 
@@ -398,7 +398,7 @@ class Hearing(PaperPolicy):
         return {"heard": len(self.heard)}
 
 
-TURNS = replace(JOB, setting="contextual", delivery="turns")
+TURNS = JOB.with_options(setting="contextual", delivery="turns")
 
 
 @pytest.mark.parametrize("policy_class", [PaperPolicy, Hearing])

@@ -152,7 +152,7 @@ def test_every_split_is_valid_in_the_words_of_either_pool(task, pool, episodes):
 def test_a_plan_takes_a_pool_in_the_place_of_a_file(pool):
     plan = make_plan(["random"], tasks="PickXtimes", settings="direct", episodes="2", wordings=pool)
     (job, *_) = plan.jobs()
-    assert (job.wordings, job.wordings_file) == (pool, pool)
+    assert (job.options.wordings, job.wordings_file) == (pool, pool)
     said = instruct_job(job)
     assert said.metadata["pool"] == pool
     assert said.text == instruct(get_episode("PickXtimes", "test", 0), "direct", wordings=pool).text
