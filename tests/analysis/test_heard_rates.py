@@ -59,14 +59,18 @@ def sample(result: MakeResult) -> list[Summary]:
     return [
         *results(result, ("success", "heard"), ("failure", "heard")),
         *results(
-            result, ("failure", "cut"), ("failure", "cut"), ("success", "heard"), ("error", "cut"),
+            result,
+            ("failure", "cut"),
+            ("failure", "cut"),
+            ("success", "heard"),
+            ("error", "cut"),
             **contextual,
         ),
         *results(
             result, ("failure", "unknown"), ("success", "heard"), task="BinFill", **contextual
         ),
         *results(result, ("success", "unknown"), policy="other"),
-    ]  # fmt: skip
+    ]
 
 
 def test_notes_tell_rates_over_what_was_heard_beside_rates_over_all(result: MakeResult) -> None:
@@ -99,7 +103,14 @@ def test_the_table_has_a_row_for_each_cell_and_for_all_tasks(result: MakeResult)
 
 
 def long_record(policy: str, tokens: int | None, **fields: object) -> Record:
-    job = Job(policy=policy, task="PickXtimes", split="test", episode=0, **fields, options=InstructionOptions("contextual", distractors=16))  # fmt: skip
+    job = Job(
+        policy=policy,
+        task="PickXtimes",
+        split="test",
+        episode=0,
+        **fields,
+        options=InstructionOptions("contextual", distractors=16),
+    )
     limit = None if tokens is None else PromptLimit(tokens, 0, most_tokens, "some.model")
     result = RolloutResult("failure", cause="because", prompt_limit=limit)
     return make_record(job, result, started_at="2026-01-02T03:04:05+00:00")

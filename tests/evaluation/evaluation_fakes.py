@@ -72,7 +72,7 @@ class FakePlayer:
         video = self.folder / "videos" / f"{job.slug}.mp4"
         video.parent.mkdir(exist_ok=True)
         video.write_text(job.slug)
-        return replace(record, video=f"videos/{video.name}")
+        return msgspec.structs.replace(record, video=f"videos/{video.name}")
 
 
 @dataclass(frozen=True)

@@ -21,13 +21,14 @@ from roboirg.core.errors import (
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.evaluation.episode_errors import one_line
 from roboirg.evaluation.play import rollout
-from roboirg.evaluation.play.job_instruction import instruct_job
+from roboirg.evaluation.play.job_instruction import PreparedJob, instruct_job
 from roboirg.evaluation.play.rollout import EpisodeRunner, load_policy, play_episode
 from roboirg.evaluation.play.rollout_result import RolloutResult
 from roboirg.evaluation.play.video_writer import VideoWriter
 from roboirg.evaluation.records.film import VideoOptions
 from roboirg.evaluation.records.record import EventRecord, Job
 from roboirg.evaluation.records.record_codec import encode, read_record
+from roboirg.tasks.splits import splits
 
 JOB = Job(
     policy="random",
@@ -79,7 +80,8 @@ class PaperWorld:
         first = {"step": 3, "kind": "still", "subject": "robot", "place": None, "holds": True}
         shown = {"joint_positions": np.zeros((3, 7))}
         info = {"demonstration": shown, "elapsed_steps": 4, "events": [first]}
-        return {}, {**info, "demonstration_source": "planned"}
+        now = {"status": "ongoing", "heard": []}
+        return {}, {**info, **now, "demonstration_source": "planned"}
 
     def step_chunk(self, actions: np.ndarray) -> tuple[Any, float, bool, bool, dict[str, Any]]:
         assert actions.shape[1:] == (8,)
@@ -97,6 +99,7 @@ class PaperWorld:
             "cause": self.cause if over else None,
             "steps": self.steps,
             "events": [{**event, "holds": True}] if over else [],
+            "heard": [],
         }
         return {}, 0.0, over and self.status != "timeout", over and self.status == "timeout", info
 
@@ -232,7 +235,7 @@ def test_ctrl_c_is_no_episode_error(stage: Callable[..., RolloutResult]) -> None
 
 def test_the_policys_luck_is_the_same_in_every_setting_and_another_in_every_episode() -> None:
     def luck(**changes: object) -> int:
-        return load_policy(replace(JOB, **changes)).seed  # type: ignore[attr-defined]
+        return load_policy(PreparedJob(replace(JOB, **changes))).seed  # type: ignore[attr-defined]
 
     assert luck() == luck(setting="explicit")
     assert len({luck(), luck(episode=3), luck(policy_seed=1)}) == 3
@@ -399,6 +402,24 @@ class Hearing(PaperPolicy):
 
 
 TURNS = JOB.with_options(setting="contextual", delivery="turns")
+
+
+def test_the_episode_of_a_job_is_looked_up_once(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    found: list[tuple[object, ...]] = []
+
+    def look_up(*name: object) -> Any:
+        found.append(name)
+        return kept(*name)
+
+    world, kept = PaperWorld(), splits._episode
+    monkeypatch.setattr(splits, "_episode", look_up)  # below all names that it is imported by
+    for name, made in {"make_env": world, "load_policy": PaperPolicy()}.items():
+        # Both read the episode, as the functions that they replace do.
+        monkeypatch.setattr(rollout, name, lambda one, _, made=made: one.episode and made)
+    assert EpisodeRunner(tmp_path)(JOB).outcome == "success"
+    assert found == [("PickXtimes", "test", 2)]
 
 
 @pytest.mark.parametrize("policy_class", [PaperPolicy, Hearing])

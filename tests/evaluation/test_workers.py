@@ -22,6 +22,7 @@ from roboirg.evaluation.episode_errors import EpisodeError, attribute_errors
 from roboirg.evaluation.plan.plan import Plan
 from roboirg.evaluation.play import watchdog
 from roboirg.evaluation.play.call_guard import CallGuard
+from roboirg.evaluation.play.job_instruction import PreparedJob
 from roboirg.evaluation.play.rollout import EpisodeRunner, load_policy
 from roboirg.evaluation.play.rollout_result import RolloutResult
 from roboirg.evaluation.records.record import Job, Record
@@ -47,7 +48,7 @@ def plan_of_chaos() -> Plan:
     )
     jobs, chosen, met = plan.jobs(), [], Counter[str | None]()
     for job in jobs:
-        misdeed = load_policy(job).misdeed  # type: ignore[attr-defined]
+        misdeed = load_policy(PreparedJob(job)).misdeed  # type: ignore[attr-defined]
         if met[misdeed] < (1 if misdeed else 2 * len(chaos_policy.KINDS)):
             met[misdeed] += 1
             chosen.append(job)
@@ -115,7 +116,7 @@ def _misdeeds(plan: Plan) -> dict[Job, str]:
 
 
 def _seed(job: Job) -> int:
-    return load_policy(job).seed  # type: ignore[attr-defined]
+    return load_policy(PreparedJob(job)).seed  # type: ignore[attr-defined]
 
 
 def sleepy(job: Job) -> Record:

@@ -18,6 +18,7 @@ import roboirg
 from roboirg.apps.policy_check.policy_check import check_policy
 from roboirg.core.errors import InvalidValueError, UnknownNameError
 from roboirg.core.instruction_options import InstructionOptions
+from roboirg.evaluation.play.job_instruction import PreparedJob
 from roboirg.evaluation.play.policy_environment import job_needs, make_env
 from roboirg.evaluation.records.record import Job
 from roboirg.policies import make_policy, play
@@ -115,7 +116,7 @@ def test_a_challenge_server_is_shown_what_the_options_ask_for():
             max_steps=4,
             options=InstructionOptions("direct"),
         )
-        env = make_env(job, job_needs(client, job))
+        env = make_env(PreparedJob(job), job_needs(client, job))
         info = play(env, client)
         client.close()
         _, first, later = map(unpack, server.messages)

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass, fields
 
+from roboirg.core.field_types import Name, Stages, Whole
+
 ALL_STAGES = (1, 2, 3, 4, 5)
 DEFAULT_DISTRACTOR = "neutral"
 DEFAULT_DISTRACTORS = 1
@@ -34,14 +36,14 @@ class InstructionOptions:
             (`roboirg.core.delivery`).
     """
 
-    setting: str = "explicit"
-    form: str = "implicit"
-    stages: tuple[int, ...] = ALL_STAGES
-    distractor: str = DEFAULT_DISTRACTOR
-    distractors: int = DEFAULT_DISTRACTORS
-    frame: str = DEFAULT_FRAME
-    wordings: str | None = None
-    delivery: str = DEFAULT_DELIVERY
+    setting: Name = "explicit"
+    form: Name = "implicit"
+    stages: Stages = ALL_STAGES
+    distractor: Name = DEFAULT_DISTRACTOR
+    distractors: Whole = DEFAULT_DISTRACTORS
+    frame: Name = DEFAULT_FRAME
+    wordings: Name | None = None
+    delivery: Name = DEFAULT_DELIVERY
 
 
 OPTION_NAMES = tuple(one.name for one in fields(InstructionOptions))

@@ -2,6 +2,7 @@
 
 import contextlib
 import json
+import os
 import sqlite3
 
 import msgspec
@@ -171,3 +172,34 @@ def test_wrong_files_are_refused_in_a_sentence(tmp_path):
          "--set", "colour=red"],
     )  # fmt: skip
     assert "no field 'colour'" in str(wrong.exception)
+
+
+EPISODE = b'{"task": "PickXtimes", "episode": 0, "success": false, "steps": %s}'
+
+
+@pytest.mark.parametrize("harness", ["jsonl", "lerobot", "inspect"])
+@pytest.mark.parametrize(
+    "content",
+    [b"[" * 100_000, b"\xff\xfe", b'{"a": ' + b"9" * 10_000 + b"}"],
+    ids=["deep nesting", "no UTF-8", "10,000 digits"],
+)
+def test_files_that_are_no_results_are_refused(harness, content, tmp_path):
+    (tmp_path / "results").write_bytes(content)
+    with pytest.raises(InvalidValueError, match="is not a file of results of"):
+        import_results(harness, tmp_path / "results", tmp_path / "run", OPTIONS)
+
+
+@pytest.mark.parametrize("steps", [b"NaN", b"1e400", b"[1]", b"9" * 5_000])
+def test_numbers_of_steps_that_cannot_be_are_refused(steps, tmp_path):
+    (tmp_path / "results").write_bytes(EPISODE % steps)
+    with pytest.raises(InvalidValueError, match="results"):
+        import_results("jsonl", tmp_path / "results", tmp_path / "run", OPTIONS)
+
+
+@pytest.mark.parametrize("harness", ["jsonl", "lerobot", "inspect"])
+def test_devices_and_pipes_are_not_read(harness, tmp_path):
+    (tmp_path / "device").symlink_to("/dev/zero")
+    os.mkfifo(tmp_path / "pipe")
+    for name in ("device", "pipe"):
+        with pytest.raises(InvalidValueError, match="no regular file"):
+            import_results(harness, tmp_path / name, tmp_path / "run", OPTIONS)

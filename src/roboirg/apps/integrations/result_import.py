@@ -25,7 +25,7 @@ from typing import Any, NamedTuple
 import msgspec
 from pydantic import JsonValue
 
-from roboirg.core.errors import InvalidValueError, UnknownNameError
+from roboirg.core.errors import InvalidValueError, RoboIRGError, UnknownNameError
 from roboirg.core.instruction_options import OPTION_NAMES
 from roboirg.evaluation.hosting.policy_descriptions import PolicyDescription
 from roboirg.evaluation.play.rollout_result import RolloutResult, make_record
@@ -33,10 +33,14 @@ from roboirg.evaluation.records.record import DEFAULT_MAX_STEPS, ErrorKind, Job,
 from roboirg.evaluation.records.record_codec import encode, read_record, with_nested_options
 from roboirg.evaluation.records.store import RecordStore
 from roboirg.tasks.splits.splits import split_size
+from roboirg.util.regular_file import read_regular
 
 LEROBOT_SEED = 1000
 """The seed of lerobot-eval's first episode, if none is given."""
 UNTOLD_CAUSE = "the harness does not tell the cause"
+
+_MOST_BYTES = 512 << 20
+"""Of a file of JSON."""
 
 _ERRORS: Mapping[str, ErrorKind] = {
     "timeout": "timeout",
@@ -83,11 +87,14 @@ def import_results(harness: str, path: Path, out: Path, options: ImportOptions) 
         raise UnknownNameError("harness", harness, _READERS)
     try:
         records = list(_READERS[harness](path, options))
+    except RoboIRGError:
+        raise
     except OSError as error:
         raise InvalidValueError(f"{path} cannot be read: {error.strerror}.") from error
     except msgspec.ValidationError as error:
         raise InvalidValueError(f"{path}: {error}.") from error
-    except (KeyError, TypeError, AttributeError, json.JSONDecodeError, sqlite3.Error) as error:
+    except (AttributeError, ArithmeticError, KeyError, RecursionError, TypeError, ValueError,
+            sqlite3.Error) as error:  # fmt: skip
         raise InvalidValueError(
             f"{path} is not a file of results of {harness} ({type(error).__name__}: {error})."
         ) from error
@@ -97,10 +104,14 @@ def import_results(harness: str, path: Path, out: Path, options: ImportOptions) 
     return len(records)
 
 
+def _text(path: Path) -> str:
+    return read_regular(path, _MOST_BYTES).decode()
+
+
 def _read_lerobot(path: Path, options: ImportOptions) -> Iterator[Record]:
     """Yield the records of lerobot-eval; its groups are called ``task-setting-split``."""
     lacks = ("steps", "cause", "events", "errors", "timings", "started_at")
-    for entry in json.loads(path.read_text(encoding="utf-8"))["per_task"]:
+    for entry in json.loads(_text(path))["per_task"]:
         names = entry["task_group"].rsplit("-", 2)
         if len(names) != 3:  # noqa: PLR2004
             raise InvalidValueError(
@@ -154,7 +165,7 @@ def _read_inspect(path: Path, options: ImportOptions) -> Iterator[Record]:
             f"{path} is a packed log; convert it: inspect log convert --to json --output-dir LOGS "
             f"{path.name}."
         )
-    samples = json.loads(path.read_text(encoding="utf-8"))["samples"]
+    samples = json.loads(_text(path))["samples"]
     for number, sample in enumerate(samples, 1):
         scores = sample.get("scores") or {}
         found = next((one["metadata"]["record"] for one in scores.values()), None)
@@ -172,7 +183,7 @@ def _read_inspect(path: Path, options: ImportOptions) -> Iterator[Record]:
 def _read_lines(path: Path, options: ImportOptions) -> Iterator[Record]:
     """Yield a record for each line; what it has besides the verdict are fields of the job."""
     lacks = ("cause", "events", "errors", "timings", "started_at")
-    for number, line in enumerate(path.read_text(encoding="utf-8").splitlines(), 1):
+    for number, line in enumerate(_text(path).splitlines(), 1):
         told = json.loads(line)
         success, steps = told.pop("success"), told.pop("steps", None)
         if not isinstance(success, bool):

@@ -11,6 +11,7 @@ from roboirg.apps.leaderboard.board_rows import BoardRate, BoardRow, PackedRun, 
 from roboirg.apps.leaderboard.pack_checks import check_pack, read_check
 from roboirg.apps.leaderboard.packing import PACK_SUFFIX, opened_run
 from roboirg.core.errors import InvalidValueError
+from roboirg.core.plain_text import printable
 from roboirg.core.version import __version__
 from roboirg.evaluation.analysis.page.report import check_report_support
 from roboirg.evaluation.analysis.stats.option_labels import setting_sort_key
@@ -133,4 +134,4 @@ def _cell(rate: BoardRate | None) -> _Cell:
 
 
 def _name(path: Path) -> str:
-    return path.name.removesuffix(PACK_SUFFIX)
+    return printable(path.name.removesuffix(PACK_SUFFIX))

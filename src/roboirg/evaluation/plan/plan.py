@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import itertools
+import math
+import os
 import re
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
-from pathlib import Path
 from typing import Any, Literal, get_args
 
 import msgspec
@@ -15,6 +16,7 @@ from pydantic import BaseModel, ConfigDict, field_validator, model_validator
 from roboirg import language, policies, tasks
 from roboirg.core.actions import find_action_space
 from roboirg.core.errors import InvalidValueError
+from roboirg.core.field_types import CONTROLS, NAME
 from roboirg.core.instruction_options import (
     ALL_STAGES,
     DEFAULT_DELIVERY,
@@ -38,7 +40,6 @@ from roboirg.evaluation.records.film import VideoMode
 from roboirg.evaluation.records.record import (
     DEFAULT_MAX_STEPS,
     DEFAULT_MESHES,
-    NAME,
     ErrorKind,
     Job,
 )
@@ -49,6 +50,7 @@ from roboirg.tasks.splits import splits
 from roboirg.tasks.splits.private_splits import MissingSaltError, is_private
 from roboirg.util.short_hash import short_hash
 
+MOST_JOBS = 1_000_000
 REQUIRED = "required"
 """Instead of a wording file in a plan: one must be given when the plan is run."""
 
@@ -147,13 +149,40 @@ class Plan(BaseModel):
             return fields
         if fields["wordings"] in POOLS:
             return {**fields, "wordings_identity": fields["wordings"]}
-        path = Path(str(fields["wordings"])).resolve()
-        return {**fields, "wordings": str(path), "wordings_identity": open_wordings(path)}
+        path = os.path.realpath(str(fields["wordings"]))
+        return {**fields, "wordings": path, "wordings_identity": open_wordings(path)}
 
     @field_validator("demonstration_frames", mode="before")
     @classmethod
     def _check_frames(cls, value: object) -> object:
         return None if value is None else check_demonstration_frames(value)
+
+    @model_validator(mode="after")
+    def _check_text(self) -> Plan:
+        if not is_encodable(self.seed_secret or ""):
+            raise InvalidValueError(f"seed_secret is {self.seed_secret!r}: it has lone surrogates.")
+        texts = self.model_dump(exclude={"seed_secret"})
+        for name, value in texts.items():
+            for text in value if isinstance(value, tuple) else (value,):
+                if isinstance(text, str) and re.search(f"[{CONTROLS}]", text):
+                    raise InvalidValueError(
+                        f"The plan has {text[:80]!r} as {name}; no character of it may control a "
+                        "terminal."
+                    )
+        return self
+
+    @model_validator(mode="after")
+    def _check_size(self) -> Plan:
+        if not self.policy_seeds:
+            raise InvalidValueError("The plan has no policy seeds; it needs at least one.")
+        several = (self.policies, self.tasks, self.forms, self.episodes, self.policy_seeds)
+        settings = plain_settings() if self.settings == "all" else self.settings
+        size = math.prod(map(len, (*several, settings, self.stages)))
+        if size > MOST_JOBS:
+            raise InvalidValueError(
+                f"The plan has up to {size:,} episodes; a plan has at most {MOST_JOBS:,}."
+            )
+        return self
 
     @property
     def specs(self) -> dict[str, str]:

@@ -9,13 +9,17 @@ from pathlib import Path
 from typing import Any
 
 from roboirg.core.errors import InvalidValueError
+from roboirg.core.plain_text import is_encodable
 from roboirg.evaluation.plan.plan import Plan
 from roboirg.evaluation.records.record_codec import harder_setting
-from roboirg.evaluation.records.run_files import PLAN_FILE, earlier_plans, store_plan
+from roboirg.evaluation.records.run_files import (
+    MOST_PLAN_BYTES,
+    PLAN_FILE,
+    earlier_plans,
+    store_plan,
+)
 from roboirg.util.regular_file import read_regular
 from roboirg.util.short_hash import short_hash
-
-MOST_PLAN_BYTES = 64_000_000
 
 
 def with_secret(plan: Plan, folder: Path) -> Plan:
@@ -79,9 +83,10 @@ def _stored(paths: list[Path]) -> Iterator[dict[str, Any]]:
     for path in paths:
         try:
             data = json.loads(read_regular(path, MOST_PLAN_BYTES))
+            can_be_written = is_encodable(json.dumps(data, ensure_ascii=False))
         except (OSError, ValueError, RecursionError, InvalidValueError):
             continue
-        if isinstance(data, dict):
+        if isinstance(data, dict) and can_be_written:
             yield data
 
 

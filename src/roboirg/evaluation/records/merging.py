@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import os
 import shutil
 from collections.abc import Iterable, Iterator, Sequence
@@ -23,12 +22,13 @@ from roboirg.evaluation.records.record_codec import (
     read_summary,
 )
 from roboirg.evaluation.records.run_files import (
-    PLAN_FILE,
-    earlier_plans,
+    MOST_PLAN_BYTES,
     keep_earlier_plan,
+    plan_names,
     run_file,
 )
 from roboirg.evaluation.records.store import RecordStore, StoredRun
+from roboirg.util.regular_file import read_regular
 
 
 class MergeSummary(NamedTuple):
@@ -92,9 +92,12 @@ def merge_runs(folders: Sequence[Path], out: Path) -> MergeSummary:
 def _keep_plans(folders: Sequence[Path], out: Path) -> None:
     """Keep the plans of all runs, so that it can be told which episodes are missing."""
     for folder in folders:
-        for path in (folder / PLAN_FILE, *earlier_plans(folder)):
-            if path.is_file():
-                keep_earlier_plan(path.read_bytes(), out)
+        for name in plan_names(folder):
+            try:
+                content = read_regular(run_file(folder, name), MOST_PLAN_BYTES)
+            except OSError as error:
+                raise StoreError(f"Cannot read {folder / name}: {error.strerror}.") from error
+            keep_earlier_plan(content, out)
 
 
 def _read_checked(line: bytes, path: Path, number: int) -> Summary:
@@ -140,7 +143,7 @@ def _lines(
     logs = logged_slugs(source)
     for one, line in zip(wanted, run.lines(wanted), strict=True):
         if logs and (slug := one.slug) in logs:
-            _copy_log(log_path(source, slug), log_path(target, slug))
+            _copy_log(source, target, log_path(Path(), slug).as_posix())
         if one.action_log is not None:
             _copy_actions(one.action_log, source, target)
         if one.video is None or _copy_video(one.video, source, target):
@@ -158,19 +161,22 @@ def _copy_video(name: str, source: Path, target: Path) -> bool:
     if not copy.exists():
         copy.parent.mkdir(parents=True, exist_ok=True)
         _copy_file(video, copy)
-        with contextlib.suppress(FileNotFoundError):
-            _copy_file(video.with_suffix(".jpg"), copy.with_suffix(".jpg"))
+        poster = run_file(source, str(Path(name).with_suffix(".jpg")))
+        if poster.is_file():
+            _copy_file(poster, copy.with_suffix(".jpg"))
     return True
 
 
 def _copy_actions(digest: str, source: Path, target: Path) -> None:
-    actions, copy = action_path(source, digest), action_path(target, digest)
+    name = action_path(Path(), digest).as_posix()
+    actions, copy = run_file(source, name), run_file(target, name)
     if actions.is_file() and not copy.exists():
         copy.parent.mkdir(parents=True, exist_ok=True)
         _copy_file(actions, copy)
 
 
-def _copy_log(log: Path, copy: Path) -> None:
+def _copy_log(source: Path, target: Path, name: str) -> None:
+    log, copy = run_file(source, name), run_file(target, name)
     copy.parent.mkdir(parents=True, exist_ok=True)
     copy.unlink(missing_ok=True)  # of an error that this record replaces
     _copy_file(log, copy)
@@ -178,6 +184,6 @@ def _copy_log(log: Path, copy: Path) -> None:
 
 def _copy_file(path: Path, copy: Path) -> None:
     try:
-        os.link(path, copy)  # takes no space on the same disk
+        os.link(path.resolve(), copy)  # takes no space on the same disk
     except OSError:
         shutil.copyfile(path, copy)

@@ -25,9 +25,9 @@ _BATCH_ROWS = 5_000
 def write_parquet(records: Iterable[Record], path: Path) -> int:
     """Write records to a Parquet file, which appears complete or not at all.
 
-    The columns are the fields of a record and its instruction options. ``instruction``, ``mentions``, ``prompt``, ``events``
-    and ``attribution`` are nested; dictionaries, whose keys depend on the task or the policy, are
-    JSON texts.
+    The columns are the fields of a record and its instruction options. ``instruction``,
+    ``mentions``, ``prompt``, ``events`` and ``attribution`` are nested; dictionaries, whose keys
+    depend on the task or the policy, are JSON texts.
 
     Returns:
         Number of rows.

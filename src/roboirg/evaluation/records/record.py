@@ -17,6 +17,7 @@ from typing import Annotated, Any, Literal, Self, get_args
 import msgspec
 
 from roboirg.core.delivery import PromptVerdict
+from roboirg.core.field_types import Cause, Name, Whole
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.core.observations import DemonstrationFrames, DemonstrationSource
 from roboirg.evaluation.records.run_files import RELATIVE_PATH
@@ -24,12 +25,7 @@ from roboirg.util.short_hash import short_hash
 
 SCHEMA_VERSION: Literal[4] = 4
 
-NAME = "^[^\\x00-\\x1f\\x7f-\\x9f\\u200e\\u200f\\u202a-\\u202e\\u2066-\\u2069]{0,1000}$"
-"""A name in a record: text without characters that control a terminal or reorder what is read."""
-
-Name = Annotated[str, msgspec.Meta(pattern=NAME)]
 RunPath = Annotated[str, msgspec.Meta(pattern=RELATIVE_PATH)]
-
 Outcome = Literal["success", "failure", "error"]
 
 ErrorKind = Literal[
@@ -92,13 +88,13 @@ class Job(msgspec.Struct, frozen=True, kw_only=True, gc=False):
     policy: Name
     task: Name
     split: Name
-    episode: int
+    episode: Whole
     options: InstructionOptions
-    policy_seed: int = 0
-    max_steps: int = DEFAULT_MAX_STEPS
+    policy_seed: Whole = 0
+    max_steps: Whole = DEFAULT_MAX_STEPS
     actions: Name | None = None
     demonstration_frames: DemonstrationFrames | None = None
-    observe_every: int | None = None
+    observe_every: Whole | None = None
     meshes: Name = DEFAULT_MESHES
     wordings_file: str | None = None
     spec: str | None = None
@@ -156,7 +152,7 @@ class UtteranceRecord(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_
 
     stage: str
     text: str
-    step: int | None = 0
+    step: Whole | None = 0
 
 
 class MentionSpan(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -172,9 +168,9 @@ class MentionSpan(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
         value: value of the slot.
     """
 
-    utterance: int
-    start: int
-    end: int
+    utterance: Whole
+    start: Whole
+    end: Whole
     role: str
     expression: str | None
     slot: str
@@ -192,7 +188,7 @@ class EventRecord(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
         holds: whether it became true; otherwise it became false.
     """
 
-    step: int
+    step: Whole
     kind: str
     subject: str
     place: str | None = None
@@ -214,7 +210,7 @@ class Attribution(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
     kind: FailureKind
     failure: str
     subject: str | None = None
-    step: int | None = None
+    step: Whole | None = None
     sentence: str
 
 
@@ -230,11 +226,11 @@ class PromptAudit(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
         lost: indices of the mentions that certainly did not arrive whole.
     """
 
-    limit: int
-    needed: tuple[int, int]
+    limit: Whole
+    needed: tuple[Whole, Whole]
     tokenizer: str | None = None
-    reached: tuple[int, ...]
-    lost: tuple[int, ...] = ()
+    reached: tuple[Whole, ...]
+    lost: tuple[Whole, ...] = ()
 
     @property
     def sent(self) -> tuple[int, int]:
@@ -294,30 +290,30 @@ class Summary(Job, frozen=True, kw_only=True, gc=False):
     """
 
     schema_version: Literal[4] = SCHEMA_VERSION
-    seed: int
-    difficulty: str
+    seed: Whole
+    difficulty: Name
     outcome: Outcome
     error: ErrorKind | None = None
-    cause: str | None = None
+    cause: Cause | None = None
     attribution: Attribution | None = None
-    steps: int = 0
-    demonstration_steps: int = 0
+    steps: Whole = 0
+    demonstration_steps: Whole = 0
     demonstration_source: DemonstrationSource = "none"
     privileged: bool
     policy_version: Name = "unknown"
     server_version: Name | None = None
-    language_version: str
-    environment_version: int
-    package_version: str
-    code: str = "unknown"
-    plan: str | None = None
-    attempt: int = 1
+    language_version: Name
+    environment_version: Whole
+    package_version: Name
+    code: Name = "unknown"
+    plan: Name | None = None
+    attempt: Whole = 1
     prompt_verdict: PromptVerdict = "unknown"
     robot: Name | None = None
     action_log: str | None = None
     video: RunPath | None = None
-    render_device: str | None = None
-    started_at: str
+    render_device: Name | None = None
+    started_at: Name
     duration_s: float
 
     @property

@@ -12,15 +12,16 @@ from typing import Any, TypeVar
 import msgspec
 
 from roboirg.core.errors import RoboIRGError
+from roboirg.core.field_types import MOST_NAME_LETTERS, NAME
 from roboirg.core.instruction_options import OPTION_NAMES
 from roboirg.evaluation.records.record import (
     IDENTITY,
-    NAME,
     SCHEMA_VERSION,
     Record,
     Summary,
     real_robot,
 )
+from roboirg.evaluation.records.run_files import RELATIVE_PATH
 
 Stored = TypeVar("Stored", bound=Summary)
 
@@ -34,6 +35,12 @@ class StoreError(RoboIRGError):
 
 class DamagedLineError(StoreError):
     """A line is not valid JSON: cut short or overwritten."""
+
+
+_MEANINGS = {
+    NAME: f"of at most {MOST_NAME_LETTERS:,} characters, none of which controls a terminal",
+    RELATIVE_PATH: "that is a path below the run's folder, in letters, digits, '_', '.' and '-'",
+}
 
 
 class _Version(msgspec.Struct):
@@ -84,7 +91,7 @@ def _read(decoder: msgspec.json.Decoder[Stored], line: bytes, path: Path, number
         stored = decoder.decode(line)
     except msgspec.ValidationError as error:
         stored = _read_other_version(decoder, line, path, number, error)
-    except (msgspec.DecodeError, RecursionError) as error:
+    except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
         raise DamagedLineError(
             f"{path} line {number} is damaged: it is not JSON ({error})."
         ) from error
@@ -111,7 +118,7 @@ def _read_other_version(
     except msgspec.ValidationError:
         version = None
     if version == SCHEMA_VERSION:
-        raise StoreError(f"{path} line {number} is not a record: {error}.") from error
+        raise StoreError(f"{path} line {number} is not a record: {_words(error)}.") from error
     if version != SCHEMA_VERSION - 1:
         raise StoreError(
             f"{path} line {number} has schema version {version!r}, but this roboirg reads only "
@@ -121,7 +128,15 @@ def _read_other_version(
     try:
         return msgspec.convert(_from_schema_3(msgspec.json.decode(line)), decoder.type)
     except (msgspec.ValidationError, TypeError, AttributeError) as problem:
-        raise StoreError(f"{path} line {number} is not a record: {problem}.") from problem
+        raise StoreError(f"{path} line {number} is not a record: {_words(problem)}.") from problem
+
+
+def _words(error: Exception) -> str:
+    """Return what is wrong with a record, without regular expressions."""
+    words = str(error)
+    for pattern, meaning in _MEANINGS.items():
+        words = words.replace(f"matching regex {pattern!r}", meaning)
+    return words
 
 
 def _from_schema_3(data: dict[str, Any]) -> dict[str, Any]:
