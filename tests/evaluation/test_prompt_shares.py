@@ -15,6 +15,7 @@ from typer.testing import CliRunner
 
 from roboirg import main
 from roboirg.core.errors import UnknownNameError
+from roboirg.core.instruction_options import InstructionOptions, split_options
 from roboirg.evaluation.analysis.stats.heard_rates import count_heard
 from roboirg.evaluation.analysis.tables.run_tables import make_run_tables, print_run_tables
 from roboirg.evaluation.plan.plan_file import read_plan_file
@@ -43,7 +44,8 @@ LONG = {"setting": "contextual", "distractors": 16}
 
 def job(**fields: object) -> Job:
     usual = {"policy": "p", "task": "PickXtimes", "split": "test", "episode": 0}
-    return Job(**{**usual, "setting": "direct", **fields})  # type: ignore[arg-type]
+    words, others = split_options({**usual, "setting": "direct", **fields})
+    return Job(**others, options=InstructionOptions(**words))
 
 
 def test_no_system_of_the_paper_cuts_an_instruction_of_the_papers_plan() -> None:

@@ -147,13 +147,7 @@ class ListeningStudy(BaseModel):
             episodes=tuple(dict.fromkeys(episodes)),
             settings=tuple(dict.fromkeys((EXPLICIT, *named))),
             forms=plan.forms,
-            options=InstructionOptions(
-                stages=plan.stages[0],
-                distractor=plan.distractor,
-                distractors=plan.distractors,
-                frame=plan.frame,
-                wordings=plan.wordings_identity,
-            ),
+            options=replace(plan.options, stages=plan.stages[0], delivery=DEFAULT_DELIVERY),
             frames_every=self.frames_every,
             wordings=plan.wordings,
             formats=(),
@@ -197,7 +191,7 @@ class ListeningStudy(BaseModel):
             task=task,
             split=TRAINING,
             episode=index,
-            options=InstructionOptions(EXPLICIT, wordings=plan.wordings_identity),
+            options=InstructionOptions(EXPLICIT, wordings=plan.options.wordings),
             wordings_file=plan.wordings,
         )
 

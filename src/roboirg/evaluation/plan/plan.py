@@ -6,12 +6,12 @@ import itertools
 import math
 import os
 import re
-from collections.abc import Iterable, Iterator
-from dataclasses import replace
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import asdict, replace
 from typing import Any, Literal, get_args
 
 import msgspec
-from pydantic import BaseModel, ConfigDict, field_validator, model_validator
+from pydantic import BaseModel, ConfigDict, field_serializer, field_validator, model_validator
 
 from roboirg import language, policies, tasks
 from roboirg.core.actions import find_action_space
@@ -19,10 +19,8 @@ from roboirg.core.errors import InvalidValueError
 from roboirg.core.field_types import CONTROLS, NAME
 from roboirg.core.instruction_options import (
     ALL_STAGES,
-    DEFAULT_DELIVERY,
-    DEFAULT_DISTRACTOR,
-    DEFAULT_DISTRACTORS,
     DEFAULT_FRAME,
+    OPTION_NAMES,
     InstructionOptions,
 )
 from roboirg.core.observations import (
@@ -63,6 +61,9 @@ LONG_PROMPTS: tuple[LongPrompts, ...] = get_args(LongPrompts)
 
 MESHES = ("faithful", "light")
 
+AXES = ("setting", "form", "stages")
+"""Options of instructions of which a plan plays several."""
+
 RETRYABLE: tuple[ErrorKind, ...] = ("connection", "environment", "infrastructure")
 """Kinds of errors that may not occur again when the episode is retried."""
 
@@ -83,12 +84,11 @@ class Plan(BaseModel):
         seed_secret: text from which, with the policy seed and the scene, policies' seeds are made;
             None draws one when the run begins, or takes that of the run's folder.
         stages: sets of stages for settings that read them; every set is played.
-        distractor: kind of distractor, for settings that read it.
-        distractors: number of distractors, for settings that read it.
-        frame: frame of reference, for settings that read it.
-        delivery: prompt or turns, for settings with several utterances.
-        wordings: path of the wording file whose commands are used; None for our own.
-        wordings_identity: name and fingerprint of that file; read from it if it is not given.
+        options: of all instructions, for settings that read them; the setting, form and stages
+            are those above. Its `wordings` are those of the next field, read from the file unless
+            they are given.
+        wordings: path of the wording file whose commands are used, or the name of a pool of ours;
+            None for our own words.
         max_steps: the policy's limit, control steps.
         actions: required action space; None for each policy's own.
         demonstration_frames: which frames of the video policies get; None for each policy's choice.
@@ -119,12 +119,8 @@ class Plan(BaseModel):
     policy_seeds: tuple[int, ...] = (0,)
     seed_secret: str | None = None
     stages: tuple[tuple[int, ...], ...] = (ALL_STAGES,)
-    distractor: str = DEFAULT_DISTRACTOR
-    distractors: int = DEFAULT_DISTRACTORS
-    frame: str = DEFAULT_FRAME
-    delivery: str = DEFAULT_DELIVERY
+    options: InstructionOptions = InstructionOptions()
     wordings: str | None = None
-    wordings_identity: str | None = None
     max_steps: int = DEFAULT_MAX_STEPS
     actions: str | None = None
     demonstration_frames: DemonstrationFrames | None = None
@@ -145,12 +141,20 @@ class Plan(BaseModel):
     def _identify_wordings(cls, fields: Any) -> Any:  # noqa: ANN401 - whatever is to be validated
         if not isinstance(fields, dict) or fields.get("wordings") is None:
             return fields
-        if fields.get("wordings_identity") is not None:
+        options: Any = fields.get("options", {})
+        if isinstance(options, InstructionOptions):
+            options = asdict(options)
+        if not isinstance(options, dict) or options.get("wordings") is not None:
             return fields
-        if fields["wordings"] in POOLS:
-            return {**fields, "wordings_identity": fields["wordings"]}
-        path = os.path.realpath(str(fields["wordings"]))
-        return {**fields, "wordings": path, "wordings_identity": open_wordings(path)}
+        path = str(fields["wordings"])
+        if path not in POOLS:
+            path = os.path.realpath(path)
+        options = {**options, "wordings": path if path in POOLS else open_wordings(path)}
+        return {**fields, "wordings": path, "options": options}
+
+    @field_serializer("options")
+    def _write_options(self, options: InstructionOptions) -> dict[str, Any]:
+        return {name: value for name, value in asdict(options).items() if name not in AXES}
 
     @field_validator("demonstration_frames", mode="before")
     @classmethod
@@ -162,6 +166,7 @@ class Plan(BaseModel):
         if not is_encodable(self.seed_secret or ""):
             raise InvalidValueError(f"seed_secret is {self.seed_secret!r}: it has lone surrogates.")
         texts = self.model_dump(exclude={"seed_secret"})
+        texts |= texts.pop("options")
         for name, value in texts.items():
             for text in value if isinstance(value, tuple) else (value,):
                 if isinstance(text, str) and re.search(f"[{CONTROLS}]", text):
@@ -316,7 +321,7 @@ class Plan(BaseModel):
                 task=task,
                 split=self.split,
                 episode=episode,
-                options=replace(options, wordings=self.wordings_identity),
+                options=replace(options, wordings=self.options.wordings),
                 wordings_file=self.wordings,
                 policy_seed=seeds[0],
                 max_steps=self.max_steps,
@@ -337,7 +342,7 @@ class Plan(BaseModel):
         An option that the setting does not read keeps its default, so that equal words are one job.
         """
         rule, usual = all_settings()[setting], InstructionOptions(setting)
-        chosen = {option: getattr(self, option) for option in rule.reads - {"stages"}}
+        chosen = {option: getattr(self.options, option) for option in rule.reads - {"stages"}}
         for form in self.forms if rule.implicit else (usual.form,):
             for stages in self.stages if "stages" in rule.reads else (usual.stages,):
                 yield replace(usual, form=form, stages=stages, **chosen)
@@ -358,7 +363,9 @@ class Plan(BaseModel):
     def _instruction_jobs(self) -> Iterator[Job]:
         """Yield one job for each instruction that the language may not be able to express."""
         # All settings with the default frame are only those that can express the episode.
-        usual = self.settings == "all" and self.frame == DEFAULT_FRAME and self.wordings is None
+        usual = (
+            self.settings == "all" and self.options.frame == DEFAULT_FRAME and self.wordings is None
+        )
         for task in self.tasks:
             for episode in self.episodes[:1] if usual else self.episodes:
                 settings = self.settings_of(task, episode)
@@ -366,17 +373,7 @@ class Plan(BaseModel):
 
     def _check_options(self) -> None:
         for form, stages in itertools.product(self.forms, self.stages):
-            check_options(
-                InstructionOptions(
-                    EXPLICIT,
-                    form=form,
-                    stages=stages,
-                    distractor=self.distractor,
-                    distractors=self.distractors,
-                    frame=self.frame,
-                    delivery=self.delivery,
-                )
-            )
+            check_options(replace(self.options, form=form, stages=stages))
         check_names("kind of meshes", (self.meshes,), MESHES)
         for name, least in (("max_steps", 1), ("tries", 1), ("batch", 1)):
             if getattr(self, name) < least:
@@ -404,5 +401,16 @@ class Plan(BaseModel):
                 )
 
 
+SINGLE_OPTIONS = tuple(name for name in OPTION_NAMES if name not in (*AXES, *Plan.model_fields))
+"""Options of instructions of which a plan has one value, in `options`."""
+
+
 def _names_the_goal(options: InstructionOptions) -> bool:
     return options.setting == EXPLICIT or options.form == "resolved"
+
+
+def nest_options(fields: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the fields of a plan, with the options of instructions among them in `options`."""
+    nested = {name: value for name, value in fields.items() if name in SINGLE_OPTIONS}
+    others = {name: value for name, value in fields.items() if name not in SINGLE_OPTIONS}
+    return {**others, "options": {**others.get("options", {}), **nested}}

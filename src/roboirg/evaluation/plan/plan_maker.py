@@ -8,7 +8,7 @@ from pydantic import ValidationError
 
 from roboirg import tasks as task_registry
 from roboirg.core.errors import InvalidValueError
-from roboirg.evaluation.plan.plan import LONG_PROMPTS, REQUIRED, RETRYABLE, Plan
+from roboirg.evaluation.plan.plan import LONG_PROMPTS, REQUIRED, RETRYABLE, Plan, nest_options
 from roboirg.evaluation.plan.plan_parsing import (
     ALL,
     check_names,
@@ -48,7 +48,7 @@ def make_plan(
         stages: a list of numbers, or several lists separated by semicolons.
         retry_on: kinds of errors separated by commas, or ``none``.
         devices: names separated by commas; none for one process on any device.
-        **options: other fields of `Plan`.
+        **options: other fields of `Plan`, and options of instructions by their own names.
 
     Raises:
         UnknownNameError: a name does not exist; the message suggests the nearest.
@@ -74,7 +74,7 @@ def make_plan(
             stages=parse_stage_sets(stages),
             retry_on=_error_kinds(retry_on),
             devices=parse_names("device", devices) if devices else (),
-            **options,  # type: ignore[arg-type]
+            **nest_options(options),
         )
     except ValidationError as error:
         raise _explain(error) from error

@@ -12,7 +12,6 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Iterable
-from dataclasses import asdict
 from fractions import Fraction
 
 from roboirg.core.instruction_options import InstructionOptions
@@ -46,14 +45,14 @@ def floor_level(floor: str, jobs: Iterable[Job]) -> Fraction | None:
         UnknownNameError: a task or the floor does not exist.
         InvalidValueError: an episode does not exist, or has no such instruction.
     """
-    instructions = dict.fromkeys((job.task, job.split, job.episode, job.options) for job in jobs)
+    instructions = dict.fromkeys((job.task, job.split, job.episode, job.column) for job in jobs)
     levels = [_level(floor, *each) for each in instructions]
     return sum(levels, Fraction(0)) / len(levels) if levels else None
 
 
 @functools.lru_cache(maxsize=65_536)
 def _level(floor: str, task: str, split: str, number: int, options: InstructionOptions) -> Fraction:
-    job = Job(policy="", task=task, split=split, episode=number, **asdict(options))
+    job = Job(policy="", task=task, split=split, episode=number, options=options)
     episode, instruction = get_episode(task, split, number), instruct_job(job)
     if floor == CHANCE:
         return right_share(blind_goals(instruction, episode), episode)
