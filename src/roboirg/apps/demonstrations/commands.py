@@ -9,12 +9,11 @@ import typer
 
 from roboirg.cli.export_commands import export_app
 from roboirg.cli.options import (
-    DEFAULT_WORDS,
-    Forms,
+    NO_PLAN,
+    PlanWords,
     Settings,
     Split,
     Tasks,
-    WordChoices,
     Workers,
     check_output_file,
     spread,
@@ -37,11 +36,7 @@ def export_demonstrations(
         str, typer.Option(help="all, 4 for the first four, or a list such as 0,3,5-9.")
     ] = "all",
     settings: Settings = "all",
-    forms: Forms = "implicit",
-    words: WordChoices = DEFAULT_WORDS,
-    delivery: Annotated[
-        str, typer.Option(help="prompt, or turns: in language columns and the table of episodes.")
-    ] = "prompt",
+    words: PlanWords = NO_PLAN,
     pictures: Annotated[
         str, typer.Option(help="png or lossless-video, both without loss; lossy-video; or none.")
     ] = "png",
@@ -86,8 +81,7 @@ def export_demonstrations(
     from roboirg.apps.demonstrations.size_estimate import size_text
     from roboirg.cli.names import known_settings
     from roboirg.cli.progress_bar import progress_bars
-    from roboirg.evaluation.plan.plan_parsing import means_all, parse_episodes, parse_names
-    from roboirg.language import FORMS
+    from roboirg.evaluation.plan.plan_parsing import parse_episodes, parse_names
     from roboirg.policies import load_policy_class
     from roboirg.tasks import find_tasks
     from roboirg.util.processor import core_count
@@ -99,8 +93,8 @@ def export_demonstrations(
         split=split,
         episodes=parse_episodes(episodes, split),
         settings=known_settings(settings),
-        forms=FORMS if means_all(forms) else parse_names("form", forms),
-        options=words.instruction_options(delivery),
+        forms=words.forms(),
+        options=words.options(),
         format=cast("Any", format),
         pictures=cast("Any", pictures),
         video=cast("Any", video or _default_video(format)),

@@ -12,13 +12,11 @@ import typer
 from roboirg.cli.export_commands import export_app
 from roboirg.cli.names import known_name, known_settings, known_tasks
 from roboirg.cli.options import (
-    DEFAULT_WORDS,
+    NO_PLAN,
     AnySplit,
-    Forms,
+    PlanWords,
     Settings,
     Tasks,
-    WordChoices,
-    Wordings,
     Workers,
     check_output_file,
     spread,
@@ -51,8 +49,7 @@ def export_instructions(
     split: AnySplit = "test",
     tasks: Tasks = "all",
     settings: Settings = "all",
-    forms: Forms = "implicit,resolved",
-    words: WordChoices = DEFAULT_WORDS,
+    words: PlanWords = NO_PLAN,
 ) -> None:
     """Export a row per episode, setting and form (columns: see docs/language.md)."""
     from roboirg.apps.language_lab.instruction_export import (
@@ -60,7 +57,7 @@ def export_instructions(
         check_export_support,
         write_rows,
     )
-    from roboirg.evaluation.plan.plan_parsing import parse_names, parse_splits
+    from roboirg.evaluation.plan.plan_parsing import parse_splits
     from roboirg.language import FORMS
     from roboirg.language.instruction_row import row
     from roboirg.language.variants import instructions
@@ -69,11 +66,10 @@ def export_instructions(
     kind = known_name("format", format, EXPORT_FORMATS)
     check_export_support(kind)
     check_output_file(out)
-    options = words.instruction_options()
+    options = words.options()
     names, chosen = known_tasks(tasks, options.wordings), known_settings(settings)
-    spoken = [known_name("form", one, FORMS) for one in parse_names("form", forms)]
     episodes = list(split_episodes(names, parse_splits(split)))
-    said = instructions(episodes, chosen, spoken, options)
+    said = instructions(episodes, chosen, words.forms(FORMS), options)
     rows = [row(episode, instruction) for episode, instruction in said]
     if not rows:
         raise InvalidValueError(f"None of these tasks has the setting {', '.join(chosen)}.")
@@ -122,7 +118,10 @@ def validate_instructions(
     ] = 100,
     tasks: Tasks = "all",
     split: Annotated[str, typer.Option(help="train, val, test, all or none.")] = "all",
-    wordings: Wordings = None,
+    wordings: Annotated[
+        str | None,
+        typer.Option(help="A wording file, or our words for train or test."),
+    ] = None,
     workers: Workers = None,
 ) -> None:
     """Read all instructions back and check their rules; exit code 2 if one is broken."""
@@ -158,9 +157,7 @@ def score_shortcuts(
     seeds: Annotated[int, typer.Option(help="Random scenes for each task, beyond the split.")] = 0,
     tasks: Tasks = "all",
     settings: Settings = "all",
-    form: Annotated[str, typer.Option(help="implicit or resolved.")] = "implicit",
-    words: WordChoices = DEFAULT_WORDS,
-    distractors: Annotated[int, typer.Option(help="Number of distractors.")] = 1,
+    words: PlanWords = NO_PLAN,
     by: Annotated[
         str | None, typer.Option(help="A row for each pattern or task of a setting.")
     ] = None,
@@ -170,7 +167,6 @@ def score_shortcuts(
 ) -> None:
     """Score rules that see the words only, beside chance: how much needs no understanding."""
     from roboirg.evaluation.plan.plan_parsing import parse_splits
-    from roboirg.language import FORMS
     from roboirg.shortcuts.learned_floor import check_learning_support
     from roboirg.shortcuts.shortcut_scores import GROUPINGS
     from roboirg.shortcuts.shortcut_tables import TRAINING_SPLIT, shortcut_rows, shortcut_table
@@ -184,9 +180,7 @@ def score_shortcuts(
                 f"--learned learns from the split {TRAINING_SPLIT}, so --split {split} would test "
                 "it on what it has seen; ask for val or test."
             )
-    options = replace(
-        words.instruction_options(), form=known_name("form", form, FORMS), distractors=distractors
-    )
+    options = replace(words.options(), form=words.form())
     names, chosen = known_tasks(tasks, options.wordings), known_settings(settings)
     rows = shortcut_rows(names, splits, chosen, options, seeds=seeds, by=grouping, learned=learned)
     if not rows:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from roboirg.cli.options import Salt, Workers, add_working_directory, check_output_file
+from roboirg.cli.options import Workers, add_working_directory, check_output_file
 from roboirg.cli.progress_bar import progress_bar
 from roboirg.cli.run_commands import USAGE_ERROR, Folder, folder_of, report_problems
 from roboirg.core.errors import InvalidValueError
@@ -31,7 +31,6 @@ def verify(
     run: RunOrPack,
     sample: SampleShare = "100%",
     sample_seed: SampleSeed = None,
-    salt: Salt = None,
     workers: Workers = None,
 ) -> None:
     """Play the actions of a run again and check its records; exit code 2 if one does not hold."""
@@ -39,7 +38,6 @@ def verify(
     from roboirg.apps.leaderboard.run_verification import verify_run
     from roboirg.util.processor import core_count
 
-    _take_salt(salt)
     with opened_run(folder_of(run)) as folder, progress_bar("records") as show:
         found = verify_run(
             folder,
@@ -77,7 +75,6 @@ def board(
             "--verify", help="Share of the episodes to play again where not done yet, such as 5%."
         ),
     ] = None,
-    salt: Salt = None,
     workers: Workers = None,
 ) -> None:
     """Make a leaderboard page of packed runs: verified, privileged, comparable or not."""
@@ -86,7 +83,6 @@ def board(
     from roboirg.util.processor import core_count
 
     check_report_support()
-    _take_salt(salt)
     path = folder_of(folder)
     with progress_bar("packed runs") as show:
         packs = read_packs(
@@ -98,13 +94,6 @@ def board(
     page = out or path / BOARD_FILE
     write_board(packs, page)
     typer.echo(f"{counted(len(packs), 'packed run')}: {page}")
-
-
-def _take_salt(salt: str | None) -> None:
-    from roboirg.tasks.splits.private_splits import use_salt
-
-    if salt is not None:
-        use_salt(salt)
 
 
 def _share(text: str) -> float:

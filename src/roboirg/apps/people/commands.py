@@ -11,11 +11,11 @@ import typer
 
 from roboirg.cli import run_commands
 from roboirg.cli.options import (
-    DEFAULT_WORDS,
+    NO_PLAN,
+    PlanWords,
     Settings,
     Split,
     Tasks,
-    WordChoices,
     Workers,
     spread,
 )
@@ -38,9 +38,6 @@ AllowHost = Annotated[
     list[str] | None,
     typer.Option(help="Further name under which browsers reach this machine; repeatable."),
 ]
-Delivery = Annotated[
-    str, typer.Option(help="prompt: all words at once; turns: one utterance after another.")
-]
 
 
 @listen_app.command()
@@ -52,13 +49,11 @@ def plan(
     ],
     tasks: Tasks = "all",
     settings: Settings = "all",
-    form: Annotated[str, typer.Option(help="implicit or resolved.")] = "implicit",
     split: Split = "test",
     episodes: Annotated[
         str, typer.Option(help="all, 4 for the first four, or a list such as 0,3,5-9.")
     ] = "4",
-    delivery: Delivery = "prompt",
-    words: WordChoices = DEFAULT_WORDS,
+    words: PlanWords = NO_PLAN,
     practice: Annotated[int, typer.Option(help="Practice questions for each task.")] = 1,
     checks: Annotated[int, typer.Option(help="Attention checks for each person.")] = 2,
     seed: Annotated[int, typer.Option(help="Seed of the order of the episodes.")] = 0,
@@ -89,11 +84,10 @@ def plan(
         [f"{PEOPLE}=oracle"],
         tasks=tasks,
         settings=settings,
-        forms=form,
+        forms=words.form(),
         split=split,
         episodes=episodes,
-        delivery=delivery,
-        **words._asdict(),
+        **words.words,
     )
     study = ListeningStudy(
         plan=made.model_copy(update={"policies": (PEOPLE,)}),
@@ -207,11 +201,8 @@ def drive(
     task: Annotated[str, typer.Argument(help="Name of the task.")],
     episode: Annotated[int, typer.Argument(help="Position in the split, from 0.")],
     setting: Annotated[str, typer.Option(help="Setting of the words.")] = "explicit",
-    form: Annotated[str, typer.Option(help="implicit or resolved.")] = "implicit",
     split: Split = "test",
-    delivery: Delivery = "prompt",
-    words: WordChoices = DEFAULT_WORDS,
-    max_steps: Annotated[int, typer.Option(help="Limit in control steps, 20 per second.")] = 1300,
+    words: PlanWords = NO_PLAN,
     out: run_commands.Out = "runs/driven",
     name: Annotated[str, typer.Option(help="Name of the policy in the records.")] = "person",
     host: Host = "127.0.0.1",
@@ -223,18 +214,18 @@ def drive(
     from roboirg.apps.people.driving_run import DRIVER
     from roboirg.envs.factory import check_simulator
     from roboirg.evaluation.plan.plan_maker import make_plan
+    from roboirg.evaluation.records.record import DEFAULT_MAX_STEPS
 
     # The plan checks the words as those of a run; a person is no policy that can be loaded.
     made = make_plan(
         [f"{DRIVER}=oracle"],
         tasks=task,
         settings=setting,
-        forms=form,
+        forms=words.form(),
         split=split,
         episodes=f"{episode},",
-        delivery=delivery,
-        **words._asdict(),
-        max_steps=max_steps,
+        **words.words,
+        max_steps=words.fields.get("max_steps", DEFAULT_MAX_STEPS),
     )
     check_simulator()
     jobs = made.jobs()

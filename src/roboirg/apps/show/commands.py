@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from roboirg.cli.names import known_settings
-from roboirg.cli.options import DEFAULT_WORDS, Settings, Split, WordChoices, spread
+from roboirg.cli.options import NO_WORDS, Settings, Split, WordOptions, spread
 from roboirg.core.errors import InvalidValueError
 from roboirg.core.plain_text import counted
 
@@ -28,8 +28,7 @@ def show(
         bool, typer.Option("--words", help="Print the instructions only, with their lengths.")
     ] = False,
     settings: Settings = "all",
-    choices: WordChoices = DEFAULT_WORDS,
-    distractors: Annotated[int, typer.Option(help="Number of distractors.")] = 1,
+    choices: WordOptions = NO_WORDS,
     out: Annotated[
         str | None, typer.Option(help="PNG file to write; TASK-SPLIT-EPISODE.png by default.")
     ] = None,
@@ -41,7 +40,7 @@ def show(
     from roboirg.tasks.splits.splits import get_episode
 
     found = get_episode(task, split, episode)
-    options = replace(choices.instruction_options(), distractors=distractors)
+    options = choices.options()
     check_options(options)
     possible, chosen = settings_of(get_task(task)), known_settings(settings)
     shown = [name for name in chosen if name in possible] or chosen

@@ -220,8 +220,8 @@ def _points_question(questions: Prompts, episode: Episode) -> str:
 
 
 def _option_fields(options: InstructionOptions) -> dict[str, Any]:
-    fields = asdict(options)
-    del fields["delivery"]
+    known = GroundingItem.__struct_fields__
+    fields = {name: value for name, value in asdict(options).items() if name in known}
     return {**fields, "stages": list(options.stages), "wordings": options.wordings or "own"}
 
 

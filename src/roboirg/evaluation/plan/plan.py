@@ -69,72 +69,67 @@ RETRYABLE: tuple[ErrorKind, ...] = ("connection", "environment", "infrastructure
 
 
 class Plan(BaseModel):
-    """Which policies play which episodes, with which instructions.
+    """Which policies play which episodes, with which instructions."""
 
-    Attributes:
-        policies: built-in names, ``package.module:Class``, or addresses; each may be given a name
-            of its own as ``NAME=SPEC``.
-        tasks: names of tasks.
-        settings: names, or ``"all"`` for every setting that can express the episode, without
-            the harder ones.
-        forms: implicit, resolved or both.
-        split: train, val, test, random, or the name of a private split.
-        episodes: 0-based positions in the split.
-        policy_seeds: every seed plays every episode.
-        seed_secret: text from which, with the policy seed and the scene, policies' seeds are made;
-            None draws one when the run begins, or takes that of the run's folder.
-        stages: sets of stages for settings that read them; every set is played.
-        options: of all instructions, for settings that read them; the setting, form and stages
-            are those above. Its `wordings` are those of the next field, read from the file unless
-            they are given.
-        wordings: path of the wording file whose commands are used, or the name of a pool of ours;
-            None for our own words.
-        max_steps: the policy's limit, control steps.
-        actions: required action space; None for each policy's own.
-        demonstration_frames: which frames of the video policies get; None for each policy's choice.
-        observe_every: control steps between observations; None for each policy's choice.
-        meshes: faithful or light.
-        video: which episodes get a video. This and all that follows is not part of a record's
-            identity.
-        policy_process: ``own``: each policy that is neither built in nor remote has a process of
-            its own; ``shared``: it runs in the world's, for debuggers.
-        batch: most episodes that a policy is asked about together.
-        devices: values of ``CUDA_VISIBLE_DEVICES``; each policy has a process on each of them.
-        long_prompts: whether an episode is played (``send``) or not (``refuse``) if its prompt is
-            longer than what the policy declares that its model reads.
-        policy_timeout_s: seconds that one call of a policy may take.
-        episode_timeout_s: seconds that an episode may take.
-        tries: how often an episode is played if it ends in an error of a kind in `retry_on`.
-        retry_on: kinds of errors.
-    """
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
+    model_config = ConfigDict(frozen=True, extra="forbid", use_attribute_docstrings=True)
 
     policies: tuple[str, ...]
+    """Built-in names, package.module:Class, or addresses; NAME=SPEC gives one a name of its own."""
     tasks: tuple[str, ...]
+    """Tasks or suites; all for the whole benchmark."""
     settings: tuple[str, ...] | Literal["all"] = "all"
+    """Settings; all for every setting that can express the episode, without the harder ones."""
     forms: tuple[str, ...] = ("implicit",)
+    """implicit, resolved or both."""
     split: str = "test"
+    """train, val, test, random, or the name of a private split."""
     episodes: tuple[int, ...]
+    """Positions in the split, from 0; a number alone, such as 4, is the first four."""
     policy_seeds: tuple[int, ...] = (0,)
+    """Every seed plays every episode."""
     seed_secret: str | None = None
+    """Text from which, with the policy seed and the scene, the seeds of policies are made; without
+    one, the run draws it, or takes that of its folder."""
     stages: tuple[tuple[int, ...], ...] = (ALL_STAGES,)
+    """Sets of stages of the contextual setting; every set is played."""
     options: InstructionOptions = InstructionOptions()
+    """Further options of instructions, for settings that read them. Its `wordings` identify those
+    of `wordings`; the setting, form and stages are the fields above."""
     wordings: str | None = None
+    """Wording file whose commands are used; or train or test: our words of that pool in every
+    split."""
     max_steps: int = DEFAULT_MAX_STEPS
+    """Limit of an episode in control steps, 20 per second."""
     actions: str | None = None
+    """Required action space; without one, each policy's own."""
     demonstration_frames: DemonstrationFrames | None = None
+    """Frames of the demonstration that policies get: all, none, or their number; without it, as
+    each policy asks."""
     observe_every: int | None = None
+    """Control steps between two observations; without it, as each policy asks."""
     meshes: str = DEFAULT_MESHES
+    """Meshes for rendering: faithful or light."""
     video: VideoMode = "off"
+    """Episodes whose video is recorded: off, failures or all. This and all that follows is no part
+    of a record's identity."""
     policy_process: PolicyProcessMode = "own"
+    """own: a policy that is neither built in nor remote has a process of its own; shared: it runs
+    in the world's process, for debuggers."""
     batch: int = DEFAULT_BATCH
+    """Most episodes that a policy is asked about at once."""
     devices: tuple[str, ...] = ()
+    """GPUs, such as 0,1; each policy has a process on each of them. Without any, one on any."""
     long_prompts: LongPrompts = "send"
+    """Episodes whose prompt is longer than what the policy declares that its model reads: send or
+    refuse."""
     policy_timeout_s: float = 600.0
+    """Time limit of one call of a policy, seconds."""
     episode_timeout_s: float = 7200.0
+    """Time limit of an episode, seconds."""
     tries: int = 2
+    """How often an episode is played if it ends in an error of a kind in `retry_on`."""
     retry_on: tuple[ErrorKind, ...] = RETRYABLE
+    """Kinds of errors after which an episode is played again."""
 
     @model_validator(mode="before")
     @classmethod

@@ -47,26 +47,14 @@ def known_salt() -> str | None:
     return os.environ.get(SALT_VARIABLE) or None
 
 
-def with_salt(split: str, salt: str | None) -> str:
-    """Return the split that is meant: with a salt, ``random`` is the private split of it.
-
-    Args:
-        split: as typed.
-        salt: as typed; None for that of the environment, if there is one.
+def drawn_split(split: str) -> str:
+    """Return the split that is meant: if a salt is known, ``random`` is the private split of it.
 
     Raises:
-        InvalidValueError: the salt is too short, or was typed for a public split.
+        InvalidValueError: the salt is too short.
     """
-    if salt is not None:
-        use_salt(salt)
     known = known_salt()
-    if known is None or (split != RANDOM and salt is None):
-        return split
-    if split != RANDOM and not is_private(split):
-        raise InvalidValueError(
-            f"--salt draws the episodes of --split random, but the split is {split!r}."
-        )
-    return _split_of(known) if split == RANDOM else split
+    return _split_of(known) if known is not None and split == RANDOM else split
 
 
 def is_private(split: str) -> bool:
