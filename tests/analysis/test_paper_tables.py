@@ -18,6 +18,7 @@ from rich.console import Console
 from roboirg.core.errors import UnknownNameError
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.evaluation.analysis.stats.cells import gather
+from roboirg.evaluation.analysis.stats.chance import CHANCE, FLOORS
 from roboirg.evaluation.analysis.stats.rates import change, mean_percent, percent
 from roboirg.evaluation.analysis.tables.paper_tables import is_informative, make_table
 from roboirg.evaluation.analysis.tables.rendering import FORMATS, get_format
@@ -186,7 +187,7 @@ def test_spatial_is_compared_with_explicit_on_the_tasks_that_have_it(result) -> 
 
 
 def test_the_chance_level_stands_below(result) -> None:
-    table = make_table("main", gather([("run", whole(result))]), chance=True)
+    table = make_table("main", gather([("run", whole(result))]), floors=(CHANCE,))
     assert entries(table, "explicit", source="chance")["Avg"].text == "100.00"
     direct = entries(table, "direct", source="chance")
     assert direct["StopCube"].text == "25.00"
@@ -195,7 +196,7 @@ def test_the_chance_level_stands_below(result) -> None:
 
 def test_the_floors_stand_below_the_chance_level(result) -> None:
     cells = gather([("run", whole(result))])
-    table = make_table("main", cells, floors=True)
+    table = make_table("main", cells, floors=FLOORS)
     below = [(row.group, row.name) for row in table.rows if row.source == "chance"]
     names = ["chance", "first-mention", "last-mention", "elimination", "surface"]
     assert below == [(setting, name) for setting in ("explicit", "direct") for name in names]

@@ -26,11 +26,10 @@ Settings = Annotated[
 ]
 Forms = Annotated[str, typer.Option(help="implicit, resolved, or both separated by a comma.")]
 Split = Annotated[str, typer.Option(help="train, val, test or random.")]
-Video = Annotated[str, typer.Option(help="Record videos of episodes: off, failures or all.")]
 AnySplit = Annotated[str, typer.Option(help="train, val, test or all.")]
 Workers = Annotated[
     int | None,
-    typer.Option(help="Worker processes, one per core by default; 0 uses this process only."),
+    typer.Option(help="Worker processes, 0 for none but this.  (ROBOIRG_WORKERS, or one per core)"),
 ]
 
 

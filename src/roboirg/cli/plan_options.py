@@ -54,7 +54,6 @@ Wordings = Annotated[
     _words(help="Our words for train or test, or a file with commands.  (ours of the split)"),
 ]
 MaxSteps = Annotated[int | None, _episodes(help="Limit in control steps, 20 per second.  (1300)")]
-Actions = Annotated[str | None, _play(help="Required action space.  (the policy's own)")]
 Video = Annotated[str | None, _play(help="Record videos of episodes: off, failures or all.  (off)")]
 
 
@@ -71,7 +70,6 @@ class PlanChoices(OptionGroup):
     stages: Stages
     wordings: Wordings
     max_steps: MaxSteps
-    actions: Actions
     video: Video
 
 

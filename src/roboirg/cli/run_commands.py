@@ -265,7 +265,7 @@ def _print_estimate(plan: Plan, folder: Path, workers: int | None) -> None:
     from roboirg.evaluation.run.world_speed import ASSUMED, measure_world
     from roboirg.language.settings import EXPLICIT
     from roboirg.util.console_width import widen
-    from roboirg.util.processor import core_count
+    from roboirg.util.processor import core_count, worker_count
 
     jobs, console = plan.jobs(), Console()
     table = Table(title=f"plan {plan.fingerprint}", title_justify="left")
@@ -285,7 +285,7 @@ def _print_estimate(plan: Plan, folder: Path, workers: int | None) -> None:
     _print_prompt_shares(jobs, settings, console)
     played = read_index(folder)
     todo = [job for job in jobs if identity_key(job) not in played]
-    count = core_count() if workers is None else max(workers, 1)  # 0 is this process
+    count = max(worker_count(workers), 1)  # 0 is this process
     known = {(one.policy, one.task) for one in played.values()}
     new = [job for job in todo if (job.policy, job.task) not in known]
     speed = measure_world(new) if new else ASSUMED

@@ -84,7 +84,7 @@ def export_demonstrations(
     from roboirg.evaluation.plan.plan_parsing import parse_episodes, parse_names
     from roboirg.policies import load_policy_class
     from roboirg.tasks import find_tasks
-    from roboirg.util.processor import core_count
+    from roboirg.util.processor import worker_count
 
     load_policy_class(policy)
     # `validated` checks the names that are cast.
@@ -108,7 +108,7 @@ def export_demonstrations(
     _print_estimate(plan)
     if dry_run:
         return
-    count = core_count() if workers is None else workers
+    count = worker_count(workers)
     with progress_bars() as show:
 
         def report(stage: str, done: int, total: int, size: int) -> None:
@@ -149,7 +149,6 @@ def replay(
         Path,
         typer.Argument(help="Folder of an export, or of RoboMME's HDF5 files, or such a file."),
     ],
-    workers: Workers = None,
     log: Annotated[
         Path | None,
         typer.Option(help="File with a line for each result; what is in it is not replayed again."),
@@ -159,12 +158,12 @@ def replay(
     from collections import Counter
 
     from roboirg.apps.demonstrations.dataset_replay import TOLERANCE, replay_dataset
-    from roboirg.util.processor import core_count
+    from roboirg.util.processor import worker_count
 
     if log is not None:
         check_output_file(log)
     count, largest = Counter[str](), 0.0
-    for one in replay_dataset(dataset, core_count() if workers is None else workers, log):
+    for one in replay_dataset(dataset, worker_count(), log):
         count["trajectories"] += 1
         count["same verdict"] += one.status == one.recorded_status
         count["agree"] += one.agrees

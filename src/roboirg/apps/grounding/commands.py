@@ -15,7 +15,6 @@ from roboirg.cli.options import (
     PlanWords,
     Settings,
     Tasks,
-    Workers,
     spread,
 )
 from roboirg.core.errors import InvalidValueError
@@ -52,7 +51,6 @@ def export_grounding(
     frames_every: Annotated[
         int, typer.Option(min=1, help="Control steps between two frames of a video.")
     ] = 8,
-    workers: Workers = None,
 ) -> None:
     """Export questions of grounding with pictures: Parquet, JSON lines, VLMEvalKit's TSV."""
     from roboirg.apps.grounding.dataset_export import export_grounding
@@ -65,7 +63,7 @@ def export_grounding(
     from roboirg.evaluation.plan.plan_parsing import parse_episodes, parse_splits
     from roboirg.language.generator import check_options
     from roboirg.util.parquet_support import check_parquet_support
-    from roboirg.util.processor import core_count
+    from roboirg.util.processor import worker_count
 
     check_parquet_support()
     options = words.options()
@@ -85,7 +83,7 @@ def export_grounding(
         frames_every=frames_every,
         wordings=words.file,
     )
-    count = core_count() if workers is None else workers
+    count = worker_count()
     with progress_bar("episodes") as progress:
         facts = export_grounding(request, out, count, progress)
     typer.echo(
@@ -155,14 +153,9 @@ def score_grounding(
 
 def _floors(text: str | None) -> tuple[str, ...]:
     from roboirg.apps.grounding.answer_floors import FLOORS
-    from roboirg.cli.names import known_name
-    from roboirg.evaluation.plan.plan_parsing import means_all, parse_names
+    from roboirg.cli.names import known_names
 
-    if text is None:
-        return ()
-    if means_all(text):
-        return FLOORS
-    return tuple(known_name("floor", one, FLOORS) for one in parse_names("floor", text))
+    return () if text is None else known_names("floor", text, FLOORS)
 
 
 def _comparisons(scores: Sequence[GroundingScore]) -> list[str]:

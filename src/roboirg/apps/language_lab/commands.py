@@ -17,7 +17,6 @@ from roboirg.cli.options import (
     PlanWords,
     Settings,
     Tasks,
-    Workers,
     check_output_file,
     spread,
 )
@@ -44,8 +43,7 @@ language_app = typer.Typer(no_args_is_help=True, help="Count, validate and score
 
 @spread
 def export_instructions(
-    out: Annotated[Path, typer.Option(help="File to write.")],
-    format: Annotated[str, typer.Option(help="File format: jsonl or parquet.")] = "jsonl",  # noqa: A002
+    out: Annotated[Path, typer.Option(help="File to write; its name ends in .jsonl or .parquet.")],
     split: AnySplit = "test",
     tasks: Tasks = "all",
     settings: Settings = "all",
@@ -63,7 +61,7 @@ def export_instructions(
     from roboirg.language.variants import instructions
     from roboirg.tasks.splits.splits import split_episodes
 
-    kind = known_name("format", format, EXPORT_FORMATS)
+    kind = known_name("format", out.suffix.removeprefix("."), EXPORT_FORMATS)
     check_export_support(kind)
     check_output_file(out)
     options = words.options()
@@ -122,19 +120,18 @@ def validate_instructions(
         str | None,
         typer.Option(help="A wording file, or our words for train or test."),
     ] = None,
-    workers: Workers = None,
 ) -> None:
     """Read all instructions back and check their rules; exit code 2 if one is broken."""
     from roboirg.apps.language_lab.validation import ValidationResults, batches, validate
     from roboirg.apps.language_lab.validation.validation_tables import validation_tables
     from roboirg.evaluation.plan.plan_parsing import parse_splits
     from roboirg.language.wordings.wording_store import open_wordings
-    from roboirg.util.processor import core_count
+    from roboirg.util.processor import worker_count
 
     names = known_tasks(tasks, open_wordings(wordings))
     wanted = () if split.strip().lower() == "none" else parse_splits(split)
     work = batches(names, wanted, seeds, wordings)
-    count = core_count() if workers is None else workers
+    count = worker_count()
     found = ValidationResults()
     for results in _with_progress(validate(work, count), work):
         found.add(results)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from roboirg.cli.options import Workers, add_working_directory, check_output_file
+from roboirg.cli.options import add_working_directory, check_output_file
 from roboirg.cli.progress_bar import progress_bar
 from roboirg.cli.run_commands import USAGE_ERROR, Folder, folder_of, report_problems
 from roboirg.core.errors import InvalidValueError
@@ -31,19 +31,18 @@ def verify(
     run: RunOrPack,
     sample: SampleShare = "100%",
     sample_seed: SampleSeed = None,
-    workers: Workers = None,
 ) -> None:
     """Play the actions of a run again and check its records; exit code 2 if one does not hold."""
     from roboirg.apps.leaderboard.packing import opened_run
     from roboirg.apps.leaderboard.run_verification import verify_run
-    from roboirg.util.processor import core_count
+    from roboirg.util.processor import worker_count
 
     with opened_run(folder_of(run)) as folder, progress_bar("records") as show:
         found = verify_run(
             folder,
             sample=_share(sample),
             seed=sample_seed,
-            workers=core_count() if workers is None else workers,
+            workers=worker_count(),
             progress=show,
         )
     _print(found)
@@ -75,12 +74,11 @@ def board(
             "--verify", help="Share of the episodes to play again where not done yet, such as 5%."
         ),
     ] = None,
-    workers: Workers = None,
 ) -> None:
     """Make a leaderboard page of packed runs: verified, privileged, comparable or not."""
     from roboirg.apps.leaderboard.board_page import BOARD_FILE, read_packs, write_board
     from roboirg.evaluation.analysis.page.report import check_report_support
-    from roboirg.util.processor import core_count
+    from roboirg.util.processor import worker_count
 
     check_report_support()
     path = folder_of(folder)
@@ -88,7 +86,7 @@ def board(
         packs = read_packs(
             path,
             sample=None if verify_share is None else _share(verify_share),
-            workers=core_count() if workers is None else workers,
+            workers=worker_count(),
             progress=show,
         )
     page = out or path / BOARD_FILE
@@ -152,7 +150,6 @@ def _print_some(what: str, slugs: tuple[str, ...]) -> None:
 def repeat(
     run: Folder,
     out: Annotated[str, typer.Option(help="Folder of the repetition; the same again to resume.")],
-    workers: Workers = None,
 ) -> None:
     """Play a run's plan again with its policies, and print which verdicts changed."""
     from roboirg.apps.leaderboard.repeats import flips_by_cell, repeated_episodes, write_flips
@@ -172,7 +169,7 @@ def repeat(
     summary = play(
         with_secret(plan, folder).checked(),
         target,
-        choose_executor(workers, plan.episode_timeout_s),
+        choose_executor(episode_timeout_s=plan.episode_timeout_s),
         retry=True,
     )
     found = repeated_episodes(folder, target)

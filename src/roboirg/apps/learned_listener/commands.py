@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from roboirg.cli.options import Settings, Tasks, Workers, check_output_file
+from roboirg.cli.options import Settings, Tasks, check_output_file
 from roboirg.core.errors import InvalidValueError
 from roboirg.core.plain_text import counted
 
@@ -19,8 +19,6 @@ if TYPE_CHECKING:
 
 learn_app = typer.Typer(no_args_is_help=True, help="Train a listener, and let it answer.")
 
-_Words = Annotated[str, typer.Option(help="Pool of words: train or test.")]
-_Rivals = Annotated[bool, typer.Option("--rivals", help="Also hear instructions with a rival.")]
 _Without = Annotated[
     str, typer.Option(help="What it does not get: none, pictures, video or words.")
 ]
@@ -31,8 +29,9 @@ def learn_listener(
     out: Annotated[Path, typer.Option(help="File for what it has learned; with --study a folder.")],
     tasks: Tasks = "all",
     settings: Settings = "all",
-    words: _Words = "train",
-    rivals: _Rivals = False,
+    wordings: Annotated[
+        str, typer.Option(help="Our words that it hears: those for train or for test.")
+    ] = "train",
     scenes: Annotated[
         int, typer.Option(min=0, help="Random scenes of each task beyond the train split.")
     ] = 300,
@@ -49,17 +48,16 @@ def learn_listener(
             "them in tables and a figure.",
         ),
     ] = False,
-    workers: Workers = None,
 ) -> None:
     """Train a listener on the train split: pictures with free labels, then instructions."""
     from roboirg.apps.learned_listener.learned_listener import check_learn_support
-    from roboirg.util.processor import core_count
+    from roboirg.util.processor import worker_count
 
     check_learn_support()
-    plan = _plan(tasks, settings, words, without)._replace(
-        rivals=rivals, scenes=scenes, detector_epochs=epochs // 2, reader_epochs=epochs, seed=seed
+    plan = _plan(tasks, settings, wordings, without)._replace(
+        scenes=scenes, detector_epochs=epochs // 2, reader_epochs=epochs, seed=seed
     )
-    count = core_count() if workers is None else workers
+    count = worker_count()
     if study:
         _run_study(plan, out, count)
         return

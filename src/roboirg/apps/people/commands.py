@@ -16,7 +16,6 @@ from roboirg.cli.options import (
     Settings,
     Split,
     Tasks,
-    Workers,
     spread,
 )
 from roboirg.core.errors import InvalidValueError
@@ -63,7 +62,6 @@ def plan(
     consent: Annotated[
         Path | None, typer.Option(help="Text file that people agree to, instead of ours.")
     ] = None,
-    workers: Workers = None,
 ) -> None:
     """Plan a study of listeners and draw its pictures; continues one that was interrupted."""
     from roboirg.apps.people.listening_session import QUESTIONS
@@ -77,7 +75,7 @@ def plan(
     from roboirg.evaluation.grounding_items.grounding_item import write_items
     from roboirg.evaluation.grounding_items.question_set import collect_items
     from roboirg.evaluation.plan.plan_maker import make_plan
-    from roboirg.util.processor import core_count
+    from roboirg.util.processor import worker_count
 
     # The policy can be checked only when its answers are there; the oracle stands in for it.
     made = make_plan(
@@ -99,7 +97,7 @@ def plan(
         consent=CONSENT if consent is None else _read_text(consent),
     ).checked()
     write_listening_study(study, folder)
-    count = core_count() if workers is None else workers
+    count = worker_count()
     with progress_bar("episodes") as progress:
         found = collect_items(study.export_request(), folder / QUESTIONS, count, progress)
     write_items(found, folder / QUESTIONS)
@@ -136,7 +134,6 @@ def print_results(
     play: Annotated[
         bool, typer.Option("--play", help="Let the oracle's hands play the answers first.")
     ] = False,
-    workers: Workers = None,
 ) -> None:
     """Print how far people agree, how long they take, whether they pay attention.
 
@@ -149,7 +146,7 @@ def print_results(
         _print_listeners(folder)
         return
     made, out = answered_plan(folder), folder.absolute() / RUN
-    summary = run_commands.play(made, out, choose_executor(workers), retry=True)
+    summary = run_commands.play(made, out, choose_executor(), retry=True)
     run_commands.print_tables_of(out, made.jobs())
     _print_listeners(folder)
     run_commands.report_problems(summary, out)

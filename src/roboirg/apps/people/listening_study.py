@@ -150,7 +150,6 @@ class ListeningStudy(BaseModel):
             options=replace(plan.options, stages=plan.stages[0], delivery=DEFAULT_DELIVERY),
             frames_every=self.frames_every,
             wordings=plan.wordings,
-            formats=(),
         )
 
     @functools.cached_property
