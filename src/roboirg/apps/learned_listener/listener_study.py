@@ -14,7 +14,7 @@ from roboirg.core.word_pools import POOLS, PoolName
 from roboirg.envs.environment import RoboIRGEnv
 from roboirg.language import FORMS
 from roboirg.language.rivals import RIVAL_SETTINGS
-from roboirg.language.settings import plain_settings
+from roboirg.language.settings import all_settings, plain_settings
 from roboirg.language.variants import instructions
 from roboirg.tasks.splits.splits import SIZES, get_episode
 from roboirg.util.parallel_map import parallel_map

@@ -111,7 +111,7 @@ class Results:
     def table(
         self,
         which: str = "main",
-        format: str = "terminal",
+        format: str = "terminal",  # noqa: A002
         *,
         published: bool = False,
         floors: Sequence[str] = (),
