@@ -225,7 +225,7 @@ def hand_made(result: Any) -> tuple[list[Any], dict[InstructionKey, tuple[str, .
         results.append(result("success" if episode < 6 else "failure", episode))
         direct = result("success" if episode < 3 else "failure", episode, setting="direct")
         results.append(direct)
-        key = InstructionKey("PickXtimes", "test", episode, direct.options, None, "1", 1)
+        key = InstructionKey("PickXtimes", "test", episode, direct.options, "1", 1)
         labels[key] = ("a",) if episode % 2 == 0 else ("b", "c")
     return results, labels
 

@@ -97,7 +97,7 @@ def test_an_error_marks_its_cell_and_every_average_over_it(result) -> None:
 def test_what_is_missing_is_marked_and_compared_with_nothing(result) -> None:
     results = whole(result)
     planned = [one.identity for one in results]
-    gone = [one for one in results if (one.task, one.setting) != ("StopCube", "explicit")]
+    gone = [one for one in results if (one.task, one.options.setting) != ("StopCube", "explicit")]
     table = make_table("main", gather([("run", gone)], planned))
     assert (
         entries(table, "explicit")["StopCube"].text,

@@ -237,7 +237,7 @@ def test_the_policys_luck_is_the_same_in_every_setting_and_another_in_every_epis
     def luck(**changes: object) -> int:
         return load_policy(PreparedJob(replace(JOB, **changes))).seed  # type: ignore[attr-defined]
 
-    assert luck() == luck(setting="explicit")
+    assert luck() == luck(options=InstructionOptions("explicit"))
     assert len({luck(), luck(episode=3), luck(policy_seed=1)}) == 3
 
 

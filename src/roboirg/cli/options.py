@@ -18,11 +18,11 @@ if TYPE_CHECKING:
 
 Tasks = Annotated[
     str,
-    typer.Option(help="Tasks or suites, separated by commas; all for the whole benchmark."),
+    typer.Option(help="Tasks or suites, separated by commas."),
 ]
 Settings = Annotated[
     str,
-    typer.Option(help="Settings, separated by commas; all for every one but the harder ones."),
+    typer.Option(help="Settings, separated by commas; all but the harder ones."),
 ]
 Forms = Annotated[str, typer.Option(help="implicit, resolved, or both separated by a comma.")]
 Split = Annotated[str, typer.Option(help="train, val, test or random.")]
@@ -84,8 +84,7 @@ PlanName = Annotated[
     str | None,
     typer.Option(
         "--plan",
-        help="Plan that gives words, tasks, settings, … unless they are options here; see "
-        "roboirg run --show-plan.",
+        help="Plan with the words, and defaults of options here (roboirg run --show-plan).",
     ),
 ]
 SELECTION = ("tasks", "split", "episodes", "settings")

@@ -53,7 +53,7 @@ Wordings = Annotated[
     str | None,
     _words(help="Our words for train or test, or a file with commands.  (ours of the split)"),
 ]
-MaxSteps = Annotated[int | None, _episodes(help="Limit in control steps, 20 per second.  (1300)")]
+MaxSteps = Annotated[int | None, _play(help="Limit in control steps, 20 per second.  (1300)")]
 Video = Annotated[str | None, _play(help="Record videos of episodes: off, failures or all.  (off)")]
 
 

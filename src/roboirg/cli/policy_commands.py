@@ -75,7 +75,10 @@ def serve(
         float, typer.Option(min=0.1, help="Seconds a connection may be idle.")
     ] = _LIMITS.idle_s,
 ) -> None:
-    """Serve a policy to this benchmark and other clients of a protocol."""
+    """Serve a policy to this benchmark and other clients of a protocol.
+
+    Example: roboirg serve my_policy:MyPolicy --protocol openpi
+    """
     from roboirg.policies.policy_server import open_server
     from roboirg.policies.remote.server_options import ServerOptions
     from roboirg.util.freed_memory import keep_freed_memory

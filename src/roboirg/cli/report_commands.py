@@ -45,7 +45,10 @@ def report(
         int, typer.Option(help="Port on loopback for --serve; 0 chooses a free one.")
     ] = 0,
 ) -> None:
-    """Print the table of a run and write RUN/report.html, one self-contained page."""
+    """Print the table of a run and write RUN/report.html, one self-contained page.
+
+    Example: roboirg report runs/first
+    """
     from roboirg.cli import run_commands
     from roboirg.cli.progress_bar import progress_bar
     from roboirg.evaluation.analysis.page.report import check_report_support, write_report
@@ -105,7 +108,10 @@ def figures(
     ] = _ALL,
     published: Annotated[bool, typer.Option(help="Add the paper's values.")] = False,
 ) -> None:
-    """Draw the paper's figures of one or several runs, as PNG, SVG and PDF."""
+    """Draw the paper's figures of one or several runs, as PNG, SVG and PDF.
+
+    Example: roboirg figures runs/first --out figures
+    """
     from roboirg.evaluation.analysis.figures import FIGURES, FigureData, write_figures
     from roboirg.util.figure_files import check_figure_support
 
@@ -144,7 +150,10 @@ def tables(
         Path | None, typer.Option(help="Folder for a file of each table; prints without it.")
     ] = None,
 ) -> None:
-    """Print the paper's tables, or gaps by kind of words, for one or several runs."""
+    """Print the paper's tables, or gaps by kind of words, for one or several runs.
+
+    Example: roboirg tables runs/first --which main --published
+    """
     from roboirg.evaluation.analysis.tables.rendering import get_format
 
     output = get_format(format)
@@ -173,7 +182,10 @@ def compare(
     second: Annotated[str, typer.Argument(help="Another, or the same run.", metavar="B")],
     by: By = None,
 ) -> None:
-    """Compare two policies on the same episodes and say where one is clearly better."""
+    """Compare two policies on the same episodes and say where one is clearly better.
+
+    Example: roboirg compare runs/first runs/second --by pattern
+    """
     import numpy as np
     from rich.console import Console
     from rich.text import Text

@@ -13,7 +13,10 @@ def bench(
     rounds: Annotated[int, typer.Option(help="Number of repetitions.")] = 5,
     out: Annotated[Path | None, typer.Option(help="JSON file for the results.")] = None,
 ) -> None:
-    """Measure the time and memory of steps, resets and starts on this machine."""
+    """Measure the time and memory of steps, resets and starts on this machine.
+
+    Example: roboirg bench --out bench.json
+    """
     from rich.console import Console
 
     from roboirg.apps.bench.bench_runner import results_table, run_measures, write_results

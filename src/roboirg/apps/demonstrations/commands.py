@@ -33,18 +33,17 @@ def export_demonstrations(
     split: Split = "train",
     tasks: Tasks = "all",
     episodes: Annotated[
-        str, typer.Option(help="all, 4 for the first four, or a list such as 0,3,5-9.")
+        str, typer.Option(help="all, 4 for the first four, or a list: 0,3,5-9.")
     ] = "all",
     settings: Settings = "all",
     words: PlanWords = NO_PLAN,
     pictures: Annotated[
-        str, typer.Option(help="png or lossless-video, both without loss; lossy-video; or none.")
+        str, typer.Option(help="png, lossless-video, lossy-video or none.")
     ] = "png",
     video: Annotated[
         str | None,
         typer.Option(
-            help="Frames of the video: none, prefix (marked), or sidecar (a data set beside).  "
-            "(none; of robomme-hdf5 prefix)"
+            help="Frames of the video: none, prefix, or sidecar.  (none; of robomme-hdf5 prefix)"
         ),
     ] = None,
     names: Annotated[
@@ -52,30 +51,35 @@ def export_demonstrations(
         typer.Option(help="Names of the features: lerobot or openpi.  (by format)"),
     ] = None,
     actions: Annotated[
-        str, typer.Option(help="Further descriptions of actions: delta, pose, or both; or none.")
+        str, typer.Option(help="Further descriptions of actions: delta, pose or both.")
     ] = "none",
     variations: Annotated[
-        int, typer.Option(help="Trajectories per episode; all but the first vary.")
+        int, typer.Option(help="Trajectories per episode; further ones vary.")
     ] = 1,
     policy: Annotated[
-        str, typer.Option(help="Who moves the robot; the words change nothing for the oracle.")
+        str, typer.Option(help="Who moves the robot; words change nothing for oracle.")
     ] = "oracle",
     outcomes: Annotated[str, typer.Option(help="successes or all.")] = "successes",
     language_columns: Annotated[
         bool,
         typer.Option(
             "--language-columns",
-            help="Add LeRobot's language columns; LeRobot 0.6 or later reads them.",
+            help="Add language columns, for LeRobot 0.6 or later.",
         ),
     ] = False,
     trajectories: Annotated[
         Path | None,
-        typer.Option(help="Folder that keeps recorded trajectories for further exports."),
+        typer.Option(help="Folder that keeps trajectories for further exports."),
     ] = None,
     workers: Workers = None,
-    dry_run: Annotated[bool, typer.Option(help="Estimate the size and record nothing.")] = False,
+    dry_run: Annotated[
+        bool, typer.Option("--dry-run", help="Estimate the size and record nothing.")
+    ] = False,
 ) -> None:
-    """Export demonstrations for training, recorded once per episode, told in every setting."""
+    """Export demonstrations for training, recorded once per episode, told in every setting.
+
+    Example: roboirg export demonstrations --tasks PickXtimes --out data
+    """
     from roboirg.apps.demonstrations.export_plan import ExportPlan
     from roboirg.apps.demonstrations.export_run import run_export
     from roboirg.apps.demonstrations.size_estimate import size_text
@@ -154,7 +158,10 @@ def replay(
         typer.Option(help="File with a line for each result; what is in it is not replayed again."),
     ] = None,
 ) -> None:
-    """Execute the actions of a data set in the simulator, and compare states and verdicts."""
+    """Execute the actions of a data set in the simulator, and compare states and verdicts.
+
+    Example: roboirg replay data
+    """
     from collections import Counter
 
     from roboirg.apps.demonstrations.dataset_replay import TOLERANCE, replay_dataset

@@ -40,9 +40,6 @@ def export_grounding(
     split: AnySplit = "test",
     tasks: Tasks = "all",
     settings: Settings = "all",
-    episodes: Annotated[
-        str, typer.Option(help="all, 4 for the first four, or a list such as 0,3,5-9.")
-    ] = "all",
     words: PlanWords = NO_PLAN,
     variants: Annotated[
         bool, typer.Option(help="Add every combination of options that changes the words.")
@@ -52,7 +49,10 @@ def export_grounding(
         int, typer.Option(min=1, help="Control steps between two frames of a video.")
     ] = 8,
 ) -> None:
-    """Export questions of grounding with pictures: Parquet, JSON lines, VLMEvalKit's TSV."""
+    """Export questions of grounding with pictures: Parquet, JSON lines, VLMEvalKit's TSV.
+
+    Example: roboirg export grounding --split val --out grounding
+    """
     from roboirg.apps.grounding.dataset_export import export_grounding
     from roboirg.cli.names import known_settings, known_tasks
     from roboirg.cli.progress_bar import progress_bar
@@ -73,7 +73,7 @@ def export_grounding(
             EpisodeName(task, one, index)
             for task in known_tasks(tasks, options.wordings)
             for one in parse_splits(split)
-            for index in parse_episodes(episodes, one)
+            for index in parse_episodes(words.fields.get("episodes", "all"), one)
         ),
         settings=known_settings(settings),
         forms=words.forms(),
@@ -114,7 +114,10 @@ def score_grounding(
         Path | None, typer.Option(help="File for a report in Markdown, with confusions.")
     ] = None,
 ) -> None:
-    """Score answers to the grounding dataset; two files are also compared."""
+    """Score answers to the grounding dataset; two files are also compared.
+
+    Example: roboirg score grounding answers.jsonl --data grounding
+    """
     from rich.console import Console
 
     from roboirg.apps.grounding.answer_floors import floor_answers

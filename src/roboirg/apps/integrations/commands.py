@@ -30,7 +30,10 @@ def import_results(
         ),
     ] = None,
 ) -> None:
-    """Make records of the results of another harness, for tables, compare and report."""
+    """Make records of the results of another harness, for tables, compare and report.
+
+    Example: roboirg records import lerobot eval_info.json --policy mine --out runs/mine
+    """
     from roboirg.apps.integrations.result_import import ImportOptions
     from roboirg.apps.integrations.result_import import import_results as write_records
 

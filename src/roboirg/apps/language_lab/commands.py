@@ -49,7 +49,10 @@ def export_instructions(
     settings: Settings = "all",
     words: PlanWords = NO_PLAN,
 ) -> None:
-    """Export a row per episode, setting and form (columns: see docs/language.md)."""
+    """Export a row per episode, setting and form (columns: see docs/language.md).
+
+    Example: roboirg export instructions --split val --out words.parquet
+    """
     from roboirg.apps.language_lab.instruction_export import (
         EXPORT_FORMATS,
         check_export_support,
@@ -61,9 +64,9 @@ def export_instructions(
     from roboirg.language.variants import instructions
     from roboirg.tasks.splits.splits import split_episodes
 
+    check_output_file(out)
     kind = known_name("format", out.suffix.removeprefix("."), EXPORT_FORMATS)
     check_export_support(kind)
-    check_output_file(out)
     options = words.options()
     names, chosen = known_tasks(tasks, options.wordings), known_settings(settings)
     episodes = list(split_episodes(names, parse_splits(split)))
@@ -85,7 +88,10 @@ def stats(
     ] = None,
     settings: Settings = "all",
 ) -> None:
-    """Count words, referring expressions, patterns, relations and landmarks."""
+    """Count words, referring expressions, patterns, relations and landmarks.
+
+    Example: roboirg language stats --split val
+    """
     from roboirg.apps.language_lab.statistics_tables import overview_tables
     from roboirg.evaluation.analysis.figures.expressions import write_figure
     from roboirg.evaluation.plan.plan_parsing import parse_splits
@@ -121,7 +127,10 @@ def validate_instructions(
         typer.Option(help="A wording file, or our words for train or test."),
     ] = None,
 ) -> None:
-    """Read all instructions back and check their rules; exit code 2 if one is broken."""
+    """Read all instructions back and check their rules; exit code 2 if one is broken.
+
+    Example: roboirg language validate --seeds 10
+    """
     from roboirg.apps.language_lab.validation import ValidationResults, batches, validate
     from roboirg.apps.language_lab.validation.validation_tables import validation_tables
     from roboirg.evaluation.plan.plan_parsing import parse_splits
@@ -162,7 +171,10 @@ def score_shortcuts(
         bool, typer.Option(help="Add floors learned from the words of the train split (a minute).")
     ] = False,
 ) -> None:
-    """Score rules that see the words only, beside chance: how much needs no understanding."""
+    """Score rules that see the words only, beside chance: how much needs no understanding.
+
+    Example: roboirg language shortcuts --settings reasoning --by pattern
+    """
     from roboirg.evaluation.plan.plan_parsing import parse_splits
     from roboirg.shortcuts.learned_floor import check_learning_support
     from roboirg.shortcuts.shortcut_scores import GROUPINGS
@@ -222,7 +234,10 @@ def import_robomme(
     out: Annotated[Path, typer.Option(help="Wording file to write, TOML.")],
     name: Annotated[str, typer.Option(help="Name of the wordings, for records.")] = "robomme",
 ) -> None:
-    """Make a wording file of RoboMME's sentences; exit code 2 if one cannot be read back."""
+    """Make a wording file of RoboMME's sentences; exit code 2 if one cannot be read back.
+
+    Example: roboirg language import-robomme robomme --out robomme.toml
+    """
     from roboirg.apps.language_lab.robomme.robomme_import import import_robomme as make_wordings
     from roboirg.apps.language_lab.robomme.robomme_import import summary
     from roboirg.util.atomic_write import write_atomically

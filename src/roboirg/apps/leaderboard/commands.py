@@ -32,7 +32,10 @@ def verify(
     sample: SampleShare = "100%",
     sample_seed: SampleSeed = None,
 ) -> None:
-    """Play the actions of a run again and check its records; exit code 2 if one does not hold."""
+    """Play the actions of a run again and check its records; exit code 2 if one does not hold.
+
+    Example: roboirg leaderboard verify runs/first --sample 10%
+    """
     from roboirg.apps.leaderboard.packing import opened_run
     from roboirg.apps.leaderboard.run_verification import verify_run
     from roboirg.util.processor import worker_count
@@ -56,7 +59,10 @@ def pack(
     videos: Annotated[bool, typer.Option(help="Include the videos.")] = False,
     logs: Annotated[bool, typer.Option(help="Include what policies printed.")] = False,
 ) -> None:
-    """Pack records, plan and actions of a run into one file for others to check."""
+    """Pack records, plan and actions of a run into one file for others to check.
+
+    Example: roboirg leaderboard pack runs/first --out first.roboirg.zip
+    """
     from roboirg.apps.leaderboard.packing import pack_run
 
     check_output_file(out)
@@ -75,7 +81,10 @@ def board(
         ),
     ] = None,
 ) -> None:
-    """Make a leaderboard page of packed runs: verified, privileged, comparable or not."""
+    """Make a leaderboard page of packed runs: verified, privileged, comparable or not.
+
+    Example: roboirg leaderboard board packs --verify 5%
+    """
     from roboirg.apps.leaderboard.board_page import BOARD_FILE, read_packs, write_board
     from roboirg.evaluation.analysis.page.report import check_report_support
     from roboirg.util.processor import worker_count
@@ -151,7 +160,10 @@ def repeat(
     run: Folder,
     out: Annotated[str, typer.Option(help="Folder of the repetition; the same again to resume.")],
 ) -> None:
-    """Play a run's plan again with its policies, and print which verdicts changed."""
+    """Play a run's plan again with its policies, and print which verdicts changed.
+
+    Example: roboirg leaderboard repeat runs/first --out runs/again
+    """
     from roboirg.apps.leaderboard.repeats import flips_by_cell, repeated_episodes, write_flips
     from roboirg.cli.run_commands import play
     from roboirg.evaluation.plan.stored_plans import read_plan, with_secret

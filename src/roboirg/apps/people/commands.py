@@ -55,15 +55,14 @@ def plan(
     words: PlanWords = NO_PLAN,
     practice: Annotated[int, typer.Option(help="Practice questions for each task.")] = 1,
     checks: Annotated[int, typer.Option(help="Attention checks for each person.")] = 2,
-    seed: Annotated[int, typer.Option(help="Seed of the order of the episodes.")] = 0,
-    frames_every: Annotated[
-        int, typer.Option(help="Control steps between two frames of a video.")
-    ] = 4,
     consent: Annotated[
         Path | None, typer.Option(help="Text file that people agree to, instead of ours.")
     ] = None,
 ) -> None:
-    """Plan a study of listeners and draw its pictures; continues one that was interrupted."""
+    """Plan a study of listeners and draw its pictures; continues one that was interrupted.
+
+    Example: roboirg listen plan study --people 10
+    """
     from roboirg.apps.people.listening_session import QUESTIONS
     from roboirg.apps.people.listening_study import (
         CONSENT,
@@ -92,8 +91,6 @@ def plan(
         people=people,
         practice=practice,
         checks=checks,
-        seed=seed,
-        frames_every=frames_every,
         consent=CONSENT if consent is None else _read_text(consent),
     ).checked()
     write_listening_study(study, folder)
@@ -121,7 +118,10 @@ def serve_study(
         typer.Option(min=1, help="How many may take part, if not as many as planned."),
     ] = None,
 ) -> None:
-    """Serve the page of a study; every answer is on the disk before the next question comes."""
+    """Serve the page of a study; every answer is on the disk before the next question comes.
+
+    Example: roboirg listen serve study
+    """
     from roboirg.apps.people.listen_server import ListenServer
 
     server = ListenServer(folder, host, port, allow_host or (), people)
@@ -138,6 +138,8 @@ def print_results(
     """Print how far people agree, how long they take, whether they pay attention.
 
     Records of what --play plays are in FOLDER/run.
+
+    Example: roboirg listen results study
     """
     from roboirg.apps.people.people_run import RUN, answered_plan
     from roboirg.evaluation.run.executor import choose_executor
@@ -206,7 +208,10 @@ def drive(
     port: Port = 0,
     allow_host: AllowHost = None,
 ) -> None:
-    """Drive an episode in the browser, by mouse, touch or keyboard; stores its record."""
+    """Drive an episode in the browser, by mouse, touch or keyboard; stores its record.
+
+    Example: roboirg drive PickXtimes 3 --setting direct
+    """
     from roboirg.apps.people.drive_server import DriveServer
     from roboirg.apps.people.driving_run import DRIVER
     from roboirg.envs.factory import check_simulator

@@ -33,7 +33,10 @@ def show(
         str | None, typer.Option(help="PNG file to write; TASK-SPLIT-EPISODE.png by default.")
     ] = None,
 ) -> None:
-    """Print an episode's scene and instructions, and draw how the oracle plays it."""
+    """Print an episode's scene and instructions, and draw how the oracle plays it.
+
+    Example: roboirg show PickXtimes 3 --words
+    """
     from roboirg.language import settings_of
     from roboirg.language.generator import check_options
     from roboirg.tasks import get_task

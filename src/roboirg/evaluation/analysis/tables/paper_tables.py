@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import asdict
 from fractions import Fraction
 from typing import Literal, NamedTuple, get_args
 
@@ -247,7 +246,7 @@ def _floor(floor: str, task: str, options: InstructionOptions, cells: Cells) -> 
                 task=task,
                 split=key.policy_run.conditions.split,
                 episode=trial.episode,
-                **asdict(options),
+                options=options,
             )
             for key, cell in cells.items()
             if (key.task, key.options) == (task, options)
