@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import shlex
+from typing import get_type_hints
 
 import count_commands
 import pytest
@@ -71,7 +72,7 @@ def test_a_plan_explains_all_of_its_fields_and_is_read_back(tmp_path):
 
 
 def test_options_of_instructions_are_listed_once():
-    assert tuple(InstructionKeywords.__annotations__) == OPTION_NAMES == tuple(OPTION_HELP)
+    assert set(get_type_hints(InstructionKeywords)) == set(OPTION_NAMES) == set(OPTION_HELP)
     (shown,) = (one.parameters for one in count_commands.commands() if one.words == "show")
     own = {"setting", "form", "delivery"}
     assert {f"--{name}" for name in OPTION_NAMES if name not in own} <= set(shown)

@@ -77,17 +77,22 @@ class InstructionOptions:
     )
 
 
-class InstructionKeywords(TypedDict, total=False):
-    """The fields of `InstructionOptions` as keyword arguments."""
+class WordKeywords(TypedDict, total=False):
+    """The fields of `InstructionOptions` but setting and form, as keyword arguments."""
 
-    setting: str
-    form: str
     stages: Sequence[int]
     distractor: str
     distractors: int
     frame: str
     wordings: str | Path | None
     delivery: str
+
+
+class InstructionKeywords(WordKeywords, total=False):
+    """The fields of `InstructionOptions` as keyword arguments."""
+
+    setting: str
+    form: str
 
 
 OPTION_NAMES = tuple(one.name for one in fields(InstructionOptions))
@@ -100,3 +105,9 @@ def split_options(given: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, A
     """Return the options of instructions among some keyword arguments, and the others."""
     options = {name: value for name, value in given.items() if name in OPTION_NAMES}
     return options, {name: value for name, value in given.items() if name not in OPTION_NAMES}
+
+
+def as_fields(given: Mapping[str, Any]) -> dict[str, Any]:
+    """Return keyword arguments of options as fields, whose stages are a tuple."""
+    stages = {"stages": tuple(given["stages"])} if "stages" in given else {}
+    return {**given, **stages}

@@ -9,7 +9,12 @@ from typing import Any
 from roboirg.core.actions import JOINT_ANGLE
 from roboirg.core.episode import Episode
 from roboirg.core.errors import InvalidValueError, UnknownNameError
-from roboirg.core.instruction_options import OPTION_NAMES, InstructionOptions, split_options
+from roboirg.core.instruction_options import (
+    OPTION_NAMES,
+    InstructionOptions,
+    as_fields,
+    split_options,
+)
 from roboirg.core.observations import CAMERAS, DemonstrationFrames
 from roboirg.language.wordings.wording_store import open_wordings
 from roboirg.simulation.observation_builder import ObservationSpec
@@ -116,8 +121,7 @@ class EnvSettings:
 def _nested(words: InstructionOptions, options: Mapping[str, Any]) -> dict[str, Any]:
     """Return keyword arguments of `EnvSettings`, in which `words` holds those of the words."""
     chosen, others = split_options(options)
-    if "stages" in chosen:
-        chosen["stages"] = tuple(chosen["stages"])
+    chosen = as_fields(chosen)
     if "wordings" in chosen:
         chosen["wordings"] = open_wordings(chosen["wordings"])
     return {**others, "words": replace(words, **chosen)}
