@@ -36,10 +36,13 @@ with extra_needed("Remote policies need websockets 17.4 or newer", "remote"):
         TooManyFragments,
         WebSocketException,
     )
+    from websockets.protocol import State
     from websockets.sync.client import ClientConnection, connect
 
 CLOSE_TIMEOUT = 2.0
 """Seconds to wait for a server's closing frame."""
+_CHECK_S = 1.0
+"""Seconds between two looks at whether the library has refused what the server sends."""
 _TOO_BIG = 1009
 """Websocket close code for a message above the size limit."""
 _RETRYABLE = frozenset({408, 425, 429, 500, 502, 503, 504})
@@ -94,11 +97,14 @@ class WebsocketConnection:
 
     def _abort(self) -> None:
         """Close the connection to a server that may not take part in that."""
+        self._shut_down()
+        self.close()
+
+    def _shut_down(self) -> None:
         if self._socket is not None:
             with contextlib.suppress(OSError):
                 # Wakes a thread that sends and holds the lock that closing needs; also with TLS.
                 socket.socket.shutdown(self._socket.socket, socket.SHUT_RDWR)
-        self.close()
 
     def read_metadata(self, seconds: float) -> Mapping[str, Any]:
         """Return what the server says about itself, which it does first."""
@@ -165,13 +171,18 @@ class WebsocketConnection:
 
     def receive(self, what: str, seconds: float) -> bytes:
         """Return the next message; `what` and `seconds` are for the error if there is none."""
-        connection = self._open()
+        connection, data = self._open(), None
         try:
-            data = connection.recv(timeout=max(0.0, self._end - time.monotonic()))
-        except TimeoutError as error:
-            raise PolicyTimeoutError(
-                f"{self.spec} did not send {what} within {seconds:g} s."
-            ) from error
+            while data is None:
+                left = self._end - time.monotonic()
+                with contextlib.suppress(TimeoutError):
+                    data = connection.recv(timeout=min(_CHECK_S, max(0.0, left)))
+                if data is None and left <= 0:
+                    raise PolicyTimeoutError(
+                        f"{self.spec} did not send {what} within {seconds:g} s."
+                    )
+                if data is None and connection.protocol.state is not State.OPEN:
+                    self._shut_down()  # the server does not end what the library has refused
         except ConnectionClosed as error:
             raise self._broken(error) from error
         if isinstance(data, str):
