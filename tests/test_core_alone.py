@@ -43,7 +43,7 @@ sys.__stdout__.write(json.dumps(found))
 NEEDS = {
     "bench": "sim", "run": "sim", "show": "sim", "demo": "report", "report": "report",
     "figures": "report", "compare": "report", "serve": "remote",
-    "records export": "export", "real run": "sim", "real score": "report",
+    "records export": "export", "real run": "sim", "real score": "pages",
     "export demonstrations": "sim", "export grounding": "sim",
     "leaderboard repeat": "sim", "leaderboard board": "report",
     "language shortcuts": "report",
