@@ -176,6 +176,7 @@ def test_words_are_searched_in_utterances_and_causes(page: Any) -> None:
     assert page.locator("#nothing").is_visible()
 
 
+@pytest.mark.slow
 def test_the_address_keeps_filters_pages_and_episodes(page: Any, page_file: Path) -> None:
     page.select_option("#filters [name=task]", "VideoUnmask")
     page.get_by_label("Next page").click()

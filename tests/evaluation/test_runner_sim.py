@@ -140,6 +140,7 @@ def kill_in_the_middle(folder: Path, *words: str) -> None:
 
 
 @pytest.mark.usefixtures("without_cache")
+@pytest.mark.slow
 def test_workers_and_kills_leave_no_trace_in_the_records(tmp_path: Path) -> None:
     folders = [tmp_path / name for name in ("one", "two", "killed")]
     plan = tmp_path / "plan.yaml"

@@ -29,11 +29,12 @@ UNMASK = get_episode("VideoUnmask", "test", 0).scene
 ALLOWED = (
     "roboirg.core.episode",
     "roboirg.core.conditions",
+    "roboirg.core.errors",
     "roboirg.core.motions",
     "roboirg.tasks",
     "roboirg.reader",
 )
-"""The scene as data, and the goals that a task can have."""
+"""The scene as data, the goals that a task can have, and the errors of bad input."""
 
 
 def imported(path):
