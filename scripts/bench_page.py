@@ -17,6 +17,8 @@ import time
 from pathlib import Path
 from typing import Any
 
+from msgspec.structs import replace
+
 from roboirg.evaluation.analysis.page.report import render
 from roboirg.evaluation.records.record import Record
 from roboirg.evaluation.records.store import read_records
@@ -45,7 +47,7 @@ FILTER = """async (hash) => {
 def repeated(records: tuple[Record, ...], number: int) -> list[Record]:
     """Return a number of copies of records; each round has another policy seed."""
     copies = (
-        record.model_copy(update={"policy_seed": seed, "video": None})
+        replace(record, policy_seed=seed, video=None)
         for seed in itertools.count()
         for record in records
     )

@@ -8,17 +8,16 @@ from __future__ import annotations
 import itertools
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
 from roboirg.core.episode import Episode
-from roboirg.core.instruction_options import REASONINGS, RIVALS, InstructionOptions
-from roboirg.language.generator import find_refusal, instruct, instruct_with
+from roboirg.core.instruction_options import InstructionOptions
+from roboirg.language.generator import find_refusal, instruct
 from roboirg.language.instruction import Instruction, Mention
-from roboirg.language.settings import all_settings
+from roboirg.language.settings import all_settings, settings_of
 from roboirg.language.templates import LANGUAGE_VERSION
-from roboirg.language.variants import Variant, all_variants
-from roboirg.tasks import all_tasks, get_task
-from roboirg.tasks.splits.splits import get_episode
+from roboirg.language.variants import all_variants
+from roboirg.tasks import Task, all_tasks, get_task
+from roboirg.tasks.splits.splits import get_episode, split_size
 
 SPLIT = "test"
 PAGE = Path(__file__).parent.parent / "docs" / "language-card.md"
@@ -41,22 +40,16 @@ def language_card() -> str:
     for task in all_tasks().values():
         parts.append(f"## {task.name}")
         parts += [_example(task.name, one.setting) for one in variants if one.task == task.name]
-    parts.append("## Options\n\nWith a rival, and with open reasoning.")
-    parts += [_option_example(one) for one in variants if _option_of(one.setting)]
+    parts.append("## Harder settings\n\nWith a rival, and with open reasoning.")
+    parts += [_harder_example(*one) for one in _harder_variants()]
     return "\n\n".join(parts) + "\n"
 
 
-def example_episode(task: str, setting: str, options: InstructionOptions | None = None) -> Episode:
-    """Return the setting's example, or the next episode that the setting can express.
-
-    Args:
-        task: name of the task.
-        setting: name of the setting.
-        options: of the setting; None for the usual ones.
-    """
+def example_episode(task: str, setting: str) -> Episode:
+    """Return the setting's example, or the next episode that the setting can express."""
     first = all_settings()[setting].example
     episodes = (get_episode(get_task(task).name, SPLIT, index) for index in itertools.count(first))
-    options = options or InstructionOptions(setting)
+    options = InstructionOptions(setting)
     return next(episode for episode in episodes if find_refusal(episode, options) is None)
 
 
@@ -77,34 +70,40 @@ def _example(task: str, setting: str) -> str:
     return "\n".join(lines)
 
 
-def _option_of(setting: str) -> dict[str, Any]:
-    """Return the option that adds other words of our own to a setting; none for contextual.
+def _harder_variants() -> Iterator[tuple[str, str]]:
+    """Yield tasks with their harder settings, but contextual-rival.
 
-    Its introduction and command are those of direct.
+    Its introduction and command are those of direct-rival.
     """
-    reads = all_settings()[setting].reads
-    if "stages" in reads:
-        return {}
-    if "rival" in reads:
-        return {"rival": RIVALS[-1]}
-    return {"reasoning": REASONINGS[-1]} if "reasoning" in reads else {}
+    for task in all_tasks().values():
+        for setting in settings_of(task):
+            rule = all_settings()[setting]
+            if (
+                rule.plain is not None
+                and "stages" not in rule.reads
+                and _has_example(task, setting)
+            ):
+                yield task.name, setting
 
 
-def _option_example(variant: Variant) -> str:
-    option = _option_of(variant.setting)
-    options = InstructionOptions(variant.setting)._replace(**option)
-    episode = example_episode(variant.task, variant.setting, options)
-    ((name, value),) = option.items()
-    implicit = instruct_with(episode, options)
+def _has_example(task: Task, setting: str) -> bool:
+    options = InstructionOptions(setting)
+    episodes = (get_episode(task.name, SPLIT, index) for index in range(split_size(SPLIT)))
+    return any(find_refusal(episode, options) is None for episode in episodes)
+
+
+def _harder_example(task: str, setting: str) -> str:
+    episode = example_episode(task, setting)
+    implicit = instruct(episode, setting)
     lines = [
-        f"### {variant.task}, {variant.setting}, {name} {value}",
+        f"### {task}, {setting}",
         "",
         f"Episode `{episode.key}`, {', '.join((episode.difficulty, *_about(implicit)))}.",
         "",
         "| | |",
         "| --- | --- |",
-        f"| {variant.setting} | {marked(implicit)} |",
-        f"| resolved | {marked(instruct_with(episode, options._replace(form='resolved')))} |",
+        f"| {setting} | {marked(implicit)} |",
+        f"| resolved | {marked(instruct(episode, setting, 'resolved'))} |",
     ]
     return "\n".join(lines)
 

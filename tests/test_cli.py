@@ -10,14 +10,17 @@ from pathlib import Path
 
 import pytest
 import typer.main
+from msgspec.structs import replace
 
 from roboirg import main as cli
 from roboirg.cli import demo_commands
 from roboirg.cli.progress_bar import progress_bars
-from roboirg.evaluation.plan.plan import read_plan
+from roboirg.cli.run_commands import report_problems
+from roboirg.evaluation.plan.stored_plans import read_plan
 from roboirg.evaluation.play.rollout_result import RolloutResult, make_record
 from roboirg.evaluation.records.record import Job
 from roboirg.evaluation.records.store import RecordStore
+from roboirg.evaluation.run.runner import RunSummary
 from roboirg.util.console_width import progress_console
 
 RUN = ("run", "--policy", "random", "--tasks", "PickXtimes")
@@ -80,7 +83,7 @@ def canned(monkeypatch: pytest.MonkeyPatch) -> type[CannedPlayer]:
         (("--episodes", "50,"), "There is no episode 50: split 'test' has episodes 0 to 49."),
         (("--episodes", "four"), "'four' is not a valid episode"),
         (("--policy", "listner"), "Did you mean 'listener'?"),
-        (("--workers", "-1"), "workers is -1; it must be at least 1."),
+        (("--workers", "-1"), "workers is -1; it must be at least 0, this process only."),
         (("--plan", "papr"), "Did you mean 'paper'?"),
         (("--executor", "slurm"), "There is no executor 'slurm'; known: local, ray."),
         (("--address", "auto"), "needs --executor ray."),
@@ -332,6 +335,14 @@ def test_what_is_typed_goes_before_what_the_plan_says(
     assert (made.policies, made.tasks, made.episodes) == (("random",), ("StopCube",), (0, 1))
 
 
+@pytest.mark.parametrize(("missing", "verb"), [(1, "was"), (2, "were")])
+def test_one_episode_takes_a_singular_verb(capsys, missing: int, verb: str) -> None:
+    summary = RunSummary(9, 9 - missing, (), missing, 0, (), ())
+    with pytest.raises(SystemExit):
+        report_problems(summary, Path("out"))
+    assert f"{missing} of 9 episodes {verb} not played" in capsys.readouterr().err
+
+
 def test_a_run_without_a_policy_is_told(roboirg, tmp_path: Path) -> None:
     said = roboirg("run", "--plan", "paper", "--out", tmp_path)
     assert said.code == 2
@@ -348,9 +359,25 @@ def test_a_dry_run_counts_and_plays_nothing(roboirg, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
+    ("words", "caption"),
+    [
+        (("--settings", "explicit"), "episodes"),
+        (("--settings", "explicit,direct"), "episodes: implicit"),
+        (("--settings", "direct", "--forms", "resolved"), "episodes: resolved"),
+        (("--settings", "direct", "--forms", "implicit,resolved"), "episodes: implicit + resolved"),
+    ],
+)
+def test_a_dry_run_names_the_forms_it_counts(
+    roboirg, tmp_path: Path, words: tuple[str, ...], caption: str
+) -> None:
+    said = roboirg(*RUN, *words, "--dry-run", "--out", tmp_path / "out")
+    assert caption in map(str.strip, said.out.splitlines())
+
+
+@pytest.mark.parametrize(
     ("words", "sentence"),
     [
-        (("--workers", "-2"), "workers is -2; it must be at least 1"),
+        (("--workers", "-2"), "workers is -2; it must be at least 0, this process only."),
         (("--executor", "slurm"), "There is no executor 'slurm'"),
         (("--address", "auto"), "--address 'auto' needs --executor ray"),
         (("--out", "{file}"), "Cannot write to {file}: {file} is not a folder"),
@@ -366,11 +393,7 @@ def test_a_dry_run_checks_what_a_run_checks(
     job = Job(policy="random", task="PickXtimes", split="test", episode=0, setting="direct")
     with RecordStore(other) as store:
         result = RolloutResult("success", cause=None, steps=7)
-        store.append(
-            make_record(job, result, started_at="now").model_copy(
-                update={"language_version": "1.1"}
-            )
-        )
+        store.append(replace(make_record(job, result, started_at="now"), language_version="1.1"))
     places = {"file": file, "other": other}
     given = [word.format(**places) for word in words]
     before = sorted(tmp_path.rglob("*"))
@@ -462,6 +485,21 @@ def test_a_module_without_a_class_gets_a_hint(
     assert said.code == 2
     name = word.removesuffix(".py").replace("/", ".")
     assert said.err.endswith(f"Policy {word!r} is a module; name its class, {name}:Mine.\n")
+
+
+@pytest.mark.parametrize(
+    ("word", "meant"),
+    [
+        ("p15.py:Reach", "p15:Reach"),
+        ("./p15.py:Reach", "p15:Reach"),
+        ("folder/p15:Reach", "folder.p15:Reach"),
+        ("/elsewhere/p15.py:Reach", "p15:Reach"),
+    ],
+)
+def test_a_file_with_a_class_gets_a_hint(roboirg, tmp_path: Path, word: str, meant: str) -> None:
+    said = roboirg("run", "--policy", word, "--out", tmp_path / "out")
+    assert said.code == 2
+    assert said.err == f"roboirg: Policy {word!r} names a file; name its module: {meant}.\n"
 
 
 def test_runs_are_merged_and_exported(roboirg, tmp_path: Path, canned: type[CannedPlayer]) -> None:

@@ -18,10 +18,10 @@ from roboirg.core.delivery import (
 from roboirg.core.errors import UnknownNameError
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.evaluation.records.store import read_records
-from roboirg.language.settings import all_settings, settings_of
+from roboirg.language.settings import all_settings
 from roboirg.main import app
 from roboirg.policies import make_policy, play
-from roboirg.tasks import all_tasks, get_task
+from roboirg.tasks import all_tasks
 from roboirg.tasks.splits.splits import get_episode
 
 
@@ -62,7 +62,7 @@ def test_the_settings_with_several_utterances_read_the_delivery():
     for name in all_tasks():
         for index in range(4):
             episode = get_episode(name, "test", index)
-            for setting in settings_of(get_task(name)):
+            for setting in language.expressible(episode):
                 if len(language.instruct(episode, setting).utterances) > 1:
                     several.add(setting)
     assert several == {name for name, one in all_settings().items() if "delivery" in one.reads}

@@ -19,9 +19,9 @@ from typing import Any, NamedTuple
 import pytest
 import typer.main
 
-from roboirg.evaluation.plan.plan import write_plan
 from roboirg.evaluation.plan.plan_file import read_plan_file
 from roboirg.evaluation.plan.plan_maker import make_plan
+from roboirg.evaluation.plan.stored_plans import write_plan
 from roboirg.evaluation.play.rollout_result import RolloutResult, make_record
 from roboirg.evaluation.records.store import RecordStore
 from roboirg.main import app, main

@@ -23,6 +23,7 @@ from roboirg.envs.env_settings import EnvSettings
 from roboirg.envs.environment import RoboIRGEnv
 from roboirg.envs.registration import environment_id
 from roboirg.envs.vector.vector_environment import RoboIRGVectorEnv
+from roboirg.evaluation.play.job_instruction import PreparedJob
 from roboirg.evaluation.play.policy_environment import make_env
 from roboirg.evaluation.records.record import Job
 from roboirg.policies import make_policy, play
@@ -188,7 +189,7 @@ def test_an_environment_without_what_a_policy_looks_at_is_refused(attribute):
 def test_runs_give_policies_their_action_space():
     job = Job(policy="random", task="PickXtimes", split="test", episode=2, setting="direct")
     for space in ACTION_SPACES.values():
-        env = make_env(job, PolicyNeeds(cameras=(), actions=space.name))
+        env = make_env(PreparedJob(job), PolicyNeeds(cameras=(), actions=space.name))
         assert env.actions == space.name
         assert np.array_equal(env.action_space.low, space.low)
 
@@ -369,7 +370,9 @@ def test_policies_are_shown_what_they_ask_for():
     job = Job(
         policy=f"{__name__}:Choosy", task="PickXtimes", split="test", episode=2, setting="direct"
     )
-    env = make_env(job, PolicyNeeds(cameras=(), demonstration_frames="none", observe_every=5))
+    env = make_env(
+        PreparedJob(job), PolicyNeeds(cameras=(), demonstration_frames="none", observe_every=5)
+    )
     env.max_steps = 20
     play(env, policy)
     assert policy.seen == [3, 0, 1, 1]
@@ -384,6 +387,17 @@ def test_a_closed_environment_lets_go_of_its_world(task):
     env.close()
     del policy
     assert world() is None
+
+
+def test_a_reset_makes_the_words_again_only_for_other_options():
+    env = roboirg.make("PickXtimes", cameras=())
+    said = env.instruction
+    env.reset()
+    assert env.instruction is said
+    env.reset(options={"setting": "direct"})
+    assert env.instruction.setting == "direct"
+    env.reset()
+    assert env.instruction == said
 
 
 def test_time_is_up_after_max_steps():

@@ -173,6 +173,17 @@ def test_no_prose_has_a_forbidden_phrase(phrase):
     check_empty(found)
 
 
+def test_the_verb_of_a_count_agrees_with_it():
+    found = [
+        f"{path.relative_to(ROOT)}: {match[0]}"
+        for path in SOURCES
+        for match in re.finditer(
+            r"counted\([^{}]*\)\} (are|were|have|do)\b", path.read_text("utf-8")
+        )
+    ]
+    check_empty(found)  # `plain_text.verb_for`
+
+
 def test_inside_a_room_no_import_runs_back_up():
     check_empty(layout.imports_back_up())
 

@@ -16,7 +16,7 @@ NAMES = {
     "--tasks": "PickXtime", "--settings": "spatail", "--setting": "spatail", "--forms": "implict",
     "--form": "implict", "--split": "tset", "--episodes": "four", "--policy-seeds": "one",
     "--stages": "9-1", "--distractor": "nutral", "--frame": "robt", "--delivery": "turn",
-    "--rival": "dravn", "--reasoning": "plane", "--wordings": "nowhere.toml", "--actions": "joints",
+    "--wordings": "nowhere.toml", "--actions": "joints",
     "--demonstration-frames": "some", "--meshes": "lite", "--video": "som", "--protocol": "opnpi",
     "--policy-process": "mine", "--long-prompts": "cut", "--retry-on": "conection",
     "--executor": "slurm", "--plan": "papr", "--api-key-env": "NO_SUCH_VARIABLE", "--which": "mian",

@@ -14,6 +14,7 @@ from roboirg.evaluation.plan.plan_maker import make_plan
 from roboirg.evaluation.play.rollout import EpisodeRunner
 from roboirg.evaluation.play.rollout_result import RolloutResult, make_record, utc_now
 from roboirg.evaluation.records.record import EventRecord, Job, Record
+from roboirg.evaluation.records.record_codec import encode
 from roboirg.evaluation.records.store import RECORDS_FILE, RecordStore
 from roboirg.evaluation.run.executor import LocalProcesses
 from roboirg.evaluation.run.progress import SilentReporter
@@ -97,7 +98,7 @@ def _many_records() -> tuple[Plan, Path]:
         for job in plan.jobs():
             key = (job.episode, job.setting)
             if key not in lines:
-                lines[key] = _unplayed_record(job).model_dump_json().encode() + b"\n"
+                lines[key] = encode(_unplayed_record(job)) + b"\n"
             file.write(
                 lines[key].replace(b'"policy_seed":0', b'"policy_seed":%d' % job.policy_seed)
             )

@@ -10,14 +10,17 @@ import itertools
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 
+import msgspec
 import numpy as np
 
 from roboirg.core.conditions import Fact, FactCount, OccurrenceCount, facts_of
 from roboirg.core.episode import Episode, Stage
-from roboirg.evaluation.plan.plan import Plan, write_plan
+from roboirg.evaluation.plan.plan import Plan
 from roboirg.evaluation.plan.plan_maker import make_plan
+from roboirg.evaluation.plan.stored_plans import write_plan
 from roboirg.evaluation.play.rollout_result import RolloutResult, make_record
 from roboirg.evaluation.records.record import Attribution, EventRecord, Job, Outcome, Record
+from roboirg.evaluation.records.record_codec import encode
 from roboirg.evaluation.records.store import RECORDS_FILE
 from roboirg.tasks.splits.splits import get_episode
 
@@ -51,7 +54,7 @@ def write_synthetic_run(folder: Path, count: int) -> Plan:
     rng = np.random.default_rng(_SEED)
     with (folder / RECORDS_FILE).open("xb") as file:
         for record in _records(itertools.islice(plan.jobs(), count), rng):
-            file.write(record.model_dump_json().encode() + b"\n")
+            file.write(encode(record) + b"\n")
     return plan
 
 
@@ -59,7 +62,7 @@ def _records(jobs: Iterable[Job], rng: np.random.Generator) -> Iterator[Record]:
     """Yield the record of each job; those of one instruction are varied copies."""
     by_instruction: dict[Job, Record] = {}
     for job in jobs:
-        key = job.model_copy(update={"policy": POLICIES[0], "policy_seed": 0})
+        key = msgspec.structs.replace(job, policy=POLICIES[0], policy_seed=0)
         if key not in by_instruction:
             result = RolloutResult("success", cause=None)
             by_instruction[key] = make_record(job, result, started_at=STARTED_AT)
@@ -103,7 +106,7 @@ def _varied(record: Record, job: Job, episode: Episode, rng: np.random.Generator
         }
     elif outcome == "error":
         update |= {"error": "policy", "cause": "policy: ValueError: no action"}
-    return record.model_copy(update=update)
+    return msgspec.structs.replace(record, **update)
 
 
 def _events(episode: Episode, rng: np.random.Generator) -> tuple[list[EventRecord], int]:

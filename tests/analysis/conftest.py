@@ -11,12 +11,12 @@ import pytest
 
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.evaluation.analysis.published import TRIALS, published_rows
-from roboirg.evaluation.records.record import Result
+from roboirg.evaluation.records.record import Summary
 
-MakeResult = Callable[..., Result]
+MakeResult = Callable[..., Summary]
 
 
-def make_result(outcome: str = "success", episode: int = 0, **fields: object) -> Result:
+def make_result(outcome: str = "success", episode: int = 0, **fields: object) -> Summary:
     usual = {
         "policy": "listener",
         "task": "PickXtimes",
@@ -28,10 +28,12 @@ def make_result(outcome: str = "success", episode: int = 0, **fields: object) ->
         "language_version": "1",
         "environment_version": 1,
         "package_version": "0",
+        "started_at": "now",
+        "duration_s": 0.0,
         **fields,
     }
     error = {"error": "policy"} if outcome == "error" else {}
-    return Result(outcome=outcome, episode=episode, **error, **usual)  # type: ignore[arg-type]
+    return Summary(outcome=outcome, episode=episode, **error, **usual)  # type: ignore[arg-type]
 
 
 def with_rate(
@@ -41,7 +43,7 @@ def with_rate(
     rng: np.random.Generator,
     options: InstructionOptions,
     **fields: object,
-) -> Iterable[Result]:
+) -> Iterable[Summary]:
     """Yield the results of a cell with a number of successes on randomly drawn trials."""
     won = np.zeros(episodes * seeds, dtype=bool)
     won[rng.permutation(len(won))[:successes]] = True
@@ -55,7 +57,7 @@ def with_rate(
         )
 
 
-def like_published(table: str, only: str | None = None) -> list[Result]:
+def like_published(table: str, only: str | None = None) -> list[Summary]:
     """Return results with the rates, episodes and seeds of a published table."""
     episodes, seeds = TRIALS[table]  # type: ignore[index]
     rng = np.random.default_rng(8)
@@ -83,12 +85,12 @@ def result() -> MakeResult:
 
 
 @pytest.fixture(scope="session")
-def published_like() -> Callable[..., list[Result]]:
+def published_like() -> Callable[..., list[Summary]]:
     return like_published
 
 
 @pytest.fixture(scope="session")
-def cell_of() -> Callable[..., Iterable[Result]]:
+def cell_of() -> Callable[..., Iterable[Summary]]:
     return with_rate
 
 

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 import pytest
 import typer
+from msgspec.structs import replace
 from typer.testing import CliRunner
 
 from roboirg.cli.report_commands import compare as compare_command
@@ -37,13 +38,15 @@ from roboirg.evaluation.analysis.stats.comparison_text import sentences
 from roboirg.evaluation.analysis.stats.intervals import SEED
 from roboirg.evaluation.analysis.stats.paired_tests import Pairs, measure_gap
 from roboirg.evaluation.analysis.tables.breakdown_table import make_breakdown_table
-from roboirg.evaluation.plan.plan import Plan, write_plan
+from roboirg.evaluation.plan.plan import Plan
+from roboirg.evaluation.plan.stored_plans import write_plan
 from roboirg.evaluation.play.rollout_result import RolloutResult, make_record
 from roboirg.evaluation.records.record import Job, Record
+from roboirg.evaluation.records.record_codec import encode
 from roboirg.evaluation.records.store import (
     RECORDS_FILE,
     RecordStore,
-    read_instructions,
+    iterate_records,
     read_results,
 )
 
@@ -65,7 +68,7 @@ def played(job: Job) -> Record:
     says_it = any(one.expression == "it" for one in record.mentions)
     if job.policy == "listener" or not says_it:
         return record
-    return record.model_copy(update={"outcome": "failure", "cause": "it?"})
+    return replace(record, outcome="failure", cause="it?")
 
 
 @pytest.fixture(scope="module")
@@ -94,7 +97,7 @@ def call(*words: object) -> str:
 
 
 def labels_of(name: str, record: Record, **metadata: object) -> tuple[str, ...]:
-    changed = record.model_copy(update={"metadata": {**record.metadata, **metadata}})
+    changed = replace(record, metadata={**record.metadata, **metadata})
     return BREAKDOWNS[name].labels(changed)
 
 
@@ -131,7 +134,7 @@ def test_labels_are_what_the_record_says(records: tuple[Record, ...]) -> None:
 def test_a_rival_needs_a_pronoun_in_the_command(records: tuple[Record, ...]) -> None:
     contextual = one(records, "PickXtimes", "contextual")
     others = tuple(mention for mention in contextual.mentions if mention.expression != "it")
-    without = contextual.model_copy(update={"mentions": others})
+    without = replace(contextual, mentions=others)
     assert labels_of("rival", without, recency_rival="the printer") == ()
 
 
@@ -149,9 +152,9 @@ def test_records_that_do_not_say_are_unknown(
 ) -> None:
     record = one(records, "PickXtimes", setting)
     rest = {key: value for key, value in record.metadata.items() if key != lacking}
-    older = record.model_copy(update={"metadata": rest})
+    older = replace(record, metadata=rest)
     assert BREAKDOWNS[name].labels(older) == (UNKNOWN,)
-    bare = record.model_copy(update={"mentions": ()})
+    bare = replace(record, mentions=())
     assert BREAKDOWNS["expression"].labels(bare) == (UNKNOWN,)
 
 
@@ -159,11 +162,11 @@ def test_what_one_record_tells_holds_for_the_same_instruction_in_an_older_one(
     records: tuple[Record, ...],
 ) -> None:
     new = one(records, "PickXtimes", "direct")
-    old = new.model_copy(update={"policy": "older", "metadata": {"pattern": None}})
+    old = replace(new, policy="older", metadata={"pattern": None})
     for order in ([new, old], [old, new]):
         found = label_instructions(find_breakdowns(["slots"]), order)["slots"]
         assert found == {InstructionKey.of(new): ("2",)}
-    other = old.model_copy(update={"language_version": "0.9"})
+    other = replace(old, language_version="0.9")
     found = label_instructions(find_breakdowns(["slots"]), [new, other])["slots"]
     assert found[InstructionKey.of(other)] == (UNKNOWN,)
 
@@ -183,7 +186,7 @@ def test_only_the_command_s_expressions_count(records: tuple[Record, ...]) -> No
     said = {m.expression for r in records if r.setting == "contextual" for m in r.mentions}
     assert "them" in said - found, "said of the referents in a reinforcement"
     resolved = make_record(
-        PLAN.jobs()[0].model_copy(update={"setting": "contextual", "form": "resolved"}),
+        replace(PLAN.jobs()[0], setting="contextual", form="resolved"),
         RolloutResult("success", cause=None),
         started_at="now",
     )
@@ -341,7 +344,7 @@ def test_policies_are_compared_by_label(run: Path) -> None:
 def test_a_compared_label_is_the_difference_on_its_episodes(result: Any) -> None:
     results, labels = hand_made(result)
     direct = [one for one in results if one.setting == "direct"]
-    better = [one.model_copy(update={"policy": "better", "outcome": "success"}) for one in direct]
+    better = [replace(one, policy="better", outcome="success") for one in direct]
     found = compare(
         gather([("", better)]),
         gather([("", direct)]),
@@ -405,13 +408,13 @@ def test_tables_open_with_the_keyboard_and_fit_a_telephone(
 
 def test_labels_are_read_line_by_line(records: tuple[Record, ...], tmp_path: Path) -> None:
     """The long parts of records are dropped at once: labels take a small share of the file."""
-    long = records[1].model_copy(update={"details": "x" * 20_000})
+    long = replace(records[1], details="x" * 20_000)
     with (tmp_path / RECORDS_FILE).open("w") as file:
         for episode in range(2000):
-            file.write(long.model_copy(update={"episode": episode}).model_dump_json() + "\n")
+            file.write(encode(replace(long, episode=episode)).decode() + "\n")
     size = (tmp_path / RECORDS_FILE).stat().st_size
     tracemalloc.start()
-    labels = label_instructions(find_breakdowns(BREAKDOWNS), read_instructions(tmp_path))
+    labels = label_instructions(find_breakdowns(BREAKDOWNS), iterate_records(tmp_path))
     _, peak = tracemalloc.get_traced_memory()
     tracemalloc.stop()
     assert len(labels["slots"]) == 2000
@@ -422,5 +425,5 @@ def test_a_stored_instruction_has_the_labels_of_its_record(
     records: tuple[Record, ...], run: Path
 ) -> None:
     whole = label_instructions(find_breakdowns(BREAKDOWNS), records)
-    assert label_instructions(find_breakdowns(BREAKDOWNS), read_instructions(run)) == whole
+    assert label_instructions(find_breakdowns(BREAKDOWNS), iterate_records(run)) == whole
     assert len(read_results(run)) == len(records)

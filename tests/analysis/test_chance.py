@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+import dataclasses
 from fractions import Fraction
 from pathlib import Path
 from types import SimpleNamespace
 
+import msgspec
 import numpy as np
 import pytest
 
@@ -99,7 +100,7 @@ def test_floors_are_what_the_shortcut_listeners_come_to(rule: str, task: str, se
         level, abs=3 * np.sqrt(level * (1 - level) / 300) + 1e-9
     )
     elsewhere = SimpleNamespace(
-        episode=replace(episode, goal=get_task(task).goals(episode.scene)[-1]),
+        episode=dataclasses.replace(episode, goal=get_task(task).goals(episode.scene)[-1]),
         instruction=instruction,
     )
     again = [make_policy(rule, seed).decide(elsewhere, instruction.text) for seed in range(300)]
@@ -117,6 +118,6 @@ def test_floors_are_shares(variant) -> None:
 
 def test_who_plays_and_how_often_makes_no_difference() -> None:
     jobs = [job("StopCube", "reasoning", episode) for episode in range(4)]
-    again = [one.model_copy(update={"policy": "else", "policy_seed": 3}) for one in jobs[:1]]
+    again = [msgspec.structs.replace(one, policy="else", policy_seed=3) for one in jobs[:1]]
     assert chance_level(jobs + again * 5) == chance_level(jobs)
     assert chance_level([]) is None

@@ -6,6 +6,7 @@ import csv
 import io
 
 import pytest
+from msgspec.structs import replace
 from rich.console import Console
 
 from roboirg.core.episode import ENVIRONMENT_VERSION
@@ -80,7 +81,7 @@ def test_each_difference_is_named(result, fields, expected) -> None:
 def test_errors_and_unplayed_trials_are_named(result) -> None:
     several = [*play(result), *play(result, policy_seed=1)]
     planned = [one.identity for one in several]
-    third = several[60].model_copy(update={"outcome": "error", "error": "policy"})
+    third = replace(several[60], outcome="error", error="policy")
     rest = [*several[:60], third, *several[63:]]
     assert differences(rest, planned) == ("1 error", "2 trials still to be played")
 
@@ -88,7 +89,7 @@ def test_errors_and_unplayed_trials_are_named(result) -> None:
 def test_a_trial_is_played_wherever_policy_and_wordings_come_from(result) -> None:
     played = play(result)
     elsewhere = {"spec": "openpi://other:1", "wordings_file": "elsewhere.toml"}
-    planned = [one.identity.model_copy(update=elsewhere) for one in played]
+    planned = [replace(one.identity, **elsewhere) for one in played]
     assert differences(played, planned) == ()
 
 

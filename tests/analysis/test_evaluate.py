@@ -13,7 +13,8 @@ import roboirg
 from roboirg.core.errors import InvalidValueError, MissingDependencyError, UnknownNameError
 from roboirg.evaluation.api import python_run
 from roboirg.evaluation.api.results import Results
-from roboirg.evaluation.plan.plan import Plan, read_plan
+from roboirg.evaluation.plan.plan import Plan
+from roboirg.evaluation.plan.stored_plans import read_plan
 from roboirg.evaluation.play.rollout_result import RolloutResult, make_record
 from roboirg.evaluation.records.record import Job, Record
 from roboirg.evaluation.records.store import read_records

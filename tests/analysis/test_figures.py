@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 import typer
+from msgspec.structs import replace
 from typer.testing import CliRunner
 
 from roboirg.cli.report_commands import figures
@@ -23,7 +24,7 @@ from roboirg.evaluation.analysis.published import published_rows
 from roboirg.evaluation.analysis.stats.run_summary import ALL
 from roboirg.evaluation.plan.plan import Plan
 from roboirg.evaluation.play.rollout_result import RolloutResult, make_record
-from roboirg.evaluation.records.record import Attribution, Result
+from roboirg.evaluation.records.record import Attribution, Summary
 from roboirg.evaluation.records.store import RecordStore
 from roboirg.judging.failure_attribution import EXECUTION, GROUNDING
 
@@ -44,7 +45,7 @@ PLAN = Plan(
 )
 
 
-def results() -> list[Result]:
+def results() -> list[Summary]:
     """The listener succeeds; the forgetful fails where it must remember."""
     found = []
     for number, job in enumerate(PLAN.jobs()):
@@ -55,11 +56,11 @@ def results() -> list[Result]:
         record = make_record(
             job, RolloutResult("failure" if lost else "success", cause=None), started_at="n"
         )
-        found.append(record.model_copy(update={"attribution": attribution if lost else None}))
+        found.append(replace(record, attribution=attribution if lost else None))
     return found
 
 
-def content(found: list[Result] | None = None, **options: object) -> FigureData:
+def content(found: list[Summary] | None = None, **options: object) -> FigureData:
     return FigureData.of([("run", results() if found is None else found)], **options)  # type: ignore[arg-type]
 
 
@@ -136,7 +137,7 @@ def test_the_failures_bars_are_shares_of_what_was_played() -> None:
 
 
 def test_published_values_are_ghosts_on_request(
-    tmp_path: Path, published_like: Callable[..., list[Result]]
+    tmp_path: Path, published_like: Callable[..., list[Summary]]
 ) -> None:
     found = content(published_like("context"))
     write_figures(found, tmp_path / "with", ["context"], published=True)
@@ -153,7 +154,7 @@ def test_published_values_are_ghosts_on_request(
 
 
 def test_the_context_is_compared_on_the_same_tasks(
-    tmp_path: Path, published_like: Callable[..., list[Result]]
+    tmp_path: Path, published_like: Callable[..., list[Summary]]
 ) -> None:
     found = published_like("context")
     short = [one for one in found if not (one.task == "BinFill" and one.stages == (1, 5))]
@@ -167,10 +168,10 @@ def test_the_context_is_compared_on_the_same_tasks(
 
 
 def test_published_means_are_over_the_tasks_that_all_policies_played(
-    published_like: Callable[..., list[Result]],
+    published_like: Callable[..., list[Summary]],
 ) -> None:
     found = [
-        one.model_copy(update={"policy": policy})
+        replace(one, policy=policy)
         for one in published_like("main", "MemER")
         for policy, tasks in (
             ("wide", ("BinFill", "PickXtimes", "StopCube")),
@@ -198,10 +199,10 @@ def test_published_means_are_over_the_tasks_that_all_policies_played(
     assert explicit.average_over(["BinFill", "MyTask"]) is explicit.average_over([]) is None
 
 
-def test_published_values_need_shared_tasks(published_like: Callable[..., list[Result]]) -> None:
+def test_published_values_need_shared_tasks(published_like: Callable[..., list[Summary]]) -> None:
     """Policies without a common task have no figure; tasks outside the paper no published mean."""
     found = [
-        one.model_copy(update={"policy": one.task})
+        replace(one, policy=one.task)
         for one in published_like("main", "MemER")
         if one.task in ("BinFill", "StopCube")
     ]
@@ -223,11 +224,11 @@ def test_scenes_are_counted_in_whole_numbers(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("draw", [draw_averages, draw_context, draw_failures, draw_forms])
 def test_no_name_leaves_the_figure(
-    draw: Callable[[FigureData], Figure | None], published_like: Callable[..., list[Result]]
+    draw: Callable[[FigureData], Figure | None], published_like: Callable[..., list[Summary]]
 ) -> None:
     long = "my_package.policies:NetWithAVeryLongName, frames of the video none"
     found = [
-        one.model_copy(update={"policy": long if one.policy == "forgetful" else "a" * 90})
+        replace(one, policy=long if one.policy == "forgetful" else "a" * 90)
         for one in (published_like("context") if draw is draw_context else results())
     ]
     with mpl.rc_context(STYLE):  # type: ignore[arg-type]
@@ -301,7 +302,7 @@ def test_the_command_draws_what_it_is_asked_for(tmp_path: Path) -> None:
 
 
 def test_the_real_robot_s_figure_has_a_panel_per_task(
-    tmp_path: Path, published_like: Callable[..., list[Result]]
+    tmp_path: Path, published_like: Callable[..., list[Summary]]
 ) -> None:
     found = content(published_like("real"))
     write_figures(found, tmp_path, ["real"], published=True)

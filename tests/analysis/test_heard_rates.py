@@ -22,7 +22,7 @@ from roboirg.evaluation.analysis.tables.heard_table import make_heard_table
 from roboirg.evaluation.analysis.tables.rendering import get_format
 from roboirg.evaluation.analysis.tables.run_tables import make_run_tables, print_run_tables
 from roboirg.evaluation.play.rollout_result import RolloutResult, make_record
-from roboirg.evaluation.records.record import Job, Record, Result
+from roboirg.evaluation.records.record import Job, Record, Summary
 from roboirg.evaluation.records.store import RecordStore
 from roboirg.policies.prompt_length.prompt_audit import PromptLimit, most_tokens
 
@@ -30,10 +30,10 @@ VERDICTS = st.sampled_from(["heard", "cut", "unknown"])
 OUTCOMES = st.sampled_from(["success", "failure", "error"])
 
 
-MakeResult = Callable[..., Result]
+MakeResult = Callable[..., Summary]
 
 
-def results(make: MakeResult, *rows: tuple[str, str], **fields: object) -> list[Result]:
+def results(make: MakeResult, *rows: tuple[str, str], **fields: object) -> list[Summary]:
     return [
         make(outcome, number, prompt_verdict=verdict, **fields)
         for number, (outcome, verdict) in enumerate(rows)
@@ -53,7 +53,7 @@ def test_counts_add_up(result: MakeResult, rows: list[tuple[str, str]]) -> None:
     assert one.heard_successes == rows.count(("success", "heard")) <= one.successes <= one.trials
 
 
-def sample(result: MakeResult) -> list[Result]:
+def sample(result: MakeResult) -> list[Summary]:
     contextual = {"setting": "contextual"}
     return [
         *results(result, ("success", "heard"), ("failure", "heard")),

@@ -9,6 +9,7 @@ from decimal import Decimal
 from pathlib import Path
 
 import pytest
+from msgspec.structs import replace
 
 from roboirg.evaluation.analysis.stats.cells import gather
 from roboirg.evaluation.analysis.tables.paper_tables import WHICH, make_table
@@ -46,7 +47,7 @@ def crowded(policies: int, tasks: int) -> Table:
 
 def all_tables(like) -> list[Table]:
     cells = gather([("run", [*like("main"), *like("real"), *like("context")])])
-    perfect = [one.model_copy(update={"outcome": "success"}) for one in like("main", "MemER")]
+    perfect = [replace(one, outcome="success") for one in like("main", "MemER")]
     return [
         make_table("main", gather([("run", perfect)]), published=True),
         *(make_table(one, cells, published=True) for one in WHICH if one != "other"),

@@ -12,7 +12,7 @@ from roboirg.evaluation.analysis.stats.option_labels import (
 )
 from roboirg.evaluation.analysis.tables.paper_tables import make_table
 from roboirg.language import STAGE_SETS
-from roboirg.language.settings import setting_names
+from roboirg.language.settings import plain_settings, setting_names
 
 
 def test_labels_name_what_differs_from_the_defaults() -> None:
@@ -22,8 +22,6 @@ def test_labels_name_what_differs_from_the_defaults() -> None:
     )
     assert options_label(InstructionOptions("direct")) == "direct"
     assert options_label(InstructionOptions("direct", delivery="turns")) == "direct (in turns)"
-    assert options_label(InstructionOptions("direct", rival="drawn")) == "direct (with a rival)"
-    assert options_label(InstructionOptions("reasoning", reasoning="open")) == "reasoning (open)"
 
 
 def test_settings_have_the_order_of_the_language_and_unknown_ones_are_last() -> None:
@@ -34,7 +32,7 @@ def test_settings_have_the_order_of_the_language_and_unknown_ones_are_last() -> 
     ordered = sorted(options, key=options_sort_key)
     assert [one.setting for one in ordered[::2]] == [*setting_names(), "alpha", "zeta"]
     assert {one.form for one in ordered[::2]} == {"implicit"}
-    assert default_settings(options) == [*setting_names(), "alpha", "zeta"]
+    assert default_settings(options) == [*plain_settings(), "alpha", "zeta"]
 
 
 def test_staged_options_have_every_set_of_stages() -> None:

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from msgspec.structs import replace
 
 from roboirg.evaluation.analysis.page.entries import Run
 from roboirg.evaluation.analysis.page.page_server import PageServer
@@ -67,7 +68,7 @@ def records() -> list[Record]:
         update = {"attribution": wrong if record.outcome == "failure" else None}
         if job.task == FILMED and job.episode == 0:
             update["video"] = "videos/x.mp4"
-        found.append(record.model_copy(update=update))
+        found.append(replace(record, **update))
     return found
 
 
@@ -175,6 +176,7 @@ def test_words_are_searched_in_utterances_and_causes(page: Any) -> None:
     assert page.locator("#nothing").is_visible()
 
 
+@pytest.mark.slow
 def test_the_address_keeps_filters_pages_and_episodes(page: Any, page_file: Path) -> None:
     page.select_option("#filters [name=task]", "VideoUnmask")
     page.get_by_label("Next page").click()
@@ -408,7 +410,7 @@ def test_two_policies_are_compared_episode_by_episode(page: Any) -> None:
 def test_two_runs_are_compared(open_page: Any, tmp_path: Path) -> None:
     before = [one for one in records() if one.policy == "forgetful"]
     after = [
-        one.model_copy(update={"outcome": "success", "cause": None, "attribution": None})
+        replace(one, outcome="success", cause=None, attribution=None)
         if one.outcome == "failure" and one.task == "StopCube"
         else one
         for one in before[:-4]
@@ -469,11 +471,9 @@ def test_ten_thousand_episodes_cost_no_more_than_a_page_of_them(
     open_page: Any, tmp_path: Path
 ) -> None:
     # By the page's own counters: how much is drawn, not how long it takes on this machine.
-    some = [one.model_copy(update={"video": None}) for one in records()]
+    some = [replace(one, video=None) for one in records()]
     many = [
-        one.model_copy(update={"policy_seed": seed})
-        for seed in range(-(-10_000 // len(some)))
-        for one in some
+        replace(one, policy_seed=seed) for seed in range(-(-10_000 // len(some))) for one in some
     ][:10_000]
     path = tmp_path / "many.html"
     path.write_text(render(many))

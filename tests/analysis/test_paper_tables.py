@@ -12,6 +12,7 @@ from pathlib import Path
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from msgspec.structs import replace
 from rich.console import Console
 
 from roboirg.core.errors import UnknownNameError
@@ -22,8 +23,8 @@ from roboirg.evaluation.analysis.tables.rendering import FORMATS, get_format
 from roboirg.evaluation.analysis.tables.rendering.terminal import renderable
 from roboirg.evaluation.analysis.tables.table import Entry
 from roboirg.evaluation.play.rollout_result import RolloutResult, make_record
-from roboirg.evaluation.records.record import Job, Record
-from roboirg.evaluation.records.record_codec import read_summary
+from roboirg.evaluation.records.record import Job, Record, real_robot
+from roboirg.evaluation.records.record_codec import encode, read_summary
 from roboirg.tasks import all_tasks
 
 
@@ -115,10 +116,7 @@ def test_a_task_that_was_not_played_leaves_a_gap_and_marks_the_average(result) -
 
 def test_the_best_is_bold_among_complete_cells_only(result) -> None:
     good, poor = whole(result, "good"), whole(result, "poor")
-    good = [
-        one.model_copy(update={"outcome": "success"}) if one.task == "BinFill" else one
-        for one in good
-    ]
+    good = [replace(one, outcome="success") if one.task == "BinFill" else one for one in good]
     table = make_table("main", gather([("run", [*good, *poor])]))
     assert entries(table, "direct", "good")["BinFill"].best
     assert not entries(table, "direct", "poor")["BinFill"].best
@@ -175,8 +173,7 @@ def test_spatial_is_compared_with_explicit_on_the_tasks_that_have_it(result) -> 
     """Explicit is 50 % on those and 100 % on the others: no change, though its average is more."""
     results = whole(result, settings=("explicit",))
     results = [
-        one if all_tasks()[one.task].spatial else one.model_copy(update={"outcome": "success"})
-        for one in results
+        one if all_tasks()[one.task].spatial else replace(one, outcome="success") for one in results
     ]
     spatial = whole(result, settings=("spatial",))
     results += [one for one in spatial if all_tasks()[one.task].spatial]
@@ -308,10 +305,11 @@ def test_results_of_the_twin_are_marked_and_kept_apart_from_a_robots(result) -> 
         job = Job(policy="listener", task="PutInBox", split="test", episode=0, setting="explicit")
         course = RolloutResult(outcome, cause=None if outcome == "success" else "missed")
         course.policy_metadata = trial(robot)
-        return make_record(job, course, started_at="now")
+        record = make_record(job, course, started_at="now")
+        return replace(record, robot=real_robot(course.policy_metadata["real_trial"]))
 
     records = [played("twin", "success"), played("lerobot", "failure")]
-    stored = [read_summary(one.model_dump_json().encode(), Path("r"), 1) for one in records]
+    stored = [read_summary(encode(one), Path("r"), 1) for one in records]
     for results in (records, stored):
         table = make_table("real", gather([("run", results)]), published=True)
         ours = {row.name: row.entries[0].text for row in table.rows if row.source == "ours"}
@@ -320,5 +318,5 @@ def test_results_of_the_twin_are_marked_and_kept_apart_from_a_robots(result) -> 
             "listener, on lerobot (privileged)": "0.00",
         }
         assert "(twin): the study's twin, in simulation" in notes(table)
-    odd = played("twin", "success").model_copy(update={"policy_metadata": {"real_trial": 3}})
-    assert read_summary(odd.model_dump_json().encode(), Path("r"), 1).robot is odd.robot is None
+    odd = replace(played("twin", "success"), policy_metadata={"real_trial": 3})
+    assert read_summary(encode(odd), Path("r"), 1).robot is odd.robot is None

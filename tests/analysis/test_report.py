@@ -11,6 +11,7 @@ from typing import Any
 
 import pytest
 import typer
+from msgspec.structs import replace
 from typer.testing import CliRunner
 
 from roboirg.cli.report_commands import report
@@ -19,7 +20,8 @@ from roboirg.evaluation.analysis.page import episode_videos
 from roboirg.evaluation.analysis.page.columns import UNATTRIBUTED
 from roboirg.evaluation.analysis.page.entries import Run
 from roboirg.evaluation.analysis.page.report import make_view, render, render_runs, write_report
-from roboirg.evaluation.plan.plan import Plan, write_plan
+from roboirg.evaluation.plan.plan import Plan
+from roboirg.evaluation.plan.stored_plans import write_plan
 from roboirg.evaluation.play.rollout_result import RolloutResult, make_record
 from roboirg.evaluation.records.episode_log import EpisodeLog, log_path
 from roboirg.evaluation.records.record import (
@@ -110,9 +112,9 @@ def records(plan: Plan = PLAN) -> list[Record]:
             )
         record = make_record(job, course, started_at="2026-01-02T03:04:05+00:00")
         if record.outcome == "failure" and index % 2:
-            record = record.model_copy(update={"attribution": WRONG})
+            record = replace(record, attribution=WRONG)
         elif record.outcome == "failure":
-            record = record.model_copy(update={"attribution": None})
+            record = replace(record, attribution=None)
         found.append(record)
     return found
 
@@ -212,7 +214,7 @@ def test_the_resolved_form_is_said_again_where_it_was_not_played() -> None:
     resolved = Page(page).string(details["resolved"])
     assert resolved != " ".join(turn.text for turn in record.instruction)
     # Another version of the language may have other words.
-    (other,) = Page(render([record.model_copy(update={"language_version": "0.1"})])).details
+    (other,) = Page(render([replace(record, language_version="0.1")])).details
     assert "resolved" not in other
 
 
@@ -234,7 +236,7 @@ def test_stages_are_found_again_from_the_events() -> None:
     assert steps[0] == 30
     assert set(steps[1:]) == {None}
     assert "{at}" not in text
-    (other,) = Page(render([record.model_copy(update={"environment_version": -1})])).details
+    (other,) = Page(render([replace(record, environment_version=-1)])).details
     assert "stages" not in other
 
 
@@ -254,11 +256,11 @@ def test_what_is_amiss_is_said_first() -> None:
 
 def test_versions_that_differ_stand_apart() -> None:
     one, other = records()[0], records()[1]
-    mixed = [one, other.model_copy(update={"language_version": "9.9"})]
+    mixed = [one, replace(other, language_version="9.9")]
     page = Page(render(mixed))
     assert any("Mixed versions of the language" in words for _, words in page.warnings)
     assert len(page.data["matrix"]["policies"]) == 2
-    again = [one, one.model_copy(update={"policy_version": "2", "episode": 9})]
+    again = [one, replace(one, policy_version="2", episode=9)]
     assert any(
         "several versions: 2, built-in" in words for _, words in Page(render(again)).warnings
     )
@@ -266,7 +268,7 @@ def test_versions_that_differ_stand_apart() -> None:
 
 def test_words_that_differ_stand_apart_and_are_named() -> None:
     found = next(one for one in records() if one.setting == "direct" and one.form == "implicit")
-    other = found.model_copy(update={"wordings": "mine@1a"})
+    other = replace(found, wordings="mine@1a")
     page = Page(render([found, other]))
     warnings = " ".join(words for _, words in page.warnings)
     assert "Mixed words: our own words, the words of mine@1a." in warnings
@@ -312,8 +314,8 @@ def test_films_are_inside_or_beside(tmp_path: Path, monkeypatch: pytest.MonkeyPa
     (tmp_path / "videos" / "a-b.mp4").write_bytes(b"film")
     (tmp_path / "videos" / "a-b.jpg").write_bytes(b"poster")
     first, second, *_ = records()
-    filmed = first.model_copy(update={"video": "videos/a-b.mp4"})
-    lost = second.model_copy(update={"video": "videos/gone.mp4", "video_error": "no room"})
+    filmed = replace(first, video="videos/a-b.mp4")
+    lost = replace(second, video="videos/gone.mp4", video_error="no room")
 
     page = Page(render([filmed, lost], tmp_path))
     key = filmed.slug[-8:]
@@ -349,7 +351,7 @@ def test_what_was_printed_is_linked_to(tmp_path: Path) -> None:
 def test_the_served_page_never_holds_films(tmp_path: Path) -> None:
     (tmp_path / "videos").mkdir()
     (tmp_path / "videos" / "x.mp4").write_bytes(b"film")
-    store(tmp_path, [records()[0].model_copy(update={"video": "videos/x.mp4"})])
+    store(tmp_path, [replace(records()[0], video="videos/x.mp4")])
     (details,) = Page(make_view(tmp_path)).details
     assert details["film"] == "videos/x.mp4"
 
@@ -360,7 +362,7 @@ def test_two_runs_are_held_against_each_other(tmp_path: Path) -> None:
     (theirs / "videos" / "x.mp4").write_bytes(b"film")
     found = records()
     store(ours, found)
-    store(theirs, [found[0].model_copy(update={"video": "videos/x.mp4"}), *found[1:-4]])
+    store(theirs, [replace(found[0], video="videos/x.mp4"), *found[1:-4]])
     write_plan(PLAN, theirs)
     page = Page(
         write_report(
@@ -392,7 +394,7 @@ def test_films_of_another_run_are_found_from_the_page(
     (tmp_path / "b" / "videos").mkdir(parents=True)
     (tmp_path / "b" / "videos" / "x.mp4").write_bytes(b"film")
     store(tmp_path / "a", [records()[0]])
-    store(tmp_path / "b", [records()[0].model_copy(update={"video": "videos/x.mp4"})])
+    store(tmp_path / "b", [replace(records()[0], video="videos/x.mp4")])
     page = Page(write_report(tmp_path / "a", against=tmp_path / "b").read_text())
     assert page.details[1]["film"] == "../b/videos/x.mp4"
     assert (tmp_path / "a" / page.details[1]["film"]).is_file()
@@ -419,7 +421,7 @@ def test_the_command_prints_the_table_and_writes_the_page(tmp_path: Path) -> Non
 
 def test_what_cannot_be_compared_says_why() -> None:
     (one, *_), (_, other, *_) = records(), records()
-    runs = [Run("a", [one]), Run("b", [other.model_copy(update={"language_version": "9"})])]
+    runs = [Run("a", [one]), Run("b", [replace(other, language_version="9")])]
     (found,) = Page(render_runs(runs)).data["comparisons"]
     assert "same version can be compared" in found["sentences"][0]
 
@@ -429,7 +431,7 @@ def test_the_head_says_which_run_it_was(tmp_path: Path) -> None:
     first, second, *_ = records()
     store(
         folder,
-        [first, second.model_copy(update={"started_at": "2026-01-02T03:09:05+00:00"})],
+        [first, replace(second, started_at="2026-01-02T03:09:05+00:00")],
     )
     text = write_report(folder).read_text()
     assert "<title>tuesday – RoboIRGBench</title>" in text
@@ -444,9 +446,7 @@ def test_an_unknown_task_is_shown_too() -> None:
     mention = MentionSpan(
         utterance=0, start=3, end=5, role="anaphor", expression="it", slot="x", value=1
     )
-    odd = records()[1].model_copy(
-        update={"task": "Homemade", "instruction": (turn,), "mentions": (mention,)}
-    )
+    odd = replace(records()[1], task="Homemade", instruction=(turn,), mentions=(mention,))
     page = Page(render([odd]))
     assert page.column("task") == ["Homemade"]
     assert "stages" not in page.details[0]
@@ -474,7 +474,7 @@ def test_the_first_pair_has_something_to_show() -> None:
     even = Page(render(won))
     assert (even.data["sides"], even.data["change"]) == ([0, 1], "all")
     lost = {"outcome": "failure", "cause": "fell"}
-    some = [*won[:-1], won[-1].model_copy(update=lost)]
+    some = [*won[:-1], replace(won[-1], **lost)]
     page = Page(render(some))
     assert (page.data["sides"], page.data["change"]) == ([0, 2], "changed")
     alone = Page(render(won[:3]))
@@ -484,23 +484,19 @@ def test_the_first_pair_has_something_to_show() -> None:
 def test_events_are_acts_and_objects_have_words() -> None:
     scene = get_episode("PickXtimes", "test", 0).scene
     cube = next(one for one in scene.objects if one.kind == "cube")
-    record = records()[0].model_copy(
-        update={
-            "events": tuple(
+    record = replace(records()[0], events=tuple(
                 EventRecord(step=step, kind=kind, subject=cube.name, place=place, holds=holds)
                 for step, kind, place, holds in (
                     (1, "picked", None, True), (2, "picked", None, False),
                     (3, "placed", "target", True), (4, "placed", "target", False),
                 )
-            )
-        }
-    )  # fmt: skip
+            ))  # fmt: skip
     page = Page(render([record]))
     assert [page.string(place) for _, place, _ in page.details[0]["events"]] == [
         f"picked up the {cube.color} cube", f"lowered the {cube.color} cube or let it go",
         f"placed the {cube.color} cube on the target", f"took the {cube.color} cube off the target",
     ]  # fmt: skip
-    strange = record.model_copy(update={"task": "MyTask"})
+    strange = replace(record, task="MyTask")
     page = Page(render([strange]))
     assert (
         page.string(page.details[0]["events"][0][1]) == f"picked up {cube.name.replace('_', ' ')}"

@@ -10,8 +10,8 @@ from typer.testing import CliRunner
 
 from roboirg.cli.report_commands import compare, tables
 from roboirg.core.errors import InvalidValueError, UnknownNameError
-from roboirg.evaluation.plan.plan import write_plan
 from roboirg.evaluation.plan.plan_maker import make_plan
+from roboirg.evaluation.plan.stored_plans import write_plan
 from roboirg.evaluation.play.rollout_result import RolloutResult, make_record
 from roboirg.evaluation.records.store import RecordStore, StoreError
 

@@ -1,9 +1,10 @@
 """All commands, with words for each with which it does its work."""
 
 import typer.main
+from msgspec.structs import replace
 
-from roboirg.evaluation.plan.plan import write_plan
 from roboirg.evaluation.plan.plan_maker import make_plan
+from roboirg.evaluation.plan.stored_plans import write_plan
 from roboirg.evaluation.play.rollout_result import RolloutResult, make_record
 from roboirg.evaluation.records.record import Job
 from roboirg.evaluation.records.store import RecordStore
@@ -30,7 +31,7 @@ def make_run(folder):
                       setting="direct")  # fmt: skip
             result = RolloutResult("failure", cause="timeout", steps=7)
             if number % 2:
-                job = job.model_copy(update={"policy": "oracle"})
+                job = replace(job, policy="oracle")
                 result = RolloutResult("success", cause=None, steps=7)
             store.append(make_record(job, result, started_at="now"))
     plan = make_plan(["random", "oracle"], tasks="PickXtimes", settings="direct", episodes="3")

@@ -10,6 +10,8 @@ import time
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+import msgspec
+
 from roboirg.core.errors import RenderDeviceError
 from roboirg.core.waiting import waiting
 from roboirg.evaluation.plan.plan import Plan
@@ -70,7 +72,7 @@ class FakePlayer:
         video = self.folder / "videos" / f"{job.slug}.mp4"
         video.parent.mkdir(exist_ok=True)
         video.write_text(job.slug)
-        return record.model_copy(update={"video": f"videos/{video.name}"})
+        return msgspec.structs.replace(record, video=f"videos/{video.name}")
 
 
 @dataclass(frozen=True)
@@ -108,7 +110,8 @@ def fake_result(job: Job) -> RolloutResult:
 
 def comparable(record: Record) -> dict[str, object]:
     """Return the fields that depend only on the job."""
-    return record.model_dump(mode="json", exclude=set(NON_DETERMINISTIC_FIELDS))
+    told = msgspec.to_builtins(record)
+    return {name: one for name, one in told.items() if name not in NON_DETERMINISTIC_FIELDS}
 
 
 def starts(folder: Path, job: Job | None = None) -> list[str]:

@@ -51,7 +51,8 @@ class PaperWorld:
         video = np.arange(5 * 4 * 4 * 3, dtype=np.uint8).reshape(5, 4, 4, 3)
         demonstration = {"front_rgb": video, "joint_positions": np.zeros((5, 7))}
         info = {"demonstration": demonstration, "demonstration_source": "planned"}
-        return self.observation(), {**info, "elapsed_steps": 5, "events": []}
+        now = {"status": "ongoing", "heard": []}
+        return self.observation(), {**info, **now, "elapsed_steps": 5, "events": []}
 
     def observation(self) -> dict[str, Any]:
         return {
@@ -68,7 +69,7 @@ class PaperWorld:
         event = {"step": self.steps, "kind": "picked", "subject": f"{self.total:.9f}"}
         over = self.steps == LENGTH
         status = ("success" if self.total > 0 else "failure") if over else "ongoing"
-        info = {"status": status, "steps": self.steps, "events": [event]}
+        info = {"status": status, "steps": self.steps, "events": [event], "heard": []}
         return self.observation(), 0.0, over, False, info
 
     def close(self) -> None:
@@ -91,7 +92,7 @@ class PaperRunner(EpisodeRunner):
         if self.notes is not None:
             (self.notes / f"worker-{os.getpid()}").touch()
         kept = rollout.make_env
-        rollout.make_env = lambda job, _needs: PaperWorld(job, self.seconds)
+        rollout.make_env = lambda prepared, _needs: PaperWorld(prepared.job, self.seconds)
         try:
             return EpisodeRunner.__call__(self, job)
         finally:

@@ -4,6 +4,7 @@ from pathlib import Path
 
 import pytest
 from evaluation_fakes import FakePlay, small_plan
+from msgspec.structs import replace
 
 from roboirg.evaluation.episode_errors import EpisodeError
 from roboirg.evaluation.plan.plan_maker import make_plan
@@ -33,7 +34,7 @@ def test_what_was_measured_replaces_what_is_assumed(tmp_path: Path) -> None:
     jobs = small_plan(4).jobs()
     with RecordStore(tmp_path) as store:
         for job in jobs[:2]:
-            store.append(FakePlay()(job).model_copy(update={"duration_s": 30.0}))
+            store.append(replace(FakePlay()(job), duration_s=30.0))
     guess = estimate(jobs, (), 2, SPEED)
     known = estimate(jobs, read_index(tmp_path).values(), 2, SPEED)
     assert (guess.episodes, guess.max_steps, guess.unknown) == (8, 8 * 1300, 8)
@@ -49,7 +50,7 @@ def test_what_was_measured_replaces_what_is_assumed(tmp_path: Path) -> None:
 
 
 def test_the_limit_of_the_policy_bounds_both_ends() -> None:
-    jobs = [job.model_copy(update={"max_steps": 100}) for job in small_plan(4).jobs()]
+    jobs = [replace(job, max_steps=100) for job in small_plan(4).jobs()]
     found = estimate(jobs, (), 1, SPEED)
     assert found.least == found.most
     assert "10.0 ms (measured just now)" in estimate_text(found, 8, 1, SPEED)[2]

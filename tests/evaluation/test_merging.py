@@ -4,6 +4,7 @@ from pathlib import Path
 
 import pytest
 from evaluation_fakes import FakePlay, small_plan
+from msgspec.structs import replace
 
 from roboirg.core.errors import InvalidValueError
 from roboirg.evaluation.records.episode_log import EpisodeLog, log_path
@@ -40,10 +41,10 @@ def test_two_halves_make_the_whole(tmp_path: Path) -> None:
 
 def test_a_verdict_beats_an_error_and_the_first_verdict_a_later_one(tmp_path: Path) -> None:
     one, two, *_ = some()
-    error = one.model_copy(update={"outcome": "error", "error": "connection"})
+    error = replace(one, outcome="error", error="connection")
     other = {"success": "failure", "failure": "success"}[two.outcome]
     cause = None if other == "success" else "it fell"
-    disputed = two.model_copy(update={"outcome": other, "cause": cause})
+    disputed = replace(two, outcome=other, cause=cause)
     merged = merge_runs(
         [fill(tmp_path / "a", error, two), fill(tmp_path / "b", one, disputed)], tmp_path / "out"
     )
@@ -56,8 +57,8 @@ def test_a_verdict_beats_an_error_and_the_first_verdict_a_later_one(tmp_path: Pa
 
 
 def test_videos_are_copied(tmp_path: Path) -> None:
-    record = some()[0].model_copy(update={"video": "videos/x.mp4"})
-    lost = some()[1].model_copy(update={"video": "videos/gone.mp4"})
+    record = replace(some()[0], video="videos/x.mp4")
+    lost = replace(some()[1], video="videos/gone.mp4")
     source = fill(tmp_path / "a", record, lost)
     (source / "videos").mkdir()
     (source / "videos/x.mp4").write_bytes(b"video")
@@ -70,7 +71,7 @@ def test_videos_are_copied(tmp_path: Path) -> None:
 
 def test_logs_are_copied_with_the_records_that_are_kept(tmp_path: Path) -> None:
     one, two, *_ = some()
-    error = one.model_copy(update={"outcome": "error", "error": "connection"})
+    error = replace(one, outcome="error", error="connection")
     sources = [fill(tmp_path / "a", error, two), fill(tmp_path / "b", one, two)]
     for source, record, words in (
         (sources[0], one, "of the error"),
@@ -97,7 +98,7 @@ def test_logs_are_copied_with_the_records_that_are_kept(tmp_path: Path) -> None:
 )
 def test_versions_are_not_mixed(tmp_path: Path, field: str, value: object, words: str) -> None:
     record = some()[0]
-    odd = record.model_copy(update={field: value})
+    odd = replace(record, **{field: value})
     with pytest.raises(StoreError, match=f"cannot be merged: the {words}"):
         merge_runs([fill(tmp_path / "a", record), fill(tmp_path / "b", odd)], tmp_path / "out")
     assert not (tmp_path / "out").exists()

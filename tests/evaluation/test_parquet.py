@@ -3,9 +3,11 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
+import msgspec
 import pandas as pd
 import pytest
 from evaluation_fakes import FakePlay, small_plan
+from msgspec.structs import replace
 
 from roboirg.core.errors import InvalidValueError
 from roboirg.evaluation.records.parquet import write_parquet
@@ -15,29 +17,28 @@ from roboirg.evaluation.records.record import Attribution, Record
 def test_a_table_holds_every_field_of_every_record(tmp_path: Path) -> None:
     why = Attribution(kind="grounding", failure="wrong_object", step=4, sentence="Green.")
     records = [FakePlay()(job) for job in small_plan().jobs()]
-    records[0] = records[0].model_copy(
-        update={
-            "attribution": why,
-            "demonstration_frames": 4,
-            "usage": {"calls": 2.0},
-            "error": "connection",
-        }
+    records[0] = replace(
+        records[0],
+        attribution=why,
+        demonstration_frames=4,
+        usage={"calls": 2.0},
+        error="connection",
     )
-    records[1] = records[1].model_copy(update={"attribution": None})
+    records[1] = replace(records[1], attribution=None)
     said = records[1].instruction
-    late = (*said[:-1], said[-1].model_copy(update={"step": 20}))
-    records[1] = records[1].model_copy(update={"delivery": "turns", "instruction": late})
+    late = (*said[:-1], replace(said[-1], step=20))
+    records[1] = replace(records[1], delivery="turns", instruction=late)
     path = tmp_path / "records.parquet"
     assert write_parquet(iter(records), path) == len(records)
     table = pd.read_parquet(path)
-    assert tuple(table.columns) == tuple(Record.model_fields)
+    assert tuple(table.columns) == Record.__struct_fields__
     for row, record in zip(table.to_dict("records"), records, strict=True):
         assert (row["policy"], row["episode"], row["outcome"]) == (
             record.policy,
             record.episode,
             record.outcome,
         )
-        assert json.loads(row["goal"]) == json.loads(record.model_dump_json())["goal"]
+        assert json.loads(row["goal"]) == msgspec.to_builtins(record.goal)
         assert [event["kind"] for event in row["events"]] == [one.kind for one in record.events]
         assert list(row["stages"]) == list(record.stages)
     assert table.attribution[0]["failure"] == "wrong_object"

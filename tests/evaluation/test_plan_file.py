@@ -7,9 +7,9 @@ import pytest
 import yaml
 
 from roboirg.core.errors import InvalidValueError, UnknownNameError
-from roboirg.evaluation.plan.plan import write_plan
 from roboirg.evaluation.plan.plan_file import named_plans, read_plan_file
 from roboirg.evaluation.plan.plan_maker import make_plan
+from roboirg.evaluation.plan.stored_plans import write_plan
 from roboirg.language import STAGE_SETS
 from roboirg.tasks import all_tasks
 
@@ -113,7 +113,7 @@ def test_an_unknown_plan_is_told_with_the_nearest() -> None:
         {"settings": "contextual", "stages": "1,5", "policy_seeds": "3"},
         {"demonstration_frames": 4, "observe_every": 2, "devices": "0,1", "video": "failures"},
         {"demonstration_frames": "none", "meshes": "light", "actions": "waypoint"},
-        {"settings": "direct", "delivery": "turns", "rival": "drawn", "frame": "camera"},
+        {"settings": "direct-rival", "delivery": "turns", "frame": "camera"},
         {"wordings": "train", "split": "random", "episodes": "5,99999", "max_steps": 60},
     ],
 )

@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
-import json
 import os
 import subprocess
 import sys
 from pathlib import Path
 
+import msgspec
 import pytest
+from msgspec.structs import replace
 
 from roboirg.core.errors import InvalidValueError, UnknownNameError
-from roboirg.evaluation.plan.plan import Plan, read_plan, write_plan
+from roboirg.evaluation.plan.plan import Plan
 from roboirg.evaluation.plan.plan_file import read_plan_file
 from roboirg.evaluation.plan.plan_maker import make_plan
+from roboirg.evaluation.plan.stored_plans import read_plan, write_plan
 from roboirg.evaluation.play.job_instruction import instruct_job
 from roboirg.evaluation.records.record import Job
 from roboirg.evaluation.records.record_codec import identity_key
@@ -60,7 +62,7 @@ def test_jobs_name_the_wordings_and_their_file(wording_file: Path) -> None:
     assert {(job.wordings, job.wordings_file) for job in own.jobs()} == {(None, None)}
     # The same episodes in other words are other episodes; a file may be moved.
     assert identity_key(jobs[0]) != identity_key(own.jobs()[0])
-    moved = jobs[0].model_copy(update={"wordings_file": "elsewhere.toml"})
+    moved = replace(jobs[0], wordings_file="elsewhere.toml")
     assert identity_key(moved) == identity_key(jobs[0])
     assert moved.slug == jobs[0].slug != own.jobs()[0].slug
 
@@ -114,10 +116,10 @@ def test_what_the_wordings_lack_stops_a_plan(wording_file: Path) -> None:
 
 @pytest.mark.usefixtures("forgetful")
 def test_a_job_in_our_own_words_opens_no_file(wording_file: Path) -> None:
-    job = a_plan(wording_file).jobs()[0].model_copy(update={"wordings": None})
+    job = replace(a_plan(wording_file).jobs()[0], wordings=None)
     own = instruct_job(job)
     assert own.metadata["wordings"] is None
-    missing = job.model_copy(update={"wordings_file": "missing.toml"})
+    missing = replace(job, wordings_file="missing.toml")
     assert instruct_job(missing) == own
 
 
@@ -151,4 +153,4 @@ def test_two_workers_play_in_the_words_of_a_file(wording_file: Path, tmp_path: P
     assert said.returncode == 0, said.stderr
     assert [record.wordings is None for record in read_records(out)] == [False, False, True, True]
     assert "2 already" in play("--settings", "explicit", "--dry-run").stdout.replace(",", "")
-    assert isinstance(Job(**json.loads(records[0].identity.model_dump_json())), Job)
+    assert isinstance(msgspec.json.decode(msgspec.json.encode(records[0].identity), type=Job), Job)

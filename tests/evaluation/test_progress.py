@@ -4,6 +4,7 @@ import io
 
 import pytest
 from evaluation_fakes import FakePlay, small_plan
+from msgspec.structs import replace
 from rich.console import Console
 
 from roboirg.evaluation.run.progress import ConsoleReporter, ProgressCounter
@@ -46,7 +47,7 @@ def test_errors_are_in_the_score_but_in_no_rate() -> None:
     score = ProgressCounter()
     for record in RECORDS[:1]:
         score.add(record)
-        score.add(record.model_copy(update={"outcome": "error"}))
+        score.add(replace(record, outcome="error"))
     assert score.summary() == "direct 0/1 · errors 1"
     assert score.time_left(0) == "0:00"
     assert ProgressCounter().time_left(5) == "-:--"

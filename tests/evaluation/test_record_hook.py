@@ -8,9 +8,11 @@ from pathlib import Path
 
 import pytest
 from evaluation_fakes import FakePlay, small_plan
+from msgspec.structs import replace
 
 from roboirg.core.errors import InvalidValueError
 from roboirg.evaluation.records.record import Record
+from roboirg.evaluation.records.record_codec import encode
 from roboirg.evaluation.records.store import read_records
 from roboirg.evaluation.run import record_hook
 from roboirg.evaluation.run.executor import InProcess
@@ -44,7 +46,7 @@ def test_a_command_gets_each_record_as_a_line(tmp_path: Path) -> None:
     summary, warnings = play(tmp_path / "run", CommandHook(command(copy)))
     stored = read_records(tmp_path / "run")
     assert [json.loads(line) for line in out.read_text().splitlines()] == [
-        one.model_dump(mode="json") for one in stored
+        json.loads(encode(one)) for one in stored
     ]
     assert len(stored) == summary.total
     assert warnings == []
@@ -79,7 +81,7 @@ def test_a_command_that_reads_nothing_is_given_up(
 
     def play_job(job: object) -> Record:
         record = FakePlay()(job)  # type: ignore[arg-type]
-        return record.model_copy(update={"details": "x" * big})
+        return replace(record, details="x" * big)
 
     with HookedReporter(reporter, hook) as hooked:
         summary = run_plan(plan, tmp_path, play_job, InProcess(), reporter=hooked)

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 from evaluation_fakes import comparable
+from msgspec.structs import replace
 
 from roboirg.core.errors import (
     InvalidActionError,
@@ -19,12 +20,14 @@ from roboirg.core.errors import (
 )
 from roboirg.evaluation.episode_errors import one_line
 from roboirg.evaluation.play import rollout
-from roboirg.evaluation.play.job_instruction import instruct_job
+from roboirg.evaluation.play.job_instruction import PreparedJob, instruct_job
 from roboirg.evaluation.play.rollout import EpisodeRunner, load_policy, play_episode
 from roboirg.evaluation.play.rollout_result import RolloutResult
 from roboirg.evaluation.play.video_writer import VideoWriter
 from roboirg.evaluation.records.film import VideoOptions
-from roboirg.evaluation.records.record import EventRecord, Job, Record
+from roboirg.evaluation.records.record import EventRecord, Job
+from roboirg.evaluation.records.record_codec import encode, read_record
+from roboirg.tasks.splits import splits
 
 JOB = Job(policy="random", task="PickXtimes", split="test", episode=2, setting="direct")
 
@@ -70,7 +73,8 @@ class PaperWorld:
         first = {"step": 3, "kind": "still", "subject": "robot", "place": None, "holds": True}
         shown = {"joint_positions": np.zeros((3, 7))}
         info = {"demonstration": shown, "elapsed_steps": 4, "events": [first]}
-        return {}, {**info, "demonstration_source": "planned"}
+        now = {"status": "ongoing", "heard": []}
+        return {}, {**info, **now, "demonstration_source": "planned"}
 
     def step_chunk(self, actions: np.ndarray) -> tuple[Any, float, bool, bool, dict[str, Any]]:
         assert actions.shape[1:] == (8,)
@@ -88,6 +92,7 @@ class PaperWorld:
             "cause": self.cause if over else None,
             "steps": self.steps,
             "events": [{**event, "holds": True}] if over else [],
+            "heard": [],
         }
         return {}, 0.0, over and self.status != "timeout", over and self.status == "timeout", info
 
@@ -223,7 +228,7 @@ def test_ctrl_c_is_no_episode_error(stage: Callable[..., RolloutResult]) -> None
 
 def test_the_policys_luck_is_the_same_in_every_setting_and_another_in_every_episode() -> None:
     def luck(**changes: object) -> int:
-        return load_policy(JOB.model_copy(update=changes)).seed  # type: ignore[attr-defined]
+        return load_policy(PreparedJob(replace(JOB, **changes))).seed  # type: ignore[attr-defined]
 
     assert luck() == luck(setting="explicit")
     assert len({luck(), luck(episode=3), luck(policy_seed=1)}) == 3
@@ -309,17 +314,17 @@ def test_wrong_cameras_of_an_object_are_the_policys_fault(
 
 
 def test_a_record_says_what_is_in_the_words_and_who_cheats() -> None:
-    job = JOB.model_copy(update={"setting": "reasoning", "policy": "oracle"})
+    job = replace(JOB, setting="reasoning", policy="oracle")
     record = rollout.make_record(job, RolloutResult("success", cause=None), started_at="now")
     assert record.metadata["pattern"]
     assert record.metadata["templates"]
     assert record.privileged
     assert not rollout.make_record(JOB, RolloutResult(), started_at="now").privileged
-    assert type(record).model_validate_json(record.model_dump_json()) == record
+    assert read_record(encode(record), Path(), 1) == record
 
 
 def test_a_record_has_the_words_that_were_spoken() -> None:
-    spoken = instruct_job(JOB.model_copy(update={"setting": "spatial"}))
+    spoken = instruct_job(replace(JOB, setting="spatial"))
     result = RolloutResult("success", cause=None, instruction=spoken)
     record = rollout.make_record(JOB, result, started_at="now")
     assert record.instruction[-1].text == spoken.utterances[-1].text
@@ -354,7 +359,7 @@ class TellingWorld(PaperWorld):
 
     def __init__(self, steps: tuple[int, ...], length: int) -> None:
         super().__init__(length)
-        job = JOB.model_copy(update={"setting": "contextual"})
+        job = replace(JOB, setting="contextual")
         self.instruction = instruct_job(job)
         self.told = list(zip(self.instruction.turns, steps, strict=False))
 
@@ -383,7 +388,25 @@ class Hearing(PaperPolicy):
         return {"heard": len(self.heard)}
 
 
-TURNS = JOB.model_copy(update={"setting": "contextual", "delivery": "turns"})
+TURNS = replace(JOB, setting="contextual", delivery="turns")
+
+
+def test_the_episode_of_a_job_is_looked_up_once(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    found: list[tuple[object, ...]] = []
+
+    def look_up(*name: object) -> Any:
+        found.append(name)
+        return kept(*name)
+
+    world, kept = PaperWorld(), splits._episode
+    monkeypatch.setattr(splits, "_episode", look_up)  # below all names that it is imported by
+    for name, made in {"make_env": world, "load_policy": PaperPolicy()}.items():
+        # Both read the episode, as the functions that they replace do.
+        monkeypatch.setattr(rollout, name, lambda one, _, made=made: one.episode and made)
+    assert EpisodeRunner(tmp_path)(JOB).outcome == "success"
+    assert found == [("PickXtimes", "test", 2)]
 
 
 @pytest.mark.parametrize("policy_class", [PaperPolicy, Hearing])
@@ -403,7 +426,7 @@ def test_a_record_holds_what_was_heard_when(
     hears = policy_class is Hearing
     assert policy.heard == [turns[0], 3, *(later if hears else ())]
     assert record.policy_metadata == ({"heard": 8} if hears else {})
-    assert Record.model_validate_json(record.model_dump_json()) == record
+    assert read_record(encode(record), Path(), 1) == record
 
 
 def test_the_caption_grows_as_utterances_are_heard(

@@ -12,9 +12,10 @@ from pathlib import Path
 import evaluation_fakes
 import pytest
 from evaluation_fakes import FakePlay, comparable, is_alive, small_plan, starts, worker_pids
+from msgspec.structs import replace
 
 from roboirg.core.errors import InvalidValueError, RenderDeviceError
-from roboirg.evaluation.plan.plan import read_plan
+from roboirg.evaluation.plan.stored_plans import read_plan
 from roboirg.evaluation.records.record import Job, Record
 from roboirg.evaluation.records.store import RECORDS_FILE, RecordStore, StoreError, read_records
 from roboirg.evaluation.run.executor import InProcess, LocalProcesses, choose_executor
@@ -175,7 +176,7 @@ def test_words_of_two_versions_are_not_mixed(
 def test_worlds_of_two_versions_are_not_mixed(
     tmp_path: Path, name: str, value: object, sentence: str
 ) -> None:
-    record = FakePlay()(small_plan(1).jobs()[0]).model_copy(update={name: value})
+    record = replace(FakePlay()(small_plan(1).jobs()[0]), **{name: value})
     with RecordStore(tmp_path) as store:
         store.append(record)
     with pytest.raises(StoreError, match=sentence):
@@ -211,7 +212,7 @@ def test_a_torn_line_is_told_before_anything_is_played(tmp_path: Path) -> None:
 
 def test_lost_videos_are_counted(tmp_path: Path) -> None:
     def play(job: Job) -> Record:
-        return FakePlay()(job).model_copy(update={"video_error": "OSError: disk full"})
+        return replace(FakePlay()(job), video_error="OSError: disk full")
 
     summary = run_plan(small_plan(1), tmp_path, play, InProcess())
     assert len(summary.video_errors) == 2

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 from evaluation_fakes import comparable
 
-from roboirg.evaluation.plan.plan import read_plan
+from roboirg.evaluation.plan.stored_plans import read_plan
 from roboirg.evaluation.records.episode_log import log_path
 from roboirg.evaluation.records.store import RECORDS_FILE, read_records
 
@@ -140,6 +140,7 @@ def kill_in_the_middle(folder: Path, *words: str) -> None:
 
 
 @pytest.mark.usefixtures("without_cache")
+@pytest.mark.slow
 def test_workers_and_kills_leave_no_trace_in_the_records(tmp_path: Path) -> None:
     folders = [tmp_path / name for name in ("one", "two", "killed")]
     plan = tmp_path / "plan.yaml"

@@ -2,8 +2,9 @@
 
 import pytest
 
-from roboirg.evaluation.plan.plan import read_plan, with_secret, write_plan
 from roboirg.evaluation.plan.plan_maker import make_plan
+from roboirg.evaluation.plan.stored_plans import read_plan, with_secret, write_plan
+from roboirg.evaluation.play.job_instruction import PreparedJob
 from roboirg.evaluation.play.rollout import load_policy
 from roboirg.evaluation.run.runner import episode_runner
 from roboirg.policies.contract.random_state import episode_policy_seed
@@ -44,7 +45,7 @@ def test_a_run_that_began_without_a_secret_goes_on_without(tmp_path):
 
 def test_settings_and_forms_of_a_scene_share_the_seed_and_scenes_do_not():
     jobs = a_plan(forms="implicit,resolved").jobs()
-    seeds = {(job.episode, load_policy(job, "secret").seed) for job in jobs}
+    seeds = {(job.episode, load_policy(PreparedJob(job), "secret").seed) for job in jobs}
     assert len(jobs) == 9
     assert len(seeds) == 3
 

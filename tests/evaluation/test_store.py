@@ -11,10 +11,11 @@ import pytest
 from evaluation_fakes import fake_result, small_plan
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from msgspec.structs import replace
 
 from roboirg.evaluation.play.rollout_result import make_record
 from roboirg.evaluation.records.record import EventRecord, Record
-from roboirg.evaluation.records.record_codec import identity_key
+from roboirg.evaluation.records.record_codec import encode, identity_key
 from roboirg.evaluation.records.store import (
     RECORDS_FILE,
     TORN_FILE,
@@ -42,14 +43,13 @@ def fill(folder: Path, records: tuple[Record, ...]) -> bytes:
 
 texts = st.text(st.characters(exclude_categories=["Cs"]), max_size=40)
 records = st.builds(
-    lambda cause, steps, events, goal: some_records()[0].model_copy(
-        update={
-            "outcome": "failure",
-            "cause": cause,
-            "steps": steps,
-            "events": tuple(events),
-            "goal": goal,
-        }
+    lambda cause, steps, events, goal: replace(
+        some_records()[0],
+        outcome="failure",
+        cause=cause,
+        steps=steps,
+        events=tuple(events),
+        goal=goal,
     ),
     st.none() | texts,
     st.integers(0, 2000),
@@ -96,7 +96,7 @@ def test_a_file_cut_anywhere_loses_only_the_line_that_was_cut(data: st.DataObjec
 
         mended = (folder / RECORDS_FILE).read_bytes()
         kept = whole[: complete[-1] + 1] if complete else b""
-        last = some_records()[-1].model_dump_json().encode() + b"\n"
+        last = encode(some_records()[-1]) + b"\n"
         assert mended == kept + last
         assert torn == whole[len(kept) : cut]
         if torn:
@@ -132,9 +132,11 @@ def test_a_killed_writer_leaves_no_lock(tmp_path: Path) -> None:
 
 def test_another_schema_version_is_refused_and_nothing_changes(tmp_path: Path) -> None:
     whole = fill(tmp_path, some_records())
-    newer = whole.replace(b'"schema_version":3', b'"schema_version":7', 1)
+    newer = whole.replace(b'"schema_version":4', b'"schema_version":7', 1)
     (tmp_path / RECORDS_FILE).write_bytes(newer)
-    with pytest.raises(StoreError, match=r"line 1 has schema version 7, .* reads only version 3;"):
+    with pytest.raises(
+        StoreError, match=r"line 1 has schema version 7, .* reads only versions 3 and 4;"
+    ):
         RecordStore(tmp_path)
     assert (tmp_path / RECORDS_FILE).read_bytes() == newer
     (tmp_path / RECORDS_FILE).write_bytes(whole)
@@ -144,7 +146,8 @@ def test_another_schema_version_is_refused_and_nothing_changes(tmp_path: Path) -
 @pytest.mark.parametrize(
     ("line", "sentence"),
     [
-        (b'{"schema_version":3,"policy":3}', "line 1 is not a record: policy"),
+        (b'{"schema_version":4,"policy":3}', r"line 1 is not a record: Expected `str`.*policy"),
+        (b'{"schema_version":3,"policy":3}', r"line 1 is not a record: Expected `str`.*policy"),
         (b"[]", "line 1 has schema version None"),
     ],
 )
@@ -158,7 +161,7 @@ def test_a_line_that_is_no_record_is_told_with_its_number(
 
 def test_the_newest_record_of_a_job_wins(tmp_path: Path) -> None:
     first, *others = some_records()
-    newer = first.model_copy(update={"steps": 1234})
+    newer = replace(first, steps=1234)
     fill(tmp_path, (first, *others, newer))
     found = read_records(tmp_path)
     assert newer in found
@@ -190,12 +193,13 @@ def test_a_full_disk_is_one_sentence_and_costs_no_record(tmp_path: Path) -> None
     limit = sum(map(len, lines[:3])) + 100
     code = (
         "import pathlib, resource, sys\n"
+        "from msgspec.structs import replace\n"
         "from evaluation_fakes import FakePlay, small_plan\n"
         "from roboirg.evaluation.run.executor import InProcess\n"
         "from roboirg.evaluation.run.runner import run_plan\n"
         "from roboirg.evaluation.records.store import StoreError\n"
         "def play(job):\n"
-        "    return FakePlay()(job).model_copy(update={'started_at': 'now'})\n"
+        "    return replace(FakePlay()(job), started_at='now')\n"
         f"resource.setrlimit(resource.RLIMIT_FSIZE, ({limit}, {limit}))\n"
         "try:\n"
         "    run_plan(small_plan(), pathlib.Path(sys.argv[1]), play, InProcess())\n"

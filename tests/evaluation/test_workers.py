@@ -14,6 +14,7 @@ from types import SimpleNamespace
 import chaos_policy
 import pytest
 from evaluation_fakes import FakePlay, WaitingPlay, comparable, small_plan
+from msgspec.structs import replace
 
 from roboirg.core.errors import RoboIRGError
 from roboirg.core.waiting import Wait, waiting
@@ -21,6 +22,7 @@ from roboirg.evaluation.episode_errors import EpisodeError, attribute_errors
 from roboirg.evaluation.plan.plan import Plan
 from roboirg.evaluation.play import watchdog
 from roboirg.evaluation.play.call_guard import CallGuard
+from roboirg.evaluation.play.job_instruction import PreparedJob
 from roboirg.evaluation.play.rollout import EpisodeRunner, load_policy
 from roboirg.evaluation.play.rollout_result import RolloutResult
 from roboirg.evaluation.records.record import Job, Record
@@ -46,7 +48,7 @@ def plan_of_chaos() -> Plan:
     )
     jobs, chosen, met = plan.jobs(), [], Counter[str | None]()
     for job in jobs:
-        misdeed = load_policy(job).misdeed  # type: ignore[attr-defined]
+        misdeed = load_policy(PreparedJob(job)).misdeed  # type: ignore[attr-defined]
         if met[misdeed] < (1 if misdeed else 2 * len(chaos_policy.KINDS)):
             met[misdeed] += 1
             chosen.append(job)
@@ -114,7 +116,7 @@ def _misdeeds(plan: Plan) -> dict[Job, str]:
 
 
 def _seed(job: Job) -> int:
-    return load_policy(job).seed  # type: ignore[attr-defined]
+    return load_policy(PreparedJob(job)).seed  # type: ignore[attr-defined]
 
 
 def sleepy(job: Job) -> Record:
@@ -265,7 +267,7 @@ class Unreachable:
         if job.policy != self.policy:
             return record
         lost = {"outcome": "error", "error": "connection", "cause": "connection: refused"}
-        return record.model_copy(update=lost)
+        return replace(record, **lost)
 
 
 def test_a_policy_that_cannot_be_reached_is_left_and_the_others_go_on(tmp_path: Path) -> None:

@@ -127,8 +127,6 @@ def test_words_of_the_new_setting_are_validated(roboirg, names):
     said = roboirg("language", "validate", "--tasks", tasks, "--split", "none", "--seeds", "6")
     assert {task, setting} <= set(said.replace("│", " ").split())
     assert setting in roboirg("show", WITH_SETTING, "0", "--words", "--settings", setting)
-    roboirg("language", "card", "--out", "card.md")
-    assert f"### {WITH_SETTING}, {setting}" in (roboirg.folder / "card.md").read_text()
     roboirg(
         "export", "instructions", "--tasks", tasks, "--settings", setting, "--split", "test",
         "--out", "words.jsonl",

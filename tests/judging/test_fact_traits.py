@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from msgspec.structs import replace
 
 import roboirg
 from roboirg.apps.show.episode_text import fact_words
@@ -115,7 +116,7 @@ def test_a_kind_from_outside_is_judged_and_described(toppled: FactTraits) -> Non
     assert fact_words(TOPPLED) == "pillar knocked over"
     event = EventRecord(step=3, kind="toppled", subject="pillar", place=None, holds=True)
     assert event_text(event, {"pillar": "the red pillar"}) == "knocked the red pillar over"
-    over = event.model_copy(update={"holds": False})
+    over = replace(event, holds=False)
     assert event_text(over, {}) == "knocked pillar over; that is over"
     picked = Fact("picked", "cube")
     plan = [stage(picked), stage(TOPPLED)]

@@ -6,13 +6,18 @@ from dataclasses import replace
 
 from roboirg.core.episode import SPLITS, Episode, Point
 from roboirg.core.errors import SceneRejectedError
-from roboirg.language.settings import settings_of
+from roboirg.language.settings import plain_settings, settings_of
 from roboirg.tasks import every_task
 from roboirg.tasks.splits import splits
 from roboirg.tasks.splits.splits import CYCLE, get_episode, make_episode
 
 TASKS = tuple(every_task())
-PAIRS = [(name, setting) for name, task in every_task().items() for setting in settings_of(task)]
+PAIRS = [
+    (name, setting)
+    for name, task in every_task().items()
+    for setting in settings_of(task)
+    if setting in plain_settings()
+]
 SPATIAL_TASKS = tuple(name for name, task in every_task().items() if "spatial" in settings_of(task))
 
 

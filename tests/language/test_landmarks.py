@@ -8,6 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from language_variants import SPATIAL_TASKS, random_episodes
+from selection import slow_but
 
 from roboirg.core.episode import COLORS, SPLITS, Point, Scene, SceneObject
 from roboirg.core.motions import Away
@@ -316,7 +317,7 @@ OF_THE_ROBOT = ("You can see", "you saw", "your right to your left target")
 """What the robot sees, saw and does stays the robot's, and says so."""
 
 
-@pytest.mark.parametrize("pool", POOLS)
+@pytest.mark.parametrize("pool", slow_but(["test"], POOLS))
 @pytest.mark.parametrize("task", SPATIAL_TASKS)
 def test_the_camera_frame_mixes_no_points_of_view(task, pool):
     for episode in random_episodes(task, 200):

@@ -93,7 +93,7 @@ def test_a_refusal_says_why_wherever_it_shows(register):
     register(DUMMY)
     assert "dummy" not in expressible(EPISODE)
     assert "dummy" in expressible(HARD)
-    assert find_refusals(EPISODE) == {"dummy": REASON}
+    assert find_refusals(EPISODE)["dummy"] == REASON
     with pytest.raises(InvalidValueError, match=f"dummy setting cannot express .*{REASON}"):
         instruct(EPISODE, "dummy")
     assert REASON in printed(instructions_table(EPISODE, ["dummy"], InstructionOptions()))
@@ -108,10 +108,8 @@ def test_validation_counts_what_a_setting_refuses(register):
     assert results.texts["PickXtimes", "dummy"] == 2 * 2
     assert results.refused["PickXtimes", "dummy", "", "easy"] == 2
     text = printed(*validation_tables(results))
-    assert "Scenes that the dummy setting cannot express" in text
-    assert "Scenes that the spatial setting cannot express" in text
-    assert "2 of 2 (100.00 %)" in text
-    assert f"{REASON}: 2 refusals" in text
+    assert re.search(r"PickXtimes\s+dummy\s+2 of 2\b", text)
+    assert f"dummy: {REASON}: 2 refusals" in text
 
 
 def test_a_pairing_rule_of_a_setting_can_fail(register):

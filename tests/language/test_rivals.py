@@ -12,12 +12,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from language_variants import TASKS, first_episodes
 
-from roboirg.core.errors import InvalidValueError, UnknownNameError
+from roboirg.core.errors import InvalidValueError
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.core.word_pools import POOLS, Pools
 from roboirg.language import instruct, instruct_with
 from roboirg.language.generator import find_refusal
-from roboirg.language.rivals import rival_templates
+from roboirg.language.rivals import RIVAL_SETTINGS, rival_templates
 from roboirg.language.settings import settings_of
 from roboirg.reader import interpret
 from roboirg.reader.selections import read_selection
@@ -27,7 +27,7 @@ from roboirg.shortcuts.command_chance import blind_goals, right_share
 from roboirg.tasks import all_tasks, get_task
 from roboirg.tasks.splits.splits import get_episode
 
-SETTINGS = ("direct", "contextual", "spatial")
+SETTINGS = RIVAL_SETTINGS
 CELLS = [
     (name, setting)
     for name in TASKS
@@ -39,7 +39,7 @@ POINTERS = {"former": 0, "first": 0, "earlier": 0, "latter": 1, "last": 1, "late
 
 def told(task, setting, split="test", count=40, **options):
     """Episodes with a rival, each with its instruction."""
-    wanted = InstructionOptions(setting, rival="drawn")._replace(**options)
+    wanted = InstructionOptions(setting)._replace(**options)
     for episode in first_episodes(task, split, count):
         if find_refusal(episode, wanted) is None:
             yield episode, instruct_with(episode, wanted)
@@ -56,7 +56,7 @@ def test_random_episodes_are_read_back(cell, index, pool):
     """Exactly one goal with the context, two or more without; resolved, the command alone."""
     task, setting = cell
     episode = get_episode(task, "random", index)
-    options = InstructionOptions(setting, rival="drawn", wordings=pool)
+    options = InstructionOptions(setting, wordings=pool)
     if find_refusal(episode, options) is not None:
         return
     said = instruct_with(episode, options)
@@ -99,45 +99,40 @@ def contents(goal, slot):
 
 @pytest.mark.parametrize("task", TASKS)
 def test_direct_and_contextual_share_introduction_and_command(task):
-    for episode, direct in told(task, "direct", count=12):
-        contextual = instruct(episode, "contextual", rival="drawn")
+    for episode, direct in told(task, "direct-rival", count=12):
+        contextual = instruct(episode, "contextual-rival")
         assert (contextual.turns[0], contextual.turns[-1]) == (direct.turns[0], direct.turns[-1])
-        short = instruct(episode, "contextual", rival="drawn", stages=(1, 5))
+        short = instruct(episode, "contextual-rival", stages=(1, 5))
         assert short.turns == direct.turns
 
 
-def test_without_a_rival_nothing_changes():
+def test_only_these_settings_have_a_rival():
     for task in TASKS:
         episode = get_episode(task, "test", 3)
-        for setting in settings_of(get_task(task)):
-            assert instruct(episode, setting, rival="none") == instruct(episode, setting)
+        for setting in set(settings_of(get_task(task))) - {*SETTINGS, "reasoning-open"}:
             assert instruct(episode, setting).metadata["rival"] is None
 
 
-def test_other_settings_do_not_read_it():
-    episode = get_episode("PickXtimes", "test", 2)
-    for setting in ("explicit", "reasoning"):
-        assert instruct(episode, setting, rival="drawn").turns == instruct(episode, setting).turns
+def test_a_competing_distractor_would_name_one_value_too_many():
+    episode = get_episode("StopCube", "test", 0)
+    neutral, competing = (
+        instruct(episode, "contextual-rival", distractor=one) for one in ("neutral", "competing")
+    )
+    assert neutral == competing
 
 
 @pytest.mark.parametrize(
-    ("task", "difficulty", "setting", "options", "reason"),
+    ("task", "difficulty", "setting", "reason"),
     [
-        ("PickXtimes", "easy", "spatial", {}, "no second value that the goal could ask for"),
-        ("BinFill", "hard", "direct", {}, "counts cubes of several colors leaves no rival"),
-        ("StopCube", "easy", "contextual", {"distractor": "competing"}, "one value too many"),
+        ("PickXtimes", "easy", "spatial-rival", "no second value that the goal could ask for"),
+        ("BinFill", "hard", "direct-rival", "counts cubes of several colors leaves no rival"),
     ],
 )
-def test_what_cannot_have_a_rival_is_refused_by_name(task, difficulty, setting, options, reason):
+def test_what_cannot_have_a_rival_is_refused_by_name(task, difficulty, setting, reason):
     episodes = (get_episode(task, "test", index) for index in itertools.count())
     episode = next(one for one in episodes if one.difficulty == difficulty)
     with pytest.raises(InvalidValueError, match=f"The {setting} setting cannot express .*{reason}"):
-        instruct(episode, setting, rival="drawn", **options)
-
-
-def test_an_unknown_rival_is_refused():
-    with pytest.raises(UnknownNameError, match="drwan"):
-        instruct(get_episode("PickXtimes", "test", 0), "direct", rival="drwan")
+        instruct(episode, setting)
 
 
 def all_told(setting, split="train", count=100):
@@ -147,9 +142,9 @@ def all_told(setting, split="train", count=100):
 
 def test_each_value_is_meant_equally_often():
     """Whatever the episode: in blocks of four, each order comes with each kind of pointer once."""
-    found = Counter(said.metadata["rival_position"] for _, said in all_told("direct"))
+    found = Counter(said.metadata["rival_position"] for _, said in all_told("direct-rival"))
     assert abs(found["first"] / found.total() - 0.5) < 0.01
-    kinds = Counter(said.metadata["rival_reference"] for _, said in all_told("direct"))
+    kinds = Counter(said.metadata["rival_reference"] for _, said in all_told("direct-rival"))
     assert set(kinds) == {"alone", "set aside", *rival_templates.CHOICES}
     assert min(kinds.values()) > 0.08 * kinds.total()
 
@@ -158,7 +153,7 @@ def test_no_pointer_with_any_key_words_tells_the_value():
     """The first or last pointer, turned over by any of *other*, *not* and *no*: at chance."""
     remarks = [
         (re.findall("[a-z]+", remark(said).lower()), said.metadata["rival_position"] == "first")
-        for _, said in all_told("direct")
+        for _, said in all_told("direct-rival")
     ]
     for place, count in itertools.product((0, -1), range(4)):
         for words in itertools.combinations(("other", "not", "no"), count):

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from sentencepiece import SentencePieceProcessor
 
 from roboirg.core.word_pools import POOLS
-from roboirg.language import FORMS, instruct_with, setting_names
+from roboirg.language import FORMS, instruct_with, plain_settings
 from roboirg.language.token_counts import ADDED_TOKENS, SHORT_LIMIT, USUAL_LIMIT, count_tokens
 from roboirg.language.variants import expressible_options, instructions
 from roboirg.tasks import every_task
@@ -31,7 +31,7 @@ def said():
     return [
         instruction
         for task in every_task()
-        for _, instruction in instructions(split_episodes((task,), FIXED), setting_names(), FORMS)
+        for _, instruction in instructions(split_episodes((task,), FIXED), plain_settings(), FORMS)
     ]
 
 

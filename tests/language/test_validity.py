@@ -38,14 +38,17 @@ def test_every_instruction_is_valid(task, split, episodes):
     found = results(task, split, episodes)
     assert not found.failures
     read = {setting: found.texts[task, setting] for setting in settings_of(get_task(task))}
-    rivals, open_ones = told(found, task, "direct", "drawn"), told(found, task, "reasoning", "open")
+    rivals, open_ones = told(found, task, "direct-rival"), told(found, task, "reasoning-open")
     # Two forms; four sets of stages with two kinds of distractors, or with a rival; two frames.
-    spatial = read.pop("spatial", 4 * episodes)
+    spatial = read.pop("spatial", 4 * episodes) + read.pop("spatial-rival", 0)
     assert read == {
         "explicit": 2 * episodes,
-        "direct": 2 * (episodes + rivals),
-        "reasoning": 2 * (episodes + open_ones),
-        "contextual": 16 * episodes + 8 * rivals,
+        "direct": 2 * episodes,
+        "direct-rival": 2 * rivals,
+        "reasoning": 2 * episodes,
+        "reasoning-open": 2 * open_ones,
+        "contextual": 16 * episodes,
+        "contextual-rival": 8 * rivals,
     }
     assert 3.6 * episodes <= spatial <= 8 * episodes
     if split == "test":
@@ -54,9 +57,9 @@ def test_every_instruction_is_valid(task, split, episodes):
     assert open_ones > 0.6 * episodes or task == "PutInBox"
 
 
-def told(found: ValidationResults, task: str, setting: str, option: str) -> int:
-    """Number of scenes that a setting tells with an option."""
-    groups = [one for one in found.scenes if one.setting == setting and option in one.variant]
+def told(found: ValidationResults, task: str, setting: str) -> int:
+    """Number of scenes that a setting tells."""
+    groups = [one for one in found.scenes if one.setting == setting]
     assert groups
     assert {one.task for one in groups} == {task}
     return sum(found.scenes[one] - found.refused[one] for one in groups)

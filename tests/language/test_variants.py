@@ -2,7 +2,7 @@
 
 from collections import Counter
 
-from roboirg.language import setting_names, variants
+from roboirg.language import plain_settings, variants
 from roboirg.language.settings import settings_of
 from roboirg.tasks import all_tasks, every_task
 from roboirg.tasks.splits.splits import get_episode
@@ -19,7 +19,7 @@ def test_the_registry_yields_forty_variants():
         "spatial": sum(task.spatial for task in all_tasks().values()),
     }
     # The paper's numbers.
-    assert [by_setting[setting] for setting in setting_names()[1:]] == [11, 11, 11, 7]
+    assert [by_setting[setting] for setting in plain_settings()[1:]] == [11, 11, 11, 7]
     assert len(found) == 40
 
 
@@ -34,11 +34,17 @@ def test_every_combination_of_options_is_there():
     for name, task in every_task().items():
         told = list(variants.expressible_options(get_episode(name, "test", 0)))
         assert len(set(told)) == len(told)
-        plain = [one for one in told if (one.rival, one.reasoning) == ("none", "plain")]
+        plain = [one for one in told if one.setting in plain_settings()]
         spatial = 4 if "spatial" in settings_of(task) else 0
         assert len(plain) == 6 + 16 + spatial
         # A scene may lack a second value, or what open reasoning needs.
         others = [one for one in told if one not in plain]
-        assert len({one.setting for one in others} - {"direct", "contextual", "spatial"}) <= 1
-        for setting, most in (("direct", 2), ("reasoning", 2), ("contextual", 8), ("spatial", 4)):
+        most_of = {
+            "direct-rival": 2,
+            "reasoning-open": 2,
+            "contextual-rival": 8,
+            "spatial-rival": 4,
+        }
+        assert {one.setting for one in others} <= most_of.keys()
+        for setting, most in most_of.items():
             assert sum(one.setting == setting for one in others) in (0, most)

@@ -17,7 +17,7 @@ from roboirg.core.episode import SPLITS
 from roboirg.core.word_pools import POOLS, Pools, pool_of
 from roboirg.evaluation.plan.plan_maker import make_plan
 from roboirg.evaluation.play.job_instruction import instruct_job
-from roboirg.language import instruct, setting_names
+from roboirg.language import instruct, plain_settings
 from roboirg.language.settings import all_settings
 from roboirg.language.slot_types.number import SAME_NUMBER
 from roboirg.language.templates import derivations, introductions, remarks
@@ -31,7 +31,7 @@ KINDS = {
     for name, pools in vars(module).items()
     if isinstance(pools, Pools)
 }
-IMPLICIT = tuple(name for name in setting_names() if all_settings()[name].implicit)
+IMPLICIT = tuple(name for name in plain_settings() if all_settings()[name].implicit)
 
 OF_VERSION_1 = {
     "COLOR_INTRODUCTIONS": 4, "NUMBER_INTRODUCTIONS": 4, "AMOUNT_INTRODUCTIONS": 4,
@@ -80,7 +80,7 @@ def test_the_split_chooses_the_pool():
         "val": "train",
         "test": "test",
     }
-    for split, setting in itertools.product(SPLITS, setting_names()):
+    for split, setting in itertools.product(SPLITS, plain_settings()):
         said = instruct(get_episode("PickXtimes", split, 1), setting)
         assert said.metadata["pool"] == pool_of(split)
         assert said.metadata["wordings"] is None
@@ -90,7 +90,7 @@ def test_the_split_chooses_the_pool():
 
 
 @pytest.mark.parametrize("pool", POOLS)
-@pytest.mark.parametrize("setting", setting_names())
+@pytest.mark.parametrize("setting", plain_settings())
 def test_a_pool_may_be_chosen(setting, pool):
     """The words are those of an episode of a split with that pool, with the same scene."""
     split = {"train": "val", "test": "test"}[pool]

@@ -419,7 +419,7 @@ def test_a_setting_under_own_ignores_the_commands():
     with pytest.raises(InvalidValueError, match="have no command of PickXtimes"):
         instruct(without_command, "spatial", wordings=identity)
     # A command from outside has no rival; our own has.
-    rival = InstructionOptions("direct", rival="drawn")
+    rival = InstructionOptions("direct-rival")
     assert find_refusal(without_command, rival) is None
     options = rival._replace(wordings=identity)
     assert find_refusal(without_command, options) is None

@@ -36,7 +36,7 @@ from roboirg.core.errors import (
     PolicyTimeoutError,
 )
 from roboirg.language import instruct
-from roboirg.language.settings import settings_of
+from roboirg.language.settings import plain_settings
 from roboirg.policies import play
 from roboirg.policies.vlm.goal_schema import goal_schema
 from roboirg.policies.vlm.models import ModelOptions
@@ -156,7 +156,7 @@ def test_a_listener_that_is_told_the_truth_decides_on_the_true_goal_in_all_setti
     with fake_vlm(["{}"]) as server:
         policy = make_listener(server)
         for task, known in every_task().items():
-            for setting, index in itertools.product(settings_of(known), range(EPISODES)):
+            for setting, index in itertools.product(plain_settings(known), range(EPISODES)):
                 episode = get_episode(task, "test", index)
                 env = stand_in(episode, setting)
                 server.answer = hearing(episode)
@@ -164,7 +164,7 @@ def test_a_listener_that_is_told_the_truth_decides_on_the_true_goal_in_all_setti
                 asked += 1
         policy.close()
     assert asked == len(server.requests) == policy.usage()["calls"]
-    assert asked == EPISODES * sum(len(settings_of(known)) for known in every_task().values())
+    assert asked == EPISODES * sum(len(plain_settings(known)) for known in every_task().values())
 
 
 def test_random_answers_reach_the_chance_level():

@@ -6,7 +6,7 @@ import pytest
 import roboirg
 from roboirg.core.actions import JOINT_ANGLE, WAYPOINT, check_chunk
 from roboirg.core.errors import InvalidValueError, UnknownNameError
-from roboirg.language.settings import settings_of
+from roboirg.language.settings import plain_settings
 from roboirg.policies import Policy, PrivilegedPolicy, load_policy_class, make_policy
 from roboirg.policies.builtin.listeners import ForgetfulPolicy, ListenerPolicy
 from roboirg.policies.by_name.loading import is_privileged, policy_version
@@ -238,7 +238,7 @@ def decided(policy_class, task, setting, episode, seed=0):
 @pytest.mark.sim
 @pytest.mark.parametrize("task", every_task())
 def test_the_listener_always_understands(task):
-    for setting in settings_of(every_task()[task]):
+    for setting in plain_settings(every_task()[task]):
         for episode in range(12):
             heard, meant = decided(ListenerPolicy, task, setting, episode)
             assert heard == meant
@@ -247,7 +247,7 @@ def test_the_listener_always_understands(task):
 @pytest.mark.sim
 @pytest.mark.parametrize("task", every_task())
 def test_the_forgetful_listener_understands_what_is_explicit_and_guesses_the_rest(task):
-    for setting in settings_of(every_task()[task]):
+    for setting in plain_settings(every_task()[task]):
         pairs = [
             decided(ForgetfulPolicy, task, setting, episode, seed)
             for episode in range(12)

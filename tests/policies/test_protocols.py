@@ -17,6 +17,7 @@ from wire_servers import ChallengeServer, unpack
 import roboirg
 from roboirg.apps.policy_check.policy_check import check_policy
 from roboirg.core.errors import InvalidValueError, UnknownNameError
+from roboirg.evaluation.play.job_instruction import PreparedJob
 from roboirg.evaluation.play.policy_environment import job_needs, make_env
 from roboirg.evaluation.records.record import Job
 from roboirg.policies import make_policy, play
@@ -109,7 +110,7 @@ def test_a_challenge_server_is_shown_what_the_options_ask_for():
         job = Job(
             policy="it", task="VideoUnmask", split="test", episode=0, setting="direct", max_steps=4
         )
-        env = make_env(job, job_needs(client, job))
+        env = make_env(PreparedJob(job), job_needs(client, job))
         info = play(env, client)
         client.close()
         _, first, later = map(unpack, server.messages)

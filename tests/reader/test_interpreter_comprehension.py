@@ -10,7 +10,7 @@ from language_variants import TASKS, first_episodes
 
 from roboirg.core.episode import Goal
 from roboirg.language import instruct
-from roboirg.language.settings import settings_of
+from roboirg.language.settings import plain_settings, settings_of
 from roboirg.reader import interpret
 from roboirg.reader.tokens import FILLERS, split_sentences
 from roboirg.reader.vocabulary import is_known
@@ -182,6 +182,7 @@ COMMANDS = [
     for task, episodes in EPISODES.items()
     for episode in episodes
     for setting in settings_of(get_task(task))
+    if setting in plain_settings()
 ]
 
 

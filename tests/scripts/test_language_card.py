@@ -20,10 +20,10 @@ def test_every_variant_has_an_example():
         episode = card.example_episode(task, setting)
         assert f"`{episode.key}`" in page
     assert page.count("| explicit | ") == 40
-    options = page.split("## Options\n")[1]
+    options = page.split("## Harder settings\n")[1]
     assert page.count("| resolved | ") == 40 + options.count("### ")
-    assert options.count(", rival drawn\n") == 18
-    assert options.count(", reasoning open\n") == 11
+    assert options.count("-rival\n") == 18
+    assert options.count("-open\n") == 11
 
 
 def test_marks_are_around_the_mentions():

@@ -10,7 +10,7 @@ from benchmarks.synthetic_run import write_synthetic_run
 from roboirg.evaluation.analysis.page.entries import Run
 from roboirg.evaluation.analysis.page.report import make_view, render_runs
 from roboirg.evaluation.analysis.stats.cells import gather
-from roboirg.evaluation.plan.plan import read_plan
+from roboirg.evaluation.plan.stored_plans import read_plan
 from roboirg.evaluation.records.merging import merge_runs
 from roboirg.evaluation.records.record_codec import identity_key
 from roboirg.evaluation.records.store import RECORDS_FILE, read_records, read_results

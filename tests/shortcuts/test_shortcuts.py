@@ -243,7 +243,7 @@ def test_shares_of_every_setting(task, setting, episodes):
                 assert all(0 <= share <= 1 for share in (*score.slots, score.goal))
             if not get_setting(setting, get_task(task)).implicit:
                 assert all(score_rule(rule, told).goal == 1 for rule in SURFACE_RULES)
-            elif setting in ("direct", "contextual") and options.rival == "none":
+            elif setting in ("direct", "contextual"):
                 assert score_rule("first-mention", told).goal == 1
                 assert score_rule("surface", told).goal == 1
                 if options.form == "resolved":

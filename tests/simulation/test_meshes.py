@@ -120,6 +120,7 @@ def test_two_processes_may_fill_the_cache_at_once(right):
 
 
 @pytest.mark.sim
+@pytest.mark.slow
 def test_damaged_meshes_are_made_anew_and_told(right):
     cache, picture = right
     sound = {path.name: path.read_bytes() for path in cache.iterdir()}

@@ -11,7 +11,6 @@ import pytest
 import sapien
 import sapien.physx
 import sapien.render
-from selection import slow_but
 
 import roboirg
 from roboirg.core.errors import InvalidValueError
@@ -116,7 +115,8 @@ class Differences:
         )
 
 
-@pytest.mark.parametrize("frames", slow_but([4], [4, FRAMES]))
+@pytest.mark.slow
+@pytest.mark.parametrize("frames", [4, FRAMES])
 def test_pictures_are_those_of_the_stock_path(frames):
     found = {rendering: Differences() for rendering in (CULLING_ALONE, FAITHFUL, LIGHT)}
     whole = {rendering: replace(rendering, culling=False) for rendering in (FAITHFUL, LIGHT)}

@@ -3,6 +3,7 @@
 import importlib.util
 import re
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -11,9 +12,12 @@ import roboirg
 from roboirg import tasks
 from roboirg.apps.language_lab.validation import check_episode
 from roboirg.core.conditions import Fact
+from roboirg.core.episode import Goal, Primitive, Scene, SceneObject, Stage
+from roboirg.core.errors import RoboIRGError
 from roboirg.judging import Judge, Status
-from roboirg.language.settings import settings_of
+from roboirg.language.settings import plain_settings, settings_of
 from roboirg.policies import make_policy, play
+from roboirg.tasks.splits import splits
 from roboirg.tasks.splits.splits import get_episode, make_episode
 
 PAGE = (Path(__file__).parents[2] / "docs" / "tasks.md").read_text()
@@ -46,7 +50,10 @@ def test_it_is_found_beside_the_benchmark(task):
     assert tasks.get_task(NAME) is task
     assert tasks.find_tasks([NAME]) == tasks.find_tasks([task.suite]) == (NAME,)
     assert NAME not in tasks.find_tasks(["all"])
-    assert set(settings_of(task)) == {"explicit", "direct", "reasoning", "contextual"}
+    assert plain_settings(task) == ("explicit", "direct", "reasoning", "contextual")
+    assert set(settings_of(task)) - set(plain_settings(task)) == {
+        "direct-rival", "reasoning-open", "contextual-rival"
+    }  # fmt: skip
 
 
 def test_its_scenes_fit_and_its_instructions_are_valid(task):
@@ -78,3 +85,32 @@ def test_the_oracle_solves_it(task, index):
 def test_the_listener_solves_it(task, setting):
     env = roboirg.make(NAME, setting=setting, episode=1, cameras=())
     assert play(env, make_policy("listener", 0))["status"] == "success"
+
+
+@pytest.mark.parametrize(
+    ("fact", "sentence"),
+    [
+        (Fact("over", "cube_red", "cube_red"), "'cube_red' is a cube, not a target"),
+        (Fact("picked", "button"), "'button' is a button, not a cube or a tape"),
+        (Fact("placed", "cube_red"), "it needs a place, which is a target or a site"),
+        (Fact("picked", "cube_red", "target"), "picked has no place"),
+        (Fact("picked", "cube_pink"), "the scene has no 'cube_pink'; it has button, "),
+        (Fact("lift", "cube_red"), "There is no kind of fact 'lift'"),
+    ],
+)
+def test_a_fact_that_can_never_hold_is_refused(task, monkeypatch, fact, sentence):
+    scene = Scene(
+        (
+            SceneObject("button", "button", (-0.1, 0.1, 0.0)),
+            SceneObject("cube_red", "cube", (0.0, 0.0, 0.02), color="red"),
+            SceneObject("target", "target", (0.1, 0.0, 0.0), radius=0.04),
+        )
+    )
+    made = replace(
+        task,
+        sample=lambda _rng, _difficulty: (scene, Goal.of(color="red")),
+        stages=lambda scene, goal: (Stage(fact, (), Primitive("pick_cube", "cube_red"), "go"),),
+    )
+    monkeypatch.setattr(splits, "get_task", lambda _name: made)
+    with pytest.raises(RoboIRGError, match=re.escape(sentence)):
+        splits.make_episode(NAME, 0, "easy")

@@ -13,7 +13,7 @@ from roboirg.core.episode import DIFFICULTIES, ROBOT_BASE, SPLITS, Goal
 from roboirg.core.errors import SceneRejectedError
 from roboirg.core.footprints import Circle, overlap
 from roboirg.core.motions import Away, Glow, Shuttle, Swap, Vanish
-from roboirg.language.settings import settings_of
+from roboirg.language.settings import plain_settings
 from roboirg.tasks import every_task, get_task
 from roboirg.tasks.shared.fixtures import bin_footprint, button_footprint, cube_footprint
 from roboirg.tasks.shared.real_table import box_footprint
@@ -86,7 +86,7 @@ def test_registry_holds_each_task_once_and_in_the_order_of_codes():
 
 @each_task
 def test_settings_are_known_and_begin_with_explicit(task):
-    settings = settings_of(get_task(task))
+    settings = plain_settings(get_task(task))
     assert settings[0] == "explicit"
     assert set(settings) <= SETTINGS
     assert ("spatial" in settings) == get_task(task).spatial

@@ -34,10 +34,10 @@ def known_settings(text: str) -> tuple[str, ...]:
         UnknownNameError: one of them does not exist.
     """
     from roboirg.evaluation.plan.plan_parsing import means_all, parse_names
-    from roboirg.language import setting_names
+    from roboirg.language import plain_settings, setting_names
 
     if means_all(text):
-        return setting_names()
+        return plain_settings()
     return tuple(
         known_name("setting", name, setting_names()) for name in parse_names("setting", text)
     )

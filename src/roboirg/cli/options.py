@@ -20,7 +20,10 @@ Tasks = Annotated[
     str,
     typer.Option(help="Tasks or suites, separated by commas; all for the whole benchmark."),
 ]
-Settings = Annotated[str, typer.Option(help="Settings, separated by commas; all for every one.")]
+Settings = Annotated[
+    str,
+    typer.Option(help="Settings, separated by commas; all for every one but the harder ones."),
+]
 Forms = Annotated[str, typer.Option(help="implicit, resolved, or both separated by a comma.")]
 Split = Annotated[str, typer.Option(help="train, val, test or random.")]
 Video = Annotated[str, typer.Option(help="Record videos of episodes: off, failures or all.")]
@@ -28,10 +31,6 @@ AnySplit = Annotated[str, typer.Option(help="train, val, test or all.")]
 Stages = Annotated[str, typer.Option(help="Stages of the contextual setting, such as 1,5.")]
 Distractor = Annotated[str, typer.Option(help="Kind of distractor in the contextual setting.")]
 Frame = Annotated[str, typer.Option(help="Frame of reference in the spatial setting.")]
-Rival = Annotated[
-    str, typer.Option(help="A second value in direct, contextual, spatial: none or drawn.")
-]
-Reasoning = Annotated[str, typer.Option(help="Patterns of the reasoning setting: plain or open.")]
 Wordings = Annotated[
     str | None,
     typer.Option(
@@ -55,8 +54,6 @@ class WordChoices(NamedTuple):
     stages: Stages = "1-5"
     distractor: Distractor = "neutral"
     frame: Frame = "robot"
-    rival: Rival = "none"
-    reasoning: Reasoning = "plain"
     wordings: Wordings = None
 
     def instruction_options(self, delivery: str = "prompt") -> InstructionOptions:

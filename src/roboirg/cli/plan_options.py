@@ -75,13 +75,6 @@ Delivery = Annotated[
         help="prompt: the whole instruction at once; turns: one utterance after another.  (prompt)"
     ),
 ]
-Rival = Annotated[
-    str | None,
-    _words(help="A second value in direct, contextual, spatial: none or drawn.  (none)"),
-]
-Reasoning = Annotated[
-    str | None, _words(help="Patterns of the reasoning setting: plain or open.  (plain)")
-]
 Wordings = Annotated[
     str | None,
     _words(help="Our words for train or test, or a file with commands.  (ours of the split)"),
@@ -149,8 +142,6 @@ class PlanChoices(NamedTuple):
     distractors: Distractors = None
     frame: Frame = None
     delivery: Delivery = None
-    rival: Rival = None
-    reasoning: Reasoning = None
     wordings: Wordings = None
     max_steps: MaxSteps = None
     actions: Actions = None

@@ -43,12 +43,12 @@ def export(
 ) -> None:
     """Export the records of a run as a Parquet table (columns: see docs/running.md)."""
     from roboirg.evaluation.records.parquet import write_parquet
-    from roboirg.evaluation.records.record_codec import read_index_entry
+    from roboirg.evaluation.records.record_codec import read_summary
     from roboirg.evaluation.records.store import StoredRun
     from roboirg.util.parquet_support import check_parquet_support
 
     check_parquet_support()
     check_output_file(out)
-    stored = StoredRun(folder_of(run), read_index_entry)
+    stored = StoredRun(folder_of(run), read_summary)
     count = write_parquet(stored.records(stored.newest), out)
     typer.echo(f"{counted(count, 'record')}: {out}")

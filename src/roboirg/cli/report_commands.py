@@ -15,8 +15,7 @@ if TYPE_CHECKING:
     from roboirg.evaluation.analysis.stats.breakdowns import Breakdown, Labels
     from roboirg.evaluation.analysis.stats.cells import Cells
     from roboirg.evaluation.analysis.tables.table import Table
-    from roboirg.evaluation.records.record import Job
-    from roboirg.evaluation.records.record_codec import AnyResult
+    from roboirg.evaluation.records.record import Job, Summary
 
 # Heavy modules are imported inside the commands, so that --help answers at once.
 
@@ -268,12 +267,12 @@ def _breakdowns(by: str | None) -> tuple[Breakdown, ...]:
 def _labels(breakdowns: tuple[Breakdown, ...], runs: list[str]) -> dict[str, Labels]:
     """Return the labels of the instructions of runs, whose records are read one by one."""
     from roboirg.evaluation.analysis.stats.breakdowns import label_instructions
-    from roboirg.evaluation.records.store import read_instructions
+    from roboirg.evaluation.records.store import iterate_records
 
     if not breakdowns:
         return {}
     folders = map(Path, dict.fromkeys(runs))
-    records = itertools.chain.from_iterable(map(read_instructions, folders))
+    records = itertools.chain.from_iterable(map(iterate_records, folders))
     return label_instructions(breakdowns, records)
 
 
@@ -308,14 +307,14 @@ def _cells(runs: list[str]) -> Cells:
     return gather(*_runs(runs))
 
 
-def _runs(runs: list[str]) -> tuple[list[tuple[str, Sequence[AnyResult]]], list[Job]]:
+def _runs(runs: list[str]) -> tuple[list[tuple[str, Sequence[Summary]]], list[Job]]:
     """Return the results of runs, each with its folder, and the jobs of their plans."""
     from roboirg.cli.run_commands import planned_jobs
     from roboirg.evaluation.records.store import read_results
 
     folders = [Path(run) for run in runs]
     planned = [job for folder in folders for job in planned_jobs(folder)]
-    results: list[tuple[str, Sequence[AnyResult]]] = [
+    results: list[tuple[str, Sequence[Summary]]] = [
         (str(folder), read_results(folder)) for folder in folders
     ]
     return results, planned

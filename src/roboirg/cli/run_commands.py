@@ -13,7 +13,7 @@ import typer
 from roboirg.cli import plan_options as options
 from roboirg.cli.options import Workers, add_working_directory, spread
 from roboirg.core.errors import InvalidValueError, UnknownNameError
-from roboirg.core.plain_text import counted, printable
+from roboirg.core.plain_text import counted, printable, verb_for
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -106,7 +106,7 @@ def play(
     plan: Plan, out: Path, executor: Executor, *, retry: bool, on_record: str | None = None
 ) -> RunSummary:
     """Play a plan with a progress bar; exits the process when it is interrupted."""
-    from roboirg.evaluation.plan.plan import with_secret
+    from roboirg.evaluation.plan.stored_plans import with_secret
     from roboirg.evaluation.run.progress import ConsoleReporter
     from roboirg.evaluation.run.record_hook import CommandHook, HookedReporter
     from roboirg.evaluation.run.runner import Terminated, episode_runner, run_plan
@@ -147,7 +147,7 @@ def print_tables_of(folder: Path, planned: Sequence[Job]) -> None:
 
 def planned_jobs(folder: Path) -> tuple[Job, ...]:
     """Return the jobs of a run's newest plan; none if the plan or its episodes are not known."""
-    from roboirg.evaluation.plan.plan import read_plan
+    from roboirg.evaluation.plan.stored_plans import read_plan
 
     plan = read_plan(folder)
     return plan.drawable_jobs() if plan else ()
@@ -163,16 +163,18 @@ def report_problems(summary: RunSummary, folder: Path) -> None:
         )
     if summary.errors:
         first = summary.errors[0]
+        verb = verb_for(len(summary.errors), "are")
         typer.echo(
             f"roboirg: {len(summary.errors):,} of {counted(summary.total, 'episode')} ended in an "
-            f"error and are not counted in the rates; the first ({first.task} "
+            f"error and {verb} not counted in the rates; the first ({first.task} "
             f"{first.split}/{first.episode} {first.setting}): {printable(str(first.cause))}",
             err=True,
         )
     if summary.missing:
+        verb = verb_for(summary.missing, "were")
         typer.echo(
-            f"roboirg: {summary.missing:,} of {counted(summary.total, 'episode')} were not played; "
-            f"run the same command to play them in {folder}.",
+            f"roboirg: {summary.missing:,} of {counted(summary.total, 'episode')} {verb} not "
+            f"played; run the same command to complete {folder}.",
             err=True,
         )
     if summary.errors or summary.missing:
@@ -241,6 +243,7 @@ def _print_estimate(plan: Plan, folder: Path, workers: int | None) -> None:
     from roboirg.evaluation.records.store import read_index
     from roboirg.evaluation.run.estimate import cell_sizes, estimate, estimate_text
     from roboirg.evaluation.run.world_speed import ASSUMED, measure_world
+    from roboirg.language.settings import EXPLICIT
     from roboirg.util.console_width import widen
     from roboirg.util.processor import core_count
 
@@ -255,7 +258,8 @@ def _print_estimate(plan: Plan, folder: Path, workers: int | None) -> None:
     for (policy, task), cells in sizes.items():
         counts = (" + ".join(map(str, cells.get(one, {}).values())) or "–" for one in settings)
         table.add_row(policy, task, *counts)
-    table.caption = "episodes: implicit" + (" + resolved" if "resolved" in plan.forms else "")
+    forms = dict.fromkeys(job.form for job in jobs if job.setting != EXPLICIT)  # it has one form
+    table.caption = f"episodes: {' + '.join(forms)}" if forms else "episodes"
     widen(console, table)
     console.print(table)
     _print_prompt_shares(jobs, settings, console)

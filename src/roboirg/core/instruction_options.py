@@ -9,10 +9,6 @@ DEFAULT_DISTRACTOR = "neutral"
 DEFAULT_DISTRACTORS = 1
 DEFAULT_FRAME = "robot"
 DEFAULT_DELIVERY = "prompt"
-DEFAULT_RIVAL = "none"
-DEFAULT_REASONING = "plain"
-RIVALS = (DEFAULT_RIVAL, "drawn")
-REASONINGS = (DEFAULT_REASONING, "open")
 
 
 class InstructionOptions(NamedTuple):
@@ -35,11 +31,6 @@ class InstructionOptions(NamedTuple):
             episode's split.
         delivery: ``prompt``, all utterances at once, or ``turns``, one after another
             (`roboirg.core.delivery`).
-        rival: of the direct, contextual and spatial settings: ``none``, or ``drawn`` for a second
-            value of the same kind, introduced on equal terms; the last words before the command
-            single one out.
-        reasoning: of the reasoning setting: ``plain``, or ``open``, whose goals follow from no
-            single word.
     """
 
     setting: str = "explicit"
@@ -50,5 +41,3 @@ class InstructionOptions(NamedTuple):
     frame: str = DEFAULT_FRAME
     wordings: str | None = None
     delivery: str = DEFAULT_DELIVERY
-    rival: str = DEFAULT_RIVAL
-    reasoning: str = DEFAULT_REASONING

@@ -42,3 +42,11 @@ def counted(count: int, noun: str, plural: str | None = None) -> str:
     """
     word = noun if count == 1 else plural or f"{noun}s"
     return f"{count:,} {word}"
+
+
+_SINGULAR_VERBS = {"are": "is", "were": "was", "have": "has", "do": "does"}
+
+
+def verb_for(count: int, plural: str) -> str:
+    """Return a verb that agrees with a count: ``is`` for 1 and ``are``, else ``are``."""
+    return _SINGULAR_VERBS[plural] if count == 1 else plural

@@ -24,8 +24,6 @@ class EnvOptions(TypedDict, total=False):
     frame: str
     wordings: str | Path | None
     delivery: str
-    rival: str
-    reasoning: str
     actions: str
     cameras: Sequence[str]
     depth: bool

@@ -16,8 +16,6 @@ from roboirg.core.instruction_options import (
     DEFAULT_DISTRACTOR,
     DEFAULT_DISTRACTORS,
     DEFAULT_FRAME,
-    DEFAULT_REASONING,
-    DEFAULT_RIVAL,
     InstructionOptions,
 )
 from roboirg.core.observations import CAMERAS, DemonstrationFrames
@@ -52,8 +50,6 @@ class EnvSettings:
     frame: str = DEFAULT_FRAME
     wordings: str | Path | None = None
     delivery: str = DEFAULT_DELIVERY
-    rival: str = DEFAULT_RIVAL
-    reasoning: str = DEFAULT_REASONING
     actions: str = JOINT_ANGLE.name
     cameras: Sequence[str] = CAMERAS
     depth: bool = False

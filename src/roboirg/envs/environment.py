@@ -14,13 +14,14 @@ from roboirg.core.actions import check_action, check_chunk, find_action_space
 from roboirg.core.delivery import SpokenInstruction
 from roboirg.core.episode import Episode, Stage
 from roboirg.core.errors import InvalidValueError, MotionPlanningError
+from roboirg.core.instruction_options import InstructionOptions
 from roboirg.core.observations import CAMERAS
 from roboirg.envs.env_options import EnvOptions
 from roboirg.envs.env_settings import RENDER_MODES, EnvSettings, choose_index
 from roboirg.envs.episode_state import EpisodeState
 from roboirg.envs.observation_spaces import make_observation_space
 from roboirg.judging import Event, Status, plain_subgoal
-from roboirg.language import instruct_with
+from roboirg.language import Instruction, instruct_with
 from roboirg.simulation.controllers import make_controller
 from roboirg.simulation.episode_session import EpisodeSession
 from roboirg.simulation.observation_builder import ObservationBuilder
@@ -88,6 +89,7 @@ class RoboIRGEnv(gymnasium.Env[dict[str, Any], NDArray[np.floating[Any]]]):
     def __init__(self, task: str | Episode, **options: Unpack[EnvOptions]) -> None:
         self._task, self._settings = task, EnvSettings(**options)
         self._last_index: int | None = None
+        self._instructed: tuple[tuple[Episode, InstructionOptions], Instruction] | None = None
         self._select_episode(self._settings, choose_index(self._settings, None, None))
         self._space = find_action_space(self._settings.actions)
         self._spec = self._settings.observation_spec()
@@ -289,8 +291,10 @@ class RoboIRGEnv(gymnasium.Env[dict[str, Any], NDArray[np.floating[Any]]]):
         self._last_index = self.episode.index
 
     def _select_episode(self, settings: EnvSettings, index: int) -> None:
-        self.episode = settings.find_episode(self._task, index)
-        self.instruction = instruct_with(self.episode, settings.instruction_options())
+        chosen = settings.find_episode(self._task, index), settings.instruction_options()
+        if self._instructed is None or self._instructed[0] != chosen:
+            self._instructed = chosen, instruct_with(*chosen)
+        (self.episode, _), self.instruction = self._instructed
         self.delivery = settings.delivery
 
     def _play_demonstration(self, recording: Recording | None) -> Recording:

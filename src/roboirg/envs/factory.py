@@ -26,7 +26,8 @@ def make(task: str | Episode, **options: Unpack[EnvOptions]) -> RoboIRGEnv:
         **options: the keyword arguments below; `EnvSettings` has their defaults.
 
     Keyword Args:
-        setting: explicit, direct, reasoning, contextual or spatial.
+        setting: explicit, direct, reasoning, contextual, spatial, or one of the harder
+            direct-rival, contextual-rival, spatial-rival and reasoning-open.
         form: implicit, or resolved for the paired explicit counterpart.
         split: train, val, test or random.
         episode: index of the episode in the split, from 0; None if the seed of each reset
@@ -37,9 +38,6 @@ def make(task: str | Episode, **options: Unpack[EnvOptions]) -> RoboIRGEnv:
         frame: whose left and right a spatial instruction uses: robot or camera.
         wordings: wording file whose commands are used, or its identity; None for our own words.
         delivery: prompt, all utterances at once, or turns: one after another while it acts.
-        rival: drawn adds a second value of the same kind to direct, contextual and spatial
-            instructions; none adds nothing.
-        reasoning: plain, or open for reasoning instructions whose goal follows from no single word.
         actions: joint_angle, ee_pose or waypoint.
         cameras: cameras whose pictures observations hold; () renders nothing.
         depth: add depth for the same cameras.

@@ -6,7 +6,7 @@ from roboirg.language.generator import expressible, find_refusals, instruct, ins
 from roboirg.language.instruction import FORMS, Instruction, Mention, Utterance
 from roboirg.language.mirrored_landmarks import mirrored_objects
 from roboirg.language.request import STAGE_SETS
-from roboirg.language.settings import setting_names, settings_of
+from roboirg.language.settings import plain_settings, setting_names, settings_of
 from roboirg.language.templates import LANGUAGE_VERSION
 from roboirg.language.wordings.wording_store import open_wordings
 
@@ -23,6 +23,7 @@ __all__ = [
     "instruct_with",
     "mirrored_objects",
     "open_wordings",
+    "plain_settings",
     "setting_names",
     "settings_of",
 ]

@@ -14,10 +14,6 @@ from roboirg.core.instruction_options import (
     DEFAULT_DISTRACTOR,
     DEFAULT_DISTRACTORS,
     DEFAULT_FRAME,
-    DEFAULT_REASONING,
-    DEFAULT_RIVAL,
-    REASONINGS,
-    RIVALS,
     InstructionOptions,
 )
 from roboirg.core.word_pools import POOLS
@@ -56,7 +52,6 @@ _DEFAULT_METADATA: dict[str, object] = {
     "rival_slot": None,
     "rival_position": None,
     "rival_reference": None,
-    "reasoning": None,
     "candidates": {},
     "wordings": None,
     "command": "own",
@@ -74,8 +69,6 @@ def instruct(
     distractors: int = DEFAULT_DISTRACTORS,
     frame: str = DEFAULT_FRAME,
     wordings: str | None = None,
-    rival: str = DEFAULT_RIVAL,
-    reasoning: str = DEFAULT_REASONING,
 ) -> Instruction:
     """Return the instruction of an episode; the same arguments always give the same bytes.
 
@@ -91,8 +84,6 @@ def instruct(
         frame: of left and right, ``robot`` or ``camera``.
         wordings: ``train`` or ``test`` for the words of that pool; or the identity of an open
             wording file, whose commands are used. None for our words of the episode's split.
-        rival: ``none``, or ``drawn`` for a second value of the same kind.
-        reasoning: ``plain``, or ``open`` for patterns that no single word gives away.
 
     Raises:
         UnknownNameError: a name does not exist.
@@ -110,8 +101,6 @@ def instruct(
             distractors,
             frame,
             wordings,
-            rival=rival,
-            reasoning=reasoning,
         ),
     )
 
@@ -197,7 +186,7 @@ def _request(episode: Episode, options: InstructionOptions) -> InstructionReques
     wordings = None
     if options.wordings is not None and options.wordings not in POOLS:
         wordings = find_wordings(options.wordings).tasks.get(task.name, TaskWordings(()))
-        if options.setting in wordings.own:
+        if wordings.own & {options.setting, all_settings()[options.setting].plain}:
             wordings = None
     return InstructionRequest(episode, task, options, _sampler(episode), wordings)
 
@@ -239,8 +228,6 @@ def check_options(options: InstructionOptions) -> None:
         ("distractor", options.distractor, DISTRACTORS),
         ("frame", options.frame, FRAMES),
         ("delivery", options.delivery, DELIVERIES),
-        ("rival", options.rival, RIVALS),
-        ("reasoning", options.reasoning, REASONINGS),
     ):
         if name not in known:
             raise UnknownNameError(kind, name, known)

@@ -51,7 +51,6 @@ def row(episode: Episode, instruction: Instruction) -> ExportRow:
         "rival_slot": metadata["rival_slot"] or "none",
         "rival_position": metadata["rival_position"] or "none",
         "rival_reference": metadata["rival_reference"] or "none",
-        "reasoning": metadata["reasoning"] or "none",
         "templates": metadata["templates"],
         # Never null: readers infer the types of columns.
         "wordings": metadata["wordings"] or "own",

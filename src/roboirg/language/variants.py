@@ -27,16 +27,7 @@ def all_variants() -> tuple[Variant, ...]:
         Variant(task.name, setting)
         for task in all_tasks().values()
         for setting in settings_of(task)
-        if all_settings()[setting].implicit
-    )
-
-
-def settings_with_rivals() -> tuple[str, ...]:
-    """Return the names of the settings whose instructions can have a rival."""
-    return tuple(
-        name
-        for name, setting in all_settings().items()
-        if any("rival" in changes for changes in setting.variants)
+        if all_settings()[setting].implicit and all_settings()[setting].plain is None
     )
 
 

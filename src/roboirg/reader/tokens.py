@@ -44,7 +44,8 @@ def word_set(words: str) -> frozenset[str]:
     return frozenset(words.split())
 
 
-_SYNONYMS = {"block": "cube", "blocks": "cubes"}
+SYNONYMS = {"block": "cube", "blocks": "cubes"}
+"""Words that are read as others; `vocabulary.register_words` adds those of other packages."""
 
 FILLERS = word_set("please okay kindly carefully gently slowly quickly softly neatly calmly")
 """Words that change nothing in any position; `split_sentences` drops them."""
@@ -81,7 +82,7 @@ def split_sentences(text: str) -> tuple[Sentence, ...]:
     text = _MINUS.sub("minus ", text)
     parts = (_WORD.findall(part) for part in _SENTENCE_END.split(text))
     kept = (
-        tuple(_SYNONYMS.get(word, word) for word in part if word not in FILLERS) for part in parts
+        tuple(SYNONYMS.get(word, word) for word in part if word not in FILLERS) for part in parts
     )
     return tuple(part for part in kept if part)
 

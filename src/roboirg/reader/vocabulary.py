@@ -1,12 +1,16 @@
 """Vocabulary: every word that a command may use. A word outside these tables is unknown.
 
 Numbers, ordinals and colors are in `tokens`. A new verb goes into `TAKING`, `PUTTING` or
-`PRESSING`; a new adverb that changes nothing goes into `tokens.FILLERS`.
+`PRESSING`; a new adverb that changes nothing goes into `tokens.FILLERS`. Another package teaches
+words with `register_words`.
 """
 
 from __future__ import annotations
 
-from roboirg.reader.tokens import color_of, number_of, ordinal_of, word_set
+from collections.abc import Mapping
+
+from roboirg.core.errors import InvalidValueError
+from roboirg.reader.tokens import SYNONYMS, color_of, number_of, ordinal_of, word_set
 
 TAKING = word_set(
     "take pick grab grasp lift raise carry move bring fetch get uncover reveal remove hold swing "
@@ -133,3 +137,30 @@ def is_known(word: str) -> bool:
 def may_be_verb(word: str) -> bool:
     """Return whether an unknown word may be the verb of a command."""
     return not (is_known(word) or word in _OPENERS or word.endswith(_NO_VERB_ENDINGS))
+
+
+def register_words(synonyms: Mapping[str, str]) -> None:
+    """Teach the interpreter words of another package. Teaching the same again changes nothing.
+
+    Call it in the module of the task or setting that uses the words:
+
+        register_words({"crate": "box", "hoist": "lift"})
+
+    Args:
+        synonyms: new words in lower case, each with the known word as which it is read.
+
+    Raises:
+        InvalidValueError: a word is known already, or is to be read as an unknown one.
+    """
+    for word, meaning in synonyms.items():
+        if SYNONYMS.get(word) == meaning:
+            continue
+        if word in SYNONYMS or is_known(word):
+            raise InvalidValueError(
+                f"The interpreter knows the word {word!r} already; teach it another one."
+            )
+        if not is_known(meaning):
+            raise InvalidValueError(
+                f"{word!r} is to be read as {meaning!r}, a word that the interpreter does not know."
+            )
+        SYNONYMS[word] = meaning

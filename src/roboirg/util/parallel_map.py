@@ -32,7 +32,7 @@ def parallel_map(
         RoboIRGError: a worker process died.
     """
     if workers < 0:
-        raise InvalidValueError(f"workers is {workers}; it must be at least 0.")
+        raise InvalidValueError(f"workers is {workers}; it must be at least 0, this process only.")
     if workers == 0:
         yield from ((item, work(item)) for item in items)
         return

@@ -58,6 +58,7 @@ def check_never_broken(out):
         assert index.tolist() == list(range(len(index)))
 
 
+@pytest.mark.slow
 def test_a_killed_export_continues_without_a_broken_file(tmp_path, synthetic):
     whole = tmp_path / "whole"
     export_run.run_export(killed_export.PLAN, whole, 0, quiet)

@@ -32,7 +32,7 @@ from roboirg.evaluation.grounding_items.grounding_item import (
 from roboirg.evaluation.grounding_items.item_builder import EpisodeMedia, make_items, wanted_options
 from roboirg.evaluation.grounding_items.verdicts import guess_chance, judge_reply, right_reply
 from roboirg.evaluation.records.record import Job
-from roboirg.language import setting_names
+from roboirg.language import plain_settings
 from roboirg.main import app
 from roboirg.tasks.splits.splits import get_episode
 
@@ -66,7 +66,7 @@ def items(tasks=TASKS, episodes=12, every_variant=False):
             episode = get_episode(task, "test", index)
             wanted = wanted_options(
                 episode,
-                setting_names(),
+                plain_settings(),
                 ("implicit",),
                 InstructionOptions(),
                 every_variant=every_variant,
@@ -92,7 +92,7 @@ def item_of(task, setting="direct", index=0):
 def test_the_oracle_is_always_right(kind):
     score, rows = rows_of(floor_answers("oracle", items()), kind)
     assert score.unparsed == score.missing == 0
-    assert set(rows) == set(setting_names())
+    assert set(rows) == set(plain_settings())
     for row in rows.values():
         assert row.summary.rate == 1
         assert row.corrected == 1

@@ -37,7 +37,7 @@ from roboirg.evaluation.grounding_items.item_builder import (
 from roboirg.evaluation.grounding_items.question_set import EpisodeName, ExportRequest
 from roboirg.evaluation.grounding_items.referents import find_referents, pointed_kinds
 from roboirg.evaluation.grounding_items.seen_scene import nearest_to_center
-from roboirg.language import FORMS, instruct, setting_names
+from roboirg.language import FORMS, instruct, plain_settings
 from roboirg.language.settings import all_settings
 from roboirg.main import app
 from roboirg.policies.vlm.goal_schema import goal_schema
@@ -66,7 +66,7 @@ def unseen(steps=0):
 def items_of(task, index, *, forms=("implicit",), every_variant=False, split="test"):
     episode = get_episode(task, split, index)
     wanted = wanted_options(
-        episode, setting_names(), forms, InstructionOptions(), every_variant=every_variant
+        episode, plain_settings(), forms, InstructionOptions(), every_variant=every_variant
     )
     return episode, make_items(episode, unseen(), list(wanted))
 
@@ -131,7 +131,7 @@ def test_ids_are_unique_stable_and_the_same_whatever_the_answer():
     episode = get_episode("PickXtimes", "test", 3)
     options = InstructionOptions("direct")
     name = item_id(episode, options)
-    assert name == "gff74ca36371d2267"
+    assert name == "g7ec8e06d69d761f2"
     others = get_task("PickXtimes").goals(episode.scene)
     assert {item_id(replace(episode, goal=goal), options) for goal in others} == {name}
     assert item_id(get_episode("PickXtimes", "val", 3), options) != name
@@ -144,7 +144,7 @@ def test_the_test_split_has_2550_items():
         for index in range(SIZES["test"])
         for options in wanted_options(
             get_episode(task, "test", index),
-            setting_names(),
+            plain_settings(),
             ("implicit",),
             InstructionOptions(),
             every_variant=False,
@@ -157,10 +157,10 @@ def test_the_test_split_has_2550_items():
 
 def test_options_that_a_setting_does_not_read_keep_their_defaults():
     episode = get_episode("PickXtimes", "test", 3)
-    changed = InstructionOptions(rival="drawn", reasoning="open", frame="camera")
-    for options in wanted_options(episode, setting_names(), FORMS, changed, every_variant=True):
+    changed = InstructionOptions(delivery="turns", stages=(1, 5), frame="camera")
+    for options in wanted_options(episode, plain_settings(), FORMS, changed, every_variant=True):
         reads = all_settings()[options.setting].reads
-        for name in ("rival", "reasoning", "frame"):
+        for name in ("delivery", "stages", "frame"):
             value = getattr(options, name)
             assert value == getattr(InstructionOptions(), name) or name in reads
 
@@ -260,7 +260,7 @@ def exported(tmp_path_factory):
     folder = tmp_path_factory.mktemp("grounding") / "set"
     request = ExportRequest(
         tuple(EpisodeName(task, "test", index) for task, index in SEEN),
-        setting_names(),
+        plain_settings(),
         ("implicit",),
         frames=4,
         frames_every=16,

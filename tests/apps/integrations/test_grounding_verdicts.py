@@ -14,7 +14,7 @@ from roboirg.evaluation.grounding_items.answer_file import Answer
 from roboirg.evaluation.grounding_items.grounding_item import ITEMS_FILE, PointTarget, encode_items
 from roboirg.evaluation.grounding_items.item_builder import EpisodeMedia, make_items, wanted_options
 from roboirg.evaluation.grounding_items.media_store import store_content
-from roboirg.language import setting_names
+from roboirg.language import plain_settings
 from roboirg.policies.vlm.goal_schema import goal_schema
 from roboirg.policies.vlm.vlm_listener import NotUnderstoodError
 from roboirg.shortcuts.command_chance import is_right
@@ -37,7 +37,7 @@ def items():
     for index, task in itertools.product(range(20), all_tasks()):
         episode = get_episode(task, "test", index)
         options = wanted_options(
-            episode, setting_names(), ("implicit",), InstructionOptions(), every_variant=False
+            episode, plain_settings(), ("implicit",), InstructionOptions(), every_variant=False
         )
         found += make_items(episode, media, list(options))
     return found[:NUMBER]

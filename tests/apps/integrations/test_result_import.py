@@ -2,9 +2,12 @@
 
 import contextlib
 import json
+import os
 import sqlite3
 
+import msgspec
 import pytest
+from msgspec.structs import replace
 from typer.testing import CliRunner
 
 from roboirg.apps.integrations.result_import import ImportOptions, import_results
@@ -89,16 +92,16 @@ def test_inspect_s_logs_hold_whole_records(tmp_path):
     records = read_records(source)
     job = Job(policy="x", task="PickXtimes", split="test", episode=4, setting="contextual")
     samples = [
-        {"scores": {"grounds_reference": {"metadata": {"record": one.model_dump(mode="json")}}}}
+        {"scores": {"grounds_reference": {"metadata": {"record": msgspec.to_builtins(one)}}}}
         for one in records
     ]
     error = {"message": "the model is busy", "traceback": "Traceback"}
-    samples.append({"metadata": {"job": job.model_dump(mode="json")}, "error": error})
+    samples.append({"metadata": {"job": msgspec.to_builtins(job)}, "error": error})
     log = tmp_path / "log.json"
     log.write_text(json.dumps({"samples": samples}))
     import_results("inspect", log, tmp_path / "run", ImportOptions("gpt"))
     *whole, lost = read_records(tmp_path / "run")
-    assert [one.model_copy(update={"policy": "theirs"}) for one in whole] == list(records)
+    assert [replace(one, policy="theirs") for one in whole] == list(records)
     assert (lost.outcome, lost.task, lost.episode) == ("error", "PickXtimes", 4)
     assert lost.cause == "environment: the model is busy"
 
@@ -116,7 +119,7 @@ def test_lines_of_one_s_own_become_records(tmp_path):
     with pytest.raises(InvalidValueError, match=r"line 1: success is 1; it must be true or false"):
         import_results("jsonl", path, tmp_path / "other", OPTIONS)
     path.write_text('{"task": "StopCube", "success": true}')
-    with pytest.raises(InvalidValueError, match="episode: Field required"):
+    with pytest.raises(InvalidValueError, match="required field `episode`"):
         import_results("jsonl", path, tmp_path / "other", OPTIONS)
     path.write_text('{"task": "StopCube", "episode": 0, "success": true, "colour": 1}')
     with pytest.raises(InvalidValueError, match="colour"):
@@ -162,3 +165,34 @@ def test_wrong_files_are_refused_in_a_sentence(tmp_path):
          "--set", "colour=red"],
     )  # fmt: skip
     assert "no field 'colour'" in str(wrong.exception)
+
+
+EPISODE = b'{"task": "PickXtimes", "episode": 0, "success": false, "steps": %s}'
+
+
+@pytest.mark.parametrize("harness", ["jsonl", "lerobot", "inspect"])
+@pytest.mark.parametrize(
+    "content",
+    [b"[" * 100_000, b"\xff\xfe", b'{"a": ' + b"9" * 10_000 + b"}"],
+    ids=["deep nesting", "no UTF-8", "10,000 digits"],
+)
+def test_files_that_are_no_results_are_refused(harness, content, tmp_path):
+    (tmp_path / "results").write_bytes(content)
+    with pytest.raises(InvalidValueError, match="is not a file of results of"):
+        import_results(harness, tmp_path / "results", tmp_path / "run", OPTIONS)
+
+
+@pytest.mark.parametrize("steps", [b"NaN", b"1e400", b"[1]", b"9" * 5_000])
+def test_numbers_of_steps_that_cannot_be_are_refused(steps, tmp_path):
+    (tmp_path / "results").write_bytes(EPISODE % steps)
+    with pytest.raises(InvalidValueError, match="results"):
+        import_results("jsonl", tmp_path / "results", tmp_path / "run", OPTIONS)
+
+
+@pytest.mark.parametrize("harness", ["jsonl", "lerobot", "inspect"])
+def test_devices_and_pipes_are_not_read(harness, tmp_path):
+    (tmp_path / "device").symlink_to("/dev/zero")
+    os.mkfifo(tmp_path / "pipe")
+    for name in ("device", "pipe"):
+        with pytest.raises(InvalidValueError, match="no regular file"):
+            import_results(harness, tmp_path / name, tmp_path / "run", OPTIONS)

@@ -9,7 +9,7 @@ from language_variants import TASKS
 
 from roboirg.apps.language_lab import instruction_export
 from roboirg.core.errors import InvalidValueError, MissingDependencyError
-from roboirg.language import FORMS, setting_names
+from roboirg.language import FORMS, plain_settings
 from roboirg.language.instruction_row import row
 from roboirg.language.variants import instructions
 from roboirg.tasks.splits.splits import get_episode, split_episodes
@@ -28,7 +28,7 @@ LISTS = {
 def rows():
     """Eight episodes of each task in all settings and forms."""
     episodes = [get_episode(task, "test", index) for task in TASKS for index in range(8)]
-    return tuple(row(*one) for one in instructions(episodes, setting_names(), FORMS))
+    return tuple(row(*one) for one in instructions(episodes, plain_settings(), FORMS))
 
 
 def test_every_row_has_the_same_columns_and_types():
@@ -102,7 +102,7 @@ def test_arrow_reads_json_lines_and_parquet_alike():
         assert mine.type == theirs.type, mine.name
 
 
-@pytest.mark.parametrize("settings", [setting_names(), ("explicit",)])
+@pytest.mark.parametrize("settings", [plain_settings(), ("explicit",)])
 def test_parquet_has_its_types_whatever_is_in_it(settings):
     pytest.importorskip("pyarrow")
     from pyarrow import parquet
@@ -139,6 +139,6 @@ def test_without_pyarrow_one_sentence_says_what_to_do(monkeypatch):
 
 def test_every_episode_is_there():
     episodes = list(split_episodes(["StopCube"], ["test"]))
-    found = [row(*one) for one in instructions(episodes, setting_names(), FORMS)]
+    found = [row(*one) for one in instructions(episodes, plain_settings(), FORMS)]
     assert len(found) == 50 * 4 * 2  # no spatial setting
     assert [one["episode"] for one in found[::8]] == list(range(50))

@@ -10,7 +10,7 @@ from rich.console import Console
 from roboirg.apps.language_lab import corpus_statistics, statistics_tables
 from roboirg.core.errors import InvalidValueError, MissingDependencyError
 from roboirg.evaluation.analysis.figures import expressions
-from roboirg.language import setting_names
+from roboirg.language import plain_settings
 from roboirg.language.settings import settings_of
 from roboirg.language.variants import instructions
 from roboirg.tasks import every_task
@@ -22,7 +22,7 @@ from roboirg.util import figure_files
 def said():
     """All implicit forms of the test split."""
     episodes = list(split_episodes(TASKS, ["test"]))
-    return tuple(one for _, one in instructions(episodes, setting_names(), ("implicit",)))
+    return tuple(one for _, one in instructions(episodes, plain_settings(), ("implicit",)))
 
 
 def test_expressions_are_counted_once_per_scene():

@@ -88,7 +88,7 @@ def test_every_instruction_is_valid(style, task):
     for episode in train_episodes(task, 40, 52):  # the import looked at others
         found = check_episode(episode, wordings=identity)
         assert not found.failures
-        for setting in expressible(episode):
+        for setting in expressible(episode, wordings=identity):
             for form in FORMS:
                 options = InstructionOptions(setting, form, wordings=identity)
                 said = instruct_with(episode, options)

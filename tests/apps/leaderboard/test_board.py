@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from msgspec.structs import replace
 
 from roboirg.apps.leaderboard.board_page import read_packs, render_board, write_board
 from roboirg.apps.leaderboard.board_rows import BoardRow, PackedRun, board_rows
@@ -16,9 +17,9 @@ from roboirg.apps.leaderboard.pack_checks import CHECKS_FILE, PackCheck, check_p
 from roboirg.apps.leaderboard.packing import pack_run
 from roboirg.core.errors import InvalidValueError
 from roboirg.evaluation.analysis.published import published_rows
-from roboirg.evaluation.plan.plan import write_plan
 from roboirg.evaluation.plan.plan_file import read_plan_file
 from roboirg.evaluation.plan.plan_maker import make_plan
+from roboirg.evaluation.plan.stored_plans import write_plan
 from roboirg.evaluation.play.rollout_result import RolloutResult, make_record
 from roboirg.evaluation.records.record import Job, Record
 from roboirg.evaluation.records.store import RecordStore
@@ -42,7 +43,7 @@ def record(
     result.cause = None if won else "it failed"
     job = Job(policy=policy, task=task, split=split, episode=episode, setting=EXPLICIT)
     made = make_record(job, result, started_at="")
-    return made.model_copy(update={"privileged": privileged, "attribution": None})
+    return replace(made, privileged=privileged, attribution=None)
 
 
 def run_of(policy: str, successes: int, *, episodes: int = 8, **marks: Any) -> PackedRun:
@@ -125,7 +126,7 @@ def test_private_results_stand_beside_public_ones(private: str) -> None:
 
 def test_private_results_of_another_version_have_a_row_of_their_own(private: str) -> None:
     changed = run_of("a", 5, split=private)
-    results = [one.model_copy(update={"policy_version": "2"}) for one in changed.results]
+    results = [replace(one, policy_version="2") for one in changed.results]
     rows = own(board_rows([run_of("a", 6), changed._replace(results=results)]))
     assert [bool(row.rates) for row in rows] == [True, False]
     assert [row.private is None for row in rows] == [True, False]

@@ -163,8 +163,9 @@ def test_the_command_tells_what_does_not_hold(honest: Path, tmp_path: Path, cli:
     bad = cli.invoke(app, ["leaderboard", "verify", str(forged), "--workers", "0"])
     assert bad.exit_code == 2
     lines = (forged / "records.jsonl").read_text().splitlines()
-    assert json.loads(lines[0])["schema_version"] == 3
+    assert json.loads(lines[0])["schema_version"] == 4
     assert "outcome: the record says 'success'; it should be 'failure'" in bad.output
+    assert "1 thing does not hold." in bad.output
     wrong = cli.invoke(app, ["leaderboard", "verify", str(honest), "--sample", "many"])
     assert wrong.exit_code != 0
 
@@ -176,3 +177,11 @@ def test_a_repeated_run_shows_no_flip(honest: Path, tmp_path: Path, cli: CliRunn
     assert "0 of 4 verdicts changed." in done.output
     refused = cli.invoke(app, ["leaderboard", "repeat", str(honest), "--out", str(honest)])
     assert refused.exit_code != 0
+
+
+def test_several_commands_in_one_folder_are_no_holes(tmp_path: Path) -> None:
+    given = {"tasks": "StopCube", "max_steps": 20}
+    play(tmp_path, ["random"], **given, episodes="2", settings="explicit,direct")
+    play(tmp_path, ["random"], **given, episodes="3", settings="contextual", stages="1,5")
+    play(tmp_path, ["random"], **given, episodes="1", settings="reasoning", policy_seeds="0,1")
+    assert verify_run(tmp_path, sample=0.0).missing == ()

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from msgspec.structs import replace
 from study_fakes import answer_all, make_study
 
 from roboirg.apps.people.answer_form import FormAnswer, all_answers, answer_of, goal_of
@@ -70,7 +71,7 @@ def test_two_people_are_played_apart_and_again_by_the_log(tmp_path, monkeypatch)
     ]
     assert told == [("success", "p01"), ("failure", "p02")] * 2
     # The third person has not answered.
-    missing = run(jobs[0].model_copy(update={"policy_seed": 2}))
+    missing = run(replace(jobs[0], policy_seed=2))
     assert (missing.outcome, missing.error) == ("error", "policy")
     assert "No person of this policy seed has answered" in missing.cause
 
@@ -78,7 +79,7 @@ def test_two_people_are_played_apart_and_again_by_the_log(tmp_path, monkeypatch)
     job = Job(policy=spec, task="PickXtimes", split="test", episode=1, setting="direct")
     again = EpisodeRunner(tmp_path / "again")(job)
     assert (again.outcome, again.steps) == ("success", records[1, 0].steps)
-    other = run(job.model_copy(update={"episode": 7}))
+    other = run(replace(job, episode=7))
     assert (other.outcome, other.error) == ("error", "policy")
     assert "has no record of PickXtimes/test/7" in other.cause
     assert make_policy(f"{spec}?policy=nobody", 0)._records == []

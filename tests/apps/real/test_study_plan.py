@@ -6,9 +6,11 @@ import math
 from collections import Counter
 from itertools import groupby
 
+import msgspec
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from msgspec.structs import replace
 
 from roboirg import language
 from roboirg.apps.real.pages.arrangement_svg import draw_svg
@@ -24,10 +26,10 @@ from roboirg.apps.real.study.plan_csv import demonstrations_csv, trials_csv
 from roboirg.apps.real.study.study_plan import StudyPlan, make_study, read_study, write_study
 from roboirg.apps.real.study.study_run import Study
 from roboirg.core.errors import InvalidValueError, UnknownNameError
-from roboirg.language.settings import setting_names
+from roboirg.language.settings import plain_settings
 
 TASKS = ("PutInBox", "PickByCount")
-SETTINGS = setting_names()
+SETTINGS = plain_settings()
 
 plans = st.builds(
     make_study,
@@ -169,7 +171,11 @@ def test_a_plan_is_read_as_it_was_written_and_not_overwritten(tmp_path):
     plan = make_study(("a",), tasks=TASKS, trials=1, demonstrations=1)
     write_study(plan, tmp_path)
     write_study(plan, tmp_path)
-    assert read_study(tmp_path) == plan == StudyPlan.model_validate_json(plan.model_dump_json())
+    assert (
+        read_study(tmp_path)
+        == plan
+        == msgspec.json.decode(msgspec.json.encode(plan), type=StudyPlan)
+    )
     with pytest.raises(InvalidValueError, match="holds another plan"):
         write_study(make_study(("a",), tasks=TASKS, trials=1, seed=1), tmp_path)
     with pytest.raises(InvalidValueError, match="There is no plan in"):
@@ -284,8 +290,8 @@ def test_nothing_on_the_sheet_is_cut_off_or_overlaps():
 def test_a_trial_in_turns_is_refused_before_a_robot_moves(tmp_path):
     plan = make_study(["listener"], tasks=["PutInBox"], settings=["direct"], trials=1, seed=0)
     first, *others = plan.trials
-    turns = first.model_copy(update={"job": first.job.model_copy(update={"delivery": "turns"})})
-    changed = plan.model_copy(update={"trials": (turns, *others)})
+    turns = replace(first, job=replace(first.job, delivery="turns"))
+    changed = replace(plan, trials=(turns, *others))
     with pytest.raises(InvalidValueError, match=r"has delivery='turns'.*at once \('prompt'\)"):
         Study(changed, tmp_path, robot=None).run()
     assert list(tmp_path.iterdir()) == []

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from roboirg.apps.demonstrations.picture_coding import (
     VideoEncoder,
@@ -31,7 +31,8 @@ from roboirg.core.errors import InvalidValueError, MotionPlanningError
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.core.observations import CAMERAS
 from roboirg.envs.factory import make
-from roboirg.policies.contract.base import Policy, PrivilegedPolicy, tell_policy
+from roboirg.policies.contract.base import Policy
+from roboirg.policies.contract.play import EpisodeLoop
 from roboirg.policies.contract.policy_needs import PolicyNeeds
 from roboirg.util.atomic_write import replacing
 
@@ -184,13 +185,18 @@ def _keep_facts(part: Path, facts: TrajectoryFacts) -> None:
         TrajectoryFile(archive).finish(facts, {})
 
 
-class _Recorder:
-    """Records one episode."""
+class _GivenUpError(Exception):
+    """The policy found no motion; the message says why."""
+
+
+class _Recorder(EpisodeLoop):
+    """Plays one episode and records it."""
 
     def __init__(
         self, env: RoboIRGEnv, policy: Policy, spec: RecordingSpec, file: TrajectoryFile
     ) -> None:
-        self._env, self._policy, self._spec, self._file = env, policy, spec, file
+        super().__init__(env, policy)
+        self._spec, self._file = spec, file
         self._tracks = PictureTracks(file, spec)
         self._rows = _Rows()
         self._video: list[Mapping[str, Any]] = []
@@ -199,10 +205,12 @@ class _Recorder:
     def record(self, policy_name: str, variation: int) -> TrajectoryFacts:
         """Play the episode and store what happens."""
         if self._spec.video and self._spec.coding != "none":
-            self._env.set_frame_hook(self._see_video)
-        observation, info = self._env.reset()
-        self._start(observation, info)
-        cause = self._play(observation, info)
+            self.env.set_frame_hook(self._see_video)
+        observation, info = self.begin()
+        try:
+            cause = str(self.take_turns(observation, info)["cause"] or "")
+        except _GivenUpError as error:
+            cause = str(error)
         facts = self._facts(policy_name, variation, info, cause)
         self._file.finish(facts, self._arrays(info))
         return facts
@@ -224,35 +232,37 @@ class _Recorder:
             pictures |= {f"{name}_depth": cameras.depth(name) for name in CAMERAS}
         self._tracks.add(pictures, is_video=True)
 
-    def _start(self, observation: dict[str, Any], info: dict[str, Any]) -> None:
-        """Store the policy's first observation, which follows a step at home."""
+    def begin(self) -> tuple[dict[str, Any], dict[str, Any]]:
+        """Start the episode; store the policy's first observation, after a step at home."""
         from roboirg.simulation.physics_settings import HOME_ACTION
 
-        if isinstance(self._policy, PrivilegedPolicy):
-            self._policy.attach(self._env)
-        self._policy.reset(observation["instruction"], info["demonstration"])
-        self._add_row(HOME_ACTION, observation, self._env.subgoal, self._env.subgoal)
+        observation, info = super().begin()
+        self._add_row(HOME_ACTION, observation, self.env.subgoal, self.env.subgoal)
+        return observation, info
 
-    def _play(self, observation: Any, info: dict[str, Any]) -> str:  # noqa: ANN401
-        """Play to the end. Returns the cause of a failure."""
-        while info["status"] == "ongoing":
-            try:
-                chunk = check_chunk(self._policy.act(observation))
-            except MotionPlanningError as error:
-                return str(error)
-            heard: list[Mapping[str, Any]] = []
-            for exact in chunk:
-                action = exact.astype(np.float32).astype(np.float64)
-                observation, *_, info = self._env.step(action)
-                heard += info["heard"]
-                online = self._env.subgoal
-                stage = getattr(self._policy, "stage", None)
-                doing = online if stage is None else stage.subgoal
-                self._add_row(action, observation, doing, online)
-                if info["status"] != "ongoing":
-                    break
-            tell_policy(self._policy, heard)
-        return str(info["cause"] or "")
+    def act(self, observation: dict[str, Any]) -> ArrayLike:
+        """Return the policy's next actions; a policy that finds no motion gives up."""
+        try:
+            return super().act(observation)
+        except MotionPlanningError as error:
+            raise _GivenUpError(str(error)) from error
+
+    def execute(self, actions: ArrayLike) -> tuple[dict[str, Any], dict[str, Any]]:
+        """Execute and store one action after the other."""
+        observation: dict[str, Any] = {}
+        info: dict[str, Any] = {}
+        heard: list[Mapping[str, Any]] = []
+        for exact in check_chunk(actions):
+            action = exact.astype(np.float32).astype(np.float64)
+            observation, info = super().execute(action[None])
+            heard += info["heard"]
+            online = self.env.subgoal
+            stage = getattr(self.policy, "stage", None)
+            doing = online if stage is None else stage.subgoal
+            self._add_row(action, observation, doing, online)
+            if info["status"] != "ongoing":
+                break
+        return observation, {**info, "heard": heard}
 
     def _add_row(
         self, action: NDArray[np.float64], observation: Mapping[str, Any], doing: str, online: str
@@ -268,7 +278,7 @@ class _Recorder:
     def _facts(
         self, policy_name: str, variation: int, info: Mapping[str, Any], cause: str
     ) -> TrajectoryFacts:
-        episode, status = self._env.episode, self._env.status
+        episode, status = self.env.episode, self.env.status
         return TrajectoryFacts(
             task=episode.task,
             split=episode.split,
@@ -319,7 +329,7 @@ class _Recorder:
         """Return the tool's pose at the joint targets of each action, with unwrapped angles."""
         from roboirg.simulation.expert.motion_planning import MotionPlanner
 
-        planner = MotionPlanner(self._env.session.world.robot)
+        planner = MotionPlanner(self.env.session.world.robot)
         poses = [planner.forward_kinematics(action[:ARM_JOINTS]) for action in actions]
         angles = np.unwrap([pose.rotation.as_euler("xyz") for pose in poses], axis=0)
         positions = np.stack([pose.position for pose in poses])

@@ -25,7 +25,9 @@ def import_results(
     seed: Annotated[int, typer.Option(help="Seed that lerobot-eval was given.")] = 1000,
     set_: Annotated[
         list[str] | None,
-        typer.Option("--set", help="FIELD=VALUE of all records, such as rival=drawn; repeatable."),
+        typer.Option(
+            "--set", help="FIELD=VALUE of all records, such as max_steps=900; repeatable."
+        ),
     ] = None,
 ) -> None:
     """Make records of the results of another harness, for tables, compare and report."""

@@ -22,18 +22,24 @@ from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from pydantic import JsonValue, ValidationError
+import msgspec
+from pydantic import JsonValue
 
-from roboirg.core.errors import InvalidValueError, UnknownNameError
+from roboirg.core.errors import InvalidValueError, RoboIRGError, UnknownNameError
 from roboirg.evaluation.hosting.policy_descriptions import PolicyDescription
 from roboirg.evaluation.play.rollout_result import RolloutResult, make_record
 from roboirg.evaluation.records.record import DEFAULT_MAX_STEPS, ErrorKind, Job, Record
+from roboirg.evaluation.records.record_codec import encode
 from roboirg.evaluation.records.store import RecordStore
 from roboirg.tasks.splits.splits import split_size
+from roboirg.util.regular_file import read_regular
 
 LEROBOT_SEED = 1000
 """The seed of lerobot-eval's first episode, if none is given."""
 UNTOLD_CAUSE = "the harness does not tell the cause"
+
+_MOST_BYTES = 512 << 20
+"""Of a file of JSON."""
 
 _ERRORS: Mapping[str, ErrorKind] = {
     "timeout": "timeout",
@@ -78,26 +84,31 @@ def import_results(harness: str, path: Path, out: Path, options: ImportOptions) 
         raise UnknownNameError("harness", harness, _READERS)
     try:
         records = list(_READERS[harness](path, options))
+    except RoboIRGError:
+        raise
     except OSError as error:
         raise InvalidValueError(f"{path} cannot be read: {error.strerror}.") from error
-    except ValidationError as error:
-        first = error.errors()[0]
-        place = ".".join(map(str, first["loc"]))
-        raise InvalidValueError(f"{path}: {place}: {first['msg']}.") from error
-    except (KeyError, TypeError, AttributeError, json.JSONDecodeError, sqlite3.Error) as error:
+    except msgspec.ValidationError as error:
+        raise InvalidValueError(f"{path}: {error}.") from error
+    except (AttributeError, ArithmeticError, KeyError, RecursionError, TypeError, ValueError,
+            sqlite3.Error) as error:  # fmt: skip
         raise InvalidValueError(
             f"{path} is not a file of results of {harness} ({type(error).__name__}: {error})."
         ) from error
     _refuse_repeated(records, path)
     with RecordStore(out) as store:
-        store.extend(record.model_dump_json().encode() for record in records)
+        store.extend(map(encode, records))
     return len(records)
+
+
+def _text(path: Path) -> str:
+    return read_regular(path, _MOST_BYTES).decode()
 
 
 def _read_lerobot(path: Path, options: ImportOptions) -> Iterator[Record]:
     """Yield the records of lerobot-eval; its groups are called ``task-setting-split``."""
     lacks = ("steps", "cause", "events", "errors", "timings", "started_at")
-    for entry in json.loads(path.read_text(encoding="utf-8"))["per_task"]:
+    for entry in json.loads(_text(path))["per_task"]:
         names = entry["task_group"].rsplit("-", 2)
         if len(names) != 3:  # noqa: PLR2004
             raise InvalidValueError(
@@ -129,7 +140,7 @@ def _read_vla_eval(path: Path, options: ImportOptions) -> Iterator[Record]:
         ).fetchall()
     for name, task, status, steps, seconds, context, reason, detail in rows:
         params = {_NAMES.get(key, key): value for key, value in configs[name].items()}
-        told = {key: value for key, value in params.items() if key in Job.model_fields}
+        told = {key: value for key, value in params.items() if key in Job.__struct_fields__}
         job = _job(
             options, **{"setting": "explicit", "split": "test", **told},
             task=task, episode=json.loads(context)["episode_idx"],
@@ -151,12 +162,12 @@ def _read_inspect(path: Path, options: ImportOptions) -> Iterator[Record]:
             f"{path} is a packed log; convert it: inspect log convert --to json --output-dir LOGS "
             f"{path.name}."
         )
-    for sample in json.loads(path.read_text(encoding="utf-8"))["samples"]:
+    for sample in json.loads(_text(path))["samples"]:
         scores = sample.get("scores") or {}
         found = next((one["metadata"]["record"] for one in scores.values()), None)
         if found is not None:
-            record = Record.model_validate(found)
-            yield record.model_copy(update={"policy": options.policy, **options.fields})
+            record = msgspec.convert(found, Record)
+            yield msgspec.structs.replace(record, policy=options.policy, **options.fields)
             continue
         job = _job(options, **{**sample["metadata"]["job"], "policy": options.policy})
         error, result = sample.get("error") or {}, RolloutResult()
@@ -168,7 +179,7 @@ def _read_inspect(path: Path, options: ImportOptions) -> Iterator[Record]:
 def _read_lines(path: Path, options: ImportOptions) -> Iterator[Record]:
     """Yield a record for each line; what it has besides the verdict are fields of the job."""
     lacks = ("cause", "events", "errors", "timings", "started_at")
-    for number, line in enumerate(path.read_text(encoding="utf-8").splitlines(), 1):
+    for number, line in enumerate(_text(path).splitlines(), 1):
         told = json.loads(line)
         success, steps = told.pop("success"), told.pop("steps", None)
         if not isinstance(success, bool):
@@ -183,7 +194,9 @@ def _read_lines(path: Path, options: ImportOptions) -> Iterator[Record]:
 
 def _job(options: ImportOptions, **fields: Any) -> Job:  # noqa: ANN401 - values of JSON
     named = {"policy": options.policy, "max_steps": DEFAULT_MAX_STEPS, **fields}
-    return Job.model_validate({**named, **options.fields})
+    if unknown := named.keys() - set(Job.__struct_fields__):
+        raise UnknownNameError("field of an episode", min(unknown), Job.__struct_fields__)
+    return msgspec.convert({**named, **options.fields}, Job, strict=False)
 
 
 def _verdict(success: bool, job: Job) -> RolloutResult:
@@ -208,7 +221,7 @@ def _record(
     result.policy_metadata = {"imported": imported}
     written = dt.datetime.fromtimestamp(path.stat().st_mtime, dt.UTC).isoformat(timespec="seconds")
     record = make_record(job, result, started_at=written, duration_s=round(seconds, 3))
-    return record.model_copy(update={"attribution": None})
+    return msgspec.structs.replace(record, attribution=None)
 
 
 def _refuse_repeated(records: list[Record], path: Path) -> None:

@@ -14,8 +14,6 @@ from roboirg.cli.options import (
     DEFAULT_WORDS,
     AnySplit,
     Forms,
-    Reasoning,
-    Rival,
     Settings,
     Tasks,
     WordChoices,
@@ -90,12 +88,10 @@ def stats(
         Path | None,
         typer.Option(help="Folder for a figure of the referring expressions, as PNG and SVG."),
     ] = None,
-    rival: Rival = "none",
-    reasoning: Reasoning = "plain",
+    settings: Settings = "all",
 ) -> None:
     """Count words, referring expressions, patterns, relations and landmarks."""
     from roboirg.apps.language_lab.statistics_tables import overview_tables
-    from roboirg.core.instruction_options import InstructionOptions
     from roboirg.evaluation.analysis.figures.expressions import write_figure
     from roboirg.evaluation.plan.plan_parsing import parse_splits
     from roboirg.language.variants import instructions
@@ -106,8 +102,7 @@ def stats(
         check_figure_support()
     names, wanted = known_tasks(tasks), parse_splits(split)
     episodes = split_episodes(names, wanted)
-    options = InstructionOptions(rival=rival, reasoning=reasoning)
-    said = [one for _, one in instructions(episodes, known_settings("all"), ("implicit",), options)]
+    said = [one for _, one in instructions(episodes, known_settings(settings), ("implicit",))]
     console = _console()
     for table in overview_tables(said):
         console.print(table)
@@ -145,7 +140,7 @@ def validate_instructions(
         found.add(results)
     console = _console()
     for table in validation_tables(found):
-        console.print(table)
+        console.print(table, "")
     for failure in found.failures[:MOST_FAILURES]:
         where = f"{failure.episode}, seed {failure.seed}, {failure.setting}"
         console.print(f"{failure.rule}: {where}: {failure.words}", markup=False)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
@@ -86,7 +87,7 @@ def replay(record: Record, log: ActionLog) -> tuple[Record, ActionLog | None]:
 
 def _job(record: Record) -> Job:
     """Return what was played, without the address of the policy."""
-    return record.identity.model_copy(update={"wordings_file": record.wordings_file})
+    return msgspec.structs.replace(record.identity, wordings_file=record.wordings_file)
 
 
 def _unknown_policy() -> RolloutResult:

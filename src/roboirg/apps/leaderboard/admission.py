@@ -9,7 +9,7 @@ from __future__ import annotations
 import functools
 import operator
 from collections import defaultdict
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from typing import NamedTuple
 
 import msgspec
@@ -17,11 +17,10 @@ import msgspec
 from roboirg.core.plain_text import counted
 from roboirg.evaluation.analysis.comparability import is_robomme
 from roboirg.evaluation.analysis.stats.cells import PolicyRun
-from roboirg.evaluation.plan.plan import REQUIRED, Plan
+from roboirg.evaluation.plan.plan import REQUIRED
 from roboirg.evaluation.plan.plan_file import named_plans, read_plan_file
 from roboirg.evaluation.plan.plan_maker import make_plan
-from roboirg.evaluation.records.record import IDENTITY, Result
-from roboirg.evaluation.records.record_codec import AnyResult
+from roboirg.evaluation.records.record import IDENTITY, Summary
 
 _CHOSEN = {"policy", "actions", "demonstration_frames", "observe_every", "wordings"}
 """What a named plan leaves to the policy; words are compared apart."""
@@ -40,18 +39,22 @@ class NamedEpisodes(NamedTuple):
     in_robommes_words: bool
 
 
-def refusal(results: Sequence[AnyResult], plans: Sequence[Plan]) -> str:
-    """Return why a packed run is not ranked; empty if it is."""
-    known = {plan.fingerprint for plan in plans}
+def refusal(results: Sequence[Summary], known: Collection[str]) -> str:
+    """Return why a packed run is not ranked; empty if it is.
+
+    Args:
+        results: of the run.
+        known: fingerprints of the plans in the pack.
+    """
     if stray := sum(one.plan not in known for one in results):
         return f"{counted(stray, 'record')} of no plan in the pack"
-    by_run: dict[PolicyRun, list[AnyResult]] = defaultdict(list)
+    by_run: dict[PolicyRun, list[Summary]] = defaultdict(list)
     for one in results:
         by_run[PolicyRun.of(one)].append(one)
     return next(filter(None, map(_run_refusal, by_run.values())), "")
 
 
-def _run_refusal(played: Sequence[AnyResult]) -> str:
+def _run_refusal(played: Sequence[Summary]) -> str:
     """Return why one policy's episodes are no whole named plan; empty if they are one."""
     first = played[0]
     keys = frozenset(map(_key, played))
@@ -91,13 +94,10 @@ def _named(name: str, split: str) -> NamedEpisodes:
     return NamedEpisodes(frozenset(map(_key, plan.jobs())), needs_words)
 
 
-def with_failures(results: Iterable[AnyResult]) -> list[AnyResult]:
+def with_failures(results: Iterable[Summary]) -> list[Summary]:
     """Return results in which errors are failures: what a policy broke, it did not do."""
     return [_as_failure(one) if one.outcome == "error" else one for one in results]
 
 
-def _as_failure(result: AnyResult) -> AnyResult:
-    changes = {"outcome": "failure", "error": None, "attribution": None}
-    if isinstance(result, Result):
-        return result.model_copy(update=changes)
-    return msgspec.structs.replace(result, **changes)
+def _as_failure(result: Summary) -> Summary:
+    return msgspec.structs.replace(result, outcome="failure", error=None, attribution=None)

@@ -11,10 +11,11 @@ from roboirg.apps.leaderboard.board_rows import BoardRate, BoardRow, PackedRun, 
 from roboirg.apps.leaderboard.pack_checks import check_pack, read_check
 from roboirg.apps.leaderboard.packing import PACK_SUFFIX, opened_run
 from roboirg.core.errors import InvalidValueError
+from roboirg.core.plain_text import printable
 from roboirg.core.version import __version__
 from roboirg.evaluation.analysis.page.report import check_report_support
 from roboirg.evaluation.analysis.stats.option_labels import setting_sort_key
-from roboirg.evaluation.plan.plan import read_plans
+from roboirg.evaluation.plan.stored_plans import kept_fingerprints, read_plans
 from roboirg.evaluation.records.store import read_results
 from roboirg.util.atomic_write import write_atomically
 from roboirg.util.web.page_templates import template_environment
@@ -67,9 +68,9 @@ def read_packs(
         if check is None or check.records:  # else it could not even be opened
             with opened_run(path) as run:
                 results = read_results(run)
-                plans = read_plans(run)
+                plans, known = read_plans(run), kept_fingerprints(run)
             planned = [job for plan in plans for job in plan.drawable_jobs()]
-            why = refusal(results, plans)
+            why = refusal(results, known)
             packs.append(PackedRun(_name(path), results, planned, check, why))
         else:
             packs.append(PackedRun(_name(path), (), (), check))
@@ -133,4 +134,4 @@ def _cell(rate: BoardRate | None) -> _Cell:
 
 
 def _name(path: Path) -> str:
-    return path.name.removesuffix(PACK_SUFFIX)
+    return printable(path.name.removesuffix(PACK_SUFFIX))

@@ -22,8 +22,7 @@ from roboirg.evaluation.analysis.stats.option_labels import (
 from roboirg.evaluation.analysis.stats.paired_tests import Pairs, holm, measure_gap
 from roboirg.evaluation.analysis.stats.run_summary import ALL as ALL_SCOPE
 from roboirg.evaluation.analysis.stats.run_summary import ScopeResults, group_by_scope
-from roboirg.evaluation.records.record import Job
-from roboirg.evaluation.records.record_codec import AnyResult
+from roboirg.evaluation.records.record import Job, Summary
 from roboirg.language.settings import settings_of
 from roboirg.tasks import ALL, find_tasks, get_task
 from roboirg.tasks.splits.private_splits import is_private
@@ -65,7 +64,7 @@ class PackedRun(NamedTuple):
     """
 
     name: str
-    results: Sequence[AnyResult]
+    results: Sequence[Summary]
     planned: Sequence[Job]
     check: PackCheck | None
     refusal: str = ""
@@ -232,7 +231,7 @@ def _conditions(policy_run: PolicyRun) -> str:
     return "; ".join(parts)
 
 
-def _heard(results: Sequence[AnyResult]) -> float | None:
+def _heard(results: Sequence[Summary]) -> float | None:
     known = [one.prompt_verdict for one in results if one.prompt_verdict != "unknown"]
     return known.count("heard") / len(known) if known else None
 

@@ -12,7 +12,7 @@ from roboirg.cli.options import Salt, Workers, add_working_directory, check_outp
 from roboirg.cli.progress_bar import progress_bar
 from roboirg.cli.run_commands import USAGE_ERROR, Folder, folder_of, report_problems
 from roboirg.core.errors import InvalidValueError
-from roboirg.core.plain_text import counted, printable
+from roboirg.core.plain_text import counted, printable, verb_for
 
 if TYPE_CHECKING:
     from roboirg.apps.leaderboard.repeats import RepeatedEpisode
@@ -124,7 +124,10 @@ def _print(found: Verification) -> None:
     from roboirg.apps.leaderboard.record_check import TOLERANCE, ReplayVerdict
 
     played = found.records - found.verdicts[ReplayVerdict.NOT_REPLAYED]
-    typer.echo(f"{counted(found.records, 'record')}; the actions of {played:,} were played again.")
+    verb = verb_for(played, "were")
+    typer.echo(
+        f"{counted(found.records, 'record')}; the actions of {played:,} {verb} played again."
+    )
     typer.echo(f"End states equal bit for bit: {found.verdicts[ReplayVerdict.EXACT]:,}.")
     if tolerant := found.verdicts[ReplayVerdict.TOLERANT]:
         typer.echo(
@@ -144,9 +147,10 @@ def _print(found: Verification) -> None:
     _print_some("has no record", found.missing)
     _print_some("has several verdicts", found.doubled)
     if len(found.checks) > _MOST_SHOWN:
-        typer.echo(f"… and {len(found.checks) - _MOST_SHOWN:,} more records.")
+        typer.echo(f"… and {counted(len(found.checks) - _MOST_SHOWN, 'more record')}.")
     wrong = len(found.checks) + len(found.missing) + len(found.doubled)
-    typer.echo("All of it holds." if found.holds else f"Does not hold: {counted(wrong, 'thing')}.")
+    fails = f"{counted(wrong, 'thing')} {verb_for(wrong, 'do')} not hold."
+    typer.echo("All of it holds." if found.holds else fails)
 
 
 def _print_some(what: str, slugs: tuple[str, ...]) -> None:
@@ -164,7 +168,7 @@ def repeat(
     """Play a run's plan again with its policies, and print which verdicts changed."""
     from roboirg.apps.leaderboard.repeats import flips_by_cell, repeated_episodes, write_flips
     from roboirg.cli.run_commands import play
-    from roboirg.evaluation.plan.plan import read_plan
+    from roboirg.evaluation.plan.stored_plans import read_plan, with_secret
     from roboirg.evaluation.run.executor import choose_executor
 
     folder, target = folder_of(run), folder_of(out)
@@ -177,7 +181,10 @@ def repeat(
         )
     add_working_directory()
     summary = play(
-        plan.checked(), target, choose_executor(workers, plan.episode_timeout_s), retry=True
+        with_secret(plan, folder).checked(),
+        target,
+        choose_executor(workers, plan.episode_timeout_s),
+        retry=True,
     )
     found = repeated_episodes(folder, target)
     _print_flips(found)

@@ -12,14 +12,16 @@ from roboirg.apps.leaderboard.packing import opened_run
 from roboirg.apps.leaderboard.record_check import ReplayVerdict
 from roboirg.apps.leaderboard.run_verification import Verification, verify_run
 from roboirg.core.episode import ENVIRONMENT_VERSION
-from roboirg.core.errors import RoboIRGError
+from roboirg.core.errors import InvalidValueError, RoboIRGError
 from roboirg.core.plain_text import counted
 from roboirg.language import LANGUAGE_VERSION
 from roboirg.tasks.splits.private_splits import MissingSaltError
 from roboirg.util.atomic_write import write_atomically
+from roboirg.util.regular_file import open_regular, read_regular
 
 CHECKS_FILE = "checks.json"
-_BLOCK = 1 << 20
+_MOST_BYTES = 64_000_000
+"""Of the remembered checks."""
 
 
 class PackCheck(NamedTuple):
@@ -93,8 +95,8 @@ def _versions() -> str:
 
 
 def _kept(folder: Path) -> dict[str, PackCheck]:
-    with contextlib.suppress(OSError, ValueError, TypeError, AttributeError):
-        stored = json.loads((folder / CHECKS_FILE).read_text(encoding="utf-8"))
+    with contextlib.suppress(OSError, ValueError, TypeError, AttributeError, RecursionError):
+        stored = json.loads(read_regular(folder / CHECKS_FILE, _MOST_BYTES))
         return {name: PackCheck(**check) for name, check in stored.items()}
     return {}
 
@@ -106,5 +108,8 @@ def _remember(path: Path, found: PackCheck) -> None:
 
 
 def _digest(path: Path) -> str:
-    with path.open("rb") as file:
-        return hashlib.file_digest(file, "sha256").hexdigest()
+    try:
+        with open_regular(path) as file:
+            return hashlib.file_digest(file, "sha256").hexdigest()
+    except OSError as error:
+        raise InvalidValueError(f"Cannot read {path}: {error.strerror}.") from error

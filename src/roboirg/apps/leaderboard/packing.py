@@ -8,11 +8,11 @@ from __future__ import annotations
 
 import contextlib
 import hashlib
+import os
 import re
 import tempfile
 import zipfile
-import zlib
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path, PurePosixPath
 
 from pydantic import BaseModel, ConfigDict
@@ -22,16 +22,19 @@ from roboirg.core.plain_text import printable
 from roboirg.core.version import __version__
 from roboirg.evaluation.records.action_log import ACTION_FOLDER
 from roboirg.evaluation.records.episode_log import LOG_FOLDER
-from roboirg.evaluation.records.record_codec import StoreError, read_index_entry
+from roboirg.evaluation.records.record_codec import StoreError, read_summary
 from roboirg.evaluation.records.run_files import (
     EARLIER_PLANS,
     MOST_PATH_LETTERS,
     PLAN_FILE,
     RELATIVE_PATH,
-    earlier_plans,
+    plan_names,
+    run_file,
 )
 from roboirg.evaluation.records.store import RECORDS_FILE, StoredRun
+from roboirg.util.archive_errors import UNREADABLE_ARCHIVE
 from roboirg.util.atomic_write import replacing
+from roboirg.util.regular_file import open_regular
 
 PACK_SUFFIX = ".roboirg.zip"
 MANIFEST = "manifest.json"
@@ -40,9 +43,6 @@ _MAX_BYTES = 20 << 30
 """Most bytes that a pack may hold unpacked."""
 _MAX_MANIFEST_BYTES = 64 << 20
 _MOST_SHOWN = 200
-_UNREADABLE = (zipfile.BadZipFile, zlib.error, EOFError, NotImplementedError, OSError, RuntimeError,
-               ValueError)  # fmt: skip
-"""What `zipfile` and the file system raise for archives that are damaged, encrypted or odd."""
 _EPOCH = (1980, 1, 1, 0, 0, 0)
 _BLOCK = 1 << 20
 
@@ -77,32 +77,45 @@ def pack_run(folder: Path, out: Path, *, videos: bool = False, logs: bool = Fals
         logs: whether to include what policies printed.
 
     Raises:
-        StoreError: there are no records, or a line is not a record.
+        StoreError: there are no records, a line is not a record, or there is too much.
+        ForeignPathError: a file is outside of the folder, by a symbolic link, or has an odd name.
         InvalidValueError: the file cannot be written.
     """
-    entries = StoredRun(folder, read_index_entry).newest
+    entries = StoredRun(folder, read_summary).newest
     wanted = {"actions", *(["videos"] if videos else []), *(["logs"] if logs else [])}
-    names = [name for name in (RECORDS_FILE, PLAN_FILE) if (folder / name).is_file()]
-    names += [path.relative_to(folder).as_posix() for path in earlier_plans(folder)]
+    names = [RECORDS_FILE, *plan_names(folder)]
     for name in sorted(wanted):
-        found = (folder / _PACKED_FOLDERS[name]).rglob("*")
+        found = (folder / _PACKED_FOLDERS[name]).rglob("[!.]*")
         names += sorted(path.relative_to(folder).as_posix() for path in found if path.is_file())
+    paths = {name: run_file(folder, name) for name in names}
+    _check_size(paths, folder)
     manifest = PackManifest(
         package_version=__version__,
         records=len(entries),
         policies=tuple(sorted({one.policy for one in entries})),
-        files={name: _hash(folder / name) for name in names},
+        files={name: _hash(path) for name, path in paths.items()},
     )
     with replacing(out) as part, zipfile.ZipFile(part, "w", zipfile.ZIP_DEFLATED) as archive:
         archive.writestr(zipfile.ZipInfo(MANIFEST, _EPOCH), manifest.model_dump_json(indent=1))
-        for name in names:
+        for name, path in paths.items():
             entry = zipfile.ZipInfo(name, _EPOCH)
             # Actions and videos are compressed already.
             packed = name.endswith((".npz", ".mp4", ".jpg"))
             entry.compress_type = zipfile.ZIP_STORED if packed else zipfile.ZIP_DEFLATED
             with archive.open(entry, "w", force_zip64=True) as target:
-                target.writelines(_blocks(folder / name))
+                target.writelines(_blocks(path))
     return manifest
+
+
+def _check_size(paths: Mapping[str, Path], folder: Path) -> None:
+    """Refuse a run whose pack could not be opened again."""
+    sizes = {name: path.stat().st_size for name, path in paths.items()}
+    if sum(sizes.values()) > _MAX_BYTES:
+        largest = max(sizes, key=lambda name: sizes[name])
+        raise StoreError(
+            f"The files of {folder} have {sum(sizes.values()):,} bytes, the largest, {largest}, "
+            f"{sizes[largest]:,}; a pack holds at most {_MAX_BYTES >> 30} GiB."
+        )
 
 
 @contextlib.contextmanager
@@ -112,16 +125,16 @@ def opened_run(path: Path) -> Iterator[Path]:
     Raises:
         StoreError: the file is no pack, or one of its files is not what the manifest says.
     """
-    if not path.is_file():
+    if path.is_dir() or not os.path.lexists(path):
         yield path
         return
     with tempfile.TemporaryDirectory(prefix="roboirg-") as name:
         folder = Path(name)
         try:
-            with zipfile.ZipFile(path) as archive:
+            with open_regular(path) as file, zipfile.ZipFile(file) as archive:
                 _unpack(archive, path, folder)
-        except _UNREADABLE as error:
-            words = printable(" ".join(str(error).split()))[:_MOST_SHOWN]
+        except UNREADABLE_ARCHIVE as error:
+            words = printable(" ".join(str(error).split()))[:_MOST_SHOWN].rstrip(".")
             raise StoreError(f"{path} is no packed run: {words}.") from error
         yield folder
 
@@ -133,10 +146,10 @@ def read_manifest(path: Path) -> PackManifest:
         StoreError: the file is no pack.
     """
     try:
-        with zipfile.ZipFile(path) as archive:
+        with open_regular(path) as file, zipfile.ZipFile(file) as archive:
             return _manifest(archive, path)
-    except _UNREADABLE as error:
-        words = printable(" ".join(str(error).split()))[:_MOST_SHOWN]
+    except UNREADABLE_ARCHIVE as error:
+        words = printable(" ".join(str(error).split()))[:_MOST_SHOWN].rstrip(".")
         raise StoreError(f"{path} is no packed run: {words}.") from error
 
 

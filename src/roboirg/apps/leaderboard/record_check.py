@@ -14,7 +14,7 @@ from roboirg.core.episode import ENVIRONMENT_VERSION
 from roboirg.core.errors import RoboIRGError
 from roboirg.evaluation.records.action_log import ActionLog, read_actions
 from roboirg.evaluation.records.record import Record
-from roboirg.evaluation.records.record_codec import read_line
+from roboirg.evaluation.records.record_codec import read_record
 from roboirg.evaluation.records.store import RECORDS_FILE
 from roboirg.language import LANGUAGE_VERSION
 
@@ -88,7 +88,7 @@ def check_line(one: LineToCheck, folder: Path) -> RecordCheck:
     Raises:
         StoreError: the line is not a record.
     """
-    record = read_line(one.line, folder / RECORDS_FILE, one.number)
+    record = read_record(one.line, folder / RECORDS_FILE, one.number)
     try:
         return _check(record, folder, play=one.play)
     except RoboIRGError as error:

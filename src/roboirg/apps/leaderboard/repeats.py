@@ -16,7 +16,7 @@ from roboirg.core.instruction_options import InstructionOptions
 from roboirg.evaluation.analysis.stats.flips import FLIPS_FILE, FlipCounts, Flips
 from roboirg.evaluation.records.action_log import ActionLog, read_actions
 from roboirg.evaluation.records.record import Record
-from roboirg.evaluation.records.record_codec import identity_key, read_index_entry
+from roboirg.evaluation.records.record_codec import identity_key, read_summary
 from roboirg.evaluation.records.store import StoredRun
 from roboirg.util.atomic_write import write_atomically
 
@@ -56,7 +56,7 @@ def repeated_episodes(first: Path, second: Path) -> tuple[RepeatedEpisode, ...]:
         StoreError: a run has no records, or a line is not a record.
         InvalidValueError: the runs have no episode in common.
     """
-    ours, theirs = (StoredRun(folder, read_index_entry) for folder in (first, second))
+    ours, theirs = (StoredRun(folder, read_summary) for folder in (first, second))
     there = {identity_key(one): one for one in theirs.newest}
     wanted = [one for one in ours.newest if identity_key(one) in there]
     if not wanted:

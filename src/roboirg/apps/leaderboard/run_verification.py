@@ -18,8 +18,9 @@ from roboirg.apps.leaderboard.record_check import (
 from roboirg.core.errors import InvalidValueError, RoboIRGError
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.core.plain_text import counted
-from roboirg.evaluation.plan.plan import read_earlier_plans, read_plans
-from roboirg.evaluation.records.record_codec import EpisodeSummary, identity_key
+from roboirg.evaluation.plan.stored_plans import kept_fingerprints, read_plans
+from roboirg.evaluation.records.record import Summary
+from roboirg.evaluation.records.record_codec import identity_key
 from roboirg.evaluation.records.store import StoredRun, read_summaries
 from roboirg.language.generator import find_refusal
 from roboirg.tasks.splits.private_splits import check_salt
@@ -113,9 +114,7 @@ def verify_run(
     )
 
 
-def _lines(
-    run: StoredRun[EpisodeSummary], sample: float, seed: int | None
-) -> Sequence[LineToCheck]:
+def _lines(run: StoredRun[Summary], sample: float, seed: int | None) -> Sequence[LineToCheck]:
     """Return the newest lines, with a share of them to play."""
     count = round(sample * len(run.newest))
     if sample > 0:
@@ -128,14 +127,14 @@ def _lines(
 
 
 def _completeness(
-    folder: Path, entries: Sequence[EpisodeSummary]
+    folder: Path, entries: Sequence[Summary]
 ) -> tuple[tuple[str, ...], tuple[str, ...]]:
     """Return which episodes are missing, and notes about the plan."""
     plans = read_plans(folder)
     missing = set(_holes(entries))
     made_by = {one.plan for one in entries if one.plan is not None}
-    known = {plan.fingerprint for plan in (*plans, *read_earlier_plans(folder))}
-    missing |= {f"the plan {one}, by which episodes were played" for one in made_by - known}
+    unknown = made_by - kept_fingerprints(folder)
+    missing |= {f"the plan {one}, by which episodes were played" for one in unknown}
     jobs = {identity_key(job): job.slug for plan in plans for job in plan.jobs()}
     there = {identity_key(one) for one in entries}
     missing |= {slug for key, slug in jobs.items() if key not in there}
@@ -146,8 +145,19 @@ def _completeness(
     return tuple(sorted(missing)), tuple(notes)
 
 
-def _holes(entries: Iterable[EpisodeSummary]) -> Iterator[str]:
-    """Yield episodes that a policy played in one setting or seed of a task, but not in another."""
+def _holes(entries: Iterable[Summary]) -> Iterator[str]:
+    """Yield episodes that a policy played in one setting or seed of a task, but not in another.
+
+    Only within one plan: a folder may hold commands with other settings, episodes and seeds.
+    """
+    plans: dict[str | None, list[Summary]] = defaultdict(list)
+    for one in entries:
+        plans[one.plan].append(one)
+    for played in plans.values():
+        yield from _holes_of_plan(played)
+
+
+def _holes_of_plan(entries: Iterable[Summary]) -> Iterator[str]:
     episodes: dict[tuple[str, ...], set[int]] = defaultdict(set)
     seeds: dict[str, set[int]] = defaultdict(set)
     cells: dict[tuple[str, str, str, InstructionOptions], set[tuple[int, int]]] = defaultdict(set)

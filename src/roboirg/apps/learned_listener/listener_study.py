@@ -8,13 +8,14 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from roboirg.apps.learned_listener.labeled_views import LATER_STEP
 from roboirg.core.episode import Episode, Split
-from roboirg.core.instruction_options import RIVALS, InstructionOptions
+from roboirg.core.instruction_options import InstructionOptions
 from roboirg.core.observations import FRONT
 from roboirg.core.word_pools import POOLS, PoolName
 from roboirg.envs.environment import RoboIRGEnv
 from roboirg.language import FORMS
-from roboirg.language.settings import all_settings
-from roboirg.language.variants import instructions, settings_with_rivals
+from roboirg.language.rivals import RIVAL_SETTINGS
+from roboirg.language.settings import plain_settings
+from roboirg.language.variants import instructions
 from roboirg.tasks.splits.splits import SIZES, get_episode
 from roboirg.util.parallel_map import parallel_map
 
@@ -138,11 +139,11 @@ def _answers(
 
 def told_options() -> Iterator[InstructionOptions]:
     """Yield how the test split is told: in words of both pools, and with rivals."""
-    for setting in all_settings():
+    for setting in plain_settings():
         for pool in POOLS:
             yield InstructionOptions(setting, wordings=pool)
-        if setting in settings_with_rivals():
-            yield InstructionOptions(setting, wordings=HELD_OUT, rival=RIVALS[-1])
+    for setting in RIVAL_SETTINGS:
+        yield InstructionOptions(setting, wordings=HELD_OUT)
 
 
 def _reader_of(

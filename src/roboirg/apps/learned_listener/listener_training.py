@@ -30,12 +30,13 @@ from roboirg.apps.learned_listener.object_relations import (
 )
 from roboirg.core.episode import Episode, Split
 from roboirg.core.errors import InvalidValueError
-from roboirg.core.instruction_options import RIVALS, InstructionOptions
+from roboirg.core.instruction_options import InstructionOptions
 from roboirg.core.word_pools import PoolName
 from roboirg.language import FORMS, LANGUAGE_VERSION
 from roboirg.language.instruction import Instruction
+from roboirg.language.rivals import RIVAL_SETTINGS
 from roboirg.language.settings import all_settings, settings_of
-from roboirg.language.variants import instructions, settings_with_rivals
+from roboirg.language.variants import instructions
 from roboirg.policies.vlm.goal_schema import goal_schema
 from roboirg.tasks import get_task, with_goal
 from roboirg.tasks.splits.splits import SIZES, get_episode
@@ -191,9 +192,9 @@ def _instructions(
     yield from instructions(scenes.episodes, others, FORMS[:1], options)
     yield from instructions(_with_goals(scenes.episodes, plan), by_place, FORMS[:1], options)
     if plan.rivals:
-        with_rivals = [name for name in plan.settings if name in settings_with_rivals()]
-        options = options._replace(rival=RIVALS[-1])
-        yield from instructions(scenes.episodes, with_rivals, FORMS[:1], options)
+        known = all_settings()
+        harder = [name for name in RIVAL_SETTINGS if known[name].plain in plan.settings]
+        yield from instructions(scenes.episodes, harder, FORMS[:1], options)
 
 
 def _with_goals(episodes: Iterable[Episode], plan: TrainingPlan) -> Iterator[Episode]:

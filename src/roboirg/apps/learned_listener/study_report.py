@@ -11,7 +11,7 @@ import numpy as np
 
 from roboirg.apps.learned_listener.listener_study import HELD_OUT, TEST, VARIANTS, StudyAnswer
 from roboirg.core.episode import ENVIRONMENT_VERSION
-from roboirg.core.instruction_options import DEFAULT_RIVAL, RIVALS, InstructionOptions
+from roboirg.core.instruction_options import InstructionOptions
 from roboirg.evaluation.analysis.figures.averages import draw_averages
 from roboirg.evaluation.analysis.figures.figure_data import FigureData, summaries_by_key
 from roboirg.evaluation.analysis.figures.figure_style import save
@@ -29,14 +29,16 @@ from roboirg.evaluation.analysis.stats.run_summary import ALL, SummaryRow, summa
 from roboirg.evaluation.analysis.tables.rendering.markdown import markdown
 from roboirg.evaluation.analysis.tables.table import NOT_APPLICABLE, Column, Entry, Row, Table
 from roboirg.language import LANGUAGE_VERSION
+from roboirg.language.rivals import RIVAL_SETTINGS
 from roboirg.language.settings import all_settings
 
 FIGURE = "study"
 _SECTIONS = (
-    ("Held-out words", {"wordings": HELD_OUT, "rival": DEFAULT_RIVAL}),
-    ("Words of the training pool", {"wordings": "train", "rival": DEFAULT_RIVAL}),
-    ("Held-out words with rivals", {"wordings": HELD_OUT, "rival": RIVALS[-1]}),
+    ("Held-out words", HELD_OUT, False),
+    ("Words of the training pool", "train", False),
+    ("Held-out words with rivals", HELD_OUT, True),
 )
+"""The title of each section, and its words: of which pool, and whether with a rival."""
 _NOTE = (
     "Right answers in percent, and the 95 % interval: means over tasks, implicit form, test split."
 )
@@ -68,8 +70,8 @@ def study_text(cells: Cells, about: Mapping[str, Any]) -> str:
 
 def study_tables(cells: Cells) -> Iterator[Table]:
     """Yield a table for each way in which the test split is told."""
-    for title, wanted in _SECTIONS:
-        own = _cells_of(cells, wanted)
+    for title, pool, has_rival in _SECTIONS:
+        own = _cells_of(cells, pool, has_rival=has_rival)
         found = {
             (one.policy_run.policy, one.options.setting): one
             for one in summarize(own, np.random.default_rng(SEED))
@@ -91,18 +93,18 @@ def save_study_figure(cells: Cells, folder: Path) -> tuple[Path, ...]:
     """Draw the means over tasks by setting, told in held-out words, and write the files."""
     own = {
         key._replace(options=InstructionOptions(key.options.setting)): results
-        for key, results in _cells_of(cells, _SECTIONS[0][1]).items()
+        for key, results in _cells_of(cells, HELD_OUT, has_rival=False).items()
     }
     names = {key.policy_run: key.policy_run.policy for key in own}
     content = FigureData((), own, summaries_by_key(own), names)
     return save(lambda: draw_averages(content), folder, FIGURE)
 
 
-def _cells_of(cells: Cells, wanted: Mapping[str, str]) -> Cells:
+def _cells_of(cells: Cells, pool: str, *, has_rival: bool) -> Cells:
     return {
         key: results
         for key, results in cells.items()
-        if all(getattr(key.options, name) == value for name, value in wanted.items())
+        if key.options.wordings == pool and (key.options.setting in RIVAL_SETTINGS) == has_rival
     }
 
 

@@ -6,6 +6,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
+import msgspec
 import typer
 
 from roboirg.cli import run_commands
@@ -241,7 +242,7 @@ def drive(
         raise InvalidValueError(
             f"One task, one setting and one form are driven at a time; these are {len(jobs)} jobs."
         )
-    job = jobs[0].model_copy(update={"policy": name, "spec": None})
+    job = msgspec.structs.replace(jobs[0], policy=name, spec=None)
     server = DriveServer(job, run_commands.folder_of(out), host, port, allow_host or ())
     _serve(server, f"Press Ctrl-C to stop; the records of episodes that ended are in {out}.")
 

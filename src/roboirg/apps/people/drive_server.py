@@ -12,6 +12,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 from urllib.parse import parse_qs, urlsplit
 
+import msgspec
+
 from roboirg.apps.people.driving_run import drive_episode, next_seed
 from roboirg.apps.people.driving_session import DrivingSession
 from roboirg.apps.people.listen_server import PACKAGE
@@ -65,7 +67,7 @@ class DriveServer(KeyedPageServer):
             self._end_episode()
             self.session = DrivingSession()
             seed = next_seed(self._job, self._folder)
-            job = self._job.model_copy(update={"policy_seed": seed})
+            job = msgspec.structs.replace(self._job, policy_seed=seed)
             self._thread = threading.Thread(
                 target=drive_episode, args=(job, self._folder, self.session), daemon=True
             )

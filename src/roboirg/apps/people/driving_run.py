@@ -5,6 +5,8 @@ from __future__ import annotations
 import time
 from pathlib import Path
 
+import msgspec
+
 from roboirg.apps.people.driving_policy import DrivingPolicy
 from roboirg.apps.people.driving_session import DrivingSession, DrivingStoppedError
 from roboirg.core.errors import RoboIRGError
@@ -50,7 +52,7 @@ def drive_episode(job: Job, folder: Path, session: DrivingSession) -> Record | N
 def next_seed(job: Job, folder: Path) -> int:
     """Return the first policy seed with which a folder has no record of a job."""
     stored, seed = read_index(folder), 0
-    while identity_key(job.model_copy(update={"policy_seed": seed})) in stored:
+    while identity_key(msgspec.structs.replace(job, policy_seed=seed)) in stored:
         seed += 1
     return seed
 

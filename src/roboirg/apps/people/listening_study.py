@@ -14,6 +14,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Literal, NamedTuple
 
+import msgspec
 import numpy as np
 from pydantic import BaseModel, ConfigDict, ValidationError
 
@@ -24,7 +25,7 @@ from roboirg.core.instruction_options import DEFAULT_DELIVERY, InstructionOption
 from roboirg.evaluation.grounding_items.question_set import EpisodeName, ExportRequest
 from roboirg.evaluation.plan.plan import Plan
 from roboirg.evaluation.records.record import Job
-from roboirg.language.settings import EXPLICIT, setting_names
+from roboirg.language.settings import EXPLICIT, plain_settings
 from roboirg.tasks.splits.splits import SIZES
 from roboirg.util.atomic_write import write_atomically
 
@@ -140,7 +141,7 @@ class ListeningStudy(BaseModel):
         episodes = [EpisodeName(task, plan.split, one) for task, one in self._cells]
         training = [*self._practice(), *self._checks()]
         episodes += [EpisodeName(job.task, TRAINING, job.episode) for job in training]
-        named = setting_names() if plan.settings == "all" else plan.settings
+        named = plain_settings() if plan.settings == "all" else plan.settings
         return ExportRequest(
             episodes=tuple(dict.fromkeys(episodes)),
             settings=tuple(dict.fromkeys((EXPLICIT, *named))),
@@ -151,8 +152,6 @@ class ListeningStudy(BaseModel):
                 distractors=plan.distractors,
                 frame=plan.frame,
                 wordings=plan.wordings_identity,
-                rival=plan.rival,
-                reasoning=plan.reasoning,
             ),
             frames_every=self.frames_every,
             wordings=plan.wordings,
@@ -208,7 +207,7 @@ def _assign(jobs: list[Job], place: int, column: int) -> Job:
     square = balanced_square(len(jobs))
     chosen = [square[one % len(square)][column % len(jobs)] for one in range(place + 1)]
     earlier = chosen[:-1].count(chosen[-1])
-    return jobs[chosen[-1]].model_copy(update={"policy_seed": earlier})
+    return msgspec.structs.replace(jobs[chosen[-1]], policy_seed=earlier)
 
 
 def words_of(job: Job) -> tuple[str, str, int, InstructionOptions]:

@@ -28,7 +28,7 @@ from roboirg.apps.policy_check.policy_player import (
 from roboirg.apps.policy_check.turn_check import largest_difference, play_in_turns
 from roboirg.core.actions import check_chunk
 from roboirg.core.errors import MissingDependencyError, RoboIRGError
-from roboirg.core.plain_text import counted
+from roboirg.core.plain_text import counted, verb_for
 from roboirg.policies.by_name.loading import needs_host
 from roboirg.policies.contract.base import tell_policy
 from roboirg.policies.contract.policy_needs import PolicyNeeds
@@ -112,10 +112,11 @@ def _describe_actions(
         f"{rollout.dtype}, all finite.",
     )
     if outside:
+        have = verb_for(outside, "have")
         yield CheckResult(
             f"range {when}",
             NOTE,
-            f"{outside} of {counted(sum(sizes), 'action')} have a number outside the usual "
+            f"{outside} of {counted(sum(sizes), 'action')} {have} a number outside the usual "
             f"range of {space.name}; the robot executes them as well as it can.",
         )
 

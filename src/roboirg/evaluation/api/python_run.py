@@ -9,8 +9,9 @@ from typing import Any
 
 from roboirg.core.errors import InvalidValueError
 from roboirg.evaluation.hosting.policy_descriptions import know_policy
-from roboirg.evaluation.plan.plan import Plan, with_secret
+from roboirg.evaluation.plan.plan import Plan
 from roboirg.evaluation.plan.plan_maker import make_plan
+from roboirg.evaluation.plan.stored_plans import with_secret
 from roboirg.evaluation.run.executor import choose_executor
 from roboirg.evaluation.run.progress import ConsoleReporter, SilentReporter
 from roboirg.evaluation.run.record_hook import CommandHook, HookedReporter, RecordFunction

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from roboirg.core.errors import InvalidValueError, MissingDependencyError, UnknownNameError
+from roboirg.core.plain_text import counted
 from roboirg.evaluation.analysis.figures import FIGURES, FigureData, draw_figure
 from roboirg.evaluation.analysis.stats.cells import Cells, gather
 from roboirg.evaluation.analysis.stats.comparison import compare
@@ -21,9 +22,8 @@ from roboirg.evaluation.analysis.stats.option_labels import options_label
 from roboirg.evaluation.analysis.stats.run_summary import ALL, summarize
 from roboirg.evaluation.analysis.tables.paper_tables import WHICH, is_informative, make_table
 from roboirg.evaluation.analysis.tables.rendering import get_format
-from roboirg.evaluation.plan.plan import read_plan
-from roboirg.evaluation.records.record import Job, Record
-from roboirg.evaluation.records.record_codec import EpisodeSummary
+from roboirg.evaluation.plan.stored_plans import read_plan
+from roboirg.evaluation.records.record import Job, Record, Summary
 from roboirg.evaluation.records.store import read_records, read_results
 
 if TYPE_CHECKING:
@@ -58,7 +58,7 @@ class Results:
         object.__setattr__(self, "missing", sum(cell.missing for cell in cells))
 
     @functools.cached_property
-    def summaries(self) -> tuple[EpisodeSummary, ...]:
+    def summaries(self) -> tuple[Summary, ...]:
         """The verdicts, one for each episode, without instructions and events."""
         return read_results(self.folder)
 
@@ -161,8 +161,10 @@ class Results:
         return write_report(self.folder, planned=self._planned, videos=videos)
 
     def __repr__(self) -> str:
-        counts = f"{self.errors} errors, {self.missing} missing"
-        lines = [f"Results of {len(self.summaries)} episodes ({counts}) in {self.folder}"]
+        counts = f"{counted(self.errors, 'error')}, {self.missing:,} missing"
+        lines = [
+            f"Results of {counted(len(self.summaries), 'episode')} ({counts}) in {self.folder}"
+        ]
         lines += [f"  {policy} {name}: {100 * rate:.1f} %"
                   for (policy, name), rate in self.rates().items()]  # fmt: skip
         return "\n".join(lines)

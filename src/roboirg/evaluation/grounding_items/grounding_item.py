@@ -68,8 +68,6 @@ class GroundingItem(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fi
     distractors: int
     frame: str
     wordings: str
-    rival: str
-    reasoning: str
     text: str
     turns: list[str]
     picture: str

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import itertools
+import math
+import os
 import re
-import secrets
 from collections.abc import Iterable, Iterator
-from pathlib import Path
 from typing import Any, Literal, get_args
 
+import msgspec
 from pydantic import BaseModel, ConfigDict, field_validator, model_validator
 
 from roboirg import language, policies, tasks
@@ -20,8 +21,6 @@ from roboirg.core.instruction_options import (
     DEFAULT_DISTRACTOR,
     DEFAULT_DISTRACTORS,
     DEFAULT_FRAME,
-    DEFAULT_REASONING,
-    DEFAULT_RIVAL,
     InstructionOptions,
 )
 from roboirg.core.observations import (
@@ -37,22 +36,21 @@ from roboirg.evaluation.plan.plan_parsing import check_names, name_and_spec
 from roboirg.evaluation.play.job_instruction import instruct_job
 from roboirg.evaluation.records.film import VideoMode
 from roboirg.evaluation.records.record import (
+    CONTROLS,
     DEFAULT_MAX_STEPS,
     DEFAULT_MESHES,
     NAME,
     ErrorKind,
     Job,
 )
-from roboirg.evaluation.records.run_files import PLAN_FILE, earlier_plans, store_plan
 from roboirg.language.generator import check_options, find_refusal
-from roboirg.language.settings import EXPLICIT, all_settings
+from roboirg.language.settings import EXPLICIT, all_settings, plain_settings
 from roboirg.language.wordings.wording_store import open_wordings
 from roboirg.tasks.splits import splits
 from roboirg.tasks.splits.private_splits import MissingSaltError, is_private
-from roboirg.util.regular_file import read_regular
 from roboirg.util.short_hash import short_hash
 
-MOST_PLAN_BYTES = 64_000_000
+MOST_JOBS = 1_000_000
 REQUIRED = "required"
 """Instead of a wording file in a plan: one must be given when the plan is run."""
 
@@ -76,7 +74,8 @@ class Plan(BaseModel):
         policies: built-in names, ``package.module:Class``, or addresses; each may be given a name
             of its own as ``NAME=SPEC``.
         tasks: names of tasks.
-        settings: names, or ``"all"`` for every setting that can express the episode.
+        settings: names, or ``"all"`` for every setting that can express the episode, without
+            the harder ones.
         forms: implicit, resolved or both.
         split: train, val, test, random, or the name of a private split.
         episodes: 0-based positions in the split.
@@ -88,8 +87,6 @@ class Plan(BaseModel):
         distractors: number of distractors, for settings that read it.
         frame: frame of reference, for settings that read it.
         delivery: prompt or turns, for settings with several utterances.
-        rival: none or drawn, for settings that read it.
-        reasoning: plain or open, for settings that read it.
         wordings: path of the wording file whose commands are used; None for our own.
         wordings_identity: name and fingerprint of that file; read from it if it is not given.
         max_steps: the policy's limit, control steps.
@@ -126,8 +123,6 @@ class Plan(BaseModel):
     distractors: int = DEFAULT_DISTRACTORS
     frame: str = DEFAULT_FRAME
     delivery: str = DEFAULT_DELIVERY
-    rival: str = DEFAULT_RIVAL
-    reasoning: str = DEFAULT_REASONING
     wordings: str | None = None
     wordings_identity: str | None = None
     max_steps: int = DEFAULT_MAX_STEPS
@@ -154,13 +149,40 @@ class Plan(BaseModel):
             return fields
         if fields["wordings"] in POOLS:
             return {**fields, "wordings_identity": fields["wordings"]}
-        path = Path(str(fields["wordings"])).resolve()
-        return {**fields, "wordings": str(path), "wordings_identity": open_wordings(path)}
+        path = os.path.realpath(str(fields["wordings"]))
+        return {**fields, "wordings": path, "wordings_identity": open_wordings(path)}
 
     @field_validator("demonstration_frames", mode="before")
     @classmethod
     def _check_frames(cls, value: object) -> object:
         return None if value is None else check_demonstration_frames(value)
+
+    @model_validator(mode="after")
+    def _check_text(self) -> Plan:
+        if not is_encodable(self.seed_secret or ""):
+            raise InvalidValueError(f"seed_secret is {self.seed_secret!r}: it has lone surrogates.")
+        texts = self.model_dump(exclude={"seed_secret"})
+        for name, value in texts.items():
+            for text in value if isinstance(value, tuple) else (value,):
+                if isinstance(text, str) and re.search(f"[{CONTROLS}]", text):
+                    raise InvalidValueError(
+                        f"The plan has {text[:80]!r} as {name}; no character of it may control a "
+                        "terminal."
+                    )
+        return self
+
+    @model_validator(mode="after")
+    def _check_size(self) -> Plan:
+        if not self.policy_seeds:
+            raise InvalidValueError("The plan has no policy seeds; it needs at least one.")
+        several = (self.policies, self.tasks, self.forms, self.episodes, self.policy_seeds)
+        settings = plain_settings() if self.settings == "all" else self.settings
+        size = math.prod(map(len, (*several, settings, self.stages)))
+        if size > MOST_JOBS:
+            raise InvalidValueError(
+                f"The plan has up to {size:,} episodes; a plan has at most {MOST_JOBS:,}."
+            )
+        return self
 
     @property
     def specs(self) -> dict[str, str]:
@@ -228,8 +250,8 @@ class Plan(BaseModel):
             instruct_job(job)  # raises if the options cannot express the episode
         if not jobs:
             raise InvalidValueError(
-                f"There is nothing to play: with rival {self.rival!r} and reasoning "
-                f"{self.reasoning!r} no setting can express any of these episodes."
+                f"There is nothing to play: {', '.join(self.settings)} cannot express any of "
+                "these episodes."
             )
         return self
 
@@ -253,17 +275,26 @@ class Plan(BaseModel):
         )
 
     def drawable_jobs(self) -> tuple[Job, ...]:
-        """Return every job; none if the episodes are private and their salt is not known."""
+        """Return the jobs that can be told here, for counting what a stored run lacks.
+
+        None if the episodes are private and their salt is not known; none of tasks and settings
+        whose package is not installed.
+        """
         try:
             splits.check_split(self.split)
         except MissingSaltError:
             return ()
-        return self.jobs()
+        known = tuple(name for name in self.tasks if name in tasks.every_task())
+        settings = self.settings
+        if settings != "all":
+            settings = tuple(name for name in settings if name in all_settings())
+        return self.model_copy(update={"tasks": known, "settings": settings}).jobs()
 
     def settings_of(self, task: str, episode: int) -> tuple[str, ...]:
         """Return the settings in which an episode is played."""
         if self.settings == "all":
-            return language.expressible(splits.get_episode(task, self.split, episode))
+            found = language.expressible(splits.get_episode(task, self.split, episode))
+            return tuple(name for name in found if name in plain_settings())
         return self.settings
 
     def _jobs_of(
@@ -298,7 +329,7 @@ class Plan(BaseModel):
             yield job
             # Copying is faster, and there may be very many.
             for seed in seeds[1:]:
-                yield job.model_copy(update={"policy_seed": seed})
+                yield msgspec.structs.replace(job, policy_seed=seed)
 
     def _options_of(self, setting: str) -> Iterator[InstructionOptions]:
         """Yield the instruction options to play in a setting.
@@ -312,26 +343,22 @@ class Plan(BaseModel):
                 yield usual._replace(form=form, stages=stages, **chosen)
 
     def _is_left_out(self, task: str, episode: int, options: InstructionOptions) -> bool:
-        """Return whether an episode has no rival, or no open pattern, in a setting that it has.
+        """Return whether a harder setting cannot express an episode that its plain one can.
 
         Some scenes have no second value; a plan over many tasks leaves them out.
         """
-        plain = options._replace(rival=DEFAULT_RIVAL, reasoning=DEFAULT_REASONING)
-        if options == plain:
+        plain = all_settings()[options.setting].plain
+        if plain is None:
             return False
         found = splits.get_episode(task, self.split, episode)
-        refused = [find_refusal(found, one) is not None for one in (options, plain)]
+        easier = options._replace(setting=plain)
+        refused = [find_refusal(found, one) is not None for one in (options, easier)]
         return refused == [True, False]
 
     def _instruction_jobs(self) -> Iterator[Job]:
         """Yield one job for each instruction that the language may not be able to express."""
         # All settings with the default frame are only those that can express the episode.
-        usual = (
-            self.settings == "all"
-            and self.frame == DEFAULT_FRAME
-            and self.wordings is None
-            and (self.rival, self.reasoning) == (DEFAULT_RIVAL, DEFAULT_REASONING)
-        )
+        usual = self.settings == "all" and self.frame == DEFAULT_FRAME and self.wordings is None
         for task in self.tasks:
             for episode in self.episodes[:1] if usual else self.episodes:
                 settings = self.settings_of(task, episode)
@@ -348,8 +375,6 @@ class Plan(BaseModel):
                     distractors=self.distractors,
                     frame=self.frame,
                     delivery=self.delivery,
-                    rival=self.rival,
-                    reasoning=self.reasoning,
                 )
             )
         check_names("kind of meshes", (self.meshes,), MESHES)
@@ -381,47 +406,3 @@ class Plan(BaseModel):
 
 def _names_the_goal(options: InstructionOptions) -> bool:
     return options.setting == EXPLICIT or options.form == "resolved"
-
-
-def with_secret(plan: Plan, folder: Path) -> Plan:
-    """Return a plan whose `seed_secret` is known: its own, the folder's, or a new one.
-
-    A run that began without one goes on without.
-    """
-    if plan.seed_secret is not None:
-        return plan
-    before = read_plan(folder)
-    secret = secrets.token_hex(16) if before is None else before.seed_secret or ""
-    return plan.model_copy(update={"seed_secret": secret})
-
-
-def write_plan(plan: Plan, folder: Path) -> None:
-    """Write the newest plan of a folder beside its records; earlier ones stay in ``plans/``."""
-    store_plan((plan.model_dump_json(indent=2) + "\n").encode(), folder)
-
-
-def read_plan(folder: Path) -> Plan | None:
-    """Return the newest plan of a folder; None if it is missing or of an unknown version."""
-    return _read_plan_at(folder / PLAN_FILE)
-
-
-def read_plans(folder: Path) -> tuple[Plan, ...]:
-    """Return the plans whose episodes a folder should hold.
-
-    That is the newest, or in a merged run those of its parts.
-    """
-    newest = read_plan(folder)
-    return read_earlier_plans(folder) if newest is None else (newest,)
-
-
-def read_earlier_plans(folder: Path) -> tuple[Plan, ...]:
-    """Return the plans of earlier commands, or of merged runs, that can be read."""
-    found = (_read_plan_at(path) for path in earlier_plans(folder))
-    return tuple(plan for plan in found if plan is not None)
-
-
-def _read_plan_at(path: Path) -> Plan | None:
-    try:
-        return Plan.model_validate_json(read_regular(path, MOST_PLAN_BYTES))
-    except (OSError, ValueError, InvalidValueError):
-        return None

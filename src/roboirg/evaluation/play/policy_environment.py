@@ -6,6 +6,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from roboirg.core.errors import InvalidValueError
+from roboirg.evaluation.play.job_instruction import PreparedJob
 from roboirg.evaluation.records.record import Job
 from roboirg.policies.contract.base import Policy
 from roboirg.policies.contract.policy_needs import PolicyNeeds
@@ -34,14 +35,13 @@ def job_needs(policy: Policy, job: Job) -> PolicyNeeds:
     return needs
 
 
-def make_env(job: Job, needs: PolicyNeeds) -> RoboIRGEnv:
+def make_env(prepared: PreparedJob, needs: PolicyNeeds) -> RoboIRGEnv:
     """Return the environment of a job with what the policy needs."""
     from roboirg.envs.factory import make
 
+    job = prepared.job
     return make(
-        job.task,
-        split=job.split,
-        episode=job.episode,
+        prepared.episode,
         **job.options._replace(wordings=job.wordings)._asdict(),
         **needs.env_options,
         meshes=job.meshes,

@@ -15,14 +15,11 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
 
 from roboirg import policies
-from roboirg.core.actions import ActionSpace
-from roboirg.core.delivery import SpokenInstruction
 from roboirg.evaluation.episode_errors import (
     EpisodeError,
     EpisodeLostError,
@@ -33,31 +30,27 @@ from roboirg.evaluation.hosting.host_pool import HostAddress, HostSettings
 from roboirg.evaluation.hosting.hosted_policy import HostedPolicy
 from roboirg.evaluation.hosting.policy_descriptions import PolicyDescription, describe_here
 from roboirg.evaluation.play.call_guard import CallGuard
+from roboirg.evaluation.play.guarded_loop import GuardedLoop
+from roboirg.evaluation.play.job_instruction import PreparedJob
 from roboirg.evaluation.play.policy_environment import job_needs, make_env
 from roboirg.evaluation.play.prompt_shares import audit_job, too_long_text
 from roboirg.evaluation.play.rollout_result import RolloutResult, make_record, utc_now
 from roboirg.evaluation.play.video_writer import FrameSink, VideoWriter
-from roboirg.evaluation.policy_calls import next_actions, policy_metadata, policy_usage
+from roboirg.evaluation.policy_calls import policy_usage
 from roboirg.evaluation.records.action_log import write_actions
 from roboirg.evaluation.records.film import VideoMode, VideoOptions
 from roboirg.evaluation.records.record import Job, Record
 from roboirg.language.wordings.wording_store import open_wordings
 from roboirg.policies.by_name.loading import needs_host
-from roboirg.policies.contract.base import Policy, PrivilegedPolicy, close_policy, tell_policy
+from roboirg.policies.contract.base import Policy, close_policy
 from roboirg.policies.contract.policy_needs import PolicyNeeds
 from roboirg.policies.contract.random_state import episode_policy_seed
 from roboirg.policies.prompt_length.declared_limit import prompt_limit
-from roboirg.tasks.splits.splits import get_episode
-
-if TYPE_CHECKING:
-    from roboirg.envs.environment import RoboIRGEnv
 
 PlayJob = Callable[[Job], Record]
 """Function that plays one job. Executors send it to other processes, so it must be picklable."""
 
 VIDEO_FOLDER = "videos"
-NO_RENDER_DEVICE = "none"
-"""Name of the device of an environment that renders nothing."""
 
 MAX_LOSSES = 20
 """How often an episode is played again because other episodes broke the policy's process."""
@@ -188,24 +181,25 @@ def play_episode(
     """
     if job.wordings is not None:
         open_wordings(job.wordings_file, job.wordings)
-    result = RolloutResult()
+    prepared = PreparedJob(job)
+    result = RolloutResult(prepared=prepared)
     guard = CallGuard(result, policy_timeout_s, is_hosted=hosts is not None)
     policy: Policy | None = None
     try:
         if hosts is not None and needs_host(job.policy_spec):
             with guard.policy("policy's constructor", "policy_load"):
-                seed = _policy_seed(job, seed_secret)
+                seed = _policy_seed(prepared, seed_secret)
                 policy = _load_hosted(job, hosts, result, seed, alone=alone)
         if policy is None:
             guard = CallGuard(result, policy_timeout_s)
             result.policy = describe_here(job.policy_spec)
             with guard.policy("policy's constructor", "policy_load"):
-                policy = load_policy(job, seed_secret)
+                policy = load_policy(prepared, seed_secret)
         with guard.policy("policy's constructor", "policy_load"):
             needs = job_needs(policy, job)
             result.prompt_limit = prompt_limit(needs)
         if refuse_long:
-            _refuse_long_prompt(job, result)
+            _refuse_long_prompt(prepared, result)
         play_with(policy, job, needs, result, guard, writer)
     except EpisodeError as error:
         result.record_error(error.kind, error.cause, error.details)
@@ -239,8 +233,9 @@ def play_with(
     env, broke = None, False
     try:
         with guard.environment("env_reset"):
-            env = make_env(job, needs)
-        _play_to_end(env, policy, needs.action_space, job, writer, result, guard)
+            result.prepared = result.prepared or PreparedJob(job)
+            env = make_env(result.prepared, needs)
+        GuardedLoop(env, policy, job, needs.action_space, result, guard, writer).play()
     except EpisodeError as error:
         broke = error.kind == "environment"
         raise
@@ -251,17 +246,19 @@ def play_with(
             env.close()
 
 
-def _refuse_long_prompt(job: Job, result: RolloutResult) -> None:
+def _refuse_long_prompt(prepared: PreparedJob, result: RolloutResult) -> None:
     """Raise an `EpisodeError` if the instruction is longer than what the policy's model reads."""
     if result.prompt_limit is None:
         return
-    if message := too_long_text(*audit_job(job, result.prompt_limit)):
+    audit = audit_job(prepared.job, result.prompt_limit, prepared.instruction)
+    if message := too_long_text(*audit):
         raise EpisodeError("prompt", message, "")
 
 
-def load_policy(job: Job, seed_secret: str = "") -> Policy:
+def load_policy(prepared: PreparedJob, seed_secret: str = "") -> Policy:
     """Return a new policy object, so that no state of an earlier episode remains."""
-    policy = policies.make_policy(job.policy_spec, seed=_policy_seed(job, seed_secret))
+    job = prepared.job
+    policy = policies.make_policy(job.policy_spec, seed=_policy_seed(prepared, seed_secret))
     if callable(take := getattr(policy, "take_job", None)):
         take(job)  # of ours that look up what a person answered
     return policy
@@ -278,74 +275,8 @@ def _load_hosted(
     return policy
 
 
-def _policy_seed(job: Job, secret: str) -> int:
-    episode = get_episode(job.task, job.split, job.episode)
-    return episode_policy_seed(job.policy_seed, episode.seed, secret)
-
-
-def _play_to_end(
-    env: RoboIRGEnv,
-    policy: Policy,
-    actions: ActionSpace,
-    job: Job,
-    writer: FrameSink | None,
-    result: RolloutResult,
-    guard: CallGuard,
-) -> None:
-    """Play the environment's episode with the policy to its end."""
-    with guard.environment("env_reset"):
-        result.instruction = env.instruction
-        first = SpokenInstruction(env.instruction.turns, job.delivery).prompt
-        if writer is not None:
-            writer.caption, writer.longest_caption = first, env.instruction.text
-            env.set_frame_hook(writer.add_frame, every=writer.options.every)
-        observation, info = env.reset()
-        if writer is not None:
-            writer.add_frame(env)  # the policy's first observation
-        device = str(env.render_device)
-        result.render_device = None if device == NO_RENDER_DEVICE else device
-        result.demonstration_steps = len(info["demonstration"]["joint_positions"])
-        result.demonstration_source = info["demonstration_source"]
-        result.policy_start_step = int(info["elapsed_steps"])
-        result.add_events(info)
-        result.heard += info.get("heard", ())
-    with guard.policy("policy's reset()", "policy_reset"):
-        if isinstance(policy, PrivilegedPolicy):
-            policy.attach(env)
-        policy.reset(first, info["demonstration"])
-        result.policy_metadata = policy_metadata(policy)
-    result.action_space = actions.name
-    status, cause = "ongoing", None
-    while status == "ongoing":
-        with guard.policy("policy's act()", "policy_act"):
-            rows = next_actions(policy, observation, actions)
-        with guard.environment("env_step"):
-            done = env.executed_actions
-            observation, *_, info = env.step_chunk(rows)
-            result.answers.append(rows[: env.executed_actions - done])
-        result.steps = int(info["steps"])
-        result.add_events(info)
-        if info.get("heard"):
-            _tell(policy, info["heard"], writer, result, guard)
-        status, cause = info["status"], info.get("cause")
-    if not result.record_status(status, cause, job.max_steps):
-        result.cause = f"environment: the episode ended with status {status!r}"
-
-
-def _tell(
-    policy: Policy,
-    utterances: Sequence[Mapping[str, Any]],
-    writer: FrameSink | None,
-    result: RolloutResult,
-    guard: CallGuard,
-) -> None:
-    """Tell the policy what has just been said, and write it under the video."""
-    result.heard += utterances
-    if writer is not None:
-        writer.caption = " ".join(one["text"] for one in result.heard)
-    with guard.policy("policy's hear()", "policy_hear"):
-        tell_policy(policy, utterances)
-        result.policy_metadata = policy_metadata(policy)
+def _policy_seed(prepared: PreparedJob, secret: str) -> int:
+    return episode_policy_seed(prepared.job.policy_seed, prepared.episode.seed, secret)
 
 
 def _close_policy(policy: Policy, result: RolloutResult, guard: CallGuard) -> None:

@@ -13,6 +13,7 @@ from itertools import zip_longest
 from pathlib import Path
 from typing import Any
 
+import msgspec
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import JsonValue
@@ -24,11 +25,13 @@ from roboirg.core.delivery import TURNS, PromptVerdict
 from roboirg.core.episode import ENVIRONMENT_VERSION, Episode
 from roboirg.core.errors import InvalidValueError, MissingDependencyError
 from roboirg.core.observations import DemonstrationSource
+from roboirg.core.plain_text import clip_text
 from roboirg.evaluation.hosting.policy_descriptions import PolicyDescription, describe_policy
-from roboirg.evaluation.play.job_instruction import instruct_job
+from roboirg.evaluation.play.job_instruction import PreparedJob
 from roboirg.evaluation.play.prompt_shares import audit_job, audit_prompt
 from roboirg.evaluation.records.action_log import ActionLog
 from roboirg.evaluation.records.record import (
+    MOST_CAUSE_LETTERS,
     Attribution,
     ErrorKind,
     EventRecord,
@@ -43,7 +46,6 @@ from roboirg.judging import Event, attribute_failure
 from roboirg.language.settings import EXPLICIT
 from roboirg.policies.by_name.loading import server_version
 from roboirg.policies.prompt_length.prompt_audit import PromptLimit
-from roboirg.tasks.splits.splits import get_episode
 from roboirg.util.processor import processor_family
 from roboirg.util.short_hash import DIGITS
 
@@ -65,6 +67,7 @@ class RolloutResult:
         demonstration_source: whose actions it shows: recorded, planned or none.
         policy_start_step: control steps of the episode before the policy's turn.
         elapsed_steps: control steps of the episode in all.
+        prepared: the job's episode and words, as far as they are made; None if none are.
         instruction: what the policy was told; None if the episode did not get that far.
         heard: what the policy has heard so far, in order: ``text`` and ``step``.
         events: facts that became true or ceased to be.
@@ -89,6 +92,7 @@ class RolloutResult:
     demonstration_source: DemonstrationSource = "none"
     policy_start_step: int = 0
     elapsed_steps: int = 0
+    prepared: PreparedJob | None = None
     instruction: language.Instruction | None = None
     heard: list[Mapping[str, Any]] = field(default_factory=list)
     events: list[EventRecord] = field(default_factory=list)
@@ -154,7 +158,6 @@ class RolloutResult:
 
 _COPIED = (
     "outcome",
-    "cause",
     "steps",
     "demonstration_steps",
     "demonstration_source",
@@ -190,18 +193,20 @@ def make_record(
         plan: fingerprint of the plan.
         action_log: digest of the stored actions.
     """
-    episode = get_episode(job.task, job.split, job.episode)
+    prepared = result.prepared or PreparedJob(job)
+    episode = prepared.episode
     # An episode that failed before its reset has a record with the words it would have had.
-    instruction = result.instruction or instruct_job(job)
-    explicit = instruct_job(job.model_copy(update={"setting": EXPLICIT}))
+    instruction = result.instruction or prepared.instruction
+    explicit = instruction if job.setting == EXPLICIT else prepared.explicit
     policy = result.policy or _describe(job)
     utterances = _utterances(job, instruction, result)
     prompt, verdict = _audit(job, instruction, utterances, result)
     return Record(
-        **dict(job),
+        **msgspec.structs.asdict(job),
         **{name: getattr(result, name) for name in _COPIED},
         seed=episode.seed,
         difficulty=episode.difficulty,
+        cause=None if result.cause is None else clip_text(result.cause, MOST_CAUSE_LETTERS),
         error=result.error if result.outcome == "error" else None,
         attribution=_attribution(episode, result, instruction),
         instruction=utterances,

@@ -19,12 +19,15 @@ from numpy.typing import NDArray
 from roboirg.core.actions import check_chunk, find_action_space
 from roboirg.core.errors import InvalidActionError, InvalidValueError
 from roboirg.evaluation.records.record_codec import StoreError
+from roboirg.util.archive_errors import UNREADABLE_ARCHIVE
 from roboirg.util.atomic_write import write_atomically
 from roboirg.util.regular_file import read_regular
 
 ACTION_FOLDER = "actions"
 _SUFFIX = ".npz"
 _DIGEST = re.compile("[0-9a-f]{64}")
+_KINDS = {"space": "U", "rows": "f", "requests": "i", "end_state": "f"}
+"""The arrays of a file, and NumPy's letter for the kind of their numbers or text."""
 _MAX_BYTES = 16_777_216
 """Largest content that is unpacked; an episode of 1300 steps has less than 0.2 MB."""
 
@@ -97,9 +100,7 @@ def read_actions(folder: Path, digest: str) -> ActionLog:
         log = _unpack(read_regular(path, _MAX_BYTES))
     except FileNotFoundError:
         raise StoreError(f"The actions {path} are missing.") from None
-    except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile) as error:
-        raise StoreError(f"{path} is no action log: {error}") from error
-    except (InvalidActionError, InvalidValueError) as error:
+    except (InvalidActionError, InvalidValueError, *UNREADABLE_ARCHIVE) as error:
         raise StoreError(f"{path} is no action log: {error}") from error
     if log.digest != digest:
         raise StoreError(f"{path} has another content than its name says: {log.digest}.")
@@ -131,11 +132,15 @@ def _unpack(content: bytes) -> ActionLog:
         size = sum(one.file_size for one in archive.infolist())
     if size > _MAX_BYTES:
         raise ValueError(f"it unpacks to {size:,} bytes; at most {_MAX_BYTES:,} are read.")
-    with np.load(file, allow_pickle=False) as arrays:
-        space = str(arrays["space"])
-        rows = np.ascontiguousarray(arrays["rows"], dtype=np.float64)
-        requests = arrays["requests"].astype(np.int32)
-        end_state = arrays["end_state"].astype(np.float64)
+    with np.load(file, allow_pickle=False) as stored:
+        arrays = {name: np.asarray(stored[name]) for name in _KINDS}
+    for name, kind in _KINDS.items():
+        if arrays[name].dtype.kind != kind:
+            raise ValueError(f"{name} has the type {arrays[name].dtype}.")
+    space = str(arrays["space"])
+    rows = np.ascontiguousarray(arrays["rows"], dtype=np.float64)
+    requests = arrays["requests"].astype(np.int32)
+    end_state = arrays["end_state"].astype(np.float64)
     if rows.size:
         check_chunk(rows, find_action_space(space))
     if requests.ndim != 1 or not np.array_equal(np.unique(requests), requests):

@@ -15,6 +15,7 @@ import fcntl
 import json
 import os
 from collections.abc import Callable, Iterable, Iterator
+from functools import partial
 from pathlib import Path
 from typing import NamedTuple, TypeVar
 
@@ -24,6 +25,8 @@ from roboirg.util.atomic_write import sync_to_disk
 from roboirg.util.regular_file import open_regular
 
 LOCK_FILE = ".lock"
+MOST_BYTES = 64 << 20
+"""Of a line; longer ones are not read."""
 
 Parsed = TypeVar("Parsed")
 
@@ -67,7 +70,12 @@ class LineFile:
             raise StoreError(str(error)) from error
         with file:
             start = 0
-            for number, line in enumerate(file, start=1):
+            for number, line in enumerate(iter(partial(file.readline, MOST_BYTES + 1), b""), 1):
+                if len(line) > MOST_BYTES:
+                    raise StoreError(
+                        f"{self._path} line {number} has more than {MOST_BYTES:,} bytes; no "
+                        "record is that long."
+                    )
                 # No proper prefix of a JSON object is valid JSON: if the last line lacks only its
                 # newline, the record is complete.
                 if not line.endswith(b"\n") and not _is_json(line):
@@ -170,7 +178,7 @@ class AppendFile:
 def _is_json(line: bytes) -> bool:
     try:
         json.loads(line)
-    except ValueError:
+    except (ValueError, RecursionError):
         return False
     return True
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import os
 import shutil
 from collections.abc import Iterable, Iterator, Sequence
@@ -14,20 +13,22 @@ import msgspec
 from roboirg.core.errors import InvalidValueError
 from roboirg.evaluation.records.action_log import action_path
 from roboirg.evaluation.records.episode_log import log_path, logged_slugs
+from roboirg.evaluation.records.record import Summary
 from roboirg.evaluation.records.record_codec import (
-    RecordIndexEntry,
-    RunPath,
     StoreError,
+    encode,
     identity_key,
-    read_line,
+    read_record,
+    read_summary,
 )
 from roboirg.evaluation.records.run_files import (
-    PLAN_FILE,
-    earlier_plans,
+    MOST_PLAN_BYTES,
     keep_earlier_plan,
+    plan_names,
     run_file,
 )
 from roboirg.evaluation.records.store import RecordStore, StoredRun
+from roboirg.util.regular_file import read_regular
 
 
 class MergeSummary(NamedTuple):
@@ -41,24 +42,14 @@ class MergeSummary(NamedTuple):
 
     added: int
     duplicates: int
-    conflicts: tuple[RecordIndexEntry, ...]
-
-
-class _MergeEntry(RecordIndexEntry, frozen=True):
-    """An index entry with the path of the video and the digest of the actions."""
-
-    video: RunPath | None = None
-    action_log: str | None = None
-
-
-_decoder = msgspec.json.Decoder(_MergeEntry)
+    conflicts: tuple[Summary, ...]
 
 
 def merge_runs(folders: Sequence[Path], out: Path) -> MergeSummary:
     """Copy the records, videos and logs of several runs into one folder.
 
     If several runs have the same episode, the first verdict is kept; a verdict replaces an error.
-    Records are checked and copied one by one; the memory holds only their index entries.
+    Records are checked and copied one by one; the memory holds only their summaries.
 
     Args:
         folders: output folders of the runs; they are not changed.
@@ -70,11 +61,11 @@ def merge_runs(folders: Sequence[Path], out: Path) -> MergeSummary:
     """
     if out.resolve() in {folder.resolve() for folder in folders}:
         raise InvalidValueError(f"{out} is one of the runs to be merged; choose another --out.")
-    runs = [(folder, StoredRun(folder, _read_entry)) for folder in folders]
+    runs = [(folder, StoredRun(folder, _read_checked)) for folder in folders]
     entries = [(folder, run.newest) for folder, run in runs]
     _check_versions(entries)
     added, duplicates = 0, 0
-    conflicts: list[RecordIndexEntry] = []
+    conflicts: list[Summary] = []
     with RecordStore(out) as store:
         _keep_plans(folders, out)
         kept = dict(store.stored)
@@ -101,18 +92,21 @@ def merge_runs(folders: Sequence[Path], out: Path) -> MergeSummary:
 def _keep_plans(folders: Sequence[Path], out: Path) -> None:
     """Keep the plans of all runs, so that it can be told which episodes are missing."""
     for folder in folders:
-        for path in (folder / PLAN_FILE, *earlier_plans(folder)):
-            if path.is_file():
-                keep_earlier_plan(path.read_bytes(), out)
+        for name in plan_names(folder):
+            try:
+                content = read_regular(run_file(folder, name), MOST_PLAN_BYTES)
+            except OSError as error:
+                raise StoreError(f"Cannot read {folder / name}: {error.strerror}.") from error
+            keep_earlier_plan(content, out)
 
 
-def _read_entry(line: bytes, path: Path, number: int) -> _MergeEntry:
-    """Check that a line is a whole record and return its entry."""
-    read_line(line, path, number)
-    return _decoder.decode(line)
+def _read_checked(line: bytes, path: Path, number: int) -> Summary:
+    """Check that a line is a whole record and return its summary."""
+    read_record(line, path, number)
+    return read_summary(line, path, number)
 
 
-def _check_versions(runs: Sequence[tuple[Path, Iterable[RecordIndexEntry]]]) -> None:
+def _check_versions(runs: Sequence[tuple[Path, Iterable[Summary]]]) -> None:
     """Refuse records of different versions, as a run does."""
     first: dict[object, tuple[Path, object]] = {}
     for folder, entries in runs:
@@ -133,14 +127,14 @@ def _check_versions(runs: Sequence[tuple[Path, Iterable[RecordIndexEntry]]]) -> 
                     )
 
 
-def _server_version(record: RecordIndexEntry) -> Iterator[tuple[tuple[object, ...], object]]:
+def _server_version(record: Summary) -> Iterator[tuple[tuple[object, ...], object]]:
     """Yield the version of the policy's server, if the episode has a verdict."""
     if record.outcome != "error":
         yield ("version", "of the server of", record.policy), record.server_version
 
 
 def _lines(
-    run: StoredRun[_MergeEntry], wanted: Sequence[_MergeEntry], source: Path, target: Path
+    run: StoredRun[Summary], wanted: Sequence[Summary], source: Path, target: Path
 ) -> Iterator[bytes]:
     """Yield the lines of records and copy their videos, logs and actions.
 
@@ -149,14 +143,14 @@ def _lines(
     logs = logged_slugs(source)
     for one, line in zip(wanted, run.lines(wanted), strict=True):
         if logs and (slug := one.slug) in logs:
-            _copy_log(log_path(source, slug), log_path(target, slug))
+            _copy_log(source, target, log_path(Path(), slug).as_posix())
         if one.action_log is not None:
             _copy_actions(one.action_log, source, target)
         if one.video is None or _copy_video(one.video, source, target):
             yield line
         else:
             record = next(run.records([one]))
-            yield record.model_copy(update={"video": None}).model_dump_json().encode()
+            yield encode(msgspec.structs.replace(record, video=None))
 
 
 def _copy_video(name: str, source: Path, target: Path) -> bool:
@@ -167,19 +161,22 @@ def _copy_video(name: str, source: Path, target: Path) -> bool:
     if not copy.exists():
         copy.parent.mkdir(parents=True, exist_ok=True)
         _copy_file(video, copy)
-        with contextlib.suppress(FileNotFoundError):
-            _copy_file(video.with_suffix(".jpg"), copy.with_suffix(".jpg"))
+        poster = run_file(source, str(Path(name).with_suffix(".jpg")))
+        if poster.is_file():
+            _copy_file(poster, copy.with_suffix(".jpg"))
     return True
 
 
 def _copy_actions(digest: str, source: Path, target: Path) -> None:
-    actions, copy = action_path(source, digest), action_path(target, digest)
+    name = action_path(Path(), digest).as_posix()
+    actions, copy = run_file(source, name), run_file(target, name)
     if actions.is_file() and not copy.exists():
         copy.parent.mkdir(parents=True, exist_ok=True)
         _copy_file(actions, copy)
 
 
-def _copy_log(log: Path, copy: Path) -> None:
+def _copy_log(source: Path, target: Path, name: str) -> None:
+    log, copy = run_file(source, name), run_file(target, name)
     copy.parent.mkdir(parents=True, exist_ok=True)
     copy.unlink(missing_ok=True)  # of an error that this record replaces
     _copy_file(log, copy)
@@ -187,6 +184,6 @@ def _copy_log(log: Path, copy: Path) -> None:
 
 def _copy_file(path: Path, copy: Path) -> None:
     try:
-        os.link(path, copy)  # takes no space on the same disk
+        os.link(path.resolve(), copy)  # takes no space on the same disk
     except OSError:
         shutil.copyfile(path, copy)

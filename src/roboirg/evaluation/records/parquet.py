@@ -8,67 +8,16 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import msgspec
+from msgspec import inspect
+
 from roboirg.evaluation.records.record import Record
 from roboirg.util.atomic_write import replacing
 from roboirg.util.parquet_support import check_parquet_support
 
 if TYPE_CHECKING:
-    from pyarrow import Schema
+    from pyarrow import DataType
 
-_TEXT_COLUMNS = [
-    "policy",
-    "task",
-    "split",
-    "setting",
-    "form",
-    "distractor",
-    "frame",
-    "delivery",
-    "rival",
-    "reasoning",
-    "actions",
-    "demonstration_frames",
-    "meshes",
-    "wordings",
-    "wordings_file",
-    "spec",
-    "difficulty",
-    "demonstration_source",
-    "outcome",
-    "error",
-    "cause",
-    "policy_version",
-    "server_version",
-    "prompt_verdict",
-    "language_version",
-    "package_version",
-    "code",
-    "plan",
-    "command",
-    "video",
-    "video_error",
-    "details",
-    "render_device",
-    "processor",
-    "action_log",
-    "end_state",
-    "started_at",
-]
-_NUMBER_COLUMNS = [
-    "episode",
-    "distractors",
-    "policy_seed",
-    "max_steps",
-    "observe_every",
-    "seed",
-    "steps",
-    "demonstration_steps",
-    "environment_version",
-    "attempt",
-    "schema_version",
-]
-_JSON_COLUMNS = ("goal", "metadata", "policy_metadata", "usage", "timings")
-"""Fields whose keys depend on the task or policy."""
 _BATCH_ROWS = 5_000
 
 
@@ -76,8 +25,8 @@ def write_parquet(records: Iterable[Record], path: Path) -> int:
     """Write records to a Parquet file, which appears complete or not at all.
 
     The columns are the fields of a record. ``instruction``, ``mentions``, ``prompt``, ``events``
-    and ``attribution`` are nested; ``goal``, ``metadata``, ``policy_metadata``, ``usage`` and
-    ``timings`` are JSON texts.
+    and ``attribution`` are nested; dictionaries, whose keys depend on the task or the policy, are
+    JSON texts.
 
     Returns:
         Number of rows.
@@ -90,7 +39,8 @@ def write_parquet(records: Iterable[Record], path: Path) -> int:
     import pyarrow as pa
     from pyarrow import parquet
 
-    schema, count = _schema(), 0
+    columns = {name: _arrow_type(kind) for name, kind in _COLUMNS.items()}
+    schema, count = pa.schema(columns), 0
     rows = map(_row, records)
     with (
         replacing(path) as partial,
@@ -103,49 +53,56 @@ def write_parquet(records: Iterable[Record], path: Path) -> int:
 
 
 def _row(record: Record) -> dict[str, Any]:
-    data = record.model_dump(mode="json")
-    for name in _JSON_COLUMNS:
-        data[name] = json.dumps(data[name], ensure_ascii=False)
-    frames = data["demonstration_frames"]
-    data["demonstration_frames"] = None if frames is None else str(frames)
-    for mention in data["mentions"]:
-        mention["value"] = str(mention["value"])
-    return data
+    return {name: _fit(getattr(record, name), kind) for name, kind in _COLUMNS.items()}
 
 
-def _schema() -> Schema:
+def _fit(value: Any, kind: inspect.Type) -> Any:  # noqa: ANN401 - a value of that type
+    """Return a value as its column takes it."""
+    kind = _without_none(kind)
+    if value is None:
+        return None
+    if isinstance(kind, inspect.DictType):
+        return json.dumps(msgspec.to_builtins(value), ensure_ascii=False)
+    if isinstance(kind, inspect.UnionType):
+        return str(value)
+    if isinstance(kind, inspect.StructType):
+        return {one.name: _fit(getattr(value, one.name), one.type) for one in kind.fields}
+    if isinstance(kind, inspect.VarTupleType):
+        return [_fit(one, kind.item_type) for one in value]
+    return value
+
+
+def _arrow_type(kind: inspect.Type) -> DataType:
+    """Return the type of a column; dictionaries and unions are text."""
     import pyarrow as pa
 
-    text, number, truth = pa.string(), pa.int64(), pa.bool_()
-    known = {
-        **dict.fromkeys((*_TEXT_COLUMNS, *_JSON_COLUMNS), text),
-        **dict.fromkeys(_NUMBER_COLUMNS, number),
-        "privileged": truth,
-        "duration_s": pa.float64(),
-        "stages": pa.list_(number),
-        "prompt": pa.struct(
-            {
-                "limit": number,
-                **dict.fromkeys(("needed", "reached", "lost"), pa.list_(number)),
-                "tokenizer": text,
-            }
-        ),
-        "attribution": pa.struct(
-            {"kind": text, "failure": text, "subject": text, "step": number, "sentence": text}
-        ),
-        "instruction": pa.list_(pa.struct({"stage": text, "text": text, "step": number})),
-        "mentions": pa.list_(
-            pa.struct(
-                {
-                    **dict.fromkeys(("utterance", "start", "end"), number),
-                    **dict.fromkeys(("role", "expression", "slot", "value"), text),
-                }
-            )
-        ),
-        "events": pa.list_(
-            pa.struct(
-                {"step": number, "kind": text, "subject": text, "place": text, "holds": truth}
-            )
-        ),
-    }
-    return pa.schema({name: known[name] for name in Record.model_fields})
+    kind = _without_none(kind)
+    if isinstance(kind, inspect.StructType):
+        return pa.struct({one.name: _arrow_type(one.type) for one in kind.fields})
+    if isinstance(kind, inspect.VarTupleType):
+        return pa.list_(_arrow_type(kind.item_type))
+    if isinstance(kind, inspect.TupleType):
+        return pa.list_(_arrow_type(kind.item_types[0]))
+    if isinstance(kind, inspect.LiteralType):
+        return pa.int64() if isinstance(kind.values[0], int) else pa.string()
+    plain = {inspect.IntType: pa.int64(), inspect.FloatType: pa.float64()}
+    return {**plain, inspect.BoolType: pa.bool_()}.get(type(kind), pa.string())
+
+
+def _without_none(kind: inspect.Type) -> inspect.Type:
+    """Return a type without None, of which every column may have some."""
+    if not isinstance(kind, inspect.UnionType):
+        return kind
+    kinds = tuple(one for one in kind.types if not isinstance(one, inspect.NoneType))
+    return kinds[0] if len(kinds) == 1 else inspect.UnionType(kinds)
+
+
+def _columns() -> dict[str, inspect.Type]:
+    """Return the type of each field of a record."""
+    record = inspect.type_info(Record)
+    if not isinstance(record, inspect.StructType):
+        raise TypeError(f"{Record} is no struct")
+    return {one.name: one.type for one in record.fields}
+
+
+_COLUMNS = _columns()

@@ -1,8 +1,11 @@
-"""Data of one episode: what to play (`Job`), the verdict (`Result`), and everything (`Record`).
+"""Data of one episode: what to play (`Job`), how it went (`Summary`), and everything (`Record`).
 
 A record is one JSON object with everything that reports and statistics need, so they never start
 the simulator. It depends only on its job, not on the worker, the order, or what ran before, except
 for the fields in `NON_DETERMINISTIC_FIELDS`.
+
+These structs are the one list of fields: identity, Parquet columns and keys derive from them.
+Types are checked when a line is read, and every line is read before it is stored.
 """
 
 from __future__ import annotations
@@ -11,9 +14,9 @@ import hashlib
 import operator
 import re
 from collections.abc import Mapping
-from typing import Annotated, Literal, Self, get_args
+from typing import Annotated, Any, Literal, get_args
 
-from pydantic import BaseModel, ConfigDict, Field, JsonValue, model_validator
+import msgspec
 
 from roboirg.core.delivery import PromptVerdict
 from roboirg.core.instruction_options import (
@@ -22,19 +25,26 @@ from roboirg.core.instruction_options import (
     DEFAULT_DISTRACTOR,
     DEFAULT_DISTRACTORS,
     DEFAULT_FRAME,
-    DEFAULT_REASONING,
-    DEFAULT_RIVAL,
     InstructionOptions,
 )
 from roboirg.core.observations import DemonstrationFrames, DemonstrationSource
 from roboirg.evaluation.records.run_files import RELATIVE_PATH
 
-SCHEMA_VERSION: Literal[3] = 3
+SCHEMA_VERSION: Literal[4] = 4
 
-NAME = "^[^\\x00-\\x1f\\x7f-\\x9f\\u200e\\u200f\\u202a-\\u202e\\u2066-\\u2069]{0,1000}$"
+MOST_NAME_LETTERS = 1000
+CONTROLS = "\\x00-\\x1f\\x7f-\\x9f\\u200e\\u200f\\u202a-\\u202e\\u2066-\\u2069"
+NAME = f"^[^{CONTROLS}]{{0,{MOST_NAME_LETTERS}}}\\Z"
 """A name in a record: text without characters that control a terminal or reorder what is read."""
 
-Name = Annotated[str, Field(pattern=NAME)]
+Name = Annotated[str, msgspec.Meta(pattern=NAME)]
+RunPath = Annotated[str, msgspec.Meta(pattern=RELATIVE_PATH)]
+Whole = Annotated[int, msgspec.Meta(ge=-(2**63), le=2**63 - 1)]
+"""A whole number that tables and NumPy can hold."""
+MOST_STAGES = 100
+Stages = Annotated[tuple[Whole, ...], msgspec.Meta(max_length=MOST_STAGES)]
+MOST_CAUSE_LETTERS = 10_000
+Cause = Annotated[str, msgspec.Meta(max_length=MOST_CAUSE_LETTERS)]
 
 Outcome = Literal["success", "failure", "error"]
 
@@ -73,11 +83,7 @@ NON_DETERMINISTIC_FIELDS = frozenset(
 """Fields that may differ when the same command runs twice: times, costs, paths, attempts, …"""
 
 
-class _RecordModel(BaseModel):
-    model_config = ConfigDict(frozen=True, extra="forbid")
-
-
-class Job(_RecordModel):
+class Job(msgspec.Struct, frozen=True, kw_only=True, gc=False):
     """One episode to play. All fields but `spec` and `wordings_file` identify its record.
 
     Attributes:
@@ -93,8 +99,6 @@ class Job(_RecordModel):
         distractors: number of distractors; the default if the setting does not read it.
         frame: frame of reference; the default if the setting does not read it.
         delivery: ``prompt`` or ``turns``; the default if the setting does not read it.
-        rival: ``none`` or ``drawn``; the default if the setting does not read it.
-        reasoning: ``plain`` or ``open``; the default if the setting does not read it.
         policy_seed: seed chosen for the run; the policy's seed is derived from it and the episode.
         max_steps: the policy's limit, control steps.
         actions: required action space; None for the policy's own.
@@ -111,21 +115,19 @@ class Job(_RecordModel):
     policy: Name
     task: Name
     split: Name
-    episode: int
+    episode: Whole
     setting: Name
     form: Name = "implicit"
-    stages: tuple[int, ...] = ALL_STAGES
+    stages: Stages = ALL_STAGES
     distractor: Name = DEFAULT_DISTRACTOR
-    distractors: int = DEFAULT_DISTRACTORS
+    distractors: Whole = DEFAULT_DISTRACTORS
     frame: Name = DEFAULT_FRAME
     delivery: Name = DEFAULT_DELIVERY
-    rival: Name = DEFAULT_RIVAL
-    reasoning: Name = DEFAULT_REASONING
-    policy_seed: int = 0
-    max_steps: int = DEFAULT_MAX_STEPS
+    policy_seed: Whole = 0
+    max_steps: Whole = DEFAULT_MAX_STEPS
     actions: Name | None = None
     demonstration_frames: DemonstrationFrames | None = None
-    observe_every: int | None = None
+    observe_every: Whole | None = None
     meshes: Name = DEFAULT_MESHES
     wordings: Name | None = None
     wordings_file: str | None = None
@@ -151,7 +153,7 @@ class Job(_RecordModel):
         return slug_of({name: getattr(self, name) for name in IDENTITY})
 
 
-IDENTITY = tuple(name for name in Job.model_fields if name not in {"spec", "wordings_file"})
+IDENTITY = tuple(name for name in Job.__struct_fields__ if name not in {"spec", "wordings_file"})
 """The fields that identify a job."""
 
 
@@ -173,7 +175,7 @@ def slug_of(identity: Mapping[str, object]) -> str:
     return f"{readable}-{digest[:8]}"
 
 
-class UtteranceRecord(_RecordModel):
+class UtteranceRecord(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """One utterance and its stage in the discourse.
 
     Attributes:
@@ -185,10 +187,10 @@ class UtteranceRecord(_RecordModel):
 
     stage: str
     text: str
-    step: int | None = 0
+    step: Whole | None = 0
 
 
-class MentionSpan(_RecordModel):
+class MentionSpan(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """A span of an utterance that introduces a slot value or refers back to one.
 
     Attributes:
@@ -201,16 +203,16 @@ class MentionSpan(_RecordModel):
         value: value of the slot.
     """
 
-    utterance: int
-    start: int
-    end: int
+    utterance: Whole
+    start: Whole
+    end: Whole
     role: str
     expression: str | None
     slot: str
     value: str | int
 
 
-class EventRecord(_RecordModel):
+class EventRecord(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """A fact that became true or false during the episode.
 
     Attributes:
@@ -221,14 +223,14 @@ class EventRecord(_RecordModel):
         holds: whether it became true; otherwise it became false.
     """
 
-    step: int
+    step: Whole
     kind: str
     subject: str
     place: str | None = None
     holds: bool = True
 
 
-class Attribution(_RecordModel):
+class Attribution(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """Why an episode failed, concluded from its events.
 
     Attributes:
@@ -243,11 +245,11 @@ class Attribution(_RecordModel):
     kind: FailureKind
     failure: str
     subject: str | None = None
-    step: int | None = None
+    step: Whole | None = None
     sentence: str
 
 
-class PromptAudit(_RecordModel):
+class PromptAudit(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """What of the instruction reached the policy's language model, by the limit it declares.
 
     Attributes:
@@ -259,11 +261,11 @@ class PromptAudit(_RecordModel):
         lost: indices of the mentions that certainly did not arrive whole.
     """
 
-    limit: int
-    needed: tuple[int, int]
+    limit: Whole
+    needed: tuple[Whole, Whole]
     tokenizer: str | None = None
-    reached: tuple[int, ...]
-    lost: tuple[int, ...] = ()
+    reached: tuple[Whole, ...]
+    lost: tuple[Whole, ...] = ()
 
     @property
     def sent(self) -> tuple[int, int]:
@@ -283,10 +285,13 @@ def real_robot(trial: object) -> str | None:
     return None if robot in (None, TWIN) else str(robot)
 
 
-class Result(Job):
-    """Verdict on a job, without instruction and events: everything that rates are computed from.
+class Summary(Job, frozen=True, kw_only=True, gc=False):
+    """How a job went, without instruction and events: everything that rates are computed from.
+
+    Read instead of whole records to save time and memory.
 
     Attributes:
+        schema_version: version of the list of a record's fields.
         seed: seed of the episode's scene.
         difficulty: easy, medium or hard.
         outcome: success, failure (due to the policy) or error (the episode could not be judged;
@@ -310,50 +315,52 @@ class Result(Job):
         plan: fingerprint of the plan.
         attempt: number of the attempt, from 1.
         prompt_verdict: whether all that was said reached the policy's language model.
+        robot: the real robot that played it; None in simulation, a study's twin included.
+        action_log: digest of the executed actions, as in `roboirg.evaluation.records.action_log`;
+            None if they were not kept.
+        video: path of the video relative to the records file, or None.
+        render_device: the driver's name of the render device; None if nothing was rendered.
+        started_at: ISO 8601, UTC.
+        duration_s: wall-clock seconds.
     """
 
-    seed: int
-    difficulty: str
+    schema_version: Literal[4] = SCHEMA_VERSION
+    seed: Whole
+    difficulty: Name
     outcome: Outcome
     error: ErrorKind | None = None
-    cause: str | None = None
+    cause: Cause | None = None
     attribution: Attribution | None = None
-    steps: int = 0
-    demonstration_steps: int = 0
+    steps: Whole = 0
+    demonstration_steps: Whole = 0
     demonstration_source: DemonstrationSource = "none"
     privileged: bool
     policy_version: Name = "unknown"
     server_version: Name | None = None
-    language_version: str
-    environment_version: int
-    package_version: str
-    code: str = "unknown"
-    plan: str | None = None
-    attempt: int = 1
+    language_version: Name
+    environment_version: Whole
+    package_version: Name
+    code: Name = "unknown"
+    plan: Name | None = None
+    attempt: Whole = 1
     prompt_verdict: PromptVerdict = "unknown"
-
-    @model_validator(mode="after")
-    def _refuse_success_with_cause(self) -> Self:
-        if self.outcome == "success" and self.cause is not None:
-            raise ValueError(f"a success has no cause, but there is {self.cause!r}")
-        return self
+    robot: Name | None = None
+    action_log: str | None = None
+    video: RunPath | None = None
+    render_device: Name | None = None
+    started_at: Name
+    duration_s: float
 
     @property
     def identity(self) -> Job:
-        """The job of this result, without the policy's spec."""
+        """Its job, without the policy's spec."""
         return Job(**{name: getattr(self, name) for name in IDENTITY})
 
-    @property
-    def robot(self) -> str | None:
-        """The real robot that played it; None in simulation, a study's twin included."""
-        return None
 
-
-class Record(Result):
+class Record(Summary, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """Everything that is stored of an episode.
 
     Attributes:
-        schema_version: version of this list of fields.
         instruction: the utterances that the policy was given.
         mentions: the referring expressions in them.
         prompt: what of them reached its language model; None if the policy declares no limit.
@@ -361,46 +368,29 @@ class Record(Result):
         goal: what the instruction conveys, a value for each slot.
         metadata: of the instruction: reasoning pattern, relation, stages, landmarks, ….
         policy_metadata: what the policy reports about itself: checkpoint, server, model, ….
-        action_log: digest of the executed actions, as in `roboirg.evaluation.records.action_log`;
-            None if they were not kept.
         end_state: hash of the state in which the episode left the world and the judge; None if it
             did not come to an end.
         events: facts that became true or false, in order.
         usage: what models queried by the policy cost: ``calls``, ``input_tokens``,
             ``output_tokens``, ``cost_usd``.
         timings: wall-clock seconds by phase: ``policy_load``, ``policy_act``, ``env_step``, ….
-        video: path of the video relative to the records file, or None.
         video_error: why the requested video could not be written, or None.
         details: traceback of an error, or None.
-        render_device: the driver's name of the render device; None if nothing was rendered.
         processor: architecture, maker and family of the processor that simulated it, which decide
             the last bits of `end_state`; None in records from before this was kept.
-        started_at: ISO 8601, UTC.
-        duration_s: wall-clock seconds.
     """
 
-    schema_version: Literal[3] = SCHEMA_VERSION
     instruction: tuple[UtteranceRecord, ...]
     mentions: tuple[MentionSpan, ...] = ()
     prompt: PromptAudit | None = None
     command: str
-    goal: dict[str, str | int | tuple[str, ...] | tuple[int, ...]]
-    metadata: dict[str, JsonValue]
-    policy_metadata: dict[str, JsonValue] = {}
-    action_log: str | None = None
+    goal: dict[str, str | int | tuple[str | int, ...]]
+    metadata: dict[str, Any]
+    policy_metadata: dict[str, Any] = {}
     end_state: str | None = None
     events: tuple[EventRecord, ...] = ()
     usage: dict[str, float] = {}
     timings: dict[str, float] = {}
-    video: Annotated[str, Field(pattern=RELATIVE_PATH)] | None = None
     video_error: str | None = None
     details: str | None = None
-    render_device: str | None = None
     processor: str | None = None
-    started_at: str
-    duration_s: float
-
-    @property
-    def robot(self) -> str | None:
-        """The real robot that played it; None in simulation, a study's twin included."""
-        return real_robot(self.policy_metadata.get(REAL_TRIAL))

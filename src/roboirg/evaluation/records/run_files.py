@@ -16,17 +16,18 @@ from roboirg.util.short_hash import short_hash
 PLAN_FILE = "plan.json"
 EARLIER_PLANS = "plans"
 
-RELATIVE_PATH = r"^[A-Za-z0-9_][A-Za-z0-9_.-]*(/[A-Za-z0-9_][A-Za-z0-9_.-]*)*$"
+RELATIVE_PATH = r"^[A-Za-z0-9_][A-Za-z0-9_.-]*(/[A-Za-z0-9_][A-Za-z0-9_.-]*)*\Z"
 """A path in a record: relative, without ``..`` and hidden parts, in characters without meaning."""
 MOST_PATH_LETTERS = 300
+MOST_PLAN_BYTES = 64_000_000
 
 
 class ForeignPathError(RoboIRGError):
-    """A path in a record names no file of the run's folder."""
+    """A path is that of no file of the run's folder."""
 
 
 def run_file(folder: Path, name: str) -> Path:
-    """Return the path of a file that a record names, which need not exist.
+    """Return the path of a file of a run, such as a record names, which need not exist.
 
     Raises:
         ForeignPathError: it is outside of the run's folder, perhaps by a symbolic link.
@@ -35,11 +36,21 @@ def run_file(folder: Path, name: str) -> Path:
     if (
         len(name) > MOST_PATH_LETTERS
         or not re.fullmatch(RELATIVE_PATH, name)
-        or not path.resolve().is_relative_to(folder.resolve())
+        or not _is_below(path, folder)
     ):
         shown = printable(name[:MOST_PATH_LETTERS])
-        raise ForeignPathError(f"{shown!r} in a record is no file below {folder}.")
+        raise ForeignPathError(
+            f"{shown!r} is no file below {folder}: its name is longer than {MOST_PATH_LETTERS}, "
+            "has other characters than letters, digits, '_', '.' and '-', or links lead elsewhere."
+        )
     return path
+
+
+def _is_below(path: Path, folder: Path) -> bool:
+    try:
+        return path.resolve().is_relative_to(folder.resolve())
+    except (OSError, RuntimeError):  # links in a circle
+        return False
 
 
 def store_plan(content: bytes, folder: Path) -> None:
@@ -67,6 +78,12 @@ def keep_earlier_plan(content: bytes, folder: Path) -> None:
     if not path.exists():
         path.parent.mkdir(parents=True, exist_ok=True)
         write_atomically(path, content)
+
+
+def plan_names(folder: Path) -> list[str]:
+    """Return the paths of all plans of a run, relative to its folder."""
+    paths = [folder / PLAN_FILE, *earlier_plans(folder)]
+    return [path.relative_to(folder).as_posix() for path in paths if path.is_file()]
 
 
 def earlier_plans(folder: Path) -> list[Path]:

@@ -8,24 +8,22 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import TypeVar
 
 import msgspec
 
-from roboirg.evaluation.records.record import Result
-from roboirg.evaluation.records.record_codec import RecordIndexEntry, StoreError
+from roboirg.evaluation.records.record import Summary
+from roboirg.evaluation.records.record_codec import StoreError
 
-Stored = TypeVar("Stored")
+Stored = TypeVar("Stored", bound=Summary)
 
 
-def told_versions(records: Iterable[Result | RecordIndexEntry]) -> dict[str, str | None]:
+def told_versions(records: Iterable[Summary]) -> dict[str, str | None]:
     """Return what the server of each policy with a verdict told; None if it told nothing."""
     return {one.policy: one.server_version for one in records if one.outcome != "error"}
 
 
-def check_told_version(
-    folder: Path, told: Mapping[str, str | None], record: Result | RecordIndexEntry
-) -> None:
+def check_told_version(folder: Path, told: Mapping[str, str | None], record: Summary) -> None:
     """Refuse a verdict of another version than the folder's.
 
     Args:
@@ -46,20 +44,14 @@ def check_told_version(
 
 def adopt_told_versions(records: Iterable[Stored]) -> tuple[Stored, ...]:
     """Return the records; errors without a version get that of the same policy's verdicts."""
-    found: list[Any] = list(records)
+    found = list(records)
     told = told_versions(found)
     return tuple(
-        _with_version(one, told[one.policy])
+        msgspec.structs.replace(one, server_version=told[one.policy])
         if one.outcome == "error" and one.server_version is None and told.get(one.policy)
         else one
         for one in found
     )
-
-
-def _with_version(record: Any, version: str | None) -> Any:  # noqa: ANN401 - a model or a struct
-    if isinstance(record, msgspec.Struct):
-        return msgspec.structs.replace(record, server_version=version)
-    return record.model_copy(update={"server_version": version})
 
 
 def _name(version: str | None) -> str:

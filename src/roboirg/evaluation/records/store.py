@@ -16,17 +16,13 @@ from pathlib import Path
 from typing import Generic, NamedTuple, Self, TypeVar
 
 from roboirg.evaluation.records.line_file import AppendFile, LineFile, LinePlace
-from roboirg.evaluation.records.record import Job, Record
+from roboirg.evaluation.records.record import Record, Summary
 from roboirg.evaluation.records.record_codec import (
-    EpisodeSummary,
-    RecordIndexEntry,
     RecordKey,
-    StoredInstruction,
     StoreError,
+    encode,
     identity_key,
-    read_index_entry,
-    read_instruction,
-    read_line,
+    read_record,
     read_summary,
 )
 from roboirg.evaluation.records.server_versions import (
@@ -51,8 +47,7 @@ TORN_FILE = "records.torn"
 _BUFFER = 1 << 20
 """Bytes to read at a time."""
 
-Parsed = TypeVar("Parsed")
-Identified = TypeVar("Identified", bound=Job | RecordIndexEntry)
+Stored = TypeVar("Stored", bound=Summary)
 
 
 class StoreContents(NamedTuple):
@@ -72,14 +67,14 @@ class StoreContents(NamedTuple):
 class RecordStore:
     """The records of one output folder, open for appending by this process only.
 
-    Use as a context manager. It keeps a `RecordIndexEntry` of each record in memory, not the record
+    Use as a context manager. It keeps a `Summary` of each record in memory, not the record
     itself.
 
     Args:
         folder: created if it does not exist.
 
     Attributes:
-        stored: index entries by identity, the newest of each.
+        stored: summaries by identity, the newest of each.
         torn: bytes of an unfinished line that were moved aside when the file was opened.
         damaged: numbers of the lines that are not JSON; their episodes count as not played.
 
@@ -90,7 +85,7 @@ class RecordStore:
     def __init__(self, folder: Path) -> None:
         self.folder = folder
         self.path = folder / RECORDS_FILE
-        self.stored: dict[RecordKey, RecordIndexEntry] = {}
+        self.stored: dict[RecordKey, Summary] = {}
         self._told: dict[str, str | None] = {}
         self._file = AppendFile(folder, RECORDS_FILE, TORN_FILE, self._read)
 
@@ -101,7 +96,7 @@ class RecordStore:
             StoreError: the record cannot be written, or the policy's server is now another version
                 than in earlier verdicts; the file is unchanged.
         """
-        self.extend([record.model_dump_json().encode()])
+        self.extend([encode(record)])
 
     def extend(self, lines: Iterable[bytes]) -> None:
         """Write records as JSON lines, without newlines; when this returns, all are on disk.
@@ -110,12 +105,13 @@ class RecordStore:
             StoreError: a record cannot be written, a line is not one, or a policy's server is now
                 another version than in earlier verdicts; the file is unchanged.
         """
-        added: dict[RecordKey, RecordIndexEntry] = {}
+        added: dict[RecordKey, Summary] = {}
         told = dict(self._told)
 
         def checked() -> Iterator[bytes]:
             for line in lines:
-                entry = read_index_entry(line, self.path, 0)
+                read_record(line, self.path, 0)  # whole: what is stored can be read
+                entry = read_summary(line, self.path, 0)
                 check_told_version(self.folder, told, entry)
                 told.update(told_versions([entry]))
                 added[identity_key(entry)] = entry
@@ -126,7 +122,7 @@ class RecordStore:
         self._told = told
 
     def _read(self, lines: LineFile) -> None:
-        self.stored = {identity_key(one): one for one in lines.parse(read_index_entry)}
+        self.stored = {identity_key(one): one for one in lines.parse(read_summary)}
         self.torn, self.damaged = lines.torn, tuple(lines.damaged)
         self._told = told_versions(self.stored.values())
 
@@ -148,7 +144,7 @@ def read_contents(path: Path) -> StoreContents:
         StoreError: a line is not a record of this schema version.
     """
     lines = LineFile(path)
-    records = tuple(lines.parse(read_line))
+    records = tuple(lines.parse(read_record))
     return StoreContents(records, lines.torn, tuple(lines.damaged))
 
 
@@ -160,10 +156,10 @@ def read_records(folder: Path) -> tuple[Record, ...]:
     Raises:
         StoreError: there are none, or a line is not a record of this schema version.
     """
-    return StoredRun(folder, read_line).newest
+    return StoredRun(folder, read_record).newest
 
 
-def read_results(folder: Path) -> tuple[EpisodeSummary, ...]:
+def read_results(folder: Path) -> tuple[Summary, ...]:
     """Read the results of a run's folder: like `read_records`, but much faster and smaller.
 
     Raises:
@@ -172,7 +168,7 @@ def read_results(folder: Path) -> tuple[EpisodeSummary, ...]:
     return read_summaries(folder).newest
 
 
-def read_summaries(folder: Path) -> StoredRun[EpisodeSummary]:
+def read_summaries(folder: Path) -> StoredRun[Summary]:
     """Read the summaries of a run's folder; its records are read again one by one.
 
     Raises:
@@ -181,30 +177,28 @@ def read_summaries(folder: Path) -> StoredRun[EpisodeSummary]:
     return StoredRun(folder, read_summary)
 
 
-def read_instructions(folder: Path) -> Iterator[StoredInstruction]:
-    """Yield what tells the instructions of a run apart, one record after the other.
+def iterate_records(folder: Path) -> Iterator[Record]:
+    """Yield the records of a run, one after the other.
 
     Nothing is kept, so records that were written again come twice.
 
     Raises:
         StoreError: the file cannot be read, or a line is not a record of this schema version.
     """
-    return LineFile(folder / RECORDS_FILE).parse(read_instruction)
+    return LineFile(folder / RECORDS_FILE).parse(read_record)
 
 
-def read_index(folder: Path) -> dict[RecordKey, RecordIndexEntry]:
-    """Read the index entries of a run's folder, the newest of each; empty if there is no run.
+def read_index(folder: Path) -> dict[RecordKey, Summary]:
+    """Read the summaries of a run's folder, the newest of each; empty if there is no run.
 
     Raises:
         StoreError: the file cannot be read, or a line is not a record of this schema version.
     """
-    return {
-        identity_key(one): one for one in LineFile(folder / RECORDS_FILE).parse(read_index_entry)
-    }
+    return {identity_key(one): one for one in LineFile(folder / RECORDS_FILE).parse(read_summary)}
 
 
-class StoredRun(Generic[Identified]):
-    """The newest record of each identity in a run's folder, of which only a part is in memory.
+class StoredRun(Generic[Stored]):
+    """The newest record of each identity in a run's folder, of which memory may hold a summary.
 
     Takes no lock, so a run may be writing to the folder.
 
@@ -220,11 +214,11 @@ class StoredRun(Generic[Identified]):
         StoreError: there are no records, or a line is not a record of this schema version.
     """
 
-    def __init__(self, folder: Path, parse_line: Callable[[bytes, Path, int], Identified]) -> None:
+    def __init__(self, folder: Path, parse_line: Callable[[bytes, Path, int], Stored]) -> None:
         self._path = folder / RECORDS_FILE
         lines = LineFile(self._path)
-        kept: dict[RecordKey, tuple[Identified, LinePlace]] = {}
-        self.replaced: list[Identified] = []
+        kept: dict[RecordKey, tuple[Stored, LinePlace]] = {}
+        self.replaced: list[Stored] = []
         for one in lines.parse(parse_line):
             key = identity_key(one)
             if key in kept:
@@ -234,35 +228,22 @@ class StoredRun(Generic[Identified]):
             raise StoreError(
                 f"There are no records in {folder}; give the --out folder of a `roboirg run`."
             )
-        self.newest: tuple[Identified, ...] = adopt_told_versions(one for one, _ in kept.values())
+        self.newest: tuple[Stored, ...] = adopt_told_versions(one for one, _ in kept.values())
         self._places = {key: place for key, (_, place) in kept.items()}
 
-    def lines(self, wanted: Iterable[Identified]) -> Iterator[bytes]:
+    def lines(self, wanted: Iterable[Stored]) -> Iterator[bytes]:
         """Yield the lines of some records, without newlines."""
         with self._path.open("rb", buffering=_BUFFER) as file:
             for place in (self._places[identity_key(one)] for one in wanted):
                 file.seek(place.start)
                 yield file.read(place.size)
 
-    def records(self, wanted: Iterable[Identified]) -> Iterator[Record]:
+    def records(self, wanted: Iterable[Stored]) -> Iterator[Record]:
         """Yield some whole records, each read when it is asked for.
 
         Raises:
             StoreError: a line is not a record.
         """
-        return self._parsed(wanted, read_line)
-
-    def instructions(self) -> Iterator[StoredInstruction]:
-        """Yield what tells the instructions of all records apart, each read when it is asked for.
-
-        Raises:
-            StoreError: a line is not a record.
-        """
-        return self._parsed(self.newest, read_instruction)
-
-    def _parsed(
-        self, wanted: Iterable[Identified], parse_line: Callable[[bytes, Path, int], Parsed]
-    ) -> Iterator[Parsed]:
         wanted = list(wanted)
         for one, line in zip(wanted, self.lines(wanted), strict=True):
-            yield parse_line(line, self._path, self._places[identity_key(one)].number)
+            yield read_record(line, self._path, self._places[identity_key(one)].number)

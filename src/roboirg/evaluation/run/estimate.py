@@ -8,8 +8,7 @@ from statistics import fmean
 from typing import NamedTuple
 
 from roboirg.core.plain_text import counted
-from roboirg.evaluation.records.record import Job
-from roboirg.evaluation.records.record_codec import RecordIndexEntry
+from roboirg.evaluation.records.record import Job, Summary
 from roboirg.evaluation.run.world_speed import WorldSpeed
 
 ORACLE_STEPS = 236
@@ -44,7 +43,7 @@ def cell_sizes(jobs: Iterable[Job]) -> Mapping[tuple[str, str], Mapping[str, Cou
 
 
 def estimate(
-    jobs: Iterable[Job], played: Iterable[RecordIndexEntry], workers: int, speed: WorldSpeed
+    jobs: Iterable[Job], played: Iterable[Summary], workers: int, speed: WorldSpeed
 ) -> Estimate:
     """Estimate how long jobs take.
 
@@ -78,7 +77,7 @@ def estimate_text(
         return tuple(lines)
     times = [_format_duration(seconds) for seconds in (found.least, found.most)]
     where = f"on {counted(workers, 'worker')}"
-    others = f"The other {found.episodes:,} take about"
+    others = f"Playing the other {found.episodes:,} takes about"
     if not found.unknown:
         return (*lines, f"{others} {times[0]} {where}, as long as the stored ones.")
     basis = "measured just now" if speed.is_measured else "assumed, as nothing can be played here"
@@ -103,7 +102,7 @@ def _format_duration(seconds: float) -> str:
 class _MeanDurations:
     """Mean durations of stored episodes."""
 
-    def __init__(self, played: Iterable[RecordIndexEntry]) -> None:
+    def __init__(self, played: Iterable[Summary]) -> None:
         self._known: defaultdict[tuple[str, str | None], list[float]] = defaultdict(list)
         for one in played:
             if one.outcome != "error":

@@ -124,6 +124,8 @@ def choose_executor(workers: int | None, episode_timeout_s: float = NO_TIMEOUT_S
     Raises:
         InvalidValueError: a negative number.
     """
+    if workers is not None and workers < 0:
+        raise InvalidValueError(f"workers is {workers}; it must be at least 0, this process only.")
     if workers == 0:
         return InProcess()
     return LocalProcesses(core_count() if workers is None else workers, episode_timeout_s)

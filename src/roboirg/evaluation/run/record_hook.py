@@ -14,6 +14,7 @@ from typing import Self
 
 from roboirg.core.errors import InvalidValueError
 from roboirg.evaluation.records.record import Record
+from roboirg.evaluation.records.record_codec import encode
 from roboirg.evaluation.run.progress import Reporter
 
 MOST_WAITING = 1000
@@ -69,7 +70,7 @@ class CommandHook:
         if self._failure:
             raise RuntimeError(self._failure)
         try:
-            self._lines.put_nowait(record.model_dump_json().encode() + b"\n")
+            self._lines.put_nowait(encode(record) + b"\n")
         except queue.Full:
             raise RuntimeError(f"it has not read {MOST_WAITING:,} records") from None
 

@@ -12,16 +12,19 @@ from pathlib import Path
 from types import FrameType
 from typing import NamedTuple
 
+import msgspec
+
 from roboirg.core.episode import ENVIRONMENT_VERSION
 from roboirg.core.errors import InvalidValueError
 from roboirg.core.plain_text import counted
 from roboirg.evaluation.episode_errors import MAX_CAUSE_LENGTH, format_cause
 from roboirg.evaluation.hosting.policy_descriptions import describe_policy
-from roboirg.evaluation.plan.plan import Plan, write_plan
+from roboirg.evaluation.plan.plan import Plan
+from roboirg.evaluation.plan.stored_plans import write_plan
 from roboirg.evaluation.play.rollout import VIDEO_FOLDER, EpisodeRunner, PlayJob
 from roboirg.evaluation.play.video_writer import check_video_support, without_unfinished_videos
-from roboirg.evaluation.records.record import Job, Record
-from roboirg.evaluation.records.record_codec import RecordIndexEntry, identity_key
+from roboirg.evaluation.records.record import Job, Record, Summary
+from roboirg.evaluation.records.record_codec import identity_key
 from roboirg.evaluation.records.store import (
     RECORDS_FILE,
     TORN_FILE,
@@ -57,7 +60,7 @@ class RunSummary(NamedTuple):
 
     total: int
     played: int
-    errors: tuple[RecordIndexEntry, ...]
+    errors: tuple[Summary, ...]
     missing: int
     torn_bytes: int
     video_errors: tuple[str, ...]
@@ -210,7 +213,7 @@ class _RunLoop:
         record = _refuse_contradiction(record)
         before = self._store.stored.get(identity_key(job))
         if before is not None:
-            record = record.model_copy(update={"attempt": before.attempt + 1})
+            record = msgspec.structs.replace(record, attempt=before.attempt + 1)
         self._store.append(record)
         self.tries[job] += 1
         self._reporter.advance(record, is_new=self.tries[job] == 1)
@@ -245,10 +248,10 @@ def _refuse_contradiction(record: Record) -> Record:
         return record
     cause = format_cause("policy", f"a success came with a cause ({record.cause})")
     refused = {"outcome": "error", "error": "policy", "cause": cause[:MAX_CAUSE_LENGTH]}
-    return record.model_copy(update=refused)
+    return msgspec.structs.replace(record, **refused)
 
 
-def _should_play(stored: RecordIndexEntry | None, *, retry_errors: bool) -> bool:
+def _should_play(stored: Summary | None, *, retry_errors: bool) -> bool:
     return stored is None or (retry_errors and stored.outcome == "error")
 
 
@@ -265,7 +268,7 @@ def _report_damage(store: RecordStore, reporter: Reporter) -> None:
         )
 
 
-def _check_versions(records: Iterable[RecordIndexEntry], folder: Path) -> None:
+def _check_versions(records: Iterable[Summary], folder: Path) -> None:
     """Refuse records of another language or environment version: rates must not mix them."""
     records = tuple(records)
     for language in {record.language_version for record in records} - {LANGUAGE_VERSION}:
@@ -289,7 +292,7 @@ def _check_versions(records: Iterable[RecordIndexEntry], folder: Path) -> None:
             )
 
 
-def _check_policies(plan: Plan, records: Iterable[RecordIndexEntry], folder: Path) -> None:
+def _check_policies(plan: Plan, records: Iterable[Summary], folder: Path) -> None:
     """Refuse records of another version of a policy of the same name."""
     specs = plan.specs
     for policy, version in {(record.policy, record.policy_version) for record in records}:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
+import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
@@ -105,6 +106,6 @@ def measure_world(jobs: Sequence[Job]) -> WorldSpeed:
 
 def _timings(job: Job) -> dict[str, float]:
     result = RolloutResult()
-    still = job.model_copy(update={"max_steps": MEASURED_STEPS, "actions": None})
+    still = msgspec.structs.replace(job, max_steps=MEASURED_STEPS, actions=None)
     play_with(SwingingPolicy(), still, PolicyNeeds(), result, CallGuard(result, None))
     return result.timings

@@ -13,10 +13,13 @@ from roboirg.language.rivals.value_pair import (
     draw_pair,
     hidden_by_pair,
     pair_refusal,
-    wants_pair,
 )
 
+RIVAL_SETTINGS = ("direct-rival", "contextual-rival", "spatial-rival")
+"""The settings that introduce a rival."""
+
 __all__ = [
+    "RIVAL_SETTINGS",
     "ValuePair",
     "draw_pair",
     "hidden_by_pair",
@@ -25,5 +28,4 @@ __all__ = [
     "pair_notes",
     "pair_refusal",
     "pair_reinforcement",
-    "wants_pair",
 ]

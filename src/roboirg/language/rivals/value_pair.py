@@ -8,7 +8,6 @@ from typing import Literal, NamedTuple
 
 from roboirg.core.episode import Difficulty, Goal, SlotValue, Split
 from roboirg.core.goal_slots import COLOR_SLOTS
-from roboirg.core.instruction_options import DEFAULT_DISTRACTOR, DEFAULT_RIVAL
 from roboirg.language.balanced_draw import draw_balanced
 from roboirg.language.instruction import REFERENCE, Instruction
 from roboirg.language.landmarks import Landmark
@@ -78,25 +77,15 @@ class PairDraw(NamedTuple):
         return (meant, rival) if self.meant_first else (rival, meant)
 
 
-def wants_pair(request: InstructionRequest) -> bool:
-    """Return whether the options ask for a rival."""
-    return request.options.rival != DEFAULT_RIVAL
-
-
-def hidden_by_pair(instruction: Instruction) -> frozenset[str] | None:
-    """Return the slot that an instruction with a rival leaves open; None without a rival."""
-    slot = instruction.metadata.get("rival_slot")
-    return None if slot is None else frozenset((str(slot),))
+def hidden_by_pair(instruction: Instruction, _goal: Goal) -> frozenset[str]:
+    """Return the slot that an instruction with a rival leaves open."""
+    return frozenset((str(instruction.metadata["rival_slot"]),))
 
 
 def pair_refusal(request: InstructionRequest, locate: Locate | None = None) -> str | None:
-    """Return why an episode can have no rival; None if it can, or if none is asked for."""
-    if not wants_pair(request):
-        return None
+    """Return why an episode can have no rival; None if it can."""
     if request.wordings is not None:
         return "commands from a wording file have no rivals"
-    if request.options.distractor != DEFAULT_DISTRACTOR:
-        return "next to a rival, a competing distractor would name one value too many"
     return None if _pairs(request, locate) else _lack(request, locate)
 
 

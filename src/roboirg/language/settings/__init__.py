@@ -16,6 +16,7 @@ __all__ = [
     "EXPLICIT",
     "all_settings",
     "get_setting",
+    "plain_settings",
     "setting_names",
     "settings_of",
 ]
@@ -45,6 +46,12 @@ def all_settings() -> Mapping[str, Setting]:
 def setting_names() -> tuple[str, ...]:
     """Return the names of all settings, explicit first."""
     return tuple(all_settings())
+
+
+def plain_settings(task: Task | None = None) -> tuple[str, ...]:
+    """Return the names that ``all`` means: of every setting, or a task's, but the harder ones."""
+    names = setting_names() if task is None else settings_of(task)
+    return tuple(name for name in names if all_settings()[name].plain is None)
 
 
 def settings_of(task: Task) -> tuple[str, ...]:

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import NamedTuple
 
-from roboirg.core.instruction_options import RIVALS, InstructionOptions
+from roboirg.core.instruction_options import InstructionOptions
 from roboirg.language.phrases import Phrase, fill, plain
 from roboirg.language.request import (
     DISTRACTORS,
@@ -14,15 +14,6 @@ from roboirg.language.request import (
     InstructionRequest,
     InstructionSpec,
     UtteranceSpec,
-)
-from roboirg.language.rivals import (
-    draw_pair,
-    pair_command,
-    pair_introduction,
-    pair_notes,
-    pair_refusal,
-    pair_reinforcement,
-    wants_pair,
 )
 from roboirg.language.settings import direct
 from roboirg.language.settings.setting import Instruct, Setting
@@ -36,29 +27,42 @@ MANY_DISTRACTORS = 4
 """Length of the context that must begin with the distractors of the default one."""
 
 
+Say = Callable[[InstructionRequest], UtteranceSpec]
+
+
 def say(request: InstructionRequest) -> InstructionSpec:
     """Return the requested stages; 1 and 5 alone are the direct instruction."""
-    options = request.options
-    pair = draw_pair(request) if wants_pair(request) else None
-    utterances = [
-        pair_introduction(request, pair) if pair is not None else direct.introduction(request)
-    ]
-    if REINFORCEMENT in options.stages:
-        utterances.append(
-            pair_reinforcement(request, pair) if pair is not None else reinforcement(request)
-        )
-    distracting = distractors(request) if DISTRACTOR in options.stages else ()
+    kind = request.options.distractor
+    return discourse(request, direct.introduction, reinforcement, direct.command, kind)
+
+
+def discourse(
+    request: InstructionRequest, introduce: Say, reinforce: Say, command: Say, distractor: str
+) -> InstructionSpec:
+    """Return the requested stages.
+
+    Args:
+        request: with the stages, and the number of distractors.
+        introduce: says the first stage.
+        reinforce: says one more remark on what was introduced.
+        command: says the last stage.
+        distractor: kind of distractor.
+    """
+    stages = request.options.stages
+    utterances = [introduce(request)]
+    if REINFORCEMENT in stages:
+        utterances.append(reinforce(request))
+    distracting = distractors(request, distractor) if DISTRACTOR in stages else ()
     utterances += [UtteranceSpec("distractor", phrase) for phrase, _ in distracting]
-    if CUE in options.stages:
+    if CUE in stages:
         cue = request.pick("cue", remarks.CUES)
         utterances.append(UtteranceSpec("cue", plain(cue)))
-    command = pair_command(request, pair) if pair is not None else direct.command(request)
-    utterances.append(command)
-    notes: dict[str, object] = {"stages": list(options.stages)}
-    notes |= pair_notes(pair) if pair is not None else {}
+    utterances.append(command(request))
+    notes: dict[str, object] = {"stages": list(stages)}
     if distracting:
-        notes |= {"distractor": options.distractor, "distractors": options.distractors}
-        notes["recency_rival"] = distracting[-1].thing if _says_it(command) else None
+        says_it = _says_it(utterances[-1])
+        notes |= {"distractor": distractor, "distractors": request.options.distractors}
+        notes["recency_rival"] = distracting[-1].thing if says_it else None
     return InstructionSpec(tuple(utterances), notes)
 
 
@@ -76,10 +80,9 @@ class _Distractor(NamedTuple):
     thing: str | None
 
 
-def distractors(request: InstructionRequest) -> tuple[_Distractor, ...]:
+def distractors(request: InstructionRequest, kind: str) -> tuple[_Distractor, ...]:
     """Return the requested number of remarks; a longer list begins with every shorter one."""
-    competing = request.options.distractor == "competing"
-    source = _competing(request) if competing else _neutral(request)
+    source = _competing(request) if kind == "competing" else _neutral(request)
     return tuple(itertools.islice(source, request.options.distractors))
 
 
@@ -121,15 +124,10 @@ SETTING = Setting(
     summary="direct, with reinforcement, a distractor and a cue before the command",
     color="#009E73",
     say=say,
-    refusal=pair_refusal,
-    hidden_slots=direct.hidden_slots,
-    reads=frozenset({"stages", "distractor", "distractors", "delivery", "rival"}),
-    variants=(
-        *(
-            {"stages": stages, "distractor": distractor}
-            for stages, distractor in itertools.product(STAGE_SETS, DISTRACTORS)
-        ),
-        *({"stages": stages, "rival": RIVALS[-1]} for stages in STAGE_SETS),
+    reads=frozenset({"stages", "distractor", "distractors", "delivery"}),
+    variants=tuple(
+        {"stages": stages, "distractor": distractor}
+        for stages, distractor in itertools.product(STAGE_SETS, DISTRACTORS)
     ),
     pairing_rules=_pairing_rules,
     example=1,

@@ -4,21 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from roboirg.core.episode import Goal
-from roboirg.core.instruction_options import RIVALS, InstructionOptions
+from roboirg.core.instruction_options import InstructionOptions
 from roboirg.core.word_pools import POOLS
-from roboirg.language.instruction import Instruction
 from roboirg.language.phrases import sentences
 from roboirg.language.request import InstructionRequest, InstructionSpec, UtteranceSpec
-from roboirg.language.rivals import (
-    draw_pair,
-    hidden_by_pair,
-    pair_command,
-    pair_introduction,
-    pair_notes,
-    pair_refusal,
-    wants_pair,
-)
 from roboirg.language.settings.setting import Instruct, Setting
 from roboirg.language.slot_types import Fields, slot_types_in, stated
 
@@ -44,16 +33,7 @@ def command(request: InstructionRequest) -> UtteranceSpec:
 
 def say(request: InstructionRequest) -> InstructionSpec:
     """Return introduction and command."""
-    if wants_pair(request):
-        pair = draw_pair(request)
-        utterances = pair_introduction(request, pair), pair_command(request, pair)
-        return InstructionSpec(utterances, pair_notes(pair))
     return InstructionSpec((introduction(request), command(request)))
-
-
-def hidden_slots(instruction: Instruction, goal: Goal) -> frozenset[str]:
-    """Return the slot with a rival, as the command states the others; without a rival, all."""
-    return hidden_by_pair(instruction) or frozenset(goal.as_mapping())
 
 
 def _pairing_rules(instruct: Instruct) -> Iterator[str]:
@@ -72,10 +52,7 @@ SETTING = Setting(
     summary="an introduction names every value; the command points back at it",
     color="#0072B2",
     say=say,
-    refusal=pair_refusal,
-    hidden_slots=hidden_slots,
-    reads=frozenset({"delivery", "rival"}),
-    variants=({}, {"rival": RIVALS[-1]}),
+    reads=frozenset({"delivery"}),
     pairing_rules=_pairing_rules,
     example=2,
 )

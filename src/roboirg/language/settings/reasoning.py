@@ -6,11 +6,11 @@ that the pattern does not cover.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from roboirg.core.episode import Goal
 from roboirg.core.goal_slots import COLOR_SLOTS
-from roboirg.core.instruction_options import DEFAULT_REASONING, REASONINGS
 from roboirg.language.instruction import Instruction
-from roboirg.language.open_reasoning import OPEN_PATTERNS
 from roboirg.language.patterns import Pattern, find_pattern
 from roboirg.language.request import InstructionRequest, InstructionSpec, UtteranceSpec
 from roboirg.language.settings.setting import Setting
@@ -30,55 +30,41 @@ BLOCK = 4
 """Number of episodes after which difficulties repeat; see `pattern_of`."""
 
 
-def pattern_of(request: InstructionRequest) -> tuple[str, Pattern]:
-    """Return the name of an episode's main pattern, and how it derives the goal.
+NamedPattern = tuple[str, Pattern]
+"""The name of a reasoning pattern, and how it derives the goal."""
+
+
+def turn_of(request: InstructionRequest, possible: Sequence[NamedPattern]) -> NamedPattern:
+    """Return an episode's main pattern.
 
     Cycle through the patterns that the episode allows, so that none takes the turns of another.
     Move on by one more after each block of four episodes: otherwise a task with two patterns
     would use only one of them in its hard episodes.
     """
-    possible = possible_patterns(request)
     index = request.episode.index
     return possible[(index + index // BLOCK) % len(possible)]
 
 
-def possible_patterns(request: InstructionRequest) -> list[tuple[str, Pattern]]:
-    """Return the patterns that the episode allows: of the task's own ones, or of the open ones."""
-    if is_open(request):
-        found = [(name, find_pattern(name, request, OPEN_PATTERNS)) for name in OPEN_PATTERNS]
-    else:
-        found = [(name, find_pattern(name, request)) for name in request.task.commands.patterns]
-    return [(name, pattern) for name, pattern in found if pattern is not None]
-
-
-def is_open(request: InstructionRequest) -> bool:
-    """Return whether the options ask for open reasoning."""
-    return request.options.reasoning != DEFAULT_REASONING
-
-
-def refusal(request: InstructionRequest) -> str | None:
-    """Return why an episode allows no open pattern; every episode allows a plain one."""
-    if not is_open(request) or possible_patterns(request):
-        return None
-    if len(request.values_of("amount")) > 2:  # noqa: PLR2004 - a color and its count
-        return "open reasoning derives one number of cubes or one color, and the goal has several"
-    return "no open pattern singles out the goal in this scene"
-
-
 def say(request: InstructionRequest) -> InstructionSpec:
     """Return an intermediate reference, and a command that derives the goal from it."""
-    name, pattern = pattern_of(request)
+    found = [(name, find_pattern(name, request)) for name in request.task.commands.patterns]
+    possible = [(name, pattern) for name, pattern in found if pattern is not None]
+    return say_pattern(request, *turn_of(request, possible))
+
+
+def say_pattern(request: InstructionRequest, name: str, pattern: Pattern) -> InstructionSpec:
+    """Return the context of a pattern, and the command that follows from it."""
     derived = pattern.derive(request)
     command = request.command(stated(request) | derived.fields)
     utterances = (
         UtteranceSpec("introduction", derived.context),
         UtteranceSpec("command", command),
     )
-    notes = {"pattern": name, "reasoning": request.options.reasoning, **derived.notes}
+    notes = {"pattern": name, **derived.notes}
     return InstructionSpec(utterances, notes)
 
 
-def _hidden_slots(instruction: Instruction, goal: Goal) -> frozenset[str]:
+def hidden_slots(instruction: Instruction, goal: Goal) -> frozenset[str]:
     """Return the slots of the goal that the episode's pattern derives, or its words point at."""
     last = len(instruction.utterances) - 1
     pointed = {
@@ -90,16 +76,19 @@ def _hidden_slots(instruction: Instruction, goal: Goal) -> frozenset[str]:
     return frozenset(goal.as_mapping()) & (derived | pointed)
 
 
+def hides_only_color(instruction: Instruction) -> bool:
+    """Return whether the pattern hides a color and nothing else."""
+    return instruction.metadata["pattern"] in _HIDE_ONLY_COLOR
+
+
 SETTING = Setting(
     name="reasoning",
     order=2,
     summary="the context gives an intermediate reference, from which the goal is derived",
     color="#D55E00",
     say=say,
-    refusal=refusal,
-    reads=frozenset({"delivery", "reasoning"}),
-    variants=({}, {"reasoning": REASONINGS[-1]}),
-    hidden_slots=_hidden_slots,
-    hides_only_color=lambda instruction: instruction.metadata["pattern"] in _HIDE_ONLY_COLOR,
+    reads=frozenset({"delivery"}),
+    hidden_slots=hidden_slots,
+    hides_only_color=hides_only_color,
     example=3,
 )

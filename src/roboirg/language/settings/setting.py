@@ -12,9 +12,7 @@ from roboirg.language.instruction import Instruction
 from roboirg.language.request import InstructionRequest, InstructionSpec
 from roboirg.tasks import Task
 
-OptionName = Literal[
-    "stages", "distractor", "distractors", "frame", "delivery", "rival", "reasoning"
-]
+OptionName = Literal["stages", "distractor", "distractors", "frame", "delivery"]
 """An option of an instruction that a setting may read."""
 
 Instruct = Callable[[InstructionOptions], Instruction]
@@ -59,6 +57,8 @@ class Setting:
         pairing_rules: yields how the words of an episode differ from those of another setting
             with which they must agree; nothing if they agree.
         example: index of the test episode that shows the setting in the language card.
+        plain: name of the setting that this one makes harder; None if it stands by itself. Harder
+            settings are played only where they are named: ``all`` leaves them out.
     """
 
     name: str
@@ -75,6 +75,7 @@ class Setting:
     hides_only_color: Callable[[Instruction], bool] = lambda _instruction: False
     pairing_rules: Callable[[Instruct], Iterable[str]] = no_pairing_rules
     example: int = 0
+    plain: str | None = None
 
     @property
     def may_refuse(self) -> bool:

@@ -9,13 +9,10 @@ from collections.abc import Mapping, Sequence
 
 from roboirg.core.episode import Goal
 from roboirg.core.goal_slots import COLOR_SLOTS
-from roboirg.core.instruction_options import RIVALS
 from roboirg.language.instruction import Expression, Instruction
 from roboirg.language.landmarks import FRAMES, SIMPLE, Landmark, landmarks
-from roboirg.language.phrases import Phrase, anaphor, antecedent, fill, listed, plain, sentences
+from roboirg.language.phrases import Phrase, anaphor, antecedent, fill, listed
 from roboirg.language.request import GoalValue, InstructionRequest, InstructionSpec, UtteranceSpec
-from roboirg.language.rivals import draw_pair, hidden_by_pair, pair_notes, pair_refusal, wants_pair
-from roboirg.language.rivals.pair_words import choosing_remark, chosen, the_other
 from roboirg.language.settings.setting import Setting
 from roboirg.language.slot_types import described, stated
 from roboirg.language.templates import introductions
@@ -26,15 +23,23 @@ POINTING: Mapping[int, tuple[Pointer, ...]] = {
     2: (("the former", "former"), ("the latter", "latter")),
     3: (("the first", "first"), ("the second", "second"), ("the third", "third")),
 }
+NO_LANDMARK = "no landmark singles out a target"
 LONGEST = {1: 12, 2: 6, 3: 5}
 """The length that a landmark should have beside others, in `_length`; see `templates`."""
 
 
-def usable(request: InstructionRequest, goal_value: GoalValue) -> Mapping[int, list[Landmark]]:
+def usable(
+    request: InstructionRequest, goal_value: GoalValue, places: int
+) -> Mapping[int, list[Landmark]]:
     """Return the landmarks that may locate a thing of this color, by class.
 
     These are the short ones of simple classes; or if there are none, the shortest one of a simple
     class, or of any other class.
+
+    Args:
+        request: the scene and the task.
+        goal_value: the color.
+        places: number of places that the introduction names.
     """
     found = [
         landmark
@@ -44,7 +49,7 @@ def usable(request: InstructionRequest, goal_value: GoalValue) -> Mapping[int, l
         )
     ]
     simple = [one for one in found if one.level <= SIMPLE]
-    limit = LONGEST[max(len(request.color_values), 1 + wants_pair(request))]
+    limit = LONGEST[places]
     short = [one for one in simple if _length(one) <= limit]
     possible = short or sorted(simple or found, key=_length)[:1]
     levels = sorted({one.level for one in possible})
@@ -59,17 +64,16 @@ def _length(landmark: Landmark) -> int:
 
 def refusal(request: InstructionRequest) -> str | None:
     """Return a reason if some color of the goal has no thing with a landmark."""
-    if all(usable(request, goal_value) for goal_value in request.color_values):
-        return pair_refusal(request, usable)
-    return "no landmark singles out a target"
+    places = len(request.color_values)
+    if all(usable(request, goal_value, places) for goal_value in request.color_values):
+        return None
+    return NO_LANDMARK
 
 
 def say(request: InstructionRequest) -> InstructionSpec:
     """Return an introduction with a landmark for each color, and a command that points there."""
-    if wants_pair(request):
-        return _say_with_rival(request)
     colors = request.color_values
-    marks = [_drawn(request, color) for color in colors]
+    marks = [draw_landmark(request, one, usable(request, one, len(colors))) for one in colors]
     things = [
         _pointed(request, color, landmark, pointer)
         for color, landmark, pointer in zip(colors, marks, POINTING[len(colors)], strict=True)
@@ -79,52 +83,11 @@ def say(request: InstructionRequest) -> InstructionSpec:
         introduction(request, colors, marks),
         UtteranceSpec("command", request.command(fields)),
     )
-    return InstructionSpec(utterances, _notes(request, marks))
+    return InstructionSpec(utterances, landmark_notes(request, marks))
 
 
-def _say_with_rival(request: InstructionRequest) -> InstructionSpec:
-    """Return an introduction with two places, the remark that chooses one, and the command."""
-    draw = draw_pair(request, usable)
-    meant, rival = draw.pair
-    places = {value.field: _drawn(request, value) for value in draw.pair}
-    thing = request.task.commands.pointed.removeprefix("hidden_")
-    remark = choosing_remark(
-        request, draw, lambda value: f"the {thing} {places[value.field].phrase}", thing
-    )
-    noun = "one" if request.values_of("amount") else thing
-    pointing = [(meant, chosen(request, draw, f"the {noun}"))]
-    if draw.pair.ordered:
-        pointing.append((rival, the_other(rival, f"the other {noun}")))
-    things = [
-        _chosen_thing(request, value, places[value.field], words) for value, words in pointing
-    ]
-    command = request.command(stated(request) | described(request, things))
-    shown = [places[value.field] for value in draw.introduced]
-    utterances = (
-        introduction(request, draw.introduced, shown),
-        UtteranceSpec("command", sentences([remark, command])),
-    )
-    return InstructionSpec(utterances, {**_notes(request, shown), **pair_notes(draw)})
-
-
-def _chosen_thing(
-    request: InstructionRequest, value: GoalValue, landmark: Landmark, words: Phrase
-) -> Phrase:
-    """Return the command's words for one of two things; resolved, they name its place."""
-    commands = request.task.commands
-    if commands.by_rank is not None:
-        named, template = f"the one {landmark.phrase}", commands.by_rank
-    else:
-        named = "".join(
-            piece.text for piece in fill(commands.things_at, {"place": plain(landmark.phrase)})
-        )
-        handled = commands.pointed == commands.thing
-        template = "{place}" if handled else commands.by_color.replace("{cube}", "{place}")
-    place = antecedent(named, value.slot, value.value) if request.resolved else words
-    return request.by_place(value, place, plural=request.count_of(value) > 1, template=template)
-
-
-def _notes(request: InstructionRequest, landmarks: Sequence[Landmark]) -> dict[str, object]:
+def landmark_notes(request: InstructionRequest, landmarks: Sequence[Landmark]) -> dict[str, object]:
+    """Return the entries of the metadata."""
     return {
         "landmarks": [landmark.phrase for landmark in landmarks],
         "landmark_classes": [landmark.level for landmark in landmarks],
@@ -132,9 +95,10 @@ def _notes(request: InstructionRequest, landmarks: Sequence[Landmark]) -> dict[s
     }
 
 
-def _drawn(request: InstructionRequest, color: GoalValue) -> Landmark:
+def draw_landmark(
+    request: InstructionRequest, color: GoalValue, classes: Mapping[int, list[Landmark]]
+) -> Landmark:
     """Draw the class first, or most landmarks would be extremes."""
-    classes = usable(request, color)
     level = request.sampler.pick(f"landmark class-{color.field}", list(classes))
     return request.sampler.pick(f"landmark-{color.field}", classes[level])
 
@@ -172,9 +136,8 @@ def introduction(
     return UtteranceSpec("introduction", fill(template, {"things": things}, plural=several))
 
 
-def _hidden_slots(instruction: Instruction, goal: Goal) -> frozenset[str]:
-    colors = frozenset(goal.as_mapping()) & frozenset(COLOR_SLOTS)
-    return hidden_by_pair(instruction) or colors
+def _hidden_slots(_instruction: Instruction, goal: Goal) -> frozenset[str]:
+    return frozenset(goal.as_mapping()) & frozenset(COLOR_SLOTS)
 
 
 SETTING = Setting(
@@ -186,11 +149,8 @@ SETTING = Setting(
     applies_to=lambda task: task.spatial,
     refusal=refusal,
     hidden_slots=_hidden_slots,
-    reads=frozenset({"frame", "delivery", "rival"}),
-    variants=(
-        *({"frame": frame} for frame in FRAMES),
-        *({"frame": frame, "rival": RIVALS[-1]} for frame in FRAMES),
-    ),
+    reads=frozenset({"frame", "delivery"}),
+    variants=tuple({"frame": frame} for frame in FRAMES),
     hides_only_color=lambda _instruction: True,
     example=6,
 )

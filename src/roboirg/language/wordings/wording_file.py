@@ -38,6 +38,11 @@ SLOTS: Mapping[str, tuple[type, bool]] = {
 """The slots that a condition may have: the type of their values, and whether it is a list."""
 MOST_BYTES = 4_000_000
 """Of a wording file; the largest that was seen has 30,000."""
+_MOST_KEY_PARTS = 20
+_KEY_PART = r"""(?:[\w-]++|"[^"\n]*+"|'[^'\n]*+')[ \t]*+\.[ \t]*+"""
+_DEEP_KEY = re.compile(rf"(?<![\w-]){_KEY_PART}(?:{_KEY_PART}){{{_MOST_KEY_PARTS}}}")
+MOST_LETTERS = 2_000
+"""Of a command or phrase."""
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_-]*")
 _PHRASE = re.compile(r"([^\[\]{}]*)\[([^\[\]{}]+)\]([^\[\]{}]*)|([^\[\]{}]+)")
 
@@ -53,9 +58,9 @@ def read_wordings(path: str | Path) -> Wordings:
     try:
         text = read_regular(Path(path), MOST_BYTES).decode()
     except (OSError, ValueError) as error:  # a path may hold NUL
-        raise InvalidValueError(f"The wording file {str(path)!r} cannot be read: {error}.") from (
-            error
-        )
+        reason = str(error).rstrip(".")
+        message = f"The wording file {str(path)!r} cannot be read: {reason}."
+        raise InvalidValueError(message) from error
     where = f"wording file {str(path)!r}"
     wordings = parse_wordings(text, where)
     check_robomme_name(wordings, where)
@@ -73,8 +78,8 @@ def parse_wordings(text: str, where: str) -> Wordings:
         InvalidValueError: as `read_wordings`.
     """
     try:
-        data = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
+        data = _parse_toml(text)
+    except (ValueError, RecursionError) as error:
         raise InvalidValueError(f"The {where} is not valid TOML: {error}.") from error
     name, source = data.pop("name", None), data.pop("source", "")
     name = check_name(name, where)
@@ -87,6 +92,12 @@ def parse_wordings(text: str, where: str) -> Wordings:
     if not tasks:
         raise InvalidValueError(f"The {where} has no task; add one such as [PickXtimes].")
     return Wordings(name, short_hash(text)[:8], tasks, source)
+
+
+def _parse_toml(text: str) -> dict[str, Any]:
+    if _DEEP_KEY.search(text):  # takes a time and memory that grow with the square of the depth
+        raise ValueError(f"a key has more than {_MOST_KEY_PARTS} parts")
+    return tomllib.loads(text)
 
 
 def check_name(name: object, where: str) -> str:
@@ -185,6 +196,9 @@ class _TaskReader:
         return StatedPhrase(found[1] or "", core, found[3] or "")
 
     def _check_printable(self, text: str) -> None:
+        if len(text) > MOST_LETTERS:
+            self._fail(f"has words of {len(text):,} characters, {text[:40]!r}…; at most "
+                       f"{MOST_LETTERS:,} are one instruction")  # fmt: skip
         if not (text.isascii() and text.isprintable()):
             self._fail(f"has the words {text!r}; they must be printable ASCII on one line, as all "
                        "instructions are")  # fmt: skip

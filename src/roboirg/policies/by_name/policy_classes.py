@@ -8,7 +8,7 @@ import importlib.util
 import inspect
 import pkgutil
 from collections.abc import Mapping
-from pathlib import Path
+from pathlib import Path, PurePath
 from types import ModuleType
 from typing import Any
 
@@ -63,6 +63,10 @@ def find_class(spec: str) -> type[Any]:
             raise InvalidValueError(f"Policy {spec!r} {hint}")
         raise UnknownNameError("policy", spec, [*BUILTIN, "package.module:Class", *_examples()])
     module_name, _, name = BUILTIN.get(spec, spec).partition(":")
+    if module_name.endswith(".py") or "/" in module_name:
+        raise InvalidValueError(
+            f"Policy {spec!r} names a file; name its module: {_module_of(module_name)}:{name}."
+        )
     module = _module(spec, module_name)
     if not hasattr(module, name):
         raise InvalidValueError(f"Policy {spec!r}: module {module_name} has no class {name!r}.")
@@ -166,6 +170,13 @@ def _describe_module(spec: str) -> str | None:
         "is a module; name its class, "
         f"{' or '.join(shown[:_MAX_SHOWN]) or f'such as {found.name}:MyPolicy'}."
     )
+
+
+def _module_of(file: str) -> str:
+    """Return the name by which Python imports a file; of a file elsewhere, from its folder."""
+    path = PurePath(file.removesuffix(".py"))
+    is_here = not path.is_absolute() and ".." not in path.parts
+    return ".".join(path.parts) if is_here else path.name
 
 
 def _examples() -> list[str]:

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from roboirg.core.observations import Demonstration, Observation
+from roboirg.core.plain_text import counted
 
 
 def takes_batches(policy_class: object) -> bool:
@@ -63,7 +64,8 @@ class BatchedEpisode:
         chunks = list(self._policy.act_batch(states, list(observations)))
         if len(chunks) != len(states):
             raise ValueError(
-                f"act_batch() returned {len(chunks)} chunks for {len(states)} episodes"
+                f"act_batch() returned {counted(len(chunks), 'chunk')} for "
+                f"{counted(len(states), 'episode')}"
             )
         return chunks
 

@@ -1,16 +1,63 @@
-"""Play a single episode in Python, outside of a run."""
+"""The loop that plays an episode, and `play`, which plays one outside of a run."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, cast
 
+from numpy.typing import ArrayLike
+
 from roboirg.core.errors import InvalidValueError
-from roboirg.core.observations import Observation
+from roboirg.core.observations import Demonstration, Observation
 from roboirg.policies.contract.base import Policy, PrivilegedPolicy, tell_policy
 from roboirg.policies.contract.policy_needs import ENV_NEEDS, PolicyNeeds
 
 if TYPE_CHECKING:
     from roboirg.envs.environment import RoboIRGEnv
+
+
+class EpisodeLoop:
+    """The turns of an episode; subclasses guard, record or split its calls."""
+
+    def __init__(self, env: RoboIRGEnv, policy: Policy) -> None:
+        self.env, self.policy = env, policy
+
+    def play(self) -> dict[str, Any]:
+        """Play the episode from beginning to end. Returns the last step's info."""
+        return self.take_turns(*self.begin())
+
+    def begin(self) -> tuple[dict[str, Any], dict[str, Any]]:
+        """Start the episode and the policy."""
+        observation, info = self.env.reset()
+        self.start_policy(observation["instruction"], info["demonstration"])
+        return observation, info
+
+    def start_policy(self, instruction: str, demonstration: Demonstration) -> None:
+        """Start the policy, which gets the world first if it is privileged."""
+        if isinstance(self.policy, PrivilegedPolicy):
+            self.policy.attach(self.env)
+        self.policy.reset(instruction, demonstration)
+
+    def take_turns(self, observation: dict[str, Any], info: dict[str, Any]) -> dict[str, Any]:
+        """Let the policy act until the episode is over. Returns the last step's info."""
+        while info["status"] == "ongoing":
+            observation, info = self.execute(self.act(observation))
+            if info["heard"]:
+                self.hear(info["heard"])
+        return info
+
+    def act(self, observation: dict[str, Any]) -> ArrayLike:
+        """Return the policy's next actions."""
+        return self.policy.act(cast("Observation", observation))
+
+    def execute(self, actions: ArrayLike) -> tuple[dict[str, Any], dict[str, Any]]:
+        """Execute actions. Returns the observation and the info after them."""
+        observation, *_, info = self.env.step_chunk(actions)
+        return observation, info
+
+    def hear(self, utterances: Sequence[Mapping[str, Any]]) -> None:
+        """Let the policy hear what has just been said."""
+        tell_policy(self.policy, utterances)
 
 
 def play(env: RoboIRGEnv, policy: Policy) -> dict[str, Any]:
@@ -25,15 +72,7 @@ def play(env: RoboIRGEnv, policy: Policy) -> dict[str, Any]:
             that the policy needs.
     """
     _check(env, policy)
-    observation, info = env.reset()
-    if isinstance(policy, PrivilegedPolicy):
-        policy.attach(env)
-    policy.reset(observation["instruction"], info["demonstration"])
-    while info["status"] == "ongoing":
-        actions = policy.act(cast("Observation", observation))
-        observation, *_, info = env.step_chunk(actions)
-        tell_policy(policy, info["heard"])
-    return info
+    return EpisodeLoop(env, policy).play()
 
 
 def _check(env: RoboIRGEnv, policy: Policy) -> None:

@@ -15,6 +15,7 @@ import re
 
 from roboirg.core.episode import Split
 from roboirg.core.errors import InvalidValueError
+from roboirg.core.plain_text import counted
 
 SALT_VARIABLE = "ROBOIRG_SALT"
 MIN_SALT_LENGTH = 12
@@ -122,7 +123,8 @@ def _key(salt: str) -> bytes:
     """
     if len(salt) < MIN_SALT_LENGTH:
         raise InvalidValueError(
-            f"The salt has {len(salt)} characters; it must have at least {MIN_SALT_LENGTH}."
+            f"The salt has {counted(len(salt), 'character')}; it must have at least "
+            f"{MIN_SALT_LENGTH}."
         )
     return hashlib.scrypt(
         salt.encode(errors="surrogateescape"), salt=b"roboirg private split", n=1 << 14, r=8, p=1

@@ -2,7 +2,7 @@
 
 ``published.jsonl.gz`` has a line for each episode, made by ``scripts/convert_robomme_episodes.py``
 from the poses and draws of a running RoboMME (Apache-2.0, see NOTICE). Of the 2,200 episodes six
-do not build there; they are not in the file, and our samplers fill their places.
+did not build on that machine; they are not in the file, and our samplers fill their places.
 """
 
 from __future__ import annotations

@@ -30,6 +30,7 @@ from roboirg.tasks.splits.fingerprint import fingerprint
 from roboirg.tasks.splits.private_splits import RANDOM, check_salt, is_private, private_seed
 from roboirg.tasks.splits.published_episodes import published_episode
 from roboirg.tasks.splits.recordings import is_recorded
+from roboirg.tasks.stage_checks import check_stages
 
 SIZES: Mapping[Split, int] = {"train": 100, "val": 50, "test": 50, "random": 1_000_000}
 CYCLE: tuple[Difficulty, ...] = ("easy", "easy", "medium", "hard")
@@ -131,7 +132,13 @@ def assemble_episode(
     index: int,
     recorded: bool = False,
 ) -> Episode:
-    """Return the episode of a scene and a goal, with the stages that follow from them."""
+    """Return the episode of a scene and a goal, with the stages that follow from them.
+
+    Raises:
+        InvalidValueError: a stage of the task expects or forbids what can never happen.
+    """
+    stages, demonstration = task.stages(scene, goal), task.demonstration(scene)
+    check_stages(task.name, scene, (*demonstration, *stages))
     return Episode(
         task=task.name,
         split=split,
@@ -140,8 +147,8 @@ def assemble_episode(
         difficulty=difficulty,
         scene=scene,
         goal=goal,
-        stages=task.stages(scene, goal),
-        demonstration=task.demonstration(scene),
+        stages=stages,
+        demonstration=demonstration,
         recorded=recorded,
     )
 

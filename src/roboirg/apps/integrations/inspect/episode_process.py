@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 from multiprocessing.connection import Connection
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from roboirg.core.errors import PolicyConnectionError
 from roboirg.evaluation.records.record import Job
+from roboirg.evaluation.records.record_codec import encode
 from roboirg.policies.vlm.models import ModelOptions, ModelQuery, ModelReply
 from roboirg.policies.vlm.models.openai_compatible import chat_messages
 from roboirg.policies.vlm.vlm_listener import ListenerOptions, VLMListener
@@ -77,7 +77,7 @@ def play(pipe: Pipe, job: Job, options: ListenerOptions) -> None:
     PipedListener.pipe, PipedListener.chosen = pipe, options
     started = utc_now()
     record = make_record(job, play_episode(job), started_at=started)
-    pipe.send(json.dumps(record.model_dump(mode="json")))
+    pipe.send(encode(record).decode())
 
 
 SPEC = f"{PipedListener.__module__}:{PipedListener.__name__}"

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from typing import Any
 
 import anyio
+import msgspec
 from inspect_ai import Task, task
 from inspect_ai.dataset import MemoryDataset, Sample
 from inspect_ai.model import (
@@ -30,7 +31,7 @@ from inspect_ai.util import JSONSchema
 from roboirg.apps.integrations.inspect.episode_process import SPEC, ModelRequest, play
 from roboirg.core.episode import ENVIRONMENT_VERSION
 from roboirg.core.errors import RoboIRGError
-from roboirg.core.instruction_options import DEFAULT_DELIVERY, DEFAULT_REASONING, DEFAULT_RIVAL
+from roboirg.core.instruction_options import DEFAULT_DELIVERY
 from roboirg.evaluation.records.record import DEFAULT_MAX_STEPS, Job
 from roboirg.policies.vlm.models import ModelOptions
 from roboirg.policies.vlm.vlm_listener import ListenerOptions
@@ -51,8 +52,6 @@ def listener(
     tasks: str | list[str] = "all",
     split: str = "test",
     episodes: int = 50,
-    rival: str = DEFAULT_RIVAL,
-    reasoning: str = DEFAULT_REASONING,
     delivery: str = DEFAULT_DELIVERY,
     max_steps: int = DEFAULT_MAX_STEPS,
     frames: int = 16,
@@ -62,12 +61,10 @@ def listener(
     """Instructions whose goal a vision-language model names and the scripted expert executes.
 
     Args:
-        setting: explicit, direct, reasoning, contextual or spatial.
+        setting: name of a setting, such as contextual or direct-rival.
         tasks: names of tasks or suites, separated by commas, or a list of them.
         split: train, val, test or random.
         episodes: number of episodes of each task, from 0 on.
-        rival: none or drawn.
-        reasoning: plain or open.
         delivery: prompt or turns.
         max_steps: control steps of an episode.
         frames: most pictures of the video.
@@ -78,8 +75,7 @@ def listener(
     jobs = [
         Job(
             policy="vlm-listener", spec=SPEC, task=name, split=split, episode=index,
-            setting=setting, rival=rival, reasoning=reasoning, delivery=delivery,
-            max_steps=max_steps,
+            setting=setting, delivery=delivery, max_steps=max_steps,
         )
         for name in find_tasks(tasks.split(",") if isinstance(tasks, str) else tasks)
         for index in range(count)
@@ -99,7 +95,7 @@ def _sample(job: Job) -> Sample:
         input=instruct_job(job).text,
         target=SUCCESS,
         id=f"{job.task}-{job.setting}-{job.episode:03d}",
-        metadata={"task": job.task, "setting": job.setting, "job": job.model_dump(mode="json")},
+        metadata={"task": job.task, "setting": job.setting, "job": msgspec.to_builtins(job)},
     )
 
 
@@ -122,8 +118,8 @@ def play_with_model(frames: int = 16, think: bool = False, structured: bool = Tr
             frames=frames,
             reasoning=think,
         )
-        job = Job.model_validate(state.metadata["job"])
-        job = job.model_copy(update={"policy": f"vlm-listener:inspect?model={model}"})
+        job = msgspec.convert(state.metadata["job"], Job)
+        job = msgspec.structs.replace(job, policy=f"vlm-listener:inspect?model={model}")
         record = await _play(model, job, options, state)
         if record["outcome"] == "error":
             raise RoboIRGError(record["cause"])  # Inspect counts errors apart

@@ -18,8 +18,6 @@ from roboirg.core.instruction_options import (
     DEFAULT_DELIVERY,
     DEFAULT_DISTRACTOR,
     DEFAULT_FRAME,
-    DEFAULT_REASONING,
-    DEFAULT_RIVAL,
 )
 from roboirg.core.observations import CAMERAS
 from roboirg.envs.env_settings import MAX_STEPS
@@ -52,8 +50,6 @@ class RoboIRGEnvConfig(EnvConfig):  # type: ignore[misc] # LeRobot has no types
     distractor: str = DEFAULT_DISTRACTOR
     frame: str = DEFAULT_FRAME
     delivery: str = DEFAULT_DELIVERY
-    rival: str = DEFAULT_RIVAL
-    reasoning: str = DEFAULT_REASONING
     meshes: str = "faithful"
     video: str = "none"
     video_frames: int = 16
@@ -79,8 +75,8 @@ class RoboIRGEnvConfig(EnvConfig):  # type: ignore[misc] # LeRobot has no types
     def gym_kwargs(self) -> dict[str, Any]:
         """Keyword arguments of `LeRobotSubEnvironment`."""
         names = (
-            "setting", "form", "split", "actions", "distractor", "frame", "delivery", "rival",
-            "reasoning", "meshes", "video", "video_frames",
+            "setting", "form", "split", "actions", "distractor", "frame", "delivery", "meshes",
+            "video", "video_frames",
         )  # fmt: skip
         chosen = {name: getattr(self, name) for name in names}
         return {**chosen, "cameras": _split(self.cameras), "max_steps": self.episode_length}

@@ -11,7 +11,7 @@ from vla_eval.render import configure_sapien_render
 from vla_eval.specs import IMAGE_RGB, LANGUAGE, DimSpec
 
 from roboirg.core.actions import JOINT_ANGLE, find_action_space
-from roboirg.core.instruction_options import DEFAULT_DELIVERY, DEFAULT_REASONING, DEFAULT_RIVAL
+from roboirg.core.instruction_options import DEFAULT_DELIVERY
 from roboirg.core.observations import FRONT, WRIST, proprioception
 from roboirg.tasks import ALL, find_tasks
 
@@ -45,7 +45,7 @@ class RoboIRGBenchmark(StepBenchmark):  # type: ignore[misc] # vla-eval has no t
 
     Args:
         tasks: names of tasks; None for the benchmark's.
-        setting, form, split, delivery, rival, reasoning, meshes: as in `roboirg.make`.
+        setting, form, split, delivery, meshes: as in `roboirg.make`.
         action_space: joint_angle, ee_pose or waypoint.
         max_steps: control steps that a policy has.
         send_wrist_image, send_state, send_video_history: what observations hold; a model server may
@@ -67,8 +67,6 @@ class RoboIRGBenchmark(StepBenchmark):  # type: ignore[misc] # vla-eval has no t
         action_space: str = JOINT_ANGLE.name,
         max_steps: int = MAX_STEPS,
         delivery: str = DEFAULT_DELIVERY,
-        rival: str = DEFAULT_RIVAL,
-        reasoning: str = DEFAULT_REASONING,
         meshes: str = "faithful",
         send_wrist_image: bool = True,
         send_state: bool = True,
@@ -79,10 +77,7 @@ class RoboIRGBenchmark(StepBenchmark):  # type: ignore[misc] # vla-eval has no t
         self.setting, self.split = setting, split
         self.action_space = find_action_space(action_space)
         self.max_steps = max_steps
-        self._words = {
-            "setting": setting, "form": form, "delivery": delivery, "rival": rival,
-            "reasoning": reasoning,
-        }  # fmt: skip
+        self._words = {"setting": setting, "form": form, "delivery": delivery}
         self._meshes = meshes
         self._cameras = (FRONT, WRIST) if send_wrist_image else (FRONT,)
         self._sends_state, self._sends_video = send_state, send_video_history

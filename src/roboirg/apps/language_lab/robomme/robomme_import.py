@@ -27,7 +27,7 @@ from roboirg.apps.language_lab.robomme.wording_writer import wording_text
 from roboirg.apps.language_lab.validation.episode_checks import check_episode
 from roboirg.core.episode import DIFFICULTIES, Episode, Goal, Split
 from roboirg.core.plain_text import counted
-from roboirg.language.settings import EXPLICIT, settings_of
+from roboirg.language.settings import EXPLICIT, all_settings, settings_of
 from roboirg.language.worded_command import (
     ROBOMME_NAME,
     TaskWordings,
@@ -137,7 +137,9 @@ class _TaskImport:
             return None
         own = {setting for setting in settings_of(self._task) if self._needs_own(setting, stuck)}
         wordings = replace(wordings, own=frozenset(own))
-        return replace(wordings, own=frozenset(own | self._broken(wordings)))
+        broken = own | self._broken(wordings)
+        # A setting takes its harder one along.
+        return replace(wordings, own=frozenset(all_settings()[one].plain or one for one in broken))
 
     def _sentences(self) -> dict[Goal, str]:
         """Return the sentence of every goal of the task."""

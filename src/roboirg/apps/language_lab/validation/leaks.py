@@ -7,9 +7,8 @@ from collections.abc import Collection
 from typing import cast
 
 from roboirg.core.episode import ALL_COLORS, Goal, SlotValue
-from roboirg.core.instruction_options import REASONINGS
 from roboirg.language.instruction import Instruction
-from roboirg.language.settings import all_settings
+from roboirg.language.settings import all_settings, reasoning_open
 from roboirg.language.worded_command import FIELD
 from roboirg.language.wordings.wording_store import find_wordings
 
@@ -43,7 +42,7 @@ def find_leaks(instruction: Instruction, goal: Goal) -> frozenset[str]:
 
 def _relation_words(instruction: Instruction) -> frozenset[str]:
     """Return the words of an open relation, which go with every result: *two fewer*, *twice*."""
-    if instruction.metadata.get("reasoning") != REASONINGS[-1]:
+    if instruction.setting != reasoning_open.SETTING.name:
         return frozenset()
     return frozenset(re.findall(r"[a-z]+", str(instruction.metadata["relation"])))
 

@@ -6,7 +6,7 @@ import re
 from collections.abc import Iterator, Sequence
 
 from roboirg.core.episode import Episode
-from roboirg.core.instruction_options import REASONINGS, RIVALS, InstructionOptions
+from roboirg.core.instruction_options import InstructionOptions
 from roboirg.language.generator import find_refusal, instruct_with
 from roboirg.language.instruction import Instruction, Mention
 from roboirg.language.settings import all_settings
@@ -30,18 +30,9 @@ def unpaired(
     for name in settings:
         for complaint in all_settings()[name].pairing_rules(say):
             yield name, complaint
-        for options in _kinds(name):
-            if find_refusal(episode, options._replace(wordings=wordings)) is None:
-                yield from ((name, complaint) for complaint in _differences(options, say))
-
-
-def _kinds(setting: str) -> Iterator[InstructionOptions]:
-    """Yield the options under which a setting says the same in another way of its own."""
-    yield InstructionOptions(setting)
-    if "rival" in all_settings()[setting].reads:
-        yield InstructionOptions(setting, rival=RIVALS[-1])
-    if "reasoning" in all_settings()[setting].reads:
-        yield InstructionOptions(setting, reasoning=REASONINGS[-1])
+        options = InstructionOptions(name, wordings=wordings)
+        if find_refusal(episode, options) is None:
+            yield from ((name, complaint) for complaint in _differences(options, say))
 
 
 def _differences(options: InstructionOptions, say: Instruct) -> Iterator[str]:

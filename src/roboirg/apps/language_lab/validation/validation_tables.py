@@ -4,22 +4,18 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
-from typing import TypeVar
 
+from rich import box
 from rich.table import Table
 
-from roboirg.apps.language_lab.validation.validation_results import (
-    CommandGroup,
-    SceneGroup,
-    ValidationResults,
-)
-from roboirg.core.episode import DIFFICULTIES
+from roboirg.apps.language_lab.validation.validation_results import ValidationResults
+from roboirg.core.episode import DIFFICULTIES, Difficulty
 from roboirg.core.plain_text import counted
-from roboirg.language.settings import setting_names
+from roboirg.language.settings import plain_settings
 from roboirg.tasks import every_task
 
-Group = TypeVar("Group", CommandGroup, SceneGroup)
-
+HARDER = "hard"
+"""Column of the harder settings, such as direct-rival."""
 NONE = "–"
 """Cell of a task that lacks the setting."""
 
@@ -28,21 +24,25 @@ def validation_tables(results: ValidationResults) -> Iterator[Table]:
     """Yield tables of texts and violations, exceptions of necessity, and refused scenes."""
     yield _texts(results)
     yield _exceptions(results)
-    for setting in setting_names():
-        if any(group.setting == setting for group in results.scenes):
-            yield _refusals(results, setting)
+    yield _refusals(results)
 
 
 def _texts(results: ValidationResults) -> Table:
-    names, texts = setting_names(), results.texts
-    table = _table("Texts read back, and rules broken", ("task",), (*names, "broken rules"))
-    broken = Counter((failure.task, failure.setting) for failure in results.failures)
+    """Return the number of texts of each task and setting; the harder settings share a column."""
+    names = plain_settings()
+    texts, broken = Counter[tuple[str, str]](), Counter[tuple[str, str]]()
+    for (task, setting), count in results.texts.items():
+        texts[task, setting if setting in names else HARDER] += count
+    for failure in results.failures:
+        broken[failure.task, failure.setting if failure.setting in names else HARDER] += 1
+    columns = (*names, HARDER)
+    table = _table("Texts read back, and rules broken", ("task",), (*columns, "broken"))
     tasks = _tasks(task for task, _ in texts)
     for task in tasks:
-        cells = [_count(texts, broken, (task, setting)) for setting in names]
-        table.add_row(task, *cells, f"{sum(broken[task, setting] for setting in names):,}")
+        cells = [_count(texts, broken, (task, setting)) for setting in columns]
+        table.add_row(task, *cells, f"{sum(broken[task, setting] for setting in columns):,}")
     if len(tasks) > 1:
-        sums = [sum(texts[task, setting] for task in tasks) for setting in names]
+        sums = [sum(texts[task, setting] for task in tasks) for setting in columns]
         table.add_section()
         table.add_row("all tasks", *(f"{one:,}" for one in sums), f"{broken.total():,}")
     return table
@@ -62,63 +62,51 @@ def _count(
 
 
 def _exceptions(results: ValidationResults) -> Table:
-    """Return one row for each task, setting and pattern with exceptions."""
-    table = _table(
-        "Commands that give the goal alone: the scene leaves one candidate",
-        ("task", "setting", "pattern"),
-        DIFFICULTIES,
+    """Return the commands that give the goal alone, by task, setting and pattern."""
+    groups = Counter[tuple[str, str, Difficulty]]()
+    excepted = groups.copy()
+    for one, count in results.commands.items():
+        key = (one.task, ", ".join(filter(None, (one.setting, one.pattern))), one.difficulty)
+        groups[key] += count
+        excepted[key] += results.exceptions[one]
+    title = "Commands that give the goal alone: the scene leaves one candidate"
+    return _shares(title, "setting, pattern", excepted, groups)
+
+
+def _refusals(results: ValidationResults) -> Table:
+    """Return the scenes that settings refuse, by task and variant, with the reasons below."""
+    groups = Counter[tuple[str, str, Difficulty]]()
+    refused = groups.copy()
+    for one, count in results.scenes.items():
+        key = (one.task, ", ".join(filter(None, (one.setting, one.variant))), one.difficulty)
+        groups[key] += count
+        refused[key] += results.refused[one]
+    table = _shares("Scenes that a setting cannot express", "setting, options", refused, groups)
+    reasons = (
+        f"{refusal.setting}: {refusal.reason}: {counted(count, 'refusal')}"
+        for refusal, count in results.reasons.most_common()
     )
-    excepted = {group[:3] for group, count in results.exceptions.items() if count}
-    for row in (group for group in _ordered(results.commands) if group in excepted):
-        groups = [CommandGroup(*row, difficulty) for difficulty in DIFFICULTIES]
-        shares = [_share(results.exceptions, results.commands, group) for group in groups]
-        task, setting, pattern = row
-        table.add_row(task, setting, pattern or "", *shares)
-    if not excepted:
+    table.caption = "\n".join(reasons) or None
+    return table
+
+
+def _shares(
+    title: str,
+    kind: str,
+    some: Mapping[tuple[str, str, Difficulty], int],
+    all_: Mapping[tuple[str, str, Difficulty], int],
+) -> Table:
+    """Return a row ``3 of 120`` by difficulty for each task and kind of which there are some."""
+    table = _table(title, ("task", kind), DIFFICULTIES)
+    rows = {key[:2] for key, count in some.items() if count}
+    for task in _tasks(task for task, _ in rows):
+        for label in sorted(label for one, label in rows if one == task):
+            cells = ((some[task, label, one], all_[task, label, one]) for one in DIFFICULTIES)
+            shown = (f"{count:,} of {total:,}" if total else NONE for count, total in cells)
+            table.add_row(task, label, *shown)
+    if not rows:
         table.add_row("none")
     return table
-
-
-def _ordered(commands: Iterable[CommandGroup]) -> list[tuple[str, str, str | None]]:
-    rows = {(one.task, one.setting, one.pattern) for one in commands}
-    tasks = _tasks(task for task, _, _ in rows)
-    return sorted(rows, key=lambda row: (tasks.index(row[0]), row[1], row[2] or ""))
-
-
-def _refusals(results: ValidationResults, setting: str) -> Table:
-    """Return the share of refused scenes by task, with the reasons below."""
-    scenes = [group for group in results.scenes if group.setting == setting]
-    columns = [
-        (variant, difficulty)
-        for variant in dict.fromkeys(group.variant for group in scenes)
-        for difficulty in DIFFICULTIES
-    ]
-    headers = [", ".join(filter(None, (difficulty, variant))) for variant, difficulty in columns]
-    table = _table(f"Scenes that the {setting} setting cannot express", ("task",), headers)
-    for task in _tasks(group.task for group in scenes):
-        groups = [SceneGroup(task, setting, *column) for column in columns]
-        shares = [_share(results.refused, results.scenes, group) for group in groups]
-        table.add_row(task, *shares)
-    table.caption = _reasons(results, setting)
-    return table
-
-
-def _reasons(results: ValidationResults, setting: str) -> str | None:
-    """Return one line for each reason, the most common one first; None without refusals."""
-    lines = [
-        f"{refusal.reason}: {counted(count, 'refusal')}"
-        for refusal, count in results.reasons.most_common()
-        if refusal.setting == setting
-    ]
-    return "\n".join(lines) or None
-
-
-def _share(some: Mapping[Group, int], all_: Mapping[Group, int], group: Group) -> str:
-    """Return ``3 of 120 (2.5 %)``."""
-    count, total = some.get(group, 0), all_.get(group, 0)
-    if not total:
-        return NONE
-    return f"{count:,} of {total:,} ({100 * count / total:.2f} %)" if count else f"0 of {total:,}"
 
 
 def _tasks(names: Iterable[str]) -> list[str]:
@@ -128,9 +116,19 @@ def _tasks(names: Iterable[str]) -> list[str]:
 
 
 def _table(title: str, names: Iterable[str], numbers: Iterable[str]) -> Table:
-    table = Table(title=title, title_justify="left", title_style="bold", caption_justify="left")
+    # Without side lines and double blanks a line has room for all settings at 80 characters.
+    table = Table(
+        title=title,
+        title_justify="left",
+        title_style="bold",
+        caption_justify="left",
+        box=box.SIMPLE_HEAD,
+        show_edge=False,
+        collapse_padding=True,
+        pad_edge=False,
+    )
     for name in names:
-        table.add_column(name)
+        table.add_column(name, no_wrap=name == "task")
     for name in numbers:
         table.add_column(name, justify="right")
     return table

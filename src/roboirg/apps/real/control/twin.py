@@ -13,6 +13,8 @@ from numpy.typing import NDArray
 from roboirg.apps.real.control.clock import Clock, VirtualClock
 from roboirg.apps.real.control.robot import CAMERA_RATE, COMMAND_RATE, Command, SensorReading
 from roboirg.core.actions import ARM_JOINTS
+from roboirg.evaluation.play.guarded_loop import NO_RENDER_DEVICE
+from roboirg.evaluation.play.job_instruction import PreparedJob
 from roboirg.evaluation.play.policy_environment import make_env
 from roboirg.evaluation.play.rollout_result import RolloutResult
 from roboirg.evaluation.records.record import TWIN, Job
@@ -21,7 +23,6 @@ from roboirg.policies.contract.policy_needs import PolicyNeeds
 if TYPE_CHECKING:
     from roboirg.envs.environment import RoboIRGEnv
 
-NO_RENDER_DEVICE = "none"
 _NEVER = 2**62
 
 
@@ -56,7 +57,7 @@ class Twin:
     def prepare(self, job: Job, cameras: Sequence[str]) -> None:
         """Build the scene of the trial."""
         self.cameras = tuple(cameras)
-        env = make_env(job, PolicyNeeds(cameras=()))
+        env = make_env(PreparedJob(job), PolicyNeeds(cameras=()))
         if cameras:
             # With a frame hook the environment can render; only pictures that are read are.
             env.set_frame_hook(_draw_nothing, every=_NEVER)

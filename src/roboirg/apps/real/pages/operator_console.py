@@ -5,6 +5,8 @@ from __future__ import annotations
 import select
 import sys
 
+import msgspec
+
 from roboirg.apps.real.study.study_plan import PlannedTrial, StudyPlan
 from roboirg.apps.real.study.trial_log import UNSCORED
 from roboirg.apps.real.study.trial_text import describe_positions, spoken_turns
@@ -32,7 +34,7 @@ class OperatorConsole:
         Raises:
             EOFError: standard input is closed.
         """
-        trial = self._trials[job.model_copy(update={"spec": None})]
+        trial = self._trials[msgspec.structs.replace(job, spec=None)]
         print(f"\n{trial.name}: arrange")  # noqa: T201 - this class is a terminal
         for line in (*describe_positions(trial), "say:", *spoken_turns(trial)):
             print(f"  {line}")  # noqa: T201

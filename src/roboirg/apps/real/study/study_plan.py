@@ -12,15 +12,15 @@ from itertools import product
 from pathlib import Path
 from typing import Literal
 
+import msgspec
 import numpy as np
-from pydantic import BaseModel, ConfigDict, ValidationError
 
 from roboirg.apps.real.study.counterbalancing import counterbalanced_episodes, target_kind
 from roboirg.core.episode import Episode
 from roboirg.core.errors import InvalidValueError, RoboIRGError, UnknownNameError
 from roboirg.evaluation.plan.plan_parsing import name_and_spec
 from roboirg.evaluation.records.record import DEFAULT_MAX_STEPS, Job
-from roboirg.language.settings import setting_names, settings_of
+from roboirg.language.settings import plain_settings, settings_of
 from roboirg.tasks import get_task
 from roboirg.tasks.splits.splits import get_episode
 from roboirg.util.atomic_write import write_atomically
@@ -37,11 +37,7 @@ DEFAULT_DEMONSTRATIONS = 50
 LETTERS = "ABCDEFGHIJKLMNOPQRSTUVWXYZ"
 
 
-class _StudyModel(BaseModel):
-    model_config = ConfigDict(frozen=True, extra="forbid")
-
-
-class PlannedTrial(_StudyModel):
+class PlannedTrial(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """One trial.
 
     Attributes:
@@ -58,7 +54,7 @@ class PlannedTrial(_StudyModel):
     @property
     def identity(self) -> Job:
         """The job without the policy's spec."""
-        return self.job.model_copy(update={"spec": None})
+        return msgspec.structs.replace(self.job, spec=None)
 
     @property
     def episode(self) -> Episode:
@@ -66,7 +62,7 @@ class PlannedTrial(_StudyModel):
         return get_episode(self.job.task, self.job.split, self.job.episode)
 
 
-class PlannedDemonstration(_StudyModel):
+class PlannedDemonstration(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """One demonstration for fine-tuning, in the explicit setting.
 
     Attributes:
@@ -85,7 +81,7 @@ class PlannedDemonstration(_StudyModel):
         return get_episode(self.task, DEMONSTRATION_SPLIT, self.number)
 
 
-class StudyPlan(_StudyModel):
+class StudyPlan(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """All trials and demonstrations of a study, in order.
 
     Attributes:
@@ -106,7 +102,7 @@ class StudyPlan(_StudyModel):
     @property
     def fingerprint(self) -> str:
         """Digest that identifies the plan."""
-        return short_hash(self.model_dump_json())
+        return short_hash(msgspec.json.encode(self))
 
     def trial(self, name: str) -> PlannedTrial:
         """Return the trial of that name.
@@ -194,7 +190,7 @@ def write_study(plan: StudyPlan, folder: Path) -> Path:
         raise InvalidValueError(
             f"{folder} holds another plan; repeat its options, or choose another --out."
         )
-    write_atomically(path, plan.model_dump_json(indent=1) + "\n")
+    write_atomically(path, msgspec.json.format(msgspec.json.encode(plan), indent=1).decode() + "\n")
     return path
 
 
@@ -206,12 +202,12 @@ def read_study(folder: Path) -> StudyPlan:
     """
     path = folder / PLAN_FILE
     try:
-        return StudyPlan.model_validate_json(path.read_bytes())
+        return msgspec.json.decode(path.read_bytes(), type=StudyPlan)
     except OSError as error:
         raise InvalidValueError(
             f"There is no plan in {folder} ({error.strerror}); make one with roboirg real plan."
         ) from error
-    except (ValidationError, RoboIRGError) as error:
+    except (msgspec.DecodeError, RoboIRGError) as error:
         raise InvalidValueError(
             f"{path} is not the plan of a real-robot study; make one with roboirg real plan."
         ) from error
@@ -246,7 +242,7 @@ def _demonstrations(
 def _shared_settings(tasks: Sequence[str]) -> tuple[str, ...]:
     """Return the settings that all tasks have, in the registry's order."""
     available = [settings_of(get_task(task)) for task in tasks]
-    return tuple(name for name in setting_names() if all(name in names for names in available))
+    return tuple(name for name in plain_settings() if all(name in names for names in available))
 
 
 def _check(

@@ -11,6 +11,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal, get_args
 
+import msgspec
 import numpy as np
 
 from roboirg.apps.real.control.control_loop import ControlLoop
@@ -87,8 +88,8 @@ class Study:
         _check_versions(trial_log, specs)
         to_play = ("open", "error", "void") if retry_errors else ("open",)
         trials = [
-            trial.model_copy(
-                update={"job": trial.job.model_copy(update={"spec": specs[trial.job.policy]})}
+            msgspec.structs.replace(
+                trial, job=msgspec.structs.replace(trial.job, spec=specs[trial.job.policy])
             )
             for trial in self.plan.trials
             if trial.job.policy in specs and trial_log.state(trial.name) in to_play
@@ -258,12 +259,6 @@ def lock_robot(folder: Path) -> Iterator[None]:
 
 def _without_verdict(record: Record) -> Record:
     """Return a record that waits for the operator's verdict, without what the judge saw."""
-    return record.model_copy(
-        update={
-            "outcome": "error",
-            "error": "infrastructure",
-            "cause": UNSCORED,
-            "attribution": None,
-            "events": (),
-        }
+    return msgspec.structs.replace(
+        record, outcome="error", error="infrastructure", cause=UNSCORED, attribution=None, events=()
     )

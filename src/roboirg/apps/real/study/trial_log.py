@@ -12,6 +12,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Literal
 
+import msgspec
 from pydantic import JsonValue
 
 from roboirg.apps.real.study.failure_choices import failure_choices
@@ -19,7 +20,7 @@ from roboirg.apps.real.study.study_plan import PlannedTrial, StudyPlan
 from roboirg.core.errors import InvalidValueError
 from roboirg.evaluation.episode_errors import format_cause
 from roboirg.evaluation.play.rollout_result import RolloutResult, make_record, utc_now
-from roboirg.evaluation.records.record import REAL_TRIAL, Record
+from roboirg.evaluation.records.record import REAL_TRIAL, Record, real_robot
 from roboirg.evaluation.records.store import RECORDS_FILE, RecordStore, StoreError, read_contents
 
 UNSCORED = format_cause("infrastructure", "played; waiting for the operator's verdict")
@@ -151,7 +152,7 @@ class TrialLog:
                 )
             found = choices[choice].attribution(base.steps, note)
             changes |= {"outcome": "failure", "cause": found.sentence, "attribution": found}
-        return self._append(trial, base.model_copy(update=changes), metadata)
+        return self._append(trial, msgspec.structs.replace(base, **changes), metadata)
 
     def undo(self, *, operator: str) -> str:
         """Withdraw the newest score, so that the record before it counts again.
@@ -195,11 +196,11 @@ class TrialLog:
             **trial_metadata(record), **metadata,
             "trial": trial.name, "plan": self.plan.fingerprint,
         }  # fmt: skip
-        complete = record.model_copy(
-            update={
-                "policy_metadata": {**record.policy_metadata, REAL_TRIAL: merged},
-                "plan": self.plan.fingerprint,
-            }
+        complete = msgspec.structs.replace(
+            record,
+            policy_metadata={**record.policy_metadata, REAL_TRIAL: merged},
+            robot=real_robot(merged),
+            plan=self.plan.fingerprint,
         )
         _append_record(self.folder, complete)
         self._apply(trial.name, complete)
@@ -233,9 +234,11 @@ def _append_record(folder: Path, record: Record) -> None:
 
 def _withdrawn(record: Record) -> Record:
     """Return the record of a trial whose only score was undone."""
-    return record.model_copy(
-        update={
-            "outcome": "error", "error": "infrastructure", "cause": WITHDRAWN,
-            "attribution": None, "video": None,
-        }
-    )  # fmt: skip
+    return msgspec.structs.replace(
+        record,
+        outcome="error",
+        error="infrastructure",
+        cause=WITHDRAWN,
+        attribution=None,
+        video=None,
+    )

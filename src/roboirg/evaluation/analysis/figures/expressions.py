@@ -7,6 +7,8 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, get_args
 
+import msgspec
+
 from roboirg import language
 from roboirg.core.errors import RoboIRGError
 from roboirg.evaluation.analysis.figures.figure_data import FigureData
@@ -78,8 +80,8 @@ def write_expressions(content: FigureData, folder: Path, name: str) -> tuple[Pat
         InvalidValueError: the folder is not writable.
     """
     jobs = [
-        result.identity.model_copy(
-            update={"policy": "", "policy_seed": 0, "wordings_file": result.wordings_file}
+        msgspec.structs.replace(
+            result.identity, policy="", policy_seed=0, wordings_file=result.wordings_file
         )
         for _, result in content.results
         if result.form == "implicit" and result.setting != EXPLICIT

@@ -19,7 +19,7 @@ from roboirg.evaluation.analysis.figures.figure_style import (
 )
 from roboirg.evaluation.analysis.stats.cells import PolicyRun
 from roboirg.evaluation.analysis.stats.option_labels import options_label, options_sort_key
-from roboirg.evaluation.records.record_codec import AnyResult
+from roboirg.evaluation.records.record import Summary
 from roboirg.judging.failure_attribution import EXECUTION, GROUNDING
 
 if TYPE_CHECKING:
@@ -90,7 +90,7 @@ def draw_failures(content: FigureData) -> Figure | None:
     return figure
 
 
-def failure_name(result: AnyResult) -> str:
+def failure_name(result: Summary) -> str:
     """Return the name of a result's failure."""
     return UNKNOWN if result.attribution is None else result.attribution.failure
 

@@ -17,8 +17,7 @@ from roboirg.evaluation.analysis.stats.cells import (
 )
 from roboirg.evaluation.analysis.stats.intervals import SEED
 from roboirg.evaluation.analysis.stats.run_summary import ScopeKey, SummaryRow, summarize
-from roboirg.evaluation.records.record import Job
-from roboirg.evaluation.records.record_codec import AnyResult
+from roboirg.evaluation.records.record import Job, Summary
 
 
 @dataclass(frozen=True)
@@ -32,14 +31,14 @@ class FigureData:
         names: labels of the policy runs, in order.
     """
 
-    results: tuple[tuple[PolicyRun, AnyResult], ...]
+    results: tuple[tuple[PolicyRun, Summary], ...]
     cells: Cells
     summaries: Mapping[ScopeKey, SummaryRow]
     names: Mapping[PolicyRun, str]
 
     @classmethod
     def of(
-        cls, runs: Sequence[tuple[str, Sequence[AnyResult]]], planned: Sequence[Job] = ()
+        cls, runs: Sequence[tuple[str, Sequence[Summary]]], planned: Sequence[Job] = ()
     ) -> FigureData:
         """Gather, sort and summarize runs, each with its name.
 
@@ -70,7 +69,7 @@ def summaries_by_key(cells: Cells) -> Mapping[ScopeKey, SummaryRow]:
     return {one.key: one for one in summarize(cells, np.random.default_rng(SEED))}
 
 
-def _policy_run(run: str, result: AnyResult, known: Mapping[PolicyRun, str]) -> PolicyRun:
+def _policy_run(run: str, result: Summary, known: Mapping[PolicyRun, str]) -> PolicyRun:
     """Return the policy run of a result; it names the run if several runs played the policy."""
     policy_run = PolicyRun.of(result)
     return policy_run if policy_run in known else policy_run._replace(run=run)

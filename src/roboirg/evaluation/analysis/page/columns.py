@@ -16,12 +16,12 @@ import msgspec
 from roboirg.core.episode import DIFFICULTIES
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.evaluation.analysis.page.details import Strings, details_of, searched_texts
-from roboirg.evaluation.analysis.page.entries import EpisodeEntries, EpisodeEntry, Summary
+from roboirg.evaluation.analysis.page.entries import EpisodeEntries, EpisodeEntry
 from roboirg.evaluation.analysis.page.episode_videos import EpisodeVideo, EpisodeVideos
 from roboirg.evaluation.analysis.page.reconstruction import resolved_form
 from roboirg.evaluation.analysis.stats.cells import FAIRNESS, task_order
 from roboirg.evaluation.analysis.stats.option_labels import options_label, options_sort_key
-from roboirg.evaluation.records.record import ERROR_KINDS, FailureKind, Outcome, Record
+from roboirg.evaluation.records.record import ERROR_KINDS, FailureKind, Outcome, Record, Summary
 from roboirg.judging.failure_attribution import EXECUTION, GROUNDING
 from roboirg.tasks import all_tasks
 

@@ -9,7 +9,6 @@ from pathlib import Path
 from urllib.parse import quote
 
 from roboirg.core.instruction_options import InstructionOptions
-from roboirg.evaluation.analysis.stats.breakdowns import InstructionNotes
 from roboirg.evaluation.analysis.stats.cells import (
     CellKey,
     CellResults,
@@ -23,11 +22,8 @@ from roboirg.evaluation.analysis.stats.cells import (
 )
 from roboirg.evaluation.analysis.stats.option_labels import options_sort_key
 from roboirg.evaluation.records.episode_log import log_path
-from roboirg.evaluation.records.record import Job, Record
-from roboirg.evaluation.records.record_codec import EpisodeSummary
+from roboirg.evaluation.records.record import Job, Record, Summary
 from roboirg.evaluation.records.store import StoredRun
-
-Summary = Record | EpisodeSummary
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,20 +45,14 @@ class Run:
     folder: Path | None = None
     planned: Sequence[Job] = ()
     link: str = ""
-    stored: StoredRun[EpisodeSummary] | None = None
+    stored: StoredRun[Summary] | None = None
     logs: frozenset[str] = frozenset()
 
     def whole(self, records: Iterable[Summary]) -> Iterator[Record]:
         """Yield the whole records of some of its records, each read when it is asked for."""
         if self.stored is None:
             return (one for one in records if isinstance(one, Record))
-        return self.stored.records(one for one in records if not isinstance(one, Record))
-
-    def instructions(self) -> Iterable[InstructionNotes]:
-        """Return what tells its instructions apart."""
-        if self.stored is None:
-            return [one for one in self.records if isinstance(one, Record)]
-        return self.stored.instructions()
+        return self.stored.records(records)
 
 
 @dataclass(frozen=True, slots=True)

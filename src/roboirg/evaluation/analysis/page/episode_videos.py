@@ -39,13 +39,14 @@ class EpisodeVideos:
     @classmethod
     def of(cls, entries: Iterable[EpisodeEntry], *, embed: bool = True) -> EpisodeVideos:
         """Embed the videos if wanted and not too large."""
-        sizes = [
-            path.stat().st_size
+        files = [
+            (path, run_file(one.run.folder, _poster(one.record.video)))
             for one in entries
             if one.run.folder is not None and one.record.video is not None
             if (path := run_file(one.run.folder, one.record.video)).is_file()
         ]
-        return cls(embed and sum(sizes) <= MAX_EMBEDDED_BYTES, len(sizes))
+        size = sum(path.stat().st_size for pair in files for path in pair if path.is_file())
+        return cls(embed and size <= MAX_EMBEDDED_BYTES, len(files))
 
     def video(self, entry: EpisodeEntry) -> EpisodeVideo | None:
         """Return the video of an episode, or None."""
@@ -53,8 +54,7 @@ class EpisodeVideos:
         source = None if name is None else self._link(entry, name, "video/mp4")
         if name is None or source is None:
             return None
-        poster = str(PurePosixPath(name).with_suffix(POSTER_SUFFIX))
-        return EpisodeVideo(source, self._link(entry, poster, "image/jpeg"))
+        return EpisodeVideo(source, self._link(entry, _poster(name), "image/jpeg"))
 
     def _link(self, entry: EpisodeEntry, name: str, kind: str) -> str | None:
         if entry.run.folder is None or not (path := run_file(entry.run.folder, name)).is_file():
@@ -62,3 +62,8 @@ class EpisodeVideos:
         if not self.embeds:
             return quote(f"{entry.run.link}{name}")
         return f"data:{kind};base64,{base64.b64encode(path.read_bytes()).decode('ascii')}"
+
+
+def _poster(video: str) -> str:
+    """Return the path of a video's last frame."""
+    return str(PurePosixPath(video).with_suffix(POSTER_SUFFIX))

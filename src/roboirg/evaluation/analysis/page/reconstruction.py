@@ -12,6 +12,8 @@ from collections.abc import Mapping
 from types import MappingProxyType
 from typing import NamedTuple
 
+import msgspec
+
 from roboirg import language
 from roboirg.core.conditions import Fact
 from roboirg.core.episode import ENVIRONMENT_VERSION
@@ -47,7 +49,7 @@ def resolved_form(record: Record) -> str | None:
         return None
     try:
         changes = {"form": "resolved", "wordings_file": record.wordings_file}
-        return instruct_job(record.identity.model_copy(update=changes)).text
+        return instruct_job(msgspec.structs.replace(record.identity, **changes)).text
     except RoboIRGError:
         return None  # a task or a wording file that is no longer there
 

@@ -185,7 +185,7 @@ def _data(entries: EpisodeEntries, columns: Columns) -> dict[str, Any]:
 def _breakdown_tables(runs: Sequence[Run], entries: EpisodeEntries) -> list[Table]:
     """Return the tables of gaps by kind of instruction that have rows."""
     breakdowns = tuple(BREAKDOWNS.values())
-    instructions = itertools.chain.from_iterable(run.instructions() for run in runs)
+    instructions = itertools.chain.from_iterable(run.whole(run.records) for run in runs)
     labels = label_instructions(breakdowns, instructions)
     tables = [
         make_breakdown_table(one, entries.cells, labels[one.name], entries.names)

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from roboirg.core.errors import InvalidValueError
-from roboirg.core.plain_text import counted
+from roboirg.core.plain_text import counted, verb_for
 from roboirg.evaluation.analysis.page.entries import EpisodeEntries, Run
 from roboirg.evaluation.analysis.stats.cells import FAIRNESS, EvalConditions, PolicyRun, Versions
 from roboirg.evaluation.analysis.stats.comparison import compare
@@ -101,9 +101,9 @@ def _incomplete(entries: EpisodeEntries) -> Iterable[str]:
     missing = sum(cell.missing for cell in entries.cells.values())
     total = len(entries.all)
     if missing:
-        verb = "has" if missing == 1 else "have"
+        have = verb_for(missing, "have")
         yield (
-            f"Incomplete: {missing} of {counted(missing + total, 'planned episode')} {verb} not "
+            f"Incomplete: {missing} of {counted(missing + total, 'planned episode')} {have} not "
             "been played. Cells and averages that lack some are marked “…”."
         )
     errors = Counter(

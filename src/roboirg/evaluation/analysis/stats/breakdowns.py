@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from typing import Any, NamedTuple, Protocol
+from typing import NamedTuple
 
 from roboirg.core.errors import UnknownNameError
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.evaluation.analysis.stats.cells import CellKey, CellResults, Cells, Trial
+from roboirg.evaluation.records.record import Record
 
 UNKNOWN = "unknown"
 """Label of instructions whose records do not say what is asked."""
@@ -16,62 +17,6 @@ RIVAL, NO_RIVAL = "recency rival", "no recency rival"
 COMPETING = "competing distractor"
 SINGLED = "one of two"
 """Before the kind of words that single out one of two values."""
-
-
-class MentionNotes(Protocol):
-    """What a break-down reads of a mention."""
-
-    @property
-    def utterance(self) -> int:
-        """Index of the utterance."""
-
-    @property
-    def expression(self) -> str | None:
-        """Class of an anaphor; None for an antecedent."""
-
-
-class InstructionNotes(Protocol):
-    """What a break-down reads of a record, so that it need not be a whole `Record`."""
-
-    @property
-    def task(self) -> str:
-        """Name of the task."""
-
-    @property
-    def split(self) -> str:
-        """Name of the split."""
-
-    @property
-    def episode(self) -> int:
-        """Position in the split."""
-
-    @property
-    def options(self) -> InstructionOptions:
-        """The instruction options."""
-
-    @property
-    def wordings(self) -> str | None:
-        """Identity of the wording file."""
-
-    @property
-    def language_version(self) -> str:
-        """Version of the instruction generator."""
-
-    @property
-    def environment_version(self) -> int:
-        """Version of scenes, rules and physics."""
-
-    @property
-    def metadata(self) -> Mapping[str, Any]:
-        """Of the instruction."""
-
-    @property
-    def instruction(self) -> Sequence[object]:
-        """The utterances; the last one is the command."""
-
-    @property
-    def mentions(self) -> Sequence[MentionNotes]:
-        """The referring expressions."""
 
 
 class Breakdown(NamedTuple):
@@ -87,7 +32,7 @@ class Breakdown(NamedTuple):
 
     name: str
     title: str
-    labels: Callable[[InstructionNotes], tuple[str, ...]]
+    labels: Callable[[Record], tuple[str, ...]]
     note: str
 
 
@@ -103,7 +48,7 @@ class InstructionKey(NamedTuple):
     environment_version: int
 
     @classmethod
-    def of(cls, record: InstructionNotes) -> InstructionKey:
+    def of(cls, record: Record) -> InstructionKey:
         """Return the key of a record's instruction."""
         return cls(**{name: getattr(record, name) for name in cls._fields})
 
@@ -132,12 +77,12 @@ Labels = Mapping[InstructionKey, tuple[str, ...]]
 """The labels of instructions."""
 
 
-def _pattern(record: InstructionNotes) -> tuple[str, ...]:
+def _pattern(record: Record) -> tuple[str, ...]:
     pattern = record.metadata.get("pattern", UNKNOWN)
     return () if pattern is None else (str(pattern),)
 
 
-def _expressions(record: InstructionNotes) -> tuple[str, ...]:
+def _expressions(record: Record) -> tuple[str, ...]:
     """Return the classes of the command's anaphors; those of the context add no referent."""
     if not record.mentions:
         return (UNKNOWN,)
@@ -146,18 +91,18 @@ def _expressions(record: InstructionNotes) -> tuple[str, ...]:
     return tuple(dict.fromkeys(one for one in found if one is not None))
 
 
-def _slots(record: InstructionNotes) -> tuple[str, ...]:
+def _slots(record: Record) -> tuple[str, ...]:
     hidden = record.metadata.get("hidden_slots", UNKNOWN)
     return (str(hidden),) if hidden else ()
 
 
-def _reference(record: InstructionNotes) -> tuple[str, ...]:
+def _reference(record: Record) -> tuple[str, ...]:
     """Return how an instruction with a rival singles one of the two values out."""
     reference = record.metadata.get("rival_reference")
     return () if reference is None else (f"{SINGLED}: {reference}",)
 
 
-def _rival(record: InstructionNotes) -> tuple[str, ...]:
+def _rival(record: Record) -> tuple[str, ...]:
     metadata, expressions = record.metadata, _expressions(record)
     distractor = metadata.get("distractor", UNKNOWN)
     if distractor is None:
@@ -219,7 +164,7 @@ def find_breakdowns(names: Iterable[str]) -> tuple[Breakdown, ...]:
 
 
 def label_instructions(
-    breakdowns: Sequence[Breakdown], records: Iterable[InstructionNotes]
+    breakdowns: Sequence[Breakdown], records: Iterable[Record]
 ) -> dict[str, Labels]:
     """Return the labels of all instructions by the name of the break-down.
 

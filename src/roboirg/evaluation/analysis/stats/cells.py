@@ -27,13 +27,8 @@ from roboirg.evaluation.analysis.stats.intervals import (
     without_spread,
 )
 from roboirg.evaluation.analysis.stats.option_labels import options_sort_key, words_label
-from roboirg.evaluation.records.record import DEFAULT_MAX_STEPS, DEFAULT_MESHES, Job
-from roboirg.evaluation.records.record_codec import (
-    AnyResult,
-    RecordIndexEntry,
-    RecordKey,
-    identity_key,
-)
+from roboirg.evaluation.records.record import DEFAULT_MAX_STEPS, DEFAULT_MESHES, Job, Summary
+from roboirg.evaluation.records.record_codec import RecordKey, identity_key
 from roboirg.tasks import all_tasks
 
 
@@ -56,7 +51,7 @@ class EvalConditions(NamedTuple):
     wordings: str | None = None
 
     @classmethod
-    def of(cls, job: Job | RecordIndexEntry) -> EvalConditions:
+    def of(cls, job: Job) -> EvalConditions:
         """Return the conditions of a job."""
         return cls._make(_read_conditions(job))
 
@@ -89,7 +84,7 @@ class Versions(NamedTuple):
     environment: int
 
     @classmethod
-    def of(cls, result: AnyResult) -> Versions:
+    def of(cls, result: Summary) -> Versions:
         """Return the versions of a result."""
         policy, server = result.policy_version, result.server_version
         return cls(
@@ -123,7 +118,7 @@ class PolicyRun(NamedTuple):
     robot: str | None = None
 
     @classmethod
-    def of(cls, result: AnyResult, run: str = "") -> PolicyRun:
+    def of(cls, result: Summary, run: str = "") -> PolicyRun:
         """Return the policy run of a result."""
         return cls(
             result.policy,
@@ -227,7 +222,7 @@ def cell_interval(cell: CellResults, rng: np.random.Generator) -> Interval | Non
     return wilson_interval(cell.successes, cell.trials) if cell.trials else None
 
 
-def gather(runs: Sequence[tuple[str, Sequence[AnyResult]]], planned: Iterable[Job] = ()) -> Cells:
+def gather(runs: Sequence[tuple[str, Sequence[Summary]]], planned: Iterable[Job] = ()) -> Cells:
     """Gather the results of one or several runs into cells.
 
     Args:
@@ -346,7 +341,7 @@ def _version_labels(policy_run: PolicyRun, policy_runs: Sequence[PolicyRun]) -> 
     return found
 
 
-def _played_twice(runs: Sequence[tuple[str, Sequence[AnyResult]]]) -> set[str]:
+def _played_twice(runs: Sequence[tuple[str, Sequence[Summary]]]) -> set[str]:
     """Return the policies of which several runs hold the same episode."""
     seen: set[RecordKey] = set()
     twice: set[str] = set()

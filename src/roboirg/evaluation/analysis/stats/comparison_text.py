@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 from collections.abc import Iterator
 
-from roboirg.core.plain_text import counted
+from roboirg.core.plain_text import counted, verb_for
 from roboirg.evaluation.analysis.stats.comparison import Comparison, ComparisonResult
 from roboirg.evaluation.analysis.stats.flips import Flips
 from roboirg.evaluation.analysis.stats.option_labels import options_label
@@ -141,10 +141,10 @@ def _caveats(comparison: Comparison) -> Iterator[str]:
     if comparison.parts:
         yield "A break-down is corrected by itself, over all its rows."
     if unpaired:
-        verb = "is" if unpaired == 1 else "are"
+        verb = verb_for(unpaired, "are")
         yield f"{counted(unpaired, 'trial')} without a counterpart {verb} left out."
     if unjudged:
-        verb = "is" if unjudged == 1 else "are"
+        verb = verb_for(unjudged, "are")
         yield (
             f"Incomplete: {counted(unjudged, 'trial')} without a verdict (an error, or still to be "
             f"played) {verb} left out."

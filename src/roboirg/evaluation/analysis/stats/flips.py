@@ -10,8 +10,10 @@ from typing import Any
 
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.evaluation.records.record_codec import StoreError
+from roboirg.util.regular_file import read_regular
 
 FLIPS_FILE = "flips.json"
+_MOST_BYTES = 4_000_000
 
 
 @dataclass(frozen=True)
@@ -63,13 +65,13 @@ def read_flips(folder: Path) -> Flips:
     """
     path = folder / FLIPS_FILE
     try:
-        rows = json.loads(path.read_text(encoding="utf-8"))
+        rows = json.loads(read_regular(path, _MOST_BYTES))
         return {
             (row["policy"], _options(row["options"])): FlipCounts(**row["counts"]) for row in rows
         }
     except FileNotFoundError:
         return {}
-    except (OSError, ValueError, TypeError, KeyError) as error:
+    except (OSError, ValueError, TypeError, KeyError, RecursionError) as error:
         raise StoreError(
             f"{path} is damaged; `roboirg leaderboard repeat` writes it again."
         ) from error

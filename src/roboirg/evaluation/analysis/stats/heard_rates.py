@@ -11,7 +11,7 @@ from roboirg.core.instruction_options import InstructionOptions
 from roboirg.evaluation.analysis.stats.cells import CellKey, PolicyRun, task_order
 from roboirg.evaluation.analysis.stats.option_labels import options_label, options_sort_key
 from roboirg.evaluation.analysis.stats.rates import whole_percent
-from roboirg.evaluation.records.record_codec import AnyResult
+from roboirg.evaluation.records.record import Summary
 
 
 @dataclass
@@ -36,7 +36,7 @@ class HeardCounts:
     heard: int = 0
     heard_successes: int = 0
 
-    def add(self, result: AnyResult) -> None:
+    def add(self, result: Summary) -> None:
         """Count one result."""
         is_heard, won = result.prompt_verdict == "heard", result.outcome == "success"
         self.episodes += 1
@@ -63,7 +63,7 @@ HeardCells = Mapping[CellKey, HeardCounts]
 
 
 def count_heard(
-    runs: Iterable[tuple[str, Iterable[AnyResult]]], known: Collection[PolicyRun] = ()
+    runs: Iterable[tuple[str, Iterable[Summary]]], known: Collection[PolicyRun] = ()
 ) -> HeardCells:
     """Count the results of runs by cell; policies that declare no limit are left out.
 

@@ -31,10 +31,6 @@ def options_label(options: InstructionOptions) -> str:
         changed.append(f"{options.frame} frame")
     if options.delivery != _DEFAULTS.delivery:
         changed.append(f"in {options.delivery}")
-    if options.rival != _DEFAULTS.rival:
-        changed.append("with a rival")
-    if options.reasoning != _DEFAULTS.reasoning:
-        changed.append(options.reasoning)
     return f"{options.setting} ({', '.join(changed)})" if changed else options.setting
 
 
@@ -58,8 +54,10 @@ def setting_sort_key(setting: str) -> tuple[int, str]:
 
 
 def has_default_options(options: InstructionOptions) -> bool:
-    """Whether all options but the setting have their default values."""
-    return options == InstructionOptions(options.setting)
+    """Whether the setting is none of the harder ones, and all other options are the defaults."""
+    setting = all_settings().get(options.setting)
+    is_plain = setting is None or setting.plain is None
+    return is_plain and options == InstructionOptions(options.setting)
 
 
 def default_settings(found: Iterable[InstructionOptions]) -> list[str]:

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping
 
 import numpy as np
 
-from roboirg.core.plain_text import counted
+from roboirg.core.plain_text import counted, verb_for
 from roboirg.evaluation.analysis.stats.breakdown_rows import BreakdownRow, break_down
 from roboirg.evaluation.analysis.stats.breakdowns import UNKNOWN, Breakdown, Labels
 from roboirg.evaluation.analysis.stats.cells import (
@@ -106,7 +106,7 @@ def _notes(breakdown: Breakdown, cells: Cells, rows: tuple[BreakdownRow, ...]) -
         yield f"{NOT_APPLICABLE} without explicit on the same episodes."
     left_out = sum(cell.errors + cell.missing for cell in cells.values())
     if left_out:
-        verb = "is" if left_out == 1 else "are"
+        verb = verb_for(left_out, "are")
         yield (
             f"Incomplete: {counted(left_out, 'trial')} without a verdict (an error, or still to be "
             f"played) {verb} left out."

@@ -44,8 +44,7 @@ from roboirg.evaluation.analysis.stats.run_summary import (
 from roboirg.evaluation.analysis.tables.rendering.column_parts import BORDERS, split_columns
 from roboirg.evaluation.analysis.tables.table import ERROR_MARK, MISSING_MARK
 from roboirg.evaluation.analysis.tables.table_notes import where_played
-from roboirg.evaluation.records.record import Job
-from roboirg.evaluation.records.record_codec import AnyResult
+from roboirg.evaluation.records.record import Job, Summary
 from roboirg.util.console_width import line_width, widen
 
 NO_GAP = "–"
@@ -79,7 +78,7 @@ class RunTable:
     heard: tuple[str, ...] = ()
 
 
-def make_run_tables(records: Sequence[AnyResult], planned: Sequence[Job] = ()) -> list[RunTable]:
+def make_run_tables(records: Sequence[Summary], planned: Sequence[Job] = ()) -> list[RunTable]:
     """Make a table for each policy run, in the order of the plan.
 
     Args:
@@ -116,10 +115,10 @@ def print_run_tables(tables: Sequence[RunTable], console: Console) -> None:
 
 
 def print_failures(
-    records: Iterable[AnyResult], console: Console, max_failures: int = MAX_FAILURES
+    records: Iterable[Summary], console: Console, max_failures: int = MAX_FAILURES
 ) -> None:
     """List the episodes of each policy without success and the cause; count the rest."""
-    by_policy: dict[str, list[AnyResult]] = {}
+    by_policy: dict[str, list[Summary]] = {}
     for record in records:
         if record.outcome != "success":
             by_policy.setdefault(record.policy, []).append(record)
@@ -136,7 +135,7 @@ def print_failures(
             console.print(f"  and {len(failures) - max_failures} more", highlight=False)
 
 
-def failure_text(record: AnyResult) -> str:
+def failure_text(record: Summary) -> str:
     """Return the episode, its instruction options and the cause of its failure."""
     mark = f" {ERROR_MARK}" if record.outcome == "error" else ""
     where = f"{record.task} {record.split}/{record.episode} {options_label(record.options)}"

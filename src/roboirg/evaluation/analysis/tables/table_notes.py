@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 
 from roboirg.core.instruction_options import InstructionOptions
-from roboirg.core.plain_text import counted
+from roboirg.core.plain_text import counted, verb_for
 from roboirg.evaluation.analysis.comparability import AllDifferences, comparison_notes
 from roboirg.evaluation.analysis.published import TRIALS, RateTable
 from roboirg.evaluation.analysis.stats.cells import (
@@ -30,6 +30,7 @@ from roboirg.evaluation.analysis.tables.table import (
     Entry,
     Row,
 )
+from roboirg.tasks import every_task
 
 RATES_NOTE = (
     "Success rate in percent, the mean over policy seeds; averages are unweighted means over tasks."
@@ -61,6 +62,7 @@ def notes_of(
         *_incomplete_notes(shown.values(), entries),
         *_version_notes(policy_runs),
         *_omission_notes(which, cells, tasks),
+        *_absent_notes({key.task for key in shown}),
         *_twin_notes(rows),
         *_published_notes(which, rows),
         *comparison_notes(
@@ -88,6 +90,15 @@ def _sign_notes(which: RateTable, entries: Sequence[Entry]) -> list[str]:
     if any(not entry.applies for entry in entries):
         notes.append(f"{NOT_APPLICABLE} the setting is not defined for the task.")
     return notes
+
+
+def _absent_notes(names: Iterable[str]) -> list[str]:
+    """Say which tasks are not installed here."""
+    absent = sorted(set(names) - every_task().keys())
+    if not absent:
+        return []
+    listed = ", ".join(absent)
+    return [f"The package with {listed} is not installed: what its runs lack is not counted."]
 
 
 def _condition_notes(conditions: Sequence[EvalConditions]) -> list[str]:
@@ -137,12 +148,12 @@ def _incomplete_notes(cells: Iterable[CellResults], entries: Iterable[Entry]) ->
     notes = []
     errors, missing = sum(one.errors for one in found), sum(one.missing for one in found)
     if errors:
-        verb = "is" if errors == 1 else "are"
+        verb = verb_for(errors, "are")
         notes.append(
             f"{ERROR_MARK} {counted(errors, 'trial')} ended in an error and {verb} in no rate."
         )
     if missing:
-        verb = "is" if missing == 1 else "are"
+        verb = verb_for(missing, "are")
         notes.append(
             f"{MISSING_MARK} {counted(missing, 'trial')} of the plan {verb} still to be played."
         )

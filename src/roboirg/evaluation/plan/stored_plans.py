@@ -1,0 +1,98 @@
+"""The plans that a run's folder keeps beside its records: the newest one, and earlier ones."""
+
+from __future__ import annotations
+
+import json
+import secrets
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+from roboirg.core.errors import InvalidValueError
+from roboirg.core.plain_text import is_encodable
+from roboirg.evaluation.plan.plan import Plan
+from roboirg.evaluation.records.record_codec import harder_setting
+from roboirg.evaluation.records.run_files import (
+    MOST_PLAN_BYTES,
+    PLAN_FILE,
+    earlier_plans,
+    store_plan,
+)
+from roboirg.util.regular_file import read_regular
+from roboirg.util.short_hash import short_hash
+
+
+def with_secret(plan: Plan, folder: Path) -> Plan:
+    """Return a plan whose `seed_secret` is known: its own, the folder's, or a new one.
+
+    A run that began without one goes on without.
+    """
+    if plan.seed_secret is not None:
+        return plan
+    before = read_plan(folder)
+    secret = secrets.token_hex(16) if before is None else before.seed_secret or ""
+    return plan.model_copy(update={"seed_secret": secret})
+
+
+def write_plan(plan: Plan, folder: Path) -> None:
+    """Write the newest plan of a folder beside its records; earlier ones stay in ``plans/``."""
+    store_plan((plan.model_dump_json(indent=2) + "\n").encode(), folder)
+
+
+def read_plan(folder: Path) -> Plan | None:
+    """Return the newest plan of a folder; None if it is missing or of an unknown version."""
+    return next((plan for plan in map(_parse, _stored([folder / PLAN_FILE])) if plan), None)
+
+
+def read_plans(folder: Path) -> tuple[Plan, ...]:
+    """Return the plans whose episodes a folder should hold.
+
+    That is the newest, or in a merged run those of its parts.
+    """
+    newest = read_plan(folder)
+    return read_earlier_plans(folder) if newest is None else (newest,)
+
+
+def read_earlier_plans(folder: Path) -> tuple[Plan, ...]:
+    """Return the plans of earlier commands, or of merged runs, that can be read."""
+    found = map(_parse, _stored(earlier_plans(folder)))
+    return tuple(plan for plan in found if plan is not None)
+
+
+def kept_fingerprints(folder: Path) -> frozenset[str]:
+    """Return the fingerprints, as in records, of the newest and the earlier plans of a folder."""
+    stored = _stored([folder / PLAN_FILE, *earlier_plans(folder)])
+    # Of what was written: a plan of an older schema has other fields now.
+    return frozenset(
+        short_hash(json.dumps(data, ensure_ascii=False, separators=(",", ":"))) for data in stored
+    )
+
+
+def from_schema_3(data: dict[str, Any]) -> dict[str, Any]:
+    """Return the fields of a plan, in which schema 3 wrote harder settings as options."""
+    data = dict(data)
+    rival, reasoning = data.pop("rival", "none"), data.pop("reasoning", "plain")
+    if isinstance(data.get("settings"), list):
+        harder = [harder_setting(one, rival=rival, reasoning=reasoning) for one in data["settings"]]
+        data["settings"] = harder
+    return data
+
+
+def _stored(paths: list[Path]) -> Iterator[dict[str, Any]]:
+    """Yield the contents of the files that hold a JSON object."""
+    for path in paths:
+        try:
+            data = json.loads(read_regular(path, MOST_PLAN_BYTES))
+            can_be_written = is_encodable(json.dumps(data, ensure_ascii=False))
+        except (OSError, ValueError, RecursionError, InvalidValueError):
+            continue
+        if isinstance(data, dict) and can_be_written:
+            yield data
+
+
+def _parse(data: dict[str, Any]) -> Plan | None:
+    try:
+        # As JSON, in which a list is a tuple and nothing else is converted.
+        return Plan.model_validate_json(json.dumps(from_schema_3(data)))
+    except (ValueError, InvalidValueError):
+        return None

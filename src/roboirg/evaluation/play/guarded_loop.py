@@ -1,0 +1,110 @@
+"""The loop of a rollout: guarded calls that fill the result and the video."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from roboirg.core.actions import ActionSpace
+from roboirg.core.delivery import SpokenInstruction
+from roboirg.evaluation.play.call_guard import CallGuard
+from roboirg.evaluation.play.rollout_result import RolloutResult
+from roboirg.evaluation.play.video_writer import FrameSink
+from roboirg.evaluation.policy_calls import next_actions, policy_metadata
+from roboirg.evaluation.records.record import Job
+from roboirg.policies.contract.base import Policy
+from roboirg.policies.contract.play import EpisodeLoop
+
+if TYPE_CHECKING:
+    from roboirg.envs.environment import RoboIRGEnv
+
+NO_RENDER_DEVICE = "none"
+"""Name of the device of an environment that renders nothing."""
+
+
+class GuardedLoop(EpisodeLoop):
+    """Plays a job's episode.
+
+    Args:
+        env: the environment of the job.
+        policy: answers the observations.
+        job: what is played.
+        space: of the policy's actions.
+        result: is filled in.
+        guard: attributes errors and measures calls.
+        writer: gets the frames of a video.
+    """
+
+    def __init__(
+        self,
+        env: RoboIRGEnv,
+        policy: Policy,
+        job: Job,
+        space: ActionSpace,
+        result: RolloutResult,
+        guard: CallGuard,
+        writer: FrameSink | None = None,
+    ) -> None:
+        super().__init__(env, policy)
+        self._job, self._space, self._writer = job, space, writer
+        self._result, self._guard = result, guard
+
+    def play(self) -> dict[str, Any]:
+        """Play the episode, and record its status."""
+        info, result = super().play(), self._result
+        if not result.record_status(info["status"], info.get("cause"), self._job.max_steps):
+            result.cause = f"environment: the episode ended with status {info['status']!r}"
+        return info
+
+    def begin(self) -> tuple[dict[str, Any], dict[str, Any]]:
+        """Start the episode and the policy."""
+        env, result, writer = self.env, self._result, self._writer
+        with self._guard.environment("env_reset"):
+            result.instruction = env.instruction
+            first = SpokenInstruction(env.instruction.turns, self._job.delivery).prompt
+            if writer is not None:
+                writer.caption, writer.longest_caption = first, env.instruction.text
+                env.set_frame_hook(writer.add_frame, every=writer.options.every)
+            observation, info = env.reset()
+            if writer is not None:
+                writer.add_frame(env)  # the policy's first observation
+            device = str(env.render_device)
+            result.render_device = None if device == NO_RENDER_DEVICE else device
+            result.demonstration_steps = len(info["demonstration"]["joint_positions"])
+            result.demonstration_source = info["demonstration_source"]
+            result.policy_start_step = int(info["elapsed_steps"])
+            result.add_events(info)
+            result.heard += info["heard"]
+        with self._guard.policy("policy's reset()", "policy_reset"):
+            self.start_policy(first, info["demonstration"])
+            result.policy_metadata = policy_metadata(self.policy)
+        result.action_space = self._space.name
+        return observation, info
+
+    def act(self, observation: dict[str, Any]) -> NDArray[np.float64]:
+        """Return the policy's next actions, checked."""
+        with self._guard.policy("policy's act()", "policy_act"):
+            return next_actions(self.policy, observation, self._space)
+
+    def execute(self, actions: ArrayLike) -> tuple[dict[str, Any], dict[str, Any]]:
+        """Execute actions, and keep those that were executed."""
+        rows, result = np.asarray(actions), self._result
+        with self._guard.environment("env_step"):
+            done = self.env.executed_actions
+            observation, info = super().execute(rows)
+            result.answers.append(rows[: self.env.executed_actions - done])
+        result.steps = int(info["steps"])
+        result.add_events(info)
+        return observation, info
+
+    def hear(self, utterances: Sequence[Mapping[str, Any]]) -> None:
+        """Let the policy hear what has just been said, and write it under the video."""
+        self._result.heard += utterances
+        if self._writer is not None:
+            self._writer.caption = " ".join(one["text"] for one in self._result.heard)
+        with self._guard.policy("policy's hear()", "policy_hear"):
+            super().hear(utterances)
+            self._result.policy_metadata = policy_metadata(self.policy)

@@ -1,0 +1,63 @@
+"""Runs with a task, a setting and a policy of packages that are not installed here."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+from evaluation_fakes import FakePlay, small_plan
+from msgspec.structs import replace
+from typer.testing import CliRunner
+
+from roboirg.evaluation.plan.plan import Plan
+from roboirg.evaluation.records.record import Record
+from roboirg.evaluation.records.store import RecordStore
+from roboirg.main import app
+
+THEIRS = {"PickXtimes": "TheirTask", "direct": "theirs", "random": "their_package:Policy"}
+
+
+@pytest.fixture
+def run(tmp_path: Path) -> Path:
+    plan = small_plan(3)
+    with RecordStore(tmp_path) as store:
+        for job in plan.jobs()[:-1]:
+            record = FakePlay()(job)
+            names = {name: THEIRS.get(value, value) for name, value in _names(record).items()}
+            store.append(replace(record, **names))
+    _write_plan(plan, tmp_path)
+    return tmp_path
+
+
+def _names(record: Record) -> dict[str, str]:
+    return {"task": record.task, "setting": record.setting, "policy": record.policy}
+
+
+def _write_plan(plan: Plan, folder: Path) -> None:
+    text = json.dumps(json.loads(plan.model_dump_json()))
+    for ours, theirs in THEIRS.items():
+        text = text.replace(f'"{ours}"', f'"{theirs}"')
+    (folder / "plan.json").write_text(text)
+
+
+def call(*words: object) -> str:
+    result = CliRunner().invoke(app, [str(word) for word in words], catch_exceptions=False)
+    assert result.exit_code == 0, result.output
+    return result.output
+
+
+def test_its_tables_are_shown(run: Path) -> None:
+    shown = " ".join(call("tables", run, "--which", "other").split())
+    assert "TheirTask" in shown
+    assert "their_package:Policy" in shown
+    assert (
+        "The package with TheirTask is not installed: what its runs lack is not counted." in shown
+    )
+
+
+def test_its_page_is_made(run: Path) -> None:
+    call("report", run)
+    page = (run / "report.html").read_text()
+    assert "TheirTask" in page
+    assert "theirs" in page

@@ -1,0 +1,618 @@
+"""Malformed runs, packs, plans and wording files: one sentence or an answer, and nothing outside.
+
+Each attack changes an honest run, then reads it. Without a simulator; what replays say about forged
+actions is in test_verification.py and test_forged_runs.py.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import io
+import itertools
+import json
+import os
+import re
+import shutil
+import signal
+import struct
+import zipfile
+from collections.abc import Callable, Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from evaluation_fakes import fake_result, small_plan
+
+from roboirg.apps.leaderboard.board_page import read_packs, render_board
+from roboirg.apps.leaderboard.packing import MANIFEST, PACK_SUFFIX, opened_run, pack_run
+from roboirg.apps.leaderboard.run_verification import verify_run
+from roboirg.core.errors import RoboIRGError
+from roboirg.evaluation.analysis.page.report import write_report
+from roboirg.evaluation.analysis.stats.flips import read_flips
+from roboirg.evaluation.plan.plan_file import read_plan_file
+from roboirg.evaluation.plan.stored_plans import read_plans, write_plan
+from roboirg.evaluation.play.rollout_result import make_record
+from roboirg.evaluation.records.action_log import ActionLog, read_actions, write_actions
+from roboirg.evaluation.records.episode_log import log_path
+from roboirg.evaluation.records.merging import merge_runs
+from roboirg.evaluation.records.parquet import write_parquet
+from roboirg.evaluation.records.run_files import PLAN_FILE
+from roboirg.evaluation.records.store import (
+    RECORDS_FILE,
+    RecordStore,
+    iterate_records,
+    read_records,
+)
+from roboirg.language.wordings.wording_file import read_wordings
+
+CANARY = "canary of another folder"
+LONGEST_MESSAGE = 1_500
+PATIENCE_S = 60
+"""Far more than any of these takes; a reader that blocks on a pipe would never end."""
+
+Change = Callable[[Path], object]
+Reader = Callable[[Path], object]
+
+
+@pytest.fixture(scope="module")
+def honest(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("honest") / "run"
+    plan = small_plan(episodes=1)
+    with RecordStore(folder) as store:
+        for job in plan.jobs():
+            log = ActionLog("joint_angle", np.ones((3, 8)), np.zeros(1, np.int32), np.ones(2))
+            video = f"videos/{job.slug}.mp4"
+            digest = write_actions(log, folder)
+            record = make_record(
+                job,
+                fake_result(job),
+                started_at="2026-11-23T12:00:00+00:00",
+                video=video,
+                plan=plan.fingerprint,
+                action_log=digest,
+            )
+            store.append(record)
+            for name, content in ((video, b"film"), (log_path(Path(), job.slug), b"printed")):
+                (folder / name).parent.mkdir(exist_ok=True)
+                (folder / name).write_bytes(content)
+            (folder / video).with_suffix(".jpg").write_bytes(b"poster")
+    write_plan(plan, folder)
+    return folder
+
+
+@pytest.fixture
+def run(honest: Path, tmp_path: Path) -> Path:
+    (tmp_path / "secret.txt").write_text(CANARY)
+    return Path(shutil.copytree(honest, tmp_path / "run"))
+
+
+@pytest.fixture(autouse=True)
+def _patience() -> Iterator[None]:
+    def stop(*_: object) -> None:
+        raise AssertionError("the reader blocks")
+
+    before = signal.signal(signal.SIGALRM, stop)
+    signal.alarm(PATIENCE_S)
+    yield
+    signal.alarm(0)
+    signal.signal(signal.SIGALRM, before)
+
+
+def pack(run: Path) -> Path:
+    out = run.parent / f"mine{PACK_SUFFIX}"
+    pack_run(run, out, videos=True, logs=True)
+    return out
+
+
+def merge(run: Path) -> Path:
+    merge_runs([run], run.parent / "merged")
+    return run.parent / "merged"
+
+
+def export(run: Path) -> object:
+    pytest.importorskip("pyarrow")
+    return write_parquet(iterate_records(run), run.parent / "table.parquet")
+
+
+def report(run: Path) -> Path:
+    pytest.importorskip("jinja2")
+    return write_report(run)
+
+
+def verify(run: Path) -> str:
+    return "\n".join(
+        finding for check in verify_run(run, sample=0).checks for finding in check.findings
+    )
+
+
+def refusal(reader: Reader, path: Path) -> str:
+    """Return the one sentence in which something is refused."""
+    with pytest.raises(RoboIRGError) as caught:
+        reader(path)
+    return fit(str(caught.value))
+
+
+def fit(message: str) -> str:
+    assert len(message) < LONGEST_MESSAGE
+    assert "matching regex" not in message
+    return message
+
+
+def line_of(run: Path) -> dict[str, Any]:
+    found: dict[str, Any] = json.loads((run / RECORDS_FILE).read_text().splitlines()[0])
+    return found
+
+
+def record(**changes: object) -> Change:
+    def change(run: Path) -> None:
+        lines = (run / RECORDS_FILE).read_text().splitlines()
+        lines[0] = json.dumps({**json.loads(lines[0]), **changes})
+        (run / RECORDS_FILE).write_text("\n".join(lines) + "\n")
+
+    return change
+
+
+def raw(old: bytes, new: bytes) -> Change:
+    def change(run: Path) -> None:
+        content = (run / RECORDS_FILE).read_bytes()
+        assert old in content
+        (run / RECORDS_FILE).write_bytes(content.replace(old, new, 1))
+
+    return change
+
+
+def replaced(name: str, make: Callable[[Path], object]) -> Change:
+    """Put something else in the place of a file or folder."""
+
+    def change(run: Path) -> None:
+        path = run / name
+        path.parent.mkdir(exist_ok=True)
+        if path.is_dir():
+            shutil.rmtree(path)
+        path.unlink(missing_ok=True)
+        make(path)
+
+    return change
+
+
+def link(target: str) -> Callable[[Path], None]:
+    return lambda path: path.symlink_to(target)
+
+
+def sparse(size: int) -> Callable[[Path], None]:
+    def make(path: Path) -> None:
+        path.touch()
+        os.truncate(path, size)
+
+    return make
+
+
+def planned(**changes: object) -> Change:
+    def change(run: Path) -> None:
+        plan = json.loads((run / PLAN_FILE).read_text())
+        (run / PLAN_FILE).write_text(json.dumps({**plan, **changes}))
+
+    return change
+
+
+REFUSED_RECORDS: Mapping[str, tuple[Change, str]] = {
+    "step limit of 10**30": (record(max_steps=10**30), r"\$\.max_steps"),
+    "seed of 10**40": (record(seed=10**40), r"\$\.seed"),
+    "step 10**25": (record(steps=10**25), r"\$\.steps"),
+    "a million stages": (record(stages=[1] * 1_000_000), "length <= 100"),
+    "cause of 5 MB": (record(outcome="failure", cause="x" * 5_000_000), r"\$\.cause"),
+    "version in bidi marks": (record(language_version="\u202e0.0.2"), "controls a terminal"),
+    "policy with a line end": (record(policy="random\n"), "controls a terminal"),
+    "video with a line end": (record(video="videos/a.mp4\n"), "path below"),
+    "video outside": (record(video="videos/../../secret.mp4"), "path below"),
+    "line of 65 MiB": (
+        lambda run: os.truncate(run / RECORDS_FILE, 65 << 20),
+        "line 3 has more than",
+    ),
+    "pipe": (replaced(RECORDS_FILE, os.mkfifo), "no regular file"),
+    "circle of links": (replaced(RECORDS_FILE, link(RECORDS_FILE)), "symbolic links"),
+}
+
+
+@pytest.mark.parametrize(
+    "reader", [read_records, pack, merge, export], ids=lambda one: one.__name__
+)
+@pytest.mark.parametrize("name", REFUSED_RECORDS)
+def test_records_are_refused(name: str, reader: Reader, run: Path) -> None:
+    change, says = REFUSED_RECORDS[name]
+    change(run)
+    message = refusal(reader, run)
+    assert re.search(says, message)
+    assert RECORDS_FILE in message
+
+
+def test_an_event_at_step_10_to_25_is_refused(run: Path) -> None:
+    record(events=[{"step": 10**25, "kind": "home", "subject": "robot"}])(run)
+    for reader in (read_records, merge, export, verify):
+        assert "$.events[0].step" in refusal(reader, run)
+
+
+DAMAGED_LINES: Mapping[str, Change] = {
+    "bytes that are no UTF-8": raw(b'"policy":"random"', b'"policy":"\xff\xfe"'),
+    "overlong UTF-8": raw(b'"video":"videos/', b'"video":"videos/\xc0\xae\xc0\xae/'),
+    "lone surrogate": raw(b'"policy":"random"', b'"policy":"\\udfff"'),
+    "deep nesting": raw(b'"policy_metadata":{', b'"policy_metadata":{"a":' + b"[" * 200_000),
+}
+
+
+@pytest.mark.parametrize("name", DAMAGED_LINES)
+def test_damaged_lines_are_skipped(name: str, run: Path) -> None:
+    DAMAGED_LINES[name](run)
+    assert len(read_records(run)) == 1
+
+
+@pytest.mark.parametrize("tail", [b"[" * 200_000, b"9" * 5_000, b"\xed\xa0\x80", b"\0" * 1_000])
+def test_a_torn_line_of_any_bytes_is_left_out(tail: bytes, run: Path) -> None:
+    with (run / RECORDS_FILE).open("ab") as file:
+        file.write(tail)
+    assert len(read_records(run)) == 2
+    with RecordStore(run) as store:
+        assert store.torn == tail
+    assert (run / RECORDS_FILE).read_bytes().endswith(b"}\n")
+
+
+def _slug(run: Path) -> str:
+    return Path(line_of(run)["video"]).stem
+
+
+def _action_name(run: Path) -> str:
+    digest = line_of(run)["action_log"]
+    return f"actions/{digest[:2]}/{digest}.npz"
+
+
+def _linked(name: Callable[[Path], str], target: str) -> Change:
+    return lambda run: replaced(name(run), link(target))(run)
+
+
+def _moved_out(name: str) -> Change:
+    def change(run: Path) -> None:
+        shutil.move(run / name, run.parent / "outside")
+        (run / name).symlink_to("../outside")
+
+    return change
+
+
+LEADING_OUT: Mapping[str, Change] = {
+    "log": _linked(lambda run: f"logs/{_slug(run)}.txt", "../../secret.txt"),
+    "video": _linked(lambda run: f"videos/{_slug(run)}.mp4", "../../secret.txt"),
+    "poster": _linked(lambda run: f"videos/{_slug(run)}.jpg", "../../secret.txt"),
+    "actions": _linked(_action_name, "../../../secret.txt"),
+    "plan": replaced(PLAN_FILE, link("../secret.txt")),
+    "earlier plan": replaced("plans/1.json", link("../../secret.txt")),
+    "folder of logs": _moved_out("logs"),
+    "folder of actions": _moved_out("actions"),
+    "folder of videos": _moved_out("videos"),
+}
+
+
+@pytest.mark.parametrize("reader", [pack, merge], ids=lambda one: one.__name__)
+@pytest.mark.parametrize("name", LEADING_OUT)
+def test_links_that_lead_out_are_not_followed(name: str, reader: Reader, run: Path) -> None:
+    LEADING_OUT[name](run)
+    assert "links lead elsewhere" in refusal(reader, run)
+    written = [path for path in run.parent.rglob("*") if path.is_file() and not path.is_symlink()]
+    copies = [path for path in written if CANARY.encode() in path.read_bytes()]
+    assert copies == [run.parent / "secret.txt"]
+
+
+@pytest.mark.parametrize("name", ["video", "poster", "folder of videos"])
+def test_the_page_embeds_nothing_from_outside(name: str, run: Path) -> None:
+    LEADING_OUT[name](run)
+    assert "links lead elsewhere" in refusal(report, run)
+
+
+def test_a_circle_of_links_is_no_file_of_a_run(run: Path) -> None:
+    video = f"videos/{_slug(run)}.mp4"
+    replaced(video, link(Path(video).name))(run)
+    assert "links lead elsewhere" in refusal(report, run)
+
+
+def test_a_huge_poster_is_not_embedded(run: Path) -> None:
+    replaced(f"videos/{_slug(run)}.jpg", sparse(10 << 30))(run)
+    assert report(run).stat().st_size < 20 << 20
+
+
+def test_a_run_too_large_for_a_pack_is_refused_before_it_is_read(run: Path) -> None:
+    replaced("logs/large.txt", sparse(1 << 40))(run)
+    assert "logs/large.txt" in refusal(pack, run)
+    assert not list(run.parent.glob("*.part"))
+
+
+def test_hidden_files_and_pipes_are_not_packed(run: Path) -> None:
+    (run / "logs" / ".DS_Store").touch()
+    os.mkfifo(run / "logs" / "pipe.txt")
+    with opened_run(pack(run)) as folder:
+        names = {path.name for path in folder.rglob("*")}
+    assert not names & {".DS_Store", "pipe.txt"}
+    assert f"{_slug(run)}.txt" in names
+
+
+UNREAD_PLANS: Mapping[str, Change] = {
+    "600,000 seeds in two settings": planned(policy_seeds=list(range(600_000))),
+    "600,000 episodes in two settings": planned(episodes=list(range(600_000))),
+    "no seeds": planned(policy_seeds=[]),
+    "policy that controls the terminal": planned(policies=["\x1b[31m"]),
+    "task that controls the terminal": planned(tasks=["\u202eksat"]),
+    "secret of half a character": planned(seed_secret="\ud800"),  # noqa: S106
+    "deep nesting": replaced(PLAN_FILE, lambda path: path.write_text("[" * 200_000)),
+    "pipe": replaced(PLAN_FILE, os.mkfifo),
+    "3 GB": replaced(PLAN_FILE, sparse(3 << 30)),
+}
+
+
+@pytest.mark.parametrize("name", UNREAD_PLANS)
+def test_plans_that_cannot_be_are_missing(name: str, run: Path) -> None:
+    UNREAD_PLANS[name](run)
+    assert read_plans(run) == ()
+    missing = verify_run(run, sample=0).missing
+    assert any(one.startswith("the plan ") for one in missing)
+
+
+def test_a_plan_of_3_gb_is_neither_merged_nor_played(run: Path) -> None:
+    replaced(PLAN_FILE, sparse(3 << 30))(run)
+    for reader in (merge, lambda run: read_plan_file(str(run / PLAN_FILE))):
+        assert re.search(r"plan\.json has more than", refusal(reader, run))
+
+
+LAUGHS = "a: &a [x, x]\n" + "".join(
+    f"{name}: &{name} [{', '.join([f'*{before}'] * 10)}]\n"
+    for before, name in itertools.pairwise("abcdefghi")
+)
+
+PLAN_FILES: Mapping[str, tuple[str, str]] = {
+    "billion laughs": (LAUGHS + "tasks: *i\n", "alias"),
+    "list in itself": ("tasks: &a [*a]\n", "alias"),
+    "Python object": ("tasks: !!python/object/apply:os.abort []\n", "not valid YAML"),
+    "deep nesting": ("tasks: " + "[" * 20_000, "nested too deeply"),
+    "number of 10,000 digits": ("max_steps: " + "9" * 10_000, "not valid YAML"),
+    "date that cannot be": ("split: 2020-99-99", "not valid YAML"),
+    "key twice": ("tasks: all\ntasks: all\n", "again"),
+    "list as key": ("? [tasks]\n: all\n", "not valid YAML"),
+}
+
+
+@pytest.mark.parametrize("make", [os.mkfifo, link("/dev/zero")], ids=["pipe", "device"])
+def test_plan_files_are_regular_files(make: Callable[[Path], object], tmp_path: Path) -> None:
+    make(tmp_path / "plan.yaml")
+    message = refusal(lambda folder: read_plan_file(str(folder / "plan.yaml")), tmp_path)
+    assert message.endswith("is no regular file.")
+
+
+@pytest.mark.parametrize("name", PLAN_FILES)
+def test_plan_files_are_refused(name: str, tmp_path: Path) -> None:
+    content, says = PLAN_FILES[name]
+    path = tmp_path / "plan.yaml"
+    path.write_text(content)
+    message = refusal(lambda path: read_plan_file(str(path)), path)
+    assert says in message
+    assert "plan.yaml" in message
+
+
+def _npy(header: str, payload: bytes = b"") -> bytes:
+    text = header.encode() + b" " * (-(len(header) + 11) % 64) + b"\n"
+    return b"\x93NUMPY\x01\x00" + struct.pack("<H", len(text)) + text + payload
+
+
+def _header(shape: str, kind: str = "'<f8'") -> str:
+    return f"{{'descr': {kind}, 'fortran_order': False, 'shape': {shape}, }}"
+
+
+def _rows(content: bytes) -> Callable[[bytes], bytes]:
+    def build(good: bytes) -> bytes:
+        with zipfile.ZipFile(io.BytesIO(good)) as archive:
+            members = {name: archive.read(name) for name in archive.namelist()}
+        return zipped({**members, "rows.npy": content})
+
+    return build
+
+
+def zipped(members: Mapping[str, bytes]) -> bytes:
+    file = io.BytesIO()
+    with zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED) as archive:
+        for name, content in members.items():
+            archive.writestr(name, content)
+    return file.getvalue()
+
+
+def _headers_with(offset: int, value: int) -> Callable[[bytes], bytes]:
+    """Change a number in all headers of an archive, local and central."""
+
+    def build(good: bytes) -> bytes:
+        content = bytearray(good)
+        for mark, shift in ((b"PK\x03\x04", 0), (b"PK\x01\x02", 2)):
+            for found in re.finditer(re.escape(mark), good):
+                struct.pack_into("<H", content, found.start() + offset + shift, value)
+        return bytes(content)
+
+    return build
+
+
+ENCRYPTED, UNKNOWN_METHOD = _headers_with(6, 1), _headers_with(8, 99)
+
+ACTION_FILES: Mapping[str, Callable[[bytes], bytes]] = {
+    "10**12 rows": _rows(_npy(_header("(1000000000000, 8)"))),
+    "10**30 rows": _rows(_npy(_header(f"({10**30}, 8)"))),
+    "shape of truth values": _rows(_npy(_header("(True, 8)"), bytes(64))),
+    "rows of structs": _rows(_npy(_header("(20,)", "[('a', '<f8'), ('b', '<f8')]"), bytes(320))),
+    "complex rows": _rows(_npy(_header("(3, 8)", "'<c16'"), bytes(384))),
+    "dates": _rows(_npy(_header("(3, 8)", "'<M8[s]'"), bytes(192))),
+    "pickled rows": _rows(_npy(_header("(1,)", "'|O'"), b"\x80\x04cos\nsystem\n.")),
+    "code in a header": _rows(_npy("__import__('os').abort()")),
+    "encrypted": ENCRYPTED,
+    "unknown compression": UNKNOWN_METHOD,
+    "bomb": _rows(_npy(_header("(3, 8)"), bytes(20_000_000))),
+    "no archive": lambda _good: b"x" * 100,
+}
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("name", ACTION_FILES)
+def test_action_files_are_refused(name: str, run: Path) -> None:
+    path = run / _action_name(run)
+    path.write_bytes(ACTION_FILES[name](path.read_bytes()))
+    digest = line_of(run)["action_log"]
+    assert "is no action log" in refusal(lambda folder: read_actions(folder, digest), run)
+    assert fit(verify(run)).count("is no action log") == 2  # both records name it
+
+
+def _repacked(change: Callable[[dict[str, bytes]], object]) -> Callable[[bytes], bytes]:
+    """Change the files of a pack; its manifest then names what there is."""
+
+    def build(good: bytes) -> bytes:
+        with zipfile.ZipFile(io.BytesIO(good)) as archive:
+            members = {name: archive.read(name) for name in archive.namelist()}
+        change(members)
+        manifest = json.loads(members.pop(MANIFEST))
+        manifest["files"] = {
+            name: hashlib.sha256(content).hexdigest() for name, content in members.items()
+        }
+        return zipped({MANIFEST: json.dumps(manifest).encode(), **members})
+
+    return build
+
+
+def _with(name: str) -> Callable[[bytes], bytes]:
+    return _repacked(lambda members: members.update({name: b"evil"}))
+
+
+PACKS: Mapping[str, tuple[Callable[[bytes], bytes], str]] = {
+    "absolute path": (_with("/var/evil"), "no file of a run"),
+    "path that leaves": (_with("actions/../../evil"), "no file of a run"),
+    "Windows path": (_with("actions\\..\\..\\evil"), "no file of a run"),
+    "name in bidi marks": (_with("logs/\u202egol"), "no file of a run"),
+    "name of 60,000 letters": (_with("logs/" + "a" * 60_000), "no file of a run"),
+    "name with a line end": (_with("logs/a.txt\n"), "no file of a run"),
+    "encrypted": (ENCRYPTED, "no packed run"),
+    "unknown compression": (UNKNOWN_METHOD, "no packed run"),
+    "cut short": (lambda good: good[:-100], "no packed run"),
+    "records of 70 MB of blanks": (
+        _repacked(lambda all_: all_.update({RECORDS_FILE: b" " * 70_000_000})),
+        "more than",
+    ),
+}
+
+
+@pytest.mark.parametrize("name", PACKS)
+def test_packs_are_refused(name: str, run: Path) -> None:
+    build, says = PACKS[name]
+    path = pack(run)
+    path.write_bytes(build(path.read_bytes()))
+    before = sorted(run.parent.rglob("*"))
+
+    def read(path: Path) -> None:
+        with opened_run(path) as folder:
+            verify_run(folder, sample=0)
+
+    assert says in refusal(read, path)
+    assert sorted(run.parent.rglob("*")) == before
+
+
+@pytest.mark.parametrize(
+    ("make", "says"),
+    [
+        (os.mkfifo, "no regular file"),
+        (Path.mkdir, "no records"),
+        (link("/dev/zero"), "no regular file"),
+        (link("nowhere"), "No such file"),
+    ],
+    ids=["pipe", "folder", "device", "dangling link"],
+)
+def test_a_board_names_what_is_no_pack(
+    make: Callable[[Path], object], says: str, tmp_path: Path
+) -> None:
+    make(tmp_path / f"odd{PACK_SUFFIX}")
+    message = refusal(read_packs, tmp_path)
+    assert says in message
+    assert f"odd{PACK_SUFFIX}" in message
+
+
+@pytest.mark.parametrize("name", [b"\xff", b"\x1b[31mx", b'"><script>alert(1)<'])
+def test_names_of_packs_do_not_get_into_the_page_as_they_are(name: bytes, run: Path) -> None:
+    pytest.importorskip("jinja2")
+    folder = run.parent / "packs"
+    folder.mkdir()
+    shutil.move(pack(run), os.fsencode(folder) + b"/" + name + PACK_SUFFIX.encode())
+    page = render_board(read_packs(folder))
+    assert "\x1b" not in page
+    assert "<script>alert(1)" not in page
+    assert page.encode()
+
+
+@pytest.mark.parametrize(
+    "make",
+    [os.mkfifo, Path.mkdir, link("/dev/zero"), lambda path: path.write_text("[" * 200_000)],
+    ids=["pipe", "folder", "device", "deep nesting"],
+)
+def test_remembered_checks_that_cannot_be_read_are_forgotten(
+    make: Callable[[Path], object], run: Path
+) -> None:
+    path = pack(run)
+    make(path.parent / "checks.json")
+    (read,) = read_packs(path.parent)
+    assert read.check is None
+
+
+@pytest.mark.parametrize(
+    "make",
+    [os.mkfifo, lambda path: path.write_text("[" * 200_000), link("/dev/zero")],
+    ids=["pipe", "deep nesting", "device"],
+)
+def test_flips_that_cannot_be_read_are_refused(make: Callable[[Path], object], run: Path) -> None:
+    replaced("flips.json", make)(run)
+    assert "flips.json" in refusal(read_flips, run)
+
+
+WORDINGS = """name = "workshop"
+[PickXtimes.phrases]
+color = { red = "the red cube" }
+[[PickXtimes.commands]]
+text = "pick up {color}"
+"""
+
+WORDING_FILES: Mapping[str, tuple[str, str]] = {
+    "deep list": ("a=" + "[" * 50_000, "not valid TOML"),
+    "deep tables": ("a=" + "{a=" * 3_000 + "1" + "}" * 3_000, "not valid TOML"),
+    "key of 20,000 parts": (".".join("a" * 20_000) + "=1", "more than 20 parts"),
+    "quoted key of 20,000 parts": (".".join(['"a"'] * 20_000) + "=1", "more than 20 parts"),
+    "number of 10,000 digits": ("name=" + "9" * 10_000, "not valid TOML"),
+    "command of 1 MB": (WORDINGS.replace("pick up", "pick up " + "very " * 200_000), "characters"),
+    "phrase of 1 MB": (WORDINGS.replace("red cube", "red " * 250_000), "characters"),
+    "field of an attribute": (WORDINGS.replace("{color}", "{0.__class__}"), "bracket"),
+    "field of an item": (WORDINGS.replace("{color}", "{color.__init__}"), "bracket"),
+    "format specification": (WORDINGS.replace("{color}", "{color:>1000000000}"), "bracket"),
+    "escape in a phrase": (WORDINGS.replace("red cube", "\\u001b[31m"), "must be"),
+    "path as name": (WORDINGS.replace("workshop", "../../evil"), "a word of letters"),
+    "YAML": ("a: &a [x, x]\nb: [*a, *a]\n", "not valid TOML"),
+    "byte order mark": ("\ufeff" + WORDINGS, "not valid TOML"),
+}
+
+
+@pytest.mark.parametrize("name", WORDING_FILES)
+def test_wording_files_are_refused(name: str, tmp_path: Path) -> None:
+    content, says = WORDING_FILES[name]
+    path = tmp_path / "words.toml"
+    path.write_text(content)
+    message = refusal(read_wordings, path)
+    assert says in message
+    assert "words.toml" in message
+
+
+def test_the_honest_wording_file_is_read(tmp_path: Path) -> None:
+    (tmp_path / "words.toml").write_text(WORDINGS)
+    assert set(read_wordings(tmp_path / "words.toml").tasks) == {"PickXtimes"}
+
+
+def test_the_honest_run_goes_through_every_reader(run: Path) -> None:
+    assert len(read_records(run)) == 2
+    assert export(run) == 2
+    assert len(read_records(merge(run))) == 2
+    with opened_run(pack(run)) as folder:
+        assert len(read_records(folder)) == 2
+    assert report(run).is_file()
+    assert len(read_plans(run)) == 1

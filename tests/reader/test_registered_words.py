@@ -1,0 +1,45 @@
+"""Words that another package teaches the interpreter."""
+
+from __future__ import annotations
+
+import pytest
+
+from roboirg.core.errors import InvalidValueError
+from roboirg.reader import interpret, tokens
+from roboirg.reader.vocabulary import register_words
+from roboirg.tasks.splits.splits import get_episode
+
+EPISODE = get_episode("PickXtimes", "test", 3)
+TEXT = "Hoist the {} cube and put it on the target twice, then press the button."
+
+
+@pytest.fixture(autouse=True)
+def own_words(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("roboirg.reader.vocabulary.SYNONYMS", copy := dict(tokens.SYNONYMS))
+    monkeypatch.setattr(tokens, "SYNONYMS", copy)
+
+
+def test_a_taught_word_is_read_as_the_known_one() -> None:
+    color = EPISODE.goal.text("color")
+    text = TEXT.format("vermilion")
+    before = interpret(text, EPISODE.scene, "PickXtimes")
+    assert (before.goals, before.unknown_words) == ((), ("hoist", "vermilion"))
+    for _ in range(2):  # the same again changes nothing
+        register_words({"hoist": "lift", "vermilion": color})
+    known = interpret(TEXT.replace("Hoist", "Lift").format(color), EPISODE.scene, "PickXtimes")
+    assert len(known.goals) == 1
+    assert interpret(text, EPISODE.scene, "PickXtimes") == known
+
+
+@pytest.mark.parametrize(
+    ("word", "meaning", "sentence"),
+    [
+        ("lift", "put", "knows the word 'lift' already"),
+        ("block", "box", "knows the word 'block' already"),
+        ("two", "three", "knows the word 'two' already"),
+        ("hoist", "elevate", "'hoist' is to be read as 'elevate', a word that"),
+    ],
+)
+def test_known_words_keep_their_meaning(word: str, meaning: str, sentence: str) -> None:
+    with pytest.raises(InvalidValueError, match=sentence):
+        register_words({word: meaning})
