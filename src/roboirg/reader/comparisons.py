@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 import itertools
-import re
 from collections.abc import Collection, Iterator
 from typing import NamedTuple
 
 from roboirg.core.episode import Scene, SceneObject
+from roboirg.reader.phrases import Phrases
 
-_COMPARATIVE = re.compile(
-    r"\b(?P<near>nearer|closer)(?: to you)?\b"
-    r"|\b(?:farther|further) (?:over )?(?:to|on) (?:the|your) (?P<side>left|right)\b"
-    r"|\b(?P<far>farther|further)(?: away)?(?: from you)?\b"
-)
+_COMPARATIVE = Phrases({
+    "the cube of another color that is nearer to you": r"\b(?P<near>nearer|closer)(?: to you)?\b",
+    "the one that is farther to the left":
+        r"\b(?:farther|further) (?:over )?(?:to|on) (?:the|your) (?P<side>left|right)\b",
+    "the one that is farther away from you":
+        r"\b(?P<far>farther|further)(?: away)?(?: from you)?\b",
+})  # fmt: skip
 _TIE = 0.01
 """Meters; the same words may mean things that differ by less."""
 
