@@ -47,10 +47,7 @@ def compared_colors(
 ) -> set[str]:
     """Return the colors that a comparison of the two things of other colors can mean.
 
-    Args:
-        comparison: the order.
-        scene: where things stand at first.
-        excluded: colors that are not meant; if there are none, any one may be.
+    If no color is excluded, any one may be. Things are compared where they stand at first.
     """
     colored = [item for item in scene.objects if item.color is not None]
     colors = sorted({str(item.color) for item in colored})

@@ -72,12 +72,9 @@ class OrdinalExpression(NamedTuple):
     def results(
         self, positions: Collection[int], numbers: Collection[int], length: int
     ) -> set[int] | None:
-        """Return the numbers of the possible elements; None for any element.
+        """Return the numbers of the possible elements of a series; None for any element.
 
-        Args:
-            positions: introduced elements.
-            numbers: introduced numbers.
-            length: number of elements of the series.
+        `positions` and `numbers` are the elements and the numbers that the context introduces.
         """
         elements = set(range(1, length + 1))
         if self.value is not None:

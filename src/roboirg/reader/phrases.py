@@ -9,18 +9,16 @@ from collections.abc import Iterator, Mapping
 class Phrases:
     """Ways to say one thing, which are searched in the words of a sentence, joined by spaces.
 
+    Args:
+        ways: a pattern for each way, by an example: words in which it matches, and none before it.
+        before: a pattern that precedes each of them.
+        after: a pattern that follows each of them.
+
     Attributes:
-        by_example: the pattern of each way, by words in which it matches and none before it does.
+        by_example: the whole pattern of each way, by its example.
     """
 
     def __init__(self, ways: Mapping[str, str], *, before: str = "", after: str = "") -> None:
-        """Compile the patterns of all ways.
-
-        Args:
-            ways: the pattern of each way, by its example.
-            before: a pattern that each of them follows.
-            after: a pattern that follows each of them.
-        """
         self.by_example = {
             example: re.compile(f"{before}(?:{way}){after}") for example, way in ways.items()
         }

@@ -46,12 +46,7 @@ class CullableBody:
 
 
 class CullableBodies:
-    """All render bodies of a scene.
-
-    Args:
-        scene: the scene, with all bodies built.
-        cullable_bodies: culling data of some bodies; the others are tested by boxes.
-    """
+    """All render bodies of a finished scene; those without culling data are tested by boxes."""
 
     def __init__(
         self,

@@ -82,9 +82,6 @@ def make_table(
         published: whether to add the paper's rows, and to say which rates can be compared.
         chance: whether to add the chance level below the policies.
         floors: whether to add the chance level, and the expected success of the shortcut listeners.
-
-    Raises:
-        UnknownNameError: the table does not exist.
     """
     for known in WHICH:
         if which == known:
