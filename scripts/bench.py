@@ -31,6 +31,8 @@ def main() -> None:
     keep_freed_memory()
     load = os.getloadavg()[1]
     goals = [one for one in all_goals() if options.only in one.measure.name]
+    if not goals:
+        parser.error(f"no row has {options.only!r} in its name")
     measures = [one.measure for one in goals]
     results = run_measures(measures, options.rounds, partial(print, file=sys.stderr))
     console, table = Console(), results_table(results)

@@ -18,7 +18,7 @@ from selection import slow_but
 import roboirg
 from roboirg.core.actions import ACTION_SPACES
 from roboirg.core.errors import InvalidActionError, InvalidValueError, UnknownNameError
-from roboirg.core.instruction_options import InstructionOptions
+from roboirg.core.instruction_options import OPTION_NAMES, InstructionOptions
 from roboirg.envs.env_options import EnvOptions
 from roboirg.envs.env_settings import EnvSettings
 from roboirg.envs.environment import RoboIRGEnv
@@ -162,9 +162,12 @@ def test_subgoals_change_one_step_after_their_stage_and_only_pointing_ones_are_g
 
 def test_make_is_typed_with_the_options_of_the_environment():
     typed = {name: hint.__forward_arg__ for name, hint in EnvOptions.__annotations__.items()}
-    assert typed == {option.name: option.type for option in dataclasses.fields(EnvSettings)}
+    own = {name: hint for name, hint in typed.items() if name not in OPTION_NAMES}
+    settings = {option.name: option.type for option in dataclasses.fields(EnvSettings)}
+    assert own == {name: hint for name, hint in settings.items() if name != "words"}
+    assert typed.keys() == {*own, *OPTION_NAMES}
     documented = inspect.getdoc(roboirg.make).partition("Keyword Args:")[2].partition("Raises:")[0]
-    assert re.findall(r"^    (\w+): ", documented, re.MULTILINE) == list(typed)
+    assert re.findall(r"^    (\w+): ", documented, re.MULTILINE) == list(own)
     for made in (roboirg.make, roboirg.make_vec, RoboIRGEnv, RoboIRGVectorEnv):
         annotation = inspect.signature(made).parameters["options"].annotation
         assert annotation == "Unpack[EnvOptions]"

@@ -65,5 +65,5 @@ def markdown_table(figures: Sequence[Mapping[str, Any]]) -> str:
     return "\n".join(lines) + "\n"
 
 
-def _key(row: Mapping[str, Any]) -> tuple[str, str, float]:
-    return (row["name"], row["against"], row["goal"])
+def _key(row: Mapping[str, Any]) -> tuple[str, str]:
+    return (row["name"], row["against"])

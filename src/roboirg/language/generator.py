@@ -132,13 +132,7 @@ def find_refusal(episode: Episode, options: InstructionOptions) -> str | None:
 def find_refusals(
     episode: Episode, *, frame: str = DEFAULT_FRAME, wordings: str | None = None
 ) -> Mapping[str, str]:
-    """Return the settings of the task that cannot express an episode, each with the reason.
-
-    Args:
-        episode: what to say.
-        frame: of left and right, ``robot`` or ``camera``.
-        wordings: identity of an open wording file; None for our own words.
-    """
+    """Return the settings of the task that cannot express an episode, each with the reason."""
     reasons = {
         name: find_refusal(episode, InstructionOptions(name, frame=frame, wordings=wordings))
         for name in settings_of(get_task(episode.task))
@@ -149,13 +143,7 @@ def find_refusals(
 def expressible(
     episode: Episode, *, frame: str = DEFAULT_FRAME, wordings: str | None = None
 ) -> tuple[str, ...]:
-    """Return the settings of the task that can express an episode.
-
-    Args:
-        episode: what to say.
-        frame: of left and right, ``robot`` or ``camera``.
-        wordings: identity of an open wording file; None for our own words.
-    """
+    """Return the settings of the task that can express an episode."""
     refused = find_refusals(episode, frame=frame, wordings=wordings)
     return tuple(name for name in settings_of(get_task(episode.task)) if name not in refused)
 
@@ -189,12 +177,7 @@ def _missing(request: InstructionRequest) -> str | None:
 
 
 def check_options(options: InstructionOptions) -> None:
-    """Check all options of an instruction, those that its setting does not read included.
-
-    Raises:
-        UnknownNameError: a form, kind of distractor, frame, … does not exist.
-        InvalidValueError: the stages or the number of distractors are not possible.
-    """
+    """Check all options of an instruction, those that its setting does not read included."""
     if options.stages not in STAGE_SETS:
         sets = ", ".join(str(one) for one in STAGE_SETS)
         raise InvalidValueError(f"The stages {options.stages} must be one of {sets}.")

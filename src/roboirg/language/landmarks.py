@@ -142,14 +142,7 @@ class Selector(NamedTuple):
 def landmarks(
     scene: Scene, thing: ObjectKind, target: SceneObject, frame: Frame = "robot"
 ) -> tuple[Landmark, ...]:
-    """Return the landmarks that single out the target: the simple ones, or else all others.
-
-    Args:
-        scene: the scene.
-        thing: kind of the candidates.
-        target: one of the candidates.
-        frame: of left and right.
-    """
+    """Return the landmarks that single out the target: the simple ones, or else all others."""
     found: list[Landmark] = []
     for selector in selectors(scene, thing, frame):
         if selector.landmark.kind > SIMPLE and found and found[0].kind <= SIMPLE:
@@ -348,11 +341,8 @@ def _members(
 ) -> Iterator[Selector]:
     """Yield one of two, three or four objects at a place: *closest to you among the two there*.
 
-    Args:
-        candidates: all objects.
-        groups: selectors whose first two, three or four objects are a group.
-        inner: yields the selectors within a group.
-        kind: of the landmarks.
+    The first two, three or four objects of a selector in `groups` are a group; `inner` yields the
+    selectors within it.
     """
     for group in groups:
         for size, number in SIZES.items():

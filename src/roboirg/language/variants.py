@@ -35,12 +35,7 @@ def all_variants() -> tuple[Variant, ...]:
 def expressible_options(
     episode: Episode, wordings: str | None = None
 ) -> Iterator[InstructionOptions]:
-    """Yield every setting, form and combination of options that can express an episode.
-
-    Args:
-        episode: what to say.
-        wordings: identity of an open wording file; None for our own words.
-    """
+    """Yield every setting, form and combination of options that can express an episode."""
     for name in settings_of(get_task(episode.task)):
         wanted = [
             replace(InstructionOptions(name, wordings=wordings), **changes)
@@ -60,12 +55,6 @@ def instructions(
     """Yield the instructions of episodes in every wanted setting and form.
 
     Leaves out a setting that the task lacks, or that cannot express the episode.
-
-    Args:
-        episodes: in order.
-        settings: names.
-        forms: ``implicit``, ``resolved`` or both.
-        options: all others.
     """
     for episode in episodes:
         present = [name for name in settings if name in settings_of(get_task(episode.task))]

@@ -68,10 +68,6 @@ def shortcut_rows(
         seeds: number of random scenes for each task, beyond the splits.
         by: what to break each setting down by.
         learned: whether to train the learned floors, on the train split with the same options.
-
-    Raises:
-        InvalidValueError: the number of random scenes is negative.
-        MissingDependencyError: floors are to be learned, and scikit-learn is not installed.
     """
     if seeds < 0:
         raise InvalidValueError(f"The number of random seeds is {seeds}; it must be at least 0.")

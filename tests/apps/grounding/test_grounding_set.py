@@ -42,7 +42,7 @@ from roboirg.language import FORMS, instruct, plain_settings
 from roboirg.language.settings import all_settings
 from roboirg.main import app
 from roboirg.policies.vlm.goal_schema import goal_schema
-from roboirg.policies.vlm.prompts import load_prompts
+from roboirg.policies.vlm.prompt_files import load_prompts
 from roboirg.reader import interpret
 from roboirg.tasks import all_tasks, get_task
 from roboirg.tasks.splits.splits import SIZES, get_episode

@@ -276,6 +276,16 @@ def packs_of(tmp_path: Path, run: Path) -> PackedRun:
     return next(one for one in read_packs(tmp_path / "packs") if one.name == run.name)
 
 
+def reword(run: Path, wordings: str) -> Path:
+    """Let all records of a run have words from outside."""
+    file = run / "records.jsonl"
+    lines = [json.loads(line) for line in file.read_text().splitlines()]
+    for one in lines:
+        one["options"]["wordings"] = wordings
+    file.write_text("".join(json.dumps(one) + "\n" for one in lines))
+    return run
+
+
 def drop(run: Path, wanted: Callable[[dict[str, Any]], bool], **changes: Any) -> Path:
     """Keep only some records of a run, changed."""
     file = run / "records.jsonl"
@@ -291,7 +301,7 @@ def drop(run: Path, wanted: Callable[[dict[str, Any]], bool], **changes: Any) ->
         (lambda run: drop(run, lambda one: one["outcome"] == "success"), "nearest is challenge"),
         (lambda run: drop(run, lambda one: True, plan=None), "110 records of no plan"),
         (lambda run: drop(run, lambda one: one["task"] != "StopCube"), "10 missing"),
-        (lambda run: drop(run, lambda one: True, wordings="mine@1a2b3c4d"), "of no named plan"),
+        (lambda run: reword(run, "mine@1a2b3c4d"), "of no named plan"),
         (lambda run: drop(run, lambda one: True, max_steps=3000), "110 not in it"),
         (lambda run: drop(run, lambda one: True, policy_seed=5), "110 not in it"),
     ],

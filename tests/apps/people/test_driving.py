@@ -215,9 +215,7 @@ def test_an_episode_is_driven_in_a_browser(served, open_page, wait_s, monkeypatc
     (record,) = read_records(folder)
     assert (record.policy, record.outcome, record.privileged) == ("person", "success", False)
     assert record.timings["policy_act"] > 0
-    monkeypatch.setattr(
-        "sys.argv", ["roboirg", "leaderboard", "verify", str(folder), "--workers", "0"]
-    )
+    monkeypatch.setattr("sys.argv", ["roboirg", "leaderboard", "verify", str(folder)])
     with pytest.raises(SystemExit) as left:
         cli.main()
     assert left.value.code in (0, None), capsys.readouterr()

@@ -27,8 +27,9 @@ def bench(
     from roboirg.util.console_width import widen
     from roboirg.util.freed_memory import keep_freed_memory
 
-    if out is not None and out.exists():
-        raise InvalidValueError(f"{str(out)!r} exists; --out must name a new file.")
+    if out is not None and (out.exists() or not out.parent.is_dir()):
+        why = "exists" if out.exists() else "is in no folder that exists"
+        raise InvalidValueError(f"{str(out)!r} {why}; --out must name a new file.")
     keep_freed_memory()
     where = bench_runner.circumstances(load=os.getloadavg()[1])
     results = bench_runner.run_measures(

@@ -173,7 +173,8 @@ def _read_inspect(path: Path, options: ImportOptions) -> Iterator[Record]:
             record = read_record(json.dumps(found).encode(), path, number)
             yield _with_fields(record, {**options.fields, "policy": options.policy})
             continue
-        job = _job(options, **{**sample["metadata"]["job"], "policy": options.policy})
+        told = {**sample["metadata"]["job"], "policy": options.policy}
+        job = _job(options, **told.pop("options", {}), **told)
         error, result = sample.get("error") or {}, RolloutResult()
         cause = f"environment: {error.get('message', 'the sample has no score')}"
         result.record_error("environment", cause, error.get("traceback"))

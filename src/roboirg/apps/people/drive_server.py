@@ -9,12 +9,11 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import msgspec
 from starlette.exceptions import HTTPException
 from starlette.requests import Request
 from starlette.responses import JSONResponse, Response
 from starlette.routing import Route
-
-import msgspec
 
 from roboirg.apps.people.driving_run import drive_episode, next_seed
 from roboirg.apps.people.driving_session import DrivingSession

@@ -77,11 +77,7 @@ class CoverageRow(NamedTuple):
 
 @functools.cache
 def published_rows(table: str) -> tuple[PublishedRow, ...]:
-    """Return the rows of a table, in the order of the paper.
-
-    Raises:
-        UnknownNameError: the table does not exist.
-    """
+    """Return the rows of a table, in the order of the paper."""
     if table not in RATE_TABLES:
         raise UnknownNameError("published table", table, RATE_TABLES)
     grouped: dict[tuple[str, InstructionOptions], dict[str, Decimal | None]] = {}

@@ -20,7 +20,7 @@ from roboirg.language.settings import all_settings, settings_of
 from roboirg.language.templates import LANGUAGE_VERSION
 from roboirg.policies.vlm.goal_schema import goal_schema
 from roboirg.policies.vlm.listener_query import PROMPTS, question_texts
-from roboirg.policies.vlm.prompts import Prompts, load_prompts
+from roboirg.policies.vlm.prompt_files import Prompts, load_prompts
 from roboirg.shortcuts.command_chance import blind_goals, is_right, right_share
 from roboirg.shortcuts.shortcut_scores import hidden_slots
 from roboirg.tasks import get_task

@@ -46,12 +46,7 @@ class CullableBody:
 
 
 class CullableBodies:
-    """All render bodies of a scene.
-
-    Args:
-        scene: the scene, with all bodies built.
-        cullable_bodies: culling data of some bodies; the others are tested by boxes.
-    """
+    """All render bodies of a finished scene; those without culling data are tested by boxes."""
 
     def __init__(
         self,
@@ -77,7 +72,7 @@ class CullableBodies:
             for camera in CAMERAS
         }
         self._drawn = np.ones(len(self._bodies), dtype=bool)
-        self._recorded: dict[sapien.render.RenderCameraComponent, NDArray[np.bool_]] = {}
+        self._buffered: dict[sapien.render.RenderCameraComponent, NDArray[np.bool_]] = {}
 
     def poses(self) -> NDArray[np.float64]:
         """Return the current poses of the bodies, (n, 4, 4)."""
@@ -111,10 +106,10 @@ class CullableBodies:
         for number in np.flatnonzero(visible != self._drawn):
             self._bodies[number].shading_mode = DRAWN if visible[number] else LEFT_OUT
         self._drawn = visible
-        recorded = self._recorded.get(camera)
-        if recorded is None or not np.array_equal(recorded, visible):
+        buffered = self._buffered.get(camera)
+        if buffered is None or not np.array_equal(buffered, visible):
             invalidate_command_buffers(self._bodies[0])
-            self._recorded[camera] = visible
+            self._buffered[camera] = visible
         camera.take_picture()
 
 

@@ -98,10 +98,8 @@ class KeyedPageServer(AppServer):
     ) -> None:
         self.key = key
         self._names = frozenset({*names_of_this_machine(), host.lower(), *map(str.lower, names)})
-        handlers = {
-            kind: _error_handler(status)
-            for kind, status in {RoboIRGError: 400, **(statuses or {})}.items()
-        }
+        known: dict[type[Exception], int] = {RoboIRGError: 400, **(statuses or {})}
+        handlers = {kind: _error_handler(status) for kind, status in known.items()}
         app = Starlette(routes=routes, exception_handlers=handlers)
         super().__init__(RequestGuard(app, self._refuse, PRIVATE_HEADERS), host, port)
 

@@ -31,9 +31,6 @@ class PageServer(AppServer):
         folder: of the run.
         make_page: renders the page; called again when the records have changed.
         port: 0 for any free port.
-
-    Raises:
-        InvalidValueError: the port is not available.
     """
 
     def __init__(self, folder: Path, make_page: Callable[[], str], port: int = 0) -> None:

@@ -54,11 +54,7 @@ class InstructionKey(NamedTuple):
 
     @classmethod
     def of_trial(cls, key: CellKey, trial: Trial) -> InstructionKey:
-        """Return the key of the instruction that was played in a trial.
-
-        Raises:
-            ValueError: the policy run of the cell has not played, so the versions are unknown.
-        """
+        """Return the key of the instruction that was played in a trial."""
         conditions, versions = key.policy_run.conditions, key.policy_run.versions
         if versions is None:
             raise ValueError(f"{key.policy_run.policy} has not played {key.task}.")
@@ -150,11 +146,7 @@ BREAKDOWNS: Mapping[str, Breakdown] = {
 
 
 def find_breakdowns(names: Iterable[str]) -> tuple[Breakdown, ...]:
-    """Return the break-downs of some names.
-
-    Raises:
-        UnknownNameError: a name does not exist.
-    """
+    """Return the break-downs of some names."""
     wanted = tuple(names)
     for name in wanted:
         if name not in BREAKDOWNS:

@@ -67,9 +67,7 @@ def count_heard(
 ) -> HeardCells:
     """Count the results of runs by cell; policies that declare no limit are left out.
 
-    Args:
-        runs: each with its name.
-        known: policy runs as `gather` names them; by default none bears the name of its run.
+    `known` are policy runs as `gather` names them; by default none bears the name of its run.
     """
     found: defaultdict[CellKey, HeardCounts] = defaultdict(HeardCounts)
     for name, results in runs:

@@ -80,9 +80,6 @@ def make_table(
         cells: as `gather` makes them; may be empty if published rows are shown.
         published: whether to add the paper's rows, and to say which rates can be compared.
         floors: those of `FLOORS` whose expected success is added below the policies.
-
-    Raises:
-        UnknownNameError: the table does not exist.
     """
     for known in WHICH:
         if which == known:
