@@ -27,7 +27,7 @@ NAMES = {
 
 TEXTS = {
     "--out", "--trajectories", "--operator", "--policy", "--host",
-    "--allow-host", "--name",
+    "--name",
 }  # fmt: skip
 """Options that take any text; all others take numbers or names."""
 

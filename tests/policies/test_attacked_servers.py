@@ -52,7 +52,7 @@ def locked(shared, scheme):
 
 
 def lenient(shared, scheme):
-    return shared(scheme, "--allow-host", "Robot-Lab")
+    return shared(scheme, ROBOIRG_HOST_NAMES="Robot-Lab")
 
 
 def begin(url):

@@ -57,10 +57,6 @@ def serve(
         str | None,
         typer.Option(help="Environment variable with the key that clients must send."),
     ] = None,
-    allow_host: Annotated[
-        list[str] | None,
-        typer.Option(help="Another name under which clients reach this machine; repeatable."),
-    ] = None,
     timeout_s: Annotated[
         float,
         typer.Option(min=1, help="Seconds a connection may be idle, or a message take to arrive."),
@@ -79,7 +75,7 @@ def serve(
     key = None if api_key_env is None else os.environ.get(api_key_env)
     if api_key_env is not None and not key:
         raise InvalidValueError(f"The environment variable {api_key_env} holds no key.")
-    options = ServerOptions(host, port, key, tuple(allow_host or ()), timeout_s)
+    options = ServerOptions(host, port, key, timeout_s)
     server = open_server(policy, protocol, options, seed=seed)
     for number in _STOPPED:
         signal.signal(number, _stop)

@@ -86,7 +86,6 @@ def stats(
         Path | None,
         typer.Option(help="Folder for a figure of the referring expressions, as PNG and SVG."),
     ] = None,
-    settings: Settings = "all",
 ) -> None:
     """Count words, referring expressions, patterns, relations and landmarks.
 
@@ -95,6 +94,7 @@ def stats(
     from roboirg.apps.language_lab.statistics_tables import overview_tables
     from roboirg.evaluation.analysis.figures.expressions import write_figure
     from roboirg.evaluation.plan.plan_parsing import parse_splits
+    from roboirg.language import plain_settings
     from roboirg.language.variants import instructions
     from roboirg.tasks.splits.splits import split_episodes
     from roboirg.util.figure_files import check_figure_support
@@ -103,7 +103,7 @@ def stats(
         check_figure_support()
     names, wanted = known_tasks(tasks), parse_splits(split)
     episodes = split_episodes(names, wanted)
-    said = [one for _, one in instructions(episodes, known_settings(settings), ("implicit",))]
+    said = [one for _, one in instructions(episodes, plain_settings(), ("implicit",))]
     console = _console()
     for table in overview_tables(said):
         console.print(table)

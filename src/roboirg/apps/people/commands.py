@@ -33,10 +33,6 @@ listen_app = typer.Typer(
 Study = Annotated[Path, typer.Argument(help="Folder of the study.")]
 Host = Annotated[str, typer.Option(help="Address to listen at; 0.0.0.0 for other machines, too.")]
 Port = Annotated[int, typer.Option(help="Port to listen at; 0 for any free port.")]
-AllowHost = Annotated[
-    list[str] | None,
-    typer.Option(help="Further name under which browsers reach this machine; repeatable."),
-]
 
 
 @listen_app.command()
@@ -112,7 +108,6 @@ def serve_study(
     folder: Study,
     host: Host = "127.0.0.1",
     port: Port = 0,
-    allow_host: AllowHost = None,
     people: Annotated[
         int | None,
         typer.Option(min=1, help="How many may take part, if not as many as planned."),
@@ -124,7 +119,7 @@ def serve_study(
     """
     from roboirg.apps.people.listen_server import ListenServer
 
-    server = ListenServer(folder, host, port, allow_host or (), people)
+    server = ListenServer(folder, host, port, people)
     _serve(server, "Press Ctrl-C to stop; all answers are stored.")
 
 
@@ -206,7 +201,6 @@ def drive(
     name: Annotated[str, typer.Option(help="Name of the policy in the records.")] = "person",
     host: Host = "127.0.0.1",
     port: Port = 0,
-    allow_host: AllowHost = None,
 ) -> None:
     """Drive an episode in the browser, by mouse, touch or keyboard; stores its record.
 
@@ -236,7 +230,7 @@ def drive(
             f"One task, one setting and one form are driven at a time; these are {len(jobs)} jobs."
         )
     job = msgspec.structs.replace(jobs[0], policy=name, spec=None)
-    server = DriveServer(job, run_commands.folder_of(out), host, port, allow_host or ())
+    server = DriveServer(job, run_commands.folder_of(out), host, port)
     _serve(server, f"Press Ctrl-C to stop; the records of episodes that ended are in {out}.")
 
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import functools
 import secrets
 import threading
-from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -37,7 +36,6 @@ class DriveServer(KeyedPageServer):
         folder: of the records.
         host: address to listen at.
         port: 0 for any free port.
-        names: further names under which browsers reach this machine.
 
     Raises:
         InvalidValueError: the port is not available, or the address is not this machine's.
@@ -51,7 +49,6 @@ class DriveServer(KeyedPageServer):
         folder: Path,
         host: str = LOOPBACK,
         port: int = 0,
-        names: Sequence[str] = (),
     ) -> None:
         check_page_support("The page")
         self._job, self._folder = job, folder
@@ -66,7 +63,7 @@ class DriveServer(KeyedPageServer):
             Route("/begin", json_endpoint(self._begin), methods=["POST"]),
             Route("/command", json_endpoint(self._command), methods=["POST"]),
         ]
-        super().__init__(routes, secrets.token_urlsafe(18), host, port, names)
+        super().__init__(routes, secrets.token_urlsafe(18), host, port)
         self.session = DrivingSession("idle")
 
     def begin(self) -> None:

@@ -33,7 +33,6 @@ class ListenServer(KeyedPageServer):
         folder: of the study.
         host: address to listen at.
         port: 0 for any free port.
-        names: further names under which browsers reach this machine.
         people: how many may take part, if not as many as planned.
 
     Raises:
@@ -47,7 +46,6 @@ class ListenServer(KeyedPageServer):
         folder: Path,
         host: str = LOOPBACK,
         port: int = 0,
-        names: Sequence[str] = (),
         people: int | None = None,
     ) -> None:
         check_page_support("The page")
@@ -69,7 +67,7 @@ class ListenServer(KeyedPageServer):
         ]
         try:
             key = stored_key(folder)
-            super().__init__(routes, key, host, port, names, {OutOfDateError: 409})
+            super().__init__(routes, key, host, port, {OutOfDateError: 409})
         except RoboIRGError:
             self.session.close()
             raise

@@ -80,7 +80,6 @@ class KeyedPageServer(AppServer):
         key: secret in the address.
         host: address to listen at.
         port: 0 for any free port.
-        names: further names under which browsers reach this machine.
         statuses: of the responses to errors; other errors of the package have status 400.
 
     Raises:
@@ -93,11 +92,10 @@ class KeyedPageServer(AppServer):
         key: str,
         host: str = LOOPBACK,
         port: int = 0,
-        names: Sequence[str] = (),
         statuses: Mapping[type[Exception], int] | None = None,
     ) -> None:
         self.key = key
-        self._names = frozenset({*names_of_this_machine(), host.lower(), *map(str.lower, names)})
+        self._names = frozenset({*names_of_this_machine(), host.lower()})
         known: dict[type[Exception], int] = {RoboIRGError: 400, **(statuses or {})}
         handlers = {kind: _error_handler(status) for kind, status in known.items()}
         app = Starlette(routes=routes, exception_handlers=handlers)
