@@ -1,13 +1,17 @@
 from __future__ import annotations
 
+import contextlib
 import json
 import os
 import re
+import signal
 import subprocess
 import sys
+import time
 from importlib.metadata import version
 from pathlib import Path
 
+import numpy as np
 import pytest
 import typer.main
 from msgspec.structs import replace
@@ -349,6 +353,26 @@ def test_help_needs_nothing_heavy() -> None:
 def test_python_dash_m_is_the_command() -> None:
     command = [sys.executable, "-m", "roboirg", "tasks"]
     assert b"VideoUnmask" in subprocess.run(command, check=True, capture_output=True).stdout
+
+
+def test_ctrl_c_at_any_moment_is_one_sentence() -> None:
+    code = "from roboirg.__main__ import main; print(flush=True); main()"
+    for delay_s in np.linspace(0, 0.3, 13):
+        command = subprocess.Popen(
+            [sys.executable, "-c", code, "run", "--help"],
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+            start_new_session=True,
+        )
+        assert command.stdout is not None
+        command.stdout.readline()  # what comes before is Python's
+        time.sleep(delay_s)
+        with contextlib.suppress(ProcessLookupError):
+            os.killpg(command.pid, signal.SIGINT)
+        _, errors = command.communicate()
+        # It may have ended before, or be Python's again.
+        assert (command.returncode, errors) in ((130, "roboirg: stopped.\n"), (0, ""), (-2, ""))
 
 
 def test_what_is_typed_goes_before_what_the_plan_says(

@@ -44,7 +44,7 @@ def over_loopback() -> float:
 def hosted() -> float:
     """Return steps per second with the same policy in a process of its own."""
     with HostPool(HostSettings()) as pool:
-        policy = HostedPolicy(pool.address, POLICY, 0)
+        policy = HostedPolicy(pool.connect(), POLICY, 0)
         try:
             return steps_per_second(policy)
         finally:

@@ -1,7 +1,29 @@
 """RoboIRGBench: does a robot policy understand people who do not spell everything out?"""
 
-from roboirg.core.version import __version__
-from roboirg.envs.factory import make, make_vec
-from roboirg.evaluation.api.evaluate import evaluate
+from __future__ import annotations
 
-__all__ = ["__version__", "evaluate", "make", "make_vec"]
+import importlib
+from typing import TYPE_CHECKING
+
+from roboirg.core.version import __version__
+
+if TYPE_CHECKING:
+    from roboirg.envs.factory import make, make_vec
+    from roboirg.evaluation.api.evaluate import evaluate
+    from roboirg.policies.by_name.local_policies import Privileged
+
+__all__ = ["Privileged", "__version__", "evaluate", "make", "make_vec"]
+
+_HOMES = {
+    "Privileged": "roboirg.policies.by_name.local_policies",
+    "evaluate": "roboirg.evaluation.api.evaluate",
+    "make": "roboirg.envs.factory",
+    "make_vec": "roboirg.envs.factory",
+}
+
+
+def __getattr__(name: str) -> object:
+    """Import what is asked for: the command must handle Ctrl-C before anything heavy is loaded."""
+    if name not in _HOMES:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return getattr(importlib.import_module(_HOMES[name]), name)

@@ -1,6 +1,34 @@
-"""``python -m roboirg`` is the ``roboirg`` command."""
+"""The ``roboirg`` command, also as ``python -m roboirg``."""
 
-from roboirg.main import main
+from __future__ import annotations
+
+import os
+import signal
+
+
+def main() -> None:
+    """Run the command; before and after it, Ctrl-C ends the process at once."""
+    handled = signal.getsignal(signal.SIGINT) is not signal.SIG_IGN
+    if handled:
+        signal.signal(signal.SIGINT, _stop)
+    from roboirg.main import main as run
+
+    try:
+        if handled:
+            signal.signal(signal.SIGINT, signal.default_int_handler)
+        run()
+    except KeyboardInterrupt:
+        _stop()
+    finally:
+        if handled:
+            signal.signal(signal.SIGINT, _stop)
+
+
+def _stop(*_signal: object) -> None:
+    # Exceptions are lost, or printed, where callbacks, C code or the end of Python are interrupted.
+    os.write(2, b"roboirg: stopped.\n")
+    os._exit(128 + signal.SIGINT)
+
 
 if __name__ == "__main__":
     main()

@@ -109,8 +109,10 @@ def main() -> None:
     except _WrongUsage as error:
         sys.exit(_print_usage_error(error))
     except typer.Abort:
-        sys.exit(INTERRUPTED)
-    # The code of `typer.Exit`; commands return nothing.
+        code = INTERRUPTED
+    # The code of `typer.Exit`, as which typer hands on Ctrl-C; commands return nothing.
+    if code == INTERRUPTED:
+        typer.echo("roboirg: stopped.", err=True)
     sys.exit(code)
 
 

@@ -129,6 +129,7 @@ class Dice:
 
     def reset(self, instruction: str, demonstration: Any) -> None:
         np.random.seed(self.seed)  # noqa: NPY002
+        self.instruction = instruction
         self.start = float(demonstration["front_rgb"].sum())
 
     def act(self, observation: Any) -> np.ndarray:

@@ -9,7 +9,6 @@ import subprocess
 import sys
 import time
 from collections.abc import Iterator
-from multiprocessing.shared_memory import SharedMemory
 from pathlib import Path
 from typing import Any
 
@@ -24,7 +23,7 @@ from roboirg.core.errors import InvalidValueError, MissingDependencyError
 from roboirg.evaluation.episode_errors import EpisodeError, EpisodeLostError
 from roboirg.evaluation.hosting.host_pool import HostPool, HostSettings
 from roboirg.evaluation.hosting.hosted_policy import HostedPolicy
-from roboirg.evaluation.hosting.payload import BLOCK_SIZE, pack_payload, unpack_payload
+from roboirg.evaluation.hosting.messages import BLOCK_SIZE, pack_payload, unpack_payload
 from roboirg.evaluation.hosting.policy_descriptions import describe_policy
 from roboirg.evaluation.plan.plan import Plan
 from roboirg.evaluation.records.record import Job, Record
@@ -117,7 +116,7 @@ class It:
         return {"calls": 2, "cost": float("nan")}
 """,
     )
-    policy = HostedPolicy(pool.address, spec, 5)
+    policy = HostedPolicy(pool.connect(), spec, 5)
     assert PolicyNeeds.of(policy) == PolicyNeeds(observe_every=4, depth=True, prompt_tokens=7)
     frames = np.random.default_rng(0).integers(0, 255, (30, 256, 256, 3), np.uint8)
     assert frames.nbytes > 2 * BLOCK_SIZE
@@ -138,8 +137,7 @@ class It:
     assert policy.usage() == {"calls": 2.0}
     policy.close()
     policy.close()
-    with pytest.raises(FileNotFoundError):
-        SharedMemory(policy._block.name)
+    assert policy._block.closed
 
 
 def test_pictures_of_a_video_are_drawn_when_they_are_read_and_then_sent_at_once(
@@ -173,7 +171,7 @@ class It:
         video = Video(front_rgb=np.zeros((2, 4, 4, 3), np.uint8), joint_positions=np.zeros((2, 7)))
         video["wrist_rgb"] = video["wrist_depth"] = np.zeros((2, 4, 4, 3), np.uint8)
         video.drawn = []
-        policy = HostedPolicy(pool.address, spec, 0)
+        policy = HostedPolicy(pool.connect(), spec, 0)
         policy.reset("Pick it.", video)
         drawn.append(list(video.drawn))
         policy.act({})  # type: ignore[typeddict-item]
@@ -250,10 +248,11 @@ class It:
         return np.ones((24, 8))
 """,
     )
-    plan = paper_plan(spec, 1)
-    play(plan, tmp_path / "run", LocalProcesses(1))
+    plan = paper_plan(f"privileged:{spec}", 1)
+    play(plan.checked(), tmp_path / "run", LocalProcesses(1))
     (record,) = read_records(tmp_path / "run")
     assert record.privileged
+    assert record.policy == "privileged:insider:It"
     assert "token" in str(record.policy_metadata["secret"])
 
 
@@ -362,7 +361,7 @@ class It:
         return np.zeros((1, 8))
 """,
     )
-    good, bad, over, late = (HostedPolicy(pool.address, spec, 0) for _ in range(4))
+    good, bad, over, late = (HostedPolicy(pool.connect(), spec, 0) for _ in range(4))
     good.reset("live", {})
     bad.reset("die", {})
     assert good.act({}).shape == (1, 8)  # type: ignore[typeddict-item]
@@ -376,7 +375,7 @@ class It:
         over.usage()  # what it has cost is lost
     for one in (good, bad, over, late):
         one.close()
-    again = HostedPolicy(pool.address, spec, 0)  # in a new process
+    again = HostedPolicy(pool.connect(), spec, 0)  # in a new process
     again.reset("live", {})
     assert again.act({}).shape == (1, 8)  # type: ignore[typeddict-item]
     again.close()
@@ -384,17 +383,11 @@ class It:
 
 def test_a_world_that_dies_in_a_call_does_not_stop_the_host(pool: HostPool) -> None:
     spec = f"{Path(hosting_fakes.__file__).stem}:Dice"
-    policy = HostedPolicy(pool.address, spec, 0)
+    policy = HostedPolicy(pool.connect(), spec, 0)
     policy._connection.send_bytes(b"\x81\xa6method\xa5reset")  # half a message
     policy._connection.close()
-    after = HostedPolicy(pool.address, spec, 1)
+    after = HostedPolicy(pool.connect(), spec, 1)
     after.close()
-
-
-def test_strangers_are_turned_away(pool: HostPool) -> None:
-    stranger = pool.address._replace(key=b"x" * 32)
-    with pytest.raises(EpisodeLostError):
-        HostedPolicy(stranger, "random", 0)
 
 
 def host_pids(supervisor: int) -> list[int]:

@@ -95,7 +95,7 @@ def test_an_episode_begins_where_the_run_began(
     monkeypatch.chdir(tmp_path)
     with HostPool(HostSettings()) as pool:
         for _ in range(2):  # the first one left for elsewhere
-            policy = HostedPolicy(pool.address, hostile_policies.SPEC("Wanderer"), 0)
+            policy = HostedPolicy(pool.connect(), hostile_policies.SPEC("Wanderer"), 0)
             policy.reset("Pick it.", {})
             policy.act({})  # type: ignore[typeddict-item]
             policy.hear("The red one.", 1)
@@ -154,7 +154,7 @@ def test_the_memory_of_a_host_holds_no_goal_scene_or_seed() -> None:
     world = PaperWorld(job)
     _, info = world.reset()
     with HostPool(HostSettings()) as pool:
-        policy = HostedPolicy(pool.address, HONEST, 3)
+        policy = HostedPolicy(pool.connect(), HONEST, 3)
         policy.reset("Pick the needle in the haystack.", info["demonstration"])
         policy.act(world.observation())  # type: ignore[arg-type]
         (pid,) = pool.pids

@@ -7,6 +7,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import msgspec
 import numpy as np
 import pytest
 from evaluation_fakes import comparable
@@ -131,10 +132,10 @@ class PaperInsider(PaperPolicy):
 
 @pytest.fixture
 def stage(monkeypatch: pytest.MonkeyPatch) -> Callable[..., Any]:
-    def play(world: PaperWorld, policy: Any) -> RolloutResult:
+    def play(world: PaperWorld, policy: Any, job: Job = JOB) -> RolloutResult:
         monkeypatch.setattr(rollout, "make_env", lambda _job, _cameras: world)
         monkeypatch.setattr(rollout, "load_policy", lambda _job, _secret: policy)
-        return play_episode(JOB)
+        return play_episode(job)
 
     return play
 
@@ -156,8 +157,16 @@ def test_one_row_is_a_chunk_of_one(stage: Callable[..., RolloutResult]) -> None:
 
 def test_an_insider_is_attached_before_reset(stage: Callable[..., RolloutResult]) -> None:
     policy = PaperInsider()
-    stage(PaperWorld(), policy)
+    stage(PaperWorld(), policy, msgspec.structs.replace(JOB, policy="oracle"))
     assert policy.heard == ["PaperWorld", instruct_job(JOB).text, 3]
+
+
+def test_a_policy_that_is_not_declared_privileged_is_never_attached(
+    stage: Callable[..., RolloutResult],
+) -> None:
+    policy = PaperInsider()
+    stage(PaperWorld(), policy, JOB)
+    assert policy.heard == [instruct_job(JOB).text, 3]
 
 
 @pytest.mark.parametrize(

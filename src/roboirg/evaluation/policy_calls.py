@@ -14,6 +14,7 @@ from roboirg.core.actions import ActionSpace, check_chunk
 from roboirg.core.errors import InvalidActionError, InvalidValueError
 from roboirg.core.observations import Observation
 from roboirg.core.plain_text import is_encodable
+from roboirg.evaluation.records.record import REAL_TRIAL
 from roboirg.policies.contract.base import Policy
 
 MAX_ROWS = 10_000
@@ -21,6 +22,16 @@ MAX_ROWS = 10_000
 
 MAX_METADATA_LENGTH = 65_536
 """Most characters of JSON in a policy's metadata."""
+
+MAX_METADATA_DEPTH = 16
+"""Most containers of a policy's metadata around a value."""
+
+SERVER = "server"
+"""Key under which clients of remote policies name the address of the server."""
+
+_NEVER = (REAL_TRIAL,)
+_TOO_LARGE = 2**63
+_METADATA = "the policy's metadata"
 
 MAX_COSTS = 64
 """Most entries of a policy's usage."""
@@ -47,23 +58,73 @@ def check_rows(rows: Any, space: ActionSpace) -> NDArray[np.float64]:  # noqa: A
     return check_chunk(rows, space)
 
 
-def policy_metadata(policy: Policy) -> dict[str, JsonValue]:
+def policy_metadata(policy: Policy, *, is_ours: bool = True) -> dict[str, JsonValue]:
     """Return the policy's metadata exactly as a reader of the record gets them.
 
+    Args:
+        policy: any policy.
+        is_ours: whether it is our own code, which may name its ``server``.
+
     Raises:
-        InvalidValueError: they are too long, or their text is not Unicode.
+        InvalidValueError: they are too long or too deep, their text is not Unicode, or a key is
+            reserved.
         TypeError: they hold something that JSON does not.
         ValueError: they hold a number that is not finite.
     """
-    text = json.dumps(dict(getattr(policy, "metadata", {})), allow_nan=False, ensure_ascii=False)
-    if len(text) > MAX_METADATA_LENGTH:
+    return read_metadata(dump_metadata(policy), is_ours=is_ours)
+
+
+def dump_metadata(policy: Policy) -> str:
+    """Return the policy's metadata as JSON; raises like `policy_metadata`."""
+    text = json.dumps(dict(getattr(policy, "metadata", {})), allow_nan=False)
+    read_metadata(text, is_ours=True)
+    return text
+
+
+def read_metadata(text: str, *, is_ours: bool) -> dict[str, JsonValue]:
+    """Return the metadata in a JSON text, checked; raises like `policy_metadata`."""
+    try:
+        found = json.loads(text)
+        plain = json.dumps(found, allow_nan=False, ensure_ascii=False)
+    except RecursionError:
+        raise InvalidValueError(f"{_METADATA} are nested too deep.") from None
+    if len(plain) > MAX_METADATA_LENGTH:
         raise InvalidValueError(
-            f"the policy's metadata have {len(text)} characters of JSON; "
+            f"{_METADATA} have {len(plain)} characters of JSON; "
             f"at most {MAX_METADATA_LENGTH} are allowed."
         )
-    if not is_encodable(text):
-        raise InvalidValueError("the policy's metadata hold text with lone surrogates.")
-    return cast("dict[str, JsonValue]", json.loads(text))
+    if not is_encodable(plain):
+        raise InvalidValueError(f"{_METADATA} hold text with lone surrogates.")
+    if not isinstance(found, dict):
+        raise InvalidValueError(f"{_METADATA} are a {type(found).__name__}, not a dict.")
+    _check_values(found)
+    _check_keys(found, is_ours=is_ours)
+    return cast("dict[str, JsonValue]", found)
+
+
+def _check_values(value: object, depth: int = 1) -> None:
+    """Raise for what readers of records could not read: deep nests, and huge numbers."""
+    if depth > MAX_METADATA_DEPTH:
+        raise InvalidValueError(
+            f"{_METADATA} are nested more than {MAX_METADATA_DEPTH} deep; make them flat."
+        )
+    if isinstance(value, int) and abs(value) >= _TOO_LARGE:
+        raise InvalidValueError(f"{_METADATA} hold a whole number of more than 63 bits.")
+    if isinstance(value, dict | list):
+        for one in value.values() if isinstance(value, dict) else value:
+            _check_values(one, depth + 1)
+
+
+def _check_keys(metadata: dict[str, Any], *, is_ours: bool) -> None:
+    """Raise for keys with a meaning that only our own code may give."""
+    # A planner's metadata have those of the policy behind it under "policy".
+    behind = metadata.get("policy")
+    for table in (metadata, behind if isinstance(behind, dict) else {}):
+        for key in _NEVER if is_ours else (*_NEVER, SERVER):
+            if key in table:
+                raise InvalidValueError(
+                    f"{_METADATA} have the key {key!r}, which is reserved; choose another name."
+                )
 
 
 def policy_usage(policy: Policy) -> dict[str, float]:

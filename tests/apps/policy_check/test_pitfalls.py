@@ -1,5 +1,6 @@
 """Every planted mistake is found by its name, and none in policies that are right."""
 
+import re
 from collections import deque
 from typing import ClassVar
 
@@ -102,6 +103,19 @@ class KeepsInClass(Honest):
     def act(self, observation):
         self.count.append(1)
         return super().act(observation) + 1e-3 * len(self.count)
+
+
+@planted("order of words", "once 'Take ", FAIL)
+class RemembersExplicitCommand(Honest):
+    """Understands what is implicit by what was once said explicitly in the same scene."""
+
+    commands: ClassVar[dict[float, str]] = {}
+
+    def reset(self, instruction, demonstration):
+        super().reset(instruction, demonstration)
+        if re.fullmatch(r"Take the \w+ cube and .*", instruction):
+            self.commands[self.memory] = instruction
+        self.instruction = self.commands.get(self.memory, instruction)
 
 
 @planted("constant", "are the same one")

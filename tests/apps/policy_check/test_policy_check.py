@@ -156,6 +156,7 @@ def test_a_sound_policy_passes_everything():
         "deterministic",
         "reset forgets",
         "turns",
+        "order of words",
         "language",
         "prompt end",
         "pictures",
@@ -251,7 +252,7 @@ def test_the_command_prints_a_table_and_an_exit_code(name, code, tmp_path, monke
     result = CliRunner().invoke(app, [f"my_policy:{name}", "--no-expert"])
     assert result.exit_code == code, result.output
     assert (
-        "13 checks, none failed, 1 warning." if code == 0 else "1 of 3 checks failed."
+        "14 checks, none failed, 1 warning." if code == 0 else "1 of 3 checks failed."
     ) in result.output
     assert "Actions joint_angle" in result.output
 

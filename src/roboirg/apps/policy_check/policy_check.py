@@ -35,6 +35,7 @@ from roboirg.apps.policy_check.influence_checks import (
     check_state,
     check_video,
 )
+from roboirg.apps.policy_check.order_check import check_order
 from roboirg.apps.policy_check.policy_player import PolicyPlayer
 from roboirg.core.plain_text import counted
 from roboirg.policies.contract.base import Policy
@@ -55,6 +56,7 @@ CHECKS: tuple[Check, ...] = (
     check_determinism,
     check_reset,
     check_turns,
+    check_order,
     check_hearing,
     check_language,
     check_pictures,

@@ -1,25 +1,26 @@
-"""The policy hosts of a run, and the door at which worlds ask for them."""
+"""The policy hosts of a run, and the lines on which worlds ask for them."""
 
 from __future__ import annotations
 
 import contextlib
-import secrets
-import tempfile
+import os
+import socket
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from multiprocessing.connection import Client, Connection, Listener
-from pathlib import Path
-from typing import NamedTuple, Protocol, Self, TypeVar, runtime_checkable
+from multiprocessing.connection import Connection
+from typing import Any, Self
 
 from roboirg.core.errors import InvalidValueError
-from roboirg.evaluation.hosting.payload import decode, encode
+from roboirg.evaluation.hosting.messages import encode, read_call
 from roboirg.evaluation.hosting.policy_child import ChildLostError, PolicyChild
-from roboirg.evaluation.hosting.policy_host import HostSession, PolicyHost, host_variables
+from roboirg.evaluation.hosting.policy_host import HostSession, PolicyHost
 
-RETRY_S = 0.25
-"""How long to wait before a client is accepted after one that could not be."""
 DEFAULT_BATCH = 16
+
+Connect = Callable[[], socket.socket]
+"""Returns a new line to a pool, for a process with worlds."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,45 +45,19 @@ class HostSettings:
             raise InvalidValueError(f"batch is {self.batch}; it must be at least 1.")
 
 
-class HostAddress(NamedTuple):
-    """Where a pool listens.
-
-    Attributes:
-        path: of its socket.
-        key: proves that a client belongs to the run; policies do not know it.
-    """
-
-    path: str
-    key: bytes
-
-
-@runtime_checkable
-class HostUser(Protocol):
-    """A function that plays jobs and needs policy hosts, if it has settings for them."""
-
-    @property
-    def hosting(self) -> HostSettings | None:
-        """How policies are hosted; None for policies in the world's process."""
-
-    def with_hosts(self, hosts: HostAddress) -> Self:
-        """Return a copy that asks these hosts."""
-
-
-Playing = TypeVar("Playing")
-
-
 @contextlib.contextmanager
-def open_hosts(play: Playing) -> Iterator[Playing]:
-    """Open the hosts that a function needs on this machine.
+def open_hosts(play: Any) -> Iterator[Connect | None]:  # noqa: ANN401 - what plays jobs
+    """Open the hosts that a function needs on this machine, if it has ``hosting`` settings.
 
     Yields:
-        The function with the hosts' address, or itself if it needs none.
+        What connects a process to them; None if it needs none.
     """
-    if not isinstance(play, HostUser) or play.hosting is None:
-        yield play
+    settings: HostSettings | None = getattr(play, "hosting", None)
+    if settings is None:
+        yield None
         return
-    with HostPool(play.hosting) as pool:
-        yield play.with_hosts(pool.address)
+    with HostPool(settings) as pool:
+        yield pool.connect
 
 
 class HostPool:
@@ -90,19 +65,28 @@ class HostPool:
 
     Args:
         settings: how policies are hosted.
-
-    Attributes:
-        address: where worlds reach it.
     """
 
     def __init__(self, settings: HostSettings) -> None:
         self._settings = settings
-        self._folder = tempfile.TemporaryDirectory(prefix="roboirg-")
-        self.address = HostAddress(str(Path(self._folder.name) / "hosts"), secrets.token_bytes(32))
-        self._listener = Listener(self.address.path, "AF_UNIX", backlog=128)
         self._hosts: dict[tuple[str, str | None], PolicyHost] = {}
-        self._lock, self._closed = threading.Lock(), threading.Event()
-        threading.Thread(target=self._accept, name="policy hosts", daemon=True).start()
+        self._lines: list[socket.socket] = []
+        self._lock, self._is_closed = threading.Lock(), False
+        # The kernel ends a process with the thread that started it.
+        self._starter = ThreadPoolExecutor(1, "policy starter")
+
+    def connect(self) -> socket.socket:
+        """Return a new line, on which `HostedPolicy` begins episodes; no other process has it."""
+        ours, theirs = socket.socketpair()
+        self.serve(ours)
+        return theirs
+
+    def serve(self, line: socket.socket) -> None:
+        """Serve the worlds at the other end of a line."""
+        self._lines.append(line)
+        threading.Thread(
+            target=self._accept, args=(line,), name="policy hosts", daemon=True
+        ).start()
 
     @property
     def pids(self) -> list[int]:
@@ -120,16 +104,16 @@ class HostPool:
 
     def close(self) -> None:
         """End all hosts."""
-        self._closed.set()
-        with contextlib.suppress(OSError):
-            Client(self.address.path, "AF_UNIX").close()  # wakes the thread that accepts
-        self._listener.close()
         with self._lock:
+            self._is_closed = True
             hosts = list(self._hosts.values())
             self._hosts.clear()
+        for line in self._lines:
+            with contextlib.suppress(OSError):
+                line.shutdown(socket.SHUT_RDWR)
         for host in hosts:
-            host.join()
-        self._folder.cleanup()
+            host.stop()
+        self._starter.shutdown(wait=False)
 
     def __enter__(self) -> Self:
         return self
@@ -137,52 +121,60 @@ class HostPool:
     def __exit__(self, *_exception: object) -> None:
         self.close()
 
-    def _accept(self) -> None:
-        while not self._closed.is_set():
-            try:
-                connection = self._listener.accept()
-            except OSError:  # closed, or a client hung up
-                self._closed.wait(RETRY_S)
-                continue
-            threading.Thread(
-                target=self._serve, args=(connection,), name="hosted world", daemon=True
-            ).start()
+    def _accept(self, line: socket.socket) -> None:
+        """Serve the episodes that begin on a line until its process ends."""
+        with line, contextlib.suppress(OSError):
+            while True:
+                _, descriptors, *_ = socket.recv_fds(line, 1, 2)
+                if len(descriptors) != len(("connection", "block")):
+                    return
+                threading.Thread(
+                    target=self._serve, args=descriptors, name="hosted world", daemon=True
+                ).start()
 
-    def _serve(self, connection: Connection) -> None:
+    def _serve(self, connection: int, block: int) -> None:
         """Carry out the calls of one episode until its world hangs up."""
-        host, session = None, HostSession(connection)
-        key = self.address.key
-        with connection, contextlib.suppress(EOFError, OSError, ValueError):
-            if not secrets.compare_digest(connection.recv_bytes(len(key)), key):
-                return
-            try:
+        session, host = HostSession(Connection(connection), block), None
+        try:
+            with contextlib.suppress(EOFError, OSError):
                 while True:
-                    message = decode(connection.recv_bytes())
-                    if message["method"] == "open":
-                        session.alone = bool(message["alone"])
-                        host = self._host_for(message["spec"], session)
-                    if host is not None:
-                        connection.send_bytes(encode(host.call(session, message)))
-            finally:
-                if host is not None:
-                    host.leave(session)
+                    call = read_call(session.connection.recv_bytes())
+                    if call.method == "open":
+                        session.alone = call.alone
+                        host = self._host_for(call.spec, session)
+                    if host is None:
+                        return
+                    session.connection.send_bytes(encode(host.call(session, call)))
+        finally:
+            session.connection.close()
+            if host is not None:
+                host.leave(session)
+            os.close(block)
 
-    def _host_for(self, spec: str, session: HostSession) -> PolicyHost:
+    def _host_for(self, spec: str, session: HostSession) -> PolicyHost | None:
         """Return the host of a policy with the fewest episodes, and end what is not needed."""
-        settings = self._settings
         with self._lock:
-            for device in settings.devices or (None,):
+            if self._is_closed:
+                return None
+            for device in self._settings.devices or (None,):
                 if (spec, device) not in self._hosts:
-                    self._hosts[spec, device] = PolicyHost(
-                        host_variables(device), settings.batch, settings.policy_timeout_s
-                    )
+                    self._hosts[spec, device] = self._new_host(device)
             # A run plays one policy after the other: what has no episodes is over, most likely.
             for other, device in tuple(self._hosts):
                 if other != spec and not self._hosts[other, device].sessions:
-                    self._hosts.pop((other, device)).stop()
+                    over = self._hosts.pop((other, device))
+                    threading.Thread(target=over.stop, name="policy end", daemon=True).start()
             chosen = min(
                 (host for (name, _), host in self._hosts.items() if name == spec),
                 key=lambda host: len(host.sessions),
             )
             chosen.sessions.add(session)
             return chosen
+
+    def _new_host(self, device: str | None) -> PolicyHost:
+        variables = {} if device is None else {"CUDA_VISIBLE_DEVICES": device}
+
+        def start() -> PolicyChild:
+            return self._starter.submit(PolicyChild.start, variables).result()
+
+        return PolicyHost(start, self._settings.batch, self._settings.policy_timeout_s)

@@ -12,21 +12,27 @@ import io
 import os
 import sys
 import threading
-import time
 from collections.abc import Sequence
-from dataclasses import asdict
 from multiprocessing.connection import Connection
 from typing import Any
 
 from roboirg.core.errors import MissingDependencyError
 from roboirg.evaluation.episode_errors import describe_error, one_line
 from roboirg.evaluation.hosting.hosted_episode import HostedEpisode
-from roboirg.evaluation.hosting.payload import Message, decode, encode
-from roboirg.policies.by_name.loading import is_privileged, policy_needs, policy_version
+from roboirg.evaluation.hosting.messages import (
+    MAX_TEXT,
+    Ask,
+    Call,
+    Failure,
+    Opened,
+    Outcome,
+    encode,
+    read_call,
+    read_calls,
+    receive_descriptor,
+)
+from roboirg.policies.by_name.loading import policy_needs, policy_version
 from roboirg.policies.contract.random_state import RandomState
-
-MISSING = "missing"
-"""Instead of a kind of error: a package is not installed."""
 
 
 class HostProcess:
@@ -47,71 +53,57 @@ class HostProcess:
         """Answer every message."""
         with contextlib.suppress(EOFError, OSError):
             while True:
-                message = decode(self._connection.recv_bytes())
-                self._connection.send_bytes(encode(self._answer(message)))
+                calls = read_calls(self._connection.recv_bytes())
+                self._connection.send_bytes(encode(self._answer(calls)))
 
-    def _answer(self, message: Message) -> Message:
-        method, calls = message["method"], message["calls"]
+    def _answer(self, calls: Sequence[Call]) -> list[Outcome]:
         with contextlib.suppress(OSError):
             os.chdir(self._home)  # an earlier episode may have changed it
-        self._asking = {call["session"] for call in calls}
-        start = time.perf_counter()
-        if method == "act" and len(calls) > 1:
-            results = self._act_together(calls)
-        else:
-            results = [self._result(call, method) for call in calls]
+        self._asking = {call.session for call in calls}
+        together = len(calls) > 1
+        outcomes = self._act_together(calls) if together else list(map(self._outcome, calls))
         self._asking = set()
-        seconds = time.perf_counter() - start
         for stream in (sys.stdout, sys.stderr):
             with contextlib.suppress(Exception):  # a policy may have closed or replaced it
                 stream.flush()
-        return {"results": results, "seconds": seconds}
+        return outcomes
 
-    def _result(self, call: Message, method: str) -> Message:
+    def _outcome(self, call: Call) -> Outcome:
+        # What belongs to the next call is not left in the socket, whatever happens in this one.
+        block = receive_descriptor(self._connection) if call.method == "open" else -1
         try:
-            return {"value": self._carry_out(call, method)}
+            return self._carry_out(call, block)
         except BaseException as error:  # noqa: BLE001 - policies may raise anything
-            return {"error": _error(error)}
+            return _failure(error)
 
-    def _carry_out(self, call: Message, method: str) -> Message:
-        session: int = call["session"]
-        if method == "describe":
-            return {
-                "needs": asdict(policy_needs(call["spec"])),
-                "version": policy_version(call["spec"]),
-                "privileged": is_privileged(call["spec"]),
-            }
-        if method == "open":
-            if is_privileged(call["spec"]):
-                return {"privileged": True}  # its place is beside the world
-            ask = functools.partial(self.ask, session)
-            episode = HostedEpisode(call, ask, self._read_fields)
-            self._episodes[session] = episode
-            return episode.describe(call["spec"])
-        episode = self._episodes[session]
-        if method == "close":
-            del self._episodes[session]
+    def _carry_out(self, call: Call, block: int) -> Outcome:
+        if call.method == "describe":
+            return Opened(policy_needs(call.spec), policy_version(call.spec))
+        if call.method == "open":
+            ask = functools.partial(self.ask, call.session)
+            episode = HostedEpisode(call, block, ask, self._read_fields)
+            self._episodes[call.session] = episode
+            return episode.describe(call.spec)
+        episode = self._episodes[call.session]
+        if call.method == "close":
+            del self._episodes[call.session]
         with episode.random:
-            found: Message = getattr(episode, method)(call)
+            found: Outcome = getattr(episode, call.method)(call)
         return found
 
-    def _act_together(self, calls: Sequence[Message]) -> list[Message]:
+    def _act_together(self, calls: Sequence[Call]) -> list[Outcome]:
         """Ask about several episodes at once; a failure is not attributed to any of them."""
-        episodes = [self._episodes[call["session"]] for call in calls]
+        episodes = [self._episodes[call.session] for call in calls]
         try:
-            observations = [
-                one.observation(call) for one, call in zip(episodes, calls, strict=True)
-            ]
+            observations = [one.read(call) for one, call in zip(episodes, calls, strict=True)]
             first: Any = episodes[0].policy
             RandomState.set_aside()
             chunks = first.act_together([one.policy for one in episodes], observations)
-            return [
-                {"value": one.actions(rows)} for one, rows in zip(episodes, chunks, strict=True)
-            ]
+            return [one.actions(rows) for one, rows in zip(episodes, chunks, strict=True)]
         except BaseException as error:  # noqa: BLE001 - policies may raise anything
-            return [{"error": _error(error)}] * len(calls)
+            return [_failure(error)] * len(calls)
 
-    def ask(self, session: int, question: Message) -> Message:
+    def ask(self, session: int, question: Ask) -> Call:
         """Ask the world of an episode whose call is under way.
 
         Raises:
@@ -122,22 +114,24 @@ class HostProcess:
                 "pictures of the demonstration can be read only while a call of the policy is "
                 "under way, by the thread that was called"
             )
-        self._connection.send_bytes(encode({**question, "session": session}))
-        answer = decode(self._connection.recv_bytes())
-        if answer.get("gone"):
+        question.session = session
+        self._connection.send_bytes(encode(question))
+        answer = read_call(self._connection.recv_bytes())
+        if answer.method == "gone":
             raise RuntimeError("the episode has ended")
         return answer
 
 
-def _error(error: BaseException) -> list[str]:
+def _failure(error: BaseException) -> Failure:
     """Return kind, message and traceback of an exception that is being handled."""
     if isinstance(error, MissingDependencyError):
-        return [MISSING, one_line(error), ""]
+        return Failure("missing", one_line(error))
     try:
         found = describe_error("policy", error)
     except BaseException:  # noqa: BLE001 - its attributes are a policy's code, too
-        return ["policy", "it raised an exception that cannot be described", ""]
-    return [found.kind, str(found), found.details]
+        return Failure("policy", "it raised an exception that cannot be described")
+    kind: Any = found.kind  # of the policy, never of the environment
+    return Failure(kind, str(found)[:MAX_TEXT], found.details)
 
 
 def main(connection: Connection) -> None:

@@ -3,26 +3,27 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import asdict, replace
-from multiprocessing.shared_memory import SharedMemory
-from typing import Any, cast
+from dataclasses import replace
+from typing import Any
 
 from numpy.typing import NDArray
 
-from roboirg.core.observations import Observation
-from roboirg.evaluation.hosting.payload import (
-    Message,
-    attach_block,
-    buffer_of,
+from roboirg.evaluation.hosting.messages import (
+    Acted,
+    Ask,
+    Call,
+    Opened,
+    Told,
+    map_block,
     unpack_payload,
 )
-from roboirg.evaluation.policy_calls import check_rows, policy_metadata, policy_usage
-from roboirg.policies.by_name.loading import is_privileged, make_policy, policy_version
+from roboirg.evaluation.policy_calls import check_rows, dump_metadata, policy_usage
+from roboirg.policies.by_name.loading import make_policy, policy_version
 from roboirg.policies.contract.base import close_policy, tell_policy
 from roboirg.policies.contract.policy_needs import PolicyNeeds
 from roboirg.policies.contract.random_state import RandomState
 
-Ask = Callable[[Message], Message]
+AskWorld = Callable[[Ask], Call]
 """Sends a question to the world of an episode in a call, and returns its answer."""
 
 
@@ -78,7 +79,8 @@ class HostedEpisode:
     """Carries out the calls of one episode.
 
     Args:
-        call: ``spec`` and ``seed`` of the policy, ``block``, the name of the shared memory.
+        call: ``spec`` and ``seed`` of the policy.
+        block: descriptor of the shared memory.
         ask: sends questions to the world.
         read_fields: names of the demonstration's fields that any episode has read; grows.
 
@@ -87,71 +89,61 @@ class HostedEpisode:
         random: its random numbers.
     """
 
-    def __init__(self, call: Message, ask: Ask, read_fields: dict[str, None]) -> None:
+    def __init__(self, call: Call, block: int, ask: AskWorld, read_fields: dict[str, None]) -> None:
         self._ask, self._read_fields = ask, read_fields
-        self._block: SharedMemory = attach_block(call["block"])
-        self.random = RandomState(call["seed"])
+        self._block = map_block(block)
+        self.random = RandomState(call.seed)
         with self.random:
-            self.policy = make_policy(call["spec"], call["seed"])
+            self.policy = make_policy(call.spec, call.seed)
         # Pixels of subgoals are for privileged policies, and those have no host.
         self._needs = replace(PolicyNeeds.of(self.policy), grounded=False)
 
-    def describe(self, spec: str) -> Message:
+    def describe(self, spec: str) -> Opened:
         """Return what the world must know of the policy."""
-        return {
-            "needs": asdict(self._needs),
-            "version": policy_version(spec),
-            "privileged": is_privileged(spec),
-            "together": callable(getattr(self.policy, "act_together", None)),
-            "reads": list(self._read_fields),
-        }
+        together = callable(getattr(self.policy, "act_together", None))
+        return Opened(self._needs, policy_version(spec), together, tuple(self._read_fields))
 
-    def reset(self, call: Message) -> Message:
+    def reset(self, call: Call) -> Told:
         """Begin the episode; returns the policy's metadata."""
-        value = self._read(call)
+        value = self.read(call)
         demonstration = HostedDemonstration(value["fields"], value["arrays"], self._fetch)
         self.policy.reset(value["instruction"], demonstration)
-        return {"metadata": policy_metadata(self.policy)}
+        return Told(dump_metadata(self.policy))
 
-    def observation(self, call: Message) -> Observation:
-        """Return the observation of a call of `act`."""
-        return cast("Observation", self._read(call))
-
-    def act(self, call: Message) -> Message:
+    def act(self, call: Call) -> Acted:
         """Return the next actions."""
-        return self.actions(self.policy.act(self.observation(call)))
+        return self.actions(self.policy.act(self.read(call)))
 
-    def actions(self, rows: Any) -> Message:  # noqa: ANN401 - whatever the policy returned
+    def actions(self, rows: Any) -> Acted:  # noqa: ANN401 - whatever the policy returned
         """Return a policy's actions, checked, for a message."""
         chunk = check_rows(rows, self._needs.action_space)
         latency_s = float(getattr(self.policy, "latency_s", 0.0))
-        return {"rows": chunk.tobytes(), "size": chunk.shape[1], "latency_s": latency_s}
+        return Acted(chunk.tobytes(), chunk.shape[1], latency_s)
 
-    def hear(self, call: Message) -> Message:
+    def hear(self, call: Call) -> Told:
         """Tell the policy what was said; returns its metadata."""
-        tell_policy(self.policy, call["utterances"])
-        return {"metadata": policy_metadata(self.policy)}
+        tell_policy(self.policy, call.utterances)
+        return Told(dump_metadata(self.policy))
 
-    def usage(self, _call: Message) -> Message:
+    def usage(self, _call: Call) -> Told:
         """Return the cost of the episode."""
-        return {"usage": policy_usage(self.policy)}
+        return Told(usage=policy_usage(self.policy))
 
-    def close(self, _call: Message) -> Message:
+    def close(self, _call: Call) -> Told:
         """End the episode."""
         self._block.close()
         close_policy(self.policy)
-        return {}
+        return Told()
+
+    def read(self, message: Call) -> Any:  # noqa: ANN401 - whatever the world has packed
+        """Return the value of a message; what does not fit into shared memory comes in parts."""
+        data = bytearray(self._block[: message.size])
+        while len(data) < message.size:
+            self._ask(Ask(0, start=len(data)))
+            data += self._block[: message.size - len(data)]
+        return unpack_payload(message.tree, data)
 
     def _fetch(self, fields: Sequence[str]) -> Mapping[str, NDArray[Any]]:
         self._read_fields.update(dict.fromkeys(fields))
-        found: Mapping[str, NDArray[Any]] = self._read(self._ask({"want": list(fields)}))
+        found: Mapping[str, NDArray[Any]] = self.read(self._ask(Ask(0, tuple(fields))))
         return found
-
-    def _read(self, message: Message) -> Any:  # noqa: ANN401 - whatever the world has packed
-        """Return the value of a message; what does not fit into shared memory comes in parts."""
-        size, shared = message["size"], buffer_of(self._block)
-        data = bytearray(shared[:size])
-        while len(data) < size:
-            self._ask({"want_from": len(data)})
-            data += shared[: size - len(data)]
-        return unpack_payload(message["tree"], data)

@@ -7,59 +7,57 @@ policy's.
 from __future__ import annotations
 
 import contextlib
-import json
+import mmap
 import os
+import socket
 import sys
 import time
-from collections.abc import Iterator, Mapping, Sequence
-from multiprocessing.connection import Client, Connection
-from multiprocessing.shared_memory import SharedMemory
-from typing import Any
+from collections.abc import Sequence
+from multiprocessing.connection import Connection
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import JsonValue
 
-from roboirg.core.errors import MissingDependencyError
+from roboirg.core.errors import InvalidValueError, MissingDependencyError
 from roboirg.core.observations import Demonstration, Observation
-from roboirg.core.plain_text import clip_text
-from roboirg.evaluation.episode_errors import (
-    MAX_DETAILS_LENGTH,
-    EpisodeError,
-    EpisodeLostError,
-    attribute_errors,
-)
-from roboirg.evaluation.hosting.host_pool import HostAddress
-from roboirg.evaluation.hosting.host_process import MISSING
-from roboirg.evaluation.hosting.payload import (
-    BLOCK_SIZE,
-    Message,
+from roboirg.evaluation.episode_errors import EpisodeError, EpisodeLostError, attribute_errors
+from roboirg.evaluation.hosting.messages import (
+    Acted,
+    Ask,
+    Call,
+    Failure,
+    Lost,
+    Opened,
     Payload,
-    buffer_of,
-    decode,
+    Told,
     encode,
+    map_block,
+    new_block,
     pack_payload,
+    read_supervisor,
 )
-from roboirg.evaluation.records.record import ERROR_KINDS
-from roboirg.policies.contract.policy_needs import PolicyNeeds
+from roboirg.evaluation.policy_calls import read_metadata
 from roboirg.policies.contract.policy_urls import is_url
 
 _DRAWN = ("_rgb", "_depth")
 """How the fields of a demonstration end that are drawn when they are read."""
-_MAX_TEXT_LENGTH = 2000
+_SENT = "the policy's process sent"
+
+Found = TypeVar("Found", Opened, Told, Acted)
 
 
 class HostedPolicy:
     """A policy in its host's process, for one episode.
 
     Args:
-        hosts: where to ask for its host.
+        hosts: the line on which to ask for its host, of `HostPool.connect`.
         spec: of the policy.
         seed: of its random choices.
         alone: whether it must not be asked about this episode together with others.
 
     Attributes:
-        is_privileged: whether it must be run in the world's process instead.
         version: of the policy.
         metadata: as the policy reports them, from `reset` on.
         waited_s: seconds that its calls waited for others.
@@ -71,31 +69,21 @@ class HostedPolicy:
         MissingDependencyError: a package that one of our own policies needs is not installed.
     """
 
-    def __init__(self, hosts: HostAddress, spec: str, seed: int, *, alone: bool = False) -> None:
+    def __init__(self, hosts: socket.socket, spec: str, seed: int, *, alone: bool = False) -> None:
         self._spec = spec
         self.metadata: dict[str, JsonValue] = {}
         self.waited_s = self.latency_s = 0.0
-        self.version = "unknown"
-        self._reads: tuple[str, ...] = ()
         self._demonstration: Demonstration = {}
         self._sent: Payload = pack_payload(None)
-        self._seconds = 0.0
         self._is_open = True
         with contextlib.ExitStack() as undo:
-            self._block = SharedMemory(create=True, size=BLOCK_SIZE)
+            self._connection, self._block = _begin_episode(hosts)
             undo.callback(self._block.close)
-            # The host opens it in the first call, so it needs its name no longer: however this
-            # process ends, nothing is left behind.
-            with contextlib.ExitStack() as named:
-                named.callback(self._block.unlink)
-                self._connection = _connect(hosts)
-                undo.callback(self._connection.close)
-                call = {"spec": spec, "seed": seed, "alone": alone, "block": self._block.name}
-                found = self._call("open", call)
-            self.is_privileged = found.get("privileged") is True
-            if not self.is_privileged:
-                self._take_description(found)
-                self._end = undo.pop_all()
+            undo.callback(self._connection.close)
+            found = self._call(Opened, Call("open", spec=spec, seed=seed, alone=alone))
+            found.needs.declare_on(self)
+            self.version, self._reads = found.version, found.reads
+            self._end = undo.pop_all()
 
     def reset(self, instruction: str, demonstration: Demonstration) -> None:
         """Begin the episode."""
@@ -108,34 +96,34 @@ class HostedPolicy:
             "fields": list(demonstration),
             "arrays": self._drawn(now),
         }
-        self._take_metadata(self._call("reset", self._pack(value)))
+        self._take_metadata(self._call(Told, self._pack("reset", value)))
 
     def act(self, observation: Observation) -> NDArray[np.float64]:
         """Return the next actions (n, 8) or (n, 7)."""
-        found = self._call("act", self._pack(observation))
-        with _reading():
-            self.latency_s = float(found["latency_s"])
-            return np.frombuffer(found["rows"], np.float64).reshape(-1, found["size"]).copy()
+        found = self._call(Acted, self._pack("act", observation))
+        self.latency_s = found.latency_s
+        if not found.rows or len(found.rows) % (8 * found.size):
+            raise EpisodeError("policy", f"{_SENT} actions in part", "")
+        return np.frombuffer(found.rows, np.float64).reshape(-1, found.size).copy()
 
     def hear(self, text: str, step: int) -> None:
         """Tell the policy what was said."""
-        self._take_metadata(self._call("hear", {"utterances": [{"text": text, "step": step}]}))
+        utterance = {"text": text, "step": step}
+        self._take_metadata(self._call(Told, Call("hear", utterances=(utterance,))))
 
     def usage(self) -> dict[str, float]:
         """Return the cost of the episode; empty after an error."""
-        found = self._call("usage", {}) if self._is_open else {}
-        with _reading():
-            return {str(name): float(cost) for name, cost in found.get("usage", {}).items()}
+        return dict(self._call(Told, Call("usage")).usage) if self._is_open else {}
 
     def close(self) -> None:
         """End the episode; repeated calls do nothing."""
         is_open, self._is_open = self._is_open, False
         with self._end, contextlib.suppress(EpisodeLostError):  # what is lost needs no end
             if is_open:
-                self._call("close", {})
+                self._call(Told, Call("close"))
 
-    def _call(self, method: str, call: Message) -> Message:
-        """Call the host, draw what it asks for, and return the reply.
+    def _call(self, kind: type[Found], call: Call) -> Found:
+        """Call the host, draw what it asks for, and return the outcome.
 
         Raises:
             EpisodeError: the policy raised, or broke its process.
@@ -144,64 +132,51 @@ class HostedPolicy:
         """
         start = time.perf_counter()
         try:
-            self._connection.send_bytes(encode({**call, "method": method}))
-            while True:
-                reply = decode(self._connection.recv_bytes())
-                if "want" in reply:
-                    answer = self._draw(reply["want"])
-                elif "want_from" in reply:
-                    self._copy(int(reply["want_from"]))
-                    answer = {}
-                else:
-                    break
-                self._connection.send_bytes(encode({**answer, "method": "answer"}))
+            self._connection.send_bytes(encode(call))
+            while isinstance(reply := read_supervisor(self._connection.recv_bytes()), Ask):
+                self._connection.send_bytes(encode(self._draw(reply)))
         except (EOFError, OSError) as error:
             self._is_open = False
             raise _lost() from error
         except EpisodeError:
             self._is_open = False  # the host waits for an answer
             raise
-        _print(reply.get("output"))
-        found = self._result(reply)
-        self.waited_s += max(time.perf_counter() - start - self._seconds, 0.0)
-        return found
+        _print(reply.output)
+        self.waited_s += max(time.perf_counter() - start - reply.seconds, 0.0)
+        outcome = reply.outcome
+        if isinstance(outcome, Failure | Lost):
+            raise self._error(outcome)
+        if not isinstance(outcome, kind):
+            raise EpisodeError("policy", f"{_SENT} something else than was asked for", "")
+        return outcome
 
-    def _result(self, reply: Message) -> Message:
-        with _reading():
-            if "lost" in reply:
-                self._is_open = False
-                kind, message, alone = reply["lost"]
-                raise EpisodeLostError(kind, str(message), alone=bool(alone))
-            if "error" in reply:
-                kind, message, details = map(str, reply["error"])
-                message = clip_text(message, _MAX_TEXT_LENGTH)
-                if kind == MISSING and is_url(self._spec):
-                    raise MissingDependencyError(message)
-                known = kind if kind in ERROR_KINDS else "policy"
-                # A process that broke is gone; a policy that raised is still there to be closed.
-                self._is_open = bool(details)
-                raise EpisodeError(known, message, clip_text(details, MAX_DETAILS_LENGTH))
-            self._seconds = float(reply.get("seconds", 0.0))
-            value = reply["value"]
-            if not isinstance(value, dict):
-                raise TypeError(type(value).__name__)
-            return value
+    def _error(self, outcome: Failure | Lost) -> Exception:
+        """Return what a failure raises here."""
+        if isinstance(outcome, Failure):
+            if outcome.kind != "missing":
+                return EpisodeError(outcome.kind, outcome.message, outcome.details)
+            if is_url(self._spec):
+                return MissingDependencyError(outcome.message)
+            return EpisodeError("policy", outcome.message, "")
+        self._is_open = False
+        if outcome.again:
+            return EpisodeLostError(outcome.kind, outcome.message, alone=outcome.alone)
+        return EpisodeError(outcome.kind, outcome.message, "")
 
-    def _take_description(self, found: Message) -> None:
-        with _reading():
-            PolicyNeeds(**found["needs"]).declare_on(self)
-            self.version = clip_text(str(found["version"]), _MAX_TEXT_LENGTH)
-            self._reads = tuple(map(str, found["reads"]))
+    def _take_metadata(self, found: Told) -> None:
+        try:
+            self.metadata = read_metadata(found.metadata, is_ours=False)
+        except (InvalidValueError, ValueError) as error:
+            raise EpisodeError("policy", str(error), "") from error
 
-    def _take_metadata(self, found: Message) -> None:
-        with _reading():
-            self.metadata = json.loads(json.dumps(dict(found["metadata"])))
-
-    def _draw(self, fields: Any) -> Message:  # noqa: ANN401 - as a policy's process sent it
-        with _reading():
-            wanted = [field for field in self._demonstration if field in list(fields)]
+    def _draw(self, question: Ask) -> Call:
+        """Return the answer to a question of the policy's process."""
+        if question.start is not None:
+            self._sent.copy_to(self._block, question.start)
+            return Call("answer")
+        wanted = [field for field in self._demonstration if field in question.fields]
         with attribute_errors("environment"):
-            return self._pack(self._drawn(wanted))
+            return self._pack("answer", self._drawn(wanted))
 
     def _drawn(self, fields: Sequence[str]) -> dict[str, NDArray[Any]]:
         draw = getattr(self._demonstration, "draw", None)
@@ -211,42 +186,34 @@ class HostedPolicy:
             draw()  # all cameras in one replay
         return {field: self._demonstration[field] for field in fields}
 
-    def _pack(self, value: Mapping[str, Any]) -> Message:
-        """Put the arrays of a value into shared memory; return the rest for the message."""
+    def _pack(self, method: str, value: object) -> Call:
+        """Put the arrays of a value into shared memory; return the rest as a call."""
         self._sent = pack_payload(value)
-        self._copy(0)
-        return {"tree": self._sent.tree, "size": self._sent.size}
-
-    def _copy(self, start: int) -> None:
-        self._sent.copy_to(buffer_of(self._block), start)
+        self._sent.copy_to(self._block, 0)
+        return Call(method, tree=self._sent.tree, size=self._sent.size)
 
 
-def _print(output: object) -> None:
+def _begin_episode(hosts: socket.socket) -> tuple[Connection, mmap.mmap]:
+    """Return a connection to the supervisor, and memory shared with the policy's process."""
+    ours, theirs = socket.socketpair()
+    block = new_block()
+    with theirs:
+        try:
+            socket.send_fds(hosts, [b"\0"], [theirs.fileno(), block])
+        except OSError as error:
+            ours.close()
+            os.close(block)
+            raise _lost() from error
+    return Connection(ours.detach()), map_block(block)
+
+
+def _print(output: bytes) -> None:
     """Print what the policy printed, so that it is in the log of its episode."""
-    if output and isinstance(output, bytes):
+    if output:
         with contextlib.suppress(OSError):
             sys.stderr.flush()
             os.write(sys.__stderr__.fileno() if sys.__stderr__ else 2, output)
 
 
-def _connect(hosts: HostAddress) -> Connection:
-    try:
-        connection = Client(hosts.path, "AF_UNIX")
-        connection.send_bytes(hosts.key)
-    except OSError as error:
-        raise _lost() from error
-    return connection
-
-
 def _lost() -> EpisodeLostError:
     return EpisodeLostError("infrastructure", "the policy's host is gone", alone=False)
-
-
-@contextlib.contextmanager
-def _reading() -> Iterator[None]:
-    """Turn what goes wrong while a reply is read into an error of the policy."""
-    try:
-        yield
-    except (AttributeError, KeyError, TypeError, ValueError) as error:
-        message = f"the policy's process sent a malformed reply ({type(error).__name__})"
-        raise EpisodeError("policy", message, "") from error

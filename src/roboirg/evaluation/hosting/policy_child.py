@@ -8,10 +8,19 @@ import os
 import select
 import termios
 import threading
-from collections.abc import Mapping
-from typing import IO, Self
+from collections.abc import Mapping, Sequence
+from typing import Any, Self
 
-from roboirg.evaluation.hosting.payload import MAX_MESSAGE, Message, decode, encode
+from roboirg.core.errors import RoboIRGError
+from roboirg.evaluation.hosting.messages import (
+    MAX_MESSAGE,
+    Ask,
+    Call,
+    Outcome,
+    encode,
+    read_child,
+    send_descriptor,
+)
 from roboirg.evaluation.records.record import ErrorKind
 from roboirg.tasks.splits.private_splits import SALT_VARIABLE
 from roboirg.util.child_process import ChildExit, ChildProcess
@@ -20,6 +29,7 @@ _MODULE = "roboirg.evaluation.hosting.host_process"
 
 MAX_OUTPUT = 256 * 2**10
 """Bytes that are kept of what a policy process prints in one call; the rest is read and dropped."""
+MAX_WORDS = 300
 DRAIN_S = 1.0
 """How long to wait for the end of what was printed; a thread of the policy may print for ever."""
 
@@ -37,61 +47,50 @@ class ChildLostError(Exception):
 
 
 class PolicyChild(ChildProcess):
-    """A policy process; made by `start`.
+    """A policy process; made by `start`."""
 
-    Attributes:
-        printed: what it prints.
-    """
-
-    printed: _Output
+    def __init__(self, *channel: Any) -> None:  # noqa: ANN401
+        super().__init__(*channel)
+        self._changed = threading.Condition()
+        self._kept, self._dropped, self._is_reading = bytearray(), 0, False
+        threading.Thread(target=self._read_output, name="policy output", daemon=True).start()
 
     @classmethod
     def start(cls, variables: Mapping[str, str] | None = None) -> Self:
-        """Start a process with environment variables beside those of this one, without a salt."""
-        child = cls.run_module(_MODULE, {**(variables or {}), SALT_VARIABLE: None})
-        child.printed = _Output(child.output)
-        return child
+        """Start a process with environment variables besides those of this one, without a salt."""
+        return cls.run_module(_MODULE, {**(variables or {}), SALT_VARIABLE: None})
 
-    def exchange(self, message: Message) -> Message:
-        """Send a message and return the reply; waits for as long as it takes.
+    def exchange(
+        self, message: Call | Sequence[Call], block: int | None = None
+    ) -> Ask | list[Outcome]:
+        """Send calls, or an answer, and return the reply; waits for as long as it takes.
+
+        Args:
+            message: to send.
+            block: descriptor of an episode's shared memory, sent after the message.
 
         Raises:
             ChildLostError: the process has died, or sent something other than a message.
         """
         try:
             self.connection.send_bytes(encode(message))
-            return decode(self.connection.recv_bytes(MAX_MESSAGE))
+            if block is not None:
+                send_descriptor(self.connection, block)
+            reply: Ask | list[Outcome] = read_child(self.connection.recv_bytes(MAX_MESSAGE))
+            return reply
         except (EOFError, OSError):
             raise _explain(self.close()) from None
-        except ValueError as error:
-            self.kill()
-            raise ChildLostError("policy", f"the process sent {error}") from error
+        except (RoboIRGError, RecursionError, ValueError) as error:
+            self.end()
+            words = f"the process sent what is no reply ({error})"
+            raise ChildLostError("policy", words[:MAX_WORDS]) from None
 
     def loss(self) -> ChildLostError | None:
         """Return how the process died; None while it is alive."""
         return None if self.exit is None else _explain(self.exit)
 
-
-def _explain(ended: ChildExit) -> ChildLostError:
-    return ChildLostError("infrastructure" if ended.was_killed else "policy", str(ended))
-
-
-class _Output:
-    """Reads what a process prints, so that it never waits, and keeps a part of it.
-
-    Args:
-        stream: the read end of the pipe that is its stdout and stderr.
-    """
-
-    def __init__(self, stream: IO[bytes] | None) -> None:
-        self._stream = stream
-        self._changed = threading.Condition()
-        self._kept, self._dropped = bytearray(), 0
-        self._is_reading = False
-        threading.Thread(target=self._read, name="policy output", daemon=True).start()
-
-    def take(self) -> bytes:
-        """Return what is kept, and forget it. Called when the process waits or has ended."""
+    def take_output(self) -> bytes:
+        """Return what it printed, and forget it. Called when it waits or has ended."""
         with self._changed:
             self._changed.wait_for(self._is_drained, DRAIN_S)
             output, dropped = bytes(self._kept), self._dropped
@@ -101,17 +100,18 @@ class _Output:
         return output + (note.encode() if dropped else b"")
 
     def _is_drained(self) -> bool:
-        if self._stream is None or self._stream.closed:
+        if self.output is None or self.output.closed:
             return True
         waiting = array.array("i", [0])
-        fcntl.ioctl(self._stream.fileno(), termios.FIONREAD, waiting)
+        fcntl.ioctl(self.output.fileno(), termios.FIONREAD, waiting)
         return not (waiting[0] or self._is_reading)
 
-    def _read(self) -> None:
-        while self._stream is not None and select.select([self._stream], [], []):
+    def _read_output(self) -> None:
+        """Read what it prints, so that it never waits, and keep a part of it."""
+        while self.output is not None and select.select([self.output], [], []):
             with self._changed:
                 self._is_reading = True
-            data = os.read(self._stream.fileno(), 65_536)
+            data = os.read(self.output.fileno(), 65_536)
             with self._changed:
                 room = max(MAX_OUTPUT - len(self._kept), 0)
                 self._kept += data[:room]
@@ -120,3 +120,8 @@ class _Output:
                 self._changed.notify_all()
             if not data:
                 return
+
+
+def _explain(ended: ChildExit) -> ChildLostError:
+    """Return the loss of a process that ended so."""
+    return ChildLostError("infrastructure" if ended.was_killed else "policy", str(ended))

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from roboirg.core.errors import InvalidValueError, MissingDependencyError
-from roboirg.core.plain_text import clip_text
-from roboirg.evaluation.hosting.host_process import MISSING
+from roboirg.evaluation.hosting.messages import Call, Failure, Opened
 from roboirg.evaluation.hosting.policy_child import ChildLostError, PolicyChild
 from roboirg.policies.by_name.loading import (
     is_foreign,
@@ -16,8 +15,6 @@ from roboirg.policies.by_name.loading import (
     policy_version,
 )
 from roboirg.policies.contract.policy_needs import PolicyNeeds
-
-_MAX_LENGTH = 2000
 
 
 class PolicyDescription(NamedTuple):
@@ -77,20 +74,18 @@ def _describe_ours(spec: str) -> PolicyDescription:
 def _describe_apart(spec: str) -> PolicyDescription:
     child = PolicyChild.start()
     try:
-        reply = child.exchange({"method": "describe", "calls": [{"spec": spec, "session": 0}]})
-        (result,) = reply["results"]
-        if "error" not in result:
-            return _read(result["value"])
-        kind, message, _ = map(str, result["error"])
-    except (ChildLostError, AttributeError, KeyError, TypeError, ValueError) as error:
+        reply = child.exchange([Call("describe", spec=spec)])
+    except ChildLostError as error:
         raise InvalidValueError(f"Policy {spec!r} cannot be loaded: {error}.") from error
     finally:
         child.end()
-    message = clip_text(message, _MAX_LENGTH)
-    raise MissingDependencyError(message) if kind == MISSING else InvalidValueError(message)
-
-
-def _read(value: Any) -> PolicyDescription:  # noqa: ANN401 - as a policy's process sent it
-    version = clip_text(str(value["version"]), _MAX_LENGTH)
-    needs = PolicyNeeds(**value["needs"])
-    return PolicyDescription(version, value["privileged"] is True, needs)
+    match reply:
+        case [Opened() as found]:
+            # Whether it is privileged is not for its own process to say.
+            return PolicyDescription(found.version, is_privileged(spec), found.needs)
+        case [Failure(kind="missing") as failure]:
+            raise MissingDependencyError(failure.message)
+        case [Failure() as failure]:
+            raise InvalidValueError(failure.message)
+        case _:
+            raise InvalidValueError(f"Policy {spec!r} cannot be loaded: it sent no description.")

@@ -1,7 +1,10 @@
-"""The host of one policy: a queue of calls in front of its process.
+"""The host of one policy: its process, and the turns in which episodes are asked about.
 
 A call that breaks the process costs its own episode. The other episodes of that process, and those
-asked about together with it, are played again: no record depends on which episodes shared a host.
+asked about together with it, are played again: no verdict depends on who shared a host.
+
+Each episode has a thread. The one whose call waits longest carries it out, and with it the calls of
+others that can be carried out together.
 """
 
 from __future__ import annotations
@@ -10,12 +13,22 @@ import itertools
 import threading
 import time
 from collections import deque
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from multiprocessing.connection import Connection
-from queue import SimpleQueue
 
-from roboirg.evaluation.hosting.payload import Message, decode, encode
+from roboirg.evaluation.hosting.messages import (
+    Ask,
+    Call,
+    Failure,
+    Lost,
+    Opened,
+    Outcome,
+    Reply,
+    Told,
+    encode,
+    read_call,
+)
 from roboirg.evaluation.hosting.policy_child import ChildLostError, PolicyChild
 from roboirg.util.deadline_watch import DeadlineWatch
 
@@ -30,6 +43,7 @@ PHASES: Mapping[str, str] = {
     "usage": "policy's close()",
     "close": "policy's close()",
 }
+_ENDING = ChildLostError("infrastructure", "the run is ending")
 _numbers = itertools.count(1)
 
 
@@ -39,43 +53,30 @@ class HostSession:
 
     Attributes:
         connection: to its world.
-        alone: whether it must not be asked about together with others.
+        block: descriptor of its shared memory.
         number: unique in this process.
+        alone: whether it must not be asked about together with others.
         started: which of the host's processes serves it; 0 before it is open.
         together: whether its policy can be asked about several episodes at once.
+        call: the latest.
+        reply: to it; None while it waits or is under way.
     """
 
     connection: Connection
-    alone: bool = False
+    block: int
     number: int = field(default_factory=lambda: next(_numbers))
+    alone: bool = False
     started: int = 0
     together: bool = False
-
-
-@dataclass(eq=False)
-class _Call:
-    """A call that waits or is under way.
-
-    Attributes:
-        session: its episode.
-        message: as the world sent it.
-        replies: questions to the world and the final reply; read by the session's thread.
-        answers: the world's answers to questions; None if the world is gone.
-        is_orphaned: whether the world is gone.
-    """
-
-    session: HostSession
-    message: Message
-    replies: SimpleQueue[Message] = field(default_factory=SimpleQueue)
-    answers: SimpleQueue[Message | None] = field(default_factory=SimpleQueue)
-    is_orphaned: bool = False
+    call: Call = field(default_factory=lambda: Call("open"))
+    reply: Reply | None = None
 
 
 class PolicyHost:
     """Runs one policy process for many worlds, and starts it again when it dies.
 
     Args:
-        variables: environment variables of the process.
+        start: starts the process.
         batch: most episodes that are asked about together.
         timeout_s: how long a call may take, without the time in the queue; None for no limit.
 
@@ -84,217 +85,168 @@ class PolicyHost:
         child: the policy's process; None if there is none.
     """
 
-    def __init__(self, variables: Mapping[str, str], batch: int, timeout_s: float | None) -> None:
-        self._variables, self._batch, self._timeout_s = dict(variables), batch, timeout_s
+    def __init__(
+        self, start: Callable[[], PolicyChild], batch: int, timeout_s: float | None
+    ) -> None:
+        self._start, self._batch, self._timeout_s = start, batch, timeout_s
         self.sessions: set[HostSession] = set()
-        self._waiting: deque[_Call] = deque()
-        self._changed = threading.Condition()
-        self._stopped = False
         self.child: PolicyChild | None = None
-        self._starts = 0
+        self._waiting: deque[HostSession] = deque()
+        self._changed = threading.Condition()
+        self._is_busy = self._is_stopped = False
+        self._starts, self._loss = 0, _ENDING
         self._limit = DeadlineWatch(self._kill)
-        self._loss = ChildLostError("infrastructure", "the run is ending")
-        self._thread = threading.Thread(target=self._run, name="policy host", daemon=True)
-        self._thread.start()
+        self._limit.__enter__()
 
-    def call(self, session: HostSession, message: Message) -> Message:
-        """Carry out a call of a world and return the reply; called by the session's thread.
-
-        Raises:
-            EOFError: the world is gone.
-            OSError: likewise.
-        """
-        call = _Call(session, message)
+    def call(self, session: HostSession, call: Call) -> Reply:
+        """Carry out a call of a world and return the reply; called by the session's thread."""
+        call.session = session.number
+        session.call, session.reply = call, None
         with self._changed:
-            self._waiting.append(call)
-            self._changed.notify()
-        while True:
-            reply = call.replies.get()
-            if "want" not in reply and "want_from" not in reply:
-                return reply
-            answer = None
-            try:
-                session.connection.send_bytes(encode(reply))
-                answer = decode(session.connection.recv_bytes())
-            finally:
-                call.is_orphaned = answer is None
-                call.answers.put(answer)
+            self._waiting.append(session)
+            self._changed.notify_all()
+            done = self._changed.wait_for(lambda: session.reply or self._is_next(session))
+            if isinstance(done, Reply):  # carried out with the call of another
+                return done
+            self._waiting.popleft()
+            self._is_busy = True
+            calls = self._gather(session)
+        replies = [Reply(Lost("infrastructure", "the policy's host failed", again=True))]
+        try:
+            replies = self._carry_out(calls)
+        finally:
+            with self._changed:
+                for one, reply in zip(calls, itertools.cycle(replies), strict=False):
+                    one.reply = reply
+                self._is_busy = False
+                self._changed.notify_all()
+        return replies[0]
 
     def leave(self, session: HostSession) -> None:
         """End an episode whose world may be gone."""
-        self.sessions.discard(session)
         if session.started:
-            with self._changed:
-                self._waiting.append(_Call(session, {"method": "close"}, is_orphaned=True))
-                self._changed.notify()
+            self.call(session, Call("close"))
+        self.sessions.discard(session)
 
     def stop(self) -> None:
-        """End the process after the call that is under way."""
-        with self._changed:
-            self._stopped = True
-            self._changed.notify()
-
-    def join(self) -> None:
-        """Stop now, and wait for it."""
-        self.stop()
-        if self.sessions:
-            self._kill()
-        self._thread.join()
+        """End the process; what is under way is lost."""
+        self._is_stopped = True
+        self._kill()
+        self._limit.__exit__()
 
     def _kill(self) -> None:
         if (child := self.child) is not None:
             child.kill()
 
-    def _run(self) -> None:
-        with self._limit:
-            self._carry_out_all()
-        for call in self._waiting:
-            self._reply_lost(call)
-        if self.child is not None:
-            self.child.close()
+    def _is_next(self, session: HostSession) -> bool:
+        return not self._is_busy and self._waiting[0] is session
 
-    def _carry_out_all(self) -> None:
-        while calls := self._gather():
-            if self.child is not None and (loss := self.child.loss()) is not None:
-                self._forget_child(loss)
-            ready = [call for call in calls if self._is_current(call)]
-            if ready:
-                self._carry_out(ready)
+    def _gather(self, first: HostSession) -> list[HostSession]:
+        """Wait for calls that can be carried out together with one; holds the condition."""
+        if not self._joins(first):
+            return [first]
+        # Worlds that wait already, and those that are just about to.
+        wanted = min(self._batch, sum(not one.alone for one in tuple(self.sessions)))
+        self._changed.wait_for(lambda: len(self._waiting) + 1 >= wanted, GATHER_S)
+        joining = [one for one in self._waiting if self._joins(one)][: self._batch - 1]
+        for one in joining:
+            self._waiting.remove(one)
+        return [first, *joining]
+
+    def _joins(self, session: HostSession) -> bool:
+        can_join = session.together and not session.alone and session.started == self._starts
+        return can_join and session.call.method == "act"
+
+    def _carry_out(self, sessions: Sequence[HostSession]) -> list[Reply]:
+        """Carry out the calls of sessions that are asked about together, mostly one."""
+        if self.child is not None and (loss := self.child.loss()) is not None:
+            self._forget_child(loss)
+        first = sessions[0]
+        method = first.call.method
+        # Those that join others are of the process that is alive.
+        if self._is_stopped or (method != "open" and first.started != self._starts):
+            loss = _ENDING if self._is_stopped else self._loss
+            return [Reply(_again(loss) if method != "close" else Told())] * len(sessions)
+        self._limit.acted_after = None
+        try:
+            outcomes, seconds = self._exchange(sessions)
+        except ChildLostError as loss:
+            return self._attribute(sessions, loss)
+        printed = b"" if self.child is None else self.child.take_output()
+        if len(sessions) > 1 and any(isinstance(one, Failure) for one in outcomes):
+            failed = ChildLostError("policy", "a call for several episodes failed")
+            return [Reply(_again(failed, alone=True))] * len(sessions)
+        if isinstance(outcomes[0], Opened):
+            first.started, first.together = self._starts, outcomes[0].together
+        elif method == "close":
+            first.started = 0
+        # What a call for several episodes prints is of all of them.
+        return [Reply(one, seconds, printed) for one in outcomes]
+
+    def _exchange(self, sessions: Sequence[HostSession]) -> tuple[list[Outcome], float]:
+        """Send calls to the process, and return the outcomes and the seconds that it took."""
+        child = self._started_child()
+        by_number = {session.number: session for session in sessions}
+        block = sessions[0].block if sessions[0].call.method == "open" else None
+        message: Call | list[Call] = [session.call for session in sessions]
+        spent_s = 0.0
+        while True:
+            start = time.monotonic()
+            self._limit.begin(None if self._timeout_s is None else self._timeout_s - spent_s)
+            try:
+                reply = child.exchange(message, block)
+            finally:
+                self._limit.begin(None)
+                spent_s += time.monotonic() - start
+            block = None
+            if isinstance(reply, list):
+                if len(reply) != len(sessions):
+                    raise ChildLostError("policy", "the process sent too few or too many results")
+                return reply, spent_s
+            if reply.session not in by_number:
+                raise ChildLostError("policy", "the process asked for the video of another episode")
+            # What the world takes to draw is not the policy's time.
+            message = _ask(by_number[reply.session], reply)
+
+    def _started_child(self) -> PolicyChild:
+        if self.child is None:
+            self.child, self._starts = self._start(), self._starts + 1
+            if self._is_stopped:
+                self._kill()
+            # The start of the interpreter is not the policy's time.
+            self.child.exchange([])
+        return self.child
 
     def _forget_child(self, loss: ChildLostError) -> None:
         """Give up a process that is dead; the episodes that it served are played again."""
         if self.child is not None:
-            self.child.close()
+            self.child.end()
         self.child, self._starts, self._loss = None, self._starts + 1, loss
 
-    def _gather(self) -> list[_Call]:
-        """Wait for a call and for others to go with it; empty when the host is stopped."""
-        with self._changed:
-            self._changed.wait_for(lambda: self._waiting or self._stopped)
-            if self._stopped:
-                return []
-            first = self._waiting.popleft()
-            if not self._joins(first):
-                return [first]
-            # Worlds that wait already, and those that are just about to.
-            wanted = min(self._batch, sum(not one.alone for one in tuple(self.sessions)))
-            self._changed.wait_for(lambda: len(self._waiting) + 1 >= wanted, GATHER_S)
-            calls, left = [first], deque[_Call]()
-            while self._waiting:
-                call = self._waiting.popleft()
-                joins = len(calls) < self._batch and self._joins(call)
-                (calls if joins else left).append(call)
-            self._waiting = left
-            return calls
-
-    def _joins(self, call: _Call) -> bool:
-        session = call.session
-        return (
-            call.message["method"] == "act"
-            and session.together
-            and not session.alone
-            and session.started == self._starts
-        )
-
-    def _is_current(self, call: _Call) -> bool:
-        """Return whether the episode's process is alive; tell its world if not."""
-        session, method = call.session, call.message["method"]
-        if method == "open" or session.started == self._starts:
-            return True
-        if method == "close":
-            call.replies.put({"value": {}})
-        else:
-            self._reply_lost(call)
-        return False
-
-    def _carry_out(self, calls: Sequence[_Call]) -> None:
-        self._limit.acted_after = None
-        try:
-            if self.child is None:
-                self.child, self._starts = PolicyChild.start(self._variables), self._starts + 1
-                # The start of the interpreter is not the policy's time.
-                self.child.exchange({"method": "start", "calls": []})
-            reply = self._exchange(calls)
-            results = reply["results"]
-            # What a call for several episodes prints is of all of them.
-            printed = self.child.printed.take()
-            replies = [
-                {**result, "seconds": reply["seconds"], "output": printed}
-                for _, result in zip(calls, results, strict=True)
-            ]
-        except ChildLostError as loss:
-            self._attribute(calls, loss)
-            return
-        except (AttributeError, KeyError, TypeError, ValueError) as error:
-            self._attribute(calls, ChildLostError("policy", f"the process sent {error!r}"))
-            return
-        if len(calls) > 1 and any("error" in one for one in replies):
-            failed = ChildLostError("policy", "a call for several episodes failed")
-            for call in calls:
-                self._reply_lost(call, failed, alone=True)
-            return
-        for call, one in zip(calls, replies, strict=True):
-            method, session = call.message["method"], call.session
-            if method == "open" and "needs" in one.get("value", {}):
-                session.started = self._starts
-                session.together = bool(one["value"]["together"])
-            elif method == "close":
-                session.started = 0
-            call.replies.put(one)
-
-    def _exchange(self, calls: Sequence[_Call]) -> Message:
-        """Send calls to the process, pass on its questions, and return its reply."""
-        child = self.child
-        if child is None:
-            raise AssertionError("the process has been started")
-        message: Message = {
-            "method": calls[0].message["method"],
-            "calls": [{**call.message, "session": call.session.number} for call in calls],
-        }
-        by_number = {call.session.number: call for call in calls}
-        left_s = self._timeout_s
-        while True:
-            start = time.monotonic()
-            self._limit.begin(left_s)
-            try:
-                reply = child.exchange(message)
-            finally:
-                self._limit.begin(None)
-            if "results" in reply:
-                return reply
-            if left_s is not None:  # what the world takes to draw is not the policy's time
-                left_s -= time.monotonic() - start
-            call = by_number[reply.pop("session")]
-            if not call.is_orphaned:
-                call.replies.put(reply)
-            answer = None if call.is_orphaned else call.answers.get()
-            message = answer or {"gone": True}
-
-    def _attribute(self, calls: Sequence[_Call], loss: ChildLostError) -> None:
+    def _attribute(self, sessions: Sequence[HostSession], loss: ChildLostError) -> list[Reply]:
         """Attribute the loss of the process to the call that was under way."""
         printed = b""
         if self.child is not None:
             self.child.kill()
-            printed = self.child.printed.take()
+            printed = self.child.take_output()
         self._forget_child(loss)
-        for call in calls:
-            phase = PHASES[call.message["method"]]
-            if len(calls) > 1:
-                self._reply_lost(call, loss, alone=True)
-            elif self._limit.acted_after is not None:
-                error = ["timeout", f"the {phase} did not return within {self._timeout_s:g} s", ""]
-                call.replies.put({"error": error, "output": printed})
-            else:
-                error = [loss.kind, f"{loss} in the {phase}", ""]
-                call.replies.put({"error": error, "output": printed})
-
-    def _reply_lost(
-        self, call: _Call, loss: ChildLostError | None = None, *, alone: bool = False
-    ) -> None:
-        loss = loss or self._loss
-        call.replies.put({"lost": [loss.kind, str(loss), alone]})
+        phase = PHASES[sessions[0].call.method]
+        if len(sessions) > 1 or self._is_stopped:
+            return [Reply(_again(loss, alone=not self._is_stopped))] * len(sessions)
+        if self._limit.acted_after is not None:
+            words = f"the {phase} did not return within {self._timeout_s:g} s"
+            return [Reply(Lost("timeout", words), output=printed)]
+        return [Reply(Lost(loss.kind, f"{loss} in the {phase}"), output=printed)]
 
 
-def host_variables(device: str | None) -> dict[str, str]:
-    """Return the environment variables of a host process on a device."""
-    return {} if device is None else {"CUDA_VISIBLE_DEVICES": device}
+def _ask(session: HostSession, question: Ask) -> Call:
+    """Return the answer of a world."""
+    try:
+        session.connection.send_bytes(encode(question))
+        return read_call(session.connection.recv_bytes())
+    except (EOFError, OSError):
+        return Call("gone")
+
+
+def _again(loss: ChildLostError, *, alone: bool = False) -> Lost:
+    return Lost(loss.kind, str(loss), again=True, alone=alone)

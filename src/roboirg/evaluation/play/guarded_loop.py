@@ -10,11 +10,13 @@ from numpy.typing import ArrayLike, NDArray
 
 from roboirg.core.actions import ActionSpace
 from roboirg.core.delivery import SpokenInstruction
+from roboirg.core.observations import Demonstration
 from roboirg.evaluation.play.call_guard import CallGuard
 from roboirg.evaluation.play.rollout_result import RolloutResult
 from roboirg.evaluation.play.video_writer import FrameSink
 from roboirg.evaluation.policy_calls import next_actions, policy_metadata
 from roboirg.evaluation.records.record import Job
+from roboirg.policies.by_name.loading import is_foreign, is_privileged
 from roboirg.policies.contract.base import Policy
 from roboirg.policies.contract.play import EpisodeLoop
 
@@ -51,6 +53,7 @@ class GuardedLoop(EpisodeLoop):
         super().__init__(env, policy)
         self._job, self._space, self._writer = job, space, writer
         self._result, self._guard = result, guard
+        self._is_ours = not is_foreign(job.policy_spec)
 
     def play(self) -> dict[str, Any]:
         """Play the episode, and record its status."""
@@ -80,9 +83,16 @@ class GuardedLoop(EpisodeLoop):
             result.heard += info["heard"]
         with self._guard.policy("policy's reset()", "policy_reset"):
             self.start_policy(first, info["demonstration"])
-            result.policy_metadata = policy_metadata(self.policy)
+            result.policy_metadata = policy_metadata(self.policy, is_ours=self._is_ours)
         result.action_space = self._space.name
         return observation, info
+
+    def start_policy(self, instruction: str, demonstration: Demonstration) -> None:
+        """Start the policy, which gets the world only if its spec declares that."""
+        if is_privileged(self._job.policy_spec):
+            super().start_policy(instruction, demonstration)
+        else:
+            self.policy.reset(instruction, demonstration)
 
     def act(self, observation: dict[str, Any]) -> NDArray[np.float64]:
         """Return the policy's next actions, checked."""
@@ -107,4 +117,4 @@ class GuardedLoop(EpisodeLoop):
             self._writer.caption = " ".join(one["text"] for one in self._result.heard)
         with self._guard.policy("policy's hear()", "policy_hear"):
             super().hear(utterances)
-            self._result.policy_metadata = policy_metadata(self.policy)
+            self._result.policy_metadata = policy_metadata(self.policy, is_ours=self._is_ours)

@@ -18,6 +18,7 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from socket import socket
 
 from roboirg import policies
 from roboirg.evaluation.episode_errors import (
@@ -26,7 +27,7 @@ from roboirg.evaluation.episode_errors import (
     format_cause,
     one_line,
 )
-from roboirg.evaluation.hosting.host_pool import HostAddress, HostSettings
+from roboirg.evaluation.hosting.host_pool import HostSettings
 from roboirg.evaluation.hosting.hosted_policy import HostedPolicy
 from roboirg.evaluation.hosting.policy_descriptions import PolicyDescription, describe_here
 from roboirg.evaluation.play.call_guard import CallGuard
@@ -67,7 +68,7 @@ class EpisodeRunner:
         policy_timeout_s: seconds that one call of the policy may take, if a supervisor watches.
         plan: fingerprint of the plan, for the records.
         hosting: how policies get processes of their own; None for policies in the world's process.
-        hosts: where to ask for them; an executor sets it.
+        hosts: the line on which to ask for them; an executor sets it.
         refuse_long: whether an episode is not played if its prompt is longer than what the policy's
             model reads.
         seed_secret: of the run, for the policies' seeds.
@@ -79,7 +80,7 @@ class EpisodeRunner:
     policy_timeout_s: float | None = None
     plan: str | None = None
     hosting: HostSettings | None = None
-    hosts: HostAddress | None = None
+    hosts: socket | None = None
     refuse_long: bool = False
     seed_secret: str = ""
 
@@ -87,8 +88,8 @@ class EpisodeRunner:
         """Return a copy that writes its videos to another folder."""
         return replace(self, folder=folder)
 
-    def with_hosts(self, hosts: HostAddress) -> EpisodeRunner:
-        """Return a copy that asks these hosts."""
+    def with_hosts(self, hosts: socket) -> EpisodeRunner:
+        """Return a copy that asks for hosts on a line, as `HostPool.connect` returns it."""
         return replace(self, hosts=hosts)
 
     def __call__(self, job: Job) -> Record:
@@ -117,12 +118,12 @@ class EpisodeRunner:
     def _play(self, job: Job) -> tuple[VideoWriter | None, RolloutResult]:
         """Play a job, again from its beginning if the policy's process is lost meanwhile."""
         alone = False
-        for losses in range(1, MAX_LOSSES + 1):
+        for attempt in range(1, MAX_LOSSES + 1):
             writer = None
             if self.video != "off":
                 writer = VideoWriter(self.folder / VIDEO_FOLDER / f"{job.slug}.mp4", self.options)
             try:
-                return writer, play_episode(
+                result = play_episode(
                     job,
                     writer,
                     self.policy_timeout_s,
@@ -133,13 +134,14 @@ class EpisodeRunner:
                 )
             except EpisodeLostError as error:
                 alone = alone or error.alone
-                if losses == MAX_LOSSES:
-                    result, message = RolloutResult(), f"{error}, {losses} times in a row"
-                    result.record_error(error.kind, format_cause(error.kind, message))
-                    return writer, result
-                if writer is not None:
+                result, message = RolloutResult(), f"{error}, {attempt} times in a row"
+                result.record_error(error.kind, format_cause(error.kind, message))
+                if writer is not None and attempt < MAX_LOSSES:
                     writer.discard()
-        raise AssertionError("the last loss returns")
+            else:
+                break
+        result.attempt = attempt
+        return writer, result
 
     def _finish_video(self, writer: VideoWriter | None, result: RolloutResult) -> str | None:
         """Keep or discard the video; return its path relative to the folder, or None."""
@@ -156,7 +158,7 @@ def play_episode(
     job: Job,
     writer: FrameSink | None = None,
     policy_timeout_s: float | None = None,
-    hosts: HostAddress | None = None,
+    hosts: socket | None = None,
     *,
     alone: bool = False,
     refuse_long: bool = False,
@@ -168,7 +170,7 @@ def play_episode(
         job: what to play.
         writer: gets the frames of a video.
         policy_timeout_s: seconds that one call of the policy may take, if a supervisor watches.
-        hosts: where policies have processes of their own; None to run them in this process.
+        hosts: the line on which to ask for processes of policies; None to run them in this one.
         alone: whether a hosted policy must not be asked about this episode together with others.
         refuse_long: whether not to play an episode whose prompt will be cut.
         seed_secret: of the run, for the policy's seed.
@@ -183,18 +185,19 @@ def play_episode(
         open_wordings(job.wordings_file, job.options.wordings)
     prepared = PreparedJob(job)
     result = RolloutResult(prepared=prepared)
-    guard = CallGuard(result, policy_timeout_s, is_hosted=hosts is not None)
+    is_hosted = hosts is not None and needs_host(job.policy_spec)
+    guard = CallGuard(result, policy_timeout_s, is_hosted=is_hosted)
     policy: Policy | None = None
     try:
-        if hosts is not None and needs_host(job.policy_spec):
-            with guard.policy("policy's constructor", "policy_load"):
-                seed = _policy_seed(prepared, seed_secret)
-                policy = _load_hosted(job, hosts, result, seed, alone=alone)
-        if policy is None:
-            guard = CallGuard(result, policy_timeout_s)
+        if hosts is None or not is_hosted:
             result.policy = describe_here(job.policy_spec)
-            with guard.policy("policy's constructor", "policy_load"):
+        with guard.policy("policy's constructor", "policy_load"):
+            if hosts is None or not is_hosted:
                 policy = load_policy(prepared, seed_secret)
+            else:
+                seed = _policy_seed(prepared, seed_secret)
+                policy = hosted = HostedPolicy(hosts, job.policy_spec, seed, alone=alone)
+                result.policy = PolicyDescription(hosted.version, is_privileged=False)
         with guard.policy("policy's constructor", "policy_load"):
             needs = job_needs(policy, job)
             result.prompt_limit = prompt_limit(needs)
@@ -261,17 +264,6 @@ def load_policy(prepared: PreparedJob, seed_secret: str = "") -> Policy:
     policy = policies.make_policy(job.policy_spec, seed=_policy_seed(prepared, seed_secret))
     if callable(take := getattr(policy, "take_job", None)):
         take(job)  # of ours that look up what a person answered
-    return policy
-
-
-def _load_hosted(
-    job: Job, hosts: HostAddress, result: RolloutResult, seed: int, *, alone: bool
-) -> HostedPolicy | None:
-    """Return a new policy object in its host; None if it is privileged and must run here."""
-    policy = HostedPolicy(hosts, job.policy_spec, seed, alone=alone)
-    if policy.is_privileged:
-        return None
-    result.policy = PolicyDescription(policy.version, is_privileged=False)
     return policy
 
 

@@ -81,6 +81,7 @@ class RolloutResult:
         end_state: the state after the last of them, in numbers and as a hash; None before.
         usage: what the policy reports that the episode cost.
         timings: seconds spent in the policy and in the environment, by phase.
+        attempt: how often the episode was begun.
     """
 
     outcome: Outcome = "error"
@@ -106,6 +107,7 @@ class RolloutResult:
     end_state: tuple[NDArray[np.float64], str] | None = None
     usage: dict[str, float] = field(default_factory=dict)
     timings: dict[str, float] = field(default_factory=dict)
+    attempt: int = 1
 
     @property
     def action_log(self) -> ActionLog | None:
@@ -166,6 +168,7 @@ _COPIED = (
     "render_device",
     "usage",
     "timings",
+    "attempt",
 )
 """Fields that a record has from the result as they are."""
 

@@ -269,7 +269,7 @@ class Summary(Job, frozen=True, kw_only=True, gc=False):
             0 without a video.
         demonstration_source: whose actions the video shows: RoboMME's (``recorded``), the oracle's
             (``planned``), or ``none``.
-        privileged: whether the policy has access to the simulator's state (it has ``attach``).
+        privileged: whether the policy has access to the simulator's state.
         policy_version: distinguishes versions of a policy of the same name.
         server_version: the version that the policy's server told; None if there is no server, or
             it told none, or the episode ended before.

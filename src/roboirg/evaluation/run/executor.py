@@ -14,10 +14,10 @@ from multiprocessing.connection import wait
 from typing import Protocol
 
 from roboirg.core.errors import InvalidValueError, RoboIRGError
-from roboirg.evaluation.hosting.host_pool import open_hosts
+from roboirg.evaluation.hosting.host_pool import Connect, open_hosts
 from roboirg.evaluation.play.rollout import PlayJob
 from roboirg.evaluation.records.record import Job, Record
-from roboirg.evaluation.run.workers import MAX_FAILED_STARTS, POLL_S, Worker
+from roboirg.evaluation.run.workers import MAX_FAILED_STARTS, POLL_S, Worker, connected
 from roboirg.util.processor import core_count, worker_count
 
 NO_TIMEOUT_S = float("inf")
@@ -43,7 +43,7 @@ class InProcess:
 
     def run(self, jobs: Sequence[Job], play: PlayJob) -> Iterator[Record]:
         """Yield one record for each job, in order."""
-        with open_hosts(play) as hosted:
+        with open_hosts(play) as connect, connected(play, connect) as hosted:
             yield from map(hosted, jobs)
 
 
@@ -75,10 +75,10 @@ class LocalProcesses:
         Raises:
             RoboIRGError: no worker can start, or an error would end every other job too.
         """
-        with open_hosts(play) as hosted:
-            yield from self._run(jobs, hosted)
+        with open_hosts(play) as connect:
+            yield from self._run(jobs, play, connect)
 
-    def _run(self, jobs: Sequence[Job], play: PlayJob) -> Iterator[Record]:
+    def _run(self, jobs: Sequence[Job], play: PlayJob, connect: Connect | None) -> Iterator[Record]:
         waiting, failed_starts = deque(jobs), 0
         # With a process on every core, more threads in Mesa would not help.
         limit_threads = self.workers >= core_count()
@@ -88,7 +88,7 @@ class LocalProcesses:
             while waiting or active:
                 while waiting and len(active) < self.workers:
                     job = waiting.popleft()
-                    active.append(Worker.start(play, job, limit_threads=limit_threads))
+                    active.append(Worker.start(play, job, connect, limit_threads=limit_threads))
                 for worker, record in self._finished(active):
                     failed_starts = failed_starts + 1 if worker.failed_to_start else 0
                     if failed_starts >= MAX_FAILED_STARTS * self.workers:

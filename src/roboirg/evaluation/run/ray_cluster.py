@@ -12,9 +12,11 @@ import contextlib
 import functools
 import logging
 import os
+import secrets
 import socket
 import sys
 import tempfile
+import threading
 import time
 from collections import deque
 from collections.abc import Iterator, Sequence
@@ -27,12 +29,7 @@ from roboirg.core.errors import InvalidValueError, RoboIRGError
 from roboirg.core.extras import extra_needed
 from roboirg.core.plain_text import counted
 from roboirg.evaluation.episode_errors import format_cause
-from roboirg.evaluation.hosting.host_pool import (
-    HostAddress,
-    HostPool,
-    HostSettings,
-    HostUser,
-)
+from roboirg.evaluation.hosting.host_pool import HostPool, HostSettings
 from roboirg.evaluation.play.rollout import PlayJob
 from roboirg.evaluation.play.rollout_result import RolloutResult, make_record, utc_now
 from roboirg.evaluation.records.record import Job, Record
@@ -44,6 +41,8 @@ POLL_S = 1.0
 NO_CPU_TIMEOUT_S = 300.0
 """How long a cluster may have no free CPU before the run stops."""
 CONNECT_S = 10.0
+KEY_S = 1.0
+"""How long a client of a machine's hosts may take to send its key."""
 CLOSE_S = 10.0
 """How long the hosts of all machines may take to end before they are killed."""
 
@@ -150,10 +149,6 @@ def _video_recorder(play: object) -> VideoRecorder | None:
     return play if isinstance(play, VideoRecorder) else None
 
 
-def _hosting(play: object) -> HostSettings | None:
-    return play.hosting if isinstance(play, HostUser) else None
-
-
 def _check_reachable(address: str | None) -> None:
     """Check that the address accepts connections; Ray would wait minutes and then exit."""
     host, _, port = (address or "").removeprefix("ray://").rpartition(":")
@@ -167,19 +162,63 @@ def _check_reachable(address: str | None) -> None:
         ) from error
 
 
+class HostAddress(NamedTuple):
+    """Where the policy hosts of a machine listen, for other actors there.
+
+    Attributes:
+        path: of the socket.
+        key: proves that a client belongs to the run; policies do not know it.
+    """
+
+    path: str
+    key: bytes
+
+    def connect(self) -> socket.socket:
+        """Return a new line to the hosts."""
+        line = socket.socket(socket.AF_UNIX)
+        line.connect(self.path)
+        line.sendall(self.key)
+        return line
+
+
 class _MachineHosts:
     """Actor that holds the policy hosts of a machine; all workers there use them."""
 
     def __init__(self, settings: HostSettings) -> None:
         self._pool = HostPool(settings)
+        # In /tmp, because the path of a socket may have 100 characters only.
+        self._folder = tempfile.TemporaryDirectory(prefix="roboirg-", dir="/tmp")
+        path = str(Path(self._folder.name) / "hosts")
+        self._address = HostAddress(path, secrets.token_bytes(32))
+        self._door = socket.socket(socket.AF_UNIX)
+        self._door.bind(path)
+        self._door.listen()
+        threading.Thread(target=self._open_lines, daemon=True).start()
+
+    def _open_lines(self) -> None:
+        """Serve everyone who has the key; who does not send it at once is sent away."""
+        while True:
+            try:
+                line, _ = self._door.accept()
+            except OSError:
+                return
+            line.settimeout(KEY_S)
+            with contextlib.suppress(OSError):
+                if secrets.compare_digest(line.recv(len(self._address.key)), self._address.key):
+                    line.settimeout(None)
+                    self._pool.serve(line)
+                    continue
+            line.close()
 
     def address(self) -> HostAddress:
         """Return where they are, for processes on the same machine."""
-        return self._pool.address
+        return self._address
 
     def close(self) -> None:
         """End them."""
+        self._door.close()
         self._pool.close()
+        self._folder.cleanup()
 
 
 class _RemoteWorker:
@@ -203,8 +242,11 @@ class _RemoteWorker:
         if self._slot is None or self._slot[0] != hosts:  # these may have been started again
             if self._slot is not None:
                 self._slot[1].close()
-            hosted = self._play if hosts is None else cast("HostUser", self._play).with_hosts(hosts)
-            self._slot = hosts, WorkerSlot(cast("PlayJob", hosted), self._episode_timeout_s)
+            connect = None if hosts is None else hosts.connect
+            self._slot = (
+                hosts,
+                WorkerSlot(cast("PlayJob", self._play), self._episode_timeout_s, connect),
+            )
         record = self._slot[1].play(job)
         files = {}
         for path in sorted(self._folder.rglob("*")):
@@ -228,7 +270,7 @@ class _WorkerPool:
         self._actor = self._remote(num_cpus=1, max_restarts=0, scheduling_strategy="SPREAD")(
             _RemoteWorker
         )
-        self._hosting = _hosting(play)
+        self._hosting = getattr(play, "hosting", None)
         # By id of a machine: the actor that holds its policy hosts.
         self._hosts: dict[str, Any] = {}
         # By pending call: its worker, its machine and its job; both None while the worker starts.

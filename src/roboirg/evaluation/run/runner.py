@@ -213,7 +213,8 @@ class _RunLoop:
         record = _refuse_contradiction(record)
         before = self._store.stored.get(identity_key(job))
         if before is not None:
-            record = msgspec.structs.replace(record, attempt=before.attempt + 1)
+            attempt = before.attempt + record.attempt
+            record = msgspec.structs.replace(record, attempt=attempt)
         self._store.append(record)
         self.tries[job] += 1
         self._reporter.advance(record, is_new=self.tries[job] == 1)

@@ -11,12 +11,14 @@ import contextlib
 import functools
 import os
 import time
+from collections.abc import Iterator
 from dataclasses import dataclass
 from multiprocessing.connection import Connection, wait
-from typing import NamedTuple
+from typing import NamedTuple, cast
 
 from roboirg.core.errors import MissingDependencyError, RenderDeviceError, RoboIRGError
 from roboirg.evaluation.episode_errors import format_cause
+from roboirg.evaluation.hosting.host_pool import Connect
 from roboirg.evaluation.play.rollout import EpisodeRunner, PlayJob
 from roboirg.evaluation.play.rollout_result import RolloutResult, make_record, utc_now
 from roboirg.evaluation.play.watchdog import Phase, Watchdog, use_watchdog, watched
@@ -59,16 +61,25 @@ class Worker:
     started_at: str = ""
 
     @classmethod
-    def start(cls, play: PlayJob, job: Job, *, limit_threads: bool = False) -> Worker:
+    def start(
+        cls,
+        play: PlayJob,
+        job: Job,
+        connect: Connect | None = None,
+        *,
+        limit_threads: bool = False,
+    ) -> Worker:
         """Start a process and assign its first job.
 
         Args:
             play: plays one job.
             job: the first job.
+            connect: returns the process's line to the policy hosts; None if it needs none.
             limit_threads: render with one thread, because every core has its own process.
         """
         watchdog = Watchdog()
-        child = ChildProcess.spawn(_work, watchdog, play, limit_threads)
+        with connected(play, connect) as hosted:
+            child = ChildProcess.spawn(_work, watchdog, hosted, limit_threads)
         worker = cls(child, watchdog, job)
         worker.assign(job)
         return worker
@@ -135,10 +146,13 @@ class WorkerSlot:
     Args:
         play: plays one job.
         episode_timeout_s: how long an episode may take.
+        connect: returns a process's line to the policy hosts; None if it needs none.
     """
 
-    def __init__(self, play: PlayJob, episode_timeout_s: float) -> None:
-        self._play, self._episode_timeout_s = play, episode_timeout_s
+    def __init__(
+        self, play: PlayJob, episode_timeout_s: float, connect: Connect | None = None
+    ) -> None:
+        self._play, self._episode_timeout_s, self._connect = play, episode_timeout_s, connect
         self._worker: Worker | None = None
 
     def play(self, job: Job) -> Record:
@@ -148,7 +162,7 @@ class WorkerSlot:
             RoboIRGError: an error that would end every other job too (no Vulkan device, …).
         """
         if self._worker is None:
-            self._worker = Worker.start(self._play, job, limit_threads=True)
+            self._worker = Worker.start(self._play, job, self._connect, limit_threads=True)
         else:
             self._worker.assign(job)
         record = _wait_for_record(self._worker, self._episode_timeout_s)
@@ -161,6 +175,16 @@ class WorkerSlot:
         if self._worker is not None:
             self._worker.child.end()
             self._worker = None
+
+
+@contextlib.contextmanager
+def connected(play: PlayJob, connect: Connect | None) -> Iterator[PlayJob]:
+    """Yield what plays jobs, with a line of its own to the policy hosts, closed here at the end."""
+    if connect is None:
+        yield play
+        return
+    with connect() as line:
+        yield cast("EpisodeRunner", play).with_hosts(line)
 
 
 def _wait_for_record(worker: Worker, episode_timeout_s: float) -> Record:

@@ -24,6 +24,19 @@ from roboirg.util.short_hash import short_hash
 
 _MAX_VERSION_LENGTH = 200
 
+PRIVILEGED = "privileged:"
+"""Before the spec of a foreign policy: the user lets it read the simulator's state."""
+
+
+def declares_privilege(spec: str) -> bool:
+    """Return whether a spec declares its policy privileged."""
+    return spec.startswith(PRIVILEGED)
+
+
+def undeclared(spec: str) -> str:
+    """Return a spec without the declaration that its policy is privileged."""
+    return spec.removeprefix(PRIVILEGED)
+
 
 def load_policy_class(spec: str) -> type[Any]:
     """Return the class of a built-in name, ``package.module:Class``, or a URL.
@@ -33,13 +46,16 @@ def load_policy_class(spec: str) -> type[Any]:
 
     Raises:
         UnknownNameError: the spec is none of them, or the URL has an unknown option.
-        InvalidValueError: the module or class cannot be imported or is not a policy, or the URL
-            is malformed.
+        InvalidValueError: the module or class cannot be imported or is not a policy, it has
+            ``attach`` and is not declared privileged, or the URL is malformed.
         MissingDependencyError: a library that the URL's scheme needs is not installed.
     """
-    factory = policy_specs.find_policy_factory(spec) if ":" in spec else None
+    name = undeclared(spec)
+    factory = policy_specs.find_policy_factory(name) if ":" in name else None
     # A factory has every attribute of a class that is read here.
-    return find_class(spec) if factory is None else cast("type[Any]", factory)
+    found = find_class(name) if factory is None else cast("type[Any]", factory)
+    _refuse_undeclared(spec, found)
+    return found
 
 
 def make_policy(spec: str, seed: int) -> Policy:
@@ -56,7 +72,9 @@ def make_policy(spec: str, seed: int) -> Policy:
             is malformed.
         MissingDependencyError: a library that the URL's scheme needs is not installed.
     """
-    return make_from_class(spec, load_policy_class(spec), seed)
+    policy = make_from_class(undeclared(spec), load_policy_class(spec), seed)
+    _refuse_undeclared(spec, policy)
+    return policy
 
 
 def policy_needs(spec: str) -> PolicyNeeds:
@@ -75,6 +93,7 @@ def is_foreign(spec: str) -> bool:
     Raises:
         InvalidValueError: it is a system that cannot be read.
     """
+    spec = undeclared(spec)
     kind, colon, rest = spec.partition(":")
     if spec in BUILTIN or is_url(spec) or not colon:
         return False
@@ -85,19 +104,27 @@ def is_foreign(spec: str) -> bool:
 
 
 def needs_host(spec: str) -> bool:
-    """Return whether a policy gets a process of its own, unless it is privileged.
+    """Return whether a policy gets a process of its own.
 
-    Built-in policies and the clients of remote ones are our own code and run beside the world.
+    Built-in policies and the clients of remote ones are our own code and run next to the world, as
+    do policies that the user declares privileged.
 
     Raises:
         InvalidValueError: it is a system that cannot be read.
     """
+    if declares_privilege(spec):
+        return False
     return is_foreign(spec) or (is_url(spec) and spec.partition("://")[0] in CHECKPOINTS)
 
 
 def is_privileged(spec: str) -> bool:
-    """Return whether a spec names a policy that reads the simulator's state."""
+    """Return whether a spec names a policy that may read the simulator's state.
+
+    Only our own code is loaded to find out; the policies of others are what the spec declares.
+    """
     try:
+        if declares_privilege(spec) or is_foreign(spec):
+            return declares_privilege(spec)
         return hasattr(_declaring(spec), "attach")
     except InvalidValueError:
         return False
@@ -110,12 +137,13 @@ def policy_version(spec: str) -> str:
     the file that defines the class; ``built-in``; or ``unknown`` if neither is found. For a URL it
     is the option ``version``: no server is asked.
     """
-    if spec in BUILTIN:
+    name = undeclared(spec)
+    if name in BUILTIN:
         return "built-in"
     try:
         policy_class = load_policy_class(spec)
-        if is_url(spec):
-            version = getattr(policy_class(spec), "version", "unknown")
+        if is_url(name):
+            version = getattr(policy_class(name), "version", "unknown")
         else:
             version = getattr(policy_class, "version", None)
         if version is not None:
@@ -128,8 +156,17 @@ def policy_version(spec: str) -> str:
 
 def _declaring(spec: str) -> object:
     """Return what has the attributes of a spec's policies: a class, a factory, or a client."""
-    policy_class = load_policy_class(spec)
-    return policy_class(spec) if is_url(spec) else policy_class
+    policy_class, name = load_policy_class(spec), undeclared(spec)
+    return policy_class(name) if is_url(name) else policy_class
+
+
+def _refuse_undeclared(spec: str, policy: object) -> None:
+    """Raise if a foreign policy or its class has ``attach``, which its spec does not declare."""
+    if not declares_privilege(spec) and is_foreign(spec) and hasattr(policy, "attach"):
+        raise InvalidValueError(
+            f"Policy {spec!r} has attach(), with which a policy reads the simulator's state; "
+            f"declare that as {PRIVILEGED + spec!r}, or remove attach()."
+        )
 
 
 def server_version(metadata: Mapping[str, Any]) -> str | None:

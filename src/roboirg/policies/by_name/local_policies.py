@@ -5,23 +5,37 @@ from __future__ import annotations
 import importlib
 import sys
 from types import ModuleType
-from typing import Any
+from typing import Any, NamedTuple
+
+from roboirg.policies.by_name.loading import PRIVILEGED, undeclared
 
 MODULE = "roboirg_local_policies"
 """Name of a module that exists in this process only; it holds what no other process can import."""
+
+
+class Privileged(NamedTuple):
+    """Declares that a policy may read the simulator's state: its ``attach`` gets the environment.
+
+    Attributes:
+        policy: a spec, class or object.
+    """
+
+    policy: str | type[Any] | object
 
 
 def spec_of(policy: str | type[Any] | object) -> str:
     """Return the spec of a policy.
 
     Args:
-        policy: a spec; a class; or an object, which then plays every episode itself: nothing but
-            its own ``reset`` clears what it remembers.
+        policy: a spec; a class; an object; or any of them as `Privileged`. An object plays every
+            episode itself: nothing but its own ``reset`` clears what it remembers.
 
     Returns:
         A class that can be imported has a spec as on the command line. Anything else has one that
         is valid in this process.
     """
+    if isinstance(policy, Privileged):
+        return PRIVILEGED + spec_of(policy.policy)
     if isinstance(policy, str):
         return policy
     if isinstance(policy, type) and _can_be_imported(policy):
@@ -34,11 +48,13 @@ def spec_of(policy: str | type[Any] | object) -> str:
 
 def is_local(spec: str) -> bool:
     """Return whether only this process knows the policy of a spec."""
-    return spec.startswith(f"{MODULE}:")
+    return undeclared(spec).startswith(f"{MODULE}:")
 
 
 def policy_name(policy: str | type[Any] | object) -> str:
     """Return the name under which records list a policy: its spec, or the name of its class."""
+    if isinstance(policy, Privileged):
+        return policy_name(policy.policy)
     if isinstance(policy, str):
         return policy
     return policy.__name__ if isinstance(policy, type) else type(policy).__name__

@@ -65,7 +65,7 @@ class SubgoalFollower(Policy, Protocol):
 
 @runtime_checkable
 class PrivilegedPolicy(Policy, Protocol):
-    """A policy that reads the simulator's state; having ``attach`` declares it."""
+    """A policy that reads the simulator's state; the user declares it with ``privileged:``."""
 
     def attach(self, env: RoboIRGEnv) -> None:
         """Receive the environment of the next episode; called before ``reset``."""

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import contextlib
 import functools
-import json
 import queue
 import threading
 from collections.abc import Callable, Mapping
@@ -29,6 +28,7 @@ from roboirg.evaluation.episode_errors import (
 from roboirg.evaluation.hosting.host_pool import HostPool, HostSettings
 from roboirg.evaluation.hosting.hosted_policy import HostedPolicy
 from roboirg.evaluation.hosting.policy_child import ChildLostError
+from roboirg.evaluation.policy_calls import policy_metadata
 from roboirg.evaluation.records.record import ErrorKind
 from roboirg.policies.by_name.loading import make_policy
 from roboirg.policies.contract.base import Policy, PrivilegedPolicy
@@ -105,9 +105,7 @@ class PolicyDispatcher:
     def _reset(self, instruction: str, demonstration: dict[str, Any]) -> dict[str, Any]:
         policy = self._require_policy()
         policy.reset(instruction, demonstration)
-        # Through JSON, as in the record.
-        metadata: dict[str, Any] = json.loads(json.dumps(dict(getattr(policy, "metadata", {}))))
-        return metadata
+        return policy_metadata(policy)
 
     def _act(self, observation: Any) -> Any:  # noqa: ANN401
         with self._scene_lock:  # the scene must not change while a policy plans in it
@@ -180,7 +178,7 @@ class PolicyProcess(PolicyThread):
 
     def __init__(self) -> None:
         self._hosts = HostPool(HostSettings(batch=1))
-        super().__init__(functools.partial(HostedPolicy, self._hosts.address))
+        super().__init__(functools.partial(HostedPolicy, self._hosts.connect()))
 
     @property
     def pid(self) -> int:

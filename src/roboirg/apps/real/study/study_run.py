@@ -30,7 +30,7 @@ from roboirg.evaluation.play.job_instruction import instruct_job
 from roboirg.evaluation.play.rollout_result import make_record, utc_now
 from roboirg.evaluation.records.record import Job, Record
 from roboirg.language import LANGUAGE_VERSION
-from roboirg.policies.by_name.loading import is_privileged, policy_needs
+from roboirg.policies.by_name.loading import is_privileged
 
 ROBOT_LOCK = ".robot.lock"
 
@@ -155,7 +155,7 @@ class Study:
 
     def _check_policy(self, spec: str) -> tuple[str, ...]:
         """Check that a policy can act on this robot, and return the cameras that it uses."""
-        needs = policy_needs(spec)
+        needs = describe_policy(spec).needs
         if needs.actions != JOINT_ANGLE.name:
             raise InvalidValueError(
                 f"Policy {spec!r} acts in {needs.actions!r}; the control loop "
