@@ -17,6 +17,8 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from roboirg.util.web.listening import TIMEOUT_S, listen
 from roboirg.util.web.request_origin import LOOPBACK
 
+_LAST = {"Connection": "close"}
+"""Header of a response after which nothing more is read, such as the rest of a body."""
 _STOP_S = 1
 """Seconds that requests have to end when the server stops."""
 
@@ -116,8 +118,10 @@ class RequestGuard:
                     headers.setdefault(name, value)
             await send(message)
 
-        answer = self._refuse(Request(scope)) or self._app
-        await answer(scope, receive, send_with_headers)
+        refusal = self._refuse(Request(scope))
+        if refusal is not None:
+            refusal.headers.update(_LAST)
+        await (refusal or self._app)(scope, receive, send_with_headers)
 
 
 async def read_body(request: Request, limit: int, timeout_s: float = TIMEOUT_S) -> bytes:
@@ -132,16 +136,16 @@ async def read_body(request: Request, limit: int, timeout_s: float = TIMEOUT_S) 
         HTTPException: it is too large, late or cut short.
     """
     if int(request.headers.get("content-length", 0)) > limit:
-        raise HTTPException(413, "Too large.")
+        raise HTTPException(413, "Too large.", _LAST)
     body = bytearray()
     try:
         async with asyncio.timeout(timeout_s):
             async for piece in request.stream():
                 body += piece
                 if len(body) > limit:
-                    raise HTTPException(413, "Too large.")
+                    raise HTTPException(413, "Too large.", _LAST)
     except TimeoutError as error:
-        raise HTTPException(408, f"The request took longer than {timeout_s:g} s.") from error
+        raise HTTPException(408, f"The request took longer than {timeout_s:g} s.", _LAST) from error
     except ClientDisconnect as error:
         raise HTTPException(400, "The request is cut short.") from error
     return bytes(body)

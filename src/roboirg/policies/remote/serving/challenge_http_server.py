@@ -9,7 +9,7 @@ from roboirg.core.extras import extra_needed
 from roboirg.policies.remote.message_codec import MSGPACK, pack
 from roboirg.policies.remote.server_options import ServerOptions
 from roboirg.policies.remote.service import Service
-from roboirg.policies.remote.serving.policy_thread import PolicyThread
+from roboirg.policies.remote.serving.answering_thread import AnsweringThread
 
 with extra_needed("Serving over HTTP needs Starlette and uvicorn", "remote"):
     from starlette.applications import Starlette
@@ -32,7 +32,7 @@ def open_http(service: Service, metadata: Mapping[str, Any], options: ServerOpti
     Raises:
         InvalidValueError: the address is in use or is not this computer's.
     """
-    handle, thread = service.connection(), PolicyThread()
+    handle, thread = service.connection(), AnsweringThread()
 
     async def show_health(request: Request) -> Response:
         del request

@@ -19,7 +19,7 @@ from websockets.exceptions import ConnectionClosed
 from roboirg.policies.remote.message_codec import pack
 from roboirg.policies.remote.server_options import ServerOptions
 from roboirg.policies.remote.service import Service
-from roboirg.policies.remote.serving.policy_thread import PolicyThread
+from roboirg.policies.remote.serving.answering_thread import AnsweringThread
 from roboirg.util.web.listening import listen
 
 if TYPE_CHECKING:
@@ -49,7 +49,7 @@ class WebsocketServer:
     ) -> None:
         self._service, self._metadata, self._options = service, pack(metadata), options
         self.socket = listen(options.host, options.port)
-        self._policy = PolicyThread()
+        self._policy = AnsweringThread()
         self._stopping = threading.Event()
         self._wake: Callable[[], None] = self._stopping.set
 

@@ -10,7 +10,7 @@ from roboirg.policies.remote.message_codec import pack, unpack
 from roboirg.policies.remote.service import Handler
 
 
-class PolicyThread:
+class AnsweringThread:
     """Answers messages one by one; a policy may belong to the thread that made it."""
 
     def __init__(self) -> None:
