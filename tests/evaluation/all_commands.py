@@ -2,6 +2,7 @@
 
 import typer.main
 from msgspec.structs import replace
+from plan_files import plan_file
 
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.evaluation.plan.plan_maker import make_plan
@@ -112,8 +113,8 @@ def words_of(folder, run):
         "export grounding": [
             "--tasks",
             "StopCube",
-            "--episodes",
-            "1",
+            "--plan",
+            plan_file(episodes=1),
             "--settings",
             "explicit",
             "--out",
