@@ -119,6 +119,23 @@ def test_classes_and_objects_play_in_this_process(unplayed: None, tmp_path: Path
         roboirg.evaluate(object(), out=tmp_path, **QUICK)
 
 
+class Insider(Still):
+    def attach(self, env) -> None:
+        pass
+
+
+@pytest.mark.parametrize("policy", [Insider(), Insider, f"{__name__}:Insider"])
+def test_privilege_is_declared(unplayed: None, tmp_path: Path, policy) -> None:
+    options = {**QUICK, "out": tmp_path, "policy_process": "shared"}
+    with pytest.raises(InvalidValueError, match=r"has attach\(\).*roboirg\.Privileged\(policy\)"):
+        roboirg.evaluate(policy, **options)
+    both = [roboirg.Privileged(policy), Still()]
+    results = roboirg.evaluate(both, **options)
+    assert {(one.policy.split(":")[-1], one.privileged) for one in results.records} == {
+        ("Insider", True), ("Still", False),
+    }  # fmt: skip
+
+
 def test_what_can_be_imported_has_a_spec_as_on_the_command_line() -> None:
     from roboirg.policies.builtin.random_policy import RandomPolicy
 

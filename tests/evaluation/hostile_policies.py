@@ -11,8 +11,9 @@ import sys
 import threading
 import time
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import Any, ClassVar, NoReturn
 
+import msgspec
 import numpy as np
 
 NEEDLE = "9035768"
@@ -184,6 +185,159 @@ class Renderless(Hostile):
         raise RenderDeviceError("No device.")
 
 
+class Forger(Hostile):
+    """Sends a message of its own instead of the reply."""
+
+    message: Any = None
+
+    def act(self, observation: Any) -> Any:
+        host_of(sys._getframe())._connection.send_bytes(msgspec.msgpack.encode(self.message))
+        time.sleep(3600)
+
+
+def host_of(frame: Any) -> Any:
+    """Return the object that carries out the calls of this process."""
+    while not hasattr(frame.f_locals.get("self"), "_connection"):
+        frame = frame.f_back
+    return frame.f_locals["self"]
+
+
+class ForgesLost(Forger):
+    message = ({"type": "lost", "kind": "infrastructure", "message": "x", "again": True},)
+
+
+class ForgesSeconds(Forger):
+    message = ({"type": "told", "seconds": float("nan")},)
+
+
+class ForgesLatency(Forger):
+    message = ({"type": "acted", "rows": bytes(64), "size": 8, "latency_s": float("nan")},)
+
+
+class ForgesWant(Forger):
+    message = ({"type": "told", "want": ["front_rgb"]},)
+
+
+class ForgesPrivilege(Forger):
+    message = ({"type": "opened", "needs": {}, "version": "1", "is_privileged": True},)
+
+
+class ForgesOtherEpisode(Forger):
+    message: ClassVar = {"type": "ask", "session": 10**6}
+
+
+class Deep210(Hostile):
+    levels = 210
+
+    def reset(self, instruction: str, demonstration: Any) -> None:
+        self.metadata = {}
+        for _ in range(self.levels):
+            self.metadata = {"deeper": self.metadata}
+
+
+class Deep300(Deep210):
+    levels = 300
+
+
+class NamesServer(Hostile):
+    def reset(self, instruction: str, demonstration: Any) -> None:
+        self.metadata = {"server": "localhost:1", "version": "2"}
+
+
+class NamesTrial(Hostile):
+    def reset(self, instruction: str, demonstration: Any) -> None:
+        self.metadata = {"real_trial": {"robot": "panda"}}
+
+
+class Asker(Hostile):
+    """Asks for nothing, at the end too."""
+
+    def act(self, observation: Any) -> Any:
+        self.ask()
+        return super().act(observation)
+
+    def close(self) -> None:
+        self.ask()
+
+    def ask(self) -> None:
+        host = host_of(sys._getframe())
+        (session,) = host._asking
+        host._connection.send_bytes(msgspec.msgpack.encode({"type": "ask", "session": session}))
+        host._connection.recv_bytes()
+
+
+class Forker(Hostile):
+    """Leaves a process that no group, session or parent leads to, with everything open."""
+
+    def act(self, observation: Any) -> Any:
+        if (child := os.fork()) == 0:
+            os.setsid()
+            if os.fork() == 0:
+                Path(os.environ["HOSTILE_NOTES"], str(os.getpid())).touch()
+                time.sleep(3600)
+            os._exit(0)
+        os.waitpid(child, 0)
+        while not any(Path(os.environ["HOSTILE_NOTES"]).iterdir()):
+            time.sleep(0.01)
+        return super().act(observation)
+
+
+class GuardStopper(Forker):
+    """Stops the process that would end what it leaves."""
+
+    def act(self, observation: Any) -> Any:
+        actions = super().act(observation)
+        os.kill(os.getppid(), signal.SIGSTOP)
+        return actions
+
+
+class Aborter(Forker):
+    def act(self, observation: Any) -> Any:
+        super().act(observation)
+        os.abort()
+
+
+class Quitter(Hostile):
+    """Ends its process between two calls, so that its first episode is played again."""
+
+    def act(self, observation: Any) -> Any:
+        note = Path(os.environ["HOSTILE_NOTES"], "quit")
+        if not note.exists():
+            note.touch()
+            threading.Timer(0.5, os._exit, (3,)).start()
+        return -np.ones((12, 8))
+
+
+class Turncoat(Hostile):
+    """Becomes privileged where only its own process sees it."""
+
+    if any("host_process" in word for word in sys.orig_argv):
+
+        def attach(self, env: Any) -> None:
+            env.total = 1e9
+
+
+class LateTurncoat(Hostile):
+    def __init__(self) -> None:
+        self.attach = print
+
+
+FORGED = {
+    "ForgesLost": "policy: the process sent what is no reply (Invalid value 'lost' - ",
+    "ForgesSeconds": "policy: the process sent what is no reply (Object contains unknown field ",
+    "ForgesLatency": "policy: the process sent what is no reply (Expected `float` >= 0.0 - at ",
+    "ForgesWant": "policy: the process sent what is no reply (Object contains unknown field `want",
+    "ForgesPrivilege": "policy: the process sent what is no reply (Object contains unknown field ",
+    "ForgesOtherEpisode": "policy: the process asked for the video of another episode",
+    "Deep210": "policy: the policy's metadata are nested more than 16 deep; make them flat.",
+    "Deep300": "policy: the policy's metadata are nested more than 16 deep; make them flat.",
+    "NamesServer": "policy: the policy's metadata have the key 'server', which is reserved; ",
+    "NamesTrial": "policy: the policy's metadata have the key 'real_trial', which is reserved; ",
+    "Aborter": "policy: the process died of signal 6 in the policy's act()",
+    "LateTurncoat": "policy: Policy 'hostile_policies:LateTurncoat' has attach(), with which",
+    "Turncoat": "policy: Policy 'hostile_policies:Turncoat' has attach(), with which",
+}
+"""Those that send what they must not, and how the cause of their errors begins."""
 SPOILED = {
     "Closer": "policy: the process",
     "Babbler": "policy: the ",

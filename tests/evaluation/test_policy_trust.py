@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import os
 import re
+import resource
 import sys
+import tempfile
+import time
 from pathlib import Path
 from typing import Any
 
@@ -87,6 +90,75 @@ def test_what_a_policy_breaks_is_its_own(
         assert len(log) <= MAX_LOG_BYTES + 1000
     honest = {record.slug for name in names for record in found[f"{name}+1"]}
     assert honest.isdisjoint(logged_slugs(tmp_path / "run"))
+
+
+def is_alive(pid: int) -> bool:
+    try:
+        return "Z" not in Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0]
+    except OSError:
+        return False
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(sys.platform != "linux", reason="there are subreapers on Linux")
+def test_what_is_forged_is_an_error_of_its_own_episode_and_nothing_started_survives(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    notes = tmp_path / "notes"
+    notes.mkdir()
+    monkeypatch.setenv("HOSTILE_NOTES", str(notes))
+    names = (*hostile_policies.FORGED, "Asker", "Forker", "GuardStopper")
+    found = play(tmp_path / "run", names)
+    for name in names:
+        cause = hostile_policies.FORGED.get(name)
+        for record in found[hostile_policies.SPEC(name)]:
+            assert record.outcome == ("failure" if cause is None else "error"), record.cause
+            assert str(record.cause).startswith(cause or ""), record.cause
+            assert (record.privileged, record.robot, record.server_version) == (False, None, None)
+    assert len(list(notes.iterdir())) > 2
+    until = time.monotonic() + 60
+    while any(is_alive(int(path.name)) for path in notes.iterdir()):
+        assert time.monotonic() < until
+        time.sleep(0.1)
+
+
+@pytest.mark.slow
+def test_what_is_played_again_is_counted(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("HOSTILE_NOTES", str(tmp_path))
+    plan = paper_plan(hostile_policies.SPEC("Quitter"), 1)
+    (record,) = InProcess().run(plan.jobs(), paper_runner(plan, tmp_path, seconds=1.5))
+    assert (record.outcome, record.attempt) == ("failure", 2)
+
+
+def test_a_run_needs_no_short_temporary_folder_and_few_descriptors(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    folder = tmp_path / ("long" * 40)
+    folder.mkdir()
+    monkeypatch.setenv("TMPDIR", str(folder))
+    monkeypatch.setattr(tempfile, "tempdir", None)
+    before = resource.getrlimit(resource.RLIMIT_NOFILE)
+    used = max(map(int, os.listdir("/dev/fd")))  # noqa: PTH208
+    resource.setrlimit(resource.RLIMIT_NOFILE, (used + 30, before[1]))
+    try:
+        found = play(tmp_path / "run", ("Wanderer",))
+    finally:
+        resource.setrlimit(resource.RLIMIT_NOFILE, before)
+    assert {record.error for records in found.values() for record in records} == {None}
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="reads /proc")
+def test_nobody_can_connect_to_the_supervisor() -> None:
+    with HostPool(HostSettings()) as pool:
+        policy = HostedPolicy(pool.connect(), HONEST, 0)
+        ours = {
+            str(path.readlink()) for path in Path("/proc/self/fd").iterdir() if path.is_socket()
+        }
+        for line in Path("/proc/net/unix").read_text().splitlines()[1:]:
+            *_, flags, _kind, _state, inode = line.split()[:7]
+            assert f"socket:[{inode}]" not in ours or int(flags, 16) == 0, "it listens"
+        assert ours
+        policy.close()
 
 
 def test_an_episode_begins_where_the_run_began(

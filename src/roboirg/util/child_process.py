@@ -73,9 +73,13 @@ class _Interpreter(subprocess.Popen[bytes]):
         return self.poll()
 
     def kill(self) -> None:
-        """Let the guard kill all; kill the guard too if something has stopped it."""
+        """Let the guard kill all; if something has stopped it, kill it and them."""
         self.terminate()
         self.join(GUARD_S)
+        if self.poll() is None:
+            for pid in _descendants(self.pid):
+                with contextlib.suppress(OSError):
+                    os.kill(pid, signal.SIGKILL)
         super().kill()
 
     def join(self, timeout: float | None = None) -> None:

@@ -51,6 +51,8 @@ def load_policy_class(spec: str) -> type[Any]:
         MissingDependencyError: a library that the URL's scheme needs is not installed.
     """
     name = undeclared(spec)
+    if name != spec and not is_foreign(name):
+        raise InvalidValueError(f"Policy {name!r} is no class of yours; leave out {PRIVILEGED!r}.")
     factory = policy_specs.find_policy_factory(name) if ":" in name else None
     # A factory has every attribute of a class that is read here.
     found = find_class(name) if factory is None else cast("type[Any]", factory)
@@ -165,7 +167,8 @@ def _refuse_undeclared(spec: str, policy: object) -> None:
     if not declares_privilege(spec) and is_foreign(spec) and hasattr(policy, "attach"):
         raise InvalidValueError(
             f"Policy {spec!r} has attach(), with which a policy reads the simulator's state; "
-            f"declare that as {PRIVILEGED + spec!r}, or remove attach()."
+            f"declare that as {PRIVILEGED + spec!r}, in Python with roboirg.Privileged(policy), or "
+            "remove attach()."
         )
 
 

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import importlib
 import sys
+from dataclasses import dataclass
 from types import ModuleType
-from typing import Any, NamedTuple
+from typing import Any
 
 from roboirg.policies.by_name.loading import PRIVILEGED, undeclared
 
@@ -13,7 +14,8 @@ MODULE = "roboirg_local_policies"
 """Name of a module that exists in this process only; it holds what no other process can import."""
 
 
-class Privileged(NamedTuple):
+@dataclass(frozen=True)
+class Privileged:
     """Declares that a policy may read the simulator's state: its ``attach`` gets the environment.
 
     Attributes:
@@ -54,7 +56,7 @@ def is_local(spec: str) -> bool:
 def policy_name(policy: str | type[Any] | object) -> str:
     """Return the name under which records list a policy: its spec, or the name of its class."""
     if isinstance(policy, Privileged):
-        return policy_name(policy.policy)
+        return spec_of(policy) if isinstance(policy.policy, str) else policy_name(policy.policy)
     if isinstance(policy, str):
         return policy
     return policy.__name__ if isinstance(policy, type) else type(policy).__name__
