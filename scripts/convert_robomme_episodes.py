@@ -20,7 +20,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from roboirg.core import object_sizes
 from roboirg.core.conditions import Fact
@@ -59,7 +58,7 @@ def main() -> None:
 def write_recordings(folder: Path, out: Path) -> None:
     """Write the recorded actions of each task and split, without the step at home at their end."""
     out.mkdir(exist_ok=True)
-    arrays: dict[tuple[str, str], dict[str, NDArray[Any]]] = {}
+    arrays: dict[tuple[str, str], dict[str, Any]] = {}
     for row in read_rows(folder):
         key = task, split, index = row["task"], row["dataset"], row["episode"]
         source = folder / f"{split}-{task}.npz"
@@ -179,8 +178,8 @@ def convert_stop_cube(row: Row) -> tuple[Scene, Goal]:
         thickness=stop_cube.TARGET_THICKNESS,
     )
     begin, end = (
-        Point(*(round(one, 7) for one in facts[key]), stop_cube.HEIGHT)
-        for key in ("start_pos_xy", "end_pos_xy")
+        Point(round(x, 7), round(y, 7), stop_cube.HEIGHT)
+        for x, y in (facts["start_pos_xy"], facts["end_pos_xy"])
     )
     red, green, blue = row["colors"]["target_cube"]
     yaw = upright_yaw(row["start"]["target_cube"])

@@ -8,7 +8,7 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
-from roboirg.apps.bench.bench_runner import markdown_table, read_figures
+from benchmarks.results import markdown_table, read_figures
 
 DOCS = Path(__file__).parent.parent / "docs"
 PAGE = DOCS / "performance.md"

@@ -124,3 +124,9 @@ def open_page(browser: Any) -> OpenPage:
         assert wrong == []
 
     return open_address
+
+
+@pytest.fixture
+def in_this_process(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Commands start no worker processes."""
+    monkeypatch.setenv("ROBOIRG_WORKERS", "0")

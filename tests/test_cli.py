@@ -15,11 +15,13 @@ import numpy as np
 import pytest
 import typer.main
 from msgspec.structs import replace
+from plan_files import plan_file
 
 from roboirg import main as cli
 from roboirg.cli import demo_commands
 from roboirg.cli.progress_bar import progress_bars
 from roboirg.cli.run_commands import report_problems
+from roboirg.core.instruction_options import InstructionOptions
 from roboirg.evaluation.plan.stored_plans import read_plan
 from roboirg.evaluation.play.rollout_result import RolloutResult, make_record
 from roboirg.evaluation.records.record import Job
@@ -90,18 +92,44 @@ def canned(monkeypatch: pytest.MonkeyPatch) -> type[CannedPlayer]:
         (("--workers", "-1"), "workers is -1; it must be at least 0, this process only."),
         (("--plan", "papr"), "Did you mean 'paper'?"),
         (("--executor", "slurm"), "There is no executor 'slurm'; known: local, ray."),
-        (("--address", "auto"), "needs --executor ray."),
-        (("--meshes", "lite"), "Did you mean 'light'?"),
-        (("--actions", "joints"), "known: joint_angle, ee_pose, waypoint."),
-        (("--tries", "0"), "tries is 0; it must be at least 1."),
-        (("--retry-on", "conection"), "Did you mean 'connection'?"),
-        (("--policy-timeout-s", "0"), "it must be more than 0 seconds."),
-        (("--observe-every", "0"), "observe_every is 0;"),
     ],
 )
 def test_what_is_wrong_is_one_sentence_and_exit_code_2(
     roboirg, tmp_path: Path, words: tuple[str, ...], sentence: str
 ) -> None:
+    is_refused(roboirg, tmp_path, words, sentence)
+
+
+@pytest.mark.parametrize(
+    ("fields", "sentence"),
+    [
+        ({"meshes": "lite"}, "Did you mean 'light'?"),
+        ({"actions": "joints"}, "known: joint_angle, ee_pose, waypoint."),
+        ({"tries": 0}, "tries is 0; it must be at least 1."),
+        ({"tries": "many"}, "tries is 'many'"),
+        ({"retry_on": ["conection"]}, "Did you mean 'connection'?"),
+        ({"policy_timeout_s": 0}, "it must be more than 0 seconds."),
+        ({"observe_every": 0}, "observe_every is 0;"),
+        ({"demonstration_frames": "some"}, "demonstration_frames is 'some'"),
+        ({"policy_process": "mine"}, "policy_process is 'mine'"),
+        ({"long_prompts": "cut"}, "known: send, refuse"),
+        ({"distractor": "nutral"}, "Did you mean 'neutral'?"),
+        ({"distractors": -1}, "distractors is -1"),
+        ({"frame": "robt"}, "Did you mean 'robot'?"),
+        ({"delivery": "turn"}, "Did you mean 'turns'?"),
+        ({"batch": "many"}, "batch is 'many'"),
+        ({"options": {"distracter": "neutral"}}, "distracter"),
+        ({"setting": "direct"}, "plan key"),
+    ],
+    ids=str,
+)
+def test_what_is_wrong_in_a_plan_is_one_sentence(
+    roboirg, tmp_path: Path, fields: dict[str, object], sentence: str
+) -> None:
+    is_refused(roboirg, tmp_path, ("--plan", plan_file(**fields)), sentence)
+
+
+def is_refused(roboirg, tmp_path: Path, words: tuple[str, ...], sentence: str) -> None:
     said = roboirg(*RUN, "--out", tmp_path / "out", *words)
     assert said.code == 2
     assert sentence in said.err
@@ -146,16 +174,17 @@ def test_a_missing_jinja_is_told_before_anything_is_played(
     assert not (tmp_path / "out").exists()
 
 
-@pytest.mark.usefixtures("canned")
+@pytest.mark.usefixtures("canned", "in_this_process")
 def test_a_missing_pyav_can_be_done_without(
     roboirg, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setitem(sys.modules, "av", None)
-    words = ("demo", "--out", tmp_path / "out", "--episodes", "1", "--workers", "0")
+    words = ("demo", "--out", tmp_path / "out", "--episodes", "1")
     said = roboirg(*words)
-    assert said.code == 2
-    assert "--video off" in said.err
-    assert roboirg(*words, "--video", "off").code == 0
+    assert said.code == 0
+    assert said.err.startswith("Without videos: ")
+    lines = (tmp_path / "out" / "records.jsonl").read_text().splitlines()
+    assert {json.loads(line)["video"] for line in lines} == {None}
 
 
 def test_lost_videos_are_reported_once(
@@ -190,7 +219,7 @@ def test_run_then_report(roboirg, tmp_path: Path) -> None:
     lines = (tmp_path / "records.jsonl").read_text().splitlines()
     assert "[1/10] random PickXtimes test/0 direct: success" in said.out
     assert len(lines) == 10
-    keys = {"policy", "task", "split", "episode", "seed", "difficulty", "setting", "form"}
+    keys = {"policy", "task", "split", "episode", "seed", "difficulty", "options"}
     assert keys | {"policy_seed", "outcome", "cause", "steps"} <= set(json.loads(lines[0]))
 
     again = roboirg(*command)
@@ -232,9 +261,9 @@ def test_missing_graphics_are_one_sentence(
     assert (said.code, said.err) == (2, "roboirg: No Vulkan device can render; install Mesa.\n")
 
 
-@pytest.mark.usefixtures("canned")
+@pytest.mark.usefixtures("canned", "in_this_process")
 def test_demo_ends_with_the_path_of_the_page(roboirg, tmp_path: Path) -> None:
-    said = roboirg("demo", "--out", tmp_path, "--episodes", "1", "--workers", "0")
+    said = roboirg("demo", "--out", tmp_path, "--episodes", "1")
     assert said.code == 0, said.err
     assert said.out.splitlines()[-1] == str(tmp_path / "report.html")
     for policy in demo_commands.DEMO_POLICIES:
@@ -419,7 +448,6 @@ def test_a_dry_run_names_the_forms_it_counts(
     [
         (("--workers", "-2"), "workers is -2; it must be at least 0, this process only."),
         (("--executor", "slurm"), "There is no executor 'slurm'"),
-        (("--address", "auto"), "--address 'auto' needs --executor ray"),
         (("--out", "{file}"), "Cannot write to {file}: {file} is not a folder"),
         (("--out", "{file}/deep/er"), "{file} is not a folder"),
         (("--out", "{other}"), "language version 1.1"),
@@ -430,7 +458,13 @@ def test_a_dry_run_checks_what_a_run_checks(
 ) -> None:
     file, other = tmp_path / "file", tmp_path / "other"
     file.write_text("x")
-    job = Job(policy="random", task="PickXtimes", split="test", episode=0, setting="direct")
+    job = Job(
+        policy="random",
+        task="PickXtimes",
+        split="test",
+        episode=0,
+        options=InstructionOptions("direct"),
+    )
     with RecordStore(other) as store:
         result = RolloutResult("success", cause=None, steps=7)
         store.append(replace(make_record(job, result, started_at="now"), language_version="1.1"))
@@ -451,7 +485,8 @@ def test_a_run_s_own_plan_can_be_played_again(
     roboirg, tmp_path: Path, canned: type[CannedPlayer]
 ) -> None:
     del canned
-    words = "--settings contextual,direct --stages 1,5;1-5 --episodes 3, --retry-on none"
+    words = "--settings contextual,direct --stages 1,5;1-5 --episodes 3,"
+    words += f" --plan {plan_file(retry_on='none', frame='camera')}"
     words += " --wordings train --forms implicit,resolved --workers 0 --out"
     first = roboirg(*RUN, *words.split(), tmp_path / "a")
     assert first.code == 0, first.err
@@ -589,7 +624,7 @@ def test_long_lists_of_options_have_panels(roboirg, monkeypatch: pytest.MonkeyPa
         name: len(re.findall(r"(?m)^│ [ *] {0,3}--|^│ --", body))
         for name, body in zip(panels[::2], panels[1::2], strict=True)
     }
-    assert len(sizes) == 6
+    assert len(sizes) == 4
     assert all(1 < size <= 9 for size in sizes.values()), sizes
 
 

@@ -23,7 +23,7 @@ printf '%s\\n' "${COMPREPLY[@]}"
         (["fetch"], ["fetch-models"]),
         (["ta"], ["tables", "tasks"]),
         (["language", "val"], ["validate"]),
-        (["run", "--retry"], ["--retry-errors", "--retry-on"]),
+        (["run", "--retry"], ["--retry-errors"]),
     ],
 )
 def test_bash_completes_commands_and_options(tmp_path, words, wanted):

@@ -1,6 +1,7 @@
 """Every command in an environment with the core alone: it works, or names the extra it needs."""
 
 import json
+import os
 import subprocess
 import sys
 import tomllib
@@ -43,7 +44,7 @@ sys.__stdout__.write(json.dumps(found))
 NEEDS = {
     "bench": "sim", "run": "sim", "show": "sim", "demo": "report", "report": "report",
     "figures": "report", "compare": "report", "serve": "remote",
-    "records export": "export", "real run": "sim", "real score": "report",
+    "records export": "export", "real run": "sim", "real score": "pages",
     "export demonstrations": "sim", "export grounding": "sim",
     "leaderboard repeat": "sim", "leaderboard board": "report",
     "language shortcuts": "report",
@@ -61,6 +62,7 @@ def walked(tmp_path_factory):
     done = subprocess.run(
         [sys.executable, "-c", WALK, json.dumps(refused), json.dumps(words)],
         check=True, capture_output=True, text=True, cwd=folder,
+        env=os.environ | {"ROBOIRG_WORKERS": "0"},
     )  # fmt: skip
     return json.loads(done.stdout)
 

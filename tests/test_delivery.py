@@ -3,6 +3,7 @@
 import itertools
 
 import pytest
+from plan_files import plan_file
 from typer.testing import CliRunner
 
 import roboirg
@@ -165,12 +166,12 @@ def test_the_oracle_does_not_wait_for_words():
 @pytest.mark.sim
 def test_a_run_in_turns_has_records_and_videos_of_them(tmp_path):
     words = ["--policy", "listener", "--tasks", "VideoUnmask", "--settings", "explicit,direct"]
-    words += ["--episodes", "1", "--delivery", "turns", "--video", "all", "--workers", "0"]
+    words += ["--plan", plan_file(delivery="turns", episodes=1, video="all"), "--workers", "0"]
     result = CliRunner().invoke(app, ["run", *words, "--out", str(tmp_path)])
     assert result.exit_code == 0, result.output
     direct, explicit = read_records(tmp_path)
     assert (explicit.outcome, direct.outcome) == ("success", "success")
-    assert (explicit.delivery, direct.delivery) == ("prompt", "turns")
+    assert (explicit.options.delivery, direct.options.delivery) == ("prompt", "turns")
     assert [one.step for one in explicit.instruction] == [0]
     assert [one.step for one in direct.instruction] == [0, SPACING]
     assert direct.steps == explicit.steps + SPACING

@@ -18,6 +18,7 @@ from selection import slow_but
 import roboirg
 from roboirg.core.actions import ACTION_SPACES
 from roboirg.core.errors import InvalidActionError, InvalidValueError, UnknownNameError
+from roboirg.core.instruction_options import OPTION_NAMES, InstructionOptions
 from roboirg.envs.env_options import EnvOptions
 from roboirg.envs.env_settings import EnvSettings
 from roboirg.envs.environment import RoboIRGEnv
@@ -161,9 +162,12 @@ def test_subgoals_change_one_step_after_their_stage_and_only_pointing_ones_are_g
 
 def test_make_is_typed_with_the_options_of_the_environment():
     typed = {name: hint.__forward_arg__ for name, hint in EnvOptions.__annotations__.items()}
-    assert typed == {option.name: option.type for option in dataclasses.fields(EnvSettings)}
+    own = {name: hint for name, hint in typed.items() if name not in OPTION_NAMES}
+    settings = {option.name: option.type for option in dataclasses.fields(EnvSettings)}
+    assert own == {name: hint for name, hint in settings.items() if name != "words"}
+    assert typed.keys() == {*own, *OPTION_NAMES}
     documented = inspect.getdoc(roboirg.make).partition("Keyword Args:")[2].partition("Raises:")[0]
-    assert re.findall(r"^    (\w+): ", documented, re.MULTILINE) == list(typed)
+    assert re.findall(r"^    (\w+): ", documented, re.MULTILINE) == list(own)
     for made in (roboirg.make, roboirg.make_vec, RoboIRGEnv, RoboIRGVectorEnv):
         annotation = inspect.signature(made).parameters["options"].annotation
         assert annotation == "Unpack[EnvOptions]"
@@ -187,7 +191,13 @@ def test_an_environment_without_what_a_policy_looks_at_is_refused(attribute):
 
 
 def test_runs_give_policies_their_action_space():
-    job = Job(policy="random", task="PickXtimes", split="test", episode=2, setting="direct")
+    job = Job(
+        policy="random",
+        task="PickXtimes",
+        split="test",
+        episode=2,
+        options=InstructionOptions("direct"),
+    )
     for space in ACTION_SPACES.values():
         env = make_env(PreparedJob(job), PolicyNeeds(cameras=(), actions=space.name))
         assert env.actions == space.name
@@ -368,7 +378,11 @@ def test_policies_are_shown_what_they_ask_for():
     with pytest.raises(InvalidValueError, match=r"needs observe_every=5, but .* has None"):
         play(wrong, policy)
     job = Job(
-        policy=f"{__name__}:Choosy", task="PickXtimes", split="test", episode=2, setting="direct"
+        policy=f"{__name__}:Choosy",
+        task="PickXtimes",
+        split="test",
+        episode=2,
+        options=InstructionOptions("direct"),
     )
     env = make_env(
         PreparedJob(job), PolicyNeeds(cameras=(), demonstration_frames="none", observe_every=5)

@@ -14,11 +14,10 @@ from roboirg import main as cli
 
 NAMES = {
     "--tasks": "PickXtime", "--settings": "spatail", "--setting": "spatail", "--forms": "implict",
-    "--form": "implict", "--split": "tset", "--episodes": "four", "--policy-seeds": "one",
-    "--stages": "9-1", "--distractor": "nutral", "--frame": "robt", "--delivery": "turn",
-    "--wordings": "nowhere.toml", "--actions": "joints",
-    "--demonstration-frames": "some", "--meshes": "lite", "--video": "som", "--protocol": "opnpi",
-    "--policy-process": "mine", "--long-prompts": "cut", "--retry-on": "conection",
+    "--split": "tset", "--episodes": "four", "--policy-seeds": "one",
+    "--stages": "9-1", "--distractor": "nutral", "--frame": "robt",
+    "--wordings": "nowhere.toml", "--actions": "joints", "--floors": "chanse",
+    "--video": "som", "--protocol": "opnpi",
     "--executor": "slurm", "--plan": "papr", "--api-key-env": "NO_SUCH_VARIABLE", "--which": "mian",
     "--format": "pdf", "--by": "colour", "--robot": "twn", "--score": "me",
     "--consent": "nowhere.txt",
@@ -27,8 +26,8 @@ NAMES = {
 
 
 TEXTS = {
-    "--out", "--trajectories", "--operator", "--policy", "--address", "--devices", "--host",
-    "--allow-host", "--name",
+    "--out", "--trajectories", "--operator", "--policy", "--host",
+    "--name",
 }  # fmt: skip
 """Options that take any text; all others take numbers or names."""
 

@@ -9,7 +9,7 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-from roboirg.core.instruction_options import InstructionOptions
+from roboirg.core.instruction_options import OPTION_NAMES, InstructionOptions
 from roboirg.evaluation.analysis.published import TRIALS, published_rows
 from roboirg.evaluation.records.record import Summary
 
@@ -21,7 +21,6 @@ def make_result(outcome: str = "success", episode: int = 0, **fields: object) ->
         "policy": "listener",
         "task": "PickXtimes",
         "split": "test",
-        "setting": "explicit",
         "seed": episode,
         "difficulty": "easy",
         "privileged": False,
@@ -33,6 +32,8 @@ def make_result(outcome: str = "success", episode: int = 0, **fields: object) ->
         **fields,
     }
     error = {"error": "policy"} if outcome == "error" else {}
+    words = {name: usual.pop(name) for name in OPTION_NAMES if name in usual}
+    usual.setdefault("options", InstructionOptions(**words))  # type: ignore[arg-type]
     return Summary(outcome=outcome, episode=episode, **error, **usual)  # type: ignore[arg-type]
 
 
@@ -52,7 +53,7 @@ def with_rate(
             "success" if success else "failure",
             number // seeds,
             policy_seed=number % seeds,
-            **options._asdict(),
+            options=options,
             **fields,
         )
 

@@ -11,7 +11,6 @@ from msgspec.structs import replace
 from typer.testing import CliRunner
 
 from roboirg.evaluation.plan.plan import Plan
-from roboirg.evaluation.records.record import Record
 from roboirg.evaluation.records.store import RecordStore
 from roboirg.main import app
 
@@ -24,14 +23,14 @@ def run(tmp_path: Path) -> Path:
     with RecordStore(tmp_path) as store:
         for job in plan.jobs()[:-1]:
             record = FakePlay()(job)
-            names = {name: THEIRS.get(value, value) for name, value in _names(record).items()}
-            store.append(replace(record, **names))
+            theirs = {
+                name: THEIRS.get(value, value)
+                for name, value in (("task", record.task), ("policy", record.policy))
+            }
+            setting = THEIRS.get(record.setting, record.setting)
+            store.append(replace(record.with_options(setting=setting), **theirs))
     _write_plan(plan, tmp_path)
     return tmp_path
-
-
-def _names(record: Record) -> dict[str, str]:
-    return {"task": record.task, "setting": record.setting, "policy": record.policy}
 
 
 def _write_plan(plan: Plan, folder: Path) -> None:

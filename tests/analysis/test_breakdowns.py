@@ -186,7 +186,7 @@ def test_only_the_command_s_expressions_count(records: tuple[Record, ...]) -> No
     said = {m.expression for r in records if r.setting == "contextual" for m in r.mentions}
     assert "them" in said - found, "said of the referents in a reinforcement"
     resolved = make_record(
-        replace(PLAN.jobs()[0], setting="contextual", form="resolved"),
+        PLAN.jobs()[0].with_options(setting="contextual", form="resolved"),
         RolloutResult("success", cause=None),
         started_at="now",
     )
@@ -225,7 +225,7 @@ def hand_made(result: Any) -> tuple[list[Any], dict[InstructionKey, tuple[str, .
         results.append(result("success" if episode < 6 else "failure", episode))
         direct = result("success" if episode < 3 else "failure", episode, setting="direct")
         results.append(direct)
-        key = InstructionKey("PickXtimes", "test", episode, direct.options, None, "1", 1)
+        key = InstructionKey("PickXtimes", "test", episode, direct.options, "1", 1)
         labels[key] = ("a",) if episode % 2 == 0 else ("b", "c")
     return results, labels
 

@@ -11,6 +11,7 @@ import msgspec
 import numpy as np
 import pytest
 
+from roboirg.core.instruction_options import InstructionOptions, split_options
 from roboirg.evaluation.analysis.stats.chance import FLOORS, chance_level, floor_level
 from roboirg.evaluation.play.job_instruction import instruct_job
 from roboirg.evaluation.records.record import Job
@@ -26,8 +27,9 @@ DOCS = Path(__file__).parents[2] / "docs" / "statistics.md"
 
 
 def job(task: str, setting: str, episode: int = 2, **fields: object) -> Job:
-    usual = {"policy": "any", "split": "test", **fields}
-    return Job(task=task, setting=setting, episode=episode, **usual)  # type: ignore[arg-type]
+    words, others = split_options({"setting": setting, **fields})
+    usual = {"policy": "any", "split": "test", **others}
+    return Job(task=task, episode=episode, **usual, options=InstructionOptions(**words))  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize("task", all_tasks())

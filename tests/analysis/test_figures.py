@@ -157,12 +157,12 @@ def test_the_context_is_compared_on_the_same_tasks(
     tmp_path: Path, published_like: Callable[..., list[Summary]]
 ) -> None:
     found = published_like("context")
-    short = [one for one in found if not (one.task == "BinFill" and one.stages == (1, 5))]
+    short = [one for one in found if not (one.task == "BinFill" and one.options.stages == (1, 5))]
     write_figures(content(short), tmp_path, ["context"])
     drawn = texts(tmp_path / "context.svg")
     assert "PickXtimes" in drawn
     assert "BinFill" not in drawn
-    only = content([one for one in found if one.stages == (1, 5)])
+    only = content([one for one in found if one.options.stages == (1, 5)])
     with pytest.raises(InvalidValueError, match="nothing to draw for context"):
         write_figures(only, tmp_path, ["context"])
 

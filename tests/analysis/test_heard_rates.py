@@ -14,6 +14,7 @@ from rich.console import Console
 from typer.testing import CliRunner
 
 from roboirg import main
+from roboirg.core.instruction_options import InstructionOptions
 from roboirg.evaluation.analysis.page.details import Strings, details_of
 from roboirg.evaluation.analysis.page.entries import Run, make_entries
 from roboirg.evaluation.analysis.page.run_warnings import run_warnings
@@ -58,14 +59,18 @@ def sample(result: MakeResult) -> list[Summary]:
     return [
         *results(result, ("success", "heard"), ("failure", "heard")),
         *results(
-            result, ("failure", "cut"), ("failure", "cut"), ("success", "heard"), ("error", "cut"),
+            result,
+            ("failure", "cut"),
+            ("failure", "cut"),
+            ("success", "heard"),
+            ("error", "cut"),
             **contextual,
         ),
         *results(
             result, ("failure", "unknown"), ("success", "heard"), task="BinFill", **contextual
         ),
         *results(result, ("success", "unknown"), policy="other"),
-    ]  # fmt: skip
+    ]
 
 
 def test_notes_tell_rates_over_what_was_heard_beside_rates_over_all(result: MakeResult) -> None:
@@ -99,9 +104,13 @@ def test_the_table_has_a_row_for_each_cell_and_for_all_tasks(result: MakeResult)
 
 def long_record(policy: str, tokens: int | None, **fields: object) -> Record:
     job = Job(
-        policy=policy, task="PickXtimes", split="test", episode=0, setting="contextual",
-        distractors=16, **fields,
-    )  # fmt: skip
+        policy=policy,
+        task="PickXtimes",
+        split="test",
+        episode=0,
+        **fields,
+        options=InstructionOptions("contextual", distractors=16),
+    )
     limit = None if tokens is None else PromptLimit(tokens, 0, most_tokens, "some.model")
     result = RolloutResult("failure", cause="because", prompt_limit=limit)
     return make_record(job, result, started_at="2026-01-02T03:04:05+00:00")
@@ -116,13 +125,14 @@ def run(tmp_path: Path) -> Path:
 
 
 def test_the_command_prints_it_on_request(run: Path) -> None:
-    said = CliRunner().invoke(main.app, ["tables", str(run), "--heard", "--format", "csv"])
+    said = CliRunner().invoke(main.app, ["tables", str(run), "--which", "heard", "--format", "csv"])
     assert said.exit_code == 0, said.output
     assert "cutting" in said.output
     assert "whole" in said.output
     assert "silent" not in said.output
-    refused = CliRunner().invoke(main.app, ["tables", str(run), "--heard", "--chance"])
-    assert "--heard has a table of its own" in str(refused.exception or refused.output)
+    words = ["tables", str(run), "--which", "heard", "--floors", "chance"]
+    refused = CliRunner().invoke(main.app, words)
+    assert "--which heard goes without --published" in str(refused.exception)
 
 
 def test_the_page_says_what_was_cut() -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.evaluation.analysis.stats.cells import gather
+from roboirg.evaluation.analysis.stats.chance import CHANCE
 from roboirg.evaluation.analysis.stats.option_labels import (
     default_settings,
     options_label,
@@ -42,7 +43,7 @@ def test_staged_options_have_every_set_of_stages() -> None:
 
 def test_an_unknown_setting_of_old_records_has_rows_too(result) -> None:
     results = [result(setting=name) for name in ("retired", "direct", "explicit")]
-    table = make_table("main", gather([("run", results)]), chance=True)
+    table = make_table("main", gather([("run", results)]), floors=(CHANCE,))
     ours = [row.group for row in table.rows if row.source == "ours"]
     assert ours == ["explicit", "direct", "retired"]
     (row,) = [row for row in table.rows if (row.group, row.source) == ("retired", "ours")]

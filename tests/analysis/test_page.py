@@ -378,7 +378,7 @@ def test_what_the_policy_printed_is_a_click_away(
             if served:
                 answer = page.request.get(server.address + target)
                 assert answer.text() == "<b>some words</b>"
-                assert answer.headers["content-type"] == "text/plain"
+                assert answer.headers["content-type"] == "text/plain; charset=utf-8"
         server.shutdown()
         thread.join()
 

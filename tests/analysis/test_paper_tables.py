@@ -16,7 +16,9 @@ from msgspec.structs import replace
 from rich.console import Console
 
 from roboirg.core.errors import UnknownNameError
+from roboirg.core.instruction_options import InstructionOptions
 from roboirg.evaluation.analysis.stats.cells import gather
+from roboirg.evaluation.analysis.stats.chance import CHANCE, FLOORS
 from roboirg.evaluation.analysis.stats.rates import change, mean_percent, percent
 from roboirg.evaluation.analysis.tables.paper_tables import is_informative, make_table
 from roboirg.evaluation.analysis.tables.rendering import FORMATS, get_format
@@ -95,7 +97,7 @@ def test_an_error_marks_its_cell_and_every_average_over_it(result) -> None:
 def test_what_is_missing_is_marked_and_compared_with_nothing(result) -> None:
     results = whole(result)
     planned = [one.identity for one in results]
-    gone = [one for one in results if (one.task, one.setting) != ("StopCube", "explicit")]
+    gone = [one for one in results if (one.task, one.options.setting) != ("StopCube", "explicit")]
     table = make_table("main", gather([("run", gone)], planned))
     assert (
         entries(table, "explicit")["StopCube"].text,
@@ -185,7 +187,7 @@ def test_spatial_is_compared_with_explicit_on_the_tasks_that_have_it(result) -> 
 
 
 def test_the_chance_level_stands_below(result) -> None:
-    table = make_table("main", gather([("run", whole(result))]), chance=True)
+    table = make_table("main", gather([("run", whole(result))]), floors=(CHANCE,))
     assert entries(table, "explicit", source="chance")["Avg"].text == "100.00"
     direct = entries(table, "direct", source="chance")
     assert direct["StopCube"].text == "25.00"
@@ -194,7 +196,7 @@ def test_the_chance_level_stands_below(result) -> None:
 
 def test_the_floors_stand_below_the_chance_level(result) -> None:
     cells = gather([("run", whole(result))])
-    table = make_table("main", cells, floors=True)
+    table = make_table("main", cells, floors=FLOORS)
     below = [(row.group, row.name) for row in table.rows if row.source == "chance"]
     names = ["chance", "first-mention", "last-mention", "elimination", "surface"]
     assert below == [(setting, name) for setting in ("explicit", "direct") for name in names]
@@ -302,7 +304,13 @@ def test_results_of_the_twin_are_marked_and_kept_apart_from_a_robots(result) -> 
         return {"real_trial": {"robot": robot}}
 
     def played(robot: object, outcome: str) -> Record:
-        job = Job(policy="listener", task="PutInBox", split="test", episode=0, setting="explicit")
+        job = Job(
+            policy="listener",
+            task="PutInBox",
+            split="test",
+            episode=0,
+            options=InstructionOptions("explicit"),
+        )
         course = RolloutResult(outcome, cause=None if outcome == "success" else "missed")
         course.policy_metadata = trial(robot)
         record = make_record(job, course, started_at="now")

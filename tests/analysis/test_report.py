@@ -187,7 +187,7 @@ def test_mentions_explicit_and_resolved_form_are_there() -> None:
     found = records(plan)
     page = Page(render(found))
     for record in found:
-        row = page.data["columns"]["key"].index(record.slug[-8:])
+        row = page.data["columns"]["key"].index(record.slug.rpartition("-")[2])
         details = page.details[row]
         assert len(details.get("mentions", [])) == len(record.mentions)
         for (at, start, end, *_), mention in zip(
@@ -268,7 +268,7 @@ def test_versions_that_differ_stand_apart() -> None:
 
 def test_words_that_differ_stand_apart_and_are_named() -> None:
     found = next(one for one in records() if one.setting == "direct" and one.form == "implicit")
-    other = replace(found, wordings="mine@1a")
+    other = found.with_options(wordings="mine@1a")
     page = Page(render([found, other]))
     warnings = " ".join(words for _, words in page.warnings)
     assert "Mixed words: our own words, the words of mine@1a." in warnings
@@ -318,7 +318,7 @@ def test_films_are_inside_or_beside(tmp_path: Path, monkeypatch: pytest.MonkeyPa
     lost = replace(second, video="videos/gone.mp4", video_error="no room")
 
     page = Page(render([filmed, lost], tmp_path))
-    key = filmed.slug[-8:]
+    key = filmed.slug.rpartition("-")[2]
     assert page.scripts[f"film-{key}"] == "data:video/mp4;base64,ZmlsbQ=="
     assert page.scripts[f"poster-{key}"] == "data:image/jpeg;base64,cG9zdGVy"
     assert [details.get("film") for details in page.details] == ["#", None]
@@ -378,7 +378,7 @@ def test_two_runs_are_held_against_each_other(tmp_path: Path) -> None:
     keys = page.data["columns"]["key"]
     assert len(set(keys)) == len(keys) == 2 * len(found) - 4
     # The films of the other run carry a key of their own.
-    assert page.scripts[f"film-{found[0].slug[-8:]}-2"].startswith("data:video")
+    assert page.scripts[f"film-{found[0].slug.rpartition('-')[2]}-2"].startswith("data:video")
     pairs = page.data["columns"]["pair"]
     # Both policies of both runs, but for the last four.
     assert sorted(map(pairs.count, set(pairs))) == [3] * 4 + [4] * (len(found) // 2 - 4)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 
 import pytest
+from flat_jobs import job_of
 from rich.console import Console
 
 from roboirg.core.instruction_options import InstructionOptions
@@ -33,7 +34,7 @@ def record(
     cause: str | None = "because",
     **fields: object,
 ) -> Record:
-    job = Job(
+    job = job_of(
         **{
             "policy": "listener",
             "task": "PickXtimes",

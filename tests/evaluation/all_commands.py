@@ -2,7 +2,9 @@
 
 import typer.main
 from msgspec.structs import replace
+from plan_files import plan_file
 
+from roboirg.core.instruction_options import InstructionOptions
 from roboirg.evaluation.plan.plan_maker import make_plan
 from roboirg.evaluation.plan.stored_plans import write_plan
 from roboirg.evaluation.play.rollout_result import RolloutResult, make_record
@@ -27,8 +29,13 @@ def make_run(folder):
     """Write a run of two policies, one of which succeeds, and return its folder."""
     with RecordStore(folder) as store:
         for number in range(6):
-            job = Job(policy="random", task="PickXtimes", split="test", episode=number // 2,
-                      setting="direct")  # fmt: skip
+            job = Job(
+                policy="random",
+                task="PickXtimes",
+                split="test",
+                episode=number // 2,
+                options=InstructionOptions("direct"),
+            )
             result = RolloutResult("failure", cause="timeout", steps=7)
             if number % 2:
                 job = replace(job, policy="oracle")
@@ -43,8 +50,20 @@ def words_of(folder, run):
     """Return words for each command with which it does its work where all is installed."""
     return {
         "bench": ["--rounds", "1"],
-        "run": ["--policy", "random", "--tasks", "PickXtimes", "--episodes", "1", "--workers", "0",
-                "--settings", "explicit", "--out", f"{folder}/out"],
+        "run": [
+            "--policy",
+            "random",
+            "--tasks",
+            "PickXtimes",
+            "--episodes",
+            "1",
+            "--workers",
+            "0",
+            "--settings",
+            "explicit",
+            "--out",
+            f"{folder}/out",
+        ],
         "records merge": [run, "--out", f"{folder}/merged"],
         "report": [run],
         "tables": [run],
@@ -58,36 +77,90 @@ def words_of(folder, run):
         "tasks": [],
         "show": ["PickXtimes", "0", "--out", f"{folder}/sheet.png"],
         "language stats": ["--tasks", "PickXtimes", "--split", "val"],
-        "language validate": ["--tasks", "PickXtimes", "--split", "val", "--workers", "0"],
+        "language validate": ["--tasks", "PickXtimes", "--split", "val"],
         "language shortcuts": ["--tasks", "PickXtimes", "--split", "val", "--learned"],
-        "export instructions": ["--tasks", "PickXtimes", "--split", "val",
-                                "--out", f"{folder}/words.jsonl"],
-        "export episodes": ["--tasks", "PickXtimes", "--split", "val",
-                            "--out", f"{folder}/episodes.jsonl"],
+        "export instructions": [
+            "--tasks",
+            "PickXtimes",
+            "--split",
+            "val",
+            "--out",
+            f"{folder}/words.jsonl",
+        ],
+        "export episodes": [
+            "--tasks",
+            "PickXtimes",
+            "--split",
+            "val",
+            "--out",
+            f"{folder}/episodes.jsonl",
+        ],
         "records export": [run, "--out", f"{folder}/records.parquet"],
-        "export demonstrations": ["--tasks", "StopCube", "--episodes", "1", "--pictures", "none",
-                                  "--settings", "explicit", "--workers", "0",
-                                  "--out", f"{folder}/moves"],
-        "export grounding": ["--tasks", "StopCube", "--episodes", "1", "--settings", "explicit",
-                             "--workers", "0", "--out", f"{folder}/questions"],
+        "export demonstrations": [
+            "--tasks",
+            "StopCube",
+            "--episodes",
+            "1",
+            "--pictures",
+            "none",
+            "--settings",
+            "explicit",
+            "--workers",
+            "0",
+            "--out",
+            f"{folder}/moves",
+        ],
+        "export grounding": [
+            "--tasks",
+            "StopCube",
+            "--plan",
+            plan_file(episodes=1),
+            "--settings",
+            "explicit",
+            "--out",
+            f"{folder}/questions",
+        ],
         "replay": ["--help"],
         "score grounding": ["--help"],
         "records import": ["--help"],
         "learn listener": ["--help"],
         "learn answers": ["--help"],
-        "listen plan": [f"{folder}/listeners", "--people", "1", "--tasks", "StopCube",
-                        "--episodes", "1", "--practice", "0", "--checks", "0", "--settings",
-                        "explicit", "--workers", "0"],
+        "listen plan": [
+            f"{folder}/listeners",
+            "--people",
+            "1",
+            "--tasks",
+            "StopCube",
+            "--episodes",
+            "1",
+            "--practice",
+            "0",
+            "--checks",
+            "0",
+            "--settings",
+            "explicit",
+        ],
         "listen serve": ["--help"],
         "listen results": ["--help"],
         "drive": ["--help"],
-        "leaderboard repeat": [run, "--out", f"{folder}/again", "--workers", "0"],
+        "leaderboard repeat": [run, "--out", f"{folder}/again"],
         "leaderboard pack": [run, "--out", f"{folder}/packed.zip"],
         "leaderboard verify": ["--help"],
         "leaderboard board": [folder],
-        "real plan": ["--policy", "random", "--tasks", "PutInBox", "--trials", "1", "--no-sheet",
-                      "--demonstrations", "1", "--out", f"{folder}/study"],
+        "real plan": [
+            "--policy",
+            "random",
+            "--tasks",
+            "PutInBox",
+            "--trials",
+            "1",
+            "--no-sheet",
+            "--demonstrations",
+            "1",
+            "--out",
+            f"{folder}/study",
+        ],
         "real run": [f"{folder}/study"],
         "real score": [f"{folder}/study"],
         "language import-robomme": ["--help"],
-    }  # fmt: skip
+    }

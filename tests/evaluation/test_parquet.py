@@ -10,6 +10,7 @@ from evaluation_fakes import FakePlay, small_plan
 from msgspec.structs import replace
 
 from roboirg.core.errors import InvalidValueError
+from roboirg.core.instruction_options import OPTION_NAMES
 from roboirg.evaluation.records.parquet import write_parquet
 from roboirg.evaluation.records.record import Attribution, Record
 
@@ -27,11 +28,12 @@ def test_a_table_holds_every_field_of_every_record(tmp_path: Path) -> None:
     records[1] = replace(records[1], attribution=None)
     said = records[1].instruction
     late = (*said[:-1], replace(said[-1], step=20))
-    records[1] = replace(records[1], delivery="turns", instruction=late)
+    records[1] = replace(records[1], instruction=late).with_options(delivery="turns")
     path = tmp_path / "records.parquet"
     assert write_parquet(iter(records), path) == len(records)
     table = pd.read_parquet(path)
-    assert tuple(table.columns) == Record.__struct_fields__
+    fields = [name for name in Record.__struct_fields__ if name != "options"]
+    assert set(table.columns) == {*fields, *OPTION_NAMES}
     for row, record in zip(table.to_dict("records"), records, strict=True):
         assert (row["policy"], row["episode"], row["outcome"]) == (
             record.policy,
@@ -40,7 +42,7 @@ def test_a_table_holds_every_field_of_every_record(tmp_path: Path) -> None:
         )
         assert json.loads(row["goal"]) == msgspec.to_builtins(record.goal)
         assert [event["kind"] for event in row["events"]] == [one.kind for one in record.events]
-        assert list(row["stages"]) == list(record.stages)
+        assert list(row["stages"]) == list(record.options.stages)
     assert table.attribution[0]["failure"] == "wrong_object"
     assert table.attribution[1] is None
     assert list(table.delivery[:2]) == ["prompt", "turns"]

@@ -90,8 +90,8 @@ def test_the_same_words_are_one_job() -> None:
     assert len(set(jobs)) == len(jobs)
     assert {job.form for job in jobs if job.setting == "explicit"} == {"implicit"}
     for job in jobs:
-        assert (job.stages == (1, 5)) == (job.setting == "contextual")
-        assert (job.frame == "camera") == (job.setting == "spatial")
+        assert (job.options.stages == (1, 5)) == (job.setting == "contextual")
+        assert (job.options.frame == "camera") == (job.setting == "spatial")
 
 
 def test_turns_are_other_jobs_where_there_is_more_than_one_utterance() -> None:

@@ -51,7 +51,7 @@ def test_the_papers_protocol_is_the_papers() -> None:
     # 40 implicit variants and their resolved forms, and the explicit setting once.
     assert len(told) == 40 + 40 + 11
     context = make_plan(["random"], **read_plan_file("paper-context"))
-    assert {job.stages for job in context.jobs()} == set(STAGE_SETS)
+    assert {job.options.stages for job in context.jobs()} == set(STAGE_SETS)
     assert len(context.jobs()) == 3 * 4 * 50 * 3
 
 

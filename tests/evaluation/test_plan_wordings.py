@@ -54,12 +54,12 @@ def test_jobs_name_the_wordings_and_their_file(wording_file: Path) -> None:
     plan = a_plan(wording_file)
     jobs = plan.jobs()
     assert len(jobs) == 2 * 3
-    (identity,) = {job.wordings for job in jobs}
+    (identity,) = {job.options.wordings for job in jobs}
     assert identity is not None
     assert identity.startswith("test@")
     assert {job.wordings_file for job in jobs} == {str(wording_file)}
     own = make_plan(["random"], tasks="PickXtimes", settings="explicit", episodes="2")
-    assert {(job.wordings, job.wordings_file) for job in own.jobs()} == {(None, None)}
+    assert {(job.options.wordings, job.wordings_file) for job in own.jobs()} == {(None, None)}
     # The same episodes in other words are other episodes; a file may be moved.
     assert identity_key(jobs[0]) != identity_key(own.jobs()[0])
     moved = replace(jobs[0], wordings_file="elsewhere.toml")
@@ -93,7 +93,9 @@ def test_a_job_opens_its_file_and_checks_it(
     assert instruct_job(job).text.startswith("pick up the ")
     monkeypatch.setattr(wording_store, "_OPEN", {})
     wording_file.write_text(FILE.replace("pick up", "grab"))
-    with pytest.raises(InvalidValueError, match=rf"but the episodes need {job.wordings}; put"):
+    with pytest.raises(
+        InvalidValueError, match=rf"but the episodes need {job.options.wordings}; put"
+    ):
         instruct_job(job)
 
 
@@ -116,7 +118,7 @@ def test_what_the_wordings_lack_stops_a_plan(wording_file: Path) -> None:
 
 @pytest.mark.usefixtures("forgetful")
 def test_a_job_in_our_own_words_opens_no_file(wording_file: Path) -> None:
-    job = replace(a_plan(wording_file).jobs()[0], wordings=None)
+    job = a_plan(wording_file).jobs()[0].with_options(wordings=None)
     own = instruct_job(job)
     assert own.metadata["wordings"] is None
     missing = replace(job, wordings_file="missing.toml")
@@ -143,14 +145,19 @@ def test_two_workers_play_in_the_words_of_a_file(wording_file: Path, tmp_path: P
     records = list(read_records(out))
     assert len(records) == 2
     for record in records:
-        assert record.wordings is not None
-        assert record.wordings.startswith("test@")
+        assert record.options.wordings is not None
+        assert record.options.wordings.startswith("test@")
         assert record.instruction[0].text == record.command
         assert record.command.startswith("pick up the ")
         assert record.metadata["wordings"] == record.wordings
     # The same episodes in our own words are played beside them, and none twice.
     said = play("--settings", "explicit")
     assert said.returncode == 0, said.stderr
-    assert [record.wordings is None for record in read_records(out)] == [False, False, True, True]
+    assert [record.options.wordings is None for record in read_records(out)] == [
+        False,
+        False,
+        True,
+        True,
+    ]
     assert "2 already" in play("--settings", "explicit", "--dry-run").stdout.replace(",", "")
     assert isinstance(msgspec.json.decode(msgspec.json.encode(records[0].identity), type=Job), Job)

@@ -30,11 +30,11 @@ from roboirg.tasks import ALL, find_tasks
 from roboirg.tasks.splits.private_splits import (
     SALT_VARIABLE,
     MissingSaltError,
+    drawn_split,
     is_private,
     known_salt,
     private_seed,
     use_salt,
-    with_salt,
 )
 from roboirg.tasks.splits.splits import CYCLE, get_episode, make_episode, split_size
 
@@ -134,10 +134,10 @@ def test_what_a_salt_must_be() -> None:
         use_salt("short")
     assert "short" not in str(found.value)
     assert known_salt() is None
-    with pytest.raises(InvalidValueError, match="--split random"):
-        with_salt("test", SALT)
-    assert with_salt("random", SALT) == with_salt("random", None) == use_salt(SALT)
-    assert with_salt("test", None) == "test"
+    assert drawn_split("random") == "random"
+    split = use_salt(SALT)
+    assert drawn_split("random") == split
+    assert drawn_split("test") == "test"
 
 
 def test_a_policy_in_the_worlds_process_is_refused() -> None:
@@ -220,13 +220,19 @@ def test_no_policy_and_no_file_has_the_salt(
         verify_run(run)
 
 
-def test_the_option_reaches_the_processes_of_a_command(tmp_path: Path) -> None:
+def test_the_salt_reaches_the_processes_of_a_command(tmp_path: Path) -> None:
     """One real command: the salt is in no line that it prints, and in no file."""
     command = [sys.executable, "-m", "roboirg", "run", "--out", str(tmp_path / "run"), "--dry-run"]
-    options = ["--policy", "random", "--split", "random", "--salt", SALT, "--episodes", "1"]
+    options = ["--policy", "random", "--split", "random", "--episodes", "1"]
     done = subprocess.run(
-        [*command, *options], capture_output=True, text=True, check=True, cwd=tmp_path
+        [*command, *options],
+        capture_output=True,
+        text=True,
+        check=True,
+        cwd=tmp_path,
+        env=os.environ | {SALT_VARIABLE: SALT},
     )
+    assert "random@" not in done.stderr
     assert SALT not in done.stdout + done.stderr
     assert SALT.encode() not in contents(tmp_path)
 

@@ -27,7 +27,11 @@ def test_a_terminal_sees_pace_time_left_and_score_in_80_columns() -> None:
     assert "6/6" in last
     assert "0:00 left" in last
     assert "/min" in last
-    assert "direct 0/2 · explicit 2/2" in last
+    won = {
+        setting: sum(one.outcome == "success" for one in RECORDS if one.setting == setting)
+        for setting in ("direct", "explicit")
+    }
+    assert f"direct {won['direct']}/2 · explicit {won['explicit']}/2" in last
 
 
 def test_elsewhere_every_episode_is_one_plain_line() -> None:

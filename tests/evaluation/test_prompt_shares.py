@@ -10,11 +10,13 @@ from pathlib import Path
 
 import msgspec
 import pytest
+from plan_files import plan_file
 from rich.console import Console
 from typer.testing import CliRunner
 
 from roboirg import main
 from roboirg.core.errors import UnknownNameError
+from roboirg.core.instruction_options import InstructionOptions, split_options
 from roboirg.evaluation.analysis.stats.heard_rates import count_heard
 from roboirg.evaluation.analysis.tables.run_tables import make_run_tables, print_run_tables
 from roboirg.evaluation.plan.plan_file import read_plan_file
@@ -43,7 +45,8 @@ LONG = {"setting": "contextual", "distractors": 16}
 
 def job(**fields: object) -> Job:
     usual = {"policy": "p", "task": "PickXtimes", "split": "test", "episode": 0}
-    return Job(**{**usual, "setting": "direct", **fields})  # type: ignore[arg-type]
+    words, others = split_options({**usual, "setting": "direct", **fields})
+    return Job(**others, options=InstructionOptions(**words))
 
 
 def test_no_system_of_the_paper_cuts_an_instruction_of_the_papers_plan() -> None:
@@ -175,7 +178,7 @@ def test_only_what_is_certainly_cut_is_refused() -> None:
 def test_the_dry_run_prints_the_shares(tmp_path: Path) -> None:
     words = ["run", "--dry-run", "--out", str(tmp_path), "--tasks", "PickXtimes"]
     words += ["--policy", "system:pi0.5", "--policy", "far=openpi://localhost:1"]
-    said = CliRunner().invoke(main.app, [*words, "--distractors", "16"])
+    said = CliRunner().invoke(main.app, [*words, "--plan", plan_file(distractors=16)])
     assert said.exit_code == 0, said.output
     row = next(line for line in said.output.splitlines() if "64 tokens" in line)
     assert "system:pi0.5" in row
@@ -226,9 +229,9 @@ def test_a_server_that_cuts_is_told_from_one_that_hears_everything_and_fails(
             address = server.stdout.readline().split(" at ")[1].split(";")[0]
             specs += ["--policy", f"{name}={address}?prompt_tokens={limit}"]
         words = ("--tasks", "PickXtimes", "--settings", "explicit,contextual", "--episodes", "1")
+        words += ("--plan", plan_file(distractors=16), "--max-steps", "2", "--workers", "1")
         said = subprocess.run(
-            [sys.executable, "-m", "roboirg", "run", *specs, *words, "--distractors", "16",
-             "--max-steps", "2", "--workers", "1", "--out", "out"],
+            [sys.executable, "-m", "roboirg", "run", *specs, *words, "--out", "out"],
             cwd=tmp_path, capture_output=True, text=True, check=False,
         )  # fmt: skip
     finally:
@@ -274,7 +277,7 @@ def test_a_policy_of_ones_own_declares_its_limit_from_a_process_of_its_own(tmp_p
         "    def act(self, observation): raise AssertionError('played')\n"
     )
     words = ["--policy", "mine:Mine", "--tasks", "PickXtimes", "--settings", "contextual"]
-    words += ["--episodes", "1", "--distractors", "16", "--long-prompts", "refuse"]
+    words += ["--episodes", "1", "--plan", plan_file(distractors=16, long_prompts="refuse")]
 
     def run(*more: str) -> subprocess.CompletedProcess[str]:
         return subprocess.run(

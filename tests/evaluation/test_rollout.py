@@ -19,6 +19,7 @@ from roboirg.core.errors import (
     MotionPlanningError,
     RenderDeviceError,
 )
+from roboirg.core.instruction_options import InstructionOptions
 from roboirg.evaluation.episode_errors import one_line
 from roboirg.evaluation.play import rollout
 from roboirg.evaluation.play.job_instruction import PreparedJob, instruct_job
@@ -30,7 +31,13 @@ from roboirg.evaluation.records.record import EventRecord, Job
 from roboirg.evaluation.records.record_codec import encode, read_record
 from roboirg.tasks.splits import splits
 
-JOB = Job(policy="random", task="PickXtimes", split="test", episode=2, setting="direct")
+JOB = Job(
+    policy="random",
+    task="PickXtimes",
+    split="test",
+    episode=2,
+    options=InstructionOptions("direct"),
+)
 
 
 class PaperSession:
@@ -239,7 +246,7 @@ def test_the_policys_luck_is_the_same_in_every_setting_and_another_in_every_epis
     def luck(**changes: object) -> int:
         return load_policy(PreparedJob(replace(JOB, **changes))).seed  # type: ignore[attr-defined]
 
-    assert luck() == luck(setting="explicit")
+    assert luck() == luck(options=InstructionOptions("explicit"))
     assert len({luck(), luck(episode=3), luck(policy_seed=1)}) == 3
 
 
@@ -323,7 +330,7 @@ def test_wrong_cameras_of_an_object_are_the_policys_fault(
 
 
 def test_a_record_says_what_is_in_the_words_and_who_cheats() -> None:
-    job = replace(JOB, setting="reasoning", policy="oracle")
+    job = replace(JOB.with_options(setting="reasoning"), policy="oracle")
     record = rollout.make_record(job, RolloutResult("success", cause=None), started_at="now")
     assert record.metadata["pattern"]
     assert record.metadata["templates"]
@@ -333,7 +340,7 @@ def test_a_record_says_what_is_in_the_words_and_who_cheats() -> None:
 
 
 def test_a_record_has_the_words_that_were_spoken() -> None:
-    spoken = instruct_job(replace(JOB, setting="spatial"))
+    spoken = instruct_job(JOB.with_options(setting="spatial"))
     result = RolloutResult("success", cause=None, instruction=spoken)
     record = rollout.make_record(JOB, result, started_at="now")
     assert record.instruction[-1].text == spoken.utterances[-1].text
@@ -353,7 +360,13 @@ def test_a_record_has_the_words_that_were_spoken() -> None:
 def test_a_record_tells_a_mirrored_pick_where_the_words_name_a_side(
     setting: str, frame: str, failure: str
 ) -> None:
-    job = Job(policy="p", task="PickXtimes", split="test", episode=18, setting=setting, frame=frame)
+    job = Job(
+        policy="p",
+        task="PickXtimes",
+        split="test",
+        episode=18,
+        options=InstructionOptions(setting, frame=frame),
+    )
     events = [EventRecord(step=9, kind="picked", subject="cube_red")]
     result = RolloutResult(
         "failure", None, "picked up the red cube", elapsed_steps=9, events=events
@@ -368,7 +381,7 @@ class TellingWorld(PaperWorld):
 
     def __init__(self, steps: tuple[int, ...], length: int) -> None:
         super().__init__(length)
-        job = replace(JOB, setting="contextual")
+        job = JOB.with_options(setting="contextual")
         self.instruction = instruct_job(job)
         self.told = list(zip(self.instruction.turns, steps, strict=False))
 
@@ -397,7 +410,7 @@ class Hearing(PaperPolicy):
         return {"heard": len(self.heard)}
 
 
-TURNS = replace(JOB, setting="contextual", delivery="turns")
+TURNS = JOB.with_options(setting="contextual", delivery="turns")
 
 
 def test_the_episode_of_a_job_is_looked_up_once(

@@ -54,7 +54,7 @@ def test_it_resumes_with_no_episode_played_again(run: Path) -> None:
 @pytest.mark.sim
 def test_its_pack_verifies(run: Path) -> None:
     for given in (run, STORED / "run.zip"):
-        said = command("leaderboard", "verify", str(given), "--workers", "0")
+        said = command("leaderboard", "verify", str(given))
         assert "All of it holds." in said
 
 

@@ -18,6 +18,7 @@ from roboirg.language.landmarks import (
     FRAMES,
     MARGIN,
     SIMPLE,
+    LandmarkClass,
     candidates_in,
     landmarks,
     selectors,
@@ -191,7 +192,7 @@ def test_things_in_the_middle_of_a_row_are_told_by_a_higher_rank():
     by_rank = {"fourth from your left", "fourth from your right"}
     every = {one.landmark.phrase: one for one in selectors(scene, "container", "robot")}
     assert all(every[words].select() is scene["container_3"] for words in by_rank)
-    assert {every[words].landmark.level for words in by_rank} == {10}
+    assert {every[words].landmark.kind for words in by_rank} == {LandmarkClass.FOURTH_RANK}
 
 
 def test_a_thing_is_told_among_a_few_that_stand_apart():

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import itertools
 
 import pytest
@@ -37,7 +38,7 @@ def told(task, split="test", count=40):
 @settings(max_examples=150, deadline=None)
 def test_random_episodes_are_read_back(task, index, pool):
     episode = get_episode(task, "random", index)
-    options = OPEN._replace(wordings=pool)
+    options = dataclasses.replace(OPEN, wordings=pool)
     if find_refusal(episode, options) is not None:
         return
     said = instruct_with(episode, options)
@@ -46,7 +47,7 @@ def test_random_episodes_are_read_back(task, index, pool):
     alone = interpret(said.command, episode.scene, task).goals
     assert episode.goal in alone
     assert len(alone) > 1, said.command
-    resolved = instruct_with(episode, options._replace(form="resolved"))
+    resolved = instruct_with(episode, dataclasses.replace(options, form="resolved"))
     assert interpret(resolved.command, episode.scene, task).goals == (episode.goal,)
 
 

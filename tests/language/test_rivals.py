@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import itertools
 import re
 from collections import Counter
@@ -39,7 +40,7 @@ POINTERS = {"former": 0, "first": 0, "earlier": 0, "latter": 1, "last": 1, "late
 
 def told(task, setting, split="test", count=40, **options):
     """Episodes with a rival, each with its instruction."""
-    wanted = InstructionOptions(setting)._replace(**options)
+    wanted = dataclasses.replace(InstructionOptions(setting), **options)
     for episode in first_episodes(task, split, count):
         if find_refusal(episode, wanted) is None:
             yield episode, instruct_with(episode, wanted)
@@ -65,7 +66,7 @@ def test_random_episodes_are_read_back(cell, index, pool):
     alone = interpret(said.command, episode.scene, task).goals
     assert episode.goal in alone
     assert len(alone) > 1
-    resolved = instruct_with(episode, options._replace(form="resolved"))
+    resolved = instruct_with(episode, dataclasses.replace(options, form="resolved"))
     assert interpret(resolved.command, episode.scene, task).goals == (episode.goal,)
     assert resolved.turns[:-1] == said.turns[:-1]
 

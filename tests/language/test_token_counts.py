@@ -1,5 +1,6 @@
 """Instructions are short enough to be heard."""
 
+import dataclasses
 from importlib.resources import files
 
 import pytest
@@ -52,7 +53,7 @@ def test_so_it_is_with_all_options(tokenizer, task):
     for index in range(6):
         episode = get_episode(task, "random", index)
         for options in expressible_options(episode, POOLS[index % 2]):
-            text = instruct_with(episode, options._replace(distractors=5)).text
+            text = instruct_with(episode, dataclasses.replace(options, distractors=5)).text
             assert count_tokens(text) == len(tokenizer.encode(text)) + ADDED_TOKENS, text
 
 

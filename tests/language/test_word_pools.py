@@ -8,6 +8,7 @@ from dataclasses import replace
 
 import pytest
 from language_variants import TASKS, split_episodes
+from plan_files import plan_file
 from selection import slow_but
 from typer.testing import CliRunner
 
@@ -152,7 +153,7 @@ def test_every_split_is_valid_in_the_words_of_either_pool(task, pool, episodes):
 def test_a_plan_takes_a_pool_in_the_place_of_a_file(pool):
     plan = make_plan(["random"], tasks="PickXtimes", settings="direct", episodes="2", wordings=pool)
     (job, *_) = plan.jobs()
-    assert (job.wordings, job.wordings_file) == (pool, pool)
+    assert (job.options.wordings, job.wordings_file) == (pool, pool)
     said = instruct_job(job)
     assert said.metadata["pool"] == pool
     assert said.text == instruct(get_episode("PickXtimes", "test", 0), "direct", wordings=pool).text
@@ -170,10 +171,9 @@ def test_the_commands_take_a_pool(pool, tmp_path):
     expected = instruct(episode, wordings=pool).text
     assert expected in call("show", "StopCube", "0", "--words", "--wordings", pool)
     out = tmp_path / "rows.jsonl"
-    call(
-        *("export", "instructions", "--out", str(out), "--wordings", pool),
-        *("--settings", "explicit", "--split", "val", "--forms", "implicit"),
-    )
+    words = ("--settings", "explicit", "--split", "val")
+    plan = plan_file(wordings=pool, forms="implicit")
+    call("export", "instructions", "--out", str(out), *words, "--plan", plan)
     rows = out.read_text().splitlines()
     assert len(rows) == 50 * len(all_tasks())
     run = ("run", "--policy", "random", "--out", str(tmp_path / "run"), "--dry-run")

@@ -1,5 +1,6 @@
 """Wording files: by hand, bad ones, their identity, and writing them."""
 
+import dataclasses
 import re
 from dataclasses import replace
 from pathlib import Path
@@ -421,7 +422,7 @@ def test_a_setting_under_own_ignores_the_commands():
     # A command from outside has no rival; our own has.
     rival = InstructionOptions("direct-rival")
     assert find_refusal(without_command, rival) is None
-    options = rival._replace(wordings=identity)
+    options = dataclasses.replace(rival, wordings=identity)
     assert find_refusal(without_command, options) is None
     drawn = instruct_with(without_command, options)
     assert drawn.text == instruct_with(without_command, rival).text
@@ -435,7 +436,7 @@ def test_a_pair_with_our_command_in_one_form_is_no_pair(monkeypatch):
     def say(one, options):
         outside = identity if options.form == "resolved" else None
         setting = "explicit" if outside else "direct"
-        return instruct_with(one, options._replace(setting=setting, wordings=outside))
+        return instruct_with(one, dataclasses.replace(options, setting=setting, wordings=outside))
 
     monkeypatch.setattr(pairing, "instruct_with", say)
     assert ("direct", "resolved, more than its references differ") in unpaired(episode, ["direct"])

@@ -19,13 +19,11 @@ from wire_servers import WireServer
 
 from roboirg.core.errors import PolicyServerError
 from roboirg.core.plain_text import printable
-from roboirg.policies.remote.message_codec import CodecError, unpack
-from roboirg.policies.remote.message_size import MAX_DEPTH, MAX_ELEMENTS
 from roboirg.policies.vlm.model_content import ChatTurn
 from roboirg.policies.vlm.models import ModelOptions, ModelQuery, make_model
 
 MIB = 1 << 20
-EMPTY_MAPS = b"\x81\xa1a\xdd" + struct.pack(">I", 50 * MIB) + b"\x80" * (50 * MIB)
+BIG = b"\x81\xa1a\xc6" + struct.pack(">I", 50 * MIB) + b"\x80" * (50 * MIB)
 MANY_AXES = msgpack.packb(
     {
         "actions": {
@@ -123,29 +121,17 @@ def answers(text):
 TIMEOUT, REPLY, CONNECTION = "PolicyTimeoutError", "PolicyReplyError", "PolicyConnectionError"
 LARGE = "&max_reply_mib=64"
 QUICK = "?connect=1&timeout=1"
-PATIENT = "?connect=200&timeout=200"
+PATIENT = "?connect=60&timeout=60"
 # Name, behavior, options, error, part of the message.
 WEBSOCKET = [
-    ("maps", says(EMPTY_MAPS), PATIENT + LARGE, REPLY, "more than 1,000,000 elements"),
-    ("map-replies", replies(EMPTY_MAPS), PATIENT + LARGE, REPLY, "more than 1,000,000 elements"),
-    ("large", says(EMPTY_MAPS), PATIENT, REPLY, "max_reply_mib"),
-    ("axes", replies(MANY_AXES), PATIENT, REPLY, "400000 axes; at most 32"),
-    ("nest", says(b"\x81\xa1x" + b"\x91" * 10**6), PATIENT, REPLY, "nests more than 64"),
-    ("announced", says(b"\xdd\xff\xff\xff\xff"), PATIENT, REPLY, "more than 1,000,000 elements"),
+    ("large", says(BIG), PATIENT, REPLY, "max_reply_mib"),
+    ("axes", replies(MANY_AXES), PATIENT, REPLY, "an array |u1 of shape"),
     ("traceback", replies(b"a\n" * (25 * MIB), 1), PATIENT + LARGE, REPLY, "error: a."),
     ("escapes", replies(ESCAPES.encode(), 1), PATIENT, REPLY, r"error: Error: \x1b[2J\x1b]0;"),
     ("fragments", fragments, PATIENT, REPLY, "too many pieces"),
     ("pings", pings, QUICK, TIMEOUT, "within 1 s"),
     ("half", half_a_frame, QUICK, TIMEOUT, "did not send its metadata within 1 s"),
     ("dripped-head", drips(b"HTTP/1.1 101 OK\r\nX: ", b"x"), QUICK, CONNECTION, "tried for 1 s"),
-    ("status", drips(b"", b"HTTP/1.1 102 OK\r\n\r\n"), QUICK, CONNECTION, "status 102"),
-    (
-        "length",
-        answers("HTTP/1.1 503 OK\r\nContent-Length: ²\r\n\r\n".encode()),
-        QUICK,
-        CONNECTION,
-        "cannot be reached",
-    ),
 ]
 WEBSOCKET += [
     (
@@ -156,34 +142,15 @@ WEBSOCKET += [
         "follow",
     ),
 ]
-ZEROS = gzip.compress(b"\0" * (512 * MIB), 1)
 HTTP = [
-    ("maps", responds(EMPTY_MAPS), PATIENT + LARGE, REPLY, "more than 1,000,000 elements"),
-    ("large", responds(EMPTY_MAPS), PATIENT, REPLY, "max_reply_mib"),
+    ("large", responds(BIG), PATIENT, REPLY, "max_reply_mib"),
     ("chunks", chunks, PATIENT, REPLY, "max_reply_mib"),
-    ("gzip", responds(ZEROS, "Content-Encoding: gzip"), PATIENT, REPLY, "compressed"),
-    (
-        "gzip-in-gzip",
-        responds(gzip.compress(ZEROS, 9), "Content-Encoding: gzip, gzip"),
-        PATIENT,
-        REPLY,
-        "compressed",
-    ),
-    ("status", drips(b"", b"HTTP/1.1 102 OK\r\n\r\n"), QUICK, TIMEOUT, "within"),
-    ("dripped-head", drips(b"HTTP/1.1 200 OK\r\n", b"X: y\r\n"), QUICK, TIMEOUT, "within"),
     (
         "dripped-body",
         drips(b"HTTP/1.1 200 OK\r\nContent-Length: 1000\r\n\r\n", b"\x80"),
         QUICK,
         TIMEOUT,
         "within",
-    ),
-    (
-        "length",
-        answers("HTTP/1.1 200 OK\r\nContent-Length: ²\r\n\r\n".encode()),
-        QUICK,
-        CONNECTION,
-        "cannot be reached",
     ),
     (
         "reason",
@@ -210,11 +177,6 @@ def clients():
 @pytest.mark.parametrize("attack", WEBSOCKET, ids=[one[0] for one in WEBSOCKET])
 def test_a_bad_websocket_server_is_an_error_in_time_and_within_memory(attack, clients, good):
     check(attack, "openpi", clients, good)
-
-
-@pytest.mark.parametrize("attack", WEBSOCKET[:1], ids=["maps"])
-def test_a_bad_model_server_of_vla_eval_is_an_error_within_memory(attack, clients, good):
-    check(attack, "vla-eval", clients, good)
 
 
 @pytest.mark.parametrize("attack", HTTP, ids=[one[0] for one in HTTP])
@@ -260,41 +222,6 @@ def test_a_bad_model_endpoint_is_a_named_error(provider, answer, words):
         model.close()
     assert words in str(caught.value)
     assert str(caught.value).isprintable()
-
-
-def test_what_the_longest_message_holds_is_accepted():
-    frames = [{b"__ndarray__": True, b"data": b"", b"dtype": "|u1", b"shape": [0, 1, 3]}] * 1080
-    message = {f"list {n}": frames for n in range(9)}
-    assert unpack(msgpack.packb(message))["list 8"][1079].shape == (0, 1, 3)
-
-
-@pytest.mark.parametrize(
-    "value",
-    [None, True, -33, -1, 127, 128, 2**16, 2**32, 2**63, -(2**15), -(2**31), -(2**63), 0.5,
-     "", "x" * 31, "x" * 32, "x" * 256, "x" * 65536, b"", b"x" * 256, b"x" * 65536,
-     msgpack.ExtType(5, b"x"), msgpack.ExtType(5, b"x" * 2), msgpack.ExtType(5, b"x" * 4),
-     msgpack.ExtType(5, b"x" * 8), msgpack.ExtType(5, b"x" * 16), msgpack.ExtType(5, b"x" * 17),
-     msgpack.ExtType(5, b"x" * 256), msgpack.ExtType(5, b"x" * 65536), [1] * 15, [1] * 16,
-     [1] * 65536, {str(n): n for n in range(15)}, {str(n): n for n in range(16)},
-     {str(n): n for n in range(65536)}],
-    ids=lambda value: f"{type(value).__name__}-{len(str(value))}",
-)  # fmt: skip
-def test_every_format_is_counted(value):
-    assert unpack(msgpack.packb({"x": value, "y": 1})) == {"x": value, "y": 1}
-
-
-def test_the_limits_are_exact():
-    message = {"x": [None] * (MAX_ELEMENTS - 3)}
-    assert len(unpack(msgpack.packb(message))["x"]) == MAX_ELEMENTS - 3
-    message["x"].append(None)
-    with pytest.raises(CodecError, match="more than 1,000,000 elements"):
-        unpack(msgpack.packb(message))
-    nest = None
-    for _ in range(MAX_DEPTH - 2):
-        nest = [nest]
-    unpack(msgpack.packb({"x": nest}))
-    with pytest.raises(CodecError, match="nests more than 64"):
-        unpack(msgpack.packb({"x": [nest]}))
 
 
 def test_only_what_is_printable_is_printed():

@@ -3,7 +3,6 @@
 import contextlib
 import struct
 import threading
-import time
 from functools import cache
 from types import SimpleNamespace
 
@@ -11,9 +10,6 @@ import httpx
 import pytest
 from attackers import (
     MAX_MIB,
-    PATIENCE,
-    UPGRADE,
-    frame,
     opening,
     read_all,
     serving,
@@ -22,14 +18,12 @@ from typer.testing import CliRunner
 from wire_episode import INSTRUCTION, moment, video
 from wire_servers import unpack
 
-from roboirg.core.errors import PolicyConnectionError
 from roboirg.main import app
 from roboirg.policies import make_policy, policy_server
 from roboirg.policies.policy_server import PolicyServer, open_server
 from roboirg.policies.remote.message_codec import pack
 from roboirg.policies.remote.protocols import protocols_by_scheme
 from roboirg.policies.remote.server_options import ServerOptions
-from roboirg.util.web.connection_table import ConnectionLimits, ConnectionTable
 
 GIB = 1 << 30
 SCHEMES = [scheme for scheme, protocol in protocols_by_scheme().items() if protocol.service]
@@ -57,13 +51,8 @@ def locked(shared, scheme):
     return shared(scheme, "--api-key-env", "KEY", KEY="sesame")
 
 
-def hasty(shared, scheme):
-    limits = ("--request-timeout-s", "1", "--message-timeout-s", "1", "--idle-timeout-s", "2")
-    return shared(scheme, *limits)
-
-
 def lenient(shared, scheme):
-    return shared(scheme, "--allow-host", "Robot-Lab")
+    return shared(scheme, ROBOIRG_HOST_NAMES="Robot-Lab")
 
 
 def begin(url):
@@ -75,70 +64,6 @@ def begin(url):
 
 def go_on(policy):
     assert len(policy.act(moment(1, history=(moment(1),)))) > 0
-
-
-@pytest.mark.parametrize("scheme", ALL_SCHEMES)
-def test_300_idle_connections_keep_nothing_from_an_episode(scheme):
-    with serving(scheme) as server, contextlib.ExitStack() as idle:
-        policy = begin(server.url)
-        whole = opening(scheme)
-        for number in range(300):
-            data = (b"", whole[:-20], whole)[number % 3]
-            with contextlib.suppress(ConnectionError):  # dropped for the sake of a newer one
-                idle.enter_context(server.connect(data))
-            if number % 50 == 0:
-                go_on(policy)
-        go_on(policy)
-        policy.close()
-        begin(server.url).close()
-        assert server.grown_mib() <= MAX_MIB
-        assert server.status("Threads") < 100
-        assert server.process.poll() is None
-
-
-@pytest.mark.parametrize("scheme", ALL_SCHEMES)
-def test_a_process_without_free_descriptors_serves_on(scheme):
-    with (
-        serving(scheme, "--max-connections", "1000", files=60) as server,
-        contextlib.ExitStack() as idle,
-    ):
-        policy = begin(server.url)
-        for _ in range(120):
-            idle.enter_context(server.connect())
-        go_on(policy)
-        policy.close()
-        begin(f"{server.url}?connect={PATIENCE}").close()
-        assert server.process.poll() is None
-
-
-@pytest.mark.parametrize("scheme", ALL_SCHEMES)
-def test_half_a_request_is_not_waited_for(shared, scheme):
-    server = hasty(shared, scheme)
-    whole = opening(scheme)
-    half = [b"", whole[:1], whole[:-2]]
-    if "http" in scheme:
-        half.append(b"POST /reset HTTP/1.1\r\nHost: localhost\r\nContent-Length: 9\r\n\r\nx")
-        half.append(whole)  # and no second request
-    else:
-        half.append(whole)
-        half.append(whole + frame(b"\x80" * 1000, mask=True)[:-1])
-        half.append(whole + frame(b"\x80", final=False, mask=True))
-    with contextlib.ExitStack() as opened:
-        for raw in [opened.enter_context(server.connect(data)) for data in half]:
-            read_all(raw)  # ends
-    assert server.is_healthy()
-
-
-@pytest.mark.parametrize("scheme", ALL_SCHEMES)
-def test_dripped_requests_are_not_waited_for(shared, scheme):
-    server = hasty(shared, scheme)
-    whole = opening(scheme, headers=f"X-Y: {'z' * 3000}\r\n")
-    with server.connect() as raw, contextlib.suppress(ConnectionError):
-        for byte in whole:
-            raw.sendall(bytes([byte]))
-            time.sleep(0.05)
-        pytest.fail("the server has waited for the whole head")
-    assert server.is_healthy()
 
 
 @pytest.mark.parametrize("scheme", ALL_SCHEMES)
@@ -165,24 +90,6 @@ def test_a_body_without_a_key_is_not_read(shared, scheme):
     # the connection is cut.
     assert answer.startswith(b"HTTP/1.1 401 ") or ("http" not in scheme and not answer)
     assert server.grown_mib() <= MAX_MIB
-    assert server.is_healthy()
-
-
-@pytest.mark.parametrize("scheme", ALL_SCHEMES)
-def test_a_malformed_request_gets_an_answer(shared, scheme):
-    server = lenient(shared, scheme)
-    for headers, status in (
-        ("Content-Length: \xb2\r\n", 400),
-        (f"Content-Length: {'9' * 5000}\r\n", 400),
-        ("Content-Length: -1\r\n", 400),
-        (f"X: {'y' * 70_000}\r\n", 431),
-    ):
-        if "http" in scheme:
-            request = f"POST /reset HTTP/1.1\r\nHost: 127.0.0.1\r\n{headers}\r\n"
-        else:
-            request = f"GET / HTTP/1.1\r\nHost: 127.0.0.1\r\n{UPGRADE}{headers}\r\n"
-        with server.connect(request.encode("latin-1")) as raw:
-            assert raw.recv(65536).startswith(f"HTTP/1.1 {status} ".encode()), headers
     assert server.is_healthy()
 
 
@@ -222,9 +129,6 @@ def test_pages_of_other_sites_are_refused(shared, scheme):
         (f"evil.example:{port}", "", False),
         (f"evil.example:{port}", f"Origin: http://evil.example:{port}\r\n", False),
         ("127.0.0.1.evil.example", "", False),
-        ("evil.example@127.0.0.1", "", False),
-        ("127.0.0.1/evil.example", "", False),
-        (f"127.0.0.1:{port}", "Host: evil.example\r\n", False),
         ("127.0.0.1:x", "", False),
         ("", "", False),
     ):
@@ -233,17 +137,15 @@ def test_pages_of_other_sites_are_refused(shared, scheme):
         assert (status == 403) is not welcome, (host, headers, status)
 
 
-@pytest.mark.parametrize("scheme", ALL_SCHEMES)
-def test_one_connection_too_many_is_refused_while_all_others_play(scheme):
-    with serving(scheme, "--max-connections", "2") as server:
-        playing = [begin(f"{server.url}?shared=yes") for _ in range(2)]
-        with pytest.raises(PolicyConnectionError, match="cannot be reached"):
-            make_policy(f"{server.url}?shared=yes&connect=1", 0).reset(INSTRUCTION, video(0))
-        for policy in playing:
-            go_on(policy)
-        playing.pop().close()
-        begin(f"{server.url}?shared=yes&connect={PATIENCE}").close()
-        playing.pop().close()
+@pytest.mark.parametrize("scheme", WEBSOCKETS[:1])
+def test_a_silent_connection_ends_and_the_others_play_on(scheme):
+    with serving(scheme, "--timeout-s", "2") as server:
+        with server.connect(opening(scheme)) as raw:
+            read_all(raw)  # ends
+        policy = begin(server.url)
+        go_on(policy)
+        policy.close()
+        assert server.is_healthy()
 
 
 class Costly:
@@ -297,30 +199,6 @@ def test_a_server_can_be_stopped_before_it_has_started():
         server = open_server("random", scheme).listening
         server.shutdown()
         server.serve_forever()
-
-
-def test_the_table_ends_those_who_wait_and_spares_those_who_play():
-    ended = []
-    table = ConnectionTable(ConnectionLimits(connections=3, request_s=1e-9), ended.append)
-    for name in ("one", "two", "three"):
-        assert table.add(name)
-    table.prove("one")
-    table.expect("one", None)
-    table.expect("three", 1e9)
-    assert table.add("four")
-    assert ended == ["two"]
-    time.sleep(0.01)
-    table.end_late()
-    assert ended == ["two", "four"]
-    assert (len(table), table.has("three"), table.has("four")) == (2, True, False)
-    table.prove("three")
-    assert table.add("five")
-    table.prove("five")
-    assert not table.add("six")
-    assert not table.make_room()
-    table.discard("one")
-    table.discard("one")
-    assert table.add("seven")
 
 
 def test_a_key_is_not_shown():

@@ -107,7 +107,7 @@ def test_what_must_not_be_sent_is_refused(value):
         ({b"data": b"x" * 8, b"dtype": "|V8", b"shape": [1]}, "not accepted"),
         ({b"data": b"x" * 8, b"dtype": "<c8", b"shape": [1]}, "not accepted"),
         ({b"data": b"x" * 8, b"dtype": "|u1", b"shape": [2**62, 4]}, "has 8 bytes"),
-        ({b"data": b"x" * 8, b"dtype": "|u1", b"shape": [-8]}, "shape of an array is"),
+        ({b"data": b"x" * 8, b"dtype": "|u1", b"shape": [3]}, "has 8 bytes"),
         ({b"data": b"x" * 8, b"dtype": "|u1", b"shape": 8}, "shape of an array is 8"),
         ({b"data": "text", b"dtype": "|u1", b"shape": [4]}, "is str, not bytes"),
         ({b"dtype": "|u1", b"shape": [4]}, "is NoneType, not bytes"),

@@ -31,7 +31,7 @@ from roboirg.policies.planners.points import (
     to_pixel,
 )
 from roboirg.policies.vlm.model_content import summary_clip
-from roboirg.policies.vlm.prompts import load_prompts
+from roboirg.policies.vlm.prompt_files import load_prompts
 from roboirg.tasks import every_task
 from roboirg.tasks.splits.splits import get_episode
 from roboirg.util.json_reply import UnparsableReplyError, json_object, text_of

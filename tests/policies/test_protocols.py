@@ -17,6 +17,7 @@ from wire_servers import ChallengeServer, unpack
 import roboirg
 from roboirg.apps.policy_check.policy_check import check_policy
 from roboirg.core.errors import InvalidValueError, UnknownNameError
+from roboirg.core.instruction_options import InstructionOptions
 from roboirg.evaluation.play.job_instruction import PreparedJob
 from roboirg.evaluation.play.policy_environment import job_needs, make_env
 from roboirg.evaluation.records.record import Job
@@ -108,7 +109,12 @@ def test_a_challenge_server_is_shown_what_the_options_ask_for():
     with ChallengeServer() as server:
         client = make_policy(f"challenge://{server.place}?depth=yes&calibration=yes", 0)
         job = Job(
-            policy="it", task="VideoUnmask", split="test", episode=0, setting="direct", max_steps=4
+            policy="it",
+            task="VideoUnmask",
+            split="test",
+            episode=0,
+            max_steps=4,
+            options=InstructionOptions("direct"),
         )
         env = make_env(PreparedJob(job), job_needs(client, job))
         info = play(env, client)

@@ -11,6 +11,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from language_variants import PAIRS, TASKS, first_episodes
+from plan_files import plan_file
 from selection import slow_but
 from typer.testing import CliRunner
 
@@ -393,13 +394,13 @@ def test_the_command_prints_a_row_for_each_setting_or_pattern():
     ("words", "sentence"),
     [
         (("--by", "colour"), "colour"),
-        (("--form", "implied"), "implied"),
+        (("--plan", plan_file(forms="implied")), "implied"),
         (("--split", "tset"), "tset"),
         (("--tasks", "StopCube", "--settings", "spatial"), "nothing to score"),
         (("--split", "none"), "nothing to score"),
         (("--seeds", "-1"), "number of random seeds is -1"),
         (("--learned", "--split", "all"), "ask for val or test"),
-        (("--distractors", "0"), "distractors"),
+        (("--plan", plan_file(distractors=0)), "distractors"),
     ],
 )
 def test_bad_input_is_one_sentence(words, sentence):

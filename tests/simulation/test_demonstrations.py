@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 
 import roboirg
+from roboirg.core.instruction_options import InstructionOptions
 from roboirg.evaluation.play.rollout import EpisodeRunner
 from roboirg.evaluation.records.record import Job
 from roboirg.simulation.cameras import Cameras
@@ -200,7 +201,13 @@ def test_every_nth_picture_or_none_if_that_is_wanted(drawn):
 def story(task=SHORT):
     """Everything that an environment and a run return."""
     _, observation, info = reset(task, cameras=("front", "wrist"), depth=True, grounded=True)
-    job = Job(policy=f"{__name__}:Viewer", task=task, split="test", episode=1, setting="direct")
+    job = Job(
+        policy=f"{__name__}:Viewer",
+        task=task,
+        split="test",
+        episode=1,
+        options=InstructionOptions("direct"),
+    )
     with tempfile.TemporaryDirectory() as folder:
         record = msgspec.structs.asdict(EpisodeRunner(Path(folder))(job))
     for name in ("started_at", "duration_s", "timings", "details"):

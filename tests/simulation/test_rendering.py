@@ -10,14 +10,16 @@ import numpy as np
 import pytest
 import sapien
 import sapien.physx
+import sapien.render
 
 import roboirg
+from roboirg.core.errors import InvalidValueError
 from roboirg.core.observations import CAMERAS
 from roboirg.policies import make_policy, play
 from roboirg.simulation import bodies, physics_settings
 from roboirg.simulation.cameras import Cameras
 from roboirg.simulation.panda import BASE_LINK, CAMERA_LINK, FINGERS, Panda
-from roboirg.simulation.rendering import culling, robot_meshes, shaders
+from roboirg.simulation.rendering import culling, shaders
 from roboirg.simulation.rendering.render_device import render_system
 from roboirg.simulation.rendering.render_settings import FAITHFUL, LIGHT, STOCK, RenderSettings
 from roboirg.simulation.scenery import add_scenery
@@ -141,17 +143,33 @@ def test_pictures_are_those_of_the_stock_path(frames):
     assert light.levels <= MEAN_LEVELS * light.pixels
 
 
-def test_each_camera_keeps_the_command_buffer_of_its_bodies(monkeypatch):
-    scene = get_episode("PickXtimes", "test", 2).scene
+def test_sapien_records_a_command_buffer_again_only_if_the_scene_has_changed():
     physics_settings.apply_render_settings()
-    assert culling.keeps_command_buffers(), "SAPIEN keeps no command buffers; culling became slow"
-    quick, slow = Stage(scene, FAITHFUL), Stage(scene, FAITHFUL)
-    for moment in moments("PickXtimes", 2):
-        wanted = quick.show(moment)
-        with monkeypatch.context() as patch:
-            patch.setattr(culling, "keeps_command_buffers", lambda: False)
-            for ours, theirs in zip(slow.show(moment), wanted, strict=True):
-                assert np.array_equal(ours, theirs)
+    scene = sapien.Scene([render_system()])
+    body = sapien.render.RenderBodyComponent()
+    white = sapien.render.RenderMaterial(emission=[1.0, 1.0, 1.0, 1.0])
+    body.attach(sapien.render.RenderShapeBox([0.4, 0.4, 0.4], white))
+    target, eye = sapien.Entity(), sapien.Entity()
+    target.add_component(body)
+    target.set_pose(sapien.Pose([1.0, 0.0, 0.0]))
+    camera = sapien.render.RenderCameraComponent(2, 2, shaders.slim_shader())
+    eye.add_component(camera)
+    for entity in (target, eye):
+        scene.add_entity(entity)
+    camera.set_texture("BRDFLUT", shaders.placeholder_brdf_table())
+
+    def shows():
+        scene.update_render()
+        camera.take_picture()
+        return bool(camera.get_picture(shaders.COLOR)[..., 0].any())
+
+    seen = [shows()]
+    for mode in (culling.LEFT_OUT, culling.DRAWN):
+        body.shading_mode = mode
+        seen.append(shows())
+        culling.invalidate_command_buffers(body)
+        seen.append(shows())
+    assert seen == [True, True, False, False, True]
 
 
 def test_cameras_leave_out_what_they_cannot_see(takes):
@@ -185,20 +203,10 @@ def test_a_camera_draws_again_only_when_something_in_its_view_has_moved(takes):
     assert drawn.count("wrist") > 0.9 * len(some)
 
 
-def test_an_unknown_shader_is_used_unpatched(monkeypatch, caplog):
-    scene = get_episode("PickXtimes", "test", 2).scene
-    usual = Stage(scene, RenderSettings(slim_shader=False))
-    with monkeypatch.context() as patch:
-        patch.setattr(shaders, "_STOCK_SHA256", "of another version")
-        for function in (shaders.slim_shader, robot_meshes._shapes):
-            function.cache_clear()
-        unknown = Stage(scene, FAITHFUL)
-        assert "it is used unpatched" in caplog.text
-        for moment in moments("PickXtimes", 2)[::4]:
-            for ours, theirs in zip(unknown.show(moment), usual.show(moment), strict=True):
-                assert np.array_equal(ours, theirs)
-    for function in (shaders.slim_shader, robot_meshes._shapes):
-        function.cache_clear()
+def test_another_shader_is_refused(monkeypatch):
+    monkeypatch.setattr(shaders, "_STOCK_SHA256", "of another version")
+    with pytest.raises(InvalidValueError, match=r"install sapien==3\.0\.3 again"):
+        shaders.slim_shader.__wrapped__()
 
 
 def test_a_damaged_shader_in_the_cache_is_rewritten(monkeypatch, tmp_path):

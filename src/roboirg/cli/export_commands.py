@@ -19,7 +19,10 @@ def export_episodes(
     split: AnySplit = "test",
     tasks: Tasks = "all",
 ) -> None:
-    """Export a line per episode: objects, motions, video and goal (keys: see docs/tasks.md)."""
+    """Export a line per episode: objects, motions, video and goal (keys: see docs/tasks.md).
+
+    Example: roboirg export episodes --split val --out episodes.jsonl
+    """
     from roboirg.evaluation.plan.plan_parsing import parse_names, parse_splits
     from roboirg.tasks import find_tasks
     from roboirg.tasks.splits.episode_export import write_episodes

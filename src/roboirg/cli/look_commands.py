@@ -10,7 +10,10 @@ import typer
 
 
 def doctor() -> None:
-    """Check whether episodes can be played on this machine, and show what is missing."""
+    """Check whether episodes can be played on this machine, and show what is missing.
+
+    Example: roboirg doctor
+    """
     from roboirg.cli.doctor import run_doctor
 
     raise typer.Exit(run_doctor())
@@ -21,14 +24,20 @@ def fetch_models(
         str | None, typer.Option(help="ManiSkill's wheel on this machine; downloaded by default.")
     ] = None,
 ) -> None:
-    """Put the model files of the robot and the table in place, if they are not; print where."""
+    """Put the model files of the robot and the table in place, if they are not; print where.
+
+    Example: roboirg fetch-models
+    """
     from roboirg.simulation.model_fetch import fetch_model_files
 
     typer.echo(fetch_model_files(Path(wheel) if wheel else None, partial(typer.echo, err=True)))
 
 
 def list_tasks() -> None:
-    """List the tasks with their suites and settings."""
+    """List the tasks with their suites and settings.
+
+    Example: roboirg tasks
+    """
     from roboirg.language import settings_of
     from roboirg.tasks import every_task
 

@@ -9,6 +9,7 @@ from roboirg.core.extras import install_command
 _MODULES: Mapping[str, tuple[str, ...]] = {
     "sim": ("sapien", "gymnasium", "toppra", "av", "cv2", "zstandard"),
     "light": ("fast_simplification",),
+    "pages": ("starlette", "uvicorn"),
     "report": ("jinja2", "markupsafe", "matplotlib", "sklearn", "scipy"),
     "export": ("pyarrow",),
     "demonstrations": ("h5py",),

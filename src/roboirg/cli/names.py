@@ -33,14 +33,10 @@ def known_settings(text: str) -> tuple[str, ...]:
     Raises:
         UnknownNameError: one of them does not exist.
     """
-    from roboirg.evaluation.plan.plan_parsing import means_all, parse_names
+    from roboirg.evaluation.plan.plan_parsing import means_all
     from roboirg.language import plain_settings, setting_names
 
-    if means_all(text):
-        return plain_settings()
-    return tuple(
-        known_name("setting", name, setting_names()) for name in parse_names("setting", text)
-    )
+    return plain_settings() if means_all(text) else known_names("setting", text, setting_names())
 
 
 def known_name(kind: str, name: str, known: Sequence[Name]) -> Name:
@@ -53,3 +49,16 @@ def known_name(kind: str, name: str, known: Sequence[Name]) -> Name:
         if name == one:
             return one
     raise UnknownNameError(kind, name, known)
+
+
+def known_names(kind: str, text: str, known: Sequence[Name]) -> tuple[Name, ...]:
+    """Return the names that were typed, separated by commas; all are all that are known.
+
+    Raises:
+        UnknownNameError: one of them is not known.
+    """
+    from roboirg.evaluation.plan.plan_parsing import means_all, parse_names
+
+    if means_all(text):
+        return tuple(known)
+    return tuple(known_name(kind, name, known) for name in parse_names(kind, text))

@@ -5,9 +5,9 @@ from __future__ import annotations
 import functools
 import inspect
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, NamedTuple, get_type_hints
+from typing import TYPE_CHECKING, Annotated, Any, get_type_hints
 
 import typer
 
@@ -18,92 +18,177 @@ if TYPE_CHECKING:
 
 Tasks = Annotated[
     str,
-    typer.Option(help="Tasks or suites, separated by commas; all for the whole benchmark."),
+    typer.Option(help="Tasks or suites, separated by commas."),
 ]
 Settings = Annotated[
     str,
-    typer.Option(help="Settings, separated by commas; all for every one but the harder ones."),
+    typer.Option(help="Settings, separated by commas; all but the harder ones."),
 ]
 Forms = Annotated[str, typer.Option(help="implicit, resolved, or both separated by a comma.")]
 Split = Annotated[str, typer.Option(help="train, val, test or random.")]
-Video = Annotated[str, typer.Option(help="Record videos of episodes: off, failures or all.")]
 AnySplit = Annotated[str, typer.Option(help="train, val, test or all.")]
-Stages = Annotated[str, typer.Option(help="Stages of the contextual setting, such as 1,5.")]
-Distractor = Annotated[str, typer.Option(help="Kind of distractor in the contextual setting.")]
-Frame = Annotated[str, typer.Option(help="Frame of reference in the spatial setting.")]
-Wordings = Annotated[
-    str | None,
-    typer.Option(
-        help="Wording file whose commands are used instead of our own; or train or test: our words "
-        "of that pool in every split."
-    ),
-]
-Salt = Annotated[
-    str | None,
-    typer.Option(help="Secret of a private split; not in the shell's history if in ROBOIRG_SALT."),
-]
 Workers = Annotated[
     int | None,
-    typer.Option(help="Worker processes, one per core by default; 0 uses this process only."),
+    typer.Option(help="Worker processes, 0 for none but this.  (ROBOIRG_WORKERS, or one per core)"),
 ]
 
 
-class WordChoices(NamedTuple):
-    """Options that choose the words of instructions; a parameter of commands, see `spread`."""
+_CONTEXT, _KEYWORD = "context", inspect.Parameter.KEYWORD_ONLY
 
-    stages: Stages = "1-5"
-    distractor: Distractor = "neutral"
-    frame: Frame = "robot"
-    wordings: Wordings = None
 
-    def instruction_options(self, delivery: str = "prompt") -> InstructionOptions:
-        """Return them checked one by one; `check_options` checks whether they go together.
+class OptionGroup:
+    """Options of a command that are one parameter of its function; see `spread`.
 
-        Raises:
-            InvalidValueError: there is no such stage, or the wording file cannot be read.
-        """
-        from roboirg.core.instruction_options import InstructionOptions
-        from roboirg.evaluation.plan.plan_parsing import parse_stages
-        from roboirg.language.wordings.wording_store import open_wordings
+    A subclass names its options as annotations. None of them has a default of its own.
+    """
 
-        chosen = self._asdict() | {
-            "stages": parse_stages(self.stages),
-            "wordings": open_wordings(self.wordings),
+    def __init__(self, **given: Any) -> None:  # noqa: ANN401 - whatever its options take
+        self._given = given
+
+    @classmethod
+    def types(cls) -> dict[str, Any]:
+        """Return the annotation of each option."""
+        return get_type_hints(cls, include_extras=True)
+
+    def typed(self) -> dict[str, Any]:
+        """Return those that were typed, by name."""
+        return {name: value for name, value in self._given.items() if value not in (None, [])}
+
+
+class WordOptions(OptionGroup):
+    """The options of one instruction, each an option of the command."""
+
+    @classmethod
+    def types(cls) -> dict[str, Any]:
+        """Return the annotation of each; the command chooses settings and forms itself."""
+        from roboirg.core.instruction_options import OPTION_HELP, InstructionOptions
+
+        usual = InstructionOptions()
+        return {
+            name: Annotated[
+                (int if isinstance(getattr(usual, name), int) else str) | None,
+                typer.Option(help=text),
+            ]
+            for name, text in OPTION_HELP.items()
+            if name not in ("setting", "form", "delivery")
         }
-        return InstructionOptions(**chosen, delivery=delivery)
+
+    def options(self) -> InstructionOptions:
+        """Return them checked one by one; `check_options` checks whether they go together."""
+        from roboirg.evaluation.plan.plan_maker import word_options
+
+        return word_options(**self.typed())
 
 
-DEFAULT_WORDS = WordChoices()
+PlanName = Annotated[
+    str | None,
+    typer.Option(
+        "--plan",
+        help="Plan with the words, and defaults of options here (roboirg run --show-plan).",
+    ),
+]
+SELECTION = ("tasks", "split", "episodes", "settings")
+"""Options of commands with `PlanWords` that a plan gives, too."""
+
+
+class PlanWords(OptionGroup):
+    """The options of instructions, as a plan gives them."""
+
+    plan: PlanName
+
+    @functools.cached_property
+    def fields(self) -> dict[str, Any]:
+        """The plan's fields as options of `make_plan`; empty without a plan."""
+        from roboirg.evaluation.plan.plan_file import read_plan_file
+
+        name = self._given.get("plan")
+        return {} if name is None else read_plan_file(name)
+
+    @property
+    def words(self) -> dict[str, Any]:
+        """Those of them that choose the words of each setting and form."""
+        from roboirg.evaluation.plan.plan import SINGLE_OPTIONS
+
+        names = ("stages", "wordings", "options", *SINGLE_OPTIONS)
+        return {name: self.fields[name] for name in names if name in self.fields}
+
+    @property
+    def file(self) -> str | None:
+        """The wording file or the name of a pool."""
+        return self.fields.get("wordings")
+
+    def options(self) -> InstructionOptions:
+        """Return them checked one by one; `check_options` checks whether they go together."""
+        from roboirg.evaluation.plan.plan_maker import word_options
+
+        return word_options(**self.words)
+
+    def forms(self, usual: Sequence[str] = ("implicit",)) -> tuple[str, ...]:
+        """Return the plan's forms, or the usual ones if it has none."""
+        from roboirg.evaluation.plan.plan_maker import form_names
+
+        return form_names(self.fields.get("forms", ",".join(usual)))
+
+    def form(self) -> str:
+        """Return the plan's only form."""
+        found = self.forms()
+        if len(found) > 1:
+            raise InvalidValueError(
+                f"The plan's forms are {' and '.join(found)}; here it must have one."
+            )
+        return found[0]
+
+
+NO_PLAN = PlanWords()
+NO_WORDS = WordOptions()
 
 
 def spread(command: Callable[..., None]) -> Callable[..., None]:
-    """Let a parameter that is a named tuple of options be given as an option for each field."""
+    """Let each parameter that is a group of options be given as these options."""
     types = get_type_hints(command, include_extras=True)
-    groups = {name: kind for name, kind in types.items() if hasattr(kind, "_field_defaults")}
-    parameters: list[inspect.Parameter] = []
+    groups = {
+        name: kind
+        for name, kind in types.items()
+        if isinstance(kind, type) and issubclass(kind, OptionGroup)
+    }
+    members = {name: kind.types() for name, kind in groups.items()}
+    parameters = [inspect.Parameter(_CONTEXT, _KEYWORD, annotation=typer.Context)]
     for one in inspect.signature(command).parameters.values():
-        kind = groups.get(one.name)
-        if kind is None:
-            parameters.append(one.replace(annotation=types[one.name]))
+        if one.name not in groups:
+            parameters.append(one.replace(annotation=types[one.name], kind=_KEYWORD))
             continue
-        fields = get_type_hints(kind, include_extras=True)
         parameters += [
-            one.replace(name=name, annotation=fields[name], default=default)
-            for name, default in kind._field_defaults.items()
+            one.replace(name=name, annotation=annotation, default=None, kind=_KEYWORD)
+            for name, annotation in members[one.name].items()
         ]
 
     @functools.wraps(command)
     def spread_command(**given: Any) -> None:  # noqa: ANN401 - whatever the command takes
+        context = given.pop(_CONTEXT)
         chosen = {
-            name: kind(*(given.pop(field) for field in kind._fields))
+            name: kind(**{member: given.pop(member) for member in members[name]})
             for name, kind in groups.items()
         }
+        for group in chosen.values():
+            if isinstance(group, PlanWords):
+                given |= _planned(given, group, context)
         command(**given, **chosen)
 
     # Typer reads both.
     spread_command.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
     spread_command.__annotations__ = {one.name: one.annotation for one in parameters}
     return spread_command
+
+
+def _planned(given: Mapping[str, Any], group: PlanWords, context: typer.Context) -> dict[str, Any]:
+    """Return the options of a command that a plan gives and that were not typed."""
+    shared = [name for name in SELECTION if name in given and name in group.fields]
+    sources = {name: context.get_parameter_source(name) for name in shared}
+    return {
+        name: group.fields[name]
+        for name, source in sources.items()
+        if source is not None and source.name == "DEFAULT"
+    }
 
 
 def check_output_file(path: Path) -> None:

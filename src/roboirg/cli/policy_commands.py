@@ -13,11 +13,10 @@ from typer.core import TyperCommand
 
 from roboirg.cli.options import add_working_directory
 from roboirg.core.errors import InvalidValueError, RoboIRGError
-from roboirg.util.web.connection_table import ConnectionLimits
+from roboirg.util.web.listening import TIMEOUT_S
 from roboirg.util.web.request_origin import LOOPBACK, LOOPBACK_NAMES
 
 _STOPPED = {signal.SIGINT: 130, signal.SIGTERM: 143}
-_LIMITS = ConnectionLimits()
 
 _PROTOCOLS, _URL_SCHEMES = "PROTOCOLS", "SCHEMES"
 """Stand for the protocols, and for the schemes of all policy URLs, in help texts."""
@@ -58,24 +57,15 @@ def serve(
         str | None,
         typer.Option(help="Environment variable with the key that clients must send."),
     ] = None,
-    allow_host: Annotated[
-        list[str] | None,
-        typer.Option(help="Another name under which clients reach this machine; repeatable."),
-    ] = None,
-    max_connections: Annotated[
-        int, typer.Option(min=1, help="Connections at once.")
-    ] = _LIMITS.connections,
-    request_timeout_s: Annotated[
-        float, typer.Option(min=0.1, help="Seconds for the headers of a request.")
-    ] = _LIMITS.request_s,
-    message_timeout_s: Annotated[
-        float, typer.Option(min=0.1, help="Seconds for a message to arrive, or to be taken in.")
-    ] = _LIMITS.body_s,
-    idle_timeout_s: Annotated[
-        float, typer.Option(min=0.1, help="Seconds a connection may be idle.")
-    ] = _LIMITS.idle_s,
+    timeout_s: Annotated[
+        float,
+        typer.Option(min=1, help="Seconds a connection may be idle, or a message take to arrive."),
+    ] = TIMEOUT_S,
 ) -> None:
-    """Serve a policy to this benchmark and other clients of a protocol."""
+    """Serve a policy to this benchmark and other clients of a protocol.
+
+    Example: roboirg serve my_policy:MyPolicy --protocol openpi
+    """
     from roboirg.policies.policy_server import open_server
     from roboirg.policies.remote.server_options import ServerOptions
     from roboirg.util.freed_memory import keep_freed_memory
@@ -85,8 +75,7 @@ def serve(
     key = None if api_key_env is None else os.environ.get(api_key_env)
     if api_key_env is not None and not key:
         raise InvalidValueError(f"The environment variable {api_key_env} holds no key.")
-    limits = ConnectionLimits(max_connections, request_timeout_s, message_timeout_s, idle_timeout_s)
-    options = ServerOptions(host, port, key, tuple(allow_host or ()), limits)
+    options = ServerOptions(host, port, key, timeout_s)
     server = open_server(policy, protocol, options, seed=seed)
     for number in _STOPPED:
         signal.signal(number, _stop)

@@ -19,7 +19,10 @@ def merge(
     runs: Annotated[list[str], typer.Argument(help="Output folders of runs.")],
     out: Annotated[str, typer.Option(help="Folder for all their records and videos.")],
 ) -> None:
-    """Merge the records and videos of several runs into one folder."""
+    """Merge the records and videos of several runs into one folder.
+
+    Example: roboirg records merge runs/first runs/second --out runs/all
+    """
     from roboirg.evaluation.records.merging import merge_runs
 
     merged = merge_runs([folder_of(run) for run in runs], folder_of(out))
@@ -41,7 +44,10 @@ def export(
     run: Folder,
     out: Annotated[Path, typer.Option(help="Parquet file to write.")],
 ) -> None:
-    """Export the records of a run as a Parquet table (columns: see docs/running.md)."""
+    """Export the records of a run as a Parquet table (columns: see docs/running.md).
+
+    Example: roboirg records export runs/first --out first.parquet
+    """
     from roboirg.evaluation.records.parquet import write_parquet
     from roboirg.evaluation.records.record_codec import read_summary
     from roboirg.evaluation.records.store import StoredRun

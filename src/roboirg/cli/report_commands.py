@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from roboirg.cli.names import known_names
 from roboirg.core.errors import InvalidValueError, UnknownNameError
 
 if TYPE_CHECKING:
@@ -19,7 +20,7 @@ if TYPE_CHECKING:
 
 # Heavy modules are imported inside the commands, so that --help answers at once.
 
-_ALL = "all"
+_ALL, _HEARD = "all", "heard"
 
 By = Annotated[
     str | None,
@@ -44,7 +45,10 @@ def report(
         int, typer.Option(help="Port on loopback for --serve; 0 chooses a free one.")
     ] = 0,
 ) -> None:
-    """Print the table of a run and write RUN/report.html, one self-contained page."""
+    """Print the table of a run and write RUN/report.html, one self-contained page.
+
+    Example: roboirg report runs/first
+    """
     from roboirg.cli import run_commands
     from roboirg.cli.progress_bar import progress_bar
     from roboirg.evaluation.analysis.page.report import check_report_support, write_report
@@ -104,7 +108,10 @@ def figures(
     ] = _ALL,
     published: Annotated[bool, typer.Option(help="Add the paper's values.")] = False,
 ) -> None:
-    """Draw the paper's figures of one or several runs, as PNG, SVG and PDF."""
+    """Draw the paper's figures of one or several runs, as PNG, SVG and PDF.
+
+    Example: roboirg figures runs/first --out figures
+    """
     from roboirg.evaluation.analysis.figures import FIGURES, FigureData, write_figures
     from roboirg.util.figure_files import check_figure_support
 
@@ -121,40 +128,44 @@ def tables(
         typer.Argument(help="The --out folders of runs; none with --published.", metavar="RUN"),
     ] = None,
     which: Annotated[
-        str, typer.Option(help="main, planner, context, real, other, coverage, or all that apply.")
+        str,
+        typer.Option(
+            help="main, planner, context, real, other, coverage, or all that apply; or heard: how "
+            "many prompts were cut, and rates over the others."
+        ),
     ] = _ALL,
     format: Annotated[  # noqa: A002
         str, typer.Option(help="terminal, markdown, latex or csv.")
     ] = "terminal",
     published: Annotated[bool, typer.Option(help="Add the paper's rows.")] = False,
-    chance: Annotated[
-        bool, typer.Option(help="Add the expected success of the forgetful listener.")
-    ] = False,
     floors: Annotated[
-        bool, typer.Option(help="Add that of the forgetful and the shortcut listeners.")
-    ] = False,
+        str | None,
+        typer.Option(
+            help="Add the expected success of listeners that do not understand: chance, the "
+            "forgetful listener's; shortcuts by name, several separated by commas; or all."
+        ),
+    ] = None,
     by: By = None,
-    heard: Annotated[
-        bool, typer.Option(help="Instead: how many prompts were cut, and rates over the others.")
-    ] = False,
     out: Annotated[
         Path | None, typer.Option(help="Folder for a file of each table; prints without it.")
     ] = None,
 ) -> None:
-    """Print the paper's tables, or gaps by kind of words, for one or several runs."""
+    """Print the paper's tables, or gaps by kind of words, for one or several runs.
+
+    Example: roboirg tables runs/first --which main --published
+    """
     from roboirg.evaluation.analysis.tables.rendering import get_format
 
     output = get_format(format)
-    if heard:
-        if published or chance or floors or which != _ALL or by is not None:
-            raise InvalidValueError("--heard has a table of its own; give no other but --format.")
+    if which == _HEARD:
+        if published or floors or by is not None:
+            raise InvalidValueError("--which heard goes without --published, --floors and --by.")
         found = [_heard_table(runs or [])]
     elif by is None:
-        cells = _cells(runs or [])
-        found = _tables(which, cells, published=published, chance=chance, floors=floors)
-    elif published or chance or floors or which != _ALL:
+        found = _tables(which, _cells(runs or []), published=published, floors=floors)
+    elif published or floors or which != _ALL:
         raise InvalidValueError(
-            "--by has tables of its own, without --which, --published, --chance, --floors."
+            "--by has tables of its own, without --which, --published and --floors."
         )
     else:
         found = _breakdown_tables(runs or [], by)
@@ -171,7 +182,10 @@ def compare(
     second: Annotated[str, typer.Argument(help="Another, or the same run.", metavar="B")],
     by: By = None,
 ) -> None:
-    """Compare two policies on the same episodes and say where one is clearly better."""
+    """Compare two policies on the same episodes and say where one is clearly better.
+
+    Example: roboirg compare runs/first runs/second --by pattern
+    """
     import numpy as np
     from rich.console import Console
     from rich.text import Text
@@ -197,10 +211,9 @@ def compare(
         console.print(Text(sentence), highlight=False)
 
 
-def _tables(
-    which: str, cells: Cells, *, published: bool, chance: bool, floors: bool
-) -> list[Table]:
+def _tables(which: str, cells: Cells, *, published: bool, floors: str | None) -> list[Table]:
     from roboirg.evaluation.analysis.published import RATE_TABLES
+    from roboirg.evaluation.analysis.stats.chance import FLOORS
     from roboirg.evaluation.analysis.tables.paper_tables import WHICH, is_informative, make_table
 
     if which == _ALL:
@@ -210,14 +223,13 @@ def _tables(
     elif which in WHICH:
         wanted = [which]
     else:
-        raise UnknownNameError("table", which, (*WHICH, _ALL))
+        raise UnknownNameError("table", which, (*WHICH, _HEARD, _ALL))
     if which not in (_ALL, "coverage") and not published and not cells:
         raise InvalidValueError(
             f"The table {which!r} needs a run; give its folder, or --published."
         )
-    found = [
-        make_table(one, cells, published=published, chance=chance, floors=floors) for one in wanted
-    ]
+    added = () if floors is None else known_names("floor", floors, FLOORS)
+    found = [make_table(one, cells, published=published, floors=added) for one in wanted]
     if which not in (_ALL, "coverage") and not found[0].rows:
         raise InvalidValueError(
             f"The runs have no results for the table {which!r}; --which all shows what they have."

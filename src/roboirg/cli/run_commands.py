@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import os
 import sys
 from collections.abc import Sequence
 from pathlib import Path
@@ -44,7 +45,6 @@ RetryErrors = Annotated[
     bool,
     typer.Option(
         help="Play episodes again if their newest record is an error.",
-        rich_help_panel=options.ERRORS,
     ),
 ]
 
@@ -57,30 +57,50 @@ OnRecord = Annotated[
 
 @spread
 def run(
-    out: Out,
+    out: Annotated[
+        str | None,
+        typer.Option(
+            help="Output folder; give the same folder again to resume.", show_default="required"
+        ),
+    ] = None,
     choices: options.PlanChoices = options.NO_CHOICES,
     plan: PlanName = None,
-    salt: options.Salt = None,
     workers: Workers = None,
-    executor: Annotated[str, typer.Option(help="Where to play: local or ray.")] = "local",
-    address: Annotated[str | None, typer.Option(help="Address of the Ray cluster.")] = None,
+    executor: Annotated[
+        str, typer.Option(help="Where to play: local, or ray (its cluster in RAY_ADDRESS).")
+    ] = "local",
     retry_errors: RetryErrors = True,
     on_record: OnRecord = None,
     dry_run: Annotated[
         bool,
         typer.Option("--dry-run", help="Only check, count the episodes and estimate the time."),
     ] = False,
+    show_plan: Annotated[
+        bool,
+        typer.Option("--show-plan", help="Only print the plan, all of its fields explained."),
+    ] = False,
 ) -> None:
-    """Play episodes and store a record of each in OUT/records.jsonl; resumes where it stopped."""
+    """Play episodes and store a record of each in OUT/records.jsonl; resumes where it stopped.
+
+    What has no option here, such as time limits, is a field of the plan's file (--show-plan).
+
+    Example: roboirg run --policy oracle --tasks PickXtimes --out runs/first
+    """
+    from roboirg.evaluation.plan.plan_text import plan_text
     from roboirg.evaluation.run.record_hook import split_command
 
+    add_working_directory()
+    made = _plan(plan, choices.typed(), usual=("oracle",) if show_plan else ())
+    if show_plan:
+        typer.echo(plan_text(made), nl=False)
+        return
+    if out is None:
+        raise InvalidValueError("No folder given; name one with --out, such as runs/first.")
     # Absolute: a policy in this process may change the working directory.
     folder = folder_of(out).absolute()
-    add_working_directory()
-    made = _plan(plan, choices.typed(), salt)
     if on_record is not None:
         split_command(on_record)
-    chosen = _executor(made, executor, address, workers)
+    chosen = _executor(made, executor, workers)
     _check_run(made, folder)
     if dry_run:
         _print_estimate(made, folder, workers)
@@ -187,20 +207,22 @@ def _results(folder: Path) -> Any:  # noqa: ANN401 - imported where it is needed
     return read_results(folder)
 
 
-def _plan(name: str | None, typed: dict[str, Any], salt: str | None) -> Plan:
-    """Return the plan of a file, overridden by the options that were typed."""
+def _plan(name: str | None, typed: dict[str, Any], usual: Sequence[str]) -> Plan:
+    """Return the plan of a file, overridden by the options that were typed.
+
+    `usual` are its policies if it has none.
+    """
     from roboirg.evaluation.plan.plan_file import read_plan_file
     from roboirg.evaluation.plan.plan_maker import make_plan
-    from roboirg.tasks.splits.private_splits import with_salt
+    from roboirg.tasks.splits.private_splits import drawn_split
 
     chosen = {**({} if name is None else read_plan_file(name)), **typed}
-    policies = chosen.pop("policies", None)
+    if "wordings" in typed and "wordings" in chosen.get("options", {}):
+        chosen["options"] = {**chosen["options"], "wordings": None}  # those of the file's wordings
+    policies = chosen.pop("policies", None) or usual
     if not policies:
         raise InvalidValueError("No policy given; name one with --policy, such as oracle.")
-    frames = chosen.get("demonstration_frames")
-    if isinstance(frames, str) and frames.isdigit():
-        chosen["demonstration_frames"] = int(frames)
-    chosen["split"] = with_salt(str(chosen.get("split", "test")), salt)
+    chosen["split"] = drawn_split(str(chosen.get("split", "test")))
     return make_plan(policies, **chosen)
 
 
@@ -221,15 +243,13 @@ def _warn_of_cut_prompts(plan: Plan) -> None:
         typer.echo(line, err=True)
 
 
-def _executor(plan: Plan, name: str, address: str | None, workers: int | None) -> Executor:
+def _executor(plan: Plan, name: str, workers: int | None) -> Executor:
     if name not in EXECUTORS:
         raise UnknownNameError("executor", name, EXECUTORS)
     if name == "ray":
         from roboirg.evaluation.run.ray_cluster import RayCluster
 
-        return RayCluster(workers, address, plan.episode_timeout_s)
-    if address is not None:
-        raise InvalidValueError(f"--address {address!r} needs --executor ray.")
+        return RayCluster(workers, os.environ.get("RAY_ADDRESS"), plan.episode_timeout_s)
     from roboirg.evaluation.run.executor import choose_executor
 
     return choose_executor(workers, plan.episode_timeout_s)
@@ -245,7 +265,7 @@ def _print_estimate(plan: Plan, folder: Path, workers: int | None) -> None:
     from roboirg.evaluation.run.world_speed import ASSUMED, measure_world
     from roboirg.language.settings import EXPLICIT
     from roboirg.util.console_width import widen
-    from roboirg.util.processor import core_count
+    from roboirg.util.processor import core_count, worker_count
 
     jobs, console = plan.jobs(), Console()
     table = Table(title=f"plan {plan.fingerprint}", title_justify="left")
@@ -265,7 +285,7 @@ def _print_estimate(plan: Plan, folder: Path, workers: int | None) -> None:
     _print_prompt_shares(jobs, settings, console)
     played = read_index(folder)
     todo = [job for job in jobs if identity_key(job) not in played]
-    count = core_count() if workers is None else max(workers, 1)  # 0 is this process
+    count = max(worker_count(workers), 1)  # 0 is this process
     known = {(one.policy, one.task) for one in played.values()}
     new = [job for job in todo if (job.policy, job.task) not in known]
     speed = measure_world(new) if new else ASSUMED

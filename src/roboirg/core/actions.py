@@ -69,22 +69,14 @@ ACTION_SPACES: Mapping[str, ActionSpace] = {
 
 
 def find_action_space(name: object) -> ActionSpace:
-    """Return the action space of that name.
-
-    Raises:
-        UnknownNameError: there is none.
-    """
+    """Return the action space of that name."""
     if not isinstance(name, str) or name not in ACTION_SPACES:
         raise UnknownNameError("action space", name, ACTION_SPACES)
     return ACTION_SPACES[name]
 
 
 def check_action(action: ArrayLike, space: ActionSpace = JOINT_ANGLE) -> NDArray[np.float64]:
-    """Return the action as finite numbers of the space's size.
-
-    Raises:
-        InvalidActionError: it is not numeric, of another shape, or not finite.
-    """
+    """Return the action as finite numbers of the space's size."""
     numbers = _numbers(action, space)
     if numbers.shape != (space.size,):
         raise InvalidActionError(
@@ -95,11 +87,7 @@ def check_action(action: ArrayLike, space: ActionSpace = JOINT_ANGLE) -> NDArray
 
 
 def check_chunk(actions: ArrayLike, space: ActionSpace = JOINT_ANGLE) -> NDArray[np.float64]:
-    """Return a policy's answer as a chunk of shape (n, size), n >= 1; one action is a chunk of one.
-
-    Raises:
-        InvalidActionError: it is not numeric, of another shape, or not finite.
-    """
+    """Return a policy's answer as a chunk (n, size), n >= 1; one action is a chunk of one."""
     numbers = _numbers(actions, space)
     chunk = numbers[None] if numbers.ndim == 1 else numbers
     if chunk.ndim != 2 or chunk.shape[1] != space.size or len(chunk) == 0:  # noqa: PLR2004

@@ -45,10 +45,6 @@ def utterance_steps(count: int, delivery: str) -> tuple[int, ...]:
 class SpokenInstruction:
     """The utterances of one episode and which of them the policy has heard.
 
-    Args:
-        turns: the texts of the utterances.
-        delivery: ``prompt`` or ``turns``.
-
     Attributes:
         heard: what the policy has heard, in order.
         prompt: the words heard last. An observation that comes after several utterances brings

@@ -71,11 +71,7 @@ class MotionPlanningError(RoboIRGError, RuntimeError):
 
 
 class PolicyServerError(RoboIRGError):
-    """The server or model of a policy failed; what it said itself is safe to print.
-
-    Args:
-        message: may quote the server.
-    """
+    """The server or model of a policy failed; what it said itself is safe to print."""
 
     def __init__(self, message: str = "") -> None:
         super().__init__(printable(message))

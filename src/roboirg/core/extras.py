@@ -20,9 +20,6 @@ def extra_needed(sentence: str, extra: str) -> Iterator[None]:
     Args:
         sentence: what needs the library, for example ``"Figures need matplotlib"``.
         extra: the extra that brings the library.
-
-    Raises:
-        MissingDependencyError: the import failed.
     """
     try:
         yield

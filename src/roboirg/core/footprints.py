@@ -124,13 +124,7 @@ def place(
 ) -> Placement | None:
     """Return the first of at most 256 draws whose clearance is free of all obstacles.
 
-    Args:
-        draw: returns a candidate.
-        clearance: returns the area that a candidate needs.
-        obstacles: areas that are occupied.
-
-    Returns:
-        The accepted placement, or None if every draw hits an obstacle.
+    The clearance is the area that a candidate needs. None if every draw hits an obstacle.
     """
     for _ in range(MAX_DRAWS):
         candidate = draw()

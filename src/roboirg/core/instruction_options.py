@@ -2,7 +2,12 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, fields
+from pathlib import Path
+from typing import Any, TypedDict
+
+from roboirg.core.field_types import Name, Stages, Whole
 
 ALL_STAGES = (1, 2, 3, 4, 5)
 DEFAULT_DISTRACTOR = "neutral"
@@ -11,33 +16,98 @@ DEFAULT_FRAME = "robot"
 DEFAULT_DELIVERY = "prompt"
 
 
-class InstructionOptions(NamedTuple):
+def _help(text: str) -> dict[str, str]:
+    return {"help": text}
+
+
+@dataclass(frozen=True, slots=True)
+class InstructionOptions:
     """The options of an instruction. Equal options give the same words for the same episode.
 
-    All but `delivery` select the words.
+    All but `delivery` select the words. Plans, environments, jobs, records and commands take their
+    options of instructions from these fields.
 
     Attributes:
-        setting: name of the setting, for example ``"direct"``.
-        form: ``implicit``, or ``resolved`` with the command's referring expressions replaced by
-            their meaning.
-        stages: of the contextual setting: 1 introduction, 2 reinforcement, 3 distractor, 4 cue,
-            5 command.
-        distractor: of the contextual setting: ``neutral`` or ``competing``.
-        distractors: of the contextual setting: their number.
-        frame: of the spatial setting: the frame of left and right, ``robot`` or ``camera``.
         wordings: ``train`` or ``test`` for the words of that pool (`roboirg.core.word_pools`); or
             the identity of the wording file whose commands are used, such as
             ``robomme@1a2b3c4d``, which the process must have opened. None for our words of the
             episode's split.
-        delivery: ``prompt``, all utterances at once, or ``turns``, one after another
-            (`roboirg.core.delivery`).
+        delivery: see `roboirg.core.delivery`.
     """
 
-    setting: str = "explicit"
-    form: str = "implicit"
-    stages: tuple[int, ...] = ALL_STAGES
-    distractor: str = DEFAULT_DISTRACTOR
-    distractors: int = DEFAULT_DISTRACTORS
-    frame: str = DEFAULT_FRAME
-    wordings: str | None = None
-    delivery: str = DEFAULT_DELIVERY
+    setting: Name = field(default="explicit", metadata=_help("Name of the setting."))
+    form: Name = field(
+        default="implicit",
+        metadata=_help(
+            "implicit; or resolved, with the command's referring expressions replaced by what they "
+            "mean."
+        ),
+    )
+    stages: Stages = field(
+        default=ALL_STAGES,
+        metadata=_help(
+            "Stages of the contextual setting, such as 1,5: 1 introduction, 2 reinforcement, "
+            "3 distractor, 4 cue, 5 command."
+        ),
+    )
+    distractor: Name = field(
+        default=DEFAULT_DISTRACTOR,
+        metadata=_help("Distractors of the contextual setting: neutral or competing."),
+    )
+    distractors: Whole = field(
+        default=DEFAULT_DISTRACTORS,
+        metadata=_help("Number of distractors in the contextual setting."),
+    )
+    frame: Name = field(
+        default=DEFAULT_FRAME,
+        metadata=_help("Whose left and right the spatial setting uses: robot or camera."),
+    )
+    wordings: Name | None = field(
+        default=None,
+        metadata=_help(
+            "Wording file whose commands are used instead of our own; or train or test: our words "
+            "of that pool in every split."
+        ),
+    )
+    delivery: Name = field(
+        default=DEFAULT_DELIVERY,
+        metadata=_help(
+            "prompt: the whole instruction at once; turns: one utterance after another."
+        ),
+    )
+
+
+class WordKeywords(TypedDict, total=False):
+    """The fields of `InstructionOptions` but setting and form, as keyword arguments."""
+
+    stages: Sequence[int]
+    distractor: str
+    distractors: int
+    frame: str
+    wordings: str | Path | None
+    delivery: str
+
+
+class InstructionKeywords(WordKeywords, total=False):
+    """The fields of `InstructionOptions` as keyword arguments."""
+
+    setting: str
+    form: str
+
+
+OPTION_NAMES = tuple(one.name for one in fields(InstructionOptions))
+"""The names of all options."""
+OPTION_HELP = {one.name: str(one.metadata["help"]) for one in fields(InstructionOptions)}
+"""What each option means."""
+
+
+def split_options(given: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, Any]]:
+    """Return the options of instructions among some keyword arguments, and the others."""
+    options = {name: value for name, value in given.items() if name in OPTION_NAMES}
+    return options, {name: value for name, value in given.items() if name not in OPTION_NAMES}
+
+
+def as_fields(given: Mapping[str, Any]) -> dict[str, Any]:
+    """Return keyword arguments of options as fields, whose stages are a tuple."""
+    stages = {"stages": tuple(given["stages"])} if "stages" in given else {}
+    return {**given, **stages}

@@ -33,13 +33,7 @@ def is_encodable(text: str) -> bool:
 
 
 def counted(count: int, noun: str, plural: str | None = None) -> str:
-    """Return a count with its noun: ``1 episode``, ``2,550 episodes``, ``0 tries``.
-
-    Args:
-        count: the number.
-        noun: the noun in the singular.
-        plural: the plural, unless it is the singular with an ``s``.
-    """
+    """Return a count with its noun: ``1 episode``, ``2,550 episodes``, ``0 tries``."""
     word = noun if count == 1 else plural or f"{noun}s"
     return f"{count:,} {word}"
 

@@ -36,11 +36,9 @@ _queued = [0.0]
 
 @contextlib.contextmanager
 def waiting(what: str, *, is_queue: bool = False) -> Iterator[None]:
-    """Tell what this process waits for while the block runs.
+    """Tell what this process waits for while the block runs, in words to follow "waiting for".
 
-    Args:
-        what: in words, to follow "waiting for".
-        is_queue: whether this is waiting for one's turn, which is not the policy's own time.
+    `is_queue`: it waits for its turn, which is not the policy's own time.
     """
     wait = Wait(what, is_queue, time.monotonic())
     _waits.append(wait)

@@ -44,12 +44,9 @@ class Pools(NamedTuple, Generic[Option]):
 
 
 def pool_of(split: str, wordings: str | None = None) -> PoolName:
-    """Return the pool from which the words for an episode are taken.
+    """Return the pool from which the words for an episode of a split are taken.
 
-    Args:
-        split: split of the episode.
-        wordings: a pool that was chosen; the identity of a wording file, or None, leaves it to
-            the split.
+    A pool that was chosen; the identity of a wording file, or None, leaves it to the split.
     """
     for pool in POOLS:
         if wordings == pool:

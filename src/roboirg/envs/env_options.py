@@ -3,27 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from pathlib import Path
-from typing import TYPE_CHECKING, TypedDict
+from typing import TYPE_CHECKING
+
+from roboirg.core.instruction_options import InstructionKeywords
 
 if TYPE_CHECKING:
     # Not at run time: it loads NumPy, which `import roboirg` must not.
     from roboirg.core.observations import DemonstrationFrames
 
 
-class EnvOptions(TypedDict, total=False):
+class EnvOptions(InstructionKeywords, total=False):
     """Keyword arguments of `make`, which documents them; `EnvSettings` has their defaults."""
 
-    setting: str
-    form: str
     split: str
     episode: int | None
-    stages: Sequence[int]
-    distractor: str
-    distractors: int
-    frame: str
-    wordings: str | Path | None
-    delivery: str
     actions: str
     cameras: Sequence[str]
     depth: bool

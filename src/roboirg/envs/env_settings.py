@@ -4,19 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import Any
 
 from roboirg.core.actions import JOINT_ANGLE
 from roboirg.core.episode import Episode
 from roboirg.core.errors import InvalidValueError, UnknownNameError
 from roboirg.core.instruction_options import (
-    ALL_STAGES,
-    DEFAULT_DELIVERY,
-    DEFAULT_DISTRACTOR,
-    DEFAULT_DISTRACTORS,
-    DEFAULT_FRAME,
+    OPTION_NAMES,
     InstructionOptions,
+    as_fields,
+    split_options,
 )
 from roboirg.core.observations import CAMERAS, DemonstrationFrames
 from roboirg.language.wordings.wording_store import open_wordings
@@ -26,8 +23,9 @@ from roboirg.tasks.splits.splits import get_episode, split_size
 
 MAX_STEPS = 1300
 """Control steps a policy has, as in RoboMME's published experiments."""
+EXPLICIT_WORDS = InstructionOptions()
 RENDER_MODES = ("rgb_array",)
-RESET_OPTIONS = ("split", "episode", *InstructionOptions._fields)
+RESET_OPTIONS = ("split", "episode", *OPTION_NAMES)
 """Options that `reset` takes: which episode is played, and in which words."""
 
 
@@ -35,21 +33,17 @@ RESET_OPTIONS = ("split", "episode", *InstructionOptions._fields)
 class EnvSettings:
     """Options of an environment; `roboirg.make` documents them.
 
+    Attributes:
+        words: of the instruction; the file of its wordings has been opened.
+
     Raises:
         UnknownNameError: there is no such render mode.
         InvalidValueError: `max_steps` is no positive integer.
     """
 
-    setting: str = "explicit"
-    form: str = "implicit"
+    words: InstructionOptions = EXPLICIT_WORDS
     split: str = "test"
     episode: int | None = 0
-    stages: Sequence[int] = ALL_STAGES
-    distractor: str = DEFAULT_DISTRACTOR
-    distractors: int = DEFAULT_DISTRACTORS
-    frame: str = DEFAULT_FRAME
-    wordings: str | Path | None = None
-    delivery: str = DEFAULT_DELIVERY
     actions: str = JOINT_ANGLE.name
     cameras: Sequence[str] = CAMERAS
     depth: bool = False
@@ -61,6 +55,15 @@ class EnvSettings:
     meshes: str = "faithful"
     max_steps: int = MAX_STEPS
     render_mode: str | None = None
+
+    @classmethod
+    def of(cls, options: Mapping[str, Any]) -> EnvSettings:
+        """Return the settings of keyword arguments of `roboirg.make`; opens the wording file.
+
+        Raises:
+            InvalidValueError: a value is invalid, or the wording file cannot be read.
+        """
+        return replace(cls(), **_nested(EXPLICIT_WORDS, options))
 
     def __post_init__(self) -> None:
         if not isinstance(self.max_steps, int) or self.max_steps < 1:
@@ -76,16 +79,6 @@ class EnvSettings:
             UnknownNameError: there is no such split.
         """
         return split_size(self.split)
-
-    def instruction_options(self) -> InstructionOptions:
-        """Return the options of the instruction; opens the wording file.
-
-        Raises:
-            InvalidValueError: the wording file cannot be read.
-        """
-        values = {name: getattr(self, name) for name in InstructionOptions._fields}
-        words = {"stages": tuple(self.stages), "wordings": open_wordings(self.wordings)}
-        return InstructionOptions(**{**values, **words})
 
     def observation_spec(self) -> ObservationSpec:
         """Return the fields of observations and of the video.
@@ -113,7 +106,7 @@ class EnvSettings:
         for name in options:
             if name not in RESET_OPTIONS:
                 raise UnknownNameError("reset option", name, RESET_OPTIONS)
-        return replace(self, **options)
+        return replace(self, **_nested(self.words, options))
 
     def find_episode(self, task: str | Episode, index: int) -> Episode:
         """Return the episode to play: number `index`, or `task` itself if it is an episode.
@@ -123,6 +116,15 @@ class EnvSettings:
             InvalidValueError: the split has no episode of that number.
         """
         return task if isinstance(task, Episode) else get_episode(task, self.split, index)
+
+
+def _nested(words: InstructionOptions, options: Mapping[str, Any]) -> dict[str, Any]:
+    """Return keyword arguments of `EnvSettings`, in which `words` holds those of the words."""
+    chosen, others = split_options(options)
+    chosen = as_fields(chosen)
+    if "wordings" in chosen:
+        chosen["wordings"] = open_wordings(chosen["wordings"])
+    return {**others, "words": replace(words, **chosen)}
 
 
 def choose_index(settings: EnvSettings, seed: int | None, last: int | None) -> int:

@@ -87,7 +87,7 @@ class RoboIRGEnv(gymnasium.Env[dict[str, Any], NDArray[np.floating[Any]]]):
     observation_space: spaces.Dict
 
     def __init__(self, task: str | Episode, **options: Unpack[EnvOptions]) -> None:
-        self._task, self._settings = task, EnvSettings(**options)
+        self._task, self._settings = task, EnvSettings.of(options)
         self._last_index: int | None = None
         self._instructed: tuple[tuple[Episode, InstructionOptions], Instruction] | None = None
         self._select_episode(self._settings, choose_index(self._settings, None, None))
@@ -291,11 +291,11 @@ class RoboIRGEnv(gymnasium.Env[dict[str, Any], NDArray[np.floating[Any]]]):
         self._last_index = self.episode.index
 
     def _select_episode(self, settings: EnvSettings, index: int) -> None:
-        chosen = settings.find_episode(self._task, index), settings.instruction_options()
+        chosen = settings.find_episode(self._task, index), settings.words
         if self._instructed is None or self._instructed[0] != chosen:
             self._instructed = chosen, instruct_with(*chosen)
         (self.episode, _), self.instruction = self._instructed
-        self.delivery = settings.delivery
+        self.delivery = settings.words.delivery
 
     def _play_demonstration(self, recording: Recording | None) -> Recording:
         """Start the episode and play its demonstration."""

@@ -26,18 +26,10 @@ def make(task: str | Episode, **options: Unpack[EnvOptions]) -> RoboIRGEnv:
         **options: the keyword arguments below; `EnvSettings` has their defaults.
 
     Keyword Args:
-        setting: explicit, direct, reasoning, contextual, spatial, or one of the harder
-            direct-rival, contextual-rival, spatial-rival and reasoning-open.
-        form: implicit, or resolved for the paired explicit counterpart.
+        setting, form, …: the fields of `InstructionOptions`, which choose the words.
         split: train, val, test or random.
         episode: index of the episode in the split, from 0; None if the seed of each reset
             chooses it.
-        stages: stages, of five, that a contextual instruction includes.
-        distractor: neutral or competing, for contextual instructions.
-        distractors: number of distractors in a contextual instruction.
-        frame: whose left and right a spatial instruction uses: robot or camera.
-        wordings: wording file whose commands are used, or its identity; None for our own words.
-        delivery: prompt, all utterances at once, or turns: one after another while it acts.
         actions: joint_angle, ee_pose or waypoint.
         cameras: cameras whose pictures observations hold; () renders nothing.
         depth: add depth for the same cameras.

@@ -99,14 +99,7 @@ class EpisodeReplay:
 def rejudge(
     episode: Episode, events: Sequence[Event], policy_start_step: int, elapsed_steps: int
 ) -> EpisodeReplay:
-    """Judge an episode again.
-
-    Args:
-        episode: the episode.
-        events: all changes since the world began, in order.
-        policy_start_step: steps of the world before the policy's turn.
-        elapsed_steps: steps of the world in all; the last evaluation comes after them.
-    """
+    """Judge an episode again by all its events, in order; steps count since the world began."""
     facts = facts_by_step(events, elapsed_steps)
     judge = Judge((*episode.demonstration, *episode.stages), episode.scene)
     expected_stages: list[int] = []
@@ -123,11 +116,7 @@ def rejudge(
 def completed_stages(
     episode: Episode, events: Sequence[Event], elapsed_steps: int
 ) -> dict[int, int]:
-    """Return the steps that completed stages of the policy, by index; faster than `rejudge`.
-
-    Raises:
-        KeyError: a fact ceases to hold that did not.
-    """
+    """Return the steps that completed stages of the policy, by index; faster than `rejudge`."""
     judge = Judge((*episode.demonstration, *episode.stages), episode.scene)
     found: dict[int, int] = {}
     for step in _evaluations(judge, events, elapsed_steps):

@@ -23,11 +23,6 @@ def classify_grounding_error(
     | was expected before: once too often | ``wrong_count`` |
     | is expected with the same object at another place | ``wrong_place`` |
     | is never expected | ``wrong_object`` |
-
-    Args:
-        fact: the act, a fact that starts to hold.
-        stages: of the policy.
-        expected_stage: index of the current stage.
     """
     expected = [facts_of(stage.expects) for stage in stages]
     now, past = expected[expected_stage], expected[:expected_stage]

@@ -78,12 +78,7 @@ class Judge:
         return self.stages[self.index] if self.index < len(self.stages) else None
 
     def update(self, step: int, facts: AbstractSet[Fact]) -> Status:
-        """Evaluate once and return the status.
-
-        Args:
-            step: control steps since reset.
-            facts: all that hold now.
-        """
+        """Evaluate the facts that hold `step` control steps after reset, and return the status."""
         stage = self.current
         if self.status is not Status.ONGOING or stage is None:
             return self.status

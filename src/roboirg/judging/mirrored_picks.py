@@ -20,12 +20,7 @@ def refine_wrong_object(
 
     The mirrored one of which object depends on the order: it is the one that the current stage
     expects or, if it expects none that the words mean, the last one before or the next one after.
-
-    Args:
-        found: any failure, its step counted since the world began.
-        replay: of the episode.
-        mirrored: what the words mean with left and right exchanged.
-        place: of the act that failed, if it has one.
+    The step of `found` counts since the world began; `place` is None if the act has none.
     """
     if found.failure not in ("wrong_object", "wrong_place"):
         return found

@@ -76,10 +76,7 @@ def describe_missed_grasp(
 def describe_release(replay: EpisodeReplay, grip: FactInterval, step: int) -> FailureAttribution:
     """Return the failure of an object that was released beside its expected place.
 
-    Args:
-        replay: of the episode.
-        grip: the last interval in which the object was picked or lifted, which has ended.
-        step: when it lay there.
+    `grip` is the last interval in which it was picked or lifted; `step` is when it lay there.
     """
     name = grip.fact.subject
     words = describe_object(name, replay.episode.scene)

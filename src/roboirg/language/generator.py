@@ -3,18 +3,18 @@
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import replace
+from typing import Unpack
 
 from roboirg.core.delivery import DELIVERIES
 from roboirg.core.episode import Episode
 from roboirg.core.errors import InvalidValueError, UnknownNameError
 from roboirg.core.instruction_options import (
-    ALL_STAGES,
-    DEFAULT_DISTRACTOR,
-    DEFAULT_DISTRACTORS,
     DEFAULT_FRAME,
     InstructionOptions,
+    WordKeywords,
+    as_fields,
 )
 from roboirg.core.word_pools import POOLS
 from roboirg.language.instruction import FORMS, Instruction, Mention, Utterance
@@ -63,12 +63,7 @@ def instruct(
     episode: Episode,
     setting: str = "explicit",
     form: str = "implicit",
-    *,
-    stages: Sequence[int] = ALL_STAGES,
-    distractor: str = DEFAULT_DISTRACTOR,
-    distractors: int = DEFAULT_DISTRACTORS,
-    frame: str = DEFAULT_FRAME,
-    wordings: str | None = None,
+    **options: Unpack[WordKeywords],
 ) -> Instruction:
     """Return the instruction of an episode; the same arguments always give the same bytes.
 
@@ -77,13 +72,8 @@ def instruct(
         setting: name of a setting; `setting_names` lists them.
         form: ``implicit``, or ``resolved``, in which the command names the referents of its
             referring expressions. An explicit instruction is its own resolved form.
-        stages: of the contextual setting: 1 introduction, 2 reinforcement, 3 distractor, 4 cue,
-            5 command. Each option from here on changes only the settings that read it.
-        distractor: ``neutral`` remarks, or ``competing`` ones that name other values.
-        distractors: number of remarks.
-        frame: of left and right, ``robot`` or ``camera``.
-        wordings: ``train`` or ``test`` for the words of that pool; or the identity of an open
-            wording file, whose commands are used. None for our words of the episode's split.
+        **options: other fields of `InstructionOptions`; each changes only the settings that read
+            it.
 
     Raises:
         UnknownNameError: a name does not exist.
@@ -91,18 +81,8 @@ def instruct(
             number of distractors is below 1, the setting cannot express the episode, or the
             wordings are not open or lack a command for the goal.
     """
-    return instruct_with(
-        episode,
-        InstructionOptions(
-            setting,
-            form,
-            tuple(stages),
-            distractor,
-            distractors,
-            frame,
-            wordings,
-        ),
-    )
+    chosen = InstructionOptions(setting, form)
+    return instruct_with(episode, replace(chosen, **as_fields(options)))
 
 
 def instruct_with(episode: Episode, options: InstructionOptions) -> Instruction:
@@ -134,7 +114,7 @@ def _say_outside(
 
     Which command the setting fills is known only then, so it is said again with its phrases.
     """
-    options = request.options._replace(form=form)
+    options = replace(request.options, form=form)
     request = replace(request, options=options, sampler=_sampler(request.episode), filled=[])
     spec = setting.say(request)
     if request.phrases_of is None and request.filled:
@@ -152,13 +132,7 @@ def find_refusal(episode: Episode, options: InstructionOptions) -> str | None:
 def find_refusals(
     episode: Episode, *, frame: str = DEFAULT_FRAME, wordings: str | None = None
 ) -> Mapping[str, str]:
-    """Return the settings of the task that cannot express an episode, each with the reason.
-
-    Args:
-        episode: what to say.
-        frame: of left and right, ``robot`` or ``camera``.
-        wordings: identity of an open wording file; None for our own words.
-    """
+    """Return the settings of the task that cannot express an episode, each with the reason."""
     reasons = {
         name: find_refusal(episode, InstructionOptions(name, frame=frame, wordings=wordings))
         for name in settings_of(get_task(episode.task))
@@ -169,13 +143,7 @@ def find_refusals(
 def expressible(
     episode: Episode, *, frame: str = DEFAULT_FRAME, wordings: str | None = None
 ) -> tuple[str, ...]:
-    """Return the settings of the task that can express an episode.
-
-    Args:
-        episode: what to say.
-        frame: of left and right, ``robot`` or ``camera``.
-        wordings: identity of an open wording file; None for our own words.
-    """
+    """Return the settings of the task that can express an episode."""
     refused = find_refusals(episode, frame=frame, wordings=wordings)
     return tuple(name for name in settings_of(get_task(episode.task)) if name not in refused)
 
@@ -209,12 +177,7 @@ def _missing(request: InstructionRequest) -> str | None:
 
 
 def check_options(options: InstructionOptions) -> None:
-    """Check all options of an instruction, those that its setting does not read included.
-
-    Raises:
-        UnknownNameError: a form, kind of distractor, frame, … does not exist.
-        InvalidValueError: the stages or the number of distractors are not possible.
-    """
+    """Check all options of an instruction, those that its setting does not read included."""
     if options.stages not in STAGE_SETS:
         sets = ", ".join(str(one) for one in STAGE_SETS)
         raise InvalidValueError(f"The stages {options.stages} must be one of {sets}.")

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from enum import IntEnum
 from functools import lru_cache, partial
 from typing import Literal, NamedTuple
 
@@ -25,7 +26,41 @@ WORK_AREA = {"near": -0.3, "far": 0.2, "left": 0.25, "right": -0.25}
 TABLE = {"near": -0.7402, "far": 0.4689, "left": 1.2030, "right": -1.2149}
 """The same for the table top."""
 
-SIMPLE = 5
+
+class LandmarkClass(IntEnum):
+    """What kind of place a landmark names, in the order of preference."""
+
+    EXTREME = 1
+    """Extreme in a direction, or on a side: *farthest to your left*."""
+    CORNER = 2
+    """*closest to your near left corner*"""
+    RANK = 3
+    """Second or third in a direction: *second closest to you*."""
+    FIXTURE = 4
+    """Closest to or farthest from the only button, target or bin: *closest to the button*."""
+    OTHER_COLOR = 5
+    """Closest to the only cube of a color: *closest to the red cube*."""
+    NEXT_TO_NAMED = 6
+    """Nearest to an extreme or corner: *nearest to the cube closest to you*."""
+    NEXT_TO_RANKED = 7
+    """Nearest to a rank: *nearest to the cube second closest to you*."""
+    SECOND_FROM_NAMED = 8
+    """Second nearest to an extreme or corner: *second nearest to the cube closest to you*."""
+    THIRD_FROM_NAMED = 9
+    """Third nearest to an extreme or corner: *third nearest to the cube closest to you*."""
+    FOURTH_RANK = 10
+    """Fourth in a direction: *fourth closest to you*."""
+    EXTREME_OF_EXTREMES = 11
+    """Of a few, the extreme across: *closest to you among the two farthest to your left*."""
+    EXTREME_OF_FIXTURE = 12
+    """Of a few around a fixture: *closest to you among the two closest to the button*."""
+    RANK_OF_EXTREMES = 13
+    """Rank within a few: *second closest to you among the three farthest to your left*."""
+    FIXTURE_RANK = 14
+    """Second or third from a fixture: *second closest to the button*."""
+
+
+SIMPLE = LandmarkClass.OTHER_COLOR
 """The last class of simple landmarks, of which any may be said; others only if there is none."""
 
 Frame = Literal["robot", "camera"]
@@ -44,18 +79,18 @@ class Landmark(NamedTuple):
 
     Attributes:
         phrase: words after the noun: "the cube *farthest to your left*".
-        level: class, in the order of preference: 1 extremes and the sides of a pair, 2 corners,
-            3 ranks, 4 fixtures, 5 cubes of another color, 6 nearest to an object of class 1 or 2,
-            7 nearest to one of class 3, 8 second nearest to one of class 1 or 2, 9 third nearest
-            to one of class 1 or 2, 10 fourth in a row, 11 the extreme of a few that are extreme in
-            the other direction, 12 that of a few near or far from a fixture, 13 second or third of
-            a few, 14 second or third from a fixture.
+        kind: class.
         sided: whether the words name left or right, so that the frame matters.
     """
 
     phrase: str
-    level: int
+    kind: LandmarkClass
     sided: bool = False
+
+    @property
+    def level(self) -> int:
+        """The number of the class, as records and exports have it."""
+        return int(self.kind)
 
 
 class Ranking(NamedTuple):
@@ -107,17 +142,10 @@ class Selector(NamedTuple):
 def landmarks(
     scene: Scene, thing: ObjectKind, target: SceneObject, frame: Frame = "robot"
 ) -> tuple[Landmark, ...]:
-    """Return the landmarks that single out the target: the simple ones, or else all others.
-
-    Args:
-        scene: the scene.
-        thing: kind of the candidates.
-        target: one of the candidates.
-        frame: of left and right.
-    """
+    """Return the landmarks that single out the target: the simple ones, or else all others."""
     found: list[Landmark] = []
     for selector in selectors(scene, thing, frame):
-        if selector.landmark.level > SIMPLE and found and found[0].level <= SIMPLE:
+        if selector.landmark.kind > SIMPLE and found and found[0].kind <= SIMPLE:
             break
         if selector.select() is target:
             found.append(selector.landmark)
@@ -139,15 +167,19 @@ def selectors(scene: Scene, thing: ObjectKind, frame: Frame) -> Iterator[Selecto
     fixtures = tuple(_fixtures(scene, candidates))
     yield from fixtures
     yield from _other_colors(candidates)
-    yield from _chains(thing, candidates, named, level=6)
-    yield from _chains(thing, candidates, ranked, level=7)
-    yield from _chains(thing, candidates, named, level=8, rank=1)
-    yield from _chains(thing, candidates, named, level=9, rank=2)
-    yield from _ranks(candidates, frame, FOURTH, level=10)
+    yield from _chains(thing, candidates, named, kind=LandmarkClass.NEXT_TO_NAMED)
+    yield from _chains(thing, candidates, ranked, kind=LandmarkClass.NEXT_TO_RANKED)
+    yield from _chains(thing, candidates, named, kind=LandmarkClass.SECOND_FROM_NAMED, rank=1)
+    yield from _chains(thing, candidates, named, kind=LandmarkClass.THIRD_FROM_NAMED, rank=2)
+    yield from _ranks(candidates, frame, FOURTH, kind=LandmarkClass.FOURTH_RANK)
     extremes, ranks = partial(_extremes, frame=frame), partial(_ranks, frame=frame)
-    yield from _members(candidates, extremes(candidates), extremes, level=11)
-    yield from _members(candidates, fixtures, extremes, level=12)
-    yield from _members(candidates, extremes(candidates), ranks, level=13)
+    yield from _members(
+        candidates, extremes(candidates), extremes, kind=LandmarkClass.EXTREME_OF_EXTREMES
+    )
+    yield from _members(candidates, fixtures, extremes, kind=LandmarkClass.EXTREME_OF_FIXTURE)
+    yield from _members(
+        candidates, extremes(candidates), ranks, kind=LandmarkClass.RANK_OF_EXTREMES
+    )
     yield from _fixture_ranks(candidates, fixtures)
 
 
@@ -198,7 +230,9 @@ def _column(item: SceneObject) -> float:
 def _extremes(candidates: tuple[SceneObject, ...], frame: Frame) -> Iterator[Selector]:
     for direction in _directions(frame):
         yield Selector(
-            Landmark(direction.extreme, 1, direction.sided), (direction.ranking,), candidates
+            Landmark(direction.extreme, LandmarkClass.EXTREME, direction.sided),
+            (direction.ranking,),
+            candidates,
         )
 
 
@@ -206,7 +240,11 @@ def _sides(candidates: tuple[SceneObject, ...], frame: Frame) -> Iterator[Select
     left, right = (direction.ranking for direction in _directions(frame) if direction.sided)
     owner = "your" if frame == "robot" else "the camera's"
     for side, ranking in (("left", left), ("right", right)):
-        yield Selector(Landmark(f"on {owner} {side}", 1, sided=True), (ranking,), candidates)
+        yield Selector(
+            Landmark(f"on {owner} {side}", LandmarkClass.EXTREME, sided=True),
+            (ranking,),
+            candidates,
+        )
 
 
 def _corners(candidates: tuple[SceneObject, ...], frame: Frame) -> Iterator[Selector]:
@@ -220,21 +258,21 @@ def _corners(candidates: tuple[SceneObject, ...], frame: Frame) -> Iterator[Sele
                 y = mirrored
             corners = [(area[depth], area[y]) for area in (WORK_AREA, TABLE)]
             rankings = tuple(_nearness(corner) for corner in corners)
-            yield Selector(Landmark(phrase, 2, sided=True), rankings, candidates)
+            yield Selector(Landmark(phrase, LandmarkClass.CORNER, sided=True), rankings, candidates)
 
 
 def _ranks(
     candidates: tuple[SceneObject, ...],
     frame: Frame,
     ordinals: Mapping[int, str] = ORDINALS,
-    level: int = 3,
+    kind: LandmarkClass = LandmarkClass.RANK,
 ) -> Iterator[Selector]:
     for rank, ordinal in ordinals.items():
         # The last one in a row is the extreme of the other end.
         if rank > len(candidates) - 2:
             continue
         for direction in _directions(frame):
-            landmark = Landmark(f"{ordinal} {direction.rank}", level, direction.sided)
+            landmark = Landmark(f"{ordinal} {direction.rank}", kind, direction.sided)
             yield Selector(landmark, (direction.ranking,), candidates, rank)
 
 
@@ -244,9 +282,13 @@ def _fixtures(scene: Scene, candidates: tuple[SceneObject, ...]) -> Iterator[Sel
         if len(fixtures) != 1:
             continue
         away = _distance(fixtures[0].position)
-        near = Landmark(f"closest to the {kind}", 4)
+        near = Landmark(f"closest to the {kind}", LandmarkClass.FIXTURE)
         yield Selector(near, (Ranking(_negated(away)),), candidates)
-        yield Selector(Landmark(f"farthest from the {kind}", 4), (Ranking(away),), candidates)
+        yield Selector(
+            Landmark(f"farthest from the {kind}", LandmarkClass.FIXTURE),
+            (Ranking(away),),
+            candidates,
+        )
 
 
 def _fixture_ranks(
@@ -257,7 +299,7 @@ def _fixture_ranks(
         if rank > len(candidates) - 2:
             continue
         for selector in fixtures:
-            landmark = Landmark(f"{ordinal} {selector.landmark.phrase}", 14)
+            landmark = Landmark(f"{ordinal} {selector.landmark.phrase}", LandmarkClass.FIXTURE_RANK)
             yield selector._replace(landmark=landmark, rank=rank)
 
 
@@ -266,7 +308,7 @@ def _other_colors(candidates: Sequence[SceneObject]) -> Iterator[Selector]:
         like = [item for item in candidates if item.color == anchor.color]
         if anchor.color is None or len(like) != 1:
             continue
-        landmark = Landmark(f"closest to the {anchor.color} cube", 5)
+        landmark = Landmark(f"closest to the {anchor.color} cube", LandmarkClass.OTHER_COLOR)
         yield Selector(landmark, (_nearness(anchor.position),), _without(candidates, anchor))
 
 
@@ -274,7 +316,7 @@ def _chains(
     thing: str,
     candidates: Sequence[SceneObject],
     anchors: Sequence[Selector],
-    level: int,
+    kind: LandmarkClass,
     rank: int = 0,
 ) -> Iterator[Selector]:
     for selector in anchors:
@@ -287,7 +329,7 @@ def _chains(
             continue
         nearest = f"{ORDINALS[rank]} nearest" if rank else "nearest"
         phrase = f"{nearest} to the {thing.removeprefix('hidden_')} {selector.landmark.phrase}"
-        landmark = Landmark(phrase, level, selector.landmark.sided)
+        landmark = Landmark(phrase, kind, selector.landmark.sided)
         yield Selector(landmark, (_nearness(anchor.position),), others, rank)
 
 
@@ -295,15 +337,12 @@ def _members(
     candidates: Sequence[SceneObject],
     groups: Iterable[Selector],
     inner: Callable[[tuple[SceneObject, ...]], Iterator[Selector]],
-    level: int,
+    kind: LandmarkClass,
 ) -> Iterator[Selector]:
     """Yield one of two, three or four objects at a place: *closest to you among the two there*.
 
-    Args:
-        candidates: all objects.
-        groups: selectors whose first two, three or four objects are a group.
-        inner: yields the selectors within a group.
-        level: of the landmarks.
+    The first two, three or four objects of a selector in `groups` are a group; `inner` yields the
+    selectors within it.
     """
     for group in groups:
         for size, number in SIZES.items():
@@ -312,10 +351,10 @@ def _members(
             for one in inner(members):
                 sided, of_sided = one.landmark.sided, group.landmark.sided
                 # Along one line, the words of the group would be superfluous or odd.
-                if group.landmark.level == 1 and sided == of_sided:
+                if group.landmark.kind == LandmarkClass.EXTREME and sided == of_sided:
                     continue
                 phrase = f"{one.landmark.phrase} among the {number} {group.landmark.phrase}"
-                landmark = Landmark(phrase, level, sided or of_sided)
+                landmark = Landmark(phrase, kind, sided or of_sided)
                 yield one._replace(landmark=landmark)
 
 

@@ -26,10 +26,6 @@ def mirrored_objects(episode: Episode, instruction: Instruction) -> Mapping[str,
     Where the goal counts cubes, a place only tells their color, so all cubes of a color stand for
     one another. No object is given that the instruction means as well.
 
-    Args:
-        episode: whose scene the places are in, before anything moves.
-        instruction: of the episode, in any setting.
-
     Returns:
         For the name of each object that is meant, those that the exchanged words single out; empty
         if no place names left or right, or none of the exchanged places is clear.

@@ -53,11 +53,7 @@ def anaphor(text: str, expression: Expression, slot: str, value: str | int) -> P
 
 
 def fill(template: str, fields: Mapping[str, Phrase], *, plural: bool = False) -> Phrase:
-    """Fill the fields of a template, and choose singular or plural alternatives.
-
-    Raises:
-        KeyError: a field of the template is missing.
-    """
+    """Fill the fields of a template, and choose singular or plural alternatives."""
     pieces: list[TaggedText] = []
     end = 0
     for mark in _MARK.finditer(template):
@@ -108,14 +104,7 @@ def sentences(phrases: Iterable[Phrase]) -> Phrase:
 def speak(
     index: int, stage: UtteranceStage, phrase: Phrase, *, capitalize: bool = True
 ) -> tuple[Utterance, tuple[Mention, ...]]:
-    """Turn a phrase into the utterance of number `index`, and its tags into mentions.
-
-    Args:
-        index: position of the utterance.
-        stage: its part in the discourse.
-        phrase: its words.
-        capitalize: whether its sentences begin with a capital.
-    """
+    """Turn a phrase into the utterance of number `index`, and its tags into mentions."""
     mentions: list[Mention] = []
     start = 0
     for piece in phrase:

@@ -129,11 +129,7 @@ class InstructionRequest:
         return _alternative_numbers(self.task.name, self.episode.scene, self.episode.goal, slot)
 
     def other_colors(self, color: str) -> tuple[Color, ...]:
-        """Return the colors in the task's vocabulary, without this one.
-
-        Raises:
-            InvalidValueError: the task's vocabulary lacks this color.
-        """
+        """Return the colors in the task's vocabulary, without this one."""
         colors = self.task.commands.colors
         if color not in colors:
             raise InvalidValueError(
@@ -169,11 +165,7 @@ class InstructionRequest:
     ) -> Phrase:
         """Return words for the object to handle, given words for its place.
 
-        Args:
-            color: the color that the words stand for.
-            place: words for the place.
-            plural: whether there are several objects.
-            template: ``{place}`` and the words around it; None for those of the task.
+        `template` has ``{place}`` and the words around it; None for those of the task.
 
         Raises:
             NoCommandError: the words from outside have no phrase for the object, only for its cube.

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import replace
 from typing import NamedTuple
 
 from roboirg.core.episode import Episode
@@ -34,20 +35,15 @@ def all_variants() -> tuple[Variant, ...]:
 def expressible_options(
     episode: Episode, wordings: str | None = None
 ) -> Iterator[InstructionOptions]:
-    """Yield every setting, form and combination of options that can express an episode.
-
-    Args:
-        episode: what to say.
-        wordings: identity of an open wording file; None for our own words.
-    """
+    """Yield every setting, form and combination of options that can express an episode."""
     for name in settings_of(get_task(episode.task)):
         wanted = [
-            InstructionOptions(name, wordings=wordings)._replace(**changes)
+            replace(InstructionOptions(name, wordings=wordings), **changes)
             for changes in all_settings()[name].variants
         ]
         possible = [options for options in wanted if find_refusal(episode, options) is None]
         for form, options in itertools.product(FORMS, possible):
-            yield options._replace(form=form)
+            yield replace(options, form=form)
 
 
 def instructions(
@@ -59,16 +55,10 @@ def instructions(
     """Yield the instructions of episodes in every wanted setting and form.
 
     Leaves out a setting that the task lacks, or that cannot express the episode.
-
-    Args:
-        episodes: in order.
-        settings: names.
-        forms: ``implicit``, ``resolved`` or both.
-        options: all others.
     """
     for episode in episodes:
         present = [name for name in settings if name in settings_of(get_task(episode.task))]
         for setting, form in itertools.product(present, forms):
-            wanted = options._replace(setting=setting, form=form)
+            wanted = replace(options, setting=setting, form=form)
             if find_refusal(episode, wanted) is None:
                 yield episode, instruct_with(episode, wanted)

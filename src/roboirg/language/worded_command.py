@@ -75,10 +75,8 @@ class WordedCommand:
     def fits(self, goal: Goal, pointed: Collection[str] = ()) -> bool:
         """Return whether the template tells a goal.
 
-        Args:
-            goal: the goal.
-            pointed: fields that referring expressions fill: the template must have these, and
-                needs no words for their values.
+        It must have the fields in `pointed`, which referring expressions fill, and needs no words
+        for their values.
         """
         values = goal_fields(goal)
         slots = goal.as_mapping()

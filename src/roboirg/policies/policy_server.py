@@ -83,7 +83,7 @@ def open_server(
     listen = found.clients[protocol].transport.load_server()
     try:
         listening = listen(service(make), metadata, options)
-    except OSError as error:
+    except OSError as error:  # of another package's transport
         raise InvalidValueError(
             f"Cannot listen at {options.host}:{options.port} ({error})."
         ) from error

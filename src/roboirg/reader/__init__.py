@@ -111,10 +111,7 @@ def _command_span(sentences: tuple[Sentence, ...]) -> tuple[int, int]:
 def _command_gaps(sentences: tuple[Sentence, ...], first: int, last: int) -> list[ComprehensionGap]:
     """Return what the interpreter does not understand of the command.
 
-    Args:
-        sentences: all of them.
-        first: index of the first commanding sentence.
-        last: index after the last one; the same as `first` if there is no command.
+    It goes from the sentence `first` to the one before `last`; there is none if they are the same.
     """
     negated = [words for words in sentences[:first] if is_negated_command(words)]
     following = [words for words in sentences[last:] if _matters(words)]

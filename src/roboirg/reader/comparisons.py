@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 import itertools
-import re
 from collections.abc import Collection, Iterator
 from typing import NamedTuple
 
 from roboirg.core.episode import Scene, SceneObject
+from roboirg.reader.phrases import Phrases
 
-_COMPARATIVE = re.compile(
-    r"\b(?P<near>nearer|closer)(?: to you)?\b"
-    r"|\b(?:farther|further) (?:over )?(?:to|on) (?:the|your) (?P<side>left|right)\b"
-    r"|\b(?P<far>farther|further)(?: away)?(?: from you)?\b"
-)
+_COMPARATIVE = Phrases({
+    "the cube of another color that is nearer to you": r"\b(?P<near>nearer|closer)(?: to you)?\b",
+    "the one that is farther to the left":
+        r"\b(?:farther|further) (?:over )?(?:to|on) (?:the|your) (?P<side>left|right)\b",
+    "the one that is farther away from you":
+        r"\b(?P<far>farther|further)(?: away)?(?: from you)?\b",
+})  # fmt: skip
 _TIE = 0.01
 """Meters; the same words may mean things that differ by less."""
 
@@ -45,10 +47,7 @@ def compared_colors(
 ) -> set[str]:
     """Return the colors that a comparison of the two things of other colors can mean.
 
-    Args:
-        comparison: the order.
-        scene: where things stand at first.
-        excluded: colors that are not meant; if there are none, any one may be.
+    If no color is excluded, any one may be. Things are compared where they stand at first.
     """
     colored = [item for item in scene.objects if item.color is not None]
     colors = sorted({str(item.color) for item in colored})

@@ -6,12 +6,12 @@ A command with such a part has no goals: a guess would do what the speaker did n
 from __future__ import annotations
 
 import functools
-import re
 from collections.abc import Iterator
 from typing import NamedTuple
 
 from roboirg.reader.command import BEFORE_VERB
 from roboirg.reader.negations import OBJECT, VERB, unread_negations
+from roboirg.reader.phrases import Phrases
 from roboirg.reader.places import place_mentions
 from roboirg.reader.quantities import quantities
 from roboirg.reader.several_amounts import several_amounts
@@ -34,21 +34,34 @@ _LEAD = (
     r"(?:(?:i (?:want|need|ask|would like) you to|(?:can|could|will|would) you"
     r"|you (?:must|should|have to|need to)|try to) )?"
 )
-_UNKNOWN_COMMAND = re.compile(
-    rf"{_LEAD}(?P<verb>\w+) (?:(?:up|down|out|away|off|over) )?(?:{VERB} (?:up )?)?{OBJECT}"
-)
-_AFTER_VERB = re.compile(rf"{OBJECT}|[,;:]|up\b|down\b|$")
+_UNKNOWN_COMMAND = Phrases({
+    "And then I want you to stack the red cube.":
+        rf"{_LEAD}(?P<verb>\w+) (?:(?:up|down|out|away|off|over) )?(?:{VERB} (?:up )?)?{OBJECT}",
+})  # fmt: skip
+_AFTER_VERB = Phrases({
+    "the red cube": OBJECT,
+    ", please": "[,;:]",
+    "up and down": r"up\b|down\b",
+    "": "$",
+})  # fmt: skip
 _BEFORE_UNKNOWN_VERB = BEFORE_VERB | {"you"}
-_COMPARISON = re.compile(r"\b(?P<word>more|fewer|less)\b(?: than \w+)?")
+_COMPARISON = Phrases({"fewer than three": r"\b(?P<word>more|fewer|less)\b(?: than \w+)?"})
 _SWINGING = word_set("swing swinging forth")
 _DIFFERENCES = word_set("difference gap")
-_BOTH_TARGETS = re.compile(
-    r"(?:(?:the|both|two|these|those) )*"
-    r"(?:(?:target|disc)s\b|(?:left|right)\b.{,20}? and (?:the )?(?:left|right)\b"
-    r"|(?:target|disc) .{,20}? and the .{,20}?(?:target|disc)\b)"
-)
-_HIDDEN = re.compile(r"(?:^| )(?!(?:that|which) )\w+ (?:is|was|are|were)(?: hidden)?$")
-_COLORS_WITHOUT_ONE = re.compile(rf"{COLOR} , not {COLOR}\b")
+_BOTH_TARGETS = Phrases(
+    {
+        "both targets": r"(?:target|disc)s\b",
+        "the left and the right one": r"(?:left|right)\b.{,20}? and (?:the )?(?:left|right)\b",
+        "the target on your left and the target on your right":
+            r"(?:target|disc) .{,20}? and the .{,20}?(?:target|disc)\b",
+    },
+    before="(?:(?:the|both|two|these|those) )*",
+)  # fmt: skip
+_HIDDEN = Phrases({
+    "the container that the red cube is hidden":
+        r"(?:^| )(?!(?:that|which) )\w+ (?:is|was|are|were)(?: hidden)?$",
+})  # fmt: skip
+_COLORS_WITHOUT_ONE = Phrases({"green , not green": rf"{COLOR} , not {COLOR}\b"})
 _BELOW = word_set("under below beneath underneath")
 _AFTER_BELOW = ((), (",",), (";",), ("and",), ("then",))
 _LOCATING = PREPOSITIONS | PLACE_WORDS

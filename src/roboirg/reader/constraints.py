@@ -27,13 +27,7 @@ class Constraint(NamedTuple):
 def goal_constraints(
     candidates: Sequence[Goal], command: Command, resolver: ReferenceResolver
 ) -> list[Constraint]:
-    """Return what a goal must pass to fit the command.
-
-    Args:
-        candidates: all goals of the task; they have the same slots.
-        command: the command.
-        resolver: resolves the references of the command.
-    """
+    """Return what a goal must pass to fit the command."""
     slots = candidates[0].as_mapping() if candidates else ()
     constraints: list[Constraint] = []
     if "counts" in slots:

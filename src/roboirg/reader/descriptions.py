@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import re
 from typing import Literal, NamedTuple
 
 from roboirg.reader.comparisons import PlaceComparison, read_comparison
+from roboirg.reader.phrases import Phrases
 from roboirg.reader.places import NamedPlace, read_places
 from roboirg.reader.temporal_relations import Time, mentioned_times
 from roboirg.reader.tokens import COLOR, Sentence, color_of, colors_in, ordinal_of, word_set
@@ -15,15 +15,17 @@ _POINTED = word_set("cube box tape one color")
 _PLACE_NOUNS = word_set("place spot position location")
 _SERIES_NOUNS = word_set("visit placement time pass placing stay occasion")
 _FORMER = {"former": 0, "latter": -1}
-_CHOSEN = re.compile(
-    r"\b(?:the|my) (?P<noun>cubes?|box|container|tapes?|ones?|color|place|spot) i "
-    r"(?:mean|meant|want|wanted|asked for|favor|chose|choose|prefer|preferred|decided on"
-    r"|settled on|picked|selected|opted for)\b"
-)
-_OTHERS = re.compile(
-    r"\bthe (?:other (?P<noun>cubes?|ones?|box|container|tape|place|spot)|others)\b"
-    r"(?! (?:of|in|from|than)\b)"
-)
+_CHOSEN = Phrases({
+    "the cube I want":
+        r"\b(?:the|my) (?P<noun>cubes?|box|container|tapes?|ones?|color|place|spot) i "
+        r"(?:mean|meant|want|wanted|asked for|favor|chose|choose|prefer|preferred|decided on"
+        r"|settled on|picked|selected|opted for)\b",
+})  # fmt: skip
+_OTHERS = Phrases({
+    "the other one":
+        r"\bthe (?:other (?P<noun>cubes?|ones?|box|container|tape|place|spot)|others)\b"
+        r"(?! (?:of|in|from|than)\b)",
+})  # fmt: skip
 
 DescriptionKind = Literal[
     "any", "color", "not", "other", "place", "introduced", "introduced place", "compared"
@@ -55,17 +57,32 @@ class Description(NamedTuple):
     comparison: PlaceComparison | None = None
 
 
-_THAN = re.compile(
-    r"\b(other than|different from|different to|differs from|unlike|"
-    r"not (in|of|among|one of|part of)|neither|except|apart from|outside|"
-    r"(another|(a|an|some|any) (different|other|new|distinct|alternative|separate)) color)\b"
-)
-_OTHER_OF = re.compile(
-    r"\bthe other (?:one |color )?(?:of|in|from)\b(?! (?:the |those |these )?(?:two )?moments)"
-)
-_ONE_NOT = re.compile(r"\bthe (?:one|color) (?:of|in|from)\b.*\b(?:not|other than|except)\b")
-_EITHER_NOT = re.compile(rf"\b{COLOR} or {COLOR} , not {COLOR}\b")
-_NOT = re.compile(rf"\b(?:not|other than|except) (?:in |for |the )?({COLOR})\b")
+_THAN = Phrases(
+    {
+        "a color other than red": "other than",
+        "a color different from red": "different from|different to|differs from|unlike",
+        "a cube that is not in those colors": "not (?:in|of|among|one of|part of)",
+        "the cube that is neither red nor blue": "neither",
+        "any color except red": "except|apart from|outside",
+        "a cube of another color":
+            "(?:another|(?:a|an|some|any) (?:different|other|new|distinct|alternative|separate))"
+            " color",
+    },
+    before=r"\b",
+    after=r"\b",
+)  # fmt: skip
+_COMPLEMENT = Phrases({
+    "the other color of those two":
+        r"\bthe other (?:one |color )?(?:of|in|from)\b"
+        r"(?! (?:the |those |these )?(?:two )?moments)",
+    "the one of these two that is not red":
+        r"\bthe (?:one|color) (?:of|in|from)\b.*\b(?:not|other than|except)\b",
+    "red or green, not green": rf"\b{COLOR} or {COLOR} , not {COLOR}\b",
+})  # fmt: skip
+_NOT = Phrases({
+    "the one of these two that is not red":
+        rf"\b(?:not|other than|except) (?:in |for |the )?({COLOR})\b",
+})  # fmt: skip
 
 
 def describe(words: Sentence) -> Description:
@@ -78,7 +95,7 @@ def describe(words: Sentence) -> Description:
     places = read_places(words)
     if places:
         return Description("place", place=places[0], times=mentioned_times(text))
-    if _OTHER_OF.search(text) or _ONE_NOT.search(text) or _EITHER_NOT.search(text):
+    if _COMPLEMENT.search(text):
         return _complement(text, colors)
     if _THAN.search(text):
         return Description("not", colors)
@@ -96,8 +113,8 @@ def _complement(text: str, colors: tuple[str, ...]) -> Description:
 
 def _choice(text: str) -> Description | None:
     """Read ``the cube I want`` and ``the other one``: the chosen value comes first."""
-    for pattern, position in ((_CHOSEN, 0), (_OTHERS, 1)):
-        found = pattern.search(text)
+    for phrases, position in ((_CHOSEN, 0), (_OTHERS, 1)):
+        found = phrases.search(text)
         if found:
             placed = found["noun"] in _PLACE_NOUNS
             kind: DescriptionKind = "introduced place" if placed else "introduced"

@@ -3,21 +3,30 @@
 from __future__ import annotations
 
 import functools
-import re
 from collections.abc import Iterable
 from typing import NamedTuple
 
 from roboirg.reader.ordinals import named_positions
+from roboirg.reader.phrases import Phrases
 from roboirg.reader.places import NamedPlace, read_places
 from roboirg.reader.quantities import plain_numbers, quantities
 from roboirg.reader.temporal_relations import PressRelation, Time, mentioned_times, named_moments
 from roboirg.reader.tokens import COLOR, Sentence, colors_in
 
-_DISMISSAL = re.compile(
-    r"\b(never mind|nothing to do with|not matter|not that it matters|no matter|ignore"
-    r"|forget (about )?(it|that|this|them)|irrelevant|not important|unimportant|regardless"
-    r"|not for you)\b"
+_DISMISSAL = Phrases(
+    {
+        "Never mind that.": "never mind|ignore|regardless",
+        "That has nothing to do with you.": "nothing to do with",
+        "Not that it matters.": "not that it matters|not matter|no matter",
+        "Forget about that.": "forget (?:about )?(?:it|that|this|them)",
+        "That is not important.": "not important|unimportant|irrelevant",
+        "That is not for you.": "not for you",
+    },
+    before=r"\b",
+    after=r"\b",
 )
+_OF_COLOR = Phrases({"of the red cubes": rf"\s*(?:cubes? )?(?:of )?(?:the )?({COLOR})s?\b"})
+"""What follows a number of cubes."""
 
 
 class Remark(NamedTuple):
@@ -90,7 +99,7 @@ def _amounts(text: str) -> tuple[tuple[str, int], ...]:
     """Return the colors and numbers of ``two of the red cubes and a blue one``."""
     found: list[tuple[str, int]] = []
     for one in quantities(text):
-        after = re.match(rf"\s*(?:cubes? )?(?:of )?(?:the )?({COLOR})s?\b", text[one.end :])
+        after = _OF_COLOR.match(text, one.end)
         if one.plain and after and one.expression.quantity is not None:
             found.append((after[1], one.expression.quantity))
     return tuple(found)

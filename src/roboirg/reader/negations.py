@@ -9,6 +9,8 @@ from __future__ import annotations
 
 import re
 
+from roboirg.reader.phrases import Phrases
+from roboirg.reader.temporal_relations import NOT_NAMED, NOT_THAT
 from roboirg.reader.tokens import COLOR, NUMBER, THING, Sentence
 from roboirg.reader.vocabulary import GERUNDS, VERBS, may_be_verb
 
@@ -24,39 +26,59 @@ _REMARK = r"(?:forget|worry|mind|hesitate|matter|care)\b"
 """Verbs whose negation forbids nothing: ``do not forget to press the button``."""
 _START = r"(?:^|[,;:] |\b(?:and|but|then|so|or|also|you|now|first|finally|try) )"
 _NOT = r"(?:not|dont|never)(?: (?:to|ever|even)\b)*"
-_PROHIBITION = re.compile(
-    rf"{_START}(?:(?:do|must|should|may|can|will) )?{_NOT} (?!{_REMARK})"
-    rf"(?:{VERB}|(?P<verb>\w+) {OBJECT})"
-    rf"|{_START}(?:avoid|refrain from) (?:{OBJECT}|(?P<gerund>\w+)\b)"
-    r"|\b(?:do|does|did|would) not (?:want|need|wish|like|expect|have|ask)"
-    rf"(?: \w+){{0,3}} to {VERB}"
-)
-_NEGATION = re.compile(
-    r"(?:\b(?:do|does|did|must|should|may|can|will|would|is|are) )?"
-    r"\b(?P<negation>not|never|dont|avoid|refrain|no|none|nothing|nor|without|instead|rather than"
-    rf"|minus(?= {NUMBER}\b)|stop(?= (?:{'|'.join(sorted(GERUNDS))})\b)"
-    rf"|neither(?= (?:the )?(?:{COLOR}|{THING}|container)\b)"
-    rf"|(?:all|any|every|anything|everything)(?: \w+){{0,2}} but(?! (?:to|then|first|{VERB})))\b"
-    rf"(?: (?:to|ever|even|from|of|the|an?|any)\b)*(?: {COLOR}\b)?(?: (?!and\b|or\b)\w+)?"
-)
+_DO_NOT = rf"{_START}(?:(?:do|must|should|may|can|will) )?{_NOT} (?!{_REMARK})"
+_PROHIBITION = Phrases({
+    "You must not put the red cube into the bin.": rf"{_DO_NOT}{VERB}",
+    "Do not stack the red cubes.": rf"{_DO_NOT}(?P<verb>\w+) {OBJECT}",
+    "Avoid the red cube.": rf"{_START}(?:avoid|refrain from) {OBJECT}",
+    "Avoid putting the red cube into the bin.":
+        rf"{_START}(?:avoid|refrain from) (?P<gerund>\w+)\b",
+    "I do not want you to put the red cube into the bin.":
+        r"\b(?:do|does|did|would) not (?:want|need|wish|like|expect|have|ask)"
+        rf"(?: \w+){{0,3}} to {VERB}",
+})  # fmt: skip
+_NEGATION = Phrases(
+    {
+        "Put the red cube not in the bin.": "not|never|dont",
+        "Avoid the red cube.": "avoid|refrain",
+        "Put no red cubes into the bin.": "no|none|nothing",
+        "Put the red cube nor the blue one into the bin.": "nor",
+        "Put the blue cube instead of the red cube into the bin.": "without|instead|rather than",
+        "Put minus two red cubes into the bin.": rf"minus(?= {NUMBER}\b)",
+        "Stop putting red cubes into the bin.": rf"stop(?= (?:{'|'.join(sorted(GERUNDS))})\b)",
+        "Put neither cube into the bin.":
+            rf"neither(?= (?:the )?(?:{COLOR}|{THING}|container)\b)",
+        "Put all cubes but the red ones into the bin.":
+            r"(?:all|any|every|anything|everything)(?: \w+){0,2}"
+            rf" but(?! (?:to|then|first|{VERB}))",
+    },
+    before=r"(?:\b(?:do|does|did|must|should|may|can|will|would|is|are) )?\b(?P<negation>",
+    after=rf")\b(?: (?:to|ever|even|from|of|the|an?|any)\b)*(?: {COLOR}\b)?"
+    r"(?: (?!and\b|or\b)\w+)?",
+)  # fmt: skip
 _FIXTURE = r"(?:the |a |any )?(?:bin|button|container|target|table|disc)\b"
-_READ_ELSEWHERE = tuple(
-    re.compile(pattern)
-    for pattern in (
+_OF_COLORS = r"\b(?:painted|colored|with|in|is|are) neither"
+_READ_ELSEWHERE = Phrases({
+    "Take a cube whose color is not among those.":
         rf"\bnot (?:in|of|among|one of|part of)\b(?! {_FIXTURE})",
+    "Take the one of these two that is not blue.":
         r"\bthe (?:one|color|other|other one|other color) (?:of|in|from)\b.*?\bnot\b",
-        r"\bnot (?:the |one |right |just |moment |at |directly )*(?:before|after)\b",
-        r"\bnot (?:at |in )?(?:that|this|it|the one|the moment|when)\b",
+    "Put it where it was when it was not before but after the press.": NOT_NAMED,
+    "Put it where it was placed, but not at that moment.": NOT_THAT,
+    "Put it where it was at whichever of the two I did not choose.":
         r"\bwhichever\b.*?\bnot\b",
-        rf"\bnot {_REMARK}",
+    "Do not forget to press the button.": rf"\bnot {_REMARK}",
+    "Put it where it was at the moment she did not choose.":
         r"\b(?:she|he) (?:would|did|does) not\b",
-        rf"\bno {NUMBER}\b",
-        rf"\b(?:painted|colored|with|in|is|are) neither {COLOR} n?or {COLOR}\b",
-        r"\b(?:painted|colored|with|in|is|are) neither of (?:those|these|them|the two)\b",
+    "Stop the cube on visit no 3.": rf"\bno {NUMBER}\b",
+    "Take the cube that is neither red nor blue.": rf"{_OF_COLORS} {COLOR} n?or {COLOR}\b",
+    "Take the cube that is neither of those.": rf"{_OF_COLORS} of (?:those|these|them|the two)\b",
+    "Take the cube in the other color, so red or green, not green.":
         rf"\b{COLOR} or {COLOR} , not {COLOR}\b",
+    "Stop the cube on the visit whose number is that minus 4.":
         rf"\b(?:that|it|this|{NUMBER}) minus\b",
-    )
-)
+})  # fmt: skip
+"""Ways that other modules read; they may overlap."""
 
 
 def is_negated_command(words: Sentence) -> bool:
@@ -67,7 +89,9 @@ def is_negated_command(words: Sentence) -> bool:
 def unread_negations(words: Sentence) -> tuple[str, ...]:
     """Return the words of the negations that no other module reads."""
     text = " ".join(words)
-    read = [found for pattern in _READ_ELSEWHERE for found in pattern.finditer(text)]
+    read = [
+        found for pattern in _READ_ELSEWHERE.by_example.values() for found in pattern.finditer(text)
+    ]
     prohibitions = _prohibitions(text)
     return tuple(
         found[0]

@@ -15,15 +15,7 @@ from roboirg.reader.temporal_relations import Time
 def objects_at(
     place: Place, scene: Scene, kind: str, times: Collection[Time], *, mirrored: bool
 ) -> tuple[SceneObject, ...]:
-    """Return what stands at a place at one of these times, or at any time for no times.
-
-    Args:
-        place: the place.
-        scene: everything on the table, and what moves.
-        kind: kind of the things to compare.
-        times: before or after things move.
-        mirrored: whether left and right are those of the front camera's picture.
-    """
+    """Return what stands at a place at one of these times, or at any time for no times."""
     found: list[str] = []
     if "at first" in times or not times:
         found += [item.name for item in find_objects(place, scene, kind, mirrored=mirrored)]

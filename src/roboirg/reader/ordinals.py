@@ -6,40 +6,53 @@ import re
 from collections.abc import Collection
 from typing import Literal, NamedTuple
 
+from roboirg.reader.phrases import Phrases
 from roboirg.reader.quantities import CountExpression, read_value
 from roboirg.reader.tokens import NUMBER, ORDINAL, number_of, ordinal_of
 
 Base = int | Literal["that", "last"]
 
 _NOUN = r"(?:visit|placement|pass|passage|stay|time|occasion|placing)"
-_ELEMENT = re.compile(
-    rf"\b(?P<ordinal>{ORDINAL}|last|final) (?:\w+ )?{_NOUN}\b"
-    rf"|\b{_NOUN} (?:number |no )?(?P<number>{NUMBER})\b(?! (?:after|before|visits|placements))"
-)
+_ELEMENT = Phrases({
+    "during the third visit": rf"\b(?P<ordinal>{ORDINAL}|last|final) (?:\w+ )?{_NOUN}\b",
+    "during visit number 3":
+        rf"\b{_NOUN} (?:number |no )?(?P<number>{NUMBER})\b(?! (?:after|before|visits|placements))",
+})  # fmt: skip
 _ACTS = (
     "reache[sd]|arrive[sd]|passe[sd]|stop(?:s|ped)|move[sd]|goes|went|enter(?:s|ed)|return(?:s|ed)"
 )
-_BASE = re.compile(
-    rf"\s*(?P<that>that|it|this)\b(?! (?:is|was|has|{_ACTS})\b)"
-    rf"|\s*(?:the |its )?(?P<ordinal>{ORDINAL}|last|final)\b"
-    rf"|\s*(?:(?:the )?{_NOUN} )?(?:number )?(?P<number>{NUMBER})\b"
-)
-_STEP = re.compile(
-    rf"\b(?:(?P<step>right|just|directly|immediately|{NUMBER})(?: {_NOUN}s?)? )?"
-    r"(?P<way>after|before|following|preceding|later than|earlier than|behind|ahead of)\b"
-    r"(?! (?:the )?(?:button|press|pressing|placing|taking))"
-)
-_NEXT = re.compile(rf"\bthe (?:very )?(?P<way>next|following|previous|preceding) (?:one|{_NOUN})\b")
-_NEIGHBOR = re.compile(
-    r"\b(?:neighbor\w* (?:of|to)|adjacent to|next to|(?:just |right )?before or after)\b"
-)
-_PENULTIMATE = re.compile(
-    rf"\b(?P<rank>{ORDINAL}|next) (?:to|from) (?:the )?last\b|\bpenultimate\b"
-)
-_BARE = re.compile(rf"\b(?:its|the|placed) (?P<ordinal>{ORDINAL}|last)\b")
-_POINTER = re.compile(
-    rf"\b(?:that|this|the same) (?:very )?(?:one|number|{_NOUN})\b|\bthe {_NOUN} i\b"
-)
+_BASE = Phrases({
+    "that": rf"\s*(?P<that>that|it|this)\b(?! (?:is|was|has|{_ACTS})\b)",
+    "the fourth": rf"\s*(?:the |its )?(?P<ordinal>{ORDINAL}|last|final)\b",
+    "number 4": rf"\s*(?:(?:the )?{_NOUN} )?(?:number )?(?P<number>{NUMBER})\b",
+})  # fmt: skip
+"""What a step, or a neighbor, counts from; the words after those of the step."""
+_STEP = Phrases({
+    "during the visit two before the fourth":
+        rf"\b(?:(?P<step>right|just|directly|immediately|{NUMBER})(?: {_NOUN}s?)? )?"
+        r"(?P<way>after|before|following|preceding|later than|earlier than|behind|ahead of)\b"
+        r"(?! (?:the )?(?:button|press|pressing|placing|taking))",
+})  # fmt: skip
+_NEXT = Phrases({
+    "during the very next one":
+        rf"\bthe (?:very )?(?P<way>next|following|previous|preceding) (?:one|{_NOUN})\b",
+})  # fmt: skip
+_NEIGHBOR = Phrases({
+    "the placement that is a neighbor of that":
+        r"\b(?:neighbor\w* (?:of|to)|adjacent to|next to|(?:just |right )?before or after)\b",
+})  # fmt: skip
+_PENULTIMATE = Phrases({
+    "its second to last visit": rf"\b(?P<rank>{ORDINAL}|next) (?:to|from) (?:the )?last\b",
+    "its penultimate visit": r"\bpenultimate\b",
+})  # fmt: skip
+_BARE = Phrases({
+    "the target on which it was placed third":
+        rf"\b(?:its|the|placed) (?P<ordinal>{ORDINAL}|last)\b",
+})  # fmt: skip
+_POINTER = Phrases({
+    "during that very visit": rf"\b(?:that|this|the same) (?:very )?(?:one|number|{_NOUN})\b",
+    "during the visit I mentioned": rf"\bthe {_NOUN} i\b",
+})  # fmt: skip
 _LATER = ("after", "following", "later than", "behind", "next")
 
 
@@ -59,12 +72,9 @@ class OrdinalExpression(NamedTuple):
     def results(
         self, positions: Collection[int], numbers: Collection[int], length: int
     ) -> set[int] | None:
-        """Return the numbers of the possible elements; None for any element.
+        """Return the numbers of the possible elements of a series; None for any element.
 
-        Args:
-            positions: introduced elements.
-            numbers: introduced numbers.
-            length: number of elements of the series.
+        `positions` and `numbers` are the elements and the numbers that the context introduces.
         """
         elements = set(range(1, length + 1))
         if self.value is not None:

@@ -289,13 +289,8 @@ def find_objects(
 ) -> tuple[SceneObject, ...]:
     """Return what stands at a place among the things of one kind; several for near ties.
 
-    Cubes that appear later are not compared; containers appear together.
-
-    Args:
-        place: the place.
-        scene: everything on the table.
-        kind: kind of the things to compare.
-        mirrored: whether left and right are those of the front camera's picture.
+    Cubes that appear later are not compared; containers appear together. If `mirrored`, left and
+    right are those of the front camera's picture.
     """
     return _find(place, _present(scene, kind), scene, mirrored=mirrored)
 

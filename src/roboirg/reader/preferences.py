@@ -2,15 +2,21 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterable
 
 from roboirg.reader.discourse_context import DiscourseContext
+from roboirg.reader.phrases import Phrases
 from roboirg.reader.temporal_relations import PressRelation, named_moments
 from roboirg.reader.tokens import Sentence
 
-_FIRST = re.compile(r"\b(?:prefers?|likes?|loves?|chose|chooses|picked|keeps)\b")
-_LAST = re.compile(r"\b(?:trades?|swapped|gave up|gives up|skips?|dropped|leaves)\b.*\bfor\b")
+_FIRST = Phrases({
+    "She prefers the moment before the press to the one after it.":
+        r"\b(?:prefers?|likes?|loves?|chose|chooses|picked|keeps)\b",
+})  # fmt: skip
+_LAST = Phrases({
+    "She gave up the moment before the press for the one after it.":
+        r"\b(?:trades?|swapped|gave up|gives up|skips?|dropped|leaves)\b.*\bfor\b",
+})  # fmt: skip
 
 
 def preferred_moment(words: Sentence) -> PressRelation | None:

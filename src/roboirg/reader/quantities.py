@@ -6,6 +6,7 @@ import re
 from collections.abc import Callable, Iterable
 from typing import Literal, NamedTuple
 
+from roboirg.reader.phrases import Phrases
 from roboirg.reader.tokens import COLOR, NUMBER, THING, THINGS, Sentence, number_of
 
 _CONCEIVABLE = range(1, 11)
@@ -61,21 +62,30 @@ _TO = (
 )
 _MORE = "more|larger|greater|higher|bigger|above|over"
 _LESS = "fewer|less|smaller|lower|below|under"
-_STEP = re.compile(
-    rf"\b(?P<step>{NUMBER}){_NOUNS}{{0,3}} (?P<way>{_MORE}|{_LESS}){_NOUNS}{{0,5}}(?: than)? {_TO}"
-)
-_PLUS = re.compile(rf"\b(?P<quantity>that|it|this|{NUMBER}) (?P<way>plus|minus) (?P<step>{NUMBER})")
-_SCALED = re.compile(
-    rf"\b(?P<factor>twice|double|thrice|triple|half|{NUMBER} times)"
-    rf"(?: as (?:many|often|much){_NOUNS}{{0,5}} as| of| the| as)? {_TO}"
-)
-_SAME = re.compile(
-    r"\b(?:that|as|this|so|equally) (?:many|often)\b"
-    r"|\b(?:that|this|the same) (?:number|amount) of\b"
-    r"|\bmy (?:\w+ )?number of\b|\bthe number of times(?= i\b)"
-)
-_SOME = re.compile(r"\ba (?:couple|pair) of\b")
-_ADVERB = re.compile(r"\b(?:once(?! (?:you|it|that|the|all|this))|twice|thrice)\b")
+_STEP = Phrases({
+    "two more red cubes than that":
+        rf"\b(?P<step>{NUMBER}){_NOUNS}{{0,3}} (?P<way>{_MORE}|{_LESS}){_NOUNS}{{0,5}}(?: than)? "
+        f"{_TO}",
+})  # fmt: skip
+_PLUS = Phrases({
+    "that minus 4":
+        rf"\b(?P<quantity>that|it|this|{NUMBER}) (?P<way>plus|minus) (?P<step>{NUMBER})",
+})  # fmt: skip
+_SCALED = Phrases({
+    "half as many green cubes as 8":
+        rf"\b(?P<factor>twice|double|thrice|triple|half|{NUMBER} times)"
+        rf"(?: as (?:many|often|much){_NOUNS}{{0,5}} as| of| the| as)? {_TO}",
+})  # fmt: skip
+_SAME = Phrases({
+    "that many of them": r"\b(?:that|as|this|so|equally) (?:many|often)\b",
+    "the same number of blue cubes": r"\b(?:that|this|the same) (?:number|amount) of\b",
+    "my lucky number of blue cubes": r"\bmy (?:\w+ )?number of\b",
+    "the number of times I mentioned": r"\bthe number of times(?= i\b)",
+})  # fmt: skip
+_SOME = Phrases({"a couple of red cubes": r"\ba (?:couple|pair) of\b"})
+_ADVERB = Phrases({
+    "Put it on the target twice.": r"\b(?:once(?! (?:you|it|that|the|all|this))|twice|thrice)\b",
+})  # fmt: skip
 _NOT_AFTER = (
     "the", "that", "this", "those", "these", "which", "other", "another", "every", "each", "any",
     "some", "no", "than", "as", "from", "red", "green", "blue", "yellow", "gray", "purple",
@@ -83,21 +93,23 @@ _NOT_AFTER = (
 )  # fmt: skip
 _POINTED = "".join(rf"(?<!\b{word} )" for word in _NOT_AFTER)
 """After one of these words a number word only points: ``those two``, ``the red one``."""
-_PLAIN = re.compile(
-    rf"{_POINTED}\b(?P<number>{NUMBER})\b(?! times as)"
-    rf"|(?<=\b(?:this|that) )(?P<times>{NUMBER})(?= times\b(?! as))"
-)
-_SINGLE = re.compile(
-    r"(?<!\bas )(?<!\bthan )(?<!\bto )(?<!\bfrom )(?<!\bof )(?<!\bhides )(?<!\bover )"
-    rf"\b(?:an?|the)(?: single)? (?={COLOR} (?:{THING}|one)\b)"
-)
+_PLAIN = Phrases({
+    "three red cubes": rf"{_POINTED}\b(?P<number>{NUMBER})\b(?! times as)",
+    "I say this three times": rf"(?<=\b(?:this|that) )(?P<times>{NUMBER})(?= times\b(?! as))",
+})  # fmt: skip
+_SINGLE = Phrases({
+    "a blue cube":
+        r"(?<!\bas )(?<!\bthan )(?<!\bto )(?<!\bfrom )(?<!\bof )(?<!\bhides )(?<!\bover )"
+        rf"\b(?:an?|the)(?: single)? (?={COLOR} (?:{THING}|one)\b)",
+})  # fmt: skip
 _TOTALS = ("total", "sum")
 _FACTORS = {"twice": 2.0, "double": 2.0, "thrice": 3.0, "triple": 3.0, "half": 0.5}
 ADVERBS = {"once": 1, "twice": 2, "thrice": 3}
 """Numbers of repetitions in one word."""
-_TIMES = re.compile(r" (?:times?|rounds?|turns?|occasions?|cycles?)\b")
+_TIMES = Phrases({"three times": r" (?:times?|rounds?|turns?|occasions?|cycles?)\b"})
+"""What follows a number of repetitions."""
 
-Reading = tuple[re.Pattern[str], Callable[[re.Match[str]], CountExpression], bool]
+Reading = tuple[Phrases, Callable[[re.Match[str]], CountExpression], bool]
 
 
 def _stepped(found: re.Match[str]) -> CountExpression:
@@ -137,14 +149,14 @@ _READINGS: tuple[Reading, ...] = (
     ),
     (_SINGLE, lambda _found: CountExpression(quantity=1), True),
 )
-"""Pattern, reader, and whether it is a plain number; of two that overlap, the first one counts."""
+"""Phrases, reader, and whether it is a plain number; of two that overlap, the first one counts."""
 
 
 def quantities(text: str) -> tuple[Quantity, ...]:
     """Return all quantities of a sentence, in order."""
     found: list[Quantity] = []
-    for pattern, read, plain in _READINGS:
-        for match in pattern.finditer(text):
+    for phrases, read, plain in _READINGS:
+        for match in phrases.finditer(text):
             start, end = match.span()
             if all(end <= one.start or one.end <= start for one in found):
                 found.append(Quantity(read(match), start, end, plain))

@@ -12,30 +12,58 @@ from collections.abc import Iterable
 from typing import TypeVar
 
 from roboirg.reader.discourse_context import DiscourseContext
+from roboirg.reader.phrases import Phrases
 from roboirg.reader.tokens import Sentence
 
 Value = TypeVar("Value")
 
 _SAID = r"(?: that)? i (?:just )?(?:mentioned|named|said|listed)"
-_POINTER = re.compile(
-    r"\bthe (?P<rank>former|latter)\b(?: one)?"
-    rf"|\bthe (?P<ordinal>first|second|last) (?:ones?|\w+){_SAID}\b"
-    rf"|\bthe (?:ones?|\w+){_SAID} (?P<time>first|earlier|second|last|later)\b"
-    r"|\bthe (?P<other>other)(?: (?:ones?|cubes?|box|tape|container|place|number|visit|placement"
-    r"|moment))?\b"
-)
+_POINTER = Phrases({
+    "I want the former.": r"\bthe (?P<rank>former|latter)\b(?: one)?",
+    "I want the first color I mentioned.":
+        rf"\bthe (?P<ordinal>first|second|last) (?:ones?|\w+){_SAID}\b",
+    "I want the one I mentioned first.":
+        rf"\bthe (?:ones?|\w+){_SAID} (?P<time>first|earlier|second|last|later)\b",
+    "I want the other one.":
+        r"\bthe (?P<other>other)(?: (?:ones?|cubes?|box|tape|container|place|number|visit"
+        r"|placement|moment))?\b",
+})  # fmt: skip
 _FIRST = ("former", "first", "earlier")
-_ACCEPTED = re.compile(
-    r"\b(?:why not|not (?:do |be |live )?without|not (?:give up|trade|miss|swap|exchange)|but|for)$"
+_ACCEPTED = Phrases(
+    {
+        "Why not": "why not",
+        "I could not live without": r"not (?:do |be |live )?without",
+        "I would not give up": "not (?:give up|trade|miss|swap|exchange)",
+        "Not the latter, but": "but",
+        "I would go for": "for",
+    },
+    before=r"\b",
+    after="$",
 )
-_REJECTED = re.compile(
-    r"(?:\bnot(?: (?:do|mean|want|choose|like|need|prefer))?"
-    r"|\b(?:leave|left|rule|ruled) out|\bset|\b(?:forget|never mind|skip|ignore)(?: about)?"
-    r"|\b(?:gave|give) up|\b(?:instead of|rather than)|\b(?:swapped|swap|exchanged)"
-    r"|\b(?:prefer(?:red)?|favor|better|more|chose|rather)\b.* (?:to|than|over)"
-    r"|\bno (?:means|case|longer|way)|\banything but|\bwithout)$"
-)
-_REJECTED_AFTER = re.compile(r"^(?:[,;] )?no [,;]|^(?:is|are|was) (?:out|not|off)\b")
+"""Ways to accept a pointer by the words before it."""
+_REJECTED = Phrases(
+    {
+        "I do not want": r"\bnot(?: (?:do|mean|want|choose|like|need|prefer))?",
+        "You may leave out": r"\b(?:leave|left|rule|ruled) out",
+        "Set": r"\bset",
+        "Forget about": r"\b(?:forget|never mind|skip|ignore)(?: about)?",
+        "I gave up": r"\b(?:gave|give) up",
+        "I want the latter instead of": r"\b(?:instead of|rather than)",
+        "I swapped": r"\b(?:swapped|swap|exchanged)",
+        "I prefer the latter to":
+            r"\b(?:prefer(?:red)?|favor|better|more|chose|rather)\b.* (?:to|than|over)",
+        "By no means": r"\bno (?:means|case|longer|way)",
+        "I want anything but": r"\banything but",
+        "I would be happy without": r"\bwithout",
+    },
+    after="$",
+)  # fmt: skip
+"""Ways to set a pointer aside by the words before it, unless they accept it."""
+_REJECTED_AFTER = Phrases({
+    ", no, the latter": "^(?:[,;] )?no [,;]",
+    "is out of the question": r"^(?:is|are|was) (?:out|not|off)\b",
+})  # fmt: skip
+"""Ways to set a pointer aside by the words after it."""
 
 
 @functools.lru_cache(maxsize=8192)

@@ -6,15 +6,17 @@ import re
 from collections.abc import Collection, Iterator
 from typing import NamedTuple
 
+from roboirg.reader.phrases import Phrases
 from roboirg.reader.quantities import CountExpression
 from roboirg.reader.tokens import COLOR, NUMBER, number_of
 
-_THOSE = re.compile(r"\b(?:exactly|just|precisely) (?:those|these)\b")
-_EACH = re.compile(
-    rf"\b(?:(?P<step>{NUMBER}) (?P<way>more|fewer)|(?P<factor>twice|half) as many) of each\b"
-    rf"(?: (?:than|as) (?P<named>(?:(?:, |and )?{NUMBER} {COLOR} (?:cubes? ?)?)+))?"
-)
-_AMOUNT = re.compile(rf"(?P<number>{NUMBER}) (?P<color>{COLOR})")
+_THOSE = Phrases({"exactly those": r"\b(?:exactly|just|precisely) (?:those|these)\b"})
+_EACH = Phrases({
+    "half as many of each as four red and six green cubes":
+        rf"\b(?:(?P<step>{NUMBER}) (?P<way>more|fewer)|(?P<factor>twice|half) as many) of each\b"
+        rf"(?: (?:than|as) (?P<named>(?:(?:, |and )?{NUMBER} {COLOR} (?:cubes? ?)?)+))?",
+})  # fmt: skip
+_AMOUNT = Phrases({"four red and six green cubes": rf"(?P<number>{NUMBER}) (?P<color>{COLOR})"})
 _FACTORS = {"twice": 2.0, "half": 0.5}
 
 

@@ -7,47 +7,69 @@ from collections.abc import Collection
 from typing import Literal, NamedTuple
 
 from roboirg.core.conditions import Fact
+from roboirg.reader.phrases import Phrases
 
 PressRelation = Literal["before", "after"]
 Time = Literal["at first", "at last"]
 MOMENTS: tuple[PressRelation, PressRelation] = ("before", "after")
 
-_PRESS = re.compile(r"\b(?:press|pressed|presses|pressing|push|pushed|pushing|button)\b")
+_PRESS = Phrases({
+    "before the button was pressed":
+        r"\b(?:press|pressed|presses|pressing|push|pushed|pushing|button)\b",
+})  # fmt: skip
 _WORD: dict[str, PressRelation] = {
     "before": "before", "prior to": "before", "preceding": "before", "preceded": "before",
     "after": "after", "following": "after", "followed": "after",
 }  # fmt: skip
-_NAMED = re.compile(
-    r"\b(before|prior to|preceding|preceded|after|following|followed)\b"
-    r"(?! (?:that|this|which|watching|seeing|(?:the|this) (?:video|demonstration))\b)"
-)
-_EITHER = re.compile(r"\b(?:just |right )?before or after\b")
-_NEIGHBOR = re.compile(
-    rf"\b(?:neighbor\w*|neighboring|adjacent|next to|beside)\b|{_EITHER.pattern}"
-)
-_OTHER = re.compile(
-    r"(?<!\bcolor )\bother (?:one |moment )?(?:of|moment|time|point|than)\b|\bthe other one\b"
-    r"|\bnot (?:at |in )?(?:that|this|it|the one|the moment|when)\b|\bwhichever\b.*\bnot\b"
-    r"|\bthe moment s?he (?:(?:would|did|does) not|(?:would )?(?:skip|give up|gave up|left out))\b"
-)
-_NOT = re.compile(r"\bnot (?:the |one |right |just |moment |at |directly )*(before|after)\b")
-_POINTER = re.compile(
-    r"\b(?:that|this|the same) (?:very )?(?:moment|time|point|instant|part|placement|one)\b"
-    r"|\bthe moment (?:i|s?he|of (?:her|his) choice)\b"
-    r"|\b(?:her|his) (?:favorite|preferred) moment\b"
-    r"|\bthen\b(?! (?:press|take|put|place|set|to|go|pick|lift|push)\b)"
-)
+_NAMED = Phrases({
+    "before the button was pressed":
+        r"\b(before|prior to|preceding|preceded|after|following|followed)\b"
+        r"(?! (?:that|this|which|watching|seeing|(?:the|this) (?:video|demonstration))\b)",
+})  # fmt: skip
+_EITHER_SIDE = r"\b(?:just |right )?before or after\b"
+_NEIGHBOR = Phrases({
+    "at the placement next to that": r"\b(?:neighbor\w*|adjacent|next to|beside)\b",
+    "at the placement right before or after that": _EITHER_SIDE,
+})  # fmt: skip
+NOT_THAT = r"\bnot (?:at |in )?(?:that|this|it|the one|the moment|when)\b"
+"""A regular expression for ``not at that moment``."""
+NOT_NAMED = r"\bnot (?:the |one |right |just |moment |at |directly )*(before|after)\b"
+"""A regular expression for ``not the one right before the press``; a group has the moment."""
+_OTHER = Phrases({
+    "at the other of the two moments":
+        r"(?<!\bcolor )\bother (?:one |moment )?(?:of|moment|time|point|than)\b",
+    "I named one moment; put it where it was at the other one.": r"\bthe other one\b",
+    "not at that moment": NOT_THAT,
+    "at whichever he would not choose": r"\bwhichever\b.*\bnot\b",
+    "at the moment she would skip":
+        r"\bthe moment s?he (?:(?:would|did|does) not"
+        r"|(?:would )?(?:skip|give up|gave up|left out))\b",
+})  # fmt: skip
+_NOT = Phrases({"when it was not before but after the press": NOT_NAMED})
+_POINTER = Phrases({
+    "at that very moment":
+        r"\b(?:that|this|the same) (?:very )?(?:moment|time|point|instant|part|placement|one)\b",
+    "at the moment of her choice": r"\bthe moment (?:i|s?he|of (?:her|his) choice)\b",
+    "at his favorite moment": r"\b(?:her|his) (?:favorite|preferred) moment\b",
+    "where it was then": r"\bthen\b(?! (?:press|take|put|place|set|to|go|pick|lift|push)\b)",
+})  # fmt: skip
 
 _MOVED = r"(?:moved?|moves|moving|swapped|changed|exchanged|shuffled|started|began)"
 _SUBJECT = r"(?:(?:any|every|some)\w+|all|they|it|things|the \w+|the swaps|any of \w+)"
-_AT_FIRST = re.compile(
-    rf"\b(?:before|until) {_SUBJECT} (?:\w+ )?{_MOVED}\b|\bbefore (?:the )?(?:\w+ )?{_MOVED}\b"
-    r"|\b(?:originally|initially|to begin with|at first|at the (?:start|beginning|outset)"
-    r"|in the beginning)\b"
-)
-_AT_LAST = re.compile(
-    rf"\bafter {_SUBJECT} (?:\w+ )?{_MOVED}\b|\b(?:stands?|is|are) now\b|\bnow (?:stands?|is|are)\b"
-)
+_AT_FIRST = Phrases({
+    "the container that stood there before anything moved":
+        rf"\b(?:before|until) {_SUBJECT} (?:\w+ )?{_MOVED}\b",
+    "the container that stood there before moving": rf"\bbefore (?:the )?(?:\w+ )?{_MOVED}\b",
+    "the container that stood there at the start":
+        r"\b(?:originally|initially|to begin with|at first|at the (?:start|beginning|outset)"
+        r"|in the beginning)\b",
+})  # fmt: skip
+_AT_LAST = Phrases({
+    "the container that is there after everything has moved":
+        rf"\bafter {_SUBJECT} (?:\w+ )?{_MOVED}\b",
+    "the container that is now there": r"\b(?:stands?|is|are) now\b",
+    "the container that now stands there": r"\bnow (?:stands?|is|are)\b",
+})  # fmt: skip
 
 
 class TemporalRelation(NamedTuple):
@@ -68,7 +90,7 @@ def named_moments(text: str) -> tuple[PressRelation, ...]:
     """Return the moments about the button press that a sentence names, in order."""
     if not _PRESS.search(text):
         return ()
-    text = _EITHER.sub("", text)
+    text = re.sub(_EITHER_SIDE, "", text)
     return tuple(_WORD[found[1]] for found in _NAMED.finditer(text))
 
 

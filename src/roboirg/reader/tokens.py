@@ -10,7 +10,7 @@ Sentence = tuple[str, ...]
 _WORD = re.compile(
     r"[0-9]+(?:st|nd|rd|th)\b|[0-9]+[.][0-9]+|[^\W\d_]+(?:'[^\W\d_]+)?|[0-9]+|[,;:]|[^\W_]"
 )
-_SENTENCE_END = re.compile(r"(?:[.](?![0-9])|[!?\n。！？¿¡।])+")
+_SENTENCE_END = re.compile(r"(?:[.](?![0-9])|[!?\n])+")
 _MINUS = re.compile(r"(?<!\w)[-−](?=[0-9])")
 _SPELLINGS = (
     ("’", "'"),

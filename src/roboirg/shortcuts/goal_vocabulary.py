@@ -37,11 +37,7 @@ GoalVocabulary = Mapping[str, SlotVocabulary]
 
 @functools.cache
 def goal_vocabulary(task: str) -> GoalVocabulary:
-    """Return the slots of a task's goals, with all values that occur in any scene of train.
-
-    Raises:
-        UnknownNameError: there is no such task.
-    """
+    """Return the slots of a task's goals, with all values that occur in any scene of train."""
     found: dict[str, list[SlotValue]] = {}
     for episode in split_episodes([task], [SPLIT]):
         for goal in get_task(task).goals(episode.scene):

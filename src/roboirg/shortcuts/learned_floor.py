@@ -23,11 +23,7 @@ Place = tuple[str, int]
 
 
 def check_learning_support() -> None:
-    """Check early that the floor can be learned.
-
-    Raises:
-        MissingDependencyError: scikit-learn is not installed.
-    """
+    """Check early that the floor can be learned."""
     with extra_needed("The learned floor needs scikit-learn", "report"):
         import sklearn.linear_model  # noqa: F401
 
@@ -39,10 +35,6 @@ class LearnedFloor:
 
     Args:
         told: instructions of the task to learn from, with their episodes.
-
-    Raises:
-        InvalidValueError: there are none.
-        MissingDependencyError: scikit-learn is not installed.
     """
 
     def __init__(self, told: Sequence[Told]) -> None:

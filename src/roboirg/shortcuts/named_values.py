@@ -64,12 +64,9 @@ class NamedValue(NamedTuple):
 
 
 def named_values(text: str, slot: str, vocabulary: SlotVocabulary) -> tuple[NamedValue, ...]:
-    """Return every mention of a slot's values in a text, in order.
+    """Return every mention of a slot's values in an instruction, in order.
 
-    Args:
-        text: an instruction; its last sentence is taken for the command.
-        slot: name of the slot.
-        vocabulary: of that slot.
+    Its last sentence is taken for the command.
     """
     sentences = _sentences(text)
     return tuple(
@@ -108,10 +105,7 @@ def pointed_value(text: str) -> int | None:
 def part_count(text: str, thing: str, vocabulary: GoalVocabulary) -> int:
     """Return how many things a command seems to ask for, by its ranks, values and nouns.
 
-    Args:
-        text: an instruction.
-        thing: the noun for what the task handles.
-        vocabulary: of the task.
+    `thing` is the noun for what the task handles.
     """
     words = command_words(text)
     stated = [

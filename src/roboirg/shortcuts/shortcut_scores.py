@@ -75,11 +75,7 @@ def _overlap(guess: Goal, goal: Goal, slot: str) -> Fraction:
 
 
 def score_rule(rule: str, told: Told) -> ShortcutScore:
-    """Score a surface rule, which sees the text of the instruction only.
-
-    Raises:
-        UnknownNameError: there is no such rule.
-    """
+    """Score a surface rule, which sees the text of the instruction only."""
     episode, instruction = told
     guess = guess_goal(rule, instruction.text, episode.task)
     slots = tuple(slot_share(guess, slot, episode.goal[slot]) for slot in hidden_slots(told))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from rich.table import Table
 
@@ -68,10 +68,6 @@ def shortcut_rows(
         seeds: number of random scenes for each task, beyond the splits.
         by: what to break each setting down by.
         learned: whether to train the learned floors, on the train split with the same options.
-
-    Raises:
-        InvalidValueError: the number of random scenes is negative.
-        MissingDependencyError: floors are to be learned, and scikit-learn is not installed.
     """
     if seeds < 0:
         raise InvalidValueError(f"The number of random seeds is {seeds}; it must be at least 0.")
@@ -124,7 +120,7 @@ def _learned_scores(
     }
     for task in tasks:
         seen = list(split_episodes((task,), (TRAINING_SPLIT,)))
-        plain = options._replace(form="implicit")
+        plain = replace(options, form="implicit")
         explicit = LearnedFloor(list(_told(seen, (EXPLICIT,), plain)))
         for setting in settings:
             tested = [one for one in told if (one[0].task, one[1].setting) == (task, setting)]

@@ -30,16 +30,7 @@ TextGuess = Mapping[str, tuple[Candidates, ...]]
 
 @functools.lru_cache(maxsize=1024)
 def guess_goal(rule: str, text: str, task: str) -> TextGuess:
-    """Return what a rule makes of a text.
-
-    Args:
-        rule: a name in `SURFACE_RULES`.
-        text: an instruction of the task, the whole prompt.
-        task: name of the task.
-
-    Raises:
-        UnknownNameError: there is no such rule or task.
-    """
+    """Return what one of `SURFACE_RULES` makes of a whole prompt of a task."""
     if rule not in SURFACE_RULES:
         raise UnknownNameError("rule", rule, SURFACE_RULES)
     vocabulary = goal_vocabulary(task)

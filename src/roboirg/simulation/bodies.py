@@ -103,11 +103,7 @@ BodyBuilder = Callable[[sapien.Scene, SceneObject, bool], Body]
 
 
 def build(scene: sapien.Scene, item: SceneObject, *, visible: bool) -> Body:
-    """Add an object to a scene, with or without its visual shapes.
-
-    Raises:
-        UnknownNameError: its kind has no builder.
-    """
+    """Add an object to a scene, with or without its visual shapes."""
     builder = BODY_BUILDERS.get(item.kind)
     if builder is None:
         raise UnknownNameError("kind of object", item.kind, BODY_BUILDERS)
@@ -148,14 +144,7 @@ def _rgba(item: SceneObject, usual: Rgba) -> Rgba:
 def finish_body(
     builder: ActorBuilder, scene: sapien.Scene, item: SceneObject, body_type: str
 ) -> Body:
-    """Build an actor at its object's place in the scene.
-
-    Args:
-        builder: of the actor, with all its shapes.
-        scene: of the simulator.
-        item: the object.
-        body_type: ``"dynamic"`` or ``"kinematic"``.
-    """
+    """Build an actor with all its shapes at its object's place, ``dynamic`` or ``kinematic``."""
     builder.set_scene(scene)
     builder.set_physx_body_type(body_type)
     builder.set_initial_pose(_pose(item, item.position))

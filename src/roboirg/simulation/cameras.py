@@ -58,25 +58,20 @@ class _DrawnState:
 
 
 class Cameras:
-    """The two cameras of a scene.
+    """The two cameras of a scene whose bodies are all built.
 
     A camera draws again only if something in its view has moved.
-
-    Args:
-        scene: the scene, with all bodies built.
-        robot: the robot with the wrist camera.
-        rendering: how pictures are drawn.
     """
 
     def __init__(
         self, scene: sapien.Scene, robot: Panda, rendering: RenderSettings = FAITHFUL
     ) -> None:
         self._scene = scene
-        shader = slim_shader() if rendering.slim_shader else None
+        shader = slim_shader() if rendering.slim_shader else ""  # SAPIEN's own
         fixed = sapien.Entity()
         fixed.name = "front_camera"
-        self._color = STOCK_COLOR if shader is None else COLOR
-        self._components = {name: _make_camera(name, shader or "") for name in CAMERAS}
+        self._color = COLOR if shader else STOCK_COLOR
+        self._components = {name: _make_camera(name, shader) for name in CAMERAS}
         fixed.add_component(self._components[FRONT])
         fixed.set_pose(look_at(FRONT_EYE, FRONT_TARGET))
         scene.add_entity(fixed)

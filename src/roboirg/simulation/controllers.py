@@ -33,12 +33,7 @@ class Controller(Protocol):
 
 
 def make_controller(space: ActionSpace, robot: Panda) -> Controller:
-    """Create a controller for one episode.
-
-    Args:
-        space: the action space.
-        robot: the robot to move; its gripper is assumed to be open.
-    """
+    """Create a controller for one episode; the robot's gripper is assumed to be open."""
     return _CONTROLLERS[space.name](robot)
 
 
@@ -61,11 +56,7 @@ class ToolPoseController:
         self._planner = _make_planner(robot)
 
     def trajectories(self, action: NDArray[np.float64]) -> Iterator[JointTrajectory]:
-        """Yield one control step.
-
-        Raises:
-            MotionPlanningError: no joint positions reach the pose.
-        """
+        """Yield one control step."""
         try:
             arm = self._planner.inverse_kinematics(self._robot.arm_positions, tool_pose(action))
         except MotionPlanningError as error:
@@ -84,11 +75,7 @@ class WaypointController:
         self._gripper = OPEN
 
     def trajectories(self, action: NDArray[np.float64]) -> Iterator[JointTrajectory]:
-        """Yield the move with the gripper unchanged, then six steps if it opens or closes.
-
-        Raises:
-            MotionPlanningError: the pose cannot be reached.
-        """
+        """Yield the move with the gripper unchanged, then six steps if it opens or closes."""
         try:
             path = self._planner.plan_move(self._robot.arm_positions, tool_pose(action))
         except MotionPlanningError as error:

@@ -29,11 +29,6 @@ def _do_nothing(stage: Stage) -> None:
 class EpisodeSession:
     """One episode, from its start.
 
-    Args:
-        episode: the episode to play.
-        visible: whether pictures can be drawn.
-        rendering: how pictures are drawn.
-
     Attributes:
         world: the simulator.
         judge: follows all stages, those of the demonstration first.

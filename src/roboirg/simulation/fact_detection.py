@@ -60,10 +60,6 @@ class FactDetector:
     """Detects the facts of one world.
 
     It keeps the last ones: some facts start and cease at different thresholds, or last.
-
-    Args:
-        bodies: every object of the scene, by name.
-        robot: the robot.
     """
 
     def __init__(self, bodies: Mapping[str, Body], robot: Panda) -> None:

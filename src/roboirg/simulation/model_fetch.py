@@ -47,10 +47,6 @@ def fetch_model_files(wheel: Path | None, say: Callable[[str], None]) -> Path:
     Args:
         wheel: ManiSkill's wheel on this machine; None downloads it.
         say: receives a line for each step that takes time.
-
-    Raises:
-        InvalidValueError: the wheel is not ManiSkill 3.0.1's, or the folder cannot be written.
-        MissingDependencyError: the download failed.
     """
     if wheel is not None and not _is_right(wheel):
         problem = f"not {WHEEL}" if wheel.is_file() else "not a file"
@@ -117,11 +113,7 @@ def _download_with_pip(folder: Path) -> None:
 
 
 def download_resumably(url: str, path: Path) -> None:
-    """Download a file; a later call continues where an interrupted one stopped.
-
-    Raises:
-        MissingDependencyError: the server cannot be reached, refuses, or breaks off.
-    """
+    """Download a file; a later call continues where an interrupted one stopped."""
     part = path.with_suffix(".part")
     have = part.stat().st_size if part.exists() else 0
     request = urllib.request.Request(url, headers={"Range": f"bytes={have}-"})  # noqa: S310

@@ -57,20 +57,12 @@ class ModelFiles:
 
 @functools.cache
 def find_model_files() -> ModelFiles:
-    """Return the model files, located and verified once per process.
-
-    Raises:
-        MissingDependencyError: they are nowhere, or are not those of ManiSkill 3.0.1.
-    """
+    """Return the model files, located and verified once per process."""
     return look_for_model_files()
 
 
 def look_for_model_files() -> ModelFiles:
-    """Locate and verify the model files without caching.
-
-    Raises:
-        MissingDependencyError: they are nowhere, or are not those of ManiSkill 3.0.1.
-    """
+    """Locate and verify the model files without caching."""
     problems = []
     for root in _folders():
         problem = _problem_of(root)
@@ -87,11 +79,7 @@ def look_for_model_files() -> ModelFiles:
 
 
 def fetched_folder() -> Path:
-    """Return the folder to which the model files are fetched, which may not exist.
-
-    Raises:
-        MissingDependencyError: platformdirs is not installed.
-    """
+    """Return the folder to which the model files are fetched, which may not exist."""
     if chosen := os.environ.get(FOLDER_VARIABLE):
         return Path(chosen).expanduser()
     try:

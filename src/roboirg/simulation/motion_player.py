@@ -36,12 +36,7 @@ class MotionContext(NamedTuple):
 
 
 class MotionPlayer:
-    """Plays all motions of a scene.
-
-    Args:
-        motions: the motions to play.
-        bodies: the scene's objects by name.
-    """
+    """Plays all motions of a scene."""
 
     def __init__(self, motions: Sequence[Motion], bodies: Bodies) -> None:
         spots = (Point(10.0 + _SPACING * index, 10.0, 10.0) for index in range(len(motions)))

@@ -50,12 +50,7 @@ class ObservationSpec(NamedTuple):
         return self._replace(cameras=cameras)
 
     def validated(self) -> ObservationSpec:
-        """Return this spec, with the cameras as a tuple, if it is valid.
-
-        Raises:
-            UnknownNameError: a camera does not exist.
-            InvalidValueError: a value is invalid, or depth or calibration has no camera.
-        """
+        """Return this spec, with the cameras as a tuple, if it is valid."""
         check_demonstration_frames(self.demonstration_frames)
         check_observe_every(self.observe_every)
         cameras = check_cameras(self.cameras)
@@ -77,10 +72,6 @@ class ObservationSpec(NamedTuple):
 
 class ObservationBuilder:
     """Reads observations of one world.
-
-    Args:
-        world: the world to read.
-        spec: fields to read.
 
     Attributes:
         proprioception: the robot's proprioception.

@@ -163,11 +163,9 @@ class Panda:
     def grasps(
         self, body: sapien.physx.PhysxBaseComponent, contacts: list[sapien.physx.PhysxContact]
     ) -> bool:
-        """Return whether both fingers push the body hard enough against their opening direction.
+        """Return whether both fingers push a body hard enough against their opening direction.
 
-        Args:
-            body: the object's physics component.
-            contacts: contacts of the last physics step.
+        `contacts` are those of the last physics step.
         """
         for finger, sign in zip(self._fingers, (1.0, -1.0), strict=True):
             force = _force_on(finger, body, contacts)

@@ -17,10 +17,6 @@ CAMERA = "front"
 class PixelGrounding:
     """Follows the stages of one episode; draws only until a stage's object is visible.
 
-    Args:
-        bodies: the scene's objects by name.
-        cameras: cameras of the same world.
-
     Attributes:
         text: the current subgoal, with ``at <y, x>`` (row and column in the front picture) from
             the first frame in which the stage is due and its object visible.
@@ -34,10 +30,9 @@ class PixelGrounding:
         self.text = ""
 
     def update(self, stage: Stage | None) -> None:
-        """Update the text; call after every control step.
+        """Update the text for the published stage; None, after the last one, keeps it.
 
-        Args:
-            stage: the published stage; None, after the last one, keeps the text.
+        Call it after every control step.
         """
         if stage is None:
             return

@@ -24,11 +24,7 @@ class ProprioceptiveState(TypedDict):
 
 
 class Proprioception:
-    """Reads a robot's proprioception; unwraps the tool's angles so that they never jump.
-
-    Args:
-        robot: the robot to read.
-    """
+    """Reads a robot's proprioception; unwraps the tool's angles so that they never jump."""
 
     def __init__(self, robot: Panda) -> None:
         self._robot = robot

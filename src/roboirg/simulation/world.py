@@ -94,23 +94,14 @@ class World:
         self._stages.setdefault(index, self.elapsed)
 
     def picture(self, camera: str) -> NDArray[np.uint8]:
-        """Return the current picture of a camera, RGB, shape (256, 256, 3).
-
-        Raises:
-            UnknownNameError: the camera does not exist.
-            InvalidValueError: the world was built without pictures.
-        """
+        """Return the current picture of a camera, RGB, shape (256, 256, 3)."""
         if camera not in CAMERAS:
             raise UnknownNameError("camera", camera, CAMERAS)
         return self.cameras.picture(camera)
 
     @property
     def cameras(self) -> Cameras:
-        """The cameras of this world.
-
-        Raises:
-            InvalidValueError: the world was built without pictures.
-        """
+        """The cameras of this world."""
         if self._cameras is None:
             raise InvalidValueError("This world was built without pictures (visible=False).")
         return self._cameras
@@ -121,11 +112,7 @@ _drawing_processes: set[int] = set()
 
 
 def check_drawing_process() -> None:
-    """Remember that this process draws.
-
-    Raises:
-        RoboIRGError: a process from which it was forked had drawn.
-    """
+    """Remember that this process draws, and refuse if one from which it was forked had drawn."""
     if _drawing_processes - {os.getpid()}:
         raise RoboIRGError(
             "This process was forked from one that had drawn pictures, and the renderer's threads "

@@ -44,11 +44,7 @@ def every_task() -> Mapping[str, Task]:
 
 
 def get_task(name: str) -> Task:
-    """Return the task of that name.
-
-    Raises:
-        UnknownNameError: there is none; the message lists all and names the nearest.
-    """
+    """Return the task of that name."""
     try:
         return every_task()[name]
     except KeyError:
@@ -60,9 +56,6 @@ def find_tasks(words: Iterable[str]) -> tuple[str, ...]:
 
     Returns:
         Their names, each once: those of ``all`` first, the others in the order of the words.
-
-    Raises:
-        UnknownNameError: a word is none of these.
     """
     in_turn = sorted(words, key=lambda word: word.lower() != ALL)
     return tuple(dict.fromkeys(name for word in in_turn for name in _expand(word)))

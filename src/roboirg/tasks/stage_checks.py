@@ -14,13 +14,7 @@ ROBOT = "robot"
 
 
 def check_stages(task: str, scene: Scene, stages: Iterable[Stage]) -> None:
-    """Check that each fact that stages expect or forbid is one that can hold in a scene.
-
-    Raises:
-        UnknownNameError: a fact is of no known kind.
-        InvalidValueError: a fact is about an object that the scene lacks, or of a kind that the
-            fact is never about.
-    """
+    """Check that each fact that stages expect or forbid is one that can hold in a scene."""
     kinds = {item.name: item.kind for item in scene.objects} | {ROBOT: ROBOT}
     for stage in stages:
         for condition in (stage.expects, *stage.forbids):

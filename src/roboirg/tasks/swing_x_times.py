@@ -69,11 +69,7 @@ def make_scene(
 ) -> Scene:
     """Return the scene in which each target lights up while the cube of the goal is over it.
 
-    Args:
-        button: the button.
-        cubes: all cubes.
-        targets: in the order of `SIDES`.
-        cube: name of the goal's cube.
+    `targets` are in the order of `SIDES`.
     """
     markers = [
         marker_over(target, f"marker_{side}") for side, target in zip(SIDES, targets, strict=True)

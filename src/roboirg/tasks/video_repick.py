@@ -74,12 +74,8 @@ def make_scene(
 ) -> Scene:
     """Return the scene whose video shows a cube picked up and put down, and then swaps.
 
-    Args:
-        button: the button.
-        cubes: all cubes.
-        target: name of the cube of the video.
-        initiators: names of the cubes that start a swap, in order.
-        partners: names of those with whom they change places, where known; else the nearest.
+    `initiators` are the names of the cubes that start a swap, in order; each changes places with
+    the nearest cube, or with its partner where that is known.
     """
     motions = plan_swaps(
         cubes,

@@ -17,9 +17,6 @@ def replacing(path: Path) -> Iterator[Path]:
 
     If the block raises, the partial file is removed and `path` stays as it was. Readers see the
     old or the new content, never a part, and the content is on the disk before the name is.
-
-    Raises:
-        InvalidValueError: the file cannot be written.
     """
     part = path.with_name(f".{path.name}.{secrets.token_hex(8)}.part")
     try:
@@ -35,11 +32,7 @@ def replacing(path: Path) -> Iterator[Path]:
 
 
 def write_atomically(path: Path, content: str | bytes) -> None:
-    """Replace a file by a text (as UTF-8) or by bytes, as `replacing` does.
-
-    Raises:
-        InvalidValueError: the file cannot be written.
-    """
+    """Replace a file by a text (as UTF-8) or by bytes, as `replacing` does."""
     with replacing(path) as part:
         part.write_bytes(content.encode() if isinstance(content, str) else content)
 

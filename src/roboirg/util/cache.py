@@ -124,11 +124,7 @@ class Cache:
 
 
 def open_cache(kind: Kind) -> Cache:
-    """Return the cache of one kind of entries, as the environment variables configure it.
-
-    Raises:
-        InvalidValueError: ``ROBOIRG_CACHE_GIB`` is not a positive number.
-    """
+    """Return the cache of one kind of entries, as the environment variables configure it."""
     folder = cache_folder()
     if folder is None:
         return Cache(None, 0)

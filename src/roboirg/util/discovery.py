@@ -52,9 +52,7 @@ def discover(package: ModuleType, attribute: str, kind: type[Thing], group: str)
 def entry_names(group: str, package: str | None = None) -> tuple[str, ...]:
     """Return the names of the installed entry points of a group; nothing is imported.
 
-    Args:
-        group: of the entry points.
-        package: only those that name something in this package; None for all.
+    With a package, only of those that name something in it.
     """
     entries = _sorted_entry_points(group)
     return tuple(
@@ -68,9 +66,6 @@ def find_entry(name: str, attribute: str, kind: type[Thing], group: str) -> Thin
     """Return what the entry point of a name defines; None if no package has one of that name.
 
     Imports that one only. The other arguments are those of `discover`.
-
-    Raises:
-        InvalidValueError: it cannot be loaded, or is of another kind.
     """
     chosen = [entry for entry in _sorted_entry_points(group) if entry.name == name]
     return next((_load(entry, attribute, kind, group) for entry in chosen), None)

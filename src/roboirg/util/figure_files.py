@@ -25,11 +25,7 @@ _STYLE: Mapping[str, object] = {
 
 
 def check_figure_support() -> None:
-    """Check early that figures can be drawn.
-
-    Raises:
-        MissingDependencyError: matplotlib is not installed.
-    """
+    """Check early that figures can be drawn."""
     with extra_needed("Figures need matplotlib", "report"):
         import matplotlib as mpl  # noqa: F401
 
@@ -55,10 +51,6 @@ def save_figure(
 
     Returns:
         The files.
-
-    Raises:
-        MissingDependencyError: matplotlib is not installed.
-        InvalidValueError: the folder is not writable.
     """
     check_figure_support()
     import matplotlib as mpl

@@ -61,11 +61,7 @@ def sample_evenly(frames: Pixels, most: int) -> Pixels:
 
 
 def encode_png(picture: Picture) -> bytes:
-    """Return a picture as a PNG file.
-
-    Raises:
-        MissingDependencyError: PyAV is not installed.
-    """
+    """Return a picture as a PNG file."""
     _check_pyav()
     import av
 
@@ -87,11 +83,7 @@ def encode_jpeg(pixels: Pixels) -> bytes:
 
 
 def encode_mp4(clip: Clip) -> bytes:
-    """Return a clip as an MP4 file, H.264.
-
-    Raises:
-        MissingDependencyError: PyAV is not installed.
-    """
+    """Return a clip as an MP4 file, H.264."""
     _check_pyav()
     import av
 

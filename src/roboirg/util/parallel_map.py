@@ -26,10 +26,6 @@ def parallel_map(
         work: a function that can be pickled.
         items: its arguments, one for each call.
         workers: number of processes; 0 runs all calls in this process.
-
-    Raises:
-        InvalidValueError: a negative number of workers.
-        RoboIRGError: a worker process died.
     """
     if workers < 0:
         raise InvalidValueError(f"workers is {workers}; it must be at least 0, this process only.")

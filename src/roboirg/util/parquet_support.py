@@ -6,10 +6,6 @@ from roboirg.core.extras import extra_needed
 
 
 def check_parquet_support() -> None:
-    """Check early that Parquet files can be written.
-
-    Raises:
-        MissingDependencyError: pyarrow is not installed.
-    """
+    """Check early that Parquet files can be written."""
     with extra_needed("Parquet files need pyarrow", "export"):
         import pyarrow.parquet  # noqa: F401 - an extra

@@ -1,4 +1,4 @@
-"""What the system tells of its processor."""
+"""The processor, and how many of its cores are used."""
 
 from __future__ import annotations
 
@@ -7,12 +7,17 @@ import os
 import platform
 from pathlib import Path
 
+from roboirg.core.errors import InvalidValueError
+
+WORKERS_VARIABLE = "ROBOIRG_WORKERS"
+"""Environment variable with the number of worker processes of commands."""
+
 _FAMILY = ("vendor_id", "cpu family", "CPU implementer", "CPU architecture")
 """Of x86 the first two, of ARM the others."""
 
 
 def processor_model() -> str:
-    """Return the model of the processor; empty where the system does not tell."""
+    """Return the model of the processor; empty where the system does not say."""
     return _fields().get("model name", platform.processor())
 
 
@@ -36,7 +41,7 @@ def processor_features() -> str:
 
 @functools.cache
 def _fields() -> dict[str, str]:
-    """Return what Linux tells of the first processor; empty elsewhere."""
+    """Return what Linux says of the first processor; empty elsewhere."""
     try:
         lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
     except OSError:
@@ -49,3 +54,20 @@ def core_count() -> int:
     if hasattr(os, "sched_getaffinity"):
         return len(os.sched_getaffinity(0))
     return os.cpu_count() or 1
+
+
+def worker_count(typed: int | None = None) -> int:
+    """Return how many worker processes a command uses; 0 is this process only.
+
+    Args:
+        typed: as typed; None for the number in ``ROBOIRG_WORKERS``, or one per core without it.
+
+    Raises:
+        InvalidValueError: the variable does not hold a number.
+    """
+    text = os.environ.get(WORKERS_VARIABLE)
+    if typed is not None or not text:
+        return core_count() if typed is None else typed
+    if not text.isdecimal():
+        raise InvalidValueError(f"{WORKERS_VARIABLE} is {text!r}; it must be a number from 0.")
+    return int(text)

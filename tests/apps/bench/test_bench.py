@@ -1,83 +1,62 @@
-"""The bench: medians against goals, and rows that need a package that is not there."""
+"""The bench: rounds, medians, ratios, and the file of the command."""
 
 from __future__ import annotations
 
-import io
 import json
-import re
-import runpy
 from pathlib import Path
 
 import pytest
-from rich.console import Console
+from typer.testing import CliRunner
 
-from roboirg.apps.bench.bench_runner import (
-    markdown_table,
-    read_figures,
-    results_table,
-    run_measures,
-    write_results,
-)
-from roboirg.apps.bench.measures import Measure
+from roboirg.apps.bench import measures
+from roboirg.apps.bench.bench_runner import Measure, run_measures
 from roboirg.core.errors import InvalidValueError
+from roboirg.main import app
 
-ROOT = Path(__file__).parents[3]
 
-
-def test_a_row_whose_package_is_not_installed_says_so(tmp_path: Path) -> None:
+def test_baselines_are_timed_once_a_round_and_greater_ratios_are_better() -> None:
     asked: list[str] = []
 
     def rate(name: str, value: float) -> float:
         asked.append(name)
         return value
 
+    def base() -> float:
+        return rate("base", 4.0)
+
     rows = (
-        Measure("pace", lambda: rate("ours", 8.0), lambda: rate("base", 4.0), "one", 1.5, "1/h",
-                inverse=True),
-        Measure("memory", lambda: rate("memory", 0.25), None, "", 0.5, "GiB"),
-        Measure("model", lambda: rate("model", 1.0), lambda: 1.0, "one", 1.5, package="no_such"),
-    )  # fmt: skip
-    pace, memory, model = run_measures(rows, 2, lambda _text: None)
-    assert asked == ["base", "ours", "memory"] * 2
-    assert (pace.value, pace.ratio, pace.reached) == (8.0, 2.0, True)
-    assert (memory.value, memory.ratio, memory.reached) == (0.25, None, True)
-    assert (model.value, model.ratio, model.reached) == (None, None, False)
-    console = Console(file=io.StringIO(), width=150)
-    console.print(results_table([pace, memory, model]))
-    text = console.file.getvalue()  # type: ignore[attr-defined]
-    assert "no_such is not installed" in text
-    assert "2.00 x" in text
-    write_results([pace, memory, model], tmp_path / "rounds.json", load=0.5)
-    figures = json.loads((tmp_path / "rounds.json").read_text())["figures"]
-    assert [one["missing"] for one in figures] == ["", "", "no_such"]
+        Measure("pace", lambda: rate("pace", 8.0), base, "one", "1/h"),
+        Measure("time", lambda: rate("time", 8.0), base, "one", "s"),
+        Measure("memory", lambda: rate("memory", 0.25), None, "", "GiB"),
+    )
+    pace, seconds, memory = run_measures(rows, 2, lambda _text: None)
+    assert asked == ["base", "pace", "time", "memory"] * 2
+    assert (pace.value, pace.ratio) == (8.0, 2.0)
+    assert (seconds.value, seconds.ratio) == (8.0, 0.5)
+    assert (memory.value, memory.ratio) == (0.25, None)
+    with pytest.raises(InvalidValueError, match="rounds is 0"):
+        run_measures(rows, 0, lambda _text: None)
 
 
-def test_a_file_of_results_is_kept_up_to_date(tmp_path: Path) -> None:
-    path = tmp_path / "bench.json"
-
-    def measured(**values: float) -> None:
-        rows = [
-            Measure(name, lambda value=value: value, None, "", 0.5, "s")
-            for name, value in values.items()
-        ]
-        write_results(run_measures(rows, 1, lambda _text: None), path, load=0.5)
-
-    measured(first=1234.0, second=2.0)
-    measured(second=3.0, third=4.0)
-    figures = read_figures(path)
-    assert [(one["name"], one["value"]) for one in figures] == [
-        ("first", 1234.0), ("second", 3.0), ("third", 4.0),
-    ]  # fmt: skip
-    assert all(one["date"] and one["machine"] and one["load"] == 0.5 for one in figures)
-    assert "| first | 1,234 s |  |  | at most 0.5 s |" in markdown_table(figures)
-    path.write_text("[]")
-    with pytest.raises(InvalidValueError, match="holds no results of bench"):
-        measured(first=1.0)
-
-
-def test_the_performance_page_shows_the_file_and_no_page_has_figures_of_its_own() -> None:
-    script = runpy.run_path(str(ROOT / "scripts" / "write_bench_table.py"))
-    assert script["PAGE"].read_text() == script["page_text"]()
-    for page in ROOT.glob("docs/*.md"):
-        if page.name != "performance.md":
-            assert not re.search(r"\d steps a second (behind|in process)|\d 1/s", page.read_text())
+def test_the_command_writes_every_round_to_a_new_file(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    values = iter([1.0, 3.0, 2.0])
+    row = Measure("a step", lambda: next(values), lambda: 4.0, "stock", "s")
+    monkeypatch.setattr(measures, "measures", lambda: (row,))
+    path = tmp_path / "rounds.json"
+    words = ["bench", "--rounds", "3", "--out", str(path)]
+    done = CliRunner().invoke(app, words)
+    assert done.exit_code == 0, done.output
+    assert "2.00 x" in done.output
+    (figure,) = json.loads(path.read_text())["figures"]
+    assert (figure["ours"], figure["value"], figure["ratio"]) == ([1.0, 3.0, 2.0], 2.0, 2.0)
+    assert figure["machine"]
+    assert figure["date"]
+    before = path.read_bytes()
+    again = CliRunner().invoke(app, words)
+    assert isinstance(again.exception, InvalidValueError)
+    assert "must name a new file" in str(again.exception)
+    assert path.read_bytes() == before
+    lost = CliRunner().invoke(app, [*words[:-1], str(tmp_path / "missing" / "rounds.json")])
+    assert "is in no folder that exists" in str(lost.exception)

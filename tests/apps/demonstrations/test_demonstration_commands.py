@@ -3,6 +3,7 @@
 import sys
 
 import pytest
+from plan_files import plan_file
 
 from roboirg import main as cli
 from roboirg.apps.demonstrations import dataset_replay
@@ -60,7 +61,7 @@ def test_an_export_tells_its_progress_and_its_end(roboirg, tmp_path, synthetic):
         (("--episodes", "101"), "There is no episode 100"),
         (("--actions", "tool"), "There is no description of actions 'tool'"),
         (("--policy", "oracel"), "Did you mean 'oracle'?"),
-        (("--forms", "literal"), "There is no form 'literal'"),
+        (("--plan", plan_file(forms="literal")), "There is no form 'literal'"),
     ],
 )
 def test_bad_input_is_one_sentence(roboirg, tmp_path, words, message):
@@ -70,6 +71,7 @@ def test_bad_input_is_one_sentence(roboirg, tmp_path, words, message):
     assert err.count("\n") == 1
 
 
+@pytest.mark.usefixtures("in_this_process")
 def test_a_replay_prints_what_deviates(roboirg, export, monkeypatch):
     root = export(tasks=("PickXtimes",), episodes=(0, 2))
 
@@ -79,12 +81,13 @@ def test_a_replay_prints_what_deviates(roboirg, export, monkeypatch):
         return ReplayResult(recorded.name, recorded.task, status, "success", 3, 6, final, final)
 
     monkeypatch.setattr(dataset_replay, "replay", replay)
-    code, out, _ = roboirg("replay", root, "--workers", "0")
+    code, out, _ = roboirg("replay", root)
     assert code == 2
     assert "PickXtimes/train/2/0: failure after 3 of 6 steps (recorded: success)" in out
     assert "2 trajectories: 1 with the same verdict, 1 also with a final state" in out
 
 
+@pytest.mark.usefixtures("in_this_process")
 def test_a_stopped_replay_goes_on_where_it_was(roboirg, export, monkeypatch, tmp_path):
     root, log = export(tasks=("PickXtimes",), episodes=(0, 2)), tmp_path / "replay.jsonl"
     played = []
@@ -94,18 +97,18 @@ def test_a_stopped_replay_goes_on_where_it_was(roboirg, export, monkeypatch, tmp
         return ReplayResult(recorded.name, recorded.task, "success", "success", 6, 6, 0.0, 0.0)
 
     monkeypatch.setattr(dataset_replay, "replay", replay)
-    whole = roboirg("replay", root, "--workers", "0", "--log", log)
+    whole = roboirg("replay", root, "--log", log)
     lines = log.read_text()
     log.write_text(lines[:-9])  # stopped in the middle of a line
-    assert roboirg("replay", root, "--workers", "0", "--log", log) == whole
+    assert roboirg("replay", root, "--log", log) == whole
     assert log.read_text() == lines
     assert played == [0, 2, 2]
     log.write_text(lines.replace("/2/", "/3/"))
-    code, _, err = roboirg("replay", root, "--workers", "0", "--log", log)
+    code, _, err = roboirg("replay", root, "--log", log)
     assert code == 2
     assert "has 'PickXtimes/train/3/0'" in err
     log.write_text("{}\n")
-    code, _, err = roboirg("replay", root, "--workers", "0", "--log", log)
+    code, _, err = roboirg("replay", root, "--log", log)
     assert code == 2
     assert "is no log of `roboirg replay`" in err
 

@@ -253,7 +253,13 @@ def test_shortcuts_are_right_as_often_as_their_probability_says(rule):
     _, rows = rows_of(floor_answers(rule, dataset), "slots", dataset)
     for setting in ("direct", "reasoning", "contextual"):
         jobs = [
-            Job(policy=rule, task=item.task, split="test", episode=item.episode, setting=setting)
+            Job(
+                policy=rule,
+                task=item.task,
+                split="test",
+                episode=item.episode,
+                options=InstructionOptions(setting),
+            )
             for item in dataset
             if item.setting == setting
         ]

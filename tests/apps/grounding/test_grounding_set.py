@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from plan_files import plan_file
 from typer.testing import CliRunner
 
 from roboirg.apps.grounding.dataset_export import export_grounding
@@ -41,7 +42,7 @@ from roboirg.language import FORMS, instruct, plain_settings
 from roboirg.language.settings import all_settings
 from roboirg.main import app
 from roboirg.policies.vlm.goal_schema import goal_schema
-from roboirg.policies.vlm.prompts import load_prompts
+from roboirg.policies.vlm.prompt_files import load_prompts
 from roboirg.reader import interpret
 from roboirg.tasks import all_tasks, get_task
 from roboirg.tasks.splits.splits import SIZES, get_episode
@@ -395,15 +396,14 @@ def test_the_tsv_names_earlier_items_in_place_of_their_pictures(exported):
     ("options", "words"),
     [
         (["--tasks", "PickXtime"], "no task or suite 'PickXtime'|no task 'PickXtime'"),
-        (["--formats", "csv"], "no format 'csv'"),
-        (["--forms", "vague"], "no form 'vague'"),
+        (["--plan", plan_file(forms=["vague"])], "no form 'vague'"),
         (["--tasks", "StopCube", "--settings", "spatial"], "None of these episodes"),
     ],
 )
 def test_wrong_requests_are_one_sentence(tmp_path, options, words):
     done = CliRunner().invoke(
         app,
-        ["export", "grounding", "--out", str(tmp_path / "set"), "--workers", "0", *options],
+        ["export", "grounding", "--out", str(tmp_path / "set"), *options],
     )
     assert done.exit_code != 0
     with pytest.raises(InvalidValueError, match=words):

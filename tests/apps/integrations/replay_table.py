@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 
 import roboirg
+from roboirg.core.instruction_options import InstructionOptions
 from roboirg.evaluation.play.rollout import play_episode
 from roboirg.evaluation.records.record import Job
 from roboirg.policies import make_policy
@@ -56,9 +57,13 @@ def record_table(path: Path) -> None:
 
 def _record(task, episode):
     env = roboirg.make(
-        task, setting=SETTING, episode=episode, cameras=("front",), meshes=MESHES,
+        task,
+        setting=SETTING,
+        episode=episode,
+        cameras=("front",),
+        meshes=MESHES,
         demonstration_frames="none",
-    )  # fmt: skip
+    )
     observation, info = env.reset()
     key = key_of(observation["front_rgb"], observation["instruction"])
     policy, rows = make_policy("oracle", 0), []
@@ -115,9 +120,15 @@ def own_outcomes(spec, meshes=MESHES):
     played = []
     for task, episode in cases():
         job = Job(
-            policy="replay", spec=spec, task=task, split="test", episode=episode, setting=SETTING,
-            max_steps=MAX_STEPS, meshes=meshes,
-        )  # fmt: skip
+            policy="replay",
+            spec=spec,
+            task=task,
+            split="test",
+            episode=episode,
+            max_steps=MAX_STEPS,
+            meshes=meshes,
+            options=InstructionOptions(SETTING),
+        )
         one = play_episode(job)
         assert one.outcome in ("success", "failure"), one
         played.append((task, episode, one.outcome == "success", one.steps))

@@ -12,6 +12,7 @@ from typer.testing import CliRunner
 
 from roboirg.apps.integrations.result_import import ImportOptions, import_results
 from roboirg.core.errors import InvalidValueError, UnknownNameError
+from roboirg.core.instruction_options import InstructionOptions
 from roboirg.evaluation.records.record import Job
 from roboirg.evaluation.records.store import read_records
 from roboirg.main import app
@@ -90,7 +91,13 @@ def test_inspect_s_logs_hold_whole_records(tmp_path):
     source = tmp_path / "played"
     import_results("lerobot", lerobot_file(tmp_path), source, OPTIONS)
     records = read_records(source)
-    job = Job(policy="x", task="PickXtimes", split="test", episode=4, setting="contextual")
+    job = Job(
+        policy="x",
+        task="PickXtimes",
+        split="test",
+        episode=4,
+        options=InstructionOptions("contextual"),
+    )
     samples = [
         {"scores": {"grounds_reference": {"metadata": {"record": msgspec.to_builtins(one)}}}}
         for one in records

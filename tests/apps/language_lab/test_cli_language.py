@@ -8,6 +8,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from plan_files import plan_file
 from typer.testing import CliRunner
 
 from roboirg import main as cli
@@ -36,18 +37,20 @@ text = "press the button to stop the cube when it reaches the target {visit}"
 """
 
 
+@pytest.mark.usefixtures("in_this_process")
 def test_instructions_in_words_from_outside(tmp_path: Path):
     file, out = tmp_path / "test.toml", tmp_path / "rows.jsonl"
     file.write_text(WORDINGS)
     said = call("show", "StopCube", "0", "--words", "--wordings", file)
     assert said.count("press the button to stop the cube when it reaches the target") == 4
-    call("export", "instructions", "--out", out, "--wordings", file, "--forms", "implicit")
+    words = plan_file(wordings=str(file), forms="implicit")
+    call("export", "instructions", "--out", out, "--plan", words)
     rows = [json.loads(line) for line in out.read_text().splitlines()]
     assert {row["task"] for row in rows} == {"StopCube"}  # all of the file
     assert {row["wordings"].partition("@")[0] for row in rows} == {"test"}
     (template,) = {row["command_template"] for row in rows}
     assert template == WORDINGS.splitlines()[-1].partition('"')[2][:-1]
-    checked = ("--split", "val", "--seeds", "4", "--wordings", file, "--workers", "0")
+    checked = ("--split", "val", "--seeds", "4", "--wordings", file)
     assert "StopCube" in call("language", "validate", *checked)
     with pytest.raises(InvalidValueError, match="have no commands of BinFill"):
         call("show", "BinFill", "0", "--words", "--wordings", file)
@@ -85,7 +88,7 @@ def test_the_same_bytes_every_time_and_only_what_is_asked_for(tmp_path: Path):
     files = [tmp_path / "one.jsonl", tmp_path / "two.jsonl"]
     for file in files:
         words = ("--tasks", "VideoUnmask,StopCube", "--settings", "spatial,direct")
-        call("export", "instructions", "--out", file, *words, "--forms", "implicit")
+        call("export", "instructions", "--out", file, *words, "--plan", plan_file(forms="implicit"))
     assert files[0].read_bytes() == files[1].read_bytes()
     rows = [json.loads(line) for line in files[0].read_text().splitlines()]
     assert len(rows) == 50 * 3
@@ -95,7 +98,7 @@ def test_the_same_bytes_every_time_and_only_what_is_asked_for(tmp_path: Path):
 
 def test_options_of_the_words_are_passed_on(tmp_path: Path):
     out = tmp_path / "rows.jsonl"
-    options = ("--stages", "1,2,3,5", "--distractor", "competing", "--frame", "camera")
+    words = plan_file(stages=[1, 2, 3, 5], distractor="competing", frame="camera")
     call(
         "export",
         "instructions",
@@ -105,7 +108,8 @@ def test_options_of_the_words_are_passed_on(tmp_path: Path):
         "ButtonUnmask",
         "--split",
         "val",
-        *options,
+        "--plan",
+        words,
     )
     rows = [json.loads(line) for line in out.read_text().splitlines()]
     contextual = next(row for row in rows if row["setting"] == "contextual")
@@ -118,12 +122,11 @@ def test_options_of_the_words_are_passed_on(tmp_path: Path):
 @pytest.mark.parametrize(
     ("words", "kind", "sentence"),
     [
-        (("--format", "csv"), UnknownNameError, "There is no format 'csv'"),
         (("--settings", "spatail"), UnknownNameError, "Did you mean 'spatial'?"),
-        (("--forms", "implied"), UnknownNameError, "There is no form 'implied'"),
+        (("--plan", plan_file(forms="implied")), UnknownNameError, "There is no form 'implied'"),
         (("--tasks", "StopCub"), UnknownNameError, "Did you mean 'StopCube'?"),
         (("--split", "dev"), UnknownNameError, "There is no split 'dev'"),
-        (("--stages", "2,5"), InvalidValueError, "must be one of"),
+        (("--plan", plan_file(stages="2,5")), InvalidValueError, "must be one of"),
         (("--tasks", "StopCube", "--settings", "spatial"), InvalidValueError, "None of these"),
     ],
 )
@@ -131,6 +134,11 @@ def test_what_is_wrong_is_one_sentence(tmp_path: Path, words, kind, sentence):
     with pytest.raises(kind, match=sentence.replace("?", r"\?")):
         call("export", "instructions", "--out", tmp_path / "out.jsonl", *words)
     assert not list(tmp_path.iterdir())
+
+
+def test_the_name_of_an_export_has_its_format(tmp_path: Path):
+    with pytest.raises(UnknownNameError, match="There is no format 'csv'"):
+        call("export", "instructions", "--out", tmp_path / "out.csv")
 
 
 def test_an_export_needs_a_place(tmp_path: Path):
@@ -154,14 +162,16 @@ def test_stats_of_all_splits_need_no_figure():
     assert "Landmark" not in printed
 
 
+@pytest.mark.usefixtures("in_this_process")
 def test_validate_prints_what_was_read_and_the_exceptions():
-    words = ("--tasks", "PickXtimes", "--split", "none", "--seeds", "4", "--workers", "0")
+    words = ("--tasks", "PickXtimes", "--split", "none", "--seeds", "4")
     printed = call("language", "validate", *words)
     assert "Texts read back" in printed
     assert "2 of 2" in printed  # easy, spatial
     assert "0 of 1" in printed
 
 
+@pytest.mark.usefixtures("in_this_process")
 def test_a_broken_rule_is_told_and_ends_with_a_sentence(monkeypatch: pytest.MonkeyPatch):
     failure = RuleViolation("no leak", "PickXtimes", "direct", "PickXtimes/test/0", 7, "[red]ly")
     found = ValidationResults(failures=[failure])
@@ -169,7 +179,7 @@ def test_a_broken_rule_is_told_and_ends_with_a_sentence(monkeypatch: pytest.Monk
     monkeypatch.setattr(
         "roboirg.apps.language_lab.validation.validation_run.validate_batch", lambda _batch: found
     )
-    words = ("--tasks", "PickXtimes", "--split", "none", "--seeds", "1", "--workers", "0")
+    words = ("--tasks", "PickXtimes", "--split", "none", "--seeds", "1")
     result = CliRunner().invoke(cli.app, ["language", "validate", *words])
     assert isinstance(result.exception, RoboIRGError)
     assert "Found 1 broken rule in 1 text." in str(result.exception)

@@ -124,7 +124,7 @@ def test_other_words_are_not_paired(monkeypatch, setting, form, changed, complai
 
 def test_a_resolved_form_that_resolves_nothing_is_noticed(monkeypatch):
     def lazy(episode, options):
-        return instruct_with(episode, options._replace(form="implicit"))
+        return instruct_with(episode, dataclasses.replace(options, form="implicit"))
 
     monkeypatch.setattr(pairing, "instruct_with", lazy)
     complaints = " ".join(words for _, words in pairing.unpaired(EPISODE, expressible(EPISODE)))

@@ -1,5 +1,6 @@
 """Words from outside: the import from a repository with RoboMME's interface."""
 
+import dataclasses
 import functools
 import re
 import sys
@@ -303,7 +304,10 @@ def test_words_that_no_expression_can_replace_leave_our_own_commands():
     assert said.metadata["command"] == "own"
     assert said.metadata["wordings"] == identity
     assert said.text == instruct_with(episode, InstructionOptions("direct")).text
-    assert instruct_with(episode, direct._replace(setting="explicit")).metadata["command"] != "own"
+    assert (
+        instruct_with(episode, dataclasses.replace(direct, setting="explicit")).metadata["command"]
+        != "own"
+    )
 
 
 def test_a_form_of_its_own_for_once_is_a_case_of_its_own():

@@ -163,6 +163,11 @@ def _faster(lines: Lines, _folder: Path, rng: random.Random) -> Lines:
     return lines
 
 
+def _other_wordings(lines: Lines, _folder: Path, rng: random.Random) -> Lines:
+    rng.choice(lines)["options"]["wordings"] = "others@12345678"
+    return lines
+
+
 FORGERIES: dict[str, Forgery] = {
     "failure to success": _flip,
     "success to failure": _fail,
@@ -183,7 +188,7 @@ FORGERIES: dict[str, Forgery] = {
     "goal": _soften_goal,
     "explicit command": _changes(command="Press the button."),
     "mentions": _changes(mentions=[]),
-    "wordings": _changes(wordings="others@12345678"),
+    "wordings": _other_wordings,
     "seed of the scene": _changes(seed=1),
     "difficulty": _changes(difficulty="hardest"),
     "version of the world": _changes(environment_version=0),

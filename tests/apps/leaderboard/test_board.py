@@ -16,6 +16,7 @@ from roboirg.apps.leaderboard.board_rows import BoardRow, PackedRun, board_rows
 from roboirg.apps.leaderboard.pack_checks import CHECKS_FILE, PackCheck, check_pack
 from roboirg.apps.leaderboard.packing import pack_run
 from roboirg.core.errors import InvalidValueError
+from roboirg.core.instruction_options import InstructionOptions
 from roboirg.evaluation.analysis.published import published_rows
 from roboirg.evaluation.plan.plan_file import read_plan_file
 from roboirg.evaluation.plan.plan_maker import make_plan
@@ -41,7 +42,9 @@ def record(
 ) -> Record:
     result = RolloutResult(outcome="success" if won else "failure")
     result.cause = None if won else "it failed"
-    job = Job(policy=policy, task=task, split=split, episode=episode, setting=EXPLICIT)
+    job = Job(
+        policy=policy, task=task, split=split, episode=episode, options=InstructionOptions(EXPLICIT)
+    )
     made = make_record(job, result, started_at="")
     return replace(made, privileged=privileged, attribution=None)
 
@@ -273,6 +276,16 @@ def packs_of(tmp_path: Path, run: Path) -> PackedRun:
     return next(one for one in read_packs(tmp_path / "packs") if one.name == run.name)
 
 
+def reword(run: Path, wordings: str) -> Path:
+    """Let all records of a run have words from outside."""
+    file = run / "records.jsonl"
+    lines = [json.loads(line) for line in file.read_text().splitlines()]
+    for one in lines:
+        one["options"]["wordings"] = wordings
+    file.write_text("".join(json.dumps(one) + "\n" for one in lines))
+    return run
+
+
 def drop(run: Path, wanted: Callable[[dict[str, Any]], bool], **changes: Any) -> Path:
     """Keep only some records of a run, changed."""
     file = run / "records.jsonl"
@@ -288,7 +301,7 @@ def drop(run: Path, wanted: Callable[[dict[str, Any]], bool], **changes: Any) ->
         (lambda run: drop(run, lambda one: one["outcome"] == "success"), "nearest is challenge"),
         (lambda run: drop(run, lambda one: True, plan=None), "110 records of no plan"),
         (lambda run: drop(run, lambda one: one["task"] != "StopCube"), "10 missing"),
-        (lambda run: drop(run, lambda one: True, wordings="mine@1a2b3c4d"), "of no named plan"),
+        (lambda run: reword(run, "mine@1a2b3c4d"), "of no named plan"),
         (lambda run: drop(run, lambda one: True, max_steps=3000), "110 not in it"),
         (lambda run: drop(run, lambda one: True, policy_seed=5), "110 not in it"),
     ],

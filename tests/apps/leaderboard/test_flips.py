@@ -15,6 +15,7 @@ from roboirg.apps.leaderboard.repeats import (
     write_flips,
 )
 from roboirg.core.errors import InvalidValueError
+from roboirg.core.instruction_options import InstructionOptions
 from roboirg.evaluation.analysis.stats.cells import gather
 from roboirg.evaluation.analysis.stats.comparison import compare
 from roboirg.evaluation.analysis.stats.comparison_text import sentences
@@ -31,7 +32,13 @@ def write_run(folder: Path, outcomes: str, rows: dict[int, np.ndarray] | None = 
     with RecordStore(folder) as store:
         for episode, letter in enumerate(outcomes):
             setting = "direct" if episode % 2 else "explicit"
-            job = Job(policy="p", task="StopCube", split="test", episode=episode, setting=setting)
+            job = Job(
+                policy="p",
+                task="StopCube",
+                split="test",
+                episode=episode,
+                options=InstructionOptions(setting),
+            )
             result = RolloutResult()
             result.cause = None if letter == "s" else "it failed"
             result.outcome = {"s": "success", "f": "failure", "e": "error"}[letter]  # type: ignore[assignment]
@@ -70,7 +77,13 @@ def test_runs_without_a_shared_episode_are_refused(tmp_path: Path) -> None:
     one = write_run(tmp_path / "one", "s")
     two = tmp_path / "two"
     with RecordStore(two) as store:
-        job = Job(policy="other", task="StopCube", split="test", episode=0, setting="explicit")
+        job = Job(
+            policy="other",
+            task="StopCube",
+            split="test",
+            episode=0,
+            options=InstructionOptions("explicit"),
+        )
         store.append(make_record(job, RolloutResult(), started_at=""))
     with pytest.raises(InvalidValueError, match="no episode in common"):
         repeated_episodes(one, two)

@@ -12,6 +12,7 @@ from evaluation_fakes import fake_result
 
 from roboirg.apps.leaderboard.packing import MANIFEST, opened_run, pack_run, read_manifest
 from roboirg.core.errors import RoboIRGError
+from roboirg.core.instruction_options import InstructionOptions
 from roboirg.evaluation.play.rollout_result import make_record
 from roboirg.evaluation.records.action_log import ActionLog, write_actions
 from roboirg.evaluation.records.record import Job
@@ -27,7 +28,11 @@ def run(tmp_path: Path) -> Path:
             rows = np.ones((episode + 1, 8))
             log = ActionLog("joint_angle", rows, np.zeros(1, np.int32), np.ones(2))
             job = Job(
-                policy="random", task="PickXtimes", split="test", episode=episode, setting="direct"
+                policy="random",
+                task="PickXtimes",
+                split="test",
+                episode=episode,
+                options=InstructionOptions("direct"),
             )
             store.append(
                 make_record(

@@ -152,15 +152,13 @@ def cli() -> CliRunner:
 
 
 def test_the_command_tells_what_does_not_hold(honest: Path, tmp_path: Path, cli: CliRunner) -> None:
-    good = cli.invoke(
-        app, ["leaderboard", "verify", str(honest), "--workers", "0", "--sample", "10%"]
-    )
+    good = cli.invoke(app, ["leaderboard", "verify", str(honest), "--sample", "10%"])
     assert good.exit_code == 0, good.output
     assert "All of it holds." in good.output
     forged = tmp_path / "forged"
     shutil.copytree(honest, forged)
     assert forge(forged, FORGERIES["failure to success"], random.Random(0))
-    bad = cli.invoke(app, ["leaderboard", "verify", str(forged), "--workers", "0"])
+    bad = cli.invoke(app, ["leaderboard", "verify", str(forged)])
     assert bad.exit_code == 2
     lines = (forged / "records.jsonl").read_text().splitlines()
     assert json.loads(lines[0])["schema_version"] == 4
@@ -172,7 +170,7 @@ def test_the_command_tells_what_does_not_hold(honest: Path, tmp_path: Path, cli:
 
 def test_a_repeated_run_shows_no_flip(honest: Path, tmp_path: Path, cli: CliRunner) -> None:
     out = str(tmp_path / "again")
-    done = cli.invoke(app, ["leaderboard", "repeat", str(honest), "--out", out, "--workers", "0"])
+    done = cli.invoke(app, ["leaderboard", "repeat", str(honest), "--out", out])
     assert done.exit_code == 0, done.output
     assert "0 of 4 verdicts changed." in done.output
     refused = cli.invoke(app, ["leaderboard", "repeat", str(honest), "--out", str(honest)])

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from plan_files import plan_file
 from typer.testing import CliRunner
 
 from roboirg.apps.learned_listener.labeled_views import LATER_STEP, class_of, look
@@ -215,8 +216,10 @@ def test_what_a_variant_does_not_get_changes_nothing(torch):
 
 @pytest.mark.sim
 def test_the_study_writes_every_listener_a_table_and_a_figure(torch, tmp_path):
-    words = "learn listener --study --tasks StopCube --scenes 0 --epochs 2 --workers 0 --out"
-    done = CliRunner().invoke(app, [*words.split(), str(tmp_path)])
+    words = "learn listener --study --scenes 0 --epochs 2"
+    done = CliRunner().invoke(
+        app, [*words.split(), "--plan", plan_file(tasks="StopCube"), "--out", str(tmp_path)]
+    )
     assert done.exit_code == 0, done.output
     names = {one.name for one in tmp_path.glob("*.pt")}
     assert names == {f"{variant.name}.pt" for variant in VARIANTS}

@@ -14,6 +14,7 @@ from roboirg import main as cli
 from roboirg.apps.people.drive_server import DriveServer
 from roboirg.apps.people.driving_policy import CARRY, LOWEST, DrivingPolicy
 from roboirg.apps.people.driving_session import DrivingSession, DrivingStoppedError
+from roboirg.core.instruction_options import InstructionOptions
 from roboirg.core.observations import CAMERAS
 from roboirg.evaluation.records.record import Job
 from roboirg.evaluation.records.store import read_records
@@ -24,7 +25,13 @@ from roboirg.tasks.splits.splits import get_episode
 
 TASK, EPISODE = "PickXtimes", 1
 """An easy one: a green cube, once on the target, then the button."""
-JOB = Job(policy="person", task=TASK, split="test", episode=EPISODE, setting="contextual")
+JOB = Job(
+    policy="person",
+    task=TASK,
+    split="test",
+    episode=EPISODE,
+    options=InstructionOptions("contextual"),
+)
 
 
 def pixel_of(name):
@@ -208,9 +215,7 @@ def test_an_episode_is_driven_in_a_browser(served, open_page, wait_s, monkeypatc
     (record,) = read_records(folder)
     assert (record.policy, record.outcome, record.privileged) == ("person", "success", False)
     assert record.timings["policy_act"] > 0
-    monkeypatch.setattr(
-        "sys.argv", ["roboirg", "leaderboard", "verify", str(folder), "--workers", "0"]
-    )
+    monkeypatch.setattr("sys.argv", ["roboirg", "leaderboard", "verify", str(folder)])
     with pytest.raises(SystemExit) as left:
         cli.main()
     assert left.value.code in (0, None), capsys.readouterr()

@@ -158,8 +158,6 @@ def check_played(folder):
         "results",
         folder,
         "--play",
-        "--workers",
-        "0",
     ]
     done = subprocess.run(command, capture_output=True, text=True, env=os.environ, check=False)
     assert done.returncode == 0, done.stderr

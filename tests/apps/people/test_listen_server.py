@@ -72,7 +72,7 @@ class Client:
         except urllib.error.HTTPError as error:
             answer = error
         with answer:
-            return answer.status, dict(answer.headers), answer.read()
+            return answer.status, answer.headers, answer.read()
 
     def read(self, path, body=None):
         status, _, content = self.ask(path, body)

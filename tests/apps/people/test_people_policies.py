@@ -9,6 +9,7 @@ from roboirg.apps.people.answer_form import FormAnswer, all_answers, answer_of, 
 from roboirg.apps.people.listening_session import ListeningSession
 from roboirg.apps.people.people_run import answered_plan
 from roboirg.core.errors import InvalidValueError, UnknownNameError
+from roboirg.core.instruction_options import InstructionOptions
 from roboirg.evaluation.play.rollout import EpisodeRunner
 from roboirg.evaluation.records.record import Job
 from roboirg.evaluation.records.store import RecordStore, StoreError, read_records
@@ -76,7 +77,13 @@ def test_two_people_are_played_apart_and_again_by_the_log(tmp_path, monkeypatch)
     assert "No person of this policy seed has answered" in missing.cause
 
     spec = f"recorded:{tmp_path / 'run'}"
-    job = Job(policy=spec, task="PickXtimes", split="test", episode=1, setting="direct")
+    job = Job(
+        policy=spec,
+        task="PickXtimes",
+        split="test",
+        episode=1,
+        options=InstructionOptions("direct"),
+    )
     again = EpisodeRunner(tmp_path / "again")(job)
     assert (again.outcome, again.steps) == ("success", records[1, 0].steps)
     other = run(replace(job, episode=7))

@@ -20,12 +20,20 @@ from roboirg.apps.real.study.study_plan import make_study
 from roboirg.apps.real.study.study_run import Study
 from roboirg.apps.real.study.trial_log import TrialLog
 from roboirg.core.errors import InvalidValueError
+from roboirg.core.instruction_options import InstructionOptions
 from roboirg.evaluation.records.record import Job
 
 pytestmark = pytest.mark.sim
 
 PERIOD = 1.0 / COMMAND_RATE
-JOB = Job(policy="x", task="PutInBox", split="val", episode=1, setting="explicit", max_steps=200)
+JOB = Job(
+    policy="x",
+    task="PutInBox",
+    split="val",
+    episode=1,
+    max_steps=200,
+    options=InstructionOptions("explicit"),
+)
 CHUNK = 20
 
 

@@ -290,7 +290,7 @@ def test_nothing_on_the_sheet_is_cut_off_or_overlaps():
 def test_a_trial_in_turns_is_refused_before_a_robot_moves(tmp_path):
     plan = make_study(["listener"], tasks=["PutInBox"], settings=["direct"], trials=1, seed=0)
     first, *others = plan.trials
-    turns = replace(first, job=replace(first.job, delivery="turns"))
+    turns = replace(first, job=first.job.with_options(delivery="turns"))
     changed = replace(plan, trials=(turns, *others))
     with pytest.raises(InvalidValueError, match=r"has delivery='turns'.*at once \('prompt'\)"):
         Study(changed, tmp_path, robot=None).run()

@@ -1,20 +1,18 @@
-"""Runs measures in alternating rounds; reports medians as a table and JSON."""
+"""Runs measures in alternating rounds; reports medians as a table and all rounds as JSON."""
 
 from __future__ import annotations
 
 import datetime as dt
-import importlib.util
 import json
 import os
 import statistics
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
 from rich.table import Table
 
-from roboirg.apps.bench.measures import Measure
 from roboirg.core.errors import InvalidValueError
 from roboirg.core.version import __version__
 from roboirg.util.processor import processor_model
@@ -23,6 +21,25 @@ _WHOLE = 1000
 """From here on values are shown as whole numbers."""
 _SCALES = {"ms": 1e3}
 """Factors from stored to displayed units; other units have factor 1."""
+
+
+@dataclass(frozen=True)
+class Measure:
+    """One measure.
+
+    Attributes:
+        name: what is measured.
+        ours: returns seconds, or a figure in `unit`.
+        baseline: returns the same for the baseline; None for measures without one.
+        against: name of the baseline.
+        unit: unit in tables; of a rate ("1/s", "1/h") more is better, of others less.
+    """
+
+    name: str
+    ours: Callable[[], float]
+    baseline: Callable[[], float] | None
+    against: str
+    unit: str = "ms"
 
 
 @dataclass(frozen=True)
@@ -35,11 +52,6 @@ class MeasureResult:
         ours: result of each round.
         baseline: baseline of each round; empty for measures without one.
         against: name of the baseline.
-        value: median of `ours`; None if it could not be measured.
-        ratio: ratio of the medians, greater is better; None without a baseline.
-        goal: smallest ratio; without a baseline, the largest value.
-        reached: whether the goal is reached.
-        missing: package that is not installed, without which it cannot be measured.
     """
 
     name: str
@@ -47,26 +59,29 @@ class MeasureResult:
     ours: tuple[float, ...]
     baseline: tuple[float, ...]
     against: str
-    value: float | None
-    ratio: float | None
-    goal: float
-    reached: bool
-    missing: str = ""
+
+    @property
+    def value(self) -> float:
+        """Median of `ours`."""
+        return statistics.median(self.ours)
+
+    @property
+    def ratio(self) -> float | None:
+        """Ratio of the medians, greater is better; None without a baseline."""
+        if not self.baseline:
+            return None
+        ratio = self.value / statistics.median(self.baseline)
+        return ratio if self.unit.startswith("1/") else 1.0 / ratio
+
+    def as_json(self) -> dict[str, Any]:
+        """Return all rounds and both figures."""
+        return {**asdict(self), "value": self.value, "ratio": self.ratio}
 
 
 def run_measures(
     measures: Sequence[Measure], rounds: int, report: Callable[[str], None]
 ) -> tuple[MeasureResult, ...]:
-    """Run every measure in every round, after its baseline, which is timed once per round.
-
-    Args:
-        measures: measures to run.
-        rounds: number of rounds.
-        report: called with a progress message before each measure.
-
-    Raises:
-        InvalidValueError: `rounds` is less than 1.
-    """
+    """Run every measure in every round, after its baseline, which is timed once per round."""
     if rounds < 1:
         raise InvalidValueError(f"rounds is {rounds}; it must be at least 1.")
     ours: list[list[float]] = [[] for _ in measures]
@@ -74,133 +89,54 @@ def run_measures(
     for number in range(1, rounds + 1):
         timed: dict[Callable[[], float], float] = {}
         for measure, own, base in zip(measures, ours, baselines, strict=True):
-            if _is_missing(measure.package):
-                continue
             report(f"round {number} of {rounds}: {measure.name}")
             if measure.baseline is not None:
                 if measure.baseline not in timed:
                     timed[measure.baseline] = measure.baseline()
                 base.append(timed[measure.baseline])
             own.append(measure.ours())
-    return tuple(map(_summarize, measures, ours, baselines))
-
-
-def _summarize(measure: Measure, ours: Sequence[float], baseline: Sequence[float]) -> MeasureResult:
-    value = statistics.median(ours) if ours else None
-    ratio, reached = None, value is not None and value <= measure.goal
-    if baseline and value is not None:
-        ratio = statistics.median(baseline) / value
-        if measure.inverse:
-            ratio = 1.0 / ratio
-        reached = ratio >= measure.goal
-    return MeasureResult(
-        name=measure.name,
-        unit=measure.unit,
-        ours=tuple(ours),
-        baseline=tuple(baseline),
-        against=measure.against,
-        value=value,
-        ratio=ratio,
-        goal=measure.goal,
-        reached=reached,
-        missing="" if ours else measure.package,
+    return tuple(
+        MeasureResult(one.name, one.unit, tuple(own), tuple(base), one.against)
+        for one, own, base in zip(measures, ours, baselines, strict=True)
     )
 
 
-def _is_missing(package: str) -> bool:
-    return bool(package) and importlib.util.find_spec(package) is None
-
-
 def results_table(results: Sequence[MeasureResult]) -> Table:
-    """Return a table of medians, ratios and goals."""
+    """Return a table of medians and ratios."""
     table = Table(title=f"{__version__} on {os.cpu_count()} cores", title_justify="left")
     table.add_column("measure")
-    for name in ("ours", "baseline", "against", "ratio", "goal", ""):
+    for name in ("ours", "baseline", "against", "ratio"):
         table.add_column(name, justify="left" if name == "against" else "right")
     for result in results:
         base = statistics.median(result.baseline) if result.baseline else None
         table.add_row(
             result.name,
-            f"{result.missing} is not installed"
-            if result.value is None
-            else _format_value(result.value, result.unit),
-            "" if base is None else _format_value(base, result.unit),
+            format_value(result.value, result.unit),
+            "" if base is None else format_value(base, result.unit),
             result.against,
             "" if result.ratio is None else f"{result.ratio:.2f} x",
-            f"{'>=' if result.against else '<='} {result.goal:g}",
-            "yes" if result.reached else "no",
         )
     return table
 
 
-def write_results(results: Sequence[MeasureResult], path: Path, load: float) -> None:
-    """Write all rounds of all results as JSON, each with its machine, date and load.
-
-    A file of earlier results is kept up to date: what was measured now takes the place of the row
-    of the same name, other rows stay.
-
-    Args:
-        results: what was measured.
-        path: the file.
-        load: load average of the five minutes before, which is the load of others.
-
-    Raises:
-        InvalidValueError: the file cannot be written, or is no file of results.
-    """
-    where = {
-        "date": dt.datetime.now(dt.UTC).date().isoformat(),
-        "machine": f"{os.cpu_count()} cores, {processor_model()}",
-        "load": round(load, 1),
-        "roboirg": __version__,
-    }
-    rows = {_key(row): row for row in read_figures(path)} if path.exists() else {}
-    for result in results:
-        if result.value is not None or _key(asdict(result)) not in rows:
-            rows[_key(asdict(result))] = {**asdict(result), **where}
-    text = json.dumps({"figures": list(rows.values())}, indent=1)
+def write_json(figures: Sequence[dict[str, Any]], path: Path) -> None:
+    text = json.dumps({"figures": figures}, indent=1)
     try:
         path.write_text(text + "\n", encoding="utf-8")
     except OSError as error:
         raise InvalidValueError(f"{str(path)!r} cannot be written: {error}") from error
 
 
-def read_figures(path: Path) -> list[dict[str, Any]]:
-    """Return the rows of a file that `write_results` wrote.
-
-    Raises:
-        InvalidValueError: it is no such file.
-    """
-    try:
-        figures = json.loads(path.read_text(encoding="utf-8"))["figures"]
-        return [dict(row) for row in figures if _key(row)]
-    except (OSError, ValueError, KeyError, TypeError) as error:
-        raise InvalidValueError(f"{str(path)!r} holds no results of bench: {error}") from error
+def circumstances(load: float) -> dict[str, Any]:
+    """Return date, machine, load and version, which figures are stored with."""
+    return {
+        "date": dt.datetime.now(dt.UTC).date().isoformat(),
+        "machine": f"{os.cpu_count()} cores, {processor_model()}",
+        "load": round(load, 1),
+        "roboirg": __version__,
+    }
 
 
-def markdown_table(figures: Sequence[Mapping[str, Any]]) -> str:
-    """Return the rows of a file of results as a table for the documents."""
-    lines = ["| measure | ours | baseline | ratio | goal | date | load |",
-             "| --- | ---: | ---: | ---: | ---: | --- | ---: |"]  # fmt: skip
-    for row in figures:
-        if row["value"] is None:
-            continue
-        base, goal = "", f"at most {row['goal']:g} {row['unit']}"
-        if row["ratio"] is not None:
-            median = statistics.median(row["baseline"])
-            base = f"{_format_value(median, row['unit'])} ({row['against']})"
-            goal = f"{row['goal']:g} ×"
-        ratio = "" if row["ratio"] is None else f"{row['ratio']:.3g} ×"
-        ours = _format_value(row["value"], row["unit"])
-        load = "" if row["load"] is None else row["load"]
-        cells = (row["name"], ours, base, ratio, goal, row["date"], load)
-        lines.append(f"| {' | '.join(map(str, cells))} |")
-    return "\n".join(lines) + "\n"
-
-
-def _key(row: Mapping[str, Any]) -> tuple[str, str, float]:
-    return (row["name"], row["against"], row["goal"])
-
-
-def _format_value(value: float, unit: str) -> str:
+def format_value(value: float, unit: str) -> str:
     shown = value * _SCALES.get(unit, 1.0)
     return f"{shown:,.0f} {unit}" if shown >= _WHOLE else f"{shown:.3g} {unit}"

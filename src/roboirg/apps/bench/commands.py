@@ -11,24 +11,35 @@ import typer
 
 def bench(
     rounds: Annotated[int, typer.Option(help="Number of repetitions.")] = 5,
-    out: Annotated[Path | None, typer.Option(help="JSON file for the results.")] = None,
+    out: Annotated[
+        Path | None, typer.Option(help="New JSON file for the results of all rounds.")
+    ] = None,
 ) -> None:
-    """Measure the time and memory of steps, resets and starts on this machine."""
+    """Measure the time of steps, resets and starts, and the pace of workers, on this machine.
+
+    Example: roboirg bench --out bench.json
+    """
     from rich.console import Console
 
-    from roboirg.apps.bench.bench_runner import results_table, run_measures, write_results
+    from roboirg.apps.bench import bench_runner
     from roboirg.apps.bench.measures import measures
+    from roboirg.core.errors import InvalidValueError
     from roboirg.util.console_width import widen
     from roboirg.util.freed_memory import keep_freed_memory
 
+    if out is not None and (out.exists() or not out.parent.is_dir()):
+        why = "exists" if out.exists() else "is in no folder that exists"
+        raise InvalidValueError(f"{str(out)!r} {why}; --out must name a new file.")
     keep_freed_memory()
-    load = os.getloadavg()[1]
-    figures = run_measures(measures(), rounds, lambda words: typer.echo(words, err=True))
-    console, table = Console(), results_table(figures)
+    where = bench_runner.circumstances(load=os.getloadavg()[1])
+    results = bench_runner.run_measures(
+        measures(), rounds, lambda words: typer.echo(words, err=True)
+    )
+    console, table = Console(), bench_runner.results_table(results)
     widen(console, table)
     console.print(table)
     if out is not None:
-        write_results(figures, out, load)
+        bench_runner.write_json([{**one.as_json(), **where} for one in results], out)
 
 
 def add_commands(app: typer.Typer) -> None:

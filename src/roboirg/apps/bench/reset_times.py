@@ -1,13 +1,13 @@
-"""Reset time of an episode with a video, with or without reading its frames."""
+"""Reset time of an episode with a video."""
 
 from __future__ import annotations
 
 import os
-import tempfile
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 
+from roboirg.apps.bench.step_times import draw_as_stock
 from roboirg.core.episode import Episode
 from roboirg.core.observations import CAMERAS
 from roboirg.envs.factory import make
@@ -26,31 +26,18 @@ def stock_reset(episode: Episode) -> float:
     """Return the time of a reset as in RoboMME: plan, draw, and fetch color and segmentation."""
     start = time.perf_counter()
     session = EpisodeSession(episode, visible=True, rendering=STOCK)
-    cameras = session.world.cameras
-
-    def draw(_stage: object) -> None:
-        cameras.pictures(CAMERAS)
-        for camera in CAMERAS:
-            cameras.segmentation(camera)
-
-    session.play_demonstration(draw)
+    session.play_demonstration(lambda _stage: draw_as_stock(session.world.cameras))
     return time.perf_counter() - start
 
 
-def cold_reset(episode: Episode, *, frames: bool) -> float:
+def cold_reset(episode: Episode, *, frames: bool = True) -> float:
     """Return the time of a reset without a cache, with or without reading the frames."""
-    with _cache(OFF):
-        return _reset(episode, frames=frames)
+    with cache_folder(OFF):
+        return reset_time(episode, frames=frames)
 
 
-def warm_reset(episode: Episode, *, frames: bool) -> float:
-    """Return the time of a reset with everything cached by an earlier one."""
-    with tempfile.TemporaryDirectory() as folder, _cache(folder):
-        _reset(episode, frames=frames)
-        return _reset(episode, frames=frames)
-
-
-def _reset(episode: Episode, *, frames: bool) -> float:
+def reset_time(episode: Episode, *, frames: bool) -> float:
+    """Return the time of a reset, with or without reading the frames of the video."""
     start = time.perf_counter()
     env = make(episode)
     _, info = env.reset()
@@ -63,7 +50,7 @@ def _reset(episode: Episode, *, frames: bool) -> float:
 
 
 @contextmanager
-def _cache(folder: str) -> Iterator[None]:
+def cache_folder(folder: str) -> Iterator[None]:
     """Use another cache within the context."""
     before = os.environ.get(FOLDER_VARIABLE)
     os.environ[FOLDER_VARIABLE] = folder

@@ -1,89 +1,125 @@
-"""Seconds per control step: with pictures, without pictures, and physics alone."""
+"""Seconds per control step on a stretch of a real episode, with the oracle's actions."""
 
 from __future__ import annotations
 
+import functools
 import gc
+import itertools
 import statistics
 import time
 from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from roboirg.apps.bench.workloads import STEPS, Workload
+from roboirg.core.episode import Episode
 from roboirg.core.observations import CAMERAS
+from roboirg.simulation.cameras import Cameras
+from roboirg.simulation.episode_session import EpisodeSession
+from roboirg.simulation.expert.primitives import MotionPrimitives
 from roboirg.simulation.rendering.render_settings import FAITHFUL, STOCK, RenderSettings
+from roboirg.tasks.splits.splits import get_episode
 
 Action = NDArray[np.float64]
 
+STEPS = 48
+"""Timed control steps of a stretch."""
 CHUNK = 16
 """Control steps per picture pair of a policy that acts in chunks."""
 
 
+@dataclass(frozen=True)
+class Workload:
+    """A stretch of an episode.
+
+    Attributes:
+        episode: the episode.
+        before: untimed actions (n, 8) that lead to the stretch.
+        actions: timed actions (`STEPS`, 8).
+    """
+
+    episode: Episode
+    before: NDArray[np.float64]
+    actions: NDArray[np.float64]
+
+    def start(
+        self, *, visible: bool = True, rendering: RenderSettings = FAITHFUL
+    ) -> EpisodeSession:
+        """Return the episode, played up to the stretch."""
+        session = EpisodeSession(self.episode, visible=visible, rendering=rendering)
+        for action in self.before:
+            session.step(action)
+        return session
+
+
+def over_the_table() -> Workload:
+    """Return a stretch in which the arm moves from home to above a cube, in the background."""
+    return stretch("PickXtimes", 2, first=4)
+
+
+@functools.cache
+def stretch(task: str, index: int, first: int) -> Workload:
+    """Play the first stages, of the demonstration or the policy, and cut out a stretch."""
+    episode = get_episode(task, "test", index)
+    session = EpisodeSession(episode, visible=False)
+    expert, actions = MotionPrimitives(session.world), []
+    stages = (*episode.demonstration, *episode.stages)
+    for trajectory in itertools.chain.from_iterable(expert.execute(s.primitive) for s in stages):
+        for action in trajectory:
+            session.step(action)
+            actions.append(action)
+        if len(actions) >= first + STEPS:
+            break
+    return Workload(episode, np.stack(actions[:first]), np.stack(actions[first : first + STEPS]))
+
+
 def eager_step(workload: Workload, rendering: RenderSettings = FAITHFUL) -> float:
     """Time steps with both pictures after every step."""
-    return _with_pictures(workload, rendering, every=1)
+    session = workload.start(rendering=rendering)
+    session.world.cameras.pictures(CAMERAS)
+
+    def step(action: Action) -> None:
+        session.step(action)
+        session.world.cameras.pictures(CAMERAS)
+
+    return median_time(workload, step)
 
 
-def lazy_step(workload: Workload, rendering: RenderSettings = FAITHFUL) -> float:
+def lazy_step(workload: Workload) -> float:
     """Time steps with both pictures after every chunk."""
-    return _with_pictures(workload, rendering, every=CHUNK)
+    session = workload.start()
+    session.world.cameras.pictures(CAMERAS)
+    numbers = itertools.count(1)
+
+    def step(action: Action) -> None:
+        session.step(action)
+        if next(numbers) % CHUNK == 0:
+            session.world.cameras.pictures(CAMERAS)
+
+    return median_time(workload, step, CHUNK)
 
 
 def stock_step(workload: Workload) -> float:
     """Time steps as in RoboMME: draw everything, fetch color and segmentation at every step."""
     session = workload.start(rendering=STOCK)
-    cameras = session.world.cameras
-    cameras.pictures(CAMERAS)
+    session.world.cameras.pictures(CAMERAS)
 
     def step(action: Action) -> None:
         session.step(action)
-        cameras.pictures(CAMERAS)
-        for camera in CAMERAS:
-            cameras.segmentation(camera)
+        draw_as_stock(session.world.cameras)
 
-    return _median(workload, step)
+    return median_time(workload, step)
 
 
-def floor_step(workload: Workload) -> float:
-    """Time physics and pictures of what is visible, without rules, words or observations."""
-    world = workload.start().world
-    world.cameras.pictures(CAMERAS)
-
-    def step(action: Action) -> None:
-        world.advance(action)
-        world.cameras.pictures(CAMERAS)
-
-    return _median(workload, step)
-
-
-def undrawn_step(workload: Workload) -> float:
-    """Time physics and rules."""
-    return _median(workload, workload.start(visible=False).step, CHUNK)
-
-
-def physics_step(workload: Workload) -> float:
-    """Time physics alone."""
-    return _median(workload, workload.start(visible=False).world.advance, CHUNK)
-
-
-def _with_pictures(workload: Workload, rendering: RenderSettings, every: int) -> float:
-    session = workload.start(rendering=rendering)
-    cameras = session.world.cameras
+def draw_as_stock(cameras: Cameras) -> None:
+    """Fetch color and segmentation of both cameras."""
     cameras.pictures(CAMERAS)
-    count = 0
-
-    def step(action: Action) -> None:
-        nonlocal count
-        session.step(action)
-        count += 1
-        if count % every == 0:
-            cameras.pictures(CAMERAS)
-
-    return _median(workload, step, every)
+    for camera in CAMERAS:
+        cameras.segmentation(camera)
 
 
-def _median(workload: Workload, step: Callable[[Action], object], group: int = 1) -> float:
+def median_time(workload: Workload, step: Callable[[Action], object], group: int = 1) -> float:
     """Return seconds per step: the median over groups of steps, robust against hiccups."""
     gc.collect()  # left by an earlier measurement
     durations = []

@@ -9,12 +9,11 @@ import typer
 
 from roboirg.cli.export_commands import export_app
 from roboirg.cli.options import (
-    DEFAULT_WORDS,
-    Forms,
+    NO_PLAN,
+    PlanWords,
     Settings,
     Split,
     Tasks,
-    WordChoices,
     Workers,
     check_output_file,
     spread,
@@ -34,22 +33,17 @@ def export_demonstrations(
     split: Split = "train",
     tasks: Tasks = "all",
     episodes: Annotated[
-        str, typer.Option(help="all, 4 for the first four, or a list such as 0,3,5-9.")
+        str, typer.Option(help="all, 4 for the first four, or a list: 0,3,5-9.")
     ] = "all",
     settings: Settings = "all",
-    forms: Forms = "implicit",
-    words: WordChoices = DEFAULT_WORDS,
-    delivery: Annotated[
-        str, typer.Option(help="prompt, or turns: in language columns and the table of episodes.")
-    ] = "prompt",
+    words: PlanWords = NO_PLAN,
     pictures: Annotated[
-        str, typer.Option(help="png or lossless-video, both without loss; lossy-video; or none.")
+        str, typer.Option(help="png, lossless-video, lossy-video or none.")
     ] = "png",
     video: Annotated[
         str | None,
         typer.Option(
-            help="Frames of the video: none, prefix (marked), or sidecar (a data set beside).  "
-            "(none; of robomme-hdf5 prefix)"
+            help="Frames of the video: none, prefix, or sidecar.  (none; of robomme-hdf5 prefix)"
         ),
     ] = None,
     names: Annotated[
@@ -57,40 +51,44 @@ def export_demonstrations(
         typer.Option(help="Names of the features: lerobot or openpi.  (by format)"),
     ] = None,
     actions: Annotated[
-        str, typer.Option(help="Further descriptions of actions: delta, pose, or both; or none.")
+        str, typer.Option(help="Further descriptions of actions: delta, pose or both.")
     ] = "none",
     variations: Annotated[
-        int, typer.Option(help="Trajectories per episode; all but the first vary.")
+        int, typer.Option(help="Trajectories per episode; further ones vary.")
     ] = 1,
     policy: Annotated[
-        str, typer.Option(help="Who moves the robot; the words change nothing for the oracle.")
+        str, typer.Option(help="Who moves the robot; words change nothing for oracle.")
     ] = "oracle",
     outcomes: Annotated[str, typer.Option(help="successes or all.")] = "successes",
     language_columns: Annotated[
         bool,
         typer.Option(
             "--language-columns",
-            help="Add LeRobot's language columns; LeRobot 0.6 or later reads them.",
+            help="Add language columns, for LeRobot 0.6 or later.",
         ),
     ] = False,
     trajectories: Annotated[
         Path | None,
-        typer.Option(help="Folder that keeps recorded trajectories for further exports."),
+        typer.Option(help="Folder that keeps trajectories for further exports."),
     ] = None,
     workers: Workers = None,
-    dry_run: Annotated[bool, typer.Option(help="Estimate the size and record nothing.")] = False,
+    dry_run: Annotated[
+        bool, typer.Option("--dry-run", help="Estimate the size and record nothing.")
+    ] = False,
 ) -> None:
-    """Export demonstrations for training, recorded once per episode, told in every setting."""
+    """Export demonstrations for training, recorded once per episode, told in every setting.
+
+    Example: roboirg export demonstrations --tasks PickXtimes --out data
+    """
     from roboirg.apps.demonstrations.export_plan import ExportPlan
     from roboirg.apps.demonstrations.export_run import run_export
     from roboirg.apps.demonstrations.size_estimate import size_text
     from roboirg.cli.names import known_settings
     from roboirg.cli.progress_bar import progress_bars
-    from roboirg.evaluation.plan.plan_parsing import means_all, parse_episodes, parse_names
-    from roboirg.language import FORMS
+    from roboirg.evaluation.plan.plan_parsing import parse_episodes, parse_names
     from roboirg.policies import load_policy_class
     from roboirg.tasks import find_tasks
-    from roboirg.util.processor import core_count
+    from roboirg.util.processor import worker_count
 
     load_policy_class(policy)
     # `validated` checks the names that are cast.
@@ -99,8 +97,8 @@ def export_demonstrations(
         split=split,
         episodes=parse_episodes(episodes, split),
         settings=known_settings(settings),
-        forms=FORMS if means_all(forms) else parse_names("form", forms),
-        options=words.instruction_options(delivery),
+        forms=words.forms(),
+        options=words.options(),
         format=cast("Any", format),
         pictures=cast("Any", pictures),
         video=cast("Any", video or _default_video(format)),
@@ -114,7 +112,7 @@ def export_demonstrations(
     _print_estimate(plan)
     if dry_run:
         return
-    count = core_count() if workers is None else workers
+    count = worker_count(workers)
     with progress_bars() as show:
 
         def report(stage: str, done: int, total: int, size: int) -> None:
@@ -155,22 +153,24 @@ def replay(
         Path,
         typer.Argument(help="Folder of an export, or of RoboMME's HDF5 files, or such a file."),
     ],
-    workers: Workers = None,
     log: Annotated[
         Path | None,
         typer.Option(help="File with a line for each result; what is in it is not replayed again."),
     ] = None,
 ) -> None:
-    """Execute the actions of a data set in the simulator, and compare states and verdicts."""
+    """Execute the actions of a data set in the simulator, and compare states and verdicts.
+
+    Example: roboirg replay data
+    """
     from collections import Counter
 
     from roboirg.apps.demonstrations.dataset_replay import TOLERANCE, replay_dataset
-    from roboirg.util.processor import core_count
+    from roboirg.util.processor import worker_count
 
     if log is not None:
         check_output_file(log)
     count, largest = Counter[str](), 0.0
-    for one in replay_dataset(dataset, core_count() if workers is None else workers, log):
+    for one in replay_dataset(dataset, worker_count(), log):
         count["trajectories"] += 1
         count["same verdict"] += one.status == one.recorded_status
         count["agree"] += one.agrees

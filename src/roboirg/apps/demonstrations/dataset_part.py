@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, NamedTuple, Protocol
 
@@ -123,7 +123,7 @@ def episode_row(trajectory: Trajectory, placed: PlacedText, length: int) -> dict
     """Return the row of an episode in the table of facts beside the data set."""
     facts = trajectory.facts
     words = placed.words
-    options = words.options._asdict() | {"stages": list(words.options.stages)}
+    options = asdict(words.options) | {"stages": list(words.options.stages)}
     return {
         "episode_index": placed.episode_index,
         "from_index": placed.first_index,

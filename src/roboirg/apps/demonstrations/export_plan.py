@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Iterator
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any, Literal, NamedTuple, get_args
 
@@ -23,13 +23,13 @@ from roboirg.tasks.splits.splits import get_episode
 from roboirg.util.short_hash import short_hash
 
 FormatName = Literal["lerobot-v3", "lerobot-v2.1", "robomme-hdf5"]
-VideoMode = Literal["none", "prefix", "sidecar"]
+VideoTreatment = Literal["none", "prefix", "sidecar"]
 KeyNames = Literal["lerobot", "openpi"]
 ExtraAction = Literal["delta", "pose"]
 Outcomes = Literal["successes", "all"]
 
 FORMATS: tuple[FormatName, ...] = get_args(FormatName)
-VIDEO_MODES: tuple[VideoMode, ...] = get_args(VideoMode)
+VIDEO_TREATMENTS: tuple[VideoTreatment, ...] = get_args(VideoTreatment)
 KEY_NAMES: tuple[KeyNames, ...] = get_args(KeyNames)
 EXTRA_ACTIONS: tuple[ExtraAction, ...] = get_args(ExtraAction)
 PICTURE_CODINGS: tuple[PictureCoding, ...] = get_args(PictureCoding)
@@ -67,7 +67,7 @@ class ExportPlan:
     options: InstructionOptions = InstructionOptions()  # noqa: RUF009 - immutable
     format: FormatName = "lerobot-v3"
     pictures: PictureCoding = "png"
-    video: VideoMode = "none"
+    video: VideoTreatment = "none"
     names: KeyNames = "lerobot"
     extra_actions: tuple[ExtraAction, ...] = ()
     variations: int = 1
@@ -85,7 +85,7 @@ class ExportPlan:
         for kind, value, known in (
             ("format", self.format, FORMATS),
             ("way to store pictures", self.pictures, PICTURE_CODINGS),
-            ("way to treat the video", self.video, VIDEO_MODES),
+            ("way to treat the video", self.video, VIDEO_TREATMENTS),
             ("set of names", self.names, KEY_NAMES),
             ("choice of outcomes", self.outcomes, OUTCOMES),
             *(("form", form, FORMS) for form in self.forms),
@@ -233,7 +233,7 @@ def texts_of(plan: ExportPlan, episode: Episode) -> tuple[TaskText, ...]:
         is_repeated = one.form == "resolved" and "implicit" in plan.forms
         if is_repeated and not all_settings()[one.setting].implicit:
             continue
-        options = plan.options._replace(setting=one.setting, form=one.form)
+        options = replace(plan.options, setting=one.setting, form=one.form)
         said.append(TaskText(options, one.text, row(episode, one) | {"explicit": explicit}))
     return tuple(said)
 

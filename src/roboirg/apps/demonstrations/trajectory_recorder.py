@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 import zipfile
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -161,7 +161,7 @@ def record_trajectory(
     said, is_drawn = options or InstructionOptions(), spec.coding != "none"
     env = make(
         episode,
-        **said._asdict(),
+        **asdict(said),
         cameras=CAMERAS if is_drawn or policy_name != "oracle" else (),
         depth=spec.depth,
         calibration=spec.depth,

@@ -10,13 +10,11 @@ import typer
 
 from roboirg.cli.export_commands import export_app
 from roboirg.cli.options import (
-    DEFAULT_WORDS,
+    NO_PLAN,
     AnySplit,
-    Forms,
+    PlanWords,
     Settings,
     Tasks,
-    WordChoices,
-    Workers,
     spread,
 )
 from roboirg.core.errors import InvalidValueError
@@ -42,61 +40,50 @@ def export_grounding(
     split: AnySplit = "test",
     tasks: Tasks = "all",
     settings: Settings = "all",
-    forms: Forms = "implicit",
-    episodes: Annotated[
-        str, typer.Option(help="all, 4 for the first four, or a list such as 0,3,5-9.")
-    ] = "all",
+    words: PlanWords = NO_PLAN,
     variants: Annotated[
-        bool, typer.Option(help="Add every combination of the options below.")
+        bool, typer.Option(help="Add every combination of options that changes the words.")
     ] = False,
-    words: WordChoices = DEFAULT_WORDS,
     frames: Annotated[int, typer.Option(min=1, help="Most frames of a video as pictures.")] = 16,
     frames_every: Annotated[
         int, typer.Option(min=1, help="Control steps between two frames of a video.")
     ] = 8,
-    formats: Annotated[
-        str, typer.Option(help="Tables beside the JSON lines: parquet, tsv, both, or none.")
-    ] = "parquet,tsv",
-    workers: Workers = None,
 ) -> None:
-    """Export questions of grounding with pictures: Parquet, JSON lines, VLMEvalKit's TSV."""
+    """Export questions of grounding with pictures: Parquet, JSON lines, VLMEvalKit's TSV.
+
+    Example: roboirg export grounding --split val --out grounding
+    """
     from roboirg.apps.grounding.dataset_export import export_grounding
-    from roboirg.cli.names import known_name, known_settings, known_tasks
+    from roboirg.cli.names import known_settings, known_tasks
     from roboirg.cli.progress_bar import progress_bar
     from roboirg.evaluation.grounding_items.question_set import (
-        TABLE_FORMATS,
         EpisodeName,
         ExportRequest,
     )
-    from roboirg.evaluation.plan.plan_parsing import parse_episodes, parse_names, parse_splits
-    from roboirg.language import FORMS
+    from roboirg.evaluation.plan.plan_parsing import parse_episodes, parse_splits
     from roboirg.language.generator import check_options
     from roboirg.util.parquet_support import check_parquet_support
-    from roboirg.util.processor import core_count
+    from roboirg.util.processor import worker_count
 
-    tables = () if formats.strip().lower() == "none" else parse_names("format", formats)
-    kinds = tuple(known_name("format", one, TABLE_FORMATS) for one in tables)
-    if "parquet" in kinds:
-        check_parquet_support()
-    options = words.instruction_options()
+    check_parquet_support()
+    options = words.options()
     check_options(options)
     request = ExportRequest(
         episodes=tuple(
             EpisodeName(task, one, index)
             for task in known_tasks(tasks, options.wordings)
             for one in parse_splits(split)
-            for index in parse_episodes(episodes, one)
+            for index in parse_episodes(words.fields.get("episodes", "all"), one)
         ),
         settings=known_settings(settings),
-        forms=tuple(known_name("form", one, FORMS) for one in parse_names("form", forms)),
+        forms=words.forms(),
         options=options,
         every_variant=variants,
         frames=frames,
         frames_every=frames_every,
-        wordings=words.wordings,
-        formats=kinds,
+        wordings=words.file,
     )
-    count = core_count() if workers is None else workers
+    count = worker_count()
     with progress_bar("episodes") as progress:
         facts = export_grounding(request, out, count, progress)
     typer.echo(
@@ -127,7 +114,10 @@ def score_grounding(
         Path | None, typer.Option(help="File for a report in Markdown, with confusions.")
     ] = None,
 ) -> None:
-    """Score answers to the grounding dataset; two files are also compared."""
+    """Score answers to the grounding dataset; two files are also compared.
+
+    Example: roboirg score grounding answers.jsonl --data grounding
+    """
     from rich.console import Console
 
     from roboirg.apps.grounding.answer_floors import floor_answers
@@ -166,14 +156,9 @@ def score_grounding(
 
 def _floors(text: str | None) -> tuple[str, ...]:
     from roboirg.apps.grounding.answer_floors import FLOORS
-    from roboirg.cli.names import known_name
-    from roboirg.evaluation.plan.plan_parsing import means_all, parse_names
+    from roboirg.cli.names import known_names
 
-    if text is None:
-        return ()
-    if means_all(text):
-        return FLOORS
-    return tuple(known_name("floor", one, FLOORS) for one in parse_names("floor", text))
+    return () if text is None else known_names("floor", text, FLOORS)
 
 
 def _comparisons(scores: Sequence[GroundingScore]) -> list[str]:

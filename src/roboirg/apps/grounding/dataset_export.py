@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 from roboirg.apps.grounding.dataset_card import CARD, DatasetFacts, write_card
@@ -13,7 +12,6 @@ from roboirg.evaluation.grounding_items.question_set import (
     PARTS,
     ExportRequest,
     Progress,
-    TableFormat,
     collect_items,
 )
 
@@ -43,19 +41,13 @@ def _write_files(folder: Path, items: list[GroundingItem], request: ExportReques
     splits = tuple(dict.fromkeys(one.split for one in items))
     for split in splits:
         own = [one for one in items if one.split == split]
-        for kind in request.formats:
-            _TABLES[kind](own, folder, split)
+        write_parquet(own, folder, split)
+        write_tsv(own, folder, split)
     facts = DatasetFacts.of(
         items, hashlib.sha256(content).hexdigest(), _size(folder), splits, TSV_FOLDER
     )
     write_card(folder, facts, request.frames, request.frames_every)
     return facts
-
-
-_TABLES: Mapping[TableFormat, Callable[[Sequence[GroundingItem], Path, str], Path]] = {
-    "parquet": write_parquet,
-    "tsv": write_tsv,
-}
 
 
 def _size(folder: Path) -> int:

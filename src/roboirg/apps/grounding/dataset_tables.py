@@ -13,7 +13,7 @@ from typing import Any
 import msgspec
 
 from roboirg.evaluation.grounding_items.grounding_item import LETTERS, GroundingItem
-from roboirg.policies.vlm.prompts import load_prompts
+from roboirg.policies.vlm.prompt_files import load_prompts
 from roboirg.util.atomic_write import replacing, write_atomically
 from roboirg.util.parquet_support import check_parquet_support
 

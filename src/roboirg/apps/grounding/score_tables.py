@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import replace
 from itertools import pairwise
 
 from roboirg.apps.grounding.answer_scores import GroundingScore, ScoreRow, score_rows
@@ -112,8 +113,7 @@ def _labels(score: GroundingScore, labels_of: ItemLabels) -> Labels:
             item.task,
             item.split,
             item.episode,
-            item.options,
-            run.conditions.wordings,
+            replace(item.options, wordings=run.conditions.wordings),
             run.versions.language,
             run.versions.environment,
         ): tuple(labels_of(item))

@@ -26,10 +26,11 @@ import msgspec
 from pydantic import JsonValue
 
 from roboirg.core.errors import InvalidValueError, RoboIRGError, UnknownNameError
+from roboirg.core.instruction_options import OPTION_NAMES
 from roboirg.evaluation.hosting.policy_descriptions import PolicyDescription
 from roboirg.evaluation.play.rollout_result import RolloutResult, make_record
 from roboirg.evaluation.records.record import DEFAULT_MAX_STEPS, ErrorKind, Job, Record
-from roboirg.evaluation.records.record_codec import encode
+from roboirg.evaluation.records.record_codec import encode, read_record, with_nested_options
 from roboirg.evaluation.records.store import RecordStore
 from roboirg.tasks.splits.splits import split_size
 from roboirg.util.regular_file import read_regular
@@ -48,6 +49,8 @@ _ERRORS: Mapping[str, ErrorKind] = {
     "model_act": "policy",
 }
 """vla-eval's reasons that are not due to the environment."""
+_FIELDS = (*Job.__struct_fields__, *OPTION_NAMES)
+"""What may be told of an episode, its instruction options included."""
 _NAMES = {"action_space": "actions"}
 """Parameters of our vla-eval class that have another name in jobs."""
 
@@ -140,7 +143,7 @@ def _read_vla_eval(path: Path, options: ImportOptions) -> Iterator[Record]:
         ).fetchall()
     for name, task, status, steps, seconds, context, reason, detail in rows:
         params = {_NAMES.get(key, key): value for key, value in configs[name].items()}
-        told = {key: value for key, value in params.items() if key in Job.__struct_fields__}
+        told = {key: value for key, value in params.items() if key in _FIELDS}
         job = _job(
             options, **{"setting": "explicit", "split": "test", **told},
             task=task, episode=json.loads(context)["episode_idx"],
@@ -162,14 +165,16 @@ def _read_inspect(path: Path, options: ImportOptions) -> Iterator[Record]:
             f"{path} is a packed log; convert it: inspect log convert --to json --output-dir LOGS "
             f"{path.name}."
         )
-    for sample in json.loads(_text(path))["samples"]:
+    samples = json.loads(_text(path))["samples"]
+    for number, sample in enumerate(samples, 1):
         scores = sample.get("scores") or {}
         found = next((one["metadata"]["record"] for one in scores.values()), None)
         if found is not None:
-            record = msgspec.convert(found, Record)
-            yield msgspec.structs.replace(record, policy=options.policy, **options.fields)
+            record = read_record(json.dumps(found).encode(), path, number)
+            yield _with_fields(record, {**options.fields, "policy": options.policy})
             continue
-        job = _job(options, **{**sample["metadata"]["job"], "policy": options.policy})
+        told = {**sample["metadata"]["job"], "policy": options.policy}
+        job = _job(options, **told.pop("options", {}), **told)
         error, result = sample.get("error") or {}, RolloutResult()
         cause = f"environment: {error.get('message', 'the sample has no score')}"
         result.record_error("environment", cause, error.get("traceback"))
@@ -194,9 +199,17 @@ def _read_lines(path: Path, options: ImportOptions) -> Iterator[Record]:
 
 def _job(options: ImportOptions, **fields: Any) -> Job:  # noqa: ANN401 - values of JSON
     named = {"policy": options.policy, "max_steps": DEFAULT_MAX_STEPS, **fields}
-    if unknown := named.keys() - set(Job.__struct_fields__):
-        raise UnknownNameError("field of an episode", min(unknown), Job.__struct_fields__)
-    return msgspec.convert({**named, **options.fields}, Job, strict=False)
+    if unknown := named.keys() - set(_FIELDS):
+        raise UnknownNameError("field of an episode", min(unknown), _FIELDS)
+    return msgspec.convert(with_nested_options({**named, **options.fields}), Job, strict=False)
+
+
+def _with_fields(record: Record, fields: Mapping[str, Any]) -> Record:
+    words = {name: value for name, value in fields.items() if name in OPTION_NAMES}
+    others = {name: value for name, value in fields.items() if name not in words}
+    found = msgspec.to_builtins(record)
+    changed = {**found, **others, "options": {**found["options"], **words}}
+    return msgspec.convert(changed, Record, strict=False)
 
 
 def _verdict(success: bool, job: Job) -> RolloutResult:

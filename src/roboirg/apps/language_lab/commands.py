@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -11,14 +12,11 @@ import typer
 from roboirg.cli.export_commands import export_app
 from roboirg.cli.names import known_name, known_settings, known_tasks
 from roboirg.cli.options import (
-    DEFAULT_WORDS,
+    NO_PLAN,
     AnySplit,
-    Forms,
+    PlanWords,
     Settings,
     Tasks,
-    WordChoices,
-    Wordings,
-    Workers,
     check_output_file,
     spread,
 )
@@ -45,34 +43,34 @@ language_app = typer.Typer(no_args_is_help=True, help="Count, validate and score
 
 @spread
 def export_instructions(
-    out: Annotated[Path, typer.Option(help="File to write.")],
-    format: Annotated[str, typer.Option(help="File format: jsonl or parquet.")] = "jsonl",  # noqa: A002
+    out: Annotated[Path, typer.Option(help="File to write; its name ends in .jsonl or .parquet.")],
     split: AnySplit = "test",
     tasks: Tasks = "all",
     settings: Settings = "all",
-    forms: Forms = "implicit,resolved",
-    words: WordChoices = DEFAULT_WORDS,
+    words: PlanWords = NO_PLAN,
 ) -> None:
-    """Export a row per episode, setting and form (columns: see docs/language.md)."""
+    """Export a row per episode, setting and form (columns: see docs/language.md).
+
+    Example: roboirg export instructions --split val --out words.parquet
+    """
     from roboirg.apps.language_lab.instruction_export import (
         EXPORT_FORMATS,
         check_export_support,
         write_rows,
     )
-    from roboirg.evaluation.plan.plan_parsing import parse_names, parse_splits
+    from roboirg.evaluation.plan.plan_parsing import parse_splits
     from roboirg.language import FORMS
     from roboirg.language.instruction_row import row
     from roboirg.language.variants import instructions
     from roboirg.tasks.splits.splits import split_episodes
 
-    kind = known_name("format", format, EXPORT_FORMATS)
-    check_export_support(kind)
     check_output_file(out)
-    options = words.instruction_options()
+    kind = known_name("format", out.suffix.removeprefix("."), EXPORT_FORMATS)
+    check_export_support(kind)
+    options = words.options()
     names, chosen = known_tasks(tasks, options.wordings), known_settings(settings)
-    spoken = [known_name("form", one, FORMS) for one in parse_names("form", forms)]
     episodes = list(split_episodes(names, parse_splits(split)))
-    said = instructions(episodes, chosen, spoken, options)
+    said = instructions(episodes, chosen, words.forms(FORMS), options)
     rows = [row(episode, instruction) for episode, instruction in said]
     if not rows:
         raise InvalidValueError(f"None of these tasks has the setting {', '.join(chosen)}.")
@@ -88,12 +86,15 @@ def stats(
         Path | None,
         typer.Option(help="Folder for a figure of the referring expressions, as PNG and SVG."),
     ] = None,
-    settings: Settings = "all",
 ) -> None:
-    """Count words, referring expressions, patterns, relations and landmarks."""
+    """Count words, referring expressions, patterns, relations and landmarks.
+
+    Example: roboirg language stats --split val
+    """
     from roboirg.apps.language_lab.statistics_tables import overview_tables
     from roboirg.evaluation.analysis.figures.expressions import write_figure
     from roboirg.evaluation.plan.plan_parsing import parse_splits
+    from roboirg.language import plain_settings
     from roboirg.language.variants import instructions
     from roboirg.tasks.splits.splits import split_episodes
     from roboirg.util.figure_files import check_figure_support
@@ -102,7 +103,7 @@ def stats(
         check_figure_support()
     names, wanted = known_tasks(tasks), parse_splits(split)
     episodes = split_episodes(names, wanted)
-    said = [one for _, one in instructions(episodes, known_settings(settings), ("implicit",))]
+    said = [one for _, one in instructions(episodes, plain_settings(), ("implicit",))]
     console = _console()
     for table in overview_tables(said):
         console.print(table)
@@ -121,20 +122,25 @@ def validate_instructions(
     ] = 100,
     tasks: Tasks = "all",
     split: Annotated[str, typer.Option(help="train, val, test, all or none.")] = "all",
-    wordings: Wordings = None,
-    workers: Workers = None,
+    wordings: Annotated[
+        str | None,
+        typer.Option(help="A wording file, or our words for train or test."),
+    ] = None,
 ) -> None:
-    """Read all instructions back and check their rules; exit code 2 if one is broken."""
+    """Read all instructions back and check their rules; exit code 2 if one is broken.
+
+    Example: roboirg language validate --seeds 10
+    """
     from roboirg.apps.language_lab.validation import ValidationResults, batches, validate
     from roboirg.apps.language_lab.validation.validation_tables import validation_tables
     from roboirg.evaluation.plan.plan_parsing import parse_splits
     from roboirg.language.wordings.wording_store import open_wordings
-    from roboirg.util.processor import core_count
+    from roboirg.util.processor import worker_count
 
     names = known_tasks(tasks, open_wordings(wordings))
     wanted = () if split.strip().lower() == "none" else parse_splits(split)
     work = batches(names, wanted, seeds, wordings)
-    count = core_count() if workers is None else workers
+    count = worker_count()
     found = ValidationResults()
     for results in _with_progress(validate(work, count), work):
         found.add(results)
@@ -157,9 +163,7 @@ def score_shortcuts(
     seeds: Annotated[int, typer.Option(help="Random scenes for each task, beyond the split.")] = 0,
     tasks: Tasks = "all",
     settings: Settings = "all",
-    form: Annotated[str, typer.Option(help="implicit or resolved.")] = "implicit",
-    words: WordChoices = DEFAULT_WORDS,
-    distractors: Annotated[int, typer.Option(help="Number of distractors.")] = 1,
+    words: PlanWords = NO_PLAN,
     by: Annotated[
         str | None, typer.Option(help="A row for each pattern or task of a setting.")
     ] = None,
@@ -167,9 +171,11 @@ def score_shortcuts(
         bool, typer.Option(help="Add floors learned from the words of the train split (a minute).")
     ] = False,
 ) -> None:
-    """Score rules that see the words only, beside chance: how much needs no understanding."""
+    """Score rules that see the words only, beside chance: how much needs no understanding.
+
+    Example: roboirg language shortcuts --settings reasoning --by pattern
+    """
     from roboirg.evaluation.plan.plan_parsing import parse_splits
-    from roboirg.language import FORMS
     from roboirg.shortcuts.learned_floor import check_learning_support
     from roboirg.shortcuts.shortcut_scores import GROUPINGS
     from roboirg.shortcuts.shortcut_tables import TRAINING_SPLIT, shortcut_rows, shortcut_table
@@ -183,9 +189,7 @@ def score_shortcuts(
                 f"--learned learns from the split {TRAINING_SPLIT}, so --split {split} would test "
                 "it on what it has seen; ask for val or test."
             )
-    options = words.instruction_options()._replace(
-        form=known_name("form", form, FORMS), distractors=distractors
-    )
+    options = replace(words.options(), form=words.form())
     names, chosen = known_tasks(tasks, options.wordings), known_settings(settings)
     rows = shortcut_rows(names, splits, chosen, options, seeds=seeds, by=grouping, learned=learned)
     if not rows:
@@ -230,7 +234,10 @@ def import_robomme(
     out: Annotated[Path, typer.Option(help="Wording file to write, TOML.")],
     name: Annotated[str, typer.Option(help="Name of the wordings, for records.")] = "robomme",
 ) -> None:
-    """Make a wording file of RoboMME's sentences; exit code 2 if one cannot be read back."""
+    """Make a wording file of RoboMME's sentences; exit code 2 if one cannot be read back.
+
+    Example: roboirg language import-robomme robomme --out robomme.toml
+    """
     from roboirg.apps.language_lab.robomme.robomme_import import import_robomme as make_wordings
     from roboirg.apps.language_lab.robomme.robomme_import import summary
     from roboirg.util.atomic_write import write_atomically

@@ -22,9 +22,9 @@ from roboirg.evaluation.plan.plan_file import named_plans, read_plan_file
 from roboirg.evaluation.plan.plan_maker import make_plan
 from roboirg.evaluation.records.record import IDENTITY, Summary
 
-_CHOSEN = {"policy", "actions", "demonstration_frames", "observe_every", "wordings"}
+_CHOSEN = {"policy", "actions", "demonstration_frames", "observe_every", "options"}
 """What a named plan leaves to the policy; words are compared apart."""
-_key = operator.attrgetter(*(name for name in IDENTITY if name not in _CHOSEN))
+_key = operator.attrgetter(*(name for name in IDENTITY if name not in _CHOSEN), "column")
 
 
 class NamedEpisodes(NamedTuple):
@@ -62,7 +62,7 @@ def _run_refusal(played: Sequence[Summary]) -> str:
         return f"every episode of {first.policy} ended in an error"
     differences = {
         name: (len(plan.keys - keys), len(keys - plan.keys))
-        for name, plan in _plans(first.split, first.wordings)
+        for name, plan in _plans(first.split, first.options.wordings)
     }
     if (0, 0) in differences.values():
         return ""

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from roboirg.cli.options import Salt, Workers, add_working_directory, check_output_file
+from roboirg.cli.options import add_working_directory, check_output_file
 from roboirg.cli.progress_bar import progress_bar
 from roboirg.cli.run_commands import USAGE_ERROR, Folder, folder_of, report_problems
 from roboirg.core.errors import InvalidValueError
@@ -31,21 +31,21 @@ def verify(
     run: RunOrPack,
     sample: SampleShare = "100%",
     sample_seed: SampleSeed = None,
-    salt: Salt = None,
-    workers: Workers = None,
 ) -> None:
-    """Play the actions of a run again and check its records; exit code 2 if one does not hold."""
+    """Play the actions of a run again and check its records; exit code 2 if one does not hold.
+
+    Example: roboirg leaderboard verify runs/first --sample 10%
+    """
     from roboirg.apps.leaderboard.packing import opened_run
     from roboirg.apps.leaderboard.run_verification import verify_run
-    from roboirg.util.processor import core_count
+    from roboirg.util.processor import worker_count
 
-    _take_salt(salt)
     with opened_run(folder_of(run)) as folder, progress_bar("records") as show:
         found = verify_run(
             folder,
             sample=_share(sample),
             seed=sample_seed,
-            workers=core_count() if workers is None else workers,
+            workers=worker_count(),
             progress=show,
         )
     _print(found)
@@ -59,7 +59,10 @@ def pack(
     videos: Annotated[bool, typer.Option(help="Include the videos.")] = False,
     logs: Annotated[bool, typer.Option(help="Include what policies printed.")] = False,
 ) -> None:
-    """Pack records, plan and actions of a run into one file for others to check."""
+    """Pack records, plan and actions of a run into one file for others to check.
+
+    Example: roboirg leaderboard pack runs/first --out first.roboirg.zip
+    """
     from roboirg.apps.leaderboard.packing import pack_run
 
     check_output_file(out)
@@ -77,34 +80,27 @@ def board(
             "--verify", help="Share of the episodes to play again where not done yet, such as 5%."
         ),
     ] = None,
-    salt: Salt = None,
-    workers: Workers = None,
 ) -> None:
-    """Make a leaderboard page of packed runs: verified, privileged, comparable or not."""
+    """Make a leaderboard page of packed runs: verified, privileged, comparable or not.
+
+    Example: roboirg leaderboard board packs --verify 5%
+    """
     from roboirg.apps.leaderboard.board_page import BOARD_FILE, read_packs, write_board
     from roboirg.evaluation.analysis.page.report import check_report_support
-    from roboirg.util.processor import core_count
+    from roboirg.util.processor import worker_count
 
     check_report_support()
-    _take_salt(salt)
     path = folder_of(folder)
     with progress_bar("packed runs") as show:
         packs = read_packs(
             path,
             sample=None if verify_share is None else _share(verify_share),
-            workers=core_count() if workers is None else workers,
+            workers=worker_count(),
             progress=show,
         )
     page = out or path / BOARD_FILE
     write_board(packs, page)
     typer.echo(f"{counted(len(packs), 'packed run')}: {page}")
-
-
-def _take_salt(salt: str | None) -> None:
-    from roboirg.tasks.splits.private_splits import use_salt
-
-    if salt is not None:
-        use_salt(salt)
 
 
 def _share(text: str) -> float:
@@ -163,9 +159,11 @@ def _print_some(what: str, slugs: tuple[str, ...]) -> None:
 def repeat(
     run: Folder,
     out: Annotated[str, typer.Option(help="Folder of the repetition; the same again to resume.")],
-    workers: Workers = None,
 ) -> None:
-    """Play a run's plan again with its policies, and print which verdicts changed."""
+    """Play a run's plan again with its policies, and print which verdicts changed.
+
+    Example: roboirg leaderboard repeat runs/first --out runs/again
+    """
     from roboirg.apps.leaderboard.repeats import flips_by_cell, repeated_episodes, write_flips
     from roboirg.cli.run_commands import play
     from roboirg.evaluation.plan.stored_plans import read_plan, with_secret
@@ -183,7 +181,7 @@ def repeat(
     summary = play(
         with_secret(plan, folder).checked(),
         target,
-        choose_executor(workers, plan.episode_timeout_s),
+        choose_executor(episode_timeout_s=plan.episode_timeout_s),
         retry=True,
     )
     found = repeated_episodes(folder, target)

@@ -98,7 +98,7 @@ def write_flips(found: Flips, folder: Path) -> None:
         InvalidValueError: the file cannot be written.
     """
     rows = [
-        {"policy": policy, "options": options._asdict(), "counts": asdict(counts)}
+        {"policy": policy, "options": asdict(options), "counts": asdict(counts)}
         for (policy, options), counts in found.items()
     ]
     write_atomically(folder / FLIPS_FILE, json.dumps(rows, indent=1) + "\n")
@@ -118,7 +118,7 @@ def _compared(one: Record, other: Record, first: Path, second: Path) -> Repeated
         differs_at = _first_difference(*logs)
     return RepeatedEpisode(
         policy=one.policy,
-        options=one.options,
+        options=one.column,
         slug=one.slug,
         outcomes=(one.outcome, other.outcome),
         differs_at=differs_at,

@@ -6,7 +6,7 @@ import functools
 import random
 from collections import Counter, defaultdict
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 
 from roboirg.apps.leaderboard.record_check import (
@@ -164,7 +164,7 @@ def _holes_of_plan(entries: Iterable[Summary]) -> Iterator[str]:
     for one in entries:
         episodes[one.policy, one.task, one.split].add(one.episode)
         seeds[one.policy].add(one.policy_seed)
-        played = cells[one.policy, one.task, one.split, one.options]
+        played = cells[one.policy, one.task, one.split, one.column]
         played.add((one.episode, one.policy_seed))
     for (policy, task, split, options), played in cells.items():
         for episode in sorted(episodes[policy, task, split]):
@@ -172,7 +172,7 @@ def _holes_of_plan(entries: Iterable[Summary]) -> Iterator[str]:
             if not lacking or not _is_expressible(task, split, episode, options):
                 continue
             for seed in sorted(lacking):
-                words = " ".join(map(str, options._asdict().values()))
+                words = " ".join(map(str, asdict(options).values()))
                 yield f"{policy} {task} {split}/{episode} ({words}), policy seed {seed}"
 
 

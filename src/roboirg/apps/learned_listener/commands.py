@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from roboirg.cli.options import Settings, Tasks, Workers, check_output_file
+from roboirg.cli.options import NO_PLAN, PlanWords, check_output_file, spread
 from roboirg.core.errors import InvalidValueError
 from roboirg.core.plain_text import counted
 
@@ -19,20 +19,16 @@ if TYPE_CHECKING:
 
 learn_app = typer.Typer(no_args_is_help=True, help="Train a listener, and let it answer.")
 
-_Words = Annotated[str, typer.Option(help="Pool of words: train or test.")]
-_Rivals = Annotated[bool, typer.Option("--rivals", help="Also hear instructions with a rival.")]
 _Without = Annotated[
     str, typer.Option(help="What it does not get: none, pictures, video or words.")
 ]
 
 
 @learn_app.command("listener")
+@spread
 def learn_listener(
     out: Annotated[Path, typer.Option(help="File for what it has learned; with --study a folder.")],
-    tasks: Tasks = "all",
-    settings: Settings = "all",
-    words: _Words = "train",
-    rivals: _Rivals = False,
+    words: PlanWords = NO_PLAN,
     scenes: Annotated[
         int, typer.Option(min=0, help="Random scenes of each task beyond the train split.")
     ] = 300,
@@ -49,17 +45,19 @@ def learn_listener(
             "them in tables and a figure.",
         ),
     ] = False,
-    workers: Workers = None,
 ) -> None:
-    """Train a listener on the train split: pictures with free labels, then instructions."""
+    """Train a listener on the train split: pictures with free labels, then instructions.
+
+    Example: roboirg learn listener --out listener.pt
+    """
     from roboirg.apps.learned_listener.learned_listener import check_learn_support
-    from roboirg.util.processor import core_count
+    from roboirg.util.processor import worker_count
 
     check_learn_support()
-    plan = _plan(tasks, settings, words, without)._replace(
-        rivals=rivals, scenes=scenes, detector_epochs=epochs // 2, reader_epochs=epochs, seed=seed
+    plan = _plan(words, without)._replace(
+        scenes=scenes, detector_epochs=epochs // 2, reader_epochs=epochs, seed=seed
     )
-    count = core_count() if workers is None else workers
+    count = worker_count()
     if study:
         _run_study(plan, out, count)
         return
@@ -97,7 +95,10 @@ def learned_answers(
     data: Annotated[Path, typer.Option(help="Folder of a grounding dataset.")],
     out: Annotated[Path, typer.Option(help="File for the answers.")],
 ) -> None:
-    """Let a trained listener answer the grounding dataset, for roboirg score grounding."""
+    """Let a trained listener answer the grounding dataset, for roboirg score grounding.
+
+    Example: roboirg learn answers listener.pt --data grounding --out answers.jsonl
+    """
     from roboirg.apps.learned_listener.learned_answers import learned_answers as answers_of
     from roboirg.apps.learned_listener.learned_listener import check_learn_support
     from roboirg.evaluation.grounding_items.answer_file import write_answers
@@ -111,16 +112,16 @@ def learned_answers(
     typer.echo(f"{counted(len(items), 'answer')}: {out}")
 
 
-def _plan(tasks: str, settings: str, words: str, without: str) -> TrainingPlan:
+def _plan(words: PlanWords, without: str) -> TrainingPlan:
     from roboirg.apps.learned_listener.learned_model import WITHOUTS
     from roboirg.apps.learned_listener.listener_training import TrainingPlan
     from roboirg.cli.names import known_name, known_settings, known_tasks
     from roboirg.core.word_pools import POOLS
 
     return TrainingPlan(
-        known_tasks(tasks),
-        known_settings(settings),
-        words=known_name("pool of words", words, POOLS),
+        known_tasks(words.fields.get("tasks", "all")),
+        known_settings(words.fields.get("settings", "all")),
+        words=known_name("pool of words", words.file or "train", POOLS),
         without=known_name("variant", without, WITHOUTS),
     )
 

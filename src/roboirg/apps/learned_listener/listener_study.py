@@ -14,7 +14,7 @@ from roboirg.core.word_pools import POOLS, PoolName
 from roboirg.envs.environment import RoboIRGEnv
 from roboirg.language import FORMS
 from roboirg.language.rivals import RIVAL_SETTINGS
-from roboirg.language.settings import plain_settings
+from roboirg.language.settings import all_settings, plain_settings
 from roboirg.language.variants import instructions
 from roboirg.tasks.splits.splits import SIZES, get_episode
 from roboirg.util.parallel_map import parallel_map
@@ -34,17 +34,25 @@ class StudyVariant(NamedTuple):
         name: of its file.
         title: of its row.
         changes: of the common plan.
+        hears: harder settings that it hears, too, if it hears the plain ones.
     """
 
     name: str
     title: str
     changes: Mapping[str, Any]
+    hears: tuple[str, ...] = ()
+
+    def plan(self, common: TrainingPlan) -> TrainingPlan:
+        """Return how it is trained."""
+        known, changed = all_settings(), common._replace(**self.changes)
+        added = (name for name in self.hears if known[name].plain in changed.settings)
+        return changed._replace(settings=(*changed.settings, *added))
 
 
 VARIANTS = (
     StudyVariant("all", "all settings", {}),
     StudyVariant("explicit", "explicit only", {"settings": ("explicit",)}),
-    StudyVariant("rivals", "all settings, rivals too", {"rivals": True}),
+    StudyVariant("rivals", "all settings, rivals too", {}, RIVAL_SETTINGS),
     StudyVariant("no-video", "without video", {"without": "video"}),
     StudyVariant("no-pictures", "without pictures", {"without": "pictures"}),
     StudyVariant("no-words", "without words", {"without": "words"}),
@@ -93,7 +101,7 @@ def run_study(
         def follow(stage: str, done: int, total: int, name: str = variant.name) -> None:
             progress(f"{name}: {stage}", done, total)
 
-        model = teach(scenes, plan._replace(**variant.changes), follow)
+        model = teach(scenes, variant.plan(plan), follow)
         save_model(model, folder / f"{variant.name}.pt")
         yield from _answers(model, variant.title, shown)
 

@@ -34,7 +34,6 @@ from roboirg.core.instruction_options import InstructionOptions
 from roboirg.core.word_pools import PoolName
 from roboirg.language import FORMS, LANGUAGE_VERSION
 from roboirg.language.instruction import Instruction
-from roboirg.language.rivals import RIVAL_SETTINGS
 from roboirg.language.settings import all_settings, settings_of
 from roboirg.language.variants import instructions
 from roboirg.policies.vlm.goal_schema import goal_schema
@@ -59,9 +58,9 @@ class TrainingPlan(NamedTuple):
 
     Attributes:
         tasks: names of tasks.
-        settings: names of settings whose instructions it hears.
+        settings: names of settings whose instructions it hears, harder ones where they can
+            express the episode.
         words: the pool of words.
-        rivals: whether it also hears instructions with a rival, where there are some.
         scenes: random scenes of each task beyond the train split.
         goals: goals of each scene that are told by place, where there is the most to learn. In
             other settings only the episode's own is.
@@ -74,7 +73,6 @@ class TrainingPlan(NamedTuple):
     tasks: tuple[str, ...]
     settings: tuple[str, ...]
     words: PoolName = "train"
-    rivals: bool = False
     scenes: int = 300
     goals: int = 4
     detector_epochs: int = 6
@@ -187,14 +185,14 @@ def _instructions(
     scenes: SeenEpisodes, plan: TrainingPlan
 ) -> Iterator[tuple[Episode, Instruction]]:
     options = InstructionOptions(wordings=plan.words)
-    by_place = [name for name in plan.settings if "frame" in all_settings()[name].reads]
-    others = [name for name in plan.settings if name not in by_place]
+    known = all_settings()
+    harder = [name for name in plan.settings if known[name].plain is not None]
+    plain = [name for name in plan.settings if name not in harder]
+    by_place = [name for name in plain if "frame" in known[name].reads]
+    others = [name for name in plain if name not in by_place]
     yield from instructions(scenes.episodes, others, FORMS[:1], options)
     yield from instructions(_with_goals(scenes.episodes, plan), by_place, FORMS[:1], options)
-    if plan.rivals:
-        known = all_settings()
-        harder = [name for name in RIVAL_SETTINGS if known[name].plain in plan.settings]
-        yield from instructions(scenes.episodes, harder, FORMS[:1], options)
+    yield from instructions(scenes.episodes, harder, FORMS[:1], options)
 
 
 def _with_goals(episodes: Iterable[Episode], plan: TrainingPlan) -> Iterator[Episode]:

@@ -11,12 +11,11 @@ import typer
 
 from roboirg.cli import run_commands
 from roboirg.cli.options import (
-    DEFAULT_WORDS,
+    NO_PLAN,
+    PlanWords,
     Settings,
     Split,
     Tasks,
-    WordChoices,
-    Workers,
     spread,
 )
 from roboirg.core.errors import InvalidValueError
@@ -34,13 +33,6 @@ listen_app = typer.Typer(
 Study = Annotated[Path, typer.Argument(help="Folder of the study.")]
 Host = Annotated[str, typer.Option(help="Address to listen at; 0.0.0.0 for other machines, too.")]
 Port = Annotated[int, typer.Option(help="Port to listen at; 0 for any free port.")]
-AllowHost = Annotated[
-    list[str] | None,
-    typer.Option(help="Further name under which browsers reach this machine; repeatable."),
-]
-Delivery = Annotated[
-    str, typer.Option(help="prompt: all words at once; turns: one utterance after another.")
-]
 
 
 @listen_app.command()
@@ -52,25 +44,21 @@ def plan(
     ],
     tasks: Tasks = "all",
     settings: Settings = "all",
-    form: Annotated[str, typer.Option(help="implicit or resolved.")] = "implicit",
     split: Split = "test",
     episodes: Annotated[
         str, typer.Option(help="all, 4 for the first four, or a list such as 0,3,5-9.")
     ] = "4",
-    delivery: Delivery = "prompt",
-    words: WordChoices = DEFAULT_WORDS,
+    words: PlanWords = NO_PLAN,
     practice: Annotated[int, typer.Option(help="Practice questions for each task.")] = 1,
     checks: Annotated[int, typer.Option(help="Attention checks for each person.")] = 2,
-    seed: Annotated[int, typer.Option(help="Seed of the order of the episodes.")] = 0,
-    frames_every: Annotated[
-        int, typer.Option(help="Control steps between two frames of a video.")
-    ] = 4,
     consent: Annotated[
         Path | None, typer.Option(help="Text file that people agree to, instead of ours.")
     ] = None,
-    workers: Workers = None,
 ) -> None:
-    """Plan a study of listeners and draw its pictures; continues one that was interrupted."""
+    """Plan a study of listeners and draw its pictures; continues one that was interrupted.
+
+    Example: roboirg listen plan study --people 10
+    """
     from roboirg.apps.people.listening_session import QUESTIONS
     from roboirg.apps.people.listening_study import (
         CONSENT,
@@ -82,30 +70,27 @@ def plan(
     from roboirg.evaluation.grounding_items.grounding_item import write_items
     from roboirg.evaluation.grounding_items.question_set import collect_items
     from roboirg.evaluation.plan.plan_maker import make_plan
-    from roboirg.util.processor import core_count
+    from roboirg.util.processor import worker_count
 
     # The policy can be checked only when its answers are there; the oracle stands in for it.
     made = make_plan(
         [f"{PEOPLE}=oracle"],
         tasks=tasks,
         settings=settings,
-        forms=form,
+        forms=words.form(),
         split=split,
         episodes=episodes,
-        delivery=delivery,
-        **words._asdict(),
+        **words.words,
     )
     study = ListeningStudy(
         plan=made.model_copy(update={"policies": (PEOPLE,)}),
         people=people,
         practice=practice,
         checks=checks,
-        seed=seed,
-        frames_every=frames_every,
         consent=CONSENT if consent is None else _read_text(consent),
     ).checked()
     write_listening_study(study, folder)
-    count = core_count() if workers is None else workers
+    count = worker_count()
     with progress_bar("episodes") as progress:
         found = collect_items(study.export_request(), folder / QUESTIONS, count, progress)
     write_items(found, folder / QUESTIONS)
@@ -123,16 +108,18 @@ def serve_study(
     folder: Study,
     host: Host = "127.0.0.1",
     port: Port = 0,
-    allow_host: AllowHost = None,
     people: Annotated[
         int | None,
         typer.Option(min=1, help="How many may take part, if not as many as planned."),
     ] = None,
 ) -> None:
-    """Serve the page of a study; every answer is on the disk before the next question comes."""
+    """Serve the page of a study; every answer is on the disk before the next question comes.
+
+    Example: roboirg listen serve study
+    """
     from roboirg.apps.people.listen_server import ListenServer
 
-    server = ListenServer(folder, host, port, allow_host or (), people)
+    server = ListenServer(folder, host, port, people)
     _serve(server, "Press Ctrl-C to stop; all answers are stored.")
 
 
@@ -142,11 +129,12 @@ def print_results(
     play: Annotated[
         bool, typer.Option("--play", help="Let the oracle's hands play the answers first.")
     ] = False,
-    workers: Workers = None,
 ) -> None:
     """Print how far people agree, how long they take, whether they pay attention.
 
     Records of what --play plays are in FOLDER/run.
+
+    Example: roboirg listen results study
     """
     from roboirg.apps.people.people_run import RUN, answered_plan
     from roboirg.evaluation.run.executor import choose_executor
@@ -155,7 +143,7 @@ def print_results(
         _print_listeners(folder)
         return
     made, out = answered_plan(folder), folder.absolute() / RUN
-    summary = run_commands.play(made, out, choose_executor(workers), retry=True)
+    summary = run_commands.play(made, out, choose_executor(), retry=True)
     run_commands.print_tables_of(out, made.jobs())
     _print_listeners(folder)
     run_commands.report_problems(summary, out)
@@ -207,34 +195,33 @@ def drive(
     task: Annotated[str, typer.Argument(help="Name of the task.")],
     episode: Annotated[int, typer.Argument(help="Position in the split, from 0.")],
     setting: Annotated[str, typer.Option(help="Setting of the words.")] = "explicit",
-    form: Annotated[str, typer.Option(help="implicit or resolved.")] = "implicit",
     split: Split = "test",
-    delivery: Delivery = "prompt",
-    words: WordChoices = DEFAULT_WORDS,
-    max_steps: Annotated[int, typer.Option(help="Limit in control steps, 20 per second.")] = 1300,
+    words: PlanWords = NO_PLAN,
     out: run_commands.Out = "runs/driven",
     name: Annotated[str, typer.Option(help="Name of the policy in the records.")] = "person",
     host: Host = "127.0.0.1",
     port: Port = 0,
-    allow_host: AllowHost = None,
 ) -> None:
-    """Drive an episode in the browser, by mouse, touch or keyboard; stores its record."""
+    """Drive an episode in the browser, by mouse, touch or keyboard; stores its record.
+
+    Example: roboirg drive PickXtimes 3 --setting direct
+    """
     from roboirg.apps.people.drive_server import DriveServer
     from roboirg.apps.people.driving_run import DRIVER
     from roboirg.envs.factory import check_simulator
     from roboirg.evaluation.plan.plan_maker import make_plan
+    from roboirg.evaluation.records.record import DEFAULT_MAX_STEPS
 
     # The plan checks the words as those of a run; a person is no policy that can be loaded.
     made = make_plan(
         [f"{DRIVER}=oracle"],
         tasks=task,
         settings=setting,
-        forms=form,
+        forms=words.form(),
         split=split,
         episodes=f"{episode},",
-        delivery=delivery,
-        **words._asdict(),
-        max_steps=max_steps,
+        **words.words,
+        max_steps=words.fields.get("max_steps", DEFAULT_MAX_STEPS),
     )
     check_simulator()
     jobs = made.jobs()
@@ -243,7 +230,7 @@ def drive(
             f"One task, one setting and one form are driven at a time; these are {len(jobs)} jobs."
         )
     job = msgspec.structs.replace(jobs[0], policy=name, spec=None)
-    server = DriveServer(job, run_commands.folder_of(out), host, port, allow_host or ())
+    server = DriveServer(job, run_commands.folder_of(out), host, port)
     _serve(server, f"Press Ctrl-C to stop; the records of episodes that ended are in {out}.")
 
 

@@ -3,22 +3,22 @@
 from __future__ import annotations
 
 import functools
-import re
 import secrets
 import threading
-from collections.abc import Sequence
-from http import HTTPStatus
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
-from urllib.parse import parse_qs, urlsplit
 
 import msgspec
+from starlette.exceptions import HTTPException
+from starlette.requests import Request
+from starlette.responses import JSONResponse, Response
+from starlette.routing import Route
 
 from roboirg.apps.people.driving_run import drive_episode, next_seed
 from roboirg.apps.people.driving_session import DrivingSession
 from roboirg.apps.people.listen_server import PACKAGE
 from roboirg.evaluation.records.record import Job
-from roboirg.util.web.keyed_pages import KeyedPageHandler, KeyedPageServer
+from roboirg.util.web.keyed_pages import KeyedPageServer, json_endpoint, page_response
 from roboirg.util.web.page_templates import check_page_support, template_environment
 from roboirg.util.web.request_origin import LOOPBACK
 
@@ -26,7 +26,6 @@ if TYPE_CHECKING:
     import jinja2
 
 STYLES = ("base", "people", "drive")
-_PICTURE = re.compile(r"/picture/(front|wrist)/[0-9]+")
 
 
 class DriveServer(KeyedPageServer):
@@ -37,7 +36,6 @@ class DriveServer(KeyedPageServer):
         folder: of the records.
         host: address to listen at.
         port: 0 for any free port.
-        names: further names under which browsers reach this machine.
 
     Raises:
         InvalidValueError: the port is not available, or the address is not this machine's.
@@ -51,14 +49,21 @@ class DriveServer(KeyedPageServer):
         folder: Path,
         host: str = LOOPBACK,
         port: int = 0,
-        names: Sequence[str] = (),
     ) -> None:
         check_page_support("The page")
         self._job, self._folder = job, folder
         self._starting = threading.Lock()
         self._thread: threading.Thread | None = None
         next_seed(job, folder)
-        super().__init__(_DriveHandler, secrets.token_urlsafe(18), host, port, names)
+        routes = [
+            Route("/", self._page),
+            Route("/news", self._news),
+            Route("/picture/{camera}/{number:int}", self._picture),
+            Route("/video.mp4", self._video),
+            Route("/begin", json_endpoint(self._begin), methods=["POST"]),
+            Route("/command", json_endpoint(self._command), methods=["POST"]),
+        ]
+        super().__init__(routes, secrets.token_urlsafe(18), host, port)
         self.session = DrivingSession("idle")
 
     def begin(self) -> None:
@@ -74,54 +79,47 @@ class DriveServer(KeyedPageServer):
             self._thread.start()
 
     def server_close(self) -> None:
-        """Close the socket and end the episode."""
-        super().server_close()
+        """End the episode, whose news a page waits for, and close the socket."""
         with self._starting:
             self._end_episode()
+        super().server_close()
 
     def _end_episode(self) -> None:
         self.session.stop()
         if self._thread is not None:
             self._thread.join()
 
+    def _page(self, request: Request) -> Response:
+        del request
+        return page_response(_render)
 
-class _DriveHandler(KeyedPageHandler):
-    """Handle requests for the page, its pictures, news and commands."""
+    def _news(self, request: Request) -> Response:
+        after = request.query_params.get("after", "")
+        return JSONResponse(self.session.news(int(after) if after.isdecimal() else -1))
 
-    server: DriveServer
+    def _picture(self, request: Request) -> Response:
+        return _media(self.session.picture(request.path_params["camera"]), "image/jpeg")
 
-    def answer_get(self, path: str) -> None:
-        """Send the page, what is new, a picture or the video."""
-        session = self.server.session
-        if path == "/":
-            self.send_page(_render)
-        elif path == "/news":
-            after = parse_qs(urlsplit(self.path).query).get("after", [""])[0]
-            self.send_json(session.news(int(after) if after.isdecimal() else -1))
-        elif found := _PICTURE.fullmatch(path):
-            self._send_media(session.picture(found[1]), "image/jpeg")
-        elif path == "/video.mp4":
-            self._send_media(session.video, "video/mp4")
-        else:
-            self.send_missing()
+    def _video(self, request: Request) -> Response:
+        del request
+        return _media(self.session.video, "video/mp4")
 
-    def answer_post(self, path: str, body: dict[str, Any]) -> None:
-        """Take a command, or start the episode again."""
-        if path == "/begin":
-            self.server.begin()
-            self.send_json({})
-        elif path != "/command":
-            self.send_missing()
-        elif self.server.session.command(body):
-            self.send_json({})
-        else:
-            self.send_refusal(HTTPStatus.CONFLICT, "The robot is not waiting for a command.")
+    def _begin(self, request: Request, body: dict[str, Any]) -> object:
+        del request, body
+        self.begin()
+        return {}
 
-    def _send_media(self, content: bytes | None, content_type: str) -> None:
-        if content is None:
-            self.send_missing()
-        else:
-            self.send_bytes(content, content_type)
+    def _command(self, request: Request, body: dict[str, Any]) -> object:
+        del request
+        if not self.session.command(body):
+            raise HTTPException(409, "The robot is not waiting for a command.")
+        return {}
+
+
+def _media(content: bytes | None, content_type: str) -> Response:
+    if content is None:
+        raise HTTPException(404)
+    return Response(content, media_type=content_type)
 
 
 @functools.cache

@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 import functools
-import re
 from collections.abc import Sequence
-from http import HTTPStatus
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from starlette.requests import Request
+from starlette.responses import JSONResponse, Response
+from starlette.routing import Mount, Route
+from starlette.staticfiles import StaticFiles
+
 from roboirg.apps.people.listening_session import ListeningSession, OutOfDateError
-from roboirg.core.errors import RoboIRGError
-from roboirg.util.web.keyed_pages import KeyedPageHandler, KeyedPageServer, stored_key
+from roboirg.core.errors import InvalidValueError, RoboIRGError
+from roboirg.evaluation.grounding_items.media_store import PICTURES, VIDEOS
+from roboirg.util.web.keyed_pages import KeyedPageServer, json_endpoint, page_response, stored_key
 from roboirg.util.web.page_templates import check_page_support, template_environment
 from roboirg.util.web.request_origin import LOOPBACK
 
@@ -20,8 +24,6 @@ if TYPE_CHECKING:
 
 PACKAGE = "roboirg.apps.people"
 STYLES = ("base", "people")
-_MEDIA = re.compile(r"/media/((?:pictures|videos)/[0-9a-f]{8,64}\.(?:png|mp4))")
-_PERSON = "X-Person"
 
 
 class ListenServer(KeyedPageServer):
@@ -31,7 +33,6 @@ class ListenServer(KeyedPageServer):
         folder: of the study.
         host: address to listen at.
         port: 0 for any free port.
-        names: further names under which browsers reach this machine.
         people: how many may take part, if not as many as planned.
 
     Raises:
@@ -45,13 +46,28 @@ class ListenServer(KeyedPageServer):
         folder: Path,
         host: str = LOOPBACK,
         port: int = 0,
-        names: Sequence[str] = (),
         people: int | None = None,
     ) -> None:
         check_page_support("The page")
         self.session = ListeningSession(folder, people)
+        questions = self.session.questions_folder
+        # These two only: the folder's lists hold the answers.
+        media = [
+            Mount(f"/media/{name}", StaticFiles(directory=questions / name))
+            for name in (PICTURES, VIDEOS)
+            if (questions / name).is_dir()
+        ]
+        routes = [
+            Route("/", self._page),
+            Route("/state", self._state),
+            *media,
+            Route("/join", json_endpoint(self._join), methods=["POST"]),
+            Route("/answer", json_endpoint(self._answer), methods=["POST"]),
+            Route("/undo", json_endpoint(self._undo), methods=["POST"]),
+        ]
         try:
-            super().__init__(_ListenHandler, stored_key(folder), host, port, names)
+            key = stored_key(folder)
+            super().__init__(routes, key, host, port, {OutOfDateError: 409})
         except RoboIRGError:
             self.session.close()
             raise
@@ -61,56 +77,37 @@ class ListenServer(KeyedPageServer):
         super().server_close()
         self.session.close()
 
+    def _page(self, request: Request) -> Response:
+        del request
+        consent = self.session.study.consent.strip().split("\n\n")
+        return page_response(functools.partial(_render, consent))
 
-class _ListenHandler(KeyedPageHandler):
-    """Handle requests for the page, its pictures, and answers."""
+    def _state(self, request: Request) -> Response:
+        return JSONResponse(self.session.state(_person(request)))
 
-    server: ListenServer
+    def _join(self, request: Request, body: dict[str, Any]) -> object:
+        del request
+        if body.get("consent") is not True:
+            raise InvalidValueError("You have not agreed to take part.")
+        return {"code": self.session.join()}
 
-    def answer_get(self, path: str) -> None:
-        """Send the page, what it shows, or a picture."""
-        if path == "/":
-            consent = self.server.session.study.consent.strip().split("\n\n")
-            self.send_page(functools.partial(_render, consent))
-        elif path == "/state":
-            self._reply(lambda: self.server.session.state(self.headers.get(_PERSON, "")))
-        elif found := _MEDIA.fullmatch(path):
-            try:
-                with (self.server.session.questions_folder / found[1]).open("rb") as file:
-                    self.send_file(file, path)
-            except OSError:
-                self.send_missing()
-        else:
-            self.send_missing()
+    def _answer(self, request: Request, body: dict[str, Any]) -> object:
+        return self.session.answer(_person(request), _number(body), body)
 
-    def answer_post(self, path: str, body: dict[str, Any]) -> None:
-        """Let a person join, answer, or take an answer back."""
-        session, code = self.server.session, self.headers.get(_PERSON, "")
-        number = body.get("number")
-        if path == "/join":
-            if body.get("consent") is not True:
-                self.send_refusal(HTTPStatus.BAD_REQUEST, "You have not agreed to take part.")
-                return
-            self._reply(lambda: {"code": session.join()})
-        elif type(number) is not int:
-            self.send_refusal(HTTPStatus.BAD_REQUEST, "The request names no question.")
-        elif path == "/answer":
-            self._reply(lambda: session.answer(code, number, body))
-        elif path == "/undo":
-            self._reply(lambda: session.undo(code, number))
-        else:
-            self.send_missing()
+    def _undo(self, request: Request, body: dict[str, Any]) -> object:
+        return self.session.undo(_person(request), _number(body))
 
-    def _reply(self, act: Any) -> None:  # noqa: ANN401 - returns what is sent
-        """Send what a function returns, or why it could not."""
-        try:
-            value = act()
-        except OutOfDateError as error:
-            self.send_refusal(HTTPStatus.CONFLICT, str(error))
-        except RoboIRGError as error:
-            self.send_refusal(HTTPStatus.BAD_REQUEST, str(error))
-        else:
-            self.send_json(value)
+
+def _person(request: Request) -> str:
+    """Return the code of the person whose page sent a request; empty without one."""
+    return request.headers.get("X-Person", "")
+
+
+def _number(body: dict[str, Any]) -> int:
+    number = body.get("number")
+    if type(number) is not int:
+        raise InvalidValueError("The request names no question.")
+    return number
 
 
 @functools.cache

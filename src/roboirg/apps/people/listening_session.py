@@ -63,7 +63,7 @@ class ListeningSession:
         self._most = self.study.people if people is None else people
         self.questions_folder = folder / QUESTIONS
         if self.study.plan.wordings is not None:
-            open_wordings(self.study.plan.wordings, self.study.plan.wordings_identity)
+            open_wordings(self.study.plan.wordings, self.study.plan.options.wordings)
         if not (self.questions_folder / ITEMS_FILE).exists():
             raise InvalidValueError(
                 f"The study {str(folder)!r} has no pictures yet; give roboirg listen plan again."

@@ -11,6 +11,7 @@ import functools
 import itertools
 from collections import Counter
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Literal, NamedTuple
 
@@ -146,16 +147,9 @@ class ListeningStudy(BaseModel):
             episodes=tuple(dict.fromkeys(episodes)),
             settings=tuple(dict.fromkeys((EXPLICIT, *named))),
             forms=plan.forms,
-            options=InstructionOptions(
-                stages=plan.stages[0],
-                distractor=plan.distractor,
-                distractors=plan.distractors,
-                frame=plan.frame,
-                wordings=plan.wordings_identity,
-            ),
+            options=replace(plan.options, stages=plan.stages[0], delivery=DEFAULT_DELIVERY),
             frames_every=self.frames_every,
             wordings=plan.wordings,
-            formats=(),
         )
 
     @functools.cached_property
@@ -196,8 +190,7 @@ class ListeningStudy(BaseModel):
             task=task,
             split=TRAINING,
             episode=index,
-            setting=EXPLICIT,
-            wordings=plan.wordings_identity,
+            options=InstructionOptions(EXPLICIT, wordings=plan.options.wordings),
             wordings_file=plan.wordings,
         )
 
@@ -212,7 +205,7 @@ def _assign(jobs: list[Job], place: int, column: int) -> Job:
 
 def words_of(job: Job) -> tuple[str, str, int, InstructionOptions]:
     """Return what the words of a job depend on, as of an item of the dataset."""
-    return job.task, job.split, job.episode, job.options._replace(delivery=DEFAULT_DELIVERY)
+    return job.task, job.split, job.episode, replace(job.column, delivery=DEFAULT_DELIVERY)
 
 
 def write_listening_study(study: ListeningStudy, folder: Path) -> None:

@@ -53,7 +53,7 @@ def view_question(
     # By place alone: the order of the scene could tell what is meant.
     seen.sort(key=lambda one: (one[1].x, one[1].y))
     shown = {
-        "turns": item.turns if job.delivery == TURNS else [item.text],
+        "turns": item.turns if job.options.delivery == TURNS else [item.text],
         "picture": item.picture,
         "video": item.video,
         "points": [noun(job.task, kind) for kind in form.kinds],

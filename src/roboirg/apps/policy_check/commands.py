@@ -13,13 +13,15 @@ from roboirg.cli.run_commands import USAGE_ERROR
 
 def check_policy(
     policy: PolicySpec,
-    seed: Annotated[int, typer.Option(help="Of the policy's random choices.")] = 0,
     expert: Annotated[
         bool,
         typer.Option(help="Compare with an expert's episode, if the simulator is installed."),
     ] = True,
 ) -> None:
-    """Check a policy on synthetic episodes, and beside the scripted expert."""
+    """Check a policy on synthetic episodes, and beside the scripted expert.
+
+    Example: roboirg check-policy my_policy:MyPolicy
+    """
     from rich.console import Console
 
     from roboirg.apps.policy_check.check_result import FAIL
@@ -28,7 +30,7 @@ def check_policy(
     from roboirg.apps.policy_check.policy_check import print_check_results
 
     add_working_directory()
-    results = check(policy, seed=seed, record_expert=record_expert if expert else None)
+    results = check(policy, record_expert=record_expert if expert else None)
     print_check_results(results, Console())
     if any(result.verdict == FAIL for result in results):
         raise typer.Exit(USAGE_ERROR)

@@ -46,7 +46,10 @@ def plan(
     max_steps: Annotated[int, typer.Option(help="Limit of a trial in control steps.")] = 1300,
     sheet: Annotated[bool, typer.Option(help="Write the printable sheet.")] = True,
 ) -> None:
-    """Plan a study: write plan.json, CSV files and a sheet to print."""
+    """Plan a study: write plan.json, CSV files and a sheet to print.
+
+    Example: roboirg real plan --policy my_policy:MyPolicy --out study
+    """
     from roboirg.apps.real.pages.trial_sheet import check_sheet_support
     from roboirg.apps.real.study.study_plan import make_study
     from roboirg.evaluation.plan.plan_parsing import means_all, parse_names
@@ -120,7 +123,10 @@ def run(
         bool, typer.Option(help="Play trials again that ended in an error or were void.")
     ] = True,
 ) -> None:
-    """Play the trials of a study in order, on a robot or its twin."""
+    """Play the trials of a study in order, on a robot or its twin.
+
+    Example: roboirg real run study --robot twin
+    """
     from roboirg.apps.real.control.limits import read_limits
     from roboirg.apps.real.control.robot_loading import make_robot
     from roboirg.apps.real.pages.operator_console import OperatorConsole
@@ -151,7 +157,10 @@ def score(
     ] = "operator",
     port: Annotated[int, typer.Option(help="Port to listen on; 0 for any free port.")] = 0,
 ) -> None:
-    """Serve the scoring page: one trial at a time, by keyboard, each verdict stored at once."""
+    """Serve the scoring page: one trial at a time, by keyboard, each verdict stored at once.
+
+    Example: roboirg real score study
+    """
     from roboirg.apps.real.pages.score_server import ScoreServer
     from roboirg.apps.real.study.study_plan import read_study
 

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from roboirg.cli.names import known_settings
-from roboirg.cli.options import DEFAULT_WORDS, Settings, Split, WordChoices, spread
+from roboirg.cli.options import NO_WORDS, Settings, Split, WordOptions, spread
 from roboirg.core.errors import InvalidValueError
 from roboirg.core.plain_text import counted
 
@@ -27,20 +28,22 @@ def show(
         bool, typer.Option("--words", help="Print the instructions only, with their lengths.")
     ] = False,
     settings: Settings = "all",
-    choices: WordChoices = DEFAULT_WORDS,
-    distractors: Annotated[int, typer.Option(help="Number of distractors.")] = 1,
+    choices: WordOptions = NO_WORDS,
     out: Annotated[
         str | None, typer.Option(help="PNG file to write; TASK-SPLIT-EPISODE.png by default.")
     ] = None,
 ) -> None:
-    """Print an episode's scene and instructions, and draw how the oracle plays it."""
+    """Print an episode's scene and instructions, and draw how the oracle plays it.
+
+    Example: roboirg show PickXtimes 3 --words
+    """
     from roboirg.language import settings_of
     from roboirg.language.generator import check_options
     from roboirg.tasks import get_task
     from roboirg.tasks.splits.splits import get_episode
 
     found = get_episode(task, split, episode)
-    options = choices.instruction_options()._replace(distractors=distractors)
+    options = choices.options()
     check_options(options)
     possible, chosen = settings_of(get_task(task)), known_settings(settings)
     shown = [name for name in chosen if name in possible] or chosen
@@ -57,7 +60,7 @@ def _print_words(episode: Episode, settings: Sequence[str], options: Instruction
     from roboirg.language.token_counts import count_tokens
 
     for name in settings:
-        instruction = instruct_with(episode, options._replace(setting=name))
+        instruction = instruct_with(episode, replace(options, setting=name))
         length = counted(count_tokens(instruction.text), "token")
         typer.echo(f"{typer.style(name, bold=True)} ({length}):")
         for utterance in instruction.utterances:

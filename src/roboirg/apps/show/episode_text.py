@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 
 from rich import box
 from rich.console import Console
@@ -87,12 +88,12 @@ def instructions_table(
     table.add_column("form", style="dim")
     table.add_column("instruction", overflow="fold")
     for setting in settings:
-        chosen = options._replace(setting=setting)
+        chosen = replace(options, setting=setting)
         if refusal := find_refusal(episode, chosen):
             table.add_row(setting, "", f"cannot express the episode: {escape(refusal)}")
             continue
         for form in ("implicit",) if setting == "explicit" else ("implicit", "resolved"):
-            text = instruct_with(episode, chosen._replace(form=form)).text
+            text = instruct_with(episode, replace(chosen, form=form)).text
             table.add_row(setting if form == "implicit" else "", form, escape(text))
     return table
 

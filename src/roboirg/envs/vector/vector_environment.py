@@ -76,7 +76,7 @@ class RoboIRGVectorEnv(gymnasium.vector.VectorEnv[Batch, Any, NDArray[Any]]):
         self.observation_space = batch_space(single.observation_space, num_envs)
         self.action_space = batch_space(single.action_space, num_envs)
         self._task = task
-        self._settings = self._chosen = EnvSettings(**options)
+        self._settings = self._chosen = EnvSettings.of(options)
         self._space = find_action_space(single.actions)
         self._last: list[int | None] = [None] * num_envs
         self._kept: dict[str, Any] = {}

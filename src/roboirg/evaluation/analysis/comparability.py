@@ -77,12 +77,7 @@ def comparison_sign(differences: Differences | None) -> str:
 
 
 def comparison_notes(found: AllDifferences, names: Mapping[PolicyRun, str]) -> list[str]:
-    """Return sentences that explain the signs and say what differs, by policy and task.
-
-    Args:
-        found: the differences of each cell.
-        names: labels of the policy runs.
-    """
+    """Return sentences that explain the signs and say what differs, by policy and task."""
     cells = {key: one for key, one in found.items() if comparison_sign(one)}
     notes = []
     if () in cells.values():

@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import functools
 from collections.abc import Collection, Mapping
+from dataclasses import replace
 from decimal import Decimal
 from importlib import resources
 from typing import Literal, NamedTuple, get_args
@@ -76,11 +77,7 @@ class CoverageRow(NamedTuple):
 
 @functools.cache
 def published_rows(table: str) -> tuple[PublishedRow, ...]:
-    """Return the rows of a table, in the order of the paper.
-
-    Raises:
-        UnknownNameError: the table does not exist.
-    """
+    """Return the rows of a table, in the order of the paper."""
     if table not in RATE_TABLES:
         raise UnknownNameError("published table", table, RATE_TABLES)
     grouped: dict[tuple[str, InstructionOptions], dict[str, Decimal | None]] = {}
@@ -116,7 +113,7 @@ def published_coverage() -> tuple[CoverageRow, ...]:
 def _options(line: Mapping[str, str]) -> InstructionOptions:
     if "stages" in line:
         stages = tuple(map(int, line["stages"].split(",")))
-        return staged_options()[0]._replace(stages=stages)
+        return replace(staged_options()[0], stages=stages)
     return InstructionOptions(line["setting"])
 
 

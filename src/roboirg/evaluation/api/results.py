@@ -108,18 +108,28 @@ class Results:
             if one.key.scope == ALL and one.rate is not None
         }
 
-    def table(self, which: str = "main", format: str = "terminal", **options: bool) -> str:  # noqa: A002
+    def table(
+        self,
+        which: str = "main",
+        format: str = "terminal",  # noqa: A002
+        *,
+        published: bool = False,
+        floors: Sequence[str] = (),
+    ) -> str:
         """Return a table of the paper as text.
 
         Args:
             which: main, planner, context, real, other or coverage.
             format: terminal, markdown, latex or csv.
-            **options: ``published``, ``chance``, ``floors``: rows to add.
+            published: whether to add the paper's rows.
+            floors: expected successes to add: ``chance`` or names of shortcuts.
 
         Raises:
             UnknownNameError: there is no such table or format.
         """
-        return get_format(format).draw(make_table(which, self.cells, **options))
+        return get_format(format).draw(
+            make_table(which, self.cells, published=published, floors=floors)
+        )
 
     def plot(self, which: str = "averages", *, published: bool = False) -> Plot:
         """Return one of the figures: averages, forms, context or failures.

@@ -12,8 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from roboirg.core.errors import InvalidValueError
-from roboirg.core.instruction_options import DEFAULT_DELIVERY, InstructionOptions
-from roboirg.evaluation.records.record import options_of
+from roboirg.core.instruction_options import OPTION_NAMES, InstructionOptions
 from roboirg.util.atomic_write import write_atomically
 
 ITEMS_FILE = "items.jsonl"
@@ -101,14 +100,15 @@ class GroundingItem(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fi
     environment_version: int
 
     @property
-    def delivery(self) -> str:
-        """An item has both the text and the turns."""
-        return DEFAULT_DELIVERY
-
-    @property
     def options(self) -> InstructionOptions:
-        """The instruction options, without `wordings`, as of records."""
-        return options_of(self)._replace(stages=tuple(self.stages))
+        """The instruction options without `wordings`, as the columns of records.
+
+        Those that an item does not have keep their defaults, such as the delivery: an item has both
+        the text and the turns.
+        """
+        known = [name for name in OPTION_NAMES if name in self.__struct_fields__]
+        given = {name: getattr(self, name) for name in known}
+        return InstructionOptions(**{**given, "stages": tuple(self.stages), "wordings": None})
 
     def system_prompt(self, kind: QuestionKind) -> str:
         """Return the system prompt of a kind of question."""

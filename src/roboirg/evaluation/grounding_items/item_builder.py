@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import asdict, astuple, replace
 from typing import Any, NamedTuple
 
 from roboirg.core.episode import ENVIRONMENT_VERSION, Episode
@@ -19,7 +20,7 @@ from roboirg.language.settings import all_settings, settings_of
 from roboirg.language.templates import LANGUAGE_VERSION
 from roboirg.policies.vlm.goal_schema import goal_schema
 from roboirg.policies.vlm.listener_query import PROMPTS, question_texts
-from roboirg.policies.vlm.prompts import Prompts, load_prompts
+from roboirg.policies.vlm.prompt_files import Prompts, load_prompts
 from roboirg.shortcuts.command_chance import blind_goals, is_right, right_share
 from roboirg.shortcuts.shortcut_scores import hidden_slots
 from roboirg.tasks import get_task
@@ -83,7 +84,7 @@ def wanted_options(
         if every_variant:
             variants += setting.variants
         found = [
-            usual._replace(form=form, **changes)
+            replace(usual, form=form, **changes)
             for changes in variants
             for form in (forms if setting.implicit else (usual.form,))
         ]
@@ -100,7 +101,7 @@ def make_items(
 
 def item_id(episode: Episode, options: InstructionOptions) -> str:
     """Return the name of an item. It is a hash, which tells nothing about the answer."""
-    content = (episode.key, *options, LANGUAGE_VERSION, ENVIRONMENT_VERSION)
+    content = (episode.key, *astuple(options), LANGUAGE_VERSION, ENVIRONMENT_VERSION)
     return "g" + hashlib.sha256(repr(content).encode()).hexdigest()[:ID_DIGITS]
 
 
@@ -219,8 +220,8 @@ def _points_question(questions: Prompts, episode: Episode) -> str:
 
 
 def _option_fields(options: InstructionOptions) -> dict[str, Any]:
-    fields = options._asdict()
-    del fields["delivery"]
+    known = GroundingItem.__struct_fields__
+    fields = {name: value for name, value in asdict(options).items() if name in known}
     return {**fields, "stages": list(options.stages), "wordings": options.wordings or "own"}
 
 

@@ -10,7 +10,7 @@ import functools
 import json
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any, Literal, NamedTuple, get_args
+from typing import Any, NamedTuple
 
 import msgspec
 
@@ -30,9 +30,6 @@ PARTS = "parts"
 FRAMES = 16
 """As many frames of the video as the language-model listener sends."""
 FRAMES_EVERY = 8
-
-TableFormat = Literal["parquet", "tsv"]
-TABLE_FORMATS: tuple[TableFormat, ...] = get_args(TableFormat)
 
 Progress = Callable[[int, int], None]
 
@@ -57,7 +54,6 @@ class ExportRequest(NamedTuple):
         frames: maximum of frames of a video that are stored as pictures.
         frames_every: control steps between two frames of the video.
         wordings: path of a wording file or name of a pool, for worker processes.
-        formats: tables to write beside the JSON lines.
     """
 
     episodes: tuple[EpisodeName, ...]
@@ -68,7 +64,6 @@ class ExportRequest(NamedTuple):
     frames: int = FRAMES
     frames_every: int = FRAMES_EVERY
     wordings: str | None = None
-    formats: tuple[TableFormat, ...] = TABLE_FORMATS
 
     def pictures(self) -> dict[str, Any]:
         """Return everything that the pictures depend on, as JSON values."""

@@ -6,21 +6,21 @@ import itertools
 import math
 import os
 import re
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import asdict, replace
 from typing import Any, Literal, get_args
 
 import msgspec
-from pydantic import BaseModel, ConfigDict, field_validator, model_validator
+from pydantic import BaseModel, ConfigDict, field_serializer, field_validator, model_validator
 
 from roboirg import language, policies, tasks
 from roboirg.core.actions import find_action_space
 from roboirg.core.errors import InvalidValueError
+from roboirg.core.field_types import CONTROLS, NAME
 from roboirg.core.instruction_options import (
     ALL_STAGES,
-    DEFAULT_DELIVERY,
-    DEFAULT_DISTRACTOR,
-    DEFAULT_DISTRACTORS,
     DEFAULT_FRAME,
+    OPTION_NAMES,
     InstructionOptions,
 )
 from roboirg.core.observations import (
@@ -36,10 +36,8 @@ from roboirg.evaluation.plan.plan_parsing import check_names, name_and_spec
 from roboirg.evaluation.play.job_instruction import instruct_job
 from roboirg.evaluation.records.film import VideoMode
 from roboirg.evaluation.records.record import (
-    CONTROLS,
     DEFAULT_MAX_STEPS,
     DEFAULT_MESHES,
-    NAME,
     ErrorKind,
     Job,
 )
@@ -63,94 +61,95 @@ LONG_PROMPTS: tuple[LongPrompts, ...] = get_args(LongPrompts)
 
 MESHES = ("faithful", "light")
 
+AXES = ("setting", "form", "stages")
+"""Options of instructions of which a plan plays several."""
+
 RETRYABLE: tuple[ErrorKind, ...] = ("connection", "environment", "infrastructure")
 """Kinds of errors that may not occur again when the episode is retried."""
 
 
 class Plan(BaseModel):
-    """Which policies play which episodes, with which instructions.
+    """Which policies play which episodes, with which instructions."""
 
-    Attributes:
-        policies: built-in names, ``package.module:Class``, or addresses; each may be given a name
-            of its own as ``NAME=SPEC``.
-        tasks: names of tasks.
-        settings: names, or ``"all"`` for every setting that can express the episode, without
-            the harder ones.
-        forms: implicit, resolved or both.
-        split: train, val, test, random, or the name of a private split.
-        episodes: 0-based positions in the split.
-        policy_seeds: every seed plays every episode.
-        seed_secret: text from which, with the policy seed and the scene, policies' seeds are made;
-            None draws one when the run begins, or takes that of the run's folder.
-        stages: sets of stages for settings that read them; every set is played.
-        distractor: kind of distractor, for settings that read it.
-        distractors: number of distractors, for settings that read it.
-        frame: frame of reference, for settings that read it.
-        delivery: prompt or turns, for settings with several utterances.
-        wordings: path of the wording file whose commands are used; None for our own.
-        wordings_identity: name and fingerprint of that file; read from it if it is not given.
-        max_steps: the policy's limit, control steps.
-        actions: required action space; None for each policy's own.
-        demonstration_frames: which frames of the video policies get; None for each policy's choice.
-        observe_every: control steps between observations; None for each policy's choice.
-        meshes: faithful or light.
-        video: which episodes get a video. This and all that follows is not part of a record's
-            identity.
-        policy_process: ``own``: each policy that is neither built in nor remote has a process of
-            its own; ``shared``: it runs in the world's, for debuggers.
-        batch: most episodes that a policy is asked about together.
-        devices: values of ``CUDA_VISIBLE_DEVICES``; each policy has a process on each of them.
-        long_prompts: whether an episode is played (``send``) or not (``refuse``) if its prompt is
-            longer than what the policy declares that its model reads.
-        policy_timeout_s: seconds that one call of a policy may take.
-        episode_timeout_s: seconds that an episode may take.
-        tries: how often an episode is played if it ends in an error of a kind in `retry_on`.
-        retry_on: kinds of errors.
-    """
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
+    model_config = ConfigDict(frozen=True, extra="forbid", use_attribute_docstrings=True)
 
     policies: tuple[str, ...]
+    """Built-in names, package.module:Class, or addresses; NAME=SPEC gives one a name of its own."""
     tasks: tuple[str, ...]
+    """Tasks or suites; all for the whole benchmark."""
     settings: tuple[str, ...] | Literal["all"] = "all"
+    """Settings; all for every setting that can express the episode, without the harder ones."""
     forms: tuple[str, ...] = ("implicit",)
+    """implicit, resolved or both."""
     split: str = "test"
+    """train, val, test, random, or the name of a private split."""
     episodes: tuple[int, ...]
+    """Positions in the split, from 0; a number alone, such as 4, is the first four."""
     policy_seeds: tuple[int, ...] = (0,)
+    """Every seed plays every episode."""
     seed_secret: str | None = None
+    """Text from which, with the policy seed and the scene, the seeds of policies are made; without
+    one, the run draws it, or takes that of its folder."""
     stages: tuple[tuple[int, ...], ...] = (ALL_STAGES,)
-    distractor: str = DEFAULT_DISTRACTOR
-    distractors: int = DEFAULT_DISTRACTORS
-    frame: str = DEFAULT_FRAME
-    delivery: str = DEFAULT_DELIVERY
+    """Sets of stages of the contextual setting; every set is played."""
+    options: InstructionOptions = InstructionOptions()
+    """Further options of instructions, for settings that read them. Its `wordings` identify those
+    of `wordings`; the setting, form and stages are the fields above."""
     wordings: str | None = None
-    wordings_identity: str | None = None
+    """Wording file whose commands are used; or train or test: our words of that pool in every
+    split."""
     max_steps: int = DEFAULT_MAX_STEPS
+    """Limit of an episode in control steps, 20 per second."""
     actions: str | None = None
+    """Required action space; without one, each policy's own."""
     demonstration_frames: DemonstrationFrames | None = None
+    """Frames of the demonstration that policies get: all, none, or their number; without it, as
+    each policy asks."""
     observe_every: int | None = None
+    """Control steps between two observations; without it, as each policy asks."""
     meshes: str = DEFAULT_MESHES
+    """Meshes for rendering: faithful or light."""
     video: VideoMode = "off"
+    """Episodes whose video is recorded: off, failures or all. This and all that follows is no part
+    of a record's identity."""
     policy_process: PolicyProcessMode = "own"
+    """own: a policy that is neither built in nor remote has a process of its own; shared: it runs
+    in the world's process, for debuggers."""
     batch: int = DEFAULT_BATCH
+    """Most episodes that a policy is asked about at once."""
     devices: tuple[str, ...] = ()
+    """GPUs, such as 0,1; each policy has a process on each of them. Without any, one on any."""
     long_prompts: LongPrompts = "send"
+    """Episodes whose prompt is longer than what the policy declares that its model reads: send or
+    refuse."""
     policy_timeout_s: float = 600.0
+    """Time limit of one call of a policy, seconds."""
     episode_timeout_s: float = 7200.0
+    """Time limit of an episode, seconds."""
     tries: int = 2
+    """How often an episode is played if it ends in an error of a kind in `retry_on`."""
     retry_on: tuple[ErrorKind, ...] = RETRYABLE
+    """Kinds of errors after which an episode is played again."""
 
     @model_validator(mode="before")
     @classmethod
     def _identify_wordings(cls, fields: Any) -> Any:  # noqa: ANN401 - whatever is to be validated
         if not isinstance(fields, dict) or fields.get("wordings") is None:
             return fields
-        if fields.get("wordings_identity") is not None:
+        options: Any = fields.get("options", {})
+        if isinstance(options, InstructionOptions):
+            options = asdict(options)
+        if not isinstance(options, dict) or options.get("wordings") is not None:
             return fields
-        if fields["wordings"] in POOLS:
-            return {**fields, "wordings_identity": fields["wordings"]}
-        path = os.path.realpath(str(fields["wordings"]))
-        return {**fields, "wordings": path, "wordings_identity": open_wordings(path)}
+        path = str(fields["wordings"])
+        if path not in POOLS:
+            path = os.path.realpath(path)
+        options = {**options, "wordings": path if path in POOLS else open_wordings(path)}
+        return {**fields, "wordings": path, "options": options}
+
+    @field_serializer("options")
+    def _write_options(self, options: InstructionOptions) -> dict[str, Any]:
+        return {name: value for name, value in asdict(options).items() if name not in AXES}
 
     @field_validator("demonstration_frames", mode="before")
     @classmethod
@@ -162,6 +161,7 @@ class Plan(BaseModel):
         if not is_encodable(self.seed_secret or ""):
             raise InvalidValueError(f"seed_secret is {self.seed_secret!r}: it has lone surrogates.")
         texts = self.model_dump(exclude={"seed_secret"})
+        texts |= texts.pop("options")
         for name, value in texts.items():
             for text in value if isinstance(value, tuple) else (value,):
                 if isinstance(text, str) and re.search(f"[{CONTROLS}]", text):
@@ -316,7 +316,7 @@ class Plan(BaseModel):
                 task=task,
                 split=self.split,
                 episode=episode,
-                **options._replace(wordings=self.wordings_identity)._asdict(),
+                options=replace(options, wordings=self.options.wordings),
                 wordings_file=self.wordings,
                 policy_seed=seeds[0],
                 max_steps=self.max_steps,
@@ -337,10 +337,10 @@ class Plan(BaseModel):
         An option that the setting does not read keeps its default, so that equal words are one job.
         """
         rule, usual = all_settings()[setting], InstructionOptions(setting)
-        chosen = {option: getattr(self, option) for option in rule.reads - {"stages"}}
+        chosen = {option: getattr(self.options, option) for option in rule.reads - {"stages"}}
         for form in self.forms if rule.implicit else (usual.form,):
             for stages in self.stages if "stages" in rule.reads else (usual.stages,):
-                yield usual._replace(form=form, stages=stages, **chosen)
+                yield replace(usual, form=form, stages=stages, **chosen)
 
     def _is_left_out(self, task: str, episode: int, options: InstructionOptions) -> bool:
         """Return whether a harder setting cannot express an episode that its plain one can.
@@ -351,14 +351,16 @@ class Plan(BaseModel):
         if plain is None:
             return False
         found = splits.get_episode(task, self.split, episode)
-        easier = options._replace(setting=plain)
+        easier = replace(options, setting=plain)
         refused = [find_refusal(found, one) is not None for one in (options, easier)]
         return refused == [True, False]
 
     def _instruction_jobs(self) -> Iterator[Job]:
         """Yield one job for each instruction that the language may not be able to express."""
         # All settings with the default frame are only those that can express the episode.
-        usual = self.settings == "all" and self.frame == DEFAULT_FRAME and self.wordings is None
+        usual = (
+            self.settings == "all" and self.options.frame == DEFAULT_FRAME and self.wordings is None
+        )
         for task in self.tasks:
             for episode in self.episodes[:1] if usual else self.episodes:
                 settings = self.settings_of(task, episode)
@@ -366,17 +368,7 @@ class Plan(BaseModel):
 
     def _check_options(self) -> None:
         for form, stages in itertools.product(self.forms, self.stages):
-            check_options(
-                InstructionOptions(
-                    EXPLICIT,
-                    form=form,
-                    stages=stages,
-                    distractor=self.distractor,
-                    distractors=self.distractors,
-                    frame=self.frame,
-                    delivery=self.delivery,
-                )
-            )
+            check_options(replace(self.options, form=form, stages=stages))
         check_names("kind of meshes", (self.meshes,), MESHES)
         for name, least in (("max_steps", 1), ("tries", 1), ("batch", 1)):
             if getattr(self, name) < least:
@@ -404,5 +396,16 @@ class Plan(BaseModel):
                 )
 
 
+SINGLE_OPTIONS = tuple(name for name in OPTION_NAMES if name not in (*AXES, *Plan.model_fields))
+"""Options of instructions of which a plan has one value, in `options`."""
+
+
 def _names_the_goal(options: InstructionOptions) -> bool:
     return options.setting == EXPLICIT or options.form == "resolved"
+
+
+def nest_options(fields: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the fields of a plan, with the options of instructions among them in `options`."""
+    nested = {name: value for name, value in fields.items() if name in SINGLE_OPTIONS}
+    others = {name: value for name, value in fields.items() if name not in SINGLE_OPTIONS}
+    return {**others, "options": {**others.get("options", {}), **nested}}

@@ -11,7 +11,7 @@ from typing import Any
 import yaml
 
 from roboirg.core.errors import InvalidValueError, UnknownNameError
-from roboirg.evaluation.plan.plan import Plan
+from roboirg.evaluation.plan.plan import SINGLE_OPTIONS, Plan
 from roboirg.evaluation.plan.stored_plans import from_schema_3
 from roboirg.util.regular_file import read_regular
 
@@ -63,9 +63,10 @@ def read_plan_file(name: str) -> dict[str, Any]:
             f"The plan {name!r} is of type {type(data).__name__}; it must be a mapping such as "
             "'tasks: all'."
         )
+    known = (*Plan.model_fields, *SINGLE_OPTIONS)
     for key in data:
-        if key not in Plan.model_fields:
-            raise UnknownNameError(f"plan key (in {name!r})", key, Plan.model_fields)
+        if key not in known:
+            raise UnknownNameError(f"plan key (in {name!r})", key, known)
     return {key: _as_typed(key, value) for key, value in data.items() if value is not None}
 
 

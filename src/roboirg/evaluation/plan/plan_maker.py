@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import replace
 
 from pydantic import ValidationError
 
 from roboirg import tasks as task_registry
 from roboirg.core.errors import InvalidValueError
-from roboirg.evaluation.plan.plan import LONG_PROMPTS, REQUIRED, RETRYABLE, Plan
+from roboirg.core.instruction_options import InstructionOptions
+from roboirg.evaluation.plan.plan import LONG_PROMPTS, REQUIRED, RETRYABLE, Plan, nest_options
 from roboirg.evaluation.plan.plan_parsing import (
     ALL,
     check_names,
@@ -21,6 +23,7 @@ from roboirg.evaluation.plan.plan_parsing import (
 )
 from roboirg.evaluation.records.film import VIDEO_MODES
 from roboirg.evaluation.records.record import ERROR_KINDS, ErrorKind
+from roboirg.language import FORMS
 
 
 def make_plan(
@@ -48,7 +51,7 @@ def make_plan(
         stages: a list of numbers, or several lists separated by semicolons.
         retry_on: kinds of errors separated by commas, or ``none``.
         devices: names separated by commas; none for one process on any device.
-        **options: other fields of `Plan`.
+        **options: other fields of `Plan`, and options of instructions by their own names.
 
     Raises:
         UnknownNameError: a name does not exist; the message suggests the nearest.
@@ -74,11 +77,39 @@ def make_plan(
             stages=parse_stage_sets(stages),
             retry_on=_error_kinds(retry_on),
             devices=parse_names("device", devices) if devices else (),
-            **options,  # type: ignore[arg-type]
+            **nest_options(options),
         )
     except ValidationError as error:
         raise _explain(error) from error
     return plan.checked()
+
+
+def word_options(*, stages: str = "1-5", **options: object) -> InstructionOptions:
+    """Return options of instructions as typed for a plan, one value each; opens the wording file.
+
+    Raises:
+        InvalidValueError: a value is out of range, or there are several sets of stages.
+    """
+    sets = parse_stage_sets(stages)
+    if len(sets) > 1:
+        raise InvalidValueError(f"stages is {stages!r}; here it must be one set, such as 1,5.")
+    fields = nest_options(options)
+    try:
+        plan = Plan(policies=(), tasks=(), episodes=(), stages=sets, **fields)
+    except ValidationError as error:
+        raise _explain(error) from error
+    return replace(plan.options, stages=sets[0])
+
+
+def form_names(text: str) -> tuple[str, ...]:
+    """Return the forms that were typed.
+
+    Raises:
+        UnknownNameError: there is no such form.
+    """
+    names = FORMS if means_all(text) else parse_names("form", text)
+    check_names("form", names, FORMS)
+    return names
 
 
 def _explain(error: ValidationError) -> InvalidValueError:

@@ -10,7 +10,7 @@ from typing import Any
 
 from roboirg.core.errors import InvalidValueError
 from roboirg.core.plain_text import is_encodable
-from roboirg.evaluation.plan.plan import Plan
+from roboirg.evaluation.plan.plan import Plan, nest_options
 from roboirg.evaluation.records.record_codec import harder_setting
 from roboirg.evaluation.records.run_files import (
     MOST_PLAN_BYTES,
@@ -69,8 +69,11 @@ def kept_fingerprints(folder: Path) -> frozenset[str]:
 
 
 def from_schema_3(data: dict[str, Any]) -> dict[str, Any]:
-    """Return the fields of a plan, in which schema 3 wrote harder settings as options."""
-    data = dict(data)
+    """Return the fields of a plan; in schema 3 options were flat, harder settings among them."""
+    identity = data.get("wordings_identity")
+    data = nest_options({name: one for name, one in data.items() if name != "wordings_identity"})
+    if identity is not None:
+        data["options"]["wordings"] = identity
     rival, reasoning = data.pop("rival", "none"), data.pop("reasoning", "plain")
     if isinstance(data.get("settings"), list):
         harder = [harder_setting(one, rival=rival, reasoning=reasoning) for one in data["settings"]]

@@ -67,7 +67,7 @@ class GuardedLoop(EpisodeLoop):
         env, result, writer = self.env, self._result, self._writer
         with self._guard.environment("env_reset"):
             result.instruction = env.instruction
-            first = SpokenInstruction(env.instruction.turns, self._job.delivery).prompt
+            first = SpokenInstruction(env.instruction.turns, self._job.options.delivery).prompt
             if writer is not None:
                 writer.caption, writer.longest_caption = first, env.instruction.text
                 env.set_frame_hook(writer.add_frame, every=writer.options.every)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 from roboirg import language
@@ -37,10 +37,9 @@ class PreparedJob:
 
     def _say(self, setting: str) -> Instruction:
         job, episode = self.job, self.episode
-        if job.wordings is not None:
-            open_wordings(job.wordings_file, job.wordings)
-        options = job.options._replace(setting=setting, wordings=job.wordings)
-        return language.instruct_with(episode, options)
+        if job.options.wordings is not None:
+            open_wordings(job.wordings_file, job.options.wordings)
+        return language.instruct_with(episode, replace(job.options, setting=setting))
 
 
 def instruct_job(job: Job) -> Instruction:

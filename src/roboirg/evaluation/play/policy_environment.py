@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import asdict, replace
 from typing import TYPE_CHECKING
 
 from roboirg.core.errors import InvalidValueError
@@ -42,7 +42,7 @@ def make_env(prepared: PreparedJob, needs: PolicyNeeds) -> RoboIRGEnv:
     job = prepared.job
     return make(
         prepared.episode,
-        **job.options._replace(wordings=job.wordings)._asdict(),
+        **asdict(job.options),
         **needs.env_options,
         meshes=job.meshes,
         max_steps=job.max_steps,

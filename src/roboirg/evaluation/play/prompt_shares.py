@@ -86,7 +86,7 @@ def audit_job(
     """Return the audit of a job before it is played, each utterance being heard when it is said."""
     instruction = instruction or instruct_job(job)
     return audit_prompt(
-        instruction, utterance_steps(len(instruction.utterances), job.delivery), limit
+        instruction, utterance_steps(len(instruction.utterances), job.options.delivery), limit
     )
 
 
@@ -116,7 +116,7 @@ def prompt_shares(jobs: Iterable[Job]) -> tuple[PromptShares, ...]:
         limit = limits[job.policy]
         verdict: PromptVerdict = "unknown"
         if limit is not None:
-            key = (limit, job.task, job.split, job.episode, job.options, job.wordings)
+            key = (limit, job.task, job.split, job.episode, job.options)
             if key not in verdicts:
                 verdicts[key] = audit_job(job, limit)[1]
             verdict = verdicts[key]

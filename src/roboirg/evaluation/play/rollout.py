@@ -181,8 +181,8 @@ def play_episode(
         MissingDependencyError: a package has to be installed first.
         InvalidValueError: the job's wording file is missing or has changed.
     """
-    if job.wordings is not None:
-        open_wordings(job.wordings_file, job.wordings)
+    if job.options.wordings is not None:
+        open_wordings(job.wordings_file, job.options.wordings)
     prepared = PreparedJob(job)
     result = RolloutResult(prepared=prepared)
     is_hosted = hosts is not None and needs_host(job.policy_spec)

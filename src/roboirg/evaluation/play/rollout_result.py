@@ -24,6 +24,7 @@ from roboirg.core.conditions import Fact
 from roboirg.core.delivery import TURNS, PromptVerdict
 from roboirg.core.episode import ENVIRONMENT_VERSION, Episode
 from roboirg.core.errors import InvalidValueError, MissingDependencyError
+from roboirg.core.field_types import MOST_CAUSE_LETTERS
 from roboirg.core.observations import DemonstrationSource
 from roboirg.core.plain_text import clip_text
 from roboirg.evaluation.hosting.policy_descriptions import PolicyDescription, describe_policy
@@ -31,7 +32,6 @@ from roboirg.evaluation.play.job_instruction import PreparedJob
 from roboirg.evaluation.play.prompt_shares import audit_job, audit_prompt
 from roboirg.evaluation.records.action_log import ActionLog
 from roboirg.evaluation.records.record import (
-    MOST_CAUSE_LETTERS,
     Attribution,
     ErrorKind,
     EventRecord,
@@ -273,7 +273,7 @@ def _utterances(
 ) -> tuple[UtteranceRecord, ...]:
     """Return the utterances with the steps at which the policy heard them."""
     steps: list[int | None] = [0] * len(instruction.utterances)
-    if job.delivery == TURNS:
+    if job.options.delivery == TURNS:
         steps = [int(one["step"]) for one in result.heard]
     return tuple(
         UtteranceRecord(**asdict(one), step=step)

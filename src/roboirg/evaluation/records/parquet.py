@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import msgspec
 from msgspec import inspect
 
+from roboirg.core.instruction_options import OPTION_NAMES
 from roboirg.evaluation.records.record import Record
 from roboirg.util.atomic_write import replacing
 from roboirg.util.parquet_support import check_parquet_support
@@ -24,9 +25,9 @@ _BATCH_ROWS = 5_000
 def write_parquet(records: Iterable[Record], path: Path) -> int:
     """Write records to a Parquet file, which appears complete or not at all.
 
-    The columns are the fields of a record. ``instruction``, ``mentions``, ``prompt``, ``events``
-    and ``attribution`` are nested; dictionaries, whose keys depend on the task or the policy, are
-    JSON texts.
+    The columns are the fields of a record and its instruction options. ``instruction``,
+    ``mentions``, ``prompt``, ``events`` and ``attribution`` are nested; dictionaries, whose keys
+    depend on the task or the policy, are JSON texts.
 
     Returns:
         Number of rows.
@@ -53,7 +54,11 @@ def write_parquet(records: Iterable[Record], path: Path) -> int:
 
 
 def _row(record: Record) -> dict[str, Any]:
-    return {name: _fit(getattr(record, name), kind) for name, kind in _COLUMNS.items()}
+    return {name: _fit(_value(record, name), kind) for name, kind in _COLUMNS.items()}
+
+
+def _value(record: Record, name: str) -> Any:  # noqa: ANN401 - whatever the field holds
+    return getattr(record.options if name in OPTION_NAMES else record, name)
 
 
 def _fit(value: Any, kind: inspect.Type) -> Any:  # noqa: ANN401 - a value of that type
@@ -98,11 +103,17 @@ def _without_none(kind: inspect.Type) -> inspect.Type:
 
 
 def _columns() -> dict[str, inspect.Type]:
-    """Return the type of each field of a record."""
+    """Return the type of each field of a record; each instruction option is one."""
     record = inspect.type_info(Record)
     if not isinstance(record, inspect.StructType):
         raise TypeError(f"{Record} is no struct")
-    return {one.name: one.type for one in record.fields}
+    found: dict[str, inspect.Type] = {}
+    for one in record.fields:
+        if isinstance(one.type, inspect.DataclassType):
+            found |= {option.name: option.type for option in one.type.fields}
+        else:
+            found[one.name] = one.type
+    return found
 
 
 _COLUMNS = _columns()

@@ -10,42 +10,22 @@ Types are checked when a line is read, and every line is read before it is store
 
 from __future__ import annotations
 
-import hashlib
-import operator
 import re
-from collections.abc import Mapping
-from typing import Annotated, Any, Literal, get_args
+from dataclasses import replace
+from typing import Annotated, Any, Literal, Self, get_args
 
 import msgspec
 
 from roboirg.core.delivery import PromptVerdict
-from roboirg.core.instruction_options import (
-    ALL_STAGES,
-    DEFAULT_DELIVERY,
-    DEFAULT_DISTRACTOR,
-    DEFAULT_DISTRACTORS,
-    DEFAULT_FRAME,
-    InstructionOptions,
-)
+from roboirg.core.field_types import Cause, Name, Whole
+from roboirg.core.instruction_options import InstructionOptions
 from roboirg.core.observations import DemonstrationFrames, DemonstrationSource
 from roboirg.evaluation.records.run_files import RELATIVE_PATH
+from roboirg.util.short_hash import short_hash
 
 SCHEMA_VERSION: Literal[4] = 4
 
-MOST_NAME_LETTERS = 1000
-CONTROLS = "\\x00-\\x1f\\x7f-\\x9f\\u200e\\u200f\\u202a-\\u202e\\u2066-\\u2069"
-NAME = f"^[^{CONTROLS}]{{0,{MOST_NAME_LETTERS}}}\\Z"
-"""A name in a record: text without characters that control a terminal or reorder what is read."""
-
-Name = Annotated[str, msgspec.Meta(pattern=NAME)]
 RunPath = Annotated[str, msgspec.Meta(pattern=RELATIVE_PATH)]
-Whole = Annotated[int, msgspec.Meta(ge=-(2**63), le=2**63 - 1)]
-"""A whole number that tables and NumPy can hold."""
-MOST_STAGES = 100
-Stages = Annotated[tuple[Whole, ...], msgspec.Meta(max_length=MOST_STAGES)]
-MOST_CAUSE_LETTERS = 10_000
-Cause = Annotated[str, msgspec.Meta(max_length=MOST_CAUSE_LETTERS)]
-
 Outcome = Literal["success", "failure", "error"]
 
 ErrorKind = Literal[
@@ -91,23 +71,16 @@ class Job(msgspec.Struct, frozen=True, kw_only=True, gc=False):
         task: name of the task.
         split: train, val, test or random.
         episode: 0-based position in the split.
-        setting: name of the setting.
-        form: implicit or resolved. The explicit setting is its own resolved form and is always
-            played as ``implicit``.
-        stages: stages of the discourse; the default if the setting does not read them.
-        distractor: kind of distractor; the default if the setting does not read it.
-        distractors: number of distractors; the default if the setting does not read it.
-        frame: frame of reference; the default if the setting does not read it.
-        delivery: ``prompt`` or ``turns``; the default if the setting does not read it.
+        options: of its instruction; those that the setting does not read have their defaults. The
+            explicit setting is its own resolved form and is always played as ``implicit``.
         policy_seed: seed chosen for the run; the policy's seed is derived from it and the episode.
         max_steps: the policy's limit, control steps.
         actions: required action space; None for the policy's own.
         demonstration_frames: which frames of the video the policy gets; None for its own choice.
         observe_every: control steps between observations; None for the policy's own choice.
         meshes: faithful or light.
-        wordings: name and fingerprint of the wording file whose commands are used, for example
-            ``robomme@1a2b3c4d``; None for our own.
-        wordings_file: path of that file; not part of the identity, because a file may be moved.
+        wordings_file: path of the wording file in `options`; not part of the identity, because a
+            file may be moved.
         spec: spec of the policy if that is not its name; not part of the identity, because an
             address may change.
     """
@@ -116,30 +89,37 @@ class Job(msgspec.Struct, frozen=True, kw_only=True, gc=False):
     task: Name
     split: Name
     episode: Whole
-    setting: Name
-    form: Name = "implicit"
-    stages: Stages = ALL_STAGES
-    distractor: Name = DEFAULT_DISTRACTOR
-    distractors: Whole = DEFAULT_DISTRACTORS
-    frame: Name = DEFAULT_FRAME
-    delivery: Name = DEFAULT_DELIVERY
+    options: InstructionOptions
     policy_seed: Whole = 0
     max_steps: Whole = DEFAULT_MAX_STEPS
     actions: Name | None = None
     demonstration_frames: DemonstrationFrames | None = None
     observe_every: Whole | None = None
     meshes: Name = DEFAULT_MESHES
-    wordings: Name | None = None
     wordings_file: str | None = None
     spec: str | None = None
 
     @property
-    def options(self) -> InstructionOptions:
-        """The options of its instruction, without `wordings`.
+    def setting(self) -> str:
+        """Name of the setting."""
+        return self.options.setting
 
-        Wordings tell runs apart, as a step limit does: the columns of tables are the same in all.
+    @property
+    def form(self) -> str:
+        """The form of the instruction: ``implicit`` or ``resolved``."""
+        return self.options.form
+
+    @property
+    def column(self) -> InstructionOptions:
+        """The options without `wordings`: the columns of tables.
+
+        Wordings tell runs apart, as a step limit does: the columns are the same in all.
         """
-        return options_of(self)
+        return replace(self.options, wordings=None) if self.options.wordings else self.options
+
+    def with_options(self, **changes: Any) -> Self:  # noqa: ANN401 - as the options' fields
+        """Return the same job in other words."""
+        return msgspec.structs.replace(self, options=replace(self.options, **changes))
 
     @property
     def policy_spec(self) -> str:
@@ -149,30 +129,15 @@ class Job(msgspec.Struct, frozen=True, kw_only=True, gc=False):
     @property
     def slug(self) -> str:
         """Short unique name that is safe in file names."""
+        words = (self.policy, self.task, self.split, self.episode, self.setting, self.form)
+        readable = re.sub(r"[^A-Za-z0-9]+", "-", "-".join(map(str, words))).strip("-")[:100]
         # Only from the identity, so that a record (which is a job) has its job's slug.
-        return slug_of({name: getattr(self, name) for name in IDENTITY})
+        identity = msgspec.json.encode({name: getattr(self, name) for name in IDENTITY})
+        return f"{readable}-{short_hash(identity)}"
 
 
 IDENTITY = tuple(name for name in Job.__struct_fields__ if name not in {"spec", "wordings_file"})
 """The fields that identify a job."""
-
-
-_OPTIONS = tuple(name for name in InstructionOptions._fields if name != "wordings")
-_read_options = operator.attrgetter(*_OPTIONS)
-
-
-def options_of(record: object) -> InstructionOptions:
-    """Return the instruction options among a record's attributes, without `wordings`."""
-    return InstructionOptions(**dict(zip(_OPTIONS, _read_options(record), strict=True)))
-
-
-def slug_of(identity: Mapping[str, object]) -> str:
-    """Return the slug of a job, given the fields in `IDENTITY` in their order."""
-    names = ("policy", "task", "split", "episode", "setting", "form")
-    words = "-".join(str(identity[name]) for name in names)
-    readable = re.sub(r"[^A-Za-z0-9]+", "-", words).strip("-")[:100]
-    digest = hashlib.sha256(repr(list(identity.items())).encode()).hexdigest()
-    return f"{readable}-{digest[:8]}"
 
 
 class UtteranceRecord(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):

@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 import operator
+import re
+from collections.abc import Mapping
+from dataclasses import astuple
 from pathlib import Path
 from typing import Any, TypeVar
 
 import msgspec
 
 from roboirg.core.errors import RoboIRGError
+from roboirg.core.field_types import MOST_NAME_LETTERS, NAME
+from roboirg.core.instruction_options import OPTION_NAMES
 from roboirg.evaluation.records.record import (
     IDENTITY,
-    MOST_NAME_LETTERS,
-    NAME,
     SCHEMA_VERSION,
     Record,
     Summary,
@@ -44,6 +47,7 @@ class _Version(msgspec.Struct):
     schema_version: int
 
 
+_is_name = re.compile(NAME).fullmatch
 _encoder = msgspec.json.Encoder()
 _record_decoder = msgspec.json.Decoder(Record)
 _summary_decoder = msgspec.json.Decoder(Summary)
@@ -92,10 +96,12 @@ def _read(decoder: msgspec.json.Decoder[Stored], line: bytes, path: Path, number
             f"{path} line {number} is damaged: it is not JSON ({error})."
         ) from error
     if stored.outcome == "success" and stored.cause is not None:
-        raise StoreError(
-            f"{path} line {number} is not a record: a success has no cause, but there is "
-            f"{stored.cause!r}."
-        )
+        problem = f"a success has no cause, but there is {stored.cause!r}"
+        raise StoreError(f"{path} line {number} is not a record: {problem}.")
+    for value in astuple(stored.options):
+        if isinstance(value, str) and not _is_name(value):
+            problem = f"{value[:80]!r} is no value of an instruction option"
+            raise StoreError(f"{path} line {number} is not a record: {problem}.")
     return stored
 
 
@@ -139,12 +145,20 @@ def _from_schema_3(data: dict[str, Any]) -> dict[str, Any]:
     rival, reasoning = found.pop("rival", "none"), found.pop("reasoning", "plain")
     if "setting" in found:
         found["setting"] = harder_setting(found["setting"], rival=rival, reasoning=reasoning)
+    found = with_nested_options(found)
     if "metadata" in found:
         notes = found["metadata"].items()
         found["metadata"] = {name: note for name, note in notes if name != "reasoning"}
     if "policy_metadata" in found:
         found["robot"] = real_robot(found["policy_metadata"].get("real_trial"))
     return found
+
+
+def with_nested_options(data: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the fields of a job whose instruction options are given among them, in one field."""
+    options = {name: value for name, value in data.items() if name in OPTION_NAMES}
+    others = {name: value for name, value in data.items() if name not in options}
+    return {**others, "options": {**data.get("options", {}), **options}}
 
 
 def harder_setting(setting: str, *, rival: str, reasoning: str) -> str:

@@ -18,7 +18,7 @@ from roboirg.evaluation.hosting.host_pool import Connect, open_hosts
 from roboirg.evaluation.play.rollout import PlayJob
 from roboirg.evaluation.records.record import Job, Record
 from roboirg.evaluation.run.workers import MAX_FAILED_STARTS, POLL_S, Worker, connected
-from roboirg.util.processor import core_count
+from roboirg.util.processor import core_count, worker_count
 
 NO_TIMEOUT_S = float("inf")
 
@@ -118,14 +118,15 @@ class LocalProcesses:
                 yield worker, record
 
 
-def choose_executor(workers: int | None, episode_timeout_s: float = NO_TIMEOUT_S) -> Executor:
-    """Return the executor for a number of workers: None for one per core, 0 for this process.
+def choose_executor(
+    workers: int | None = None, episode_timeout_s: float = NO_TIMEOUT_S
+) -> Executor:
+    """Return the executor for a number of workers as typed, see `worker_count`.
 
     Raises:
         InvalidValueError: a negative number.
     """
-    if workers is not None and workers < 0:
-        raise InvalidValueError(f"workers is {workers}; it must be at least 0, this process only.")
-    if workers == 0:
-        return InProcess()
-    return LocalProcesses(core_count() if workers is None else workers, episode_timeout_s)
+    count = worker_count(workers)
+    if count < 0:
+        raise InvalidValueError(f"workers is {count}; it must be at least 0, this process only.")
+    return LocalProcesses(count, episode_timeout_s) if count else InProcess()

@@ -69,11 +69,7 @@ def choosing_remark(
 ) -> Phrase:
     """Return the remark that chooses one value; resolved, both have their names.
 
-    Args:
-        request: what to say.
-        draw: the pair.
-        name: names a value.
-        thing: the noun for a value; None for that of its kind.
+    `thing` is the noun for a value; None for that of its kind.
     """
     thing = thing or noun(request, draw)
     meant, rival = draw.pair

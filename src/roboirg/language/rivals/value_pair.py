@@ -101,9 +101,7 @@ def _lack(request: InstructionRequest, locate: Locate | None) -> str:
 def draw_pair(request: InstructionRequest, locate: Locate | None = None) -> PairDraw:
     """Draw a slot, its rival, and the words that choose.
 
-    Args:
-        request: with a rival, and not refused.
-        locate: returns landmarks, where both values must have one; None for all slots.
+    `locate` returns landmarks, where both values must have one; None for all slots.
     """
     pairs = _pairs(request, locate)
     slot = request.sampler.pick("rival slot", list(dict.fromkeys(one.slot for one in pairs)))

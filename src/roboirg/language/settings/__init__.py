@@ -34,11 +34,7 @@ longer be compared. A new setting may refuse some of these episodes instead.
 
 @functools.cache
 def all_settings() -> Mapping[str, Setting]:
-    """Return every setting by name, explicit first.
-
-    Raises:
-        InvalidValueError: an entry point of another package does not give a valid setting.
-    """
+    """Return every setting by name, explicit first."""
     found = discover(sys.modules[__name__], "SETTING", Setting, "roboirg.settings")
     return {one.name: one for one in sorted(found, key=lambda one: (one.order, one.name))}
 
@@ -60,12 +56,7 @@ def settings_of(task: Task) -> tuple[str, ...]:
 
 
 def get_setting(name: str, task: Task) -> Setting:
-    """Return a setting of a task by name.
-
-    Raises:
-        UnknownNameError: the setting does not exist.
-        InvalidValueError: the task lacks it.
-    """
+    """Return a setting of a task by name."""
     if name not in all_settings():
         raise UnknownNameError("setting", name, all_settings())
     if not all_settings()[name].applies_to(task):

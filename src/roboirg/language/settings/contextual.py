@@ -41,12 +41,8 @@ def discourse(
 ) -> InstructionSpec:
     """Return the requested stages.
 
-    Args:
-        request: with the stages, and the number of distractors.
-        introduce: says the first stage.
-        reinforce: says one more remark on what was introduced.
-        command: says the last stage.
-        distractor: kind of distractor.
+    `introduce` says the first stage, `reinforce` one more remark on what was introduced, and
+    `command` the last stage.
     """
     stages = request.options.stages
     utterances = [introduce(request)]

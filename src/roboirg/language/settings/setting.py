@@ -4,16 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Any
 
 from roboirg.core.episode import Goal
-from roboirg.core.instruction_options import InstructionOptions
+from roboirg.core.errors import UnknownNameError
+from roboirg.core.instruction_options import OPTION_NAMES, InstructionOptions
 from roboirg.language.instruction import Instruction
 from roboirg.language.request import InstructionRequest, InstructionSpec
 from roboirg.tasks import Task
-
-OptionName = Literal["stages", "distractor", "distractors", "frame", "delivery"]
-"""An option of an instruction that a setting may read."""
 
 Instruct = Callable[[InstructionOptions], Instruction]
 """Returns an instruction of the episode at hand."""
@@ -50,7 +48,8 @@ class Setting:
             express the episode:" and name no object of the scene; None if it can.
         hidden_slots: the goal slots that the command of an implicit form must not state.
         implicit: whether the command leaves something to its context.
-        reads: the options that change its words, and ``delivery`` if it has several utterances.
+        reads: names of the options that change its words, and ``delivery`` if it has several
+            utterances.
         variants: every combination of options that change its words, for validation.
         hides_only_color: whether an instruction states numbers and hides colors, so that the
             command gives the goal away where the scene has one such goal.
@@ -59,6 +58,9 @@ class Setting:
         example: index of the test episode that shows the setting in the language card.
         plain: name of the setting that this one makes harder; None if it stands by itself. Harder
             settings are played only where they are named: ``all`` leaves them out.
+
+    Raises:
+        UnknownNameError: it reads an option that does not exist.
     """
 
     name: str
@@ -70,12 +72,17 @@ class Setting:
     refusal: Callable[[InstructionRequest], str | None] = never_refuses
     hidden_slots: Callable[[Instruction, Goal], frozenset[str]] = all_slots
     implicit: bool = True
-    reads: frozenset[OptionName] = frozenset()
+    reads: frozenset[str] = frozenset()
     variants: Sequence[Mapping[str, Any]] = ({},)
     hides_only_color: Callable[[Instruction], bool] = lambda _instruction: False
     pairing_rules: Callable[[Instruct], Iterable[str]] = no_pairing_rules
     example: int = 0
     plain: str | None = None
+
+    def __post_init__(self) -> None:
+        for name in self.reads:
+            if name not in OPTION_NAMES:
+                raise UnknownNameError("option of instructions", name, OPTION_NAMES)
 
     @property
     def may_refuse(self) -> bool:

@@ -34,12 +34,7 @@ def usable(
     """Return the landmarks that may locate a thing of this color, by class.
 
     These are the short ones of simple classes; or if there are none, the shortest one of a simple
-    class, or of any other class.
-
-    Args:
-        request: the scene and the task.
-        goal_value: the color.
-        places: number of places that the introduction names.
+    class, or of any other class. The introduction names this number of places.
     """
     found = [
         landmark

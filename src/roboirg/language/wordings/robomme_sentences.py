@@ -18,15 +18,7 @@ FINGERPRINTS = {
 
 
 def check_robomme_name(wordings: Wordings, where: str) -> None:
-    """Check that words which are named after RoboMME are RoboMME's in every published episode.
-
-    Args:
-        wordings: the words.
-        where: what to call them in the message.
-
-    Raises:
-        InvalidValueError: they are not.
-    """
+    """Check that words named after RoboMME are RoboMME's in every published episode."""
     if wordings.name != ROBOMME_NAME:
         return
     for task, commands in wordings.tasks.items():

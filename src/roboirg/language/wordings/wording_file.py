@@ -50,11 +50,7 @@ _ARTICLE = re.compile(r"\b(?:the|an?) $", re.IGNORECASE)
 
 
 def read_wordings(path: str | Path) -> Wordings:
-    """Read a wording file.
-
-    Raises:
-        InvalidValueError: it cannot be read, is not TOML, or something in it is missing or wrong.
-    """
+    """Read a wording file."""
     try:
         text = read_regular(Path(path), MOST_BYTES).decode()
     except (OSError, ValueError) as error:  # a path may hold NUL
@@ -68,15 +64,7 @@ def read_wordings(path: str | Path) -> Wordings:
 
 
 def parse_wordings(text: str, where: str) -> Wordings:
-    """Return the content of a wording file.
-
-    Args:
-        text: the file's text.
-        where: what to call the file in messages.
-
-    Raises:
-        InvalidValueError: as `read_wordings`.
-    """
+    """Return the content of a wording file; `where` names it in messages."""
     try:
         data = _parse_toml(text)
     except (ValueError, RecursionError) as error:
@@ -101,11 +89,7 @@ def _parse_toml(text: str) -> dict[str, Any]:
 
 
 def check_name(name: object, where: str) -> str:
-    """Return the name of wordings if it can be one.
-
-    Raises:
-        InvalidValueError: it is not a word.
-    """
+    """Return the name of wordings if it can be one."""
     if not isinstance(name, str) or not _NAME.fullmatch(name):
         raise InvalidValueError(
             f"The {where} has the name {name!r}; it must begin with a line such as "

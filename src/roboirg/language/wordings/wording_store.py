@@ -24,9 +24,6 @@ def open_wordings(path: str | Path | None, identity: str | None = None) -> str |
         path: the file, or the identity of wordings that are open; ``train`` or ``test`` for the
             words of that pool; None for our own words.
         identity: the wordings that are wanted; None for those of the file.
-
-    Raises:
-        InvalidValueError: the file cannot be read, or holds other wordings.
     """
     if identity in _OPEN:
         return identity
@@ -57,11 +54,7 @@ def forget_wordings(identity: str) -> None:
 
 
 def find_wordings(identity: str) -> Wordings:
-    """Return wordings that this process has opened.
-
-    Raises:
-        InvalidValueError: it has not.
-    """
+    """Return wordings that this process has opened."""
     if identity not in _OPEN:
         raise InvalidValueError(
             f"The wordings {identity!r} are not open; call open_wordings with their file first."

@@ -10,7 +10,7 @@ from pydantic import BaseModel, ConfigDict, Field
 from roboirg.core.observations import Demonstration, DemonstrationFrames, Observation
 from roboirg.policies.vlm.config_fingerprint import config_version
 from roboirg.policies.vlm.models import ModelOptions
-from roboirg.policies.vlm.prompts import SHARED, load_prompts
+from roboirg.policies.vlm.prompt_files import SHARED, load_prompts
 from roboirg.policies.vlm.vlm_query import VLMQuery
 from roboirg.util.media import Pixels
 

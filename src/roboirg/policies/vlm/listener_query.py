@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from typing import NamedTuple, TypeVar
 
 from roboirg.policies.vlm.goal_schema import Field, GoalSchema
-from roboirg.policies.vlm.prompts import Prompts
+from roboirg.policies.vlm.prompt_files import Prompts
 
 PROMPTS = "listener"
 """Name of the prompts."""

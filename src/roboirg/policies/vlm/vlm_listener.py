@@ -21,7 +21,7 @@ from roboirg.policies.vlm.goal_schema import GoalSchema, goal_schema
 from roboirg.policies.vlm.listener_query import PROMPTS, question_texts
 from roboirg.policies.vlm.model_content import ChatTurn, summary_clip
 from roboirg.policies.vlm.models import Model, ModelOptions, ModelQuery, make_model
-from roboirg.policies.vlm.prompts import load_prompts
+from roboirg.policies.vlm.prompt_files import load_prompts
 from roboirg.policies.vlm.vlm_query import VLMQuery
 from roboirg.tasks import get_task
 from roboirg.util.media import Clip, Picture

@@ -25,13 +25,7 @@ FINGER_HALF = (0.008, 0.011)
 
 
 def grasp_rotations(name: str, bodies: Mapping[str, Body], tool: Rotation) -> list[Rotation]:
-    """Return tool rotations for grasping an object, best first.
-
-    Args:
-        name: name of the object.
-        bodies: all objects by name.
-        tool: current rotation of the tool.
-    """
+    """Return rotations of the tool for grasping an object, best first, given the current one."""
     matrix = bodies[name].entity.pose.to_transformation_matrix()[:3, :3]
     flat = [axis[:2] for axis in matrix.T if abs(axis[2]) < math.sqrt(0.5)]
     sides = [

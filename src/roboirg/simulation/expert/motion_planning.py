@@ -58,11 +58,7 @@ class ToolPose(NamedTuple):
 
 
 class MotionPlanner:
-    """Motion planner of one robot.
-
-    Args:
-        robot: the robot to move.
-    """
+    """Motion planner of one robot."""
 
     def __init__(self, robot: Panda) -> None:
         self._model = robot.articulation.create_pinocchio_model()
@@ -88,18 +84,11 @@ class MotionPlanner:
 
         Returns:
             Joint positions (n, 7), n >= 1, one row per control step, start and end included.
-
-        Raises:
-            MotionPlanningError: the line leaves the joint limits or cannot be followed.
         """
         return time_parameterize(self._waypoints(arm, goal))
 
     def plan_move(self, arm: NDArray[np.float64], goal: ToolPose) -> NDArray[np.float64]:
-        """Plan as `plan_straight`, but via home if the straight line is not feasible.
-
-        Raises:
-            MotionPlanningError: the goal cannot be reached from home either.
-        """
+        """Plan as `plan_straight`, but via home if the straight line is not feasible."""
         try:
             return self.plan_straight(arm, goal)
         except MotionPlanningError:

@@ -56,11 +56,7 @@ STRAIGHT_DOWN = Rotation.from_quat([1.0, 0.0, 0.0, 0.0])
 
 
 class MotionPrimitives:
-    """Executes primitives in one world.
-
-    Args:
-        world: the world to act in.
-    """
+    """Executes primitives in one world."""
 
     def __init__(self, world: World) -> None:
         self._world = world
@@ -68,11 +64,7 @@ class MotionPrimitives:
         self._gripper = OPEN
 
     def execute(self, primitive: Primitive) -> Iterator[JointTrajectory]:
-        """Yield the trajectories of a primitive; take the next after executing the last.
-
-        Raises:
-            MotionPlanningError: a waypoint cannot be reached.
-        """
+        """Yield the trajectories of a primitive; take the next after executing the last."""
         return _ROUTINES[primitive.kind](self, primitive)
 
     def _pick_cube(self, primitive: Primitive) -> Iterator[JointTrajectory]:

@@ -56,13 +56,7 @@ class MotionVariation(NamedTuple):
 
 
 class VariedPrimitives(MotionPrimitives):
-    """Executes primitives in one world with random variations.
-
-    Args:
-        world: the world to act in.
-        variation: how much varies.
-        rng: of all choices.
-    """
+    """Executes primitives in one world with random variations."""
 
     def __init__(self, world: World, variation: MotionVariation, rng: np.random.Generator) -> None:
         super().__init__(world)

@@ -5,14 +5,11 @@ shadows, culling changes no pixel.
 
 SAPIEN records a camera's command buffer once, and again only if the scene has changed. It leaves
 out bodies with an unknown shading mode, and a change of the mode alone does not trigger a new
-recording. So each camera keeps the command buffer of its visible bodies until that set changes. If
-SAPIEN behaves differently (`keeps_command_buffers`), bodies are hidden for one picture at a time,
-which is slower.
+recording. So each camera keeps the command buffer of its visible bodies until that set changes.
 """
 
 from __future__ import annotations
 
-import functools
 import math
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
@@ -23,13 +20,6 @@ import sapien.render
 from numpy.typing import NDArray
 
 from roboirg.core.observations import CAMERAS
-from roboirg.simulation.rendering.render_device import render_system
-from roboirg.simulation.rendering.shaders import (
-    COLOR,
-    STOCK_COLOR,
-    placeholder_brdf_table,
-    slim_shader,
-)
 from roboirg.simulation.rendering.viewpoint import NEAR
 
 MARGIN = 0.002
@@ -38,7 +28,7 @@ HULL_MARGIN = 1e-4
 """Meters by which convex hulls grow; the renderer is 100 times as precise. The hand stays 1 mm
 outside the wrist camera's view, so a larger margin would draw it."""
 
-_DRAWN, _LEFT_OUT = 0, 99
+DRAWN, LEFT_OUT = 0, 99
 """Shading modes; SAPIEN does not know the second."""
 
 
@@ -56,12 +46,7 @@ class CullableBody:
 
 
 class CullableBodies:
-    """All render bodies of a scene.
-
-    Args:
-        scene: the scene, with all bodies built.
-        cullable_bodies: culling data of some bodies; the others are tested by boxes.
-    """
+    """All render bodies of a finished scene; those without culling data are tested by boxes."""
 
     def __init__(
         self,
@@ -87,7 +72,7 @@ class CullableBodies:
             for camera in CAMERAS
         }
         self._drawn = np.ones(len(self._bodies), dtype=bool)
-        self._recorded: dict[sapien.render.RenderCameraComponent, NDArray[np.bool_]] = {}
+        self._buffered: dict[sapien.render.RenderCameraComponent, NDArray[np.bool_]] = {}
 
     def poses(self) -> NDArray[np.float64]:
         """Return the current poses of the bodies, (n, 4, 4)."""
@@ -117,29 +102,15 @@ class CullableBodies:
         self, camera: sapien.render.RenderCameraComponent, visible: NDArray[np.bool_]
     ) -> None:
         """Start drawing these bodies with a camera; the picture is fetched later."""
-        if not keeps_command_buffers():
-            self._take_with_visibility(camera, visible)
-            return
         # Set the modes even if the command buffer is kept: another change may invalidate it.
         for number in np.flatnonzero(visible != self._drawn):
-            self._bodies[number].shading_mode = _DRAWN if visible[number] else _LEFT_OUT
+            self._bodies[number].shading_mode = DRAWN if visible[number] else LEFT_OUT
         self._drawn = visible
-        recorded = self._recorded.get(camera)
-        if recorded is None or not np.array_equal(recorded, visible):
+        buffered = self._buffered.get(camera)
+        if buffered is None or not np.array_equal(buffered, visible):
             invalidate_command_buffers(self._bodies[0])
-            self._recorded[camera] = visible
+            self._buffered[camera] = visible
         camera.take_picture()
-
-    def _take_with_visibility(
-        self, camera: sapien.render.RenderCameraComponent, visible: NDArray[np.bool_]
-    ) -> None:
-        hidden = [body for body, seen in zip(self._bodies, visible, strict=True) if not seen]
-        for body in hidden:
-            body.visibility = 0.0
-        camera.take_picture()
-        camera.get_picture("PositionSegmentation")  # waits for the drawing
-        for body in hidden:
-            body.visibility = 1.0
 
 
 def _outside(points: NDArray[np.float64], margin: float = 0.0) -> NDArray[np.bool_]:
@@ -160,41 +131,6 @@ def invalidate_command_buffers(body: sapien.render.RenderBodyComponent) -> None:
     """Make every camera of a body's scene record a new command buffer before its next picture."""
     body.visibility = 0.0
     body.visibility = 1.0
-
-
-@functools.cache
-def keeps_command_buffers() -> bool:
-    """Return whether SAPIEN records as described above; tested once per process in a tiny scene."""
-    scene = sapien.Scene([render_system()])
-    body = sapien.render.RenderBodyComponent()
-    body.attach(
-        sapien.render.RenderShapeBox(
-            [0.4, 0.4, 0.4], sapien.render.RenderMaterial(emission=[1.0, 1.0, 1.0, 1.0])
-        )
-    )
-    target, eye = sapien.Entity(), sapien.Entity()
-    target.add_component(body)
-    target.set_pose(sapien.Pose([1.0, 0.0, 0.0]))
-    # With the usual shader, to avoid compiling another.
-    shader = slim_shader()
-    camera = sapien.render.RenderCameraComponent(2, 2, shader or "")
-    eye.add_component(camera)
-    for entity in (target, eye):
-        scene.add_entity(entity)
-    camera.set_texture("BRDFLUT", placeholder_brdf_table())
-
-    def shows() -> bool:
-        scene.update_render()
-        camera.take_picture()
-        return bool(camera.get_picture(STOCK_COLOR if shader is None else COLOR)[..., 0].any())
-
-    seen = [shows()]
-    for mode in (_LEFT_OUT, _DRAWN):
-        body.shading_mode = mode
-        seen.append(shows())
-        invalidate_command_buffers(body)
-        seen.append(shows())
-    return seen == [True, True, False, False, True]
 
 
 _boxes_of_files: dict[tuple[object, ...], NDArray[np.float64]] = {}

@@ -23,10 +23,7 @@ _WORD = 8
 def cached_arrays(name: str, sources: bytes, make: Callable[[], Arrays]) -> Arrays:
     """Return arrays from the cache, or make and cache them.
 
-    Args:
-        name: name of the entry.
-        sources: everything that determines the arrays.
-        make: makes the arrays.
+    `sources` is everything that determines the arrays.
     """
     cache = open_cache("meshes")
     key = f"{name}-{hashlib.sha256(source_code('mesh_cache') + sources).hexdigest()[:24]}"

@@ -25,9 +25,6 @@ def simplify(
 
     Returns:
         Corners (m, 3, 3) and normals (m, 3).
-
-    Raises:
-        MissingDependencyError: fast-simplification is not installed.
     """
     with extra_needed("Light meshes need fast-simplification", "light"):
         import fast_simplification

@@ -95,10 +95,6 @@ def render_system(*, keep_engine: bool = True) -> sapien.render.RenderSystem:
     creating it again takes seconds. With `keep_engine`, the first call therefore also creates a
     system that lives as long as the process. SAPIEN renders on one device per process, so
     ``ROBOIRG_RENDER_DEVICE`` is read once.
-
-    Raises:
-        MissingDependencyError: SAPIEN is not installed.
-        RenderDeviceError: no device can render, or its driver refuses.
     """
     if keep_engine:
         _engine_keeper()

@@ -41,11 +41,7 @@ SELECTABLE: Mapping[str, RenderSettings] = {"faithful": FAITHFUL, "light": LIGHT
 
 
 def find_render_settings(meshes: str) -> RenderSettings:
-    """Return the settings with the given meshes.
-
-    Raises:
-        UnknownNameError: users cannot select these meshes.
-    """
+    """Return the settings with the given meshes."""
     try:
         return SELECTABLE[meshes]
     except KeyError:

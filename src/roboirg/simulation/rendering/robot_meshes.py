@@ -115,12 +115,8 @@ def link_hull(path: Path, rendering: RenderSettings) -> NDArray[np.float64]:
 
 def apply_shading(body: sapien.render.RenderBodyComponent, rendering: RenderSettings) -> None:
     """Set the shading of a body with `link_shapes`, once it is in a scene."""
-    if _uses_flat_shading(rendering):
+    if rendering.slim_shader:
         shaders.enable_flat_shading(body)
-
-
-def _uses_flat_shading(rendering: RenderSettings) -> bool:
-    return rendering.slim_shader and shaders.slim_shader() is not None
 
 
 @functools.cache
@@ -137,9 +133,7 @@ def _shapes(
         if not len(part.triangles):
             continue
         numbers = arrays[f"material{number}"]
-        vertices, normals, triangles = (
-            part if _uses_flat_shading(rendering) else duplicate_vertices(part)
-        )
+        vertices, normals, triangles = part if rendering.slim_shader else duplicate_vertices(part)
         own = (
             _MaterialKey.unpacked(np.asarray(numbers, np.float32))
             if len(numbers)

@@ -4,7 +4,7 @@ The scenes have no environment map, so image-based light and the background pass
 and are removed; nothing is transparent either. Bodies can be shaded by one normal per triangle,
 that of its first vertex (`enable_flat_shading`); triangles can then share vertices, and the driver
 has fewer to compute. No text of SAPIEN is stored here: the installed shader is patched when it is
-used, and if its version is unknown, it is used unpatched.
+used.
 """
 
 from __future__ import annotations
@@ -94,13 +94,14 @@ _log = logging.getLogger(__name__)
 
 
 @functools.cache
-def slim_shader() -> str | None:
-    """Return the folder of the patched shader; None if SAPIEN's shader is of an unknown version."""
+def slim_shader() -> str:
+    """Return the folder of the patched shader."""
     texts = _read_installed_shader()
-    digest = _digest(texts)
-    if digest != _STOCK_SHA256:
-        _log.warning("SAPIEN's shader is of an unknown version; it is used unpatched.")
-        return None
+    if _digest(texts) != _STOCK_SHA256:
+        raise InvalidValueError(
+            f"The shader in {str(_shader_folder())!r} is not SAPIEN 3.0.3's, which pictures depend "
+            "on; install sapien==3.0.3 again."
+        )
     for name, start, end, replacement in (*_NEVER_NEEDED, *_INTERFACE, *_SHADING):
         key = f"{STOCK_SHADER}/{name}"
         texts[key] = _replace_span(texts[key], start, end, replacement)
@@ -127,9 +128,13 @@ def placeholder_brdf_table() -> sapien.render.RenderTexture:
 
 def _read_installed_shader() -> dict[str, str]:
     """Return the files of SAPIEN's shader and its includes, by folder and name."""
-    root = Path(sapien.__file__).parent / "vulkan_shader"
-    paths = sorted(path for part in (_COMMON, STOCK_SHADER) for path in (root / part).iterdir())
+    folders = (_shader_folder() / part for part in (_COMMON, STOCK_SHADER))
+    paths = sorted(path for folder in folders for path in folder.iterdir())
     return {f"{path.parent.name}/{path.name}": path.read_text() for path in paths}
+
+
+def _shader_folder() -> Path:
+    return Path(sapien.__file__).parent / "vulkan_shader"
 
 
 def _digest(texts: dict[str, str]) -> str:

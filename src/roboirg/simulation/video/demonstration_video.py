@@ -19,18 +19,12 @@ from roboirg.simulation.video.frame_sequence import FrameSequence, read_frames
 
 
 class DemonstrationVideo(Mapping[str, NDArray[Any]]):
-    """A demonstration as a mapping from an observation's fields to arrays.
+    """A demonstration as a mapping from an observation's fields to arrays, with a leading axis T.
 
     Pictures are drawn when they are first read, at any later time, and then stored. To read
     several picture fields, call `draw` first, which is faster. Pickling draws all pictures and
     leaves the actions out. The pickled video is no dictionary either: Gymnasium's vector
     environments put the arrays of dictionaries into one, and videos differ in length.
-
-    Args:
-        proprioception: the fields that are not drawn, with a leading axis T.
-        sequences: the fields that are drawn.
-        length: control steps in the video, T.
-        actions: (T, 8) joint targets (rad) and the gripper, that led to each step.
 
     Attributes:
         length: control steps in the video, T.
@@ -92,14 +86,7 @@ def make_video(
     spec: ObservationSpec,
     proprioception: Sequence[dict[str, Any]],
 ) -> DemonstrationVideo:
-    """Return the video of a demonstration that has been played.
-
-    Args:
-        episode: the episode.
-        recording: the recorded demonstration.
-        spec: fields and pictures to include.
-        proprioception: the robot's proprioception at each step.
-    """
+    """Return the video of a demonstration that has been played."""
     selection = spec.demonstration_frames
     every = selection if isinstance(selection, int) else 1
     sequences = {

@@ -1,4 +1,7 @@
-"""Draw the objects of several tasks: buttons, cubes, target discs, bins."""
+"""Draw the objects of several tasks: buttons, cubes, target discs, bins.
+
+What finds no free place raises `SceneRejectedError`: the seed gives no scene.
+"""
 
 from __future__ import annotations
 
@@ -75,11 +78,7 @@ def draw_cube(
     gap: float,
     obstacles: Sequence[Obstacle],
 ) -> SceneObject:
-    """Draw a cube with any yaw, at least `gap` meters from all obstacles.
-
-    Raises:
-        SceneRejectedError: there is no free place.
-    """
+    """Draw a cube with any yaw, at least `gap` meters from all obstacles."""
 
     def draw() -> SceneObject:
         x, y = region.draw(rng, inset=object_sizes.CUBE_HALF)
@@ -96,11 +95,7 @@ def draw_colored_cubes(
     gap: float,
     obstacles: Sequence[Obstacle],
 ) -> tuple[SceneObject, ...]:
-    """Draw `count` cubes of different colors, ``cube_red`` and so on, in random order.
-
-    Raises:
-        SceneRejectedError: there is no free place for a cube.
-    """
+    """Draw `count` cubes of different colors, ``cube_red`` and so on, in random order."""
     taken = list(obstacles)
     cubes: list[SceneObject] = []
     for index in rng.permutation(len(COLORS))[:count]:
@@ -120,11 +115,7 @@ def draw_target(
     obstacles: Sequence[Obstacle],
     rgb: tuple[float, float, float] | None = None,
 ) -> SceneObject:
-    """Draw a target disc of `radius` meters, at least `gap` meters from all obstacles.
-
-    Raises:
-        SceneRejectedError: there is no free place.
-    """
+    """Draw a target disc of `radius` meters, at least `gap` meters from all obstacles."""
 
     def draw() -> SceneObject:
         x, y = region.draw(rng, inset=radius)
@@ -147,11 +138,7 @@ def marker_over(target: SceneObject, name: str) -> SceneObject:
 def draw_bin(
     rng: np.random.Generator, region: Region, obstacles: Sequence[Obstacle], name: str = "bin"
 ) -> SceneObject:
-    """Draw a bin whose center is in the region and whose walls touch no obstacle.
-
-    Raises:
-        SceneRejectedError: there is no free place.
-    """
+    """Draw a bin whose center is in the region and whose walls touch no obstacle."""
 
     def draw() -> SceneObject:
         x, y = region.draw(rng)
@@ -179,17 +166,7 @@ def placed(
     clearance: Callable[[SceneObject], Footprint],
     obstacles: Sequence[Obstacle],
 ) -> SceneObject:
-    """Draw an object until its clearance is free of obstacles.
-
-    Args:
-        name: of the object, for the error.
-        draw: returns a candidate.
-        clearance: returns the area that a candidate needs.
-        obstacles: areas that are occupied.
-
-    Raises:
-        SceneRejectedError: there is no free place.
-    """
+    """Draw candidates for an object until the area that one needs is free of obstacles."""
     item = place(draw, clearance, obstacles)
     if item is None:
         raise SceneRejectedError(f"no place for {name}")

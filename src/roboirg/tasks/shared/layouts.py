@@ -21,11 +21,7 @@ PATTERNS: dict[int, tuple[tuple[PlanePoint, ...], ...]] = {3: (TRIANGLE, LINE), 
 
 
 def layout_points(rng: np.random.Generator, count: int) -> tuple[PlanePoint, ...]:
-    """Draw a pattern of `count` points, turned about the origin by any angle of the full circle.
-
-    Raises:
-        KeyError: there is no pattern of that number of points.
-    """
+    """Draw a pattern of `count` points, turned about the origin by any angle of the full circle."""
     patterns = PATTERNS[count]
     pattern = patterns[int(rng.integers(len(patterns)))]
     angle = 2.0 * math.pi * rng.random()

@@ -65,11 +65,7 @@ def draw_tape(
     gap: float,
     obstacles: Sequence[Footprint],
 ) -> SceneObject:
-    """Draw a roll of tape with any yaw, at least `gap` meters from all obstacles.
-
-    Raises:
-        SceneRejectedError: there is no free place.
-    """
+    """Draw a roll of tape with any yaw, at least `gap` meters from all obstacles."""
 
     def draw() -> SceneObject:
         x, y = region.draw(rng, inset=object_sizes.TAPE_RADIUS)

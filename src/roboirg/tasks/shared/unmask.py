@@ -81,11 +81,7 @@ def draw_containers_in(
 def hide_cubes(
     rng: np.random.Generator, containers: Sequence[SceneObject]
 ) -> tuple[SceneObject, ...]:
-    """Draw a red, a green and a blue cube, in random order under the first three containers.
-
-    Raises:
-        SceneRejectedError: there are fewer than three containers.
-    """
+    """Draw a red, a green and a blue cube, in random order under the first three containers."""
     if len(containers) < len(COLORS):
         raise SceneRejectedError("fewer than three containers fit")
     order = rng.permutation(len(COLORS))
@@ -146,13 +142,7 @@ def appearing(containers: Sequence[SceneObject]) -> tuple[Away, ...]:
 
 
 def press_stage(expects: Condition, button: str, which: str = "button") -> Stage:
-    """Return the stage of a press, which forbids nothing.
-
-    Args:
-        expects: the condition that completes the stage.
-        button: name of the one that the oracle presses.
-        which: its name in the subgoal.
-    """
+    """Return the stage of a press, which forbids nothing; the subgoal names the button `which`."""
     return Stage(
         expects=expects,
         forbids=(),

@@ -44,9 +44,6 @@ def sample(
 
     The cubes are out of the world while the containers move, and return under their own ones. As in
     RoboMME, two swaps may cancel out.
-
-    Raises:
-        SceneRejectedError: there are fewer than three containers.
     """
     order = rng.permutation(len(COLORS))
     cubes = hide_cubes(rng, [containers[index] for index in order if index < len(containers)])
@@ -59,12 +56,9 @@ def sample(
 def plan_motions(
     containers: Sequence[SceneObject], cubes: Sequence[SceneObject], initiators: Sequence[str]
 ) -> tuple[Motion, ...]:
-    """Return all motions: containers appear and swap, cubes are away meanwhile.
+    """Return all motions: containers appear and swap, the cubes under them are away meanwhile.
 
-    Args:
-        containers: all containers.
-        cubes: those under them.
-        initiators: names of the containers that start a swap, in order.
+    `initiators` are the names of the containers that start a swap, in order.
     """
     swaps = plan_swaps(containers, initiators, start=START, lane=LANE)
     end = last_step(swaps)

@@ -41,16 +41,9 @@ HOLD_STEPS = 60
 def draw_table(
     rng: np.random.Generator, cubes: int, discs: int, site_radius: float
 ) -> tuple[SceneObject, ...]:
-    """Draw site, button, cubes of different colors and target discs.
+    """Draw site, button, cubes of different colors and target discs, ``target_0`` first.
 
-    Args:
-        rng: of the episode.
-        cubes: number of cubes.
-        discs: number of discs, ``target_0`` first.
-        site_radius: of the round place for the cube at the end of the video, m.
-
-    Raises:
-        SceneRejectedError: there is no free place for one of them.
+    The site is the round place for the cube at the end of the video; its radius is in meters.
     """
     x, y = SITE_REGION.draw(rng, inset=site_radius)
     # A site is as high as a disc: the release height of the hand follows from it.
@@ -76,14 +69,7 @@ def draw_swap(rng: np.random.Generator, discs: Sequence[SceneObject], past: Sequ
 
 
 def plan_swap(first: str, second: str, others: Sequence[str], past: Sequence[Fact]) -> Swap:
-    """Return the swap of two discs at the end of the video.
-
-    Args:
-        first: name of a disc.
-        second: name of the other.
-        others: names of the discs that stay.
-        past: what the video shows.
-    """
+    """Return the swap of two discs at the end of the video, while the others stay."""
     kinds = [stage.primitive.kind for stage in _demonstration_of(past)]
     hold = kinds.index("hold")
     return Swap(first, second, SWAP_START, SWAP_STEPS, SWAP_LANE, pinned=tuple(others), stage=hold)

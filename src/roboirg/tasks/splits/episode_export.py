@@ -32,13 +32,9 @@ def episode_row(episode: Episode) -> dict[str, Json]:
 
 
 def write_episodes(episodes: Iterable[Episode], path: Path) -> int:
-    """Write one line of JSON for each episode; the file appears whole or not at all.
+    """Write one line of JSON for each episode, and return their number.
 
-    Returns:
-        How many lines were written.
-
-    Raises:
-        InvalidValueError: the file cannot be written.
+    The file appears whole or not at all.
     """
     lines = [json.dumps(episode_row(one), separators=(",", ":")) + "\n" for one in episodes]
     write_atomically(path, "".join(lines))

@@ -32,11 +32,7 @@ def fingerprint(episodes: Iterable[Episode]) -> str:
 
 
 def plain(value: object) -> Plain:
-    """Convert nested dataclasses and named tuples to data for JSON, with their type names.
-
-    Raises:
-        TypeError: the value contains something else, such as a NumPy number.
-    """
+    """Convert nested dataclasses and named tuples to data for JSON, with their type names."""
     if type(value) is float:
         return round(value, DECIMALS)
     if value is None or type(value) in {str, int, bool}:

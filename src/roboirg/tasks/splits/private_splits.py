@@ -32,11 +32,7 @@ class MissingSaltError(InvalidValueError):
 
 
 def use_salt(salt: str) -> Split:
-    """Give a salt to this process and its children; return the name of its split.
-
-    Raises:
-        InvalidValueError: it is too short.
-    """
+    """Give a salt to this process and its children; return the name of its split."""
     name = _split_of(salt)
     os.environ[SALT_VARIABLE] = salt
     return name
@@ -47,26 +43,10 @@ def known_salt() -> str | None:
     return os.environ.get(SALT_VARIABLE) or None
 
 
-def with_salt(split: str, salt: str | None) -> str:
-    """Return the split that is meant: with a salt, ``random`` is the private split of it.
-
-    Args:
-        split: as typed.
-        salt: as typed; None for that of the environment, if there is one.
-
-    Raises:
-        InvalidValueError: the salt is too short, or was typed for a public split.
-    """
-    if salt is not None:
-        use_salt(salt)
+def drawn_split(split: str) -> str:
+    """Return the split that is meant: if a salt is known, ``random`` is the private split of it."""
     known = known_salt()
-    if known is None or (split != RANDOM and salt is None):
-        return split
-    if split != RANDOM and not is_private(split):
-        raise InvalidValueError(
-            f"--salt draws the episodes of --split random, but the split is {split!r}."
-        )
-    return _split_of(known) if split == RANDOM else split
+    return _split_of(known) if known is not None and split == RANDOM else split
 
 
 def is_private(split: str) -> bool:
@@ -75,11 +55,7 @@ def is_private(split: str) -> bool:
 
 
 def check_salt(split: str) -> None:
-    """Check that this process can draw the episodes of a split; it can those of public ones.
-
-    Raises:
-        MissingSaltError: likewise.
-    """
+    """Check that this process can draw the episodes of a split; it can those of public ones."""
     if not is_private(split):
         return
     salt = known_salt()
@@ -92,17 +68,7 @@ def check_salt(split: str) -> None:
 
 
 def private_seed(task: str, split: Split, index: int, passed_over: int) -> int:
-    """Return a seed to try for a private episode.
-
-    Args:
-        task: name of the task.
-        split: name of the private split.
-        index: position in it.
-        passed_over: number of seeds tried before, which give no scene.
-
-    Raises:
-        MissingSaltError: the salt is missing or is another one.
-    """
+    """Return the seed to try for a private episode after some that give no scene."""
     check_salt(split)
     message = f"{task}/{index}/{passed_over}".encode()
     digest = hmac.digest(_key(os.environ[SALT_VARIABLE]), message, "sha256")
@@ -116,11 +82,7 @@ def _split_of(salt: str) -> Split:
 
 @functools.lru_cache(maxsize=8)
 def _key(salt: str) -> bytes:
-    """Return the key of a salt; slow, so that a guessed salt is not quickly compared with a name.
-
-    Raises:
-        InvalidValueError: the salt is too short.
-    """
+    """Return the key of a salt; slow, so that guessed ones are not quickly compared with names."""
     if len(salt) < MIN_SALT_LENGTH:
         raise InvalidValueError(
             f"The salt has {counted(len(salt), 'character')}; it must have at least "

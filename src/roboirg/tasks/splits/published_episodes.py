@@ -48,11 +48,7 @@ def is_published(task: str, split: str, index: int) -> bool:
 
 
 def published_episode(task: str, split: str, index: int) -> PublishedEpisode | None:
-    """Return an episode, or None if RoboMME has none there.
-
-    Raises:
-        RoboIRGError: the shipped file is damaged.
-    """
+    """Return an episode, or None if RoboMME has none there."""
     line = _lines().get((task, split, index))
     if line is None:
         return None
@@ -72,11 +68,7 @@ def published_goals(task: str) -> tuple[Goal, ...]:
 
 
 def published_text() -> str:
-    """Return the text of the shipped file, checked.
-
-    Raises:
-        RoboIRGError: it is damaged.
-    """
+    """Return the text of the shipped file, checked."""
     packed = resources.files("roboirg.tasks.splits").joinpath(FILE).read_bytes()
     text = gzip.decompress(packed).decode()
     found = hashlib.sha256(text.encode()).hexdigest()

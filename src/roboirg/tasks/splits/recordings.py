@@ -42,11 +42,7 @@ def is_recorded(task: str, split: str, index: int) -> bool:
 
 
 def recorded_actions(task: str, split: str, index: int) -> RecordedActions:
-    """Return the recording of an episode's video.
-
-    Raises:
-        KeyError: none is shipped; see `is_recorded`.
-    """
+    """Return the recording of an episode's video; it must have one, see `is_recorded`."""
     if not is_recorded(task, split, index):
         raise KeyError(f"{task}/{split}/{index}")
     with _file(task, split).open("rb") as opened, np.load(opened) as arrays:

@@ -21,11 +21,7 @@ DECIMALS = 7
 
 
 def encode(value: object) -> Json:
-    """Return a scene, a goal or a part of one as JSON values.
-
-    Raises:
-        TypeError: there is something in it that is no plain data.
-    """
+    """Return a scene, a goal or a part of one as JSON values."""
     if type(value) is float:
         return round(value, DECIMALS) + 0.0
     if value is None or isinstance(value, str | int):
@@ -39,12 +35,7 @@ def encode(value: object) -> Json:
 
 
 def decode(value: Json) -> object:
-    """Return what `encode` was given, floats rounded.
-
-    Raises:
-        KeyError: a type is unknown.
-        TypeError: fields are missing or unknown.
-    """
+    """Return what `encode` was given, floats rounded."""
     if isinstance(value, dict):
         fields = {name: decode(one) for name, one in value.items() if name != _TYPE}
         return _TYPES[str(value[_TYPE])](**fields)

@@ -77,45 +77,26 @@ def slot_key(split: Split, index: int) -> str:
 
 
 def check_split(split: str) -> Split:
-    """Return the name as a split whose episodes this process can draw.
-
-    Raises:
-        UnknownNameError: there is no such split.
-        MissingSaltError: it is private, and its salt is not known.
-    """
+    """Return the name as a split whose episodes this process can draw."""
     check_salt(split)
     return split if is_private(split) else _known_split(split, tuple(SIZES))
 
 
 def split_size(split: str) -> int:
-    """Return the number of episodes in a split.
-
-    Raises:
-        UnknownNameError: there is no such split.
-        MissingSaltError: it is private, and its salt is not known.
-    """
+    """Return the number of episodes in a split."""
     checked = check_split(split)
     return SIZES[RANDOM if is_private(checked) else checked]
 
 
 def check_fixed_split(split: str) -> Split:
-    """Return the name as a split of a fixed number of episodes: train, val or test.
-
-    Raises:
-        UnknownNameError: it is none.
-    """
+    """Return the name as a split of a fixed number of episodes: train, val or test."""
     return _known_split(split, SPLITS)
 
 
 def make_episode(
     task_name: str, seed: int, difficulty: Difficulty, split: Split = "random", index: int = 0
 ) -> Episode:
-    """Make the episode of a seed, whether or not it belongs to a split.
-
-    Raises:
-        UnknownNameError: there is no such task.
-        SceneRejectedError: the seed yields no valid scene.
-    """
+    """Make the episode of a seed, whether or not it belongs to a split."""
     task = get_task(task_name)
     scene, goal = task.sample(np.random.default_rng(seed), difficulty)
     return assemble_episode(task, seed, difficulty, scene, goal, split=split, index=index)
@@ -132,11 +113,7 @@ def assemble_episode(
     index: int,
     recorded: bool = False,
 ) -> Episode:
-    """Return the episode of a scene and a goal, with the stages that follow from them.
-
-    Raises:
-        InvalidValueError: a stage of the task expects or forbids what can never happen.
-    """
+    """Return the episode of a scene and a goal, with the stages that follow from them."""
     stages, demonstration = task.stages(scene, goal), task.demonstration(scene)
     check_stages(task.name, scene, (*demonstration, *stages))
     return Episode(
@@ -190,11 +167,7 @@ def split_episodes(tasks: Iterable[str], splits: Iterable[Split]) -> Iterator[Ep
 
 
 def fingerprint_of(task_name: str, passed_over: Mapping[str, int]) -> str:
-    """Return the fingerprint of all episodes of a task, given the numbers of seeds passed over.
-
-    Raises:
-        SceneRejectedError: one of the seeds yields no valid scene.
-    """
+    """Return the fingerprint of all episodes of a task, given the numbers of seeds passed over."""
     return fingerprint(
         _published(task_name, split, index)
         or _sampled(task_name, split, index, passed_over.get(slot_key(split, index), 0))

@@ -10,18 +10,28 @@ from __future__ import annotations
 import hmac
 import json
 import secrets
-from collections.abc import Callable, Sequence
-from http import HTTPStatus
-from http.cookies import CookieError, SimpleCookie
+from collections.abc import Awaitable, Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
-from urllib.parse import parse_qs, urlencode, urlsplit
+from urllib.parse import urlencode
 
-from roboirg.core.errors import InvalidValueError
-from roboirg.util.web.http_server import HTML_TYPE, BrowserServer, RequestHandler
+from starlette.applications import Starlette
+from starlette.concurrency import run_in_threadpool
+from starlette.exceptions import HTTPException
+from starlette.requests import Request
+from starlette.responses import (
+    HTMLResponse,
+    JSONResponse,
+    PlainTextResponse,
+    RedirectResponse,
+    Response,
+)
+from starlette.routing import BaseRoute
+
+from roboirg.core.errors import InvalidValueError, RoboIRGError
+from roboirg.util.web.app_server import AppServer, RequestGuard, header_values, read_body
 from roboirg.util.web.request_origin import LOOPBACK, is_own_request, names_of_this_machine
 
-JSON_TYPE = "application/json"
 KEY_FILE = "key"
 MAX_BODY_BYTES = 65_536
 PRIVATE_HEADERS = {
@@ -62,15 +72,15 @@ def stored_key(folder: Path) -> str:
         raise InvalidValueError(f"Cannot keep the page's key in {path}: {error}.") from error
 
 
-class KeyedPageServer(BrowserServer):
+class KeyedPageServer(AppServer):
     """Serves pages to browsers that were given the key.
 
     Args:
-        handler: class of the request handler.
+        routes: of the pages.
         key: secret in the address.
         host: address to listen at.
         port: 0 for any free port.
-        names: further names under which browsers reach this machine.
+        statuses: of the responses to errors; other errors of the package have status 400.
 
     Raises:
         InvalidValueError: the port is not available, or the address is not this machine's.
@@ -78,15 +88,18 @@ class KeyedPageServer(BrowserServer):
 
     def __init__(
         self,
-        handler: type[KeyedPageHandler],
+        routes: Sequence[BaseRoute],
         key: str,
         host: str = LOOPBACK,
         port: int = 0,
-        names: Sequence[str] = (),
+        statuses: Mapping[type[Exception], int] | None = None,
     ) -> None:
-        super().__init__(host, port, handler)
-        self.key, self.host = key, host
-        self.names = frozenset({*names_of_this_machine(), host.lower(), *map(str.lower, names)})
+        self.key = key
+        self._names = frozenset({*names_of_this_machine(), host.lower()})
+        known: dict[type[Exception], int] = {RoboIRGError: 400, **(statuses or {})}
+        handlers = {kind: _error_handler(status) for kind, status in known.items()}
+        app = Starlette(routes=routes, exception_handlers=handlers)
+        super().__init__(RequestGuard(app, self._refuse, PRIVATE_HEADERS), host, port)
 
     @property
     def url(self) -> str:
@@ -98,93 +111,48 @@ class KeyedPageServer(BrowserServer):
         """Name of the cookie; servers at other ports have others."""
         return f"roboirg_{self.port}"
 
-    def knows(self, key: str) -> bool:
-        """Return whether a key is this server's."""
+    def _refuse(self, request: Request) -> Response | None:
+        """Exchange the key for a cookie, or refuse a request without it."""
+        hosts, origins = header_values(request, "host"), header_values(request, "origin")
+        # A proxy may add HTTPS: the page is then the same host's.
+        plain = [one.replace("https://", "http://", 1) for one in origins]
+        own = is_own_request(hosts, plain, self._names)
+        asked = (request.method, request.url.path) == ("GET", "/")
+        if own and asked and self._knows(request.query_params.get("key", "")):
+            response = RedirectResponse("/", 303)
+            response.set_cookie(self.cookie, self.key, httponly=True, samesite="strict")
+            return response
+        if own and self._knows(request.cookies.get(self.cookie, "")):
+            return None
+        return PlainTextResponse("Open the address that roboirg has printed, with its key.\n", 403)
+
+    def _knows(self, key: str) -> bool:
         return hmac.compare_digest(key.encode(), self.key.encode())
 
 
-class KeyedPageHandler(RequestHandler):
-    """Handle the requests of one connection to a `KeyedPageServer`.
+def page_response(render: Callable[[str], str]) -> HTMLResponse:
+    """Return a page; `render` gets the nonce of its style and script."""
+    nonce = secrets.token_urlsafe(16)
+    return HTMLResponse(render(nonce), headers=page_policy(nonce))
 
-    Subclasses define ``answer_get`` and ``answer_post``, which are called with the path of requests
-    that are allowed.
-    """
 
-    server: KeyedPageServer
+def json_endpoint(
+    answer: Callable[[Request, dict[str, Any]], object],
+) -> Callable[[Request], Awaitable[Response]]:
+    """Return the endpoint of requests with a JSON object; `answer` returns the JSON reply."""
 
-    def answer_get(self, path: str) -> None:
-        """Answer a request with the key; subclasses override it."""
-        raise NotImplementedError(path)
-
-    def answer_post(self, path: str, body: dict[str, Any]) -> None:
-        """Answer a request with the key and a JSON object; subclasses override it."""
-        raise NotImplementedError(path, body)
-
-    def do_GET(self) -> None:  # noqa: N802 - name of the base class
-        """Exchange the key for a cookie, or answer."""
-        parts = urlsplit(self.path)
-        key = parse_qs(parts.query).get("key", [""])[0]
-        if parts.path == "/" and key and self._is_own() and self.server.knows(key):
-            cookie = f"{self.server.cookie}={self.server.key}; HttpOnly; SameSite=Strict; Path=/"
-            self.send_head(HTTPStatus.SEE_OTHER, 0, {"Location": "/", "Set-Cookie": cookie})
-        elif self._is_allowed():
-            self.answer_get(parts.path)
-
-    def do_POST(self) -> None:  # noqa: N802 - name of the base class
-        """Read a JSON object and answer; without the key, the body is not read."""
-        if not self._is_allowed():
-            return
-        content = self.read_body(MAX_BODY_BYTES, message="Too large.")
-        if content is None:
-            return
+    async def endpoint(request: Request) -> Response:
+        content = await read_body(request, MAX_BODY_BYTES)
         try:
             body = json.loads(content)
         except (ValueError, RecursionError):
             body = None
         if not isinstance(body, dict):
-            self.send_refusal(HTTPStatus.BAD_REQUEST, "The request is no JSON object.")
-            return
-        self.answer_post(urlsplit(self.path).path, body)
+            raise HTTPException(400, "The request is no JSON object.")
+        return JSONResponse(await run_in_threadpool(answer, request, body))
 
-    def common_headers(self) -> dict[str, str]:
-        """Return headers that forbid caching and foreign content."""
-        return {**super().common_headers(), **PRIVATE_HEADERS}
+    return endpoint
 
-    def send_json(self, value: object, status: HTTPStatus = HTTPStatus.OK) -> None:
-        """Send a JSON value."""
-        self.send_text(json.dumps(value), JSON_TYPE, status)
 
-    def send_page(self, render: Callable[[str], str]) -> None:
-        """Send a page; `render` gets the nonce of its style and script."""
-        nonce = secrets.token_urlsafe(16)
-        self.send_bytes(render(nonce).encode(), HTML_TYPE, headers=page_policy(nonce))
-
-    def send_missing(self) -> None:
-        """Refuse a request for something that is not there."""
-        self.send_refusal(HTTPStatus.NOT_FOUND, "There is no such page.")
-
-    def _is_own(self) -> bool:
-        hosts, origins = self.headers.get_all("Host", []), self.headers.get_all("Origin", [])
-        # A proxy may add HTTPS: the page is then the same host's.
-        plain = [one.replace("https://", "http://", 1) for one in origins]
-        return is_own_request(hosts, plain, self.server.names)
-
-    def _is_allowed(self) -> bool:
-        """Return whether a request comes from a page of this server; refuse it if not."""
-        allowed = self._is_own() and self.server.knows(self._key())
-        if allowed:
-            self.server.connections.prove(self.connection)
-        else:
-            self.send_refusal(
-                HTTPStatus.FORBIDDEN, "Open the address that roboirg has printed, with its key."
-            )
-        return allowed
-
-    def _key(self) -> str:
-        """Return the key in the request's cookie; empty if it has none."""
-        try:
-            cookies = SimpleCookie("; ".join(self.headers.get_all("Cookie", [])))
-        except CookieError:
-            return ""
-        found = cookies.get(self.server.cookie)
-        return "" if found is None else found.value
+def _error_handler(status: int) -> Callable[[Request, Exception], Response]:
+    return lambda _, error: PlainTextResponse(f"{error}\n", status)

@@ -8,11 +8,14 @@ site's.
 
 from __future__ import annotations
 
+import os
 from collections.abc import Collection, Sequence
 from urllib.parse import urlsplit
 
 LOOPBACK = "127.0.0.1"
 LOOPBACK_NAMES = (LOOPBACK, "localhost", "::1")
+NAMES_VARIABLE = "ROBOIRG_HOST_NAMES"
+"""Environment variable with further names of this machine, separated by commas or blanks."""
 
 
 def is_own_request(hosts: Sequence[str], origins: Sequence[str], names: Collection[str]) -> bool:
@@ -39,11 +42,15 @@ def is_own_host(host: str, names: Collection[str]) -> bool:
 
 
 def names_of_this_machine() -> frozenset[str]:
-    """Return the names under which clients reach this machine; a network may have more."""
+    """Return the names under which clients reach this machine.
+
+    A network may have more, such as that of a container: the user lists them in the variable.
+    """
     import socket  # here, because `roboirg --help` needs the names of loopback only
 
     name = socket.gethostname().lower()
-    return frozenset({*LOOPBACK_NAMES, name, name.partition(".")[0]})
+    further = os.environ.get(NAMES_VARIABLE, "").lower().replace(",", " ").split()
+    return frozenset({*LOOPBACK_NAMES, name, name.partition(".")[0], *further})
 
 
 def _is_address(name: str) -> bool:

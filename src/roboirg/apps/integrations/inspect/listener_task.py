@@ -31,7 +31,7 @@ from inspect_ai.util import JSONSchema
 from roboirg.apps.integrations.inspect.episode_process import SPEC, ModelRequest, play
 from roboirg.core.episode import ENVIRONMENT_VERSION
 from roboirg.core.errors import RoboIRGError
-from roboirg.core.instruction_options import DEFAULT_DELIVERY
+from roboirg.core.instruction_options import DEFAULT_DELIVERY, InstructionOptions
 from roboirg.evaluation.records.record import DEFAULT_MAX_STEPS, Job
 from roboirg.policies.vlm.models import ModelOptions
 from roboirg.policies.vlm.vlm_listener import ListenerOptions
@@ -75,7 +75,7 @@ def listener(
     jobs = [
         Job(
             policy="vlm-listener", spec=SPEC, task=name, split=split, episode=index,
-            setting=setting, delivery=delivery, max_steps=max_steps,
+            options=InstructionOptions(setting, delivery=delivery), max_steps=max_steps,
         )
         for name in find_tasks(tasks.split(",") if isinstance(tasks, str) else tasks)
         for index in range(count)

@@ -17,8 +17,8 @@ from roboirg.envs.env_options import EnvOptions
 from roboirg.envs.env_settings import MAX_STEPS
 from roboirg.envs.factory import make
 
-VideoMode = Literal["none", "stream", "key"]
-VIDEO_MODES: tuple[VideoMode, ...] = ("none", "stream", "key")
+VideoDelivery = Literal["none", "stream", "key"]
+VIDEO_DELIVERIES: tuple[VideoDelivery, ...] = ("none", "stream", "key")
 NEW_ROLLOUT = "lerobot_new_rollout"
 """Option with which LeRobot, from 0.6.1 on, marks the resets that it means."""
 LONGEST_VIDEO = 2000
@@ -70,8 +70,8 @@ class LeRobotSubEnvironment(gymnasium.Env[dict[str, Any], NDArray[np.floating[An
         video_frames: int = 16,
         **options: Unpack[EnvOptions],
     ) -> None:
-        if video not in VIDEO_MODES:
-            raise UnknownNameError("way with the video", video, VIDEO_MODES)
+        if video not in VIDEO_DELIVERIES:
+            raise UnknownNameError("way with the video", video, VIDEO_DELIVERIES)
         if not isinstance(video_frames, int) or video_frames < 1:
             raise InvalidValueError(f"video_frames is {video_frames!r}; it must be 1 or more.")
         if not options.get("cameras", CAMERAS):

@@ -5,6 +5,7 @@ from __future__ import annotations
 import functools
 from collections import Counter
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 
 from roboirg.apps.language_lab.validation.leaks import find_leaks
 from roboirg.apps.language_lab.validation.pairing import unpaired
@@ -132,7 +133,7 @@ def _count_refusals(setting: Setting, episode: Episode, results: ValidationResul
     for changes in setting.variants:
         variant = ", ".join(str(value) for value in changes.values())
         group = SceneGroup(episode.task, setting.name, variant, episode.difficulty)
-        reason = find_refusal(episode, InstructionOptions(setting.name)._replace(**changes))
+        reason = find_refusal(episode, replace(InstructionOptions(setting.name), **changes))
         results.scenes[group] += 1
         results.refused[group] += reason is not None
         if reason is not None:

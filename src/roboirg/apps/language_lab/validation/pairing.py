@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 
 from roboirg.core.episode import Episode
 from roboirg.core.instruction_options import InstructionOptions
@@ -25,7 +26,7 @@ def unpaired(
     """
 
     def say(options: InstructionOptions) -> Instruction:
-        return instruct_with(episode, options._replace(wordings=wordings))
+        return instruct_with(episode, replace(options, wordings=wordings))
 
     for name in settings:
         for complaint in all_settings()[name].pairing_rules(say):
@@ -37,7 +38,7 @@ def unpaired(
 
 def _differences(options: InstructionOptions, say: Instruct) -> Iterator[str]:
     """Yield how the forms of an instruction differ, beside their references."""
-    implicit, resolved = say(options), say(options._replace(form="resolved"))
+    implicit, resolved = say(options), say(replace(options, form="resolved"))
     if implicit.turns[:-1] != resolved.turns[:-1]:
         yield "resolved, its context differs"
     # In words from outside, one time may have a sentence of its own, without a number; but both

@@ -41,15 +41,12 @@ class VerdictButton(NamedTuple):
     chosen: bool
 
 
-def render_trial(
-    trial_log: TrialLog, trial: PlannedTrial, *, token: str, nonce: str, message: str = ""
-) -> str:
+def render_trial(trial_log: TrialLog, trial: PlannedTrial, *, nonce: str, message: str = "") -> str:
     """Render the page of a trial.
 
     Args:
         trial_log: with the records of the study.
         trial: to show.
-        token: secret that only pages of this server know.
         nonce: allows the page's own style and script.
         message: result of the last click.
 
@@ -81,7 +78,6 @@ def render_trial(
         video=(record.video or "") if record else "",
         revision=trial_log.revision(trial.name),
         undo=trial_log.last_scored or "",
-        token=token,
         nonce=nonce,
         message=message,
     )

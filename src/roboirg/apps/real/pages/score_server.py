@@ -2,31 +2,31 @@
 
 The server keeps nothing in memory: it renders every page from the records on the disk, so a server
 that was killed continues where it was. Pages of other sites cannot score: they do not know the
-token, and requests under any other name than this machine's are refused.
+key, and requests under any other name than this machine's are refused.
 """
 
 from __future__ import annotations
 
-import hmac
 import secrets
 import threading
-from http import HTTPStatus
 from pathlib import Path, PurePosixPath
-from urllib.parse import parse_qsl, urlsplit
+from urllib.parse import parse_qsl
+
+from starlette.concurrency import run_in_threadpool
+from starlette.requests import Request
+from starlette.responses import RedirectResponse, Response
+from starlette.routing import Route
 
 from roboirg.apps.real.pages.score_page import page_address, render_trial
 from roboirg.apps.real.study.study_plan import PlannedTrial, StudyPlan
 from roboirg.apps.real.study.trial_log import TrialLog
 from roboirg.core.errors import InvalidValueError, RoboIRGError
-from roboirg.util.web.http_server import HTML_TYPE, LoopbackRequestHandler, LoopbackServer
-from roboirg.util.web.keyed_pages import PRIVATE_HEADERS, page_policy
+from roboirg.util.web.app_server import read_body
+from roboirg.util.web.keyed_pages import MAX_BODY_BYTES, KeyedPageServer, page_response
 from roboirg.util.web.page_templates import check_page_support
-from roboirg.util.web.request_origin import LOOPBACK
-
-MAX_FORM_BYTES = 65_536
 
 
-class ScoreServer(LoopbackServer):
+class ScoreServer(KeyedPageServer):
     """Serves the page of one study until it is shut down.
 
     Args:
@@ -43,14 +43,13 @@ class ScoreServer(LoopbackServer):
     def __init__(self, plan: StudyPlan, folder: Path, operator: str, port: int = 0) -> None:
         check_page_support("The page")
         self.plan, self.folder, self.operator = plan, folder, operator
-        self.token = secrets.token_urlsafe(24)
         self._writing = threading.Lock()
-        super().__init__(port, _ScoreHandler)
-
-    @property
-    def url(self) -> str:
-        """Address to open, with the token."""
-        return f"http://{LOOPBACK}:{self.port}/?token={self.token}"
+        routes = [
+            Route("/", self._page),
+            Route("/score", self._take_form, methods=["POST"]),
+            Route("/undo", self._take_form, methods=["POST"]),
+        ]
+        super().__init__(routes, secrets.token_urlsafe(18), port=port)
 
     def read_trial_log(self) -> TrialLog:
         """Read the records on the disk."""
@@ -105,75 +104,31 @@ class ScoreServer(LoopbackServer):
             return path.as_posix(), ""
         return "", f" (without a video: the study's folder has no file {name!r})"
 
+    def _page(self, request: Request) -> Response:
+        trial_log = self.read_trial_log()
+        trial = _select_trial(trial_log, request.query_params.get("trial", ""))
+        message = request.query_params.get("message", "")
+        return page_response(
+            lambda nonce: render_trial(trial_log, trial, nonce=nonce, message=message)
+        )
 
-class _ScoreHandler(LoopbackRequestHandler):
-    """Handle requests for trials' pages, verdicts and undo."""
-
-    server: ScoreServer
-
-    def do_GET(self) -> None:  # noqa: N802 - name of the base class
-        """Send the page of a trial."""
-        parts = urlsplit(self.path)
-        query = dict(parse_qsl(parts.query))
-        if not self._is_allowed(query.get("token", "")):
-            return
-        if parts.path != "/":
-            self.send_refusal(HTTPStatus.NOT_FOUND, "There is no such page.")
-            return
-        message = query.get("message", "")
-        try:
-            trial_log = self.server.read_trial_log()
-            trial = _select_trial(trial_log, query.get("trial", ""))
-            nonce = secrets.token_urlsafe(16)
-            text = render_trial(
-                trial_log, trial, token=self.server.token, nonce=nonce, message=message
-            )
-        except RoboIRGError as error:
-            self.send_refusal(HTTPStatus.BAD_REQUEST, str(error))
-            return
-        self.send_bytes(text.encode(), HTML_TYPE, headers=page_policy(nonce))
-
-    def do_POST(self) -> None:  # noqa: N802 - name of the base class
+    async def _take_form(self, request: Request) -> Response:
         """Store a verdict or undo one, then redirect: reloading the page must not repeat it."""
-        if not self.is_local():
-            self._refuse()
-            return
-        form = self.read_form(MAX_FORM_BYTES, message="This is not a form of this page.")
-        if form is None or not self._is_allowed(form.get("token", "")):
-            return
-        shown: dict[str, str] = {}
+        body = await read_body(request, MAX_BODY_BYTES)
+        form = dict(parse_qsl(body.decode("utf-8", "replace"), keep_blank_values=True))
+        shown = await run_in_threadpool(self._apply, request.url.path, form)
+        return RedirectResponse(page_address(shown), 303)
+
+    def _apply(self, path: str, form: dict[str, str]) -> dict[str, str]:
+        """Return what the page shows next."""
         try:
-            if self.path == "/score":
-                message = self.server.score(form)
-            elif self.path == "/undo":
-                shown["trial"], message = self.server.undo(form)
-            else:
-                self.send_refusal(HTTPStatus.NOT_FOUND, "There is no such page.")
-                return
+            if path == "/score":
+                return {"message": self.score(form)}
+            name, message = self.undo(form)
         except RoboIRGError as error:
-            message = str(error)
-            if "trial" in form:
-                shown["trial"] = form["trial"]
-        query = {"token": self.server.token, **shown, "message": message}
-        self.send_redirect(page_address(query))
-
-    def common_headers(self) -> dict[str, str]:
-        """Return headers that forbid caching, referrers with the token, and foreign content."""
-        return {**super().common_headers(), **PRIVATE_HEADERS}
-
-    def _is_allowed(self, token: str) -> bool:
-        """Return whether a request comes from a page of this server; refuse it if not."""
-        allowed = self.is_local() and hmac.compare_digest(
-            token.encode(), self.server.token.encode()
-        )
-        if not allowed:
-            self._refuse()
-        return allowed
-
-    def _refuse(self) -> None:
-        self.send_refusal(
-            HTTPStatus.FORBIDDEN, "Open the address that roboirg real score has printed."
-        )
+            trial = {"trial": form["trial"]} if "trial" in form else {}
+            return {**trial, "message": str(error)}
+        return {"trial": name, "message": message}
 
 
 def _select_trial(trial_log: TrialLog, name: str) -> PlannedTrial:

@@ -18,6 +18,7 @@ import numpy as np
 from roboirg.apps.real.study.counterbalancing import counterbalanced_episodes, target_kind
 from roboirg.core.episode import Episode
 from roboirg.core.errors import InvalidValueError, RoboIRGError, UnknownNameError
+from roboirg.core.instruction_options import InstructionOptions
 from roboirg.evaluation.plan.plan_parsing import name_and_spec
 from roboirg.evaluation.records.record import DEFAULT_MAX_STEPS, Job
 from roboirg.language.settings import plain_settings, settings_of
@@ -161,7 +162,7 @@ def make_study(
                 task=task,
                 split=split,
                 episode=episode,
-                setting=setting,
+                options=InstructionOptions(setting),
                 max_steps=max_steps,
             )
             trial_name = f"{task}-{episode:02d}-{setting}-{LETTERS[policy]}"

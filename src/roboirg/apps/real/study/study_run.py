@@ -177,10 +177,10 @@ class Study:
 def _check_delivery(plan: StudyPlan) -> None:
     """Raise if an instruction is to be delivered in turns."""
     for trial in plan.trials:
-        if trial.job.delivery != DEFAULT_DELIVERY:
+        if trial.job.options.delivery != DEFAULT_DELIVERY:
             raise InvalidValueError(
-                f"Trial {trial.name!r} has delivery={trial.job.delivery!r}; in a study with a "
-                f"robot the whole instruction is given at once ({DEFAULT_DELIVERY!r})."
+                f"Trial {trial.name!r} has delivery={trial.job.options.delivery!r}; in a study "
+                f"with a robot the whole instruction is given at once ({DEFAULT_DELIVERY!r})."
             )
 
 

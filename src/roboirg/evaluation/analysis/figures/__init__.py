@@ -32,11 +32,6 @@ def write_figures(
 
     Returns:
         The files.
-
-    Raises:
-        UnknownNameError: a figure does not exist.
-        MissingDependencyError: matplotlib is not installed.
-        InvalidValueError: the folder is not writable, or there is nothing to draw.
     """
     for name in which:
         if name not in FIGURES:
@@ -61,11 +56,7 @@ def _written(name: str, content: FigureData, folder: Path, *, published: bool) -
 
 
 def draw_figure(name: str, content: FigureData, *, published: bool = False) -> Figure | None:
-    """Draw one of `FIGURES` but the expressions; return None without data.
-
-    Raises:
-        MissingDependencyError: matplotlib is not installed.
-    """
+    """Draw one of `FIGURES` but the expressions; return None without data."""
     check_figure_support()
     import matplotlib as mpl
 

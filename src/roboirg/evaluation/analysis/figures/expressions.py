@@ -74,10 +74,6 @@ def write_expressions(content: FigureData, folder: Path, name: str) -> tuple[Pat
 
     Results do not hold the instructions, so they are generated again, if the language has the same
     version.
-
-    Raises:
-        MissingDependencyError: matplotlib is not installed.
-        InvalidValueError: the folder is not writable.
     """
     jobs = [
         msgspec.structs.replace(
@@ -103,18 +99,7 @@ def write_figure(
 ) -> tuple[Path, ...]:
     """Draw the number of scenes with each class of referring expression, as PNG and SVG.
 
-    Args:
-        instructions: the instructions to count in.
-        folder: created if it is missing.
-        name: of the files, without extension.
-        title: above the panels.
-
-    Returns:
-        The files.
-
-    Raises:
-        MissingDependencyError: matplotlib is not installed.
-        InvalidValueError: the folder is not writable.
+    Return the files; `name` has no extension.
     """
     return save_figure(
         lambda: _draw(instructions, title),

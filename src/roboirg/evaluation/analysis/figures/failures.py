@@ -102,7 +102,7 @@ def _counts(content: FigureData) -> tuple[Counts, Counter[tuple[PolicyRun, Instr
         played[key.policy_run, key.options] += cell.trials
     for policy_run, result in content.results:
         if result.outcome == "failure":
-            counts[policy_run, result.options][failure_name(result)] += 1
+            counts[policy_run, result.column][failure_name(result)] += 1
     return counts, played
 
 

@@ -73,9 +73,7 @@ def folded(name: str, letters: int) -> str:
 def rates_figure(height: float, labels: Sequence[str]) -> tuple[Figure, Axes]:
     """Return an empty one-column figure for success in percent, with room for a legend below.
 
-    Args:
-        height: in inches, without the legend.
-        labels: of the legend.
+    The height is in inches, without the legend.
     """
     lines = sum(folded(one, LEGEND_LETTERS).count("\n") + 1 for one in labels)
     lines = -(-lines // _legend_columns(labels))

@@ -74,12 +74,7 @@ def bar_series(table: Table) -> tuple[Series, ...]:
 
 
 def draw_real_robot(content: FigureData, *, published: bool) -> Figure | None:
-    """Draw success of real-robot tasks by setting, a panel for each task; None without verdicts.
-
-    Args:
-        content: of the studies.
-        published: whether to draw the paper's values next to them.
-    """
+    """Draw success of real-robot tasks by setting, a panel for each task; None without verdicts."""
     table = make_table("real", content.cells, published=published)
     series = bar_series(table)
     if not any(one.bars for one in series if not one.published):

@@ -8,7 +8,7 @@ episode is opened.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import NamedTuple, get_args
 
 import msgspec
@@ -19,7 +19,7 @@ from roboirg.evaluation.analysis.page.details import Strings, details_of, search
 from roboirg.evaluation.analysis.page.entries import EpisodeEntries, EpisodeEntry
 from roboirg.evaluation.analysis.page.episode_videos import EpisodeVideo, EpisodeVideos
 from roboirg.evaluation.analysis.page.reconstruction import resolved_form
-from roboirg.evaluation.analysis.stats.cells import FAIRNESS, task_order
+from roboirg.evaluation.analysis.stats.cells import FAIRNESS, EvalConditions, task_order
 from roboirg.evaluation.analysis.stats.option_labels import options_label, options_sort_key
 from roboirg.evaluation.records.record import ERROR_KINDS, FailureKind, Outcome, Record, Summary
 from roboirg.judging.failure_attribution import EXECUTION, GROUNDING
@@ -192,12 +192,13 @@ def _row(
 
 def _fairness(record: Summary) -> tuple[object, ...]:
     """Return what two episodes must share to be compared, besides scene and instruction."""
-    return tuple(getattr(record, name) for name in FAIRNESS)
+    conditions = EvalConditions.of(record)
+    return tuple(getattr(conditions, name) for name in FAIRNESS)
 
 
 def setting_label(options: InstructionOptions) -> str:
     """Return the label of options whatever the form, which is a filter of its own."""
-    return options_label(options._replace(form="implicit"))
+    return options_label(replace(options, form="implicit"))
 
 
 def _instruction_key(entry: EpisodeEntry) -> tuple[object, ...]:
@@ -206,8 +207,7 @@ def _instruction_key(entry: EpisodeEntry) -> tuple[object, ...]:
         record.task,
         record.split,
         record.episode,
-        entry.options._replace(form=""),
-        record.wordings,
+        replace(record.options, form=""),
         record.language_version,
         record.environment_version,
     )

@@ -57,12 +57,8 @@ def details_of(
 ) -> Details:
     """Return the details of an episode, with texts as indices; empty ones are left out.
 
-    Args:
-        record: of the episode.
-        strings: to which the texts are added.
-        video: of the episode.
-        resolved: the resolved form of its instruction; None if it has that form or none.
-        embeds: whether the video is part of the page.
+    `resolved` is the resolved form of its instruction; None if it has that form or none. If
+    `embeds`, the video is part of the page.
     """
     index, optional_index = strings.index, strings.optional_index
     names = names_of(record)
@@ -95,9 +91,7 @@ def details_of(
 def event_text(event: EventRecord, names: Mapping[str, str]) -> str:
     """Return an event as what was done, in the past tense.
 
-    Args:
-        event: of a record.
-        names: words for the objects; others are called by their names.
+    `names` has words for the objects; others are called by their names.
     """
     traits = fact_traits(event.kind)
     subject, place = (
@@ -165,7 +159,7 @@ def _conditions(record: Record) -> str:
     parts = [
         f"{record.split} split",
         f"at most {record.max_steps} steps",
-        f"in {words_label(record.wordings)}",
+        f"in {words_label(record.options.wordings)}",
     ]
     parts += [
         f"{name.replace('_', ' ')} {getattr(record, name)}"

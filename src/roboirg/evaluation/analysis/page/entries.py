@@ -74,7 +74,7 @@ class EpisodeEntry:
     @property
     def options(self) -> InstructionOptions:
         """The instruction options."""
-        return self.record.options
+        return self.record.column
 
     @property
     def log(self) -> str | None:

@@ -6,87 +6,80 @@ are supported, so that a browser can seek in a video.
 
 from __future__ import annotations
 
+import os
 import threading
 from collections.abc import Callable
-from http import HTTPStatus
 from pathlib import Path
-from typing import BinaryIO
-from urllib.parse import unquote, urlsplit
+
+from starlette.applications import Starlette
+from starlette.requests import Request
+from starlette.responses import HTMLResponse, PlainTextResponse, Response
+from starlette.routing import Mount, Route
+from starlette.staticfiles import StaticFiles
 
 from roboirg.evaluation.records.store import RECORDS_FILE
-from roboirg.util.web.http_server import HTML_TYPE, LoopbackRequestHandler, LoopbackServer
-from roboirg.util.web.request_origin import LOOPBACK
+from roboirg.util.web.app_server import AppServer, RequestGuard, header_values
+from roboirg.util.web.request_origin import LOOPBACK, LOOPBACK_NAMES, is_own_request
+
+PAGES = ("/", "/index.html", "/report.html")
 
 
-class PageServer(LoopbackServer):
+class PageServer(AppServer):
     """Serves one run until it is shut down.
 
     Args:
         folder: of the run.
         make_page: renders the page; called again when the records have changed.
         port: 0 for any free port.
-
-    Raises:
-        InvalidValueError: the port is not available.
     """
 
     def __init__(self, folder: Path, make_page: Callable[[], str], port: int = 0) -> None:
         self.folder = folder.resolve()
         self._make_page = make_page
-        self._page: tuple[object, bytes] | None = None
+        self._page: tuple[object, str] | None = None
         self._lock = threading.Lock()
-        super().__init__(port, _PageHandler)
+        files = Mount("/", _RunFiles(directory=self.folder, check_dir=False))
+        app = Starlette(routes=[*(Route(path, self._answer) for path in PAGES), files])
+        # The browser asks again each time: the records change while a run goes on.
+        guard = RequestGuard(app, _refuse, {"Cache-Control": "no-cache"})
+        super().__init__(guard, LOOPBACK, port)
 
     @property
     def address(self) -> str:
         """Address of the page."""
         return f"http://{LOOPBACK}:{self.port}/"
 
-    def page(self) -> bytes:
+    def page(self) -> str:
         """Return the page; rendered again only if the records have changed."""
         records = self.folder / RECORDS_FILE
         with self._lock:
             state = records.stat() if records.exists() else None
             mark = None if state is None else (state.st_mtime_ns, state.st_size)
             if self._page is None or self._page[0] != mark:
-                self._page = (mark, self._make_page().encode())
+                self._page = (mark, self._make_page())
             return self._page[1]
 
+    def _answer(self, request: Request) -> Response:
+        del request
+        return HTMLResponse(self.page())
 
-class _PageHandler(LoopbackRequestHandler):
-    """Handle requests for the page and for files of the run."""
 
-    server: PageServer
+class _RunFiles(StaticFiles):
+    """The files of a run, without those whose name begins with a dot.
 
-    def do_GET(self) -> None:  # noqa: N802 - name of the base class
-        path = unquote(urlsplit(self.path).path)
-        if not self.is_local():
-            self.send_refusal(HTTPStatus.FORBIDDEN)
-        elif path in ("/", "/index.html", "/report.html"):
-            self.send_bytes(self.server.page(), HTML_TYPE)
-        elif (file := self._open(path)) is None:
-            self.send_refusal(HTTPStatus.NOT_FOUND)
-        else:
-            with file:
-                self.send_file(file, path)
+    The lock, and videos that are not finished, are the run's own.
+    """
 
-    do_HEAD = do_GET  # noqa: N815 - a name of the base class
+    def lookup_path(self, path: str) -> tuple[str, os.stat_result | None]:
+        found, state = super().lookup_path(path)
+        if state is not None and "/." in found[len(str(self.directory)) :]:
+            return "", None
+        return found, state
 
-    def common_headers(self) -> dict[str, str]:
-        """Let the browser ask again each time: the records change while a run goes on."""
-        return {**super().common_headers(), "Cache-Control": "no-cache"}
 
-    def _open(self, path: str) -> BinaryIO | None:
-        """Return the file at a path; None if there is none inside the run's folder."""
-        folder = self.server.folder
-        try:
-            # Resolved, so that neither dots nor links lead outside.
-            found = (folder / path.lstrip("/")).resolve()
-            if not found.is_relative_to(folder) or not found.is_file():
-                return None
-            # The lock, and videos that are not finished, are the run's own.
-            if any(part.startswith(".") for part in found.relative_to(folder).parts):
-                return None
-            return found.open("rb")
-        except (OSError, ValueError):
-            return None
+def _refuse(request: Request) -> Response | None:
+    """Return the response to a request that comes from a page of another site."""
+    hosts, origins = header_values(request, "host"), header_values(request, "origin")
+    if is_own_request(hosts, origins, LOOPBACK_NAMES):
+        return None
+    return PlainTextResponse("403 Forbidden\n", 403)

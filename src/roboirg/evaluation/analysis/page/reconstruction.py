@@ -48,8 +48,8 @@ def resolved_form(record: Record) -> str | None:
     if record.language_version != language.LANGUAGE_VERSION or not _has_this_environment(record):
         return None
     try:
-        changes = {"form": "resolved", "wordings_file": record.wordings_file}
-        return instruct_job(msgspec.structs.replace(record.identity, **changes)).text
+        job = msgspec.structs.replace(record.identity, wordings_file=record.wordings_file)
+        return instruct_job(job.with_options(form="resolved")).text
     except RoboIRGError:
         return None  # a task or a wording file that is no longer there
 

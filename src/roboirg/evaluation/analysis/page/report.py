@@ -67,13 +67,6 @@ def write_report(
         against: folder of another run, to compare with episode by episode.
         planned_against: planned jobs of the other run.
         progress: told after each episode.
-
-    Returns:
-        The path of the page.
-
-    Raises:
-        StoreError: there are no readable records.
-        MissingDependencyError: Jinja is not installed.
     """
     check_report_support()
     path = folder / REPORT_FILE
@@ -86,17 +79,7 @@ def write_report(
 
 
 def make_view(folder: Path, planned: Sequence[Job] = (), progress: Progress | None = None) -> str:
-    """Return the page of a run as it is served, with links to its videos.
-
-    Args:
-        folder: of the run.
-        planned: jobs that should have a record.
-        progress: told after each episode.
-
-    Raises:
-        StoreError: there are no readable records.
-        MissingDependencyError: Jinja is not installed.
-    """
+    """Return the page of a run as it is served, with links to its videos."""
     check_report_support()
     return render_runs([_run(folder, planned, videos=True)], embed=False, progress=progress)
 
@@ -116,9 +99,6 @@ def render(
             `MAX_EMBEDDED_BYTES` are linked to by their paths in the folder.
         planned: jobs that should have a record.
         name: of the run.
-
-    Raises:
-        MissingDependencyError: Jinja is not installed.
     """
     return render_runs([Run(name, records, folder, planned)])
 
@@ -126,16 +106,7 @@ def render(
 def render_runs(
     runs: Sequence[Run], *, embed: bool = True, progress: Progress | None = None
 ) -> str:
-    """Return the page of one run, or of two runs to compare.
-
-    Args:
-        runs: one or two.
-        embed: whether to embed the videos unless they are too large.
-        progress: told after each episode.
-
-    Raises:
-        MissingDependencyError: Jinja is not installed.
-    """
+    """Return the page of one run, or of two to compare; videos that are too large are linked to."""
     check_report_support()
     template = template_environment("roboirg.evaluation.analysis.page").get_template(TEMPLATE)
     entries = make_entries(runs)
@@ -157,11 +128,7 @@ def render_runs(
 
 
 def check_report_support() -> None:
-    """Check that the page can be made.
-
-    Raises:
-        MissingDependencyError: Jinja is not installed.
-    """
+    """Check that the page can be made."""
     check_page_support("The report")
 
 

@@ -48,12 +48,7 @@ def break_down(cells: Cells, labels: Labels, rng: np.random.Generator) -> tuple[
     """Return a row for each policy run, set of options and label, in the order of the cells.
 
     Gaps are paired by episode: those of a label are compared with explicit on the very same
-    episodes, whose instruction has no label.
-
-    Args:
-        cells: sorted ones, with the explicit setting.
-        labels: of the instructions.
-        rng: of the bootstrap.
+    episodes, whose instruction has no label. The cells are sorted and have the explicit setting.
     """
     explicit = {key: cell for key, cell in cells.items() if key.options == REFERENCE}
     others = {key: cell for key, cell in cells.items() if key.options != REFERENCE}

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import replace
 from typing import NamedTuple
 
 from roboirg.core.errors import UnknownNameError
@@ -43,7 +44,6 @@ class InstructionKey(NamedTuple):
     split: str
     episode: int
     options: InstructionOptions
-    wordings: str | None
     language_version: str
     environment_version: int
 
@@ -54,11 +54,7 @@ class InstructionKey(NamedTuple):
 
     @classmethod
     def of_trial(cls, key: CellKey, trial: Trial) -> InstructionKey:
-        """Return the key of the instruction that was played in a trial.
-
-        Raises:
-            ValueError: the policy run of the cell has not played, so the versions are unknown.
-        """
+        """Return the key of the instruction that was played in a trial."""
         conditions, versions = key.policy_run.conditions, key.policy_run.versions
         if versions is None:
             raise ValueError(f"{key.policy_run.policy} has not played {key.task}.")
@@ -66,8 +62,7 @@ class InstructionKey(NamedTuple):
             key.task,
             conditions.split,
             trial.episode,
-            key.options,
-            conditions.wordings,
+            replace(key.options, wordings=conditions.wordings),
             versions.language,
             versions.environment,
         )
@@ -151,11 +146,7 @@ BREAKDOWNS: Mapping[str, Breakdown] = {
 
 
 def find_breakdowns(names: Iterable[str]) -> tuple[Breakdown, ...]:
-    """Return the break-downs of some names.
-
-    Raises:
-        UnknownNameError: a name does not exist.
-    """
+    """Return the break-downs of some names."""
     wanted = tuple(names)
     for name in wanted:
         if name not in BREAKDOWNS:

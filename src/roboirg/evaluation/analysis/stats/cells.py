@@ -65,7 +65,9 @@ class EvalConditions(NamedTuple):
         return before + self.text(name)
 
 
-_read_conditions = operator.attrgetter(*EvalConditions._fields)
+_read_conditions = operator.attrgetter(
+    *("options.wordings" if name == "wordings" else name for name in EvalConditions._fields)
+)
 
 FAIRNESS = {
     "split": "splits",
@@ -243,7 +245,7 @@ def gather(runs: Sequence[tuple[str, Sequence[Summary]]], planned: Iterable[Job]
             policy_runs.setdefault((result.policy, policy_run.conditions), policy_run)
             if jobs:
                 played.add(identity_key(result))
-            key = CellKey(policy_run, result.task, result.options)
+            key = CellKey(policy_run, result.task, result.column)
             if result.outcome == "error":
                 errors[key] += 1
             else:
@@ -254,7 +256,7 @@ def gather(runs: Sequence[tuple[str, Sequence[Summary]]], planned: Iterable[Job]
         conditions = EvalConditions.of(job)
         unplayed = PolicyRun(job.policy, conditions, None)
         policy_run = policy_runs.get((job.policy, conditions), unplayed)
-        missing[CellKey(policy_run, job.task, job.options)] += 1
+        missing[CellKey(policy_run, job.task, job.column)] += 1
     keys = dict.fromkeys([*verdicts, *errors, *missing])
     return {key: CellResults(verdicts.get(key, {}), errors[key], missing[key]) for key in keys}
 

@@ -30,29 +30,20 @@ def chance_level(jobs: Iterable[Job]) -> Fraction | None:
     """Return the mean chance over the distinct instructions of some jobs; None without jobs.
 
     Policies and their seeds do not matter.
-
-    Raises:
-        UnknownNameError: a task does not exist.
-        InvalidValueError: an episode does not exist, or has no such instruction.
     """
     return floor_level(CHANCE, jobs)
 
 
 def floor_level(floor: str, jobs: Iterable[Job]) -> Fraction | None:
-    """Return the same as `chance_level` for any of `FLOORS`.
-
-    Raises:
-        UnknownNameError: a task or the floor does not exist.
-        InvalidValueError: an episode does not exist, or has no such instruction.
-    """
-    instructions = dict.fromkeys((job.task, job.split, job.episode, job.options) for job in jobs)
+    """Return the same as `chance_level` for any of `FLOORS`."""
+    instructions = dict.fromkeys((job.task, job.split, job.episode, job.column) for job in jobs)
     levels = [_level(floor, *each) for each in instructions]
     return sum(levels, Fraction(0)) / len(levels) if levels else None
 
 
 @functools.lru_cache(maxsize=65_536)
 def _level(floor: str, task: str, split: str, number: int, options: InstructionOptions) -> Fraction:
-    job = Job(policy="", task=task, split=split, episode=number, **options._asdict())
+    job = Job(policy="", task=task, split=split, episode=number, options=options)
     episode, instruction = get_episode(task, split, number), instruct_job(job)
     if floor == CHANCE:
         return right_share(blind_goals(instruction, episode), episode)

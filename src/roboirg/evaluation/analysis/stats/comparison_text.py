@@ -18,12 +18,8 @@ def sentences(
 ) -> Iterator[str]:
     """Yield the results, a sentence each; empty ones separate paragraphs.
 
-    Args:
-        comparison: of two policies.
-        first: label of the first.
-        second: label of the second.
-        flips: how often the verdicts of each policy change by themselves, as far as that is known;
-            None says nothing about it.
+    `first` and `second` are labels. `flips` says how often the verdicts of each policy change by
+    themselves, as far as that is known; None says nothing about it.
     """
     names = (first, second)
     yield f"{first} against {second}, on the same episodes."

@@ -58,11 +58,7 @@ Flips = Mapping[tuple[str, InstructionOptions], FlipCounts]
 
 
 def read_flips(folder: Path) -> Flips:
-    """Return what `write_flips` kept in the folder of a run; empty if it was never repeated.
-
-    Raises:
-        StoreError: the file is damaged.
-    """
+    """Return what `write_flips` kept in the folder of a run; empty if it was never repeated."""
     path = folder / FLIPS_FILE
     try:
         rows = json.loads(read_regular(path, _MOST_BYTES))

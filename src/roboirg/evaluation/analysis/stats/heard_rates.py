@@ -67,9 +67,7 @@ def count_heard(
 ) -> HeardCells:
     """Count the results of runs by cell; policies that declare no limit are left out.
 
-    Args:
-        runs: each with its name.
-        known: policy runs as `gather` names them; by default none bears the name of its run.
+    `known` are policy runs as `gather` names them; by default none bears the name of its run.
     """
     found: defaultdict[CellKey, HeardCounts] = defaultdict(HeardCounts)
     for name, results in runs:
@@ -77,7 +75,7 @@ def count_heard(
             policy_run = PolicyRun.of(result)
             if known and policy_run not in known:
                 policy_run = policy_run._replace(run=name)
-            found[CellKey(policy_run, result.task, result.options)].add(result)
+            found[CellKey(policy_run, result.task, result.column)].add(result)
     declared = {key.policy_run for key, one in found.items() if one.unknown < one.episodes}
     return {key: one for key, one in found.items() if key.policy_run in declared}
 

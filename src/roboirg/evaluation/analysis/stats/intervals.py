@@ -34,11 +34,7 @@ class Interval(NamedTuple):
 
 
 def wilson_interval(successes: int, trials: int, z: float = Z_95) -> Interval:
-    """Return Wilson's score interval of a proportion, which assumes independent trials.
-
-    Raises:
-        ValueError: not 0 <= successes <= trials, or no trial.
-    """
+    """Return Wilson's score interval of a proportion, which assumes independent trials."""
     if not 0 <= successes <= trials or trials == 0:
         raise ValueError(f"{successes} successes of {trials} trials are not a proportion")
     rate, weight = successes / trials, z * z / trials

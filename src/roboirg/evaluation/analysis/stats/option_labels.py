@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
+from dataclasses import asdict
+from typing import Any
 
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.core.plain_text import counted
@@ -14,23 +16,24 @@ REFERENCE = InstructionOptions(EXPLICIT)
 """The options that every gap refers to."""
 
 _DEFAULTS = InstructionOptions()
+_PHRASES: dict[str, Callable[[Any], str]] = {
+    "form": str,
+    "stages": lambda stages: "stages " + ",".join(map(str, stages)),
+    "distractor": "{} distractor".format,
+    "distractors": lambda count: counted(count, "distractor"),
+    "frame": "{} frame".format,
+    "delivery": "in {}".format,
+}
+"""How labels name the value of an option; of any other option, by its name."""
 
 
 def options_label(options: InstructionOptions) -> str:
     """Return the setting and, in brackets, the options that differ from the defaults."""
-    changed = []
-    if options.form != _DEFAULTS.form:
-        changed.append(options.form)
-    if options.stages != _DEFAULTS.stages:
-        changed.append("stages " + ",".join(map(str, options.stages)))
-    if options.distractor != _DEFAULTS.distractor:
-        changed.append(f"{options.distractor} distractor")
-    if options.distractors != _DEFAULTS.distractors:
-        changed.append(counted(options.distractors, "distractor"))
-    if options.frame != _DEFAULTS.frame:
-        changed.append(f"{options.frame} frame")
-    if options.delivery != _DEFAULTS.delivery:
-        changed.append(f"in {options.delivery}")
+    changed = [
+        _PHRASES.get(name, f"{name} {{}}".format)(value)
+        for name, value in asdict(options).items()
+        if name not in ("setting", "wordings") and value != getattr(_DEFAULTS, name)
+    ]
     return f"{options.setting} ({', '.join(changed)})" if changed else options.setting
 
 

@@ -155,9 +155,6 @@ def sign_flip_test(differences: NDArray[np.int64]) -> float:
     Compares the sum of the differences with the sums of all ways to swap the two cells within
     episodes. With one policy seed the differences are -1, 0 and 1, and this is McNemar's exact
     test; with several seeds it stays valid although the seeds of an episode are correlated.
-
-    Args:
-        differences: one for each episode, whole numbers.
     """
     sizes = np.abs(differences[differences != 0])
     if not len(sizes):

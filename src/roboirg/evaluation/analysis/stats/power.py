@@ -33,9 +33,6 @@ def mcnemar_power(episodes: int, gap: float, discordance: float, alpha: float = 
         gap: difference of the two success rates, -1 to 1.
         discordance: share of the episodes that exactly one of the two solves; at least the gap.
         alpha: level of the test.
-
-    Raises:
-        InvalidValueError: the gap is larger than the discordance, or a value is out of range.
     """
     _check(gap, discordance)
     if episodes < 1:
@@ -58,9 +55,6 @@ def episodes_needed(
 
     The power of an exact test rises in a sawtooth; the number has the wanted power and is at most
     one tooth above the smallest such number.
-
-    Raises:
-        InvalidValueError: the gap is larger than the discordance, or a value is out of range.
     """
     _check(gap, discordance)
     if gap == 0:
@@ -81,12 +75,6 @@ def smallest_gap(
     episodes: int, discordance: float, power: float = POWER, alpha: float = ALPHA
 ) -> float | None:
     """Return the smallest gap that episodes detect with the wanted power, 0 to 1.
-
-    Args:
-        episodes: played by both.
-        discordance: share of the episodes that exactly one of the two solves.
-        power: wanted.
-        alpha: level of the test.
 
     Returns:
         None if even the largest gap, with all discordant episodes on one side, is not detected.

@@ -179,7 +179,7 @@ def group_by_scope(cells: Cells) -> tuple[ScopeResults, ...]:
             key,
             grouped,
             _references(cells, key, grouped, REFERENCE),
-            _references(cells, key, grouped, key.options._replace(form="resolved")),
+            _references(cells, key, grouped, replace(key.options, form="resolved")),
         )
         for level in levels
         for key, grouped in level.items()

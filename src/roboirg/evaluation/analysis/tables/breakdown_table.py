@@ -37,14 +37,7 @@ def make_breakdown_table(
     found: Labels,
     names: Mapping[PolicyRun, str] | None = None,
 ) -> Table:
-    """Make the table of one break-down.
-
-    Args:
-        breakdown: by what.
-        cells: as `gather` makes them.
-        found: labels of the instructions.
-        names: of the policy runs, in order; by default what tells them apart.
-    """
+    """Make the table of one break-down."""
     ordered = sort_cells(cells, list(names or policy_order(cells, ())))
     rows = break_down(ordered, found, np.random.default_rng(SEED))
     names = names or labels(ordered)

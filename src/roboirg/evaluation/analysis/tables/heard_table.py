@@ -35,12 +35,7 @@ NOTE = (
 
 
 def make_heard_table(cells: HeardCells, names: Mapping[PolicyRun, str]) -> Table:
-    """Make the table, one row for each cell and for all tasks.
-
-    Args:
-        cells: counts of the policies that declare a limit.
-        names: of the policy runs, in order.
-    """
+    """Make the table, one row for each cell and for all tasks."""
     rows: list[Row] = []
     totals = add_up(cells)
     keys = sorted_keys(cells, list(names))

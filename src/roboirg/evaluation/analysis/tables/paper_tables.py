@@ -21,7 +21,7 @@ from roboirg.evaluation.analysis.published import (
     published_tasks,
 )
 from roboirg.evaluation.analysis.stats.cells import CellKey, Cells, PolicyRun, cell_interval, labels
-from roboirg.evaluation.analysis.stats.chance import CHANCE, FLOORS, floor_level
+from roboirg.evaluation.analysis.stats.chance import floor_level
 from roboirg.evaluation.analysis.stats.intervals import SEED
 from roboirg.evaluation.analysis.stats.option_labels import setting_sort_key, staged_options
 from roboirg.evaluation.analysis.stats.rates import percent
@@ -71,8 +71,7 @@ def make_table(
     cells: Cells,
     *,
     published: bool = False,
-    chance: bool = False,
-    floors: bool = False,
+    floors: Sequence[str] = (),
 ) -> Table:
     """Make one of the paper's tables.
 
@@ -80,18 +79,13 @@ def make_table(
         which: main, planner, context, real, other or coverage.
         cells: as `gather` makes them; may be empty if published rows are shown.
         published: whether to add the paper's rows, and to say which rates can be compared.
-        chance: whether to add the chance level below the policies.
-        floors: whether to add the chance level, and the expected success of the shortcut listeners.
-
-    Raises:
-        UnknownNameError: the table does not exist.
+        floors: those of `FLOORS` whose expected success is added below the policies.
     """
     for known in WHICH:
         if which == known:
             if known == "coverage":
                 return _coverage()
-            added = FLOORS if floors else (CHANCE,) if chance else ()
-            return _rate_table(known, cells, published=published, floors=added)
+            return _rate_table(known, cells, published=published, floors=floors)
     raise UnknownNameError("table", which, WHICH)
 
 
@@ -249,7 +243,7 @@ def _floor(floor: str, task: str, options: InstructionOptions, cells: Cells) -> 
                 task=task,
                 split=key.policy_run.conditions.split,
                 episode=trial.episode,
-                **options._asdict(),
+                options=options,
             )
             for key, cell in cells.items()
             if (key.task, key.options) == (task, options)

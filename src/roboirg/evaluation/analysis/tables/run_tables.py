@@ -81,9 +81,7 @@ class RunTable:
 def make_run_tables(records: Sequence[Summary], planned: Sequence[Job] = ()) -> list[RunTable]:
     """Make a table for each policy run, in the order of the plan.
 
-    Args:
-        records: one for each identity.
-        planned: jobs that should have a record; those without one are counted as missing.
+    Planned jobs without a record are counted as missing.
     """
     found = gather([("", records)], planned)
     policies = list(dict.fromkeys(job.policy for job in (*planned, *records)))

@@ -8,6 +8,8 @@ from __future__ import annotations
 
 import contextlib
 import socket
+import struct
+import time
 from collections.abc import Mapping
 from typing import Any, NoReturn
 
@@ -18,7 +20,6 @@ from roboirg.core.errors import (
     RoboIRGError,
 )
 from roboirg.core.extras import extra_needed
-from roboirg.policies.remote.client.socket_deadline import SocketDeadline
 from roboirg.policies.remote.connections import (
     ConnectionSpec,
     RetryableError,
@@ -63,17 +64,14 @@ class WebsocketConnection:
     def __init__(self, spec: ConnectionSpec) -> None:
         self.spec, options = spec, spec.options
         self._closing = contextlib.ExitStack()
-        # The library has a time limit for receiving only, and a peer that does not read may hold
-        # its lock, which closing needs too.
-        self._deadline = SocketDeadline(min(options.timeout, options.connect, CLOSE_TIMEOUT))
         self._socket: ClientConnection | None = None
         try:
             self._socket = connect_with_retries(spec, self._attempt)
-            self._deadline.add(self._socket.socket)
-            with self._deadline.limit(options.connect):
-                self.metadata: Mapping[str, Any] = self.read_metadata(options.connect)
+            _limit_sending(self._socket.socket, options.timeout)
+            self._end = time.monotonic() + options.connect
+            self.metadata: Mapping[str, Any] = self.read_metadata(options.connect)
         except BaseException:
-            self.close()
+            self._abort()
             raise
 
     def request(self, message: Mapping[str, Any]) -> dict[str, Any]:
@@ -86,18 +84,27 @@ class WebsocketConnection:
         """
         seconds = self.spec.options.timeout
         try:
-            with self._deadline.limit(seconds):
-                return self.exchange(message, seconds)
+            self._end = time.monotonic() + seconds
+            return self.exchange(message, seconds)
         except RoboIRGError:
-            self.close()
+            self._abort()
             raise
 
     def close(self) -> None:
         """Close the connection; repeated calls do nothing."""
         self._socket = None
-        with self._deadline.limit(CLOSE_TIMEOUT):
-            self._closing.close()
-        self._deadline.close()
+        self._closing.close()
+
+    def _abort(self) -> None:
+        """Close the connection to a server that may not take part in that."""
+        self._shut_down()
+        self.close()
+
+    def _shut_down(self) -> None:
+        if self._socket is not None:
+            with contextlib.suppress(OSError):
+                # Wakes a thread that sends and holds the lock that closing needs; also with TLS.
+                socket.socket.shutdown(self._socket.socket, socket.SHUT_RDWR)
 
     def read_metadata(self, seconds: float) -> Mapping[str, Any]:
         """Return what the server says about itself, which it does first."""
@@ -160,20 +167,24 @@ class WebsocketConnection:
                 self.refuse_surplus(connection.recv(timeout=0))
             connection.send(data)
         except ConnectionClosed as error:
-            late = f"did not take in a message within {self.spec.options.timeout:g} s"
-            raise self._broken(error, late) from error
+            raise self._broken(error) from error
 
     def receive(self, what: str, seconds: float) -> bytes:
         """Return the next message; `what` and `seconds` are for the error if there is none."""
         connection, data = self._open(), None
         try:
             while data is None:
+                left = self._end - time.monotonic()
                 with contextlib.suppress(TimeoutError):
-                    data = connection.recv(timeout=_CHECK_S)
+                    data = connection.recv(timeout=min(_CHECK_S, max(0.0, left)))
+                if data is None and left <= 0:
+                    raise PolicyTimeoutError(
+                        f"{self.spec} did not send {what} within {seconds:g} s."
+                    )
                 if data is None and connection.protocol.state is not State.OPEN:
-                    self._deadline.abort()  # the server does not end what the library has refused
+                    self._shut_down()  # the server does not end what the library has refused
         except ConnectionClosed as error:
-            raise self._broken(error, f"did not send {what} within {seconds:g} s") from error
+            raise self._broken(error) from error
         if isinstance(data, str):
             raise error_reply(self.spec, data)
         return data
@@ -183,10 +194,13 @@ class WebsocketConnection:
             raise PolicyConnectionError(f"The connection to {self.spec} is closed; call reset().")
         return self._socket
 
-    def _broken(self, error: ConnectionClosed, late: str) -> RoboIRGError:
+    def _broken(self, error: ConnectionClosed) -> RoboIRGError:
         """Return the error for a connection that has ended."""
-        if self._deadline.passed:
-            return PolicyTimeoutError(f"{self.spec} {late}.")
+        if isinstance(error.__cause__, BlockingIOError):
+            seconds = self.spec.options.timeout
+            return PolicyTimeoutError(
+                f"{self.spec} did not take in a message within {seconds:g} s."
+            )
         if isinstance(error.__cause__, TooManyFragments):
             return PolicyReplyError(f"{self.spec} sent a reply in too many pieces.")
         if error.sent is not None and error.sent.code == _TOO_BIG:
@@ -196,6 +210,13 @@ class WebsocketConnection:
             )
         code = f"close code {error.rcvd.code}" if error.rcvd else "without a close code"
         return PolicyConnectionError(f"{self.spec} ended the connection ({code}).")
+
+
+def _limit_sending(connection: socket.socket, seconds: float) -> None:
+    """Let the kernel end a send that a server does not take in; the library has no limit for it."""
+    whole = int(seconds)
+    limit = struct.pack("ll", whole, int(1e6 * (seconds - whole)))
+    connection.setsockopt(socket.SOL_SOCKET, socket.SO_SNDTIMEO, limit)
 
 
 def _describe(error: BaseException) -> str:

@@ -2,102 +2,75 @@
 
 from __future__ import annotations
 
-import traceback
 from collections.abc import Mapping
-from http import HTTPStatus
 from typing import Any
 
-from roboirg.policies.remote.message_codec import MSGPACK, pack, unpack
+from roboirg.core.extras import extra_needed
+from roboirg.policies.remote.message_codec import MSGPACK, pack
 from roboirg.policies.remote.server_options import ServerOptions
 from roboirg.policies.remote.service import Service
-from roboirg.util.web.http_server import HTTPServerBase, RequestHandler
+from roboirg.policies.remote.serving.answering_thread import AnsweringThread
+
+with extra_needed("Serving over HTTP needs Starlette and uvicorn", "remote"):
+    from starlette.applications import Starlette
+    from starlette.exceptions import HTTPException
+    from starlette.requests import Request
+    from starlette.responses import PlainTextResponse, Response
+    from starlette.routing import Route
+
+    from roboirg.util.web.app_server import AppServer, RequestGuard, header_values, read_body
 
 
-class _ChallengeHTTPServer(HTTPServerBase):
-    """Answers with a service.
-
-    Args:
-        service: answers requests.
-        metadata: response to ``/metadata``.
-        options: address, key and limits.
-    """
-
-    def __init__(
-        self, service: Service, metadata: Mapping[str, Any], options: ServerOptions
-    ) -> None:
-        super().__init__((options.host, options.port), _ChallengeRequestHandler, options.limits)
-        self.answer, self.metadata, self.options = service.connection(), metadata, options
-        self.max_request_bytes = service.max_request_bytes
-
-
-def open_http(
-    service: Service, metadata: Mapping[str, Any], options: ServerOptions
-) -> HTTPServerBase:
+def open_http(service: Service, metadata: Mapping[str, Any], options: ServerOptions) -> AppServer:
     """Return a listening server; it answers once `serve_forever` is called.
 
     Args:
         service: answers requests.
         metadata: response to ``/metadata``.
-        options: address, key and limits.
+        options: address, key and time limit.
 
     Raises:
-        OSError: the address is in use or is not this computer's.
+        InvalidValueError: the address is in use or is not this computer's.
     """
-    return _ChallengeHTTPServer(service, metadata, options)
+    handle, thread = service.connection(), AnsweringThread()
 
+    async def show_health(request: Request) -> Response:
+        del request
+        return PlainTextResponse("OK\n")
 
-class _ChallengeRequestHandler(RequestHandler):
-    """Handle ``/healthz``, ``/metadata``, ``/reset`` and ``/infer``."""
+    async def show_metadata(request: Request) -> Response:
+        del request
+        return Response(pack(metadata), media_type=MSGPACK)
 
-    server: _ChallengeHTTPServer
+    async def answer(request: Request) -> Response:
+        data = await read_body(request, service.max_request_bytes, options.timeout_s)
+        if request.url.path == "/reset":
+            data = pack({"reset": True})
+        elif not data:
+            raise HTTPException(400, "The request is empty.")
+        reply = await thread.answer(handle, data)
+        if isinstance(reply, str):
+            return PlainTextResponse(reply, 500)
+        return Response(reply, media_type=MSGPACK)
 
-    def do_GET(self) -> None:  # noqa: N802 - name of the base class
-        """Answer without a key, as the challenge's clients send none with these requests."""
-        if not self._check_origin():
-            return
-        if self.path == "/healthz":
-            self.send_text("OK\n")
-        elif self.path == "/metadata":
-            self.send_bytes(pack(self.server.metadata), MSGPACK)
-        else:
-            self.send_refusal(HTTPStatus.NOT_FOUND, "There is no such page.")
+    def refuse(request: Request) -> Response | None:
+        """Refuse foreign pages, and POST without the key, before the body is read."""
+        hosts, origins = header_values(request, "host"), header_values(request, "origin")
+        if refusal := options.refusal(hosts, origins):
+            return PlainTextResponse(f"{refusal}\n", 403)
+        # The challenge's clients send no key with GET.
+        key = request.headers.get("authorization")
+        if request.method != "GET" and not options.is_authorized(key):
+            return PlainTextResponse("The key is missing or wrong.\n", 401)
+        return None
 
-    def do_POST(self) -> None:  # noqa: N802 - name of the base class
-        """Answer a request that has the key; without it, the body is not read."""
-        if not self._check_origin() or not self._check_key():
-            return
-        if self.path not in ("/reset", "/infer"):
-            self.send_refusal(HTTPStatus.NOT_FOUND, "There is no such page.")
-            return
-        body = self.read_body(self.server.max_request_bytes, message="Too large.")
-        if body is None:
-            return
-        if self.path == "/infer" and not body:
-            self.send_refusal(HTTPStatus.BAD_REQUEST, "The request is empty.")
-            return
-        self.server.connections.prove(self.connection)
-        self._answer(body)
-
-    def _check_origin(self) -> bool:
-        """Return whether no page of another site caused the request; refuse it if one did."""
-        hosts, origins = self.headers.get_all("Host", []), self.headers.get_all("Origin", [])
-        refusal = self.server.options.refusal(hosts, origins)
-        if refusal is not None:
-            self.send_refusal(HTTPStatus.FORBIDDEN, refusal)
-        return refusal is None
-
-    def _check_key(self) -> bool:
-        """Return whether the client sent the key; refuse the request if not."""
-        authorized = self.server.options.is_authorized(self.headers.get("Authorization"))
-        if not authorized:
-            self.send_refusal(HTTPStatus.UNAUTHORIZED, "The key is missing or wrong.")
-        return authorized
-
-    def _answer(self, body: bytes) -> None:
-        try:
-            request = {"reset": True} if self.path == "/reset" else unpack(body)
-            reply = pack(self.server.answer(request))
-        except Exception:  # noqa: BLE001 - the boundary: the policy's author needs the traceback
-            self.send_text(traceback.format_exc(), status=HTTPStatus.INTERNAL_SERVER_ERROR)
-            return
-        self.send_bytes(reply, MSGPACK)
+    app = Starlette(
+        routes=[
+            Route("/healthz", show_health),
+            Route("/metadata", show_metadata),
+            Route("/reset", answer, methods=["POST"]),
+            Route("/infer", answer, methods=["POST"]),
+        ]
+    )
+    guard = RequestGuard(app, refuse, {})
+    return AppServer(guard, options.host, options.port, options.timeout_s)

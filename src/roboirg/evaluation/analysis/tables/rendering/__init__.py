@@ -36,11 +36,7 @@ FORMATS: Mapping[str, Format] = {
 
 
 def get_format(name: str) -> Format:
-    """Return the format of that name.
-
-    Raises:
-        UnknownNameError: the format does not exist.
-    """
+    """Return the format of that name."""
     if name not in FORMATS:
         raise UnknownNameError("format", name, FORMATS)
     return FORMATS[name]

@@ -13,8 +13,7 @@ import numpy as np
 from gymnasium.vector import AsyncVectorEnv
 from numpy.typing import NDArray
 
-from roboirg.apps.bench.step_times import CHUNK
-from roboirg.apps.bench.workloads import STEPS, Workload, over_the_table
+from roboirg.apps.bench.step_times import CHUNK, STEPS, Workload, over_the_table
 from roboirg.core.errors import RoboIRGError
 from roboirg.envs.environment import RoboIRGEnv
 from roboirg.envs.factory import make, make_vec

@@ -5,8 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+from benchmarks.synthetic_run import write_synthetic_run
 
-from roboirg.apps.bench.synthetic_run import write_synthetic_run
 from roboirg.evaluation.analysis.page.entries import Run
 from roboirg.evaluation.analysis.page.report import make_view, render_runs
 from roboirg.evaluation.analysis.stats.cells import gather

@@ -1,64 +1,54 @@
-"""Steps per second of a policy that answers at once, in process and over loopback."""
+"""Steps per second of a policy that replies at once: in process, over loopback, and hosted."""
 
 from __future__ import annotations
 
 import atexit
 import functools
+import os
 import statistics
 import subprocess
 import sys
 import time
-from typing import Any, ClassVar
+from typing import ClassVar
 
-import numpy as np
-from numpy.typing import NDArray
-
-from roboirg.core.observations import CAMERAS, Demonstration, Observation
+from roboirg.apps.bench.step_times import CHUNK
+from roboirg.apps.bench.worker_rates import WavingPolicy
+from roboirg.core.observations import CAMERAS
 from roboirg.envs.factory import make
+from roboirg.evaluation.hosting.host_pool import HostPool, HostSettings
+from roboirg.evaluation.hosting.hosted_policy import HostedPolicy
 from roboirg.policies import Policy, make_policy, play
 from roboirg.policies.contract.policy_needs import PolicyNeeds
 
-CHUNK = 16
 CHUNKS = 12
 EPISODES = 7
-SWING = 0.2
-"""Radians."""
+POLICY = f"{__name__}:BothCameras"
 
 
-class WavingPolicy:
-    """Swings the arm back and forth, so that every picture must be drawn."""
+class BothCameras(WavingPolicy):
+    """Looks at both pictures."""
 
     cameras: ClassVar[tuple[str, ...]] = CAMERAS
-    version = "1"
-
-    def __init__(self) -> None:
-        self._start: NDArray[np.floating[Any]] | None = None
-        self._step = 0
-
-    def reset(self, instruction: str, demonstration: Demonstration) -> None:
-        """Restart the swing from the arm's current position."""
-        del instruction, demonstration
-        self._start, self._step = None, 0
-
-    def act(self, observation: Observation) -> NDArray[np.floating[Any]]:
-        """Return the next sixteen actions."""
-        if self._start is None:
-            self._start = np.array(observation["joint_positions"], np.float64)
-        steps = np.arange(self._step + 1, self._step + CHUNK + 1)
-        self._step += CHUNK
-        rows = np.tile(np.append(self._start, 1.0), (CHUNK, 1))
-        rows[:, 0] += SWING * np.sin(steps / CHUNK)
-        return rows
 
 
 def in_process() -> float:
     """Return steps per second without a server."""
-    return steps_per_second(make_policy(f"{__name__}:WavingPolicy", 0))
+    return steps_per_second(make_policy(POLICY, 0))
 
 
 def over_loopback() -> float:
     """Return steps per second with the same policy in a server process, over openpi's protocol."""
     return steps_per_second(make_policy(_server(), 0))
+
+
+def hosted() -> float:
+    """Return steps per second with the same policy in a process of its own."""
+    with HostPool(HostSettings()) as pool:
+        policy = HostedPolicy(pool.connect(), POLICY, 0)
+        try:
+            return steps_per_second(policy)
+        finally:
+            policy.close()
 
 
 def steps_per_second(policy: Policy) -> float:
@@ -81,9 +71,12 @@ def steps_per_second(policy: Policy) -> float:
 @functools.cache
 def _server() -> str:
     """Start a server that lives as long as this process; returns its address."""
-    command = (sys.executable, "-m", "roboirg", "serve", f"{__name__}:WavingPolicy")
+    command = (sys.executable, "-m", "roboirg", "serve", POLICY)
     child = subprocess.Popen(  # noqa: S603 - our own command
-        [*command, "--protocol", "openpi", "--port", "0"], stdout=subprocess.PIPE, text=True
+        [*command, "--protocol", "openpi", "--port", "0"],
+        stdout=subprocess.PIPE,
+        text=True,
+        env={**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))},
     )
     atexit.register(child.kill)
     if child.stdout is None:

@@ -1,0 +1,74 @@
+"""Episodes an hour of workers that share one policy process."""
+
+from __future__ import annotations
+
+import tempfile
+import time
+from pathlib import Path
+from typing import Any, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from roboirg.apps.bench.step_times import CHUNK
+from roboirg.core.observations import FRONT, Demonstration, Observation
+from roboirg.evaluation.plan.plan_maker import make_plan
+from roboirg.evaluation.play.rollout import EpisodeRunner
+from roboirg.evaluation.run.executor import LocalProcesses
+
+MAX_STEPS = 20 * CHUNK
+EPISODES = 12
+"""Episodes that each worker plays, about."""
+_HOUR_S = 3600
+_SWING = 0.2
+"""Radians."""
+
+
+class WavingPolicy:
+    """Swings the arm back and forth, so that every picture must be drawn; replies at once."""
+
+    cameras: ClassVar[tuple[str, ...]] = (FRONT,)
+    demonstration_frames: ClassVar[str] = "none"
+    version = "1"
+
+    def __init__(self) -> None:
+        self._start: NDArray[np.floating[Any]] | None = None
+        self._step = 0
+
+    def reset(self, instruction: str, demonstration: Demonstration) -> None:
+        """Restart the swing from the arm's current position."""
+        del instruction, demonstration
+        self._start, self._step = None, 0
+
+    def act(self, observation: Observation) -> NDArray[np.floating[Any]]:
+        """Return the next sixteen actions."""
+        if self._start is None:
+            self._start = np.array(observation["joint_positions"], np.float64)
+        steps = np.arange(self._step + 1, self._step + CHUNK + 1)
+        self._step += CHUNK
+        rows = np.tile(np.append(self._start, 1.0), (CHUNK, 1))
+        rows[:, 0] += _SWING * np.sin(steps / CHUNK)
+        return rows
+
+
+def episodes_per_hour(policy: type, workers: int) -> float:
+    """Return the pace at which a number of workers plays a policy, without their start."""
+    count = EPISODES * workers
+    plan = make_plan(
+        [f"{policy.__module__}:{policy.__name__}"],
+        tasks="PickXtimes",
+        settings="explicit",
+        episodes="4",
+        policy_seeds=f"0-{count // 4 - 1}",
+        max_steps=MAX_STEPS,
+    )
+    # Without the beginning, when some workers still start, and the end, when some have no more.
+    first, last = 4 * workers, count - workers
+    times = []
+    with tempfile.TemporaryDirectory() as folder:
+        runner = EpisodeRunner(Path(folder), hosting=plan.hosting)
+        for record in LocalProcesses(workers).run(plan.jobs(), runner):
+            times.append(time.perf_counter())
+            if record.outcome == "error":
+                raise RuntimeError(f"an episode ended in an error: {record.cause}")
+    return _HOUR_S * (last - first) / (times[last - 1] - times[first - 1])

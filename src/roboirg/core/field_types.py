@@ -1,0 +1,20 @@
+"""Types of the fields of stored data: texts and numbers that every reader can show and hold."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import msgspec
+
+MOST_NAME_LETTERS = 1000
+CONTROLS = "\\x00-\\x1f\\x7f-\\x9f\\u200e\\u200f\\u202a-\\u202e\\u2066-\\u2069"
+NAME = f"^[^{CONTROLS}]{{0,{MOST_NAME_LETTERS}}}\\Z"
+"""A name in a record: text without characters that control a terminal or reorder what is read."""
+
+Name = Annotated[str, msgspec.Meta(pattern=NAME)]
+Whole = Annotated[int, msgspec.Meta(ge=-(2**63), le=2**63 - 1)]
+"""A whole number that tables and NumPy can hold."""
+MOST_STAGES = 100
+Stages = Annotated[tuple[Whole, ...], msgspec.Meta(max_length=MOST_STAGES)]
+MOST_CAUSE_LETTERS = 10_000
+Cause = Annotated[str, msgspec.Meta(max_length=MOST_CAUSE_LETTERS)]

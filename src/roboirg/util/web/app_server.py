@@ -1,0 +1,156 @@
+"""Serve an application of Starlette with uvicorn: whom it answers, and how large a request is."""
+
+from __future__ import annotations
+
+import asyncio
+import threading
+from collections.abc import Callable, Mapping
+from typing import Self
+
+import uvicorn
+from starlette.datastructures import MutableHeaders
+from starlette.exceptions import HTTPException
+from starlette.requests import ClientDisconnect, Request
+from starlette.responses import Response
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
+
+from roboirg.util.web.listening import TIMEOUT_S, listen
+from roboirg.util.web.request_origin import LOOPBACK
+
+_LAST = {"Connection": "close"}
+"""Header of a response after which nothing more is read, such as the rest of a body."""
+_STOP_S = 1
+"""Seconds that requests have to end when the server stops."""
+
+
+class AppServer:
+    """Listens from the start and answers while `serve_forever` runs; a context manager.
+
+    Args:
+        app: answers requests.
+        host: address to listen at.
+        port: 0 for any free port.
+        timeout_s: how long a connection may be idle between two requests.
+
+    Attributes:
+        socket: that listens.
+        host: address at which it listens.
+
+    Raises:
+        InvalidValueError: the port is not available, or the address is not this machine's.
+    """
+
+    def __init__(
+        self, app: ASGIApp, host: str = LOOPBACK, port: int = 0, timeout_s: float = TIMEOUT_S
+    ) -> None:
+        self.socket, self.host = listen(host, port), host
+        self._server = uvicorn.Server(
+            uvicorn.Config(
+                app,
+                http="h11",
+                ws="none",
+                lifespan="off",
+                log_config=None,
+                log_level="error",
+                access_log=False,  # addresses may hold a key
+                proxy_headers=False,
+                server_header=False,
+                timeout_keep_alive=max(1, int(timeout_s)),
+                timeout_graceful_shutdown=_STOP_S,
+            )
+        )
+        # Outside of the main thread, uvicorn leaves Ctrl-C to the command.
+        self._serving = threading.Thread(
+            target=self._server.run, args=([self.socket],), name="HTTP server", daemon=True
+        )
+
+    @property
+    def port(self) -> int:
+        """The port at which the server listens."""
+        return int(self.socket.getsockname()[1])
+
+    def serve_forever(self) -> None:
+        """Answer until `shutdown` is called by another thread, or Ctrl-C."""
+        self._serving.start()
+        self._serving.join()
+
+    def shutdown(self) -> None:
+        """Stop."""
+        self._server.should_exit = True
+
+    def server_close(self) -> None:
+        """Stop, and close the socket; repeated calls do nothing."""
+        self.shutdown()
+        if self._serving.is_alive():
+            self._serving.join(_STOP_S)
+        self.socket.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        self.server_close()
+
+
+class RequestGuard:
+    """Passes requests on to an application unless they are refused, and adds headers.
+
+    Args:
+        app: answers requests.
+        refuse: returns the response to a request that the application must not see, else None.
+        headers: of every response that has none of the same name.
+    """
+
+    def __init__(
+        self,
+        app: ASGIApp,
+        refuse: Callable[[Request], Response | None],
+        headers: Mapping[str, str],
+    ) -> None:
+        self._app, self._refuse = app, refuse
+        self._headers = {"X-Content-Type-Options": "nosniff", **headers}
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        async def send_with_headers(message: Message) -> None:
+            if message["type"] == "http.response.start":
+                headers = MutableHeaders(scope=message)
+                for name, value in self._headers.items():
+                    headers.setdefault(name, value)
+            await send(message)
+
+        refusal = self._refuse(Request(scope))
+        if refusal is not None:
+            refusal.headers.update(_LAST)
+        await (refusal or self._app)(scope, receive, send_with_headers)
+
+
+async def read_body(request: Request, limit: int, timeout_s: float = TIMEOUT_S) -> bytes:
+    """Return the body of a request.
+
+    Args:
+        request: that has one.
+        limit: largest size, bytes.
+        timeout_s: seconds until it must have arrived.
+
+    Raises:
+        HTTPException: it is too large, late or cut short.
+    """
+    if int(request.headers.get("content-length", 0)) > limit:
+        raise HTTPException(413, "Too large.", _LAST)
+    body = bytearray()
+    try:
+        async with asyncio.timeout(timeout_s):
+            async for piece in request.stream():
+                body += piece
+                if len(body) > limit:
+                    raise HTTPException(413, "Too large.", _LAST)
+    except TimeoutError as error:
+        raise HTTPException(408, f"The request took longer than {timeout_s:g} s.", _LAST) from error
+    except ClientDisconnect as error:
+        raise HTTPException(400, "The request is cut short.") from error
+    return bytes(body)
+
+
+def header_values(request: Request, name: str) -> list[str]:
+    """Return all values of a header."""
+    return request.headers.getlist(name)

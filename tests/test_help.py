@@ -1,0 +1,78 @@
+"""The command line stays small, and the help of every command is short and has an example."""
+
+from __future__ import annotations
+
+import re
+import shlex
+from typing import get_type_hints
+
+import count_commands
+import pytest
+import typer.main
+from all_commands import all_commands
+
+from roboirg.core.instruction_options import (
+    OPTION_HELP,
+    OPTION_NAMES,
+    InstructionKeywords,
+)
+from roboirg.evaluation.plan.plan import Plan
+from roboirg.evaluation.plan.plan_file import read_plan_file
+from roboirg.evaluation.plan.plan_maker import make_plan
+from roboirg.evaluation.plan.plan_text import plan_text
+from roboirg.main import app
+
+LINES, LINES_OF_RUN, COLUMNS = 45, 60, 100
+
+
+def help_of(name, monkeypatch, capsys):
+    monkeypatch.setenv("COLUMNS", str(COLUMNS))
+    monkeypatch.setenv("TERMINAL_WIDTH", str(COLUMNS))
+    with pytest.raises(SystemExit):
+        typer.main.get_command(app).main([*name.split(), "--help"], "roboirg")
+    return capsys.readouterr().out
+
+
+def test_the_command_line_is_small():
+    found = count_commands.commands()
+    assert count_commands.entries() <= count_commands.MOST_ENTRIES
+    assert len(found) - 1 <= count_commands.MOST_COMMANDS
+    assert sum(len(one.parameters) for one in found) <= count_commands.MOST_PARAMETERS
+
+
+@pytest.mark.parametrize("name", sorted(all_commands()))
+def test_help_is_short_and_has_an_example(name, monkeypatch, capsys):
+    text = help_of(name, monkeypatch, capsys)
+    assert len(text.strip().splitlines()) <= (LINES_OF_RUN if name == "run" else LINES)
+    (example,) = re.findall(r"Example: roboirg (.*)", text)
+    words = shlex.split(example)
+    assert words[: len(name.split())] == name.split()
+    # Click refuses what the command does not take.
+    all_commands()[name].make_context(name, words[len(name.split()) :])
+
+
+def test_a_plan_explains_all_of_its_fields_and_is_read_back(tmp_path):
+    plan = make_plan(
+        ["oracle", "b=listener"], tasks="PickXtimes,VideoUnmask", settings="direct,contextual",
+        forms="implicit,resolved", episodes="0-2,7", stages="1,5;1-5", distractors=3,
+        delivery="turns", frame="camera", observe_every=4, demonstration_frames="none",
+        video="failures", devices="0,1", retry_on="none", wordings="train",
+    )  # fmt: skip
+    text = plan_text(plan)
+    for name, field in Plan.model_fields.items():
+        assert field.description, name
+        assert name == "options" or f"\n{name}:" in f"\n{text}"
+    for episodes in ("0-2,7", "3,", "1", "0,2,4"):
+        one = plan.model_copy(
+            update={"episodes": make_plan(["oracle"], episodes=episodes).episodes}
+        )
+        (tmp_path / "plan.yaml").write_text(plan_text(one))
+        fields = read_plan_file(str(tmp_path / "plan.yaml"))
+        assert make_plan(fields.pop("policies"), **fields) == one
+
+
+def test_options_of_instructions_are_listed_once():
+    assert set(get_type_hints(InstructionKeywords)) == set(OPTION_NAMES) == set(OPTION_HELP)
+    (shown,) = (one.parameters for one in count_commands.commands() if one.words == "show")
+    own = {"setting", "form", "delivery"}
+    assert {f"--{name}" for name in OPTION_NAMES if name not in own} <= set(shown)
