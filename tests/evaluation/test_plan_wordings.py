@@ -149,7 +149,7 @@ def test_two_workers_play_in_the_words_of_a_file(wording_file: Path, tmp_path: P
         assert record.options.wordings.startswith("test@")
         assert record.instruction[0].text == record.command
         assert record.command.startswith("pick up the ")
-        assert record.metadata["wordings"] == record.wordings
+        assert record.metadata["wordings"] == record.options.wordings
     # The same episodes in our own words are played beside them, and none twice.
     said = play("--settings", "explicit")
     assert said.returncode == 0, said.stderr
