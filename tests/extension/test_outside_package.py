@@ -143,7 +143,7 @@ def test_an_episode_of_each_is_played_and_shown(roboirg, names):
         "--episodes", "1", "--out", "played",
     )  # fmt: skip
     records = [json.loads(line) for line in (roboirg.folder / "played/records.jsonl").open()]
-    played = {(one["task"], one["setting"]) for one in records}
+    played = {(one["task"], one["options"]["setting"]) for one in records}
     assert {(task, "direct"), (WITH_SETTING, "direct"), (WITH_SETTING, setting)} <= played
     assert {one["outcome"] for one in records} == {"success"}
     roboirg("report", "played")
