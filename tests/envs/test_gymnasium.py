@@ -9,6 +9,7 @@ import gymnasium
 import numpy as np
 import pytest
 from gymnasium import wrappers
+from selection import slow_but
 
 import roboirg
 from roboirg.core.errors import InvalidValueError, UnknownNameError
@@ -51,7 +52,7 @@ def test_seeds_choose_episodes_if_none_is_named():
     assert played == [0, 1, 49, 0, 7, 0]
 
 
-@pytest.mark.parametrize("kind", ["sync", "async"])
+@pytest.mark.parametrize("kind", slow_but(["sync"], ["sync", "async"]))
 def test_gymnasium_s_vector_environments_work_with_their_defaults(kind):
     # In a process of its own: forking is refused where pictures have been drawn.
     code = f"""

@@ -335,6 +335,7 @@ for _ in range(3):
 """
 
 
+@pytest.mark.slow
 def test_two_processes_may_fill_the_cache_at_once(cache):
     processes = [
         subprocess.Popen(
