@@ -12,7 +12,7 @@ import uvicorn
 from starlette.datastructures import MutableHeaders
 from starlette.exceptions import HTTPException
 from starlette.requests import ClientDisconnect, Request
-from starlette.responses import Response
+from starlette.responses import PlainTextResponse, Response
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from roboirg.util.web.listening import TIMEOUT_S, listen
@@ -163,3 +163,8 @@ async def read_body(request: Request, limit: int, timeout_s: float = TIMEOUT_S) 
 def header_values(request: Request, name: str) -> list[str]:
     """Return all values of a header."""
     return request.headers.getlist(name)
+
+
+def error_handler(status: int) -> Callable[[Request, Exception], Response]:
+    """Return the handler of errors whose message is the response."""
+    return lambda _, error: PlainTextResponse(f"{error}\n", status)

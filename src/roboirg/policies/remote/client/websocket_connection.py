@@ -178,9 +178,8 @@ class WebsocketConnection:
                         f"{self.spec} did not send {what} within {seconds:g} s."
                     )
                 if data is None and connection.protocol.state is not State.OPEN:
-                    shut_down(
-                        connection.socket
-                    )  # the server does not end what the library has refused
+                    # The server does not end what the library has refused.
+                    shut_down(connection.socket)
         except ConnectionClosed as error:
             raise self._broken(error) from error
         if isinstance(data, str):
