@@ -141,6 +141,16 @@ def test_a_body_that_does_not_come_is_not_waited_for(tmp_path):
         assert get(server, path).status == 200
 
 
+def test_a_request_that_ends_with_the_server_logs_nothing(tmp_path, caplog):
+    server = open_server("random", "challenge+http").listening
+    with running(server) as port:
+        head = f"POST /infer HTTP/1.1\r\nHost: 127.0.0.1:{port}\r\nContent-Length: 60000\r\n\r\nx"
+        raw = send(port, head)
+        assert get(server, "/healthz").status == 200
+    raw.close()
+    assert caplog.text == ""
+
+
 def test_an_error_of_ours_logs_its_traceback(tmp_path, caplog):
     def fail():
         raise RuntimeError("a bug")
@@ -162,13 +172,17 @@ WAITING = """
 import sys, time
 from starlette.applications import Starlette
 from starlette.routing import Route
-from roboirg.util.web.app_server import AppServer
+from roboirg.util.web.app_server import AppServer, read_body
 
 def wait(request):
     print("waiting", flush=True)
     time.sleep(600)
 
-server = AppServer(Starlette(routes=[Route("/", wait)]))
+async def read(request):
+    print("waiting", flush=True)
+    await read_body(request, 9)
+
+server = AppServer(Starlette(routes=[Route("/", wait), Route("/", read, methods=["POST"])]))
 print(server.port, flush=True)
 try:
     server.serve_forever()
@@ -179,12 +193,15 @@ finally:
 """
 
 
-def test_ctrl_c_does_not_wait_for_a_request():
+@pytest.mark.parametrize("request_line", ["GET / HTTP/1.1", "POST / HTTP/1.1"])
+def test_ctrl_c_does_not_wait_for_a_request(request_line):
     with subprocess.Popen(
         [sys.executable, "-c", WAITING], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
     ) as process:
         port = int(process.stdout.readline())
-        with send(port, f"GET / HTTP/1.1\r\nHost: 127.0.0.1:{port}\r\n\r\n"):
+        head = f"{request_line}\r\nHost: 127.0.0.1:{port}\r\n"
+        body = "Content-Length: 9\r\n\r\nx" if "POST" in request_line else "\r\n"
+        with send(port, head + body):
             assert process.stdout.readline() == "waiting\n"
             process.send_signal(signal.SIGINT)
             assert process.wait(timeout=300) == 130

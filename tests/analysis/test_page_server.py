@@ -15,6 +15,7 @@ from pathlib import Path
 
 import pytest
 
+from roboirg.core.errors import StoreError
 from roboirg.evaluation.analysis.page.page_server import PageServer
 from roboirg.evaluation.plan.plan_maker import make_plan
 from roboirg.evaluation.play.rollout_result import RolloutResult, make_record
@@ -131,6 +132,19 @@ def test_the_page_is_made_anew_when_the_run_goes_on(server: PageServer, run: Pat
     with RecordStore(run) as store:
         store.append(record(1))
     assert ask(server, "/")[1] == b"<p>page 1</p>"
+
+
+def test_records_that_cannot_be_read_are_one_sentence_in_the_browser(
+    run: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    def fail() -> str:
+        raise StoreError("line 6 is damaged.")
+
+    with PageServer(run, fail) as server:
+        threading.Thread(target=server.serve_forever).start()
+        response, body = ask(server, "/")
+    assert (response.status, body) == (500, b"line 6 is damaged.\n")
+    assert caplog.text == ""
 
 
 def test_the_command_says_where_and_ends_with_ctrl_c(run: Path, wait_s: float) -> None:

@@ -144,6 +144,8 @@ WEBSOCKET += [
 ]
 HTTP = [
     ("large", responds(BIG), PATIENT, REPLY, "max_reply_mib"),
+    ("status", drips(b"", b"HTTP/1.1 102 OK\r\n\r\n"), QUICK, TIMEOUT, "within"),
+    ("dripped-head", drips(b"HTTP/1.1 200 OK\r\n", b"X: y\r\n"), QUICK, TIMEOUT, "within"),
     ("chunks", chunks, PATIENT, REPLY, "max_reply_mib"),
     (
         "dripped-body",

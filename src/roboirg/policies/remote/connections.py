@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import contextlib
+import socket
 import time
 from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, TypeVar
@@ -108,3 +110,10 @@ def error_reply(spec: ConnectionSpec, text: str) -> PolicyReplyError:
     lines = text[-_MAX_TRACEBACK_END:].rstrip().splitlines()
     words = lines[-1].strip()[:_MAX_ERROR_LENGTH].rstrip(".") if lines else "an empty text"
     return PolicyReplyError(f"{spec} replied with an error: {words}.")
+
+
+def shut_down(connection: socket.socket | None) -> None:
+    """Wake the thread that uses a socket, also one with TLS, whose state is left alone."""
+    if connection is not None:
+        with contextlib.suppress(OSError):
+            socket.socket.shutdown(connection, socket.SHUT_RDWR)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import logging
 import threading
 from collections.abc import Callable, Mapping
 from typing import Self
@@ -11,7 +12,7 @@ import uvicorn
 from starlette.datastructures import MutableHeaders
 from starlette.exceptions import HTTPException
 from starlette.requests import ClientDisconnect, Request
-from starlette.responses import Response
+from starlette.responses import PlainTextResponse, Response
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from roboirg.util.web.listening import TIMEOUT_S, listen
@@ -59,10 +60,8 @@ class AppServer:
                 timeout_graceful_shutdown=_STOP_S,
             )
         )
-        # Outside of the main thread, uvicorn leaves Ctrl-C to the command.
-        self._serving = threading.Thread(
-            target=self._server.run, args=([self.socket],), name="HTTP server", daemon=True
-        )
+        self._ended = threading.Event()
+        self._ended.set()
 
     @property
     def port(self) -> int:
@@ -71,18 +70,28 @@ class AppServer:
 
     def serve_forever(self) -> None:
         """Answer until `shutdown` is called by another thread, or Ctrl-C."""
-        self._serving.start()
-        self._serving.join()
+        self._ended.clear()
+        # Outside of the main thread, uvicorn leaves Ctrl-C to the command.
+        threading.Thread(target=self._run, name="HTTP server", daemon=True).start()
+        # Python 3.11 takes a thread for ended once its `join` was interrupted.
+        self._ended.wait()
+
+    def _run(self) -> None:
+        try:
+            self._server.run([self.socket])
+        finally:
+            self._ended.set()
 
     def shutdown(self) -> None:
         """Stop."""
+        # That requests end with the server is no error; the next server resets the level.
+        logging.getLogger("uvicorn.error").setLevel(logging.CRITICAL)
         self._server.should_exit = True
 
     def server_close(self) -> None:
         """Stop, and close the socket; repeated calls do nothing."""
         self.shutdown()
-        if self._serving.is_alive():
-            self._serving.join(_STOP_S)
+        self._ended.wait(2 * _STOP_S)
         self.socket.close()
 
     def __enter__(self) -> Self:
@@ -154,3 +163,8 @@ async def read_body(request: Request, limit: int, timeout_s: float = TIMEOUT_S) 
 def header_values(request: Request, name: str) -> list[str]:
     """Return all values of a header."""
     return request.headers.getlist(name)
+
+
+def error_handler(status: int) -> Callable[[Request, Exception], Response]:
+    """Return the handler of errors whose message is the response."""
+    return lambda _, error: PlainTextResponse(f"{error}\n", status)

@@ -29,7 +29,13 @@ from starlette.responses import (
 from starlette.routing import BaseRoute
 
 from roboirg.core.errors import InvalidValueError, RoboIRGError
-from roboirg.util.web.app_server import AppServer, RequestGuard, header_values, read_body
+from roboirg.util.web.app_server import (
+    AppServer,
+    RequestGuard,
+    error_handler,
+    header_values,
+    read_body,
+)
 from roboirg.util.web.request_origin import LOOPBACK, is_own_request, names_of_this_machine
 
 KEY_FILE = "key"
@@ -97,7 +103,7 @@ class KeyedPageServer(AppServer):
         self.key = key
         self._names = frozenset({*names_of_this_machine(), host.lower()})
         known: dict[type[Exception], int] = {RoboIRGError: 400, **(statuses or {})}
-        handlers = {kind: _error_handler(status) for kind, status in known.items()}
+        handlers = {kind: error_handler(status) for kind, status in known.items()}
         app = Starlette(routes=routes, exception_handlers=handlers)
         super().__init__(RequestGuard(app, self._refuse, PRIVATE_HEADERS), host, port)
 
@@ -152,7 +158,3 @@ def json_endpoint(
         return JSONResponse(await run_in_threadpool(answer, request, body))
 
     return endpoint
-
-
-def _error_handler(status: int) -> Callable[[Request, Exception], Response]:
-    return lambda _, error: PlainTextResponse(f"{error}\n", status)

@@ -17,8 +17,9 @@ from starlette.responses import HTMLResponse, PlainTextResponse, Response
 from starlette.routing import Mount, Route
 from starlette.staticfiles import StaticFiles
 
+from roboirg.core.errors import RoboIRGError
 from roboirg.evaluation.records.store import RECORDS_FILE
-from roboirg.util.web.app_server import AppServer, RequestGuard, header_values
+from roboirg.util.web.app_server import AppServer, RequestGuard, error_handler, header_values
 from roboirg.util.web.request_origin import LOOPBACK, LOOPBACK_NAMES, is_own_request
 
 PAGES = ("/", "/index.html", "/report.html")
@@ -39,7 +40,10 @@ class PageServer(AppServer):
         self._page: tuple[object, str] | None = None
         self._lock = threading.Lock()
         files = Mount("/", _RunFiles(directory=self.folder, check_dir=False))
-        app = Starlette(routes=[*(Route(path, self._answer) for path in PAGES), files])
+        app = Starlette(
+            routes=[*(Route(path, self._answer) for path in PAGES), files],
+            exception_handlers={RoboIRGError: error_handler(500)},
+        )
         # The browser asks again each time: the records change while a run goes on.
         guard = RequestGuard(app, _refuse, {"Cache-Control": "no-cache"})
         super().__init__(guard, LOOPBACK, port)

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import contextlib
+import socket
+import threading
 import time
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 from roboirg.core.errors import (
@@ -18,6 +21,7 @@ from roboirg.policies.remote.connections import (
     connect_with_retries,
     error_reply,
     read_reply,
+    shut_down,
 )
 from roboirg.policies.remote.message_codec import MSGPACK, pack
 
@@ -43,6 +47,7 @@ class HttpConnection:
 
     def __init__(self, spec: ConnectionSpec) -> None:
         self._spec, self._closed = spec, False
+        self._socket: socket.socket | None = None
         options = spec.options
         # A compressed reply would hide its size; so it is neither asked for nor unpacked.
         headers = {**options.headers, "Accept": MSGPACK, "Accept-Encoding": "identity"}
@@ -95,10 +100,15 @@ class HttpConnection:
         """Send one request; the caller handles the errors of the transport."""
         spec, headers = self._spec, {"Content-Type": MSGPACK} if body is not None else {}
         end, content = time.monotonic() + seconds, bytearray()
+        limit = f"{round(seconds, 2):g} s"
         try:
-            with self._client.stream(
-                method, path, content=body, headers=headers, timeout=seconds
-            ) as response:
+            with (
+                self._within(seconds),
+                self._client.stream(
+                    method, path, content=body, headers=headers, timeout=seconds,
+                    extensions={"trace": self._note_socket},
+                ) as response,
+            ):  # fmt: skip
                 for piece in response.iter_raw():
                     content += piece
                     if len(content) > spec.options.max_reply:
@@ -106,12 +116,12 @@ class HttpConnection:
                             f"{spec} sent a reply of more than {spec.options.max_reply_mib:g} "
                             "MiB; option max_reply_mib raises that limit."
                         )
-                    if time.monotonic() > end:
-                        raise httpx.ReadTimeout("the limit of all pieces together")
         except httpx.ConnectTimeout as error:
-            raise RetryableError(f"no answer within {seconds:g} s") from error
-        except httpx.TimeoutException as error:
-            raise PolicyTimeoutError(f"{spec} did not answer within {seconds:g} s.") from error
+            raise RetryableError(f"no answer within {limit}") from error
+        except httpx.TransportError as error:
+            if isinstance(error, httpx.TimeoutException) or time.monotonic() > end:
+                raise PolicyTimeoutError(f"{spec} did not answer within {limit}.") from error
+            raise
         if response.status_code in _STARTING and body is None:
             raise RetryableError(f"HTTP status {response.status_code}")
         if response.status_code == _SERVER_ERROR:
@@ -121,3 +131,21 @@ class HttpConnection:
                 f"{spec} answered {path} with HTTP status {response.status_code}."
             )
         return read_reply(spec, bytes(content))
+
+    @contextlib.contextmanager
+    def _within(self, seconds: float) -> Iterator[None]:
+        """End what the block does with the socket after a time.
+
+        The library's limits are those of one read or write: they begin again with every byte.
+        """
+        timer = threading.Timer(seconds, lambda: shut_down(self._socket))
+        timer.daemon = True
+        timer.start()
+        try:
+            yield
+        finally:
+            timer.cancel()
+
+    def _note_socket(self, event: str, info: dict[str, Any]) -> None:
+        if event in ("connection.connect_tcp.complete", "connection.start_tls.complete"):
+            self._socket = info["return_value"].get_extra_info("socket")

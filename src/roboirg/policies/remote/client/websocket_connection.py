@@ -26,6 +26,7 @@ from roboirg.policies.remote.connections import (
     connect_with_retries,
     error_reply,
     read_reply,
+    shut_down,
 )
 from roboirg.policies.remote.message_codec import pack
 
@@ -97,14 +98,9 @@ class WebsocketConnection:
 
     def _abort(self) -> None:
         """Close the connection to a server that may not take part in that."""
-        self._shut_down()
-        self.close()
-
-    def _shut_down(self) -> None:
         if self._socket is not None:
-            with contextlib.suppress(OSError):
-                # Wakes a thread that sends and holds the lock that closing needs; also with TLS.
-                socket.socket.shutdown(self._socket.socket, socket.SHUT_RDWR)
+            shut_down(self._socket.socket)  # a thread that sends holds the lock that closing needs
+        self.close()
 
     def read_metadata(self, seconds: float) -> Mapping[str, Any]:
         """Return what the server says about itself, which it does first."""
@@ -182,7 +178,8 @@ class WebsocketConnection:
                         f"{self.spec} did not send {what} within {seconds:g} s."
                     )
                 if data is None and connection.protocol.state is not State.OPEN:
-                    self._shut_down()  # the server does not end what the library has refused
+                    # The server does not end what the library has refused.
+                    shut_down(connection.socket)
         except ConnectionClosed as error:
             raise self._broken(error) from error
         if isinstance(data, str):

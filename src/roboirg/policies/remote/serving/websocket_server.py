@@ -79,6 +79,7 @@ class WebsocketServer:
             max_size=self._service.max_request_bytes,
             process_request=self._check_request,
             close_timeout=CLOSE_TIMEOUT_S,
+            max_queue=1,  # clients wait for a reply before they send more
             ping_interval=None,  # a pong would wait behind a large message
         ):
             await stop.wait()
