@@ -15,7 +15,7 @@ from pathlib import Path
 
 import pytest
 
-from roboirg.core.errors import StoreError
+from roboirg.core.errors import RoboIRGError
 from roboirg.evaluation.analysis.page.page_server import PageServer
 from roboirg.evaluation.plan.plan_maker import make_plan
 from roboirg.evaluation.play.rollout_result import RolloutResult, make_record
@@ -138,7 +138,7 @@ def test_records_that_cannot_be_read_are_one_sentence_in_the_browser(
     run: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
     def fail() -> str:
-        raise StoreError("line 6 is damaged.")
+        raise RoboIRGError("line 6 is damaged.")
 
     with PageServer(run, fail) as server:
         threading.Thread(target=server.serve_forever).start()
