@@ -197,7 +197,8 @@ def test_the_address_keeps_filters_pages_and_episodes(page: Any, page_file: Path
     assert focused(page, "closest('li').id") == f"e-{key}"
 
 
-def test_a_cell_tells_its_numbers_to_mouse_and_keyboard_and_shows_its_episodes(page: Any) -> None:
+@pytest.mark.slow
+def test_a_cell_shows_its_numbers_to_mouse_and_keyboard_and_shows_its_episodes(page: Any) -> None:
     tip = page.locator("#tip")
     cell = page.locator(".map").nth(1).locator("tr.all .cell").nth(1)
     cell.hover()

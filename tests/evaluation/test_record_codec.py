@@ -93,6 +93,7 @@ def test_the_index_knows_a_job_by_all_its_fields() -> None:
 MANY = 100_000
 
 
+@pytest.mark.slow
 def test_very_many_records_need_little_memory(tmp_path: Path) -> None:
     (record,) = [FakePlay()(small_plan(1).jobs()[0])]
     # Long ones: what an episode of BinFill has in events.

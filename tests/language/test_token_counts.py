@@ -41,6 +41,7 @@ def test_the_vocabulary_is_small(tokenizer):
     assert tokenizer.vocab_size() <= 32_000
 
 
+@pytest.mark.slow
 def test_the_count_is_that_of_the_tokenizer(tokenizer, said):
     texts = list(dict.fromkeys(instruction.text for instruction in said))
     counts = [len(pieces) + ADDED_TOKENS for pieces in tokenizer.encode(texts)]

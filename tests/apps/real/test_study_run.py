@@ -129,6 +129,7 @@ def test_scored_in_a_browser_it_is_the_table_that_the_judge_would_have_given(bro
         assert path.stat().st_size > 10_000
 
 
+@pytest.mark.slow
 def test_two_loops_do_not_share_a_robot(study):
     from roboirg.apps.real.study.study_run import lock_robot
 
