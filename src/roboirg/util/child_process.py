@@ -6,39 +6,31 @@ The kernel kills a child when the thread that started it ends, so start it in a 
 from __future__ import annotations
 
 import contextlib
-import ctypes
-import importlib
 import json
 import multiprocessing
 import os
-import resource
 import signal
 import socket
 import subprocess
 import sys
 import threading
-import time
 from collections.abc import Callable, Iterator, Mapping
 from multiprocessing import resource_tracker
 from multiprocessing.connection import Connection
 from multiprocessing.process import BaseProcess
-from pathlib import Path
 from typing import IO, Any, NamedTuple, Self, cast
 
-from roboirg.util.freed_memory import keep_freed_memory
+from roboirg.util.process_guard import begin, descendants
 
 GRACE_S = 2.0
 """How long a child may take to exit once its channel is closed."""
 GUARD_S = 5.0
 """How long a guard may take to end all that an interpreter has started."""
-_TERM_S = 0.5
-"""How long what an interpreter has started may take to exit before it is killed."""
 
-_PR_SET_PDEATHSIG, _PR_SET_CHILD_SUBREAPER = 1, 36
 # The first thing the interpreter gets is the import path.
 _BOOT = (
     "import json, sys; sys.path[:] = json.loads(sys.argv.pop()); "
-    "from roboirg.util.child_process import _run_main; _run_main()"
+    "from roboirg.util.process_guard import run_main; run_main()"
 )
 
 
@@ -77,7 +69,7 @@ class _Interpreter(subprocess.Popen[bytes]):
         self.terminate()
         self.join(GUARD_S)
         if self.poll() is None:
-            for pid in _descendants(self.pid):
+            for pid in descendants(self.pid):
                 with contextlib.suppress(OSError):
                     os.kill(pid, signal.SIGKILL)
         super().kill()
@@ -155,7 +147,7 @@ class ChildProcess:
     def pid(self) -> int:
         """Its process id."""
         if isinstance(self._process, _Interpreter):
-            return next(iter(_descendants(self._process.pid)), self._process.pid)
+            return next(iter(descendants(self._process.pid)), self._process.pid)
         return cast("int", self._process.pid)  # it has been started
 
     @property
@@ -232,7 +224,7 @@ def _without_interrupts() -> Iterator[None]:
 def _begin_work(
     parent: int, work: Callable[..., None], connection: Connection, args: tuple[Any, ...]
 ) -> None:
-    _begin(parent)
+    begin(parent)
     work(connection, *args)
 
 
@@ -241,103 +233,3 @@ def _hang_up(process: _Interpreter, line: socket.socket) -> None:
     process.wait()
     with line, contextlib.suppress(OSError):
         line.shutdown(socket.SHUT_RDWR)
-
-
-def _run_main() -> None:
-    number, parent, module = sys.argv[1:]
-    sys.argv[1:] = []
-    _begin(int(parent))
-    _guard(int(number))
-    importlib.import_module(module).main(Connection(int(number)))
-
-
-def _begin(parent: int) -> None:
-    """Put this process under the supervision of its parent, and prepare it for its work."""
-    # Ctrl-C is for the parent, which decides what to do.
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
-    signal.signal(signal.SIGTERM, signal.SIG_DFL)
-    os.setpgid(0, 0)  # what it starts can be ended with it
-    _prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)  # even if it hangs in native code
-    if os.getppid() != parent:
-        os._exit(1)  # the parent died before the line above
-    keep_freed_memory()
-
-
-def _prctl(option: int, value: int) -> None:
-    if sys.platform == "linux":
-        ctypes.CDLL(None).prctl(option, value)
-
-
-def _guard(number: int) -> None:
-    """Fork: the child returns; this process ends all that comes of it, and then ends as it has.
-
-    Where there are no subreapers and no ``/proc``, as on macOS, that is the child's process group.
-
-    Args:
-        number: descriptor of the channel, which is the child's alone.
-    """
-    waited = {signal.SIGCHLD, signal.SIGTERM}
-    signal.pthread_sigmask(signal.SIG_BLOCK, waited)
-    _prctl(_PR_SET_PDEATHSIG, signal.SIGTERM)
-    _prctl(_PR_SET_CHILD_SUBREAPER, 1)  # what loses its parent gets this one
-    guard, child = os.getpid(), os.fork()
-    if child == 0:
-        signal.pthread_sigmask(signal.SIG_UNBLOCK, waited)
-        _begin(guard)
-        return
-    nothing = os.open(os.devnull, os.O_RDWR)
-    for descriptor in (0, 1, 2, number):
-        os.dup2(nothing, descriptor)
-    code = None
-    while code is None:
-        if signal.sigwait(waited) == signal.SIGTERM:
-            os.kill(child, signal.SIGKILL)
-        code = _reap(child)
-    _end_descendants(child)
-    if code < 0:
-        resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
-        with contextlib.suppress(OSError):  # SIGKILL has no handler
-            signal.signal(-code, signal.SIG_DFL)
-        signal.pthread_sigmask(signal.SIG_UNBLOCK, {-code})
-        os.kill(guard, -code)
-    os._exit(code)
-
-
-def _reap(child: int) -> int | None:
-    """Take leave of all dead children; return how one of them ended, None if it has not."""
-    code = None
-    with contextlib.suppress(ChildProcessError):
-        while (found := os.waitpid(-1, os.WNOHANG))[0]:
-            if found[0] == child:
-                code = os.waitstatus_to_exitcode(found[1])
-    return code
-
-
-def _end_descendants(child: int) -> None:
-    """End all that a dead child has started, until nothing is left."""
-    # First SIGTERM: Python's resource trackers are among them, and have to clean up.
-    number, until = signal.SIGTERM, time.monotonic() + _TERM_S
-    with contextlib.suppress(OSError):
-        os.killpg(child, number)
-    while found := _descendants(os.getpid()):
-        for pid in found:
-            with contextlib.suppress(OSError):
-                os.kill(pid, number)
-        time.sleep(0.01)
-        _reap(child)
-        if time.monotonic() > until:
-            number = signal.SIGKILL
-
-
-def _descendants(pid: int) -> list[int]:
-    """Return the processes that a process has started, and theirs, the oldest generation first."""
-    children: dict[int, list[int]] = {}
-    for path in Path("/proc").glob("[0-9]*/stat"):
-        with contextlib.suppress(OSError):  # it has ended meanwhile
-            parent = int(path.read_text().rpartition(")")[2].split()[1])
-            children.setdefault(parent, []).append(int(path.parent.name))
-    found = [pid]
-    for one in found:
-        found += children.get(one, [])
-    return found[1:]

@@ -1,0 +1,124 @@
+"""A guard between an interpreter and the process that started it; ends what that leaves behind."""
+
+from __future__ import annotations
+
+import contextlib
+import ctypes
+import importlib
+import os
+import resource
+import signal
+import sys
+import time
+from multiprocessing.connection import Connection
+from pathlib import Path
+
+from roboirg.util.freed_memory import keep_freed_memory
+
+_TERM_S = 0.5
+"""How long what an interpreter has started may take to exit before it is killed."""
+_PR_SET_PDEATHSIG, _PR_SET_CHILD_SUBREAPER = 1, 36
+
+
+def run_main() -> None:
+    """Run ``main(connection)`` of a module in a child of this process, which guards it.
+
+    The command line holds the descriptor of the channel, the parent's process id and the module.
+    """
+    number, parent, module = sys.argv[1:]
+    sys.argv[1:] = []
+    begin(int(parent))
+    _guard(int(number))
+    importlib.import_module(module).main(Connection(int(number)))
+
+
+def begin(parent: int) -> None:
+    """Put this process under the supervision of its parent, and prepare it for its work."""
+    # Ctrl-C is for the parent, which decides what to do.
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
+    signal.signal(signal.SIGTERM, signal.SIG_DFL)
+    os.setpgid(0, 0)  # what it starts can be ended with it
+    _prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)  # even if it hangs in native code
+    if os.getppid() != parent:
+        os._exit(1)  # the parent died before the line above
+    keep_freed_memory()
+
+
+def _prctl(option: int, value: int) -> None:
+    if sys.platform == "linux":
+        ctypes.CDLL(None).prctl(option, value)
+
+
+def _guard(number: int) -> None:
+    """Fork: the child returns; this process ends all that comes of it, and then ends as it has.
+
+    Where there are no subreapers and no ``/proc``, as on macOS, that is the child's process group.
+
+    Args:
+        number: descriptor of the channel, which is the child's alone.
+    """
+    waited = {signal.SIGCHLD, signal.SIGTERM}
+    signal.pthread_sigmask(signal.SIG_BLOCK, waited)
+    _prctl(_PR_SET_PDEATHSIG, signal.SIGTERM)
+    _prctl(_PR_SET_CHILD_SUBREAPER, 1)  # what loses its parent gets this one
+    guard, child = os.getpid(), os.fork()
+    if child == 0:
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, waited)
+        begin(guard)
+        return
+    nothing = os.open(os.devnull, os.O_RDWR)
+    for descriptor in (0, 1, 2, number):
+        os.dup2(nothing, descriptor)
+    code = None
+    while code is None:
+        if signal.sigwait(waited) == signal.SIGTERM:
+            os.kill(child, signal.SIGKILL)
+        code = _reap(child)
+    _end_descendants(child)
+    if code < 0:
+        resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+        with contextlib.suppress(OSError):  # SIGKILL has no handler
+            signal.signal(-code, signal.SIG_DFL)
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, {-code})
+        os.kill(guard, -code)
+    os._exit(code)
+
+
+def _reap(child: int) -> int | None:
+    """Take leave of all dead children; return how one of them ended, None if it has not."""
+    code = None
+    with contextlib.suppress(ChildProcessError):
+        while (found := os.waitpid(-1, os.WNOHANG))[0]:
+            if found[0] == child:
+                code = os.waitstatus_to_exitcode(found[1])
+    return code
+
+
+def _end_descendants(child: int) -> None:
+    """End all that a dead child has started, until nothing is left."""
+    # First SIGTERM: Python's resource trackers are among them, and have to clean up.
+    number, until = signal.SIGTERM, time.monotonic() + _TERM_S
+    with contextlib.suppress(OSError):
+        os.killpg(child, number)
+    while found := descendants(os.getpid()):
+        for pid in found:
+            with contextlib.suppress(OSError):
+                os.kill(pid, number)
+        time.sleep(0.01)
+        _reap(child)
+        if time.monotonic() > until:
+            number = signal.SIGKILL
+
+
+def descendants(pid: int) -> list[int]:
+    """Return the processes that a process has started, and theirs, the oldest generation first."""
+    children: dict[int, list[int]] = {}
+    for path in Path("/proc").glob("[0-9]*/stat"):
+        with contextlib.suppress(OSError):  # it has ended meanwhile
+            parent = int(path.read_text().rpartition(")")[2].split()[1])
+            children.setdefault(parent, []).append(int(path.parent.name))
+    found = [pid]
+    for one in found:
+        found += children.get(one, [])
+    return found[1:]
