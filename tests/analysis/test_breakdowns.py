@@ -382,7 +382,8 @@ def test_the_page_has_the_same_tables(records: tuple[Record, ...]) -> None:
             texts = r"\s*".join(f"<td>{text}</td>" for text in cells_of)
             assert re.search(rf'<th scope="row">{row.name}</th>\s*{texts}', page), row
     explicit = [record for record in records if record.setting == "explicit"]
-    assert "Gap to explicit by kind of words" not in render(explicit)
+    assert "By difficulty" in render(explicit)
+    assert "By reasoning pattern" not in render(explicit)
 
 
 @pytest.mark.browser
@@ -427,3 +428,29 @@ def test_a_stored_instruction_has_the_labels_of_its_record(
     whole = label_instructions(find_breakdowns(BREAKDOWNS), records)
     assert label_instructions(find_breakdowns(BREAKDOWNS), iterate_records(run)) == whole
     assert len(read_results(run)) == len(records)
+
+
+def test_difficulty_has_rows_for_explicit_and_gaps_on_the_same_episodes(
+    records: tuple[Record, ...], run: Path
+) -> None:
+    (breakdown,) = find_breakdowns(["difficulty"])
+    cells = gather([("", records)])
+    table = make_breakdown_table(
+        breakdown, cells, label_instructions([breakdown], records)["difficulty"]
+    )
+    texts = {
+        (row.group.replace(" (privileged)", ""), row.name): [entry.text for entry in row.entries]
+        for row in table.rows
+    }
+    # Of eight episodes of two tasks four are easy, two medium and two hard.
+    for level, episodes in (("easy", "8"), ("medium", "4"), ("hard", "4")):
+        entry = texts["forgetful, explicit", level]
+        assert entry[:3] == [episodes, "100.00", "–"]
+        own = [
+            one for one in records
+            if (one.policy, one.setting, one.difficulty) == ("forgetful", "direct", level)
+        ]  # fmt: skip
+        rate = 100 * sum(one.outcome == "success" for one in own) / len(own)
+        assert texts["forgetful, direct", level][:2] == [episodes, f"{rate:.2f}"]
+        assert texts["forgetful, direct", level][2] == f"{rate - 100:+.1f}".replace("-", "−")
+    assert "forgetful, explicit" not in call("tables", run, "--by", "slots", "--format", "csv")

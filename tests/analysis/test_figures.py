@@ -6,6 +6,7 @@ import re
 from collections.abc import Callable
 from pathlib import Path
 
+import numpy as np
 import pytest
 import typer
 from msgspec.structs import replace
@@ -14,14 +15,20 @@ from typer.testing import CliRunner
 from roboirg.cli.report_commands import figures
 from roboirg.core.errors import InvalidValueError, UnknownNameError
 from roboirg.core.instruction_options import InstructionOptions
-from roboirg.evaluation.analysis.figures import FIGURES, FigureData, write_figures
+from roboirg.evaluation.analysis.figures import FIGURES, write_figures
 from roboirg.evaluation.analysis.figures.averages import draw_averages
 from roboirg.evaluation.analysis.figures.context import draw_context
-from roboirg.evaluation.analysis.figures.failures import COLORS, UNKNOWN, draw_failures
+from roboirg.evaluation.analysis.figures.failures import COLORS, draw_failures
 from roboirg.evaluation.analysis.figures.figure_style import STYLE
 from roboirg.evaluation.analysis.figures.forms import PARTS, draw_forms
 from roboirg.evaluation.analysis.published import published_rows
+from roboirg.evaluation.analysis.stats.failure_counts import UNATTRIBUTED
+from roboirg.evaluation.analysis.stats.run_data import RunData
 from roboirg.evaluation.analysis.stats.run_summary import ALL
+from roboirg.evaluation.analysis.tables.diagnostic_tables import (
+    make_failure_table,
+    make_forms_table,
+)
 from roboirg.evaluation.plan.plan import Plan
 from roboirg.evaluation.play.rollout_result import RolloutResult, make_record
 from roboirg.evaluation.records.record import Attribution, Summary
@@ -60,8 +67,8 @@ def results() -> list[Summary]:
     return found
 
 
-def content(found: list[Summary] | None = None, **options: object) -> FigureData:
-    return FigureData.of([("run", results() if found is None else found)], **options)  # type: ignore[arg-type]
+def content(found: list[Summary] | None = None, **options: object) -> RunData:
+    return RunData.of([("run", results() if found is None else found)], **options)  # type: ignore[arg-type]
 
 
 def texts(path: Path) -> str:
@@ -224,7 +231,7 @@ def test_scenes_are_counted_in_whole_numbers(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("draw", [draw_averages, draw_context, draw_failures, draw_forms])
 def test_no_name_leaves_the_figure(
-    draw: Callable[[FigureData], Figure | None], published_like: Callable[..., list[Summary]]
+    draw: Callable[[RunData], Figure | None], published_like: Callable[..., list[Summary]]
 ) -> None:
     long = "my_package.policies:NetWithAVeryLongName, frames of the video none"
     found = [
@@ -258,12 +265,12 @@ def test_what_is_incomplete_is_called_so(tmp_path: Path) -> None:
 
 
 def test_every_failure_has_a_color_of_its_own() -> None:
-    assert set(COLORS) == {*GROUNDING, *EXECUTION, UNKNOWN}
+    assert set(COLORS) == {*GROUNDING, *EXECUTION, UNATTRIBUTED}
     assert len(set(COLORS.values())) == len(COLORS)
 
 
 def test_runs_that_hold_the_same_episodes_stand_apart(tmp_path: Path) -> None:
-    both = FigureData.of([("one", results()), ("two", results())])
+    both = RunData.of([("one", results()), ("two", results())])
     assert set(both.names.values()) == {
         f"{policy}, {run} (privileged)"
         for policy in ("listener", "forgetful")
@@ -311,3 +318,83 @@ def test_the_real_robot_s_figure_has_a_panel_per_task(
         assert words in drawn
     with pytest.raises(InvalidValueError, match="nothing to draw for real"):
         write_figures(content(results()), tmp_path, ["real"])
+
+
+def test_published_figures_need_no_run() -> None:
+    drawn = draw_averages(RunData.of([]), published=True)
+    assert drawn is not None
+    (axes,) = drawn.axes
+    labels = [label.get_text() for label in axes.get_xticklabels()]
+    assert labels == [
+        "explicit\n(11 tasks)",
+        "direct\n(11 tasks)",
+        "reasoning\n(11 tasks)",
+        "contextual\n(11 tasks)",
+        "spatial\n(7 tasks)",
+    ]
+    shown = sorted(
+        (line.get_label(), round(line.get_xdata()[0]), round(float(line.get_ydata()[0]), 2))  # type: ignore[index,call-overload]
+        for line in axes.lines
+        if str(line.get_label()).endswith("(published)")
+    )
+    settings = [label.split("\n")[0] for label in labels]
+    assert shown == sorted(
+        (f"{row.model} (published)", settings.index(row.options.setting), float(row.average))
+        for row in published_rows("main")
+    )
+    assert draw_averages(RunData.of([])) is None
+    assert draw_forms(RunData.of([])) is None
+
+
+def test_the_tables_of_forms_and_failures_are_the_figures_numbers() -> None:
+    found = content(planned=PLAN.jobs())
+    forms = make_forms_table(found)
+    for row in forms.rows:
+        trials, both, resolved, implicit, neither = (int(one.word) for one in row.entries[:5])
+        is_listener = row.group.startswith("listener")
+        assert (both, resolved) == ((trials, 0) if is_listener else (0, trials))
+        assert implicit == neither == 0
+        assert row.entries[5].word == ("±0.0" if is_listener else "−100.0")
+    failures = make_failure_table(found)
+    names = [column.name for column in failures.columns]
+    drawn = draw_failures(found)
+    assert drawn is not None
+    counted = names.index("wrong count")
+    total = sum(
+        int(row.entries[counted].word.split()[0])
+        for row in failures.rows
+        if row.name != "all tasks"
+    )
+    assert total == sum(
+        one.attribution is not None and one.attribution.failure == "wrong_count"
+        for one in results()
+    )
+    for row in failures.rows:
+        kinds = [int(entry.word.split()[0]) for entry in row.entries[2:]]
+        assert sum(kinds) == int(row.entries[1].word) <= int(row.entries[0].word)
+
+
+def test_a_share_of_failures_is_that_of_the_failures(
+    cell_of: Callable[..., list[Summary]],
+) -> None:
+    """As in the paper: nine wrong targets are 69 % of the 13 failures of twenty trials."""
+    spatial = InstructionOptions("spatial")
+    rng = np.random.default_rng(1)
+    found = list(cell_of(7, 20, 1, rng, spatial, policy="pi0.5", task="PutInBox"))
+    failed = iter(["wrong_object"] * 9 + ["missed_grasp"] * 4)
+    found = [
+        replace(
+            one, attribution=Attribution(kind="grounding", failure=next(failed), sentence="So.")
+        )
+        if one.outcome == "failure"
+        else one
+        for one in found
+    ]
+    table = make_failure_table(RunData.of([("", found)]))
+    (row,) = table.rows
+    assert [column.name for column in table.columns][2:] == ["wrong object", "missed grasp"]
+    assert [entry.word for entry in row.entries] == ["20", "13", "9 (69 %)", "4 (31 %)"]
+    with pytest.raises(InvalidValueError, match="No episode of the runs failed"):
+        make_failure_table(RunData.of([("", [one for one in found if one.outcome == "success"])]))
+    with pytest.raises(InvalidValueError, match="--forms implicit,resolved"):
+        make_forms_table(RunData.of([("", found)]))

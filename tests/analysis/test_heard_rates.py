@@ -18,7 +18,9 @@ from roboirg.core.instruction_options import InstructionOptions
 from roboirg.evaluation.analysis.page.details import Strings, details_of
 from roboirg.evaluation.analysis.page.entries import Run, make_entries
 from roboirg.evaluation.analysis.page.run_warnings import run_warnings
+from roboirg.evaluation.analysis.stats.cells import PolicyRun
 from roboirg.evaluation.analysis.stats.heard_rates import add_up, count_heard, cut_text, heard_notes
+from roboirg.evaluation.analysis.stats.run_data import RunData
 from roboirg.evaluation.analysis.tables.heard_table import make_heard_table
 from roboirg.evaluation.analysis.tables.rendering import get_format
 from roboirg.evaluation.analysis.tables.run_tables import make_run_tables, print_run_tables
@@ -26,6 +28,11 @@ from roboirg.evaluation.play.rollout_result import RolloutResult, make_record
 from roboirg.evaluation.records.record import Job, Record, Summary
 from roboirg.evaluation.records.store import RecordStore
 from roboirg.policies.prompt_length.prompt_audit import PromptLimit, most_tokens
+
+
+def played(found: list[Summary]) -> list[tuple[PolicyRun, Summary]]:
+    return [(PolicyRun.of(one), one) for one in found]
+
 
 VERDICTS = st.sampled_from(["heard", "cut", "unknown"])
 OUTCOMES = st.sampled_from(["success", "failure", "error"])
@@ -43,7 +50,7 @@ def results(make: MakeResult, *rows: tuple[str, str], **fields: object) -> list[
 
 @given(st.lists(st.tuples(OUTCOMES, VERDICTS), min_size=1))
 def test_counts_add_up(result: MakeResult, rows: list[tuple[str, str]]) -> None:
-    found = count_heard([("", results(result, *rows))])
+    found = count_heard(played(results(result, *rows)))
     if all(verdict == "unknown" for _, verdict in rows):
         assert not found
         return
@@ -74,7 +81,7 @@ def sample(result: MakeResult) -> list[Summary]:
 
 
 def test_notes_tell_rates_over_what_was_heard_beside_rates_over_all(result: MakeResult) -> None:
-    found = count_heard([("", sample(result))])
+    found = count_heard(played(sample(result)))
     (policy_run,) = {key.policy_run for key in found}
     (note,) = heard_notes(found, {policy_run: "listener"})
     assert "contextual 50–67 % cut, success 40 % of 5, 100 % of the 2 heard whole" in note
@@ -88,9 +95,7 @@ def test_notes_tell_rates_over_what_was_heard_beside_rates_over_all(result: Make
 
 
 def test_the_table_has_a_row_for_each_cell_and_for_all_tasks(result: MakeResult) -> None:
-    found = count_heard([("", sample(result))])
-    (policy_run,) = {key.policy_run for key in found}
-    table = make_heard_table(found, {policy_run: "listener"})
+    table = make_heard_table(RunData.of([("", sample(result))]))
     rows = {(row.group, row.name): [entry.text for entry in row.entries] for row in table.rows}
     assert rows == {
         ("listener, explicit", "PickXtimes"): ["2", "0", "50.00", "2", "50.00"],

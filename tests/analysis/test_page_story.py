@@ -9,10 +9,11 @@ import numpy as np
 import pytest
 
 from roboirg.core.instruction_options import InstructionOptions
-from roboirg.evaluation.analysis.figures import FigureData, write_figures
+from roboirg.evaluation.analysis.figures import write_figures
 from roboirg.evaluation.analysis.page.report import write_report
 from roboirg.evaluation.analysis.stats.chance import chance_level
 from roboirg.evaluation.analysis.stats.comparison import compare
+from roboirg.evaluation.analysis.stats.run_data import RunData
 from roboirg.evaluation.analysis.stats.run_summary import ALL
 from roboirg.evaluation.plan.plan_maker import make_plan
 from roboirg.evaluation.play.rollout import EpisodeRunner
@@ -76,7 +77,7 @@ def test_elsewhere_it_guesses_and_every_miss_is_one_of_grounding(run: Path) -> N
 
 
 def test_the_whole_report_follows(run: Path, tmp_path: Path) -> None:
-    content = FigureData.of([("story", read_records(run))], PLAN.jobs())
+    content = RunData.of([("story", read_records(run))], PLAN.jobs())
     listener, forgetful = content.names
     assert (listener.policy, forgetful.policy) == ("listener", "forgetful")
     direct = content.summaries[forgetful, ALL, InstructionOptions("direct")]

@@ -8,7 +8,7 @@ import pytest
 import typer
 from typer.testing import CliRunner
 
-from roboirg.cli.report_commands import compare, tables
+from roboirg.cli.report_commands import compare, figures, tables
 from roboirg.core.errors import InvalidValueError, UnknownNameError
 from roboirg.evaluation.plan.plan_maker import make_plan
 from roboirg.evaluation.plan.stored_plans import write_plan
@@ -18,6 +18,7 @@ from roboirg.evaluation.records.store import RecordStore, StoreError
 app = typer.Typer()
 app.command()(tables)
 app.command()(compare)
+app.command()(figures)
 
 
 def write_run(folder: Path, policies: tuple[str, ...], leave_out: int = 0) -> None:
@@ -79,6 +80,26 @@ def test_published_tables_need_no_run() -> None:
         call("tables", "--which", "planer")
     with pytest.raises(UnknownNameError, match="There is no format 'pdf'"):
         call("tables", "--format", "pdf")
+
+
+def test_tables_of_runs_alone(run: Path, tmp_path: Path) -> None:
+    failures = call("tables", run, "--which", "failures", "--format", "csv")
+    assert 'failures,ours,"forgetful (privileged), direct",all tasks,failures,no,,16,' in failures
+    with pytest.raises(InvalidValueError, match="goes without --published"):
+        call("tables", run, "--which", "failures", "--published")
+    with pytest.raises(InvalidValueError, match="The table 'forms' needs a run"):
+        call("tables", "--which", "forms")
+    with pytest.raises(InvalidValueError, match="--forms implicit,resolved"):
+        call("tables", run, "--which", "forms")
+    assert "averages.png" in call(
+        "figures", "--published", "--out", tmp_path, "--which", "averages"
+    )
+    with pytest.raises(InvalidValueError, match="Figures need a run"):
+        call("figures", "--out", tmp_path)
+    with pytest.raises(
+        InvalidValueError, match="The paper's tables have nothing to draw for forms"
+    ):
+        call("figures", "--published", "--out", tmp_path, "--which", "forms")
 
 
 def test_what_the_run_lacks_is_said(run: Path, tmp_path: Path) -> None:

@@ -22,10 +22,10 @@ from roboirg.tasks.splits.splits import get_episode
 
 
 def test_a_number_is_the_first_episodes_and_a_list_is_a_list() -> None:
-    assert parse_episodes("4") == (0, 1, 2, 3)
-    assert parse_episodes("0,3,5-9") == (0, 3, 5, 6, 7, 8, 9)
-    assert parse_episodes("7,") == (7,)
-    assert parse_episodes("all", "train") == tuple(range(100))
+    assert parse_episodes("4", "test", ()) == (0, 1, 2, 3)
+    assert parse_episodes("0,3,5-9", "test", ()) == (0, 3, 5, 6, 7, 8, 9)
+    assert parse_episodes("7,", "test", ()) == (7,)
+    assert parse_episodes("all", "train", ()) == tuple(range(100))
     assert parse_numbers("stage", "1,5,1") == (1, 5)
 
 
@@ -38,16 +38,34 @@ def test_a_number_is_the_first_episodes_and_a_list_is_a_list() -> None:
 )  # fmt: skip
 def test_what_is_no_list_is_one_sentence(text: str) -> None:
     with pytest.raises(InvalidValueError) as caught:
-        parse_episodes(text)
+        parse_episodes(text, "test", ())
     assert "\n" not in str(caught.value)
     assert len(str(caught.value)) < 200
 
 
+def test_difficulties_select_the_episodes_that_have_them_in_every_task() -> None:
+    tasks = tuple(all_tasks())
+    hard = parse_episodes("hard", "test", tasks)
+    assert hard == tuple(range(3, 50, 4))
+    both = parse_episodes("hard, medium", "test", tasks)
+    assert both == tuple(sorted({*hard, *range(2, 50, 4)}))
+    # The difficulties of two tasks of this split have another order in part.
+    uneven = parse_episodes("hard", "val", tasks)
+    assert {get_episode(task, "val", one).difficulty for task in tasks for one in uneven} == {
+        "hard"
+    }
+    assert len(uneven) < len(parse_episodes("hard", "val", ("BinFill",)))
+    plan = make_plan(["random"], tasks="PickXtimes", episodes="hard", settings="explicit")
+    assert plan.episodes == hard
+    with pytest.raises(InvalidValueError, match="say how many"):
+        parse_episodes("hard", "random", tasks)
+
+
 def test_sentences_about_numbers_say_what_would_be_right() -> None:
     with pytest.raises(InvalidValueError, match=r"for episode 0 alone write '0,'\.$"):
-        parse_episodes("0")
+        parse_episodes("0", "test", ())
     with pytest.raises(InvalidValueError, match="split 'train' has episodes 0 to 99"):
-        parse_episodes("0-999999999", "train")
+        parse_episodes("0-999999999", "train", ())
     with pytest.raises(InvalidValueError, match="1,5; 1,2,5; 1,2,3,5; 1,2,3,4,5"):
         parse_stages("5-1")
     with pytest.raises(InvalidValueError, match="1,000,000,000 numbers; at most 10,000"):

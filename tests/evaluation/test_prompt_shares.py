@@ -17,6 +17,7 @@ from typer.testing import CliRunner
 from roboirg import main
 from roboirg.core.errors import UnknownNameError
 from roboirg.core.instruction_options import InstructionOptions, split_options
+from roboirg.evaluation.analysis.stats.cells import PolicyRun
 from roboirg.evaluation.analysis.stats.heard_rates import count_heard
 from roboirg.evaluation.analysis.tables.run_tables import make_run_tables, print_run_tables
 from roboirg.evaluation.plan.plan_file import read_plan_file
@@ -260,7 +261,7 @@ def test_a_server_that_cuts_is_told_from_one_that_hears_everything_and_fails(
     assert "Cutting did not read every instruction to its end" in printed
     assert "100 % cut, success 0 % of 1, none heard whole" in printed
     assert "Served did not" not in printed
-    counts = count_heard([("", list(records.values()))])
+    counts = count_heard((PolicyRun.of(one), one) for one in records.values())
     assert {key.policy_run.policy: one.cut for key, one in counts.items() if one.cut} == {
         "Cutting": 1
     }

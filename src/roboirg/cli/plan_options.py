@@ -39,7 +39,8 @@ Forms = Annotated[
 ]
 Split = Annotated[str | None, _episodes(help="train, val, test or random.  (test)")]
 Episodes = Annotated[
-    str | None, _episodes(help="all, 4 for the first four, or a list such as 0,3,5-9.  (4)")
+    str | None,
+    _episodes(help="all, 4 for the first four, a list such as 0,3,5-9, or easy,medium,hard.  (4)"),
 ]
 PolicySeeds = Annotated[
     str | None,

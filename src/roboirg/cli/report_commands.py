@@ -20,13 +20,13 @@ if TYPE_CHECKING:
 
 # Heavy modules are imported inside the commands, so that --help answers at once.
 
-_ALL, _HEARD = "all", "heard"
+_ALL = "all"
 
 By = Annotated[
     str | None,
     typer.Option(
-        help="Break gaps down by pattern, expression, slots, rival (several separated by commas), "
-        "or all."
+        help="Break gaps down by pattern, expression, slots, rival, difficulty (several separated "
+        "by commas), or all."
     ),
 ]
 
@@ -97,8 +97,11 @@ def _serve(folder: Path, port: int, against: str | None) -> None:
 
 
 def figures(
-    runs: Annotated[list[str], typer.Argument(help="The --out folders of runs.", metavar="RUN...")],
     out: Annotated[Path, typer.Option(help="Folder for the figures; created if missing.")],
+    runs: Annotated[
+        list[str] | None,
+        typer.Argument(help="The --out folders of runs; none with --published.", metavar="RUN"),
+    ] = None,
     which: Annotated[
         str,
         typer.Option(
@@ -112,12 +115,15 @@ def figures(
 
     Example: roboirg figures runs/first --out figures
     """
-    from roboirg.evaluation.analysis.figures import FIGURES, FigureData, write_figures
+    from roboirg.evaluation.analysis.figures import FIGURES, write_figures
+    from roboirg.evaluation.analysis.stats.run_data import RunData
     from roboirg.util.figure_files import check_figure_support
 
     check_figure_support()
+    if not runs and not published:
+        raise InvalidValueError("Figures need a run; give its folder, or --published.")
     names = FIGURES if which == _ALL else tuple(word.strip() for word in which.split(","))
-    content = FigureData.of(*_runs(runs))
+    content = RunData.of(*_runs(runs or []))
     for path in write_figures(content, out, names, published=published):
         typer.echo(path)
 
@@ -130,12 +136,12 @@ def tables(
     which: Annotated[
         str,
         typer.Option(
-            help="main, planner, context, real, other, coverage, or all that apply; or heard: how "
-            "many prompts were cut, and rates over the others."
+            help="main, planner, context, real, other, coverage, or all that apply; or of runs "
+            "alone: forms (implicit against resolved), failures, heard (what was cut of prompts)."
         ),
     ] = _ALL,
     format: Annotated[  # noqa: A002
-        str, typer.Option(help="terminal, markdown, latex or csv.")
+        str, typer.Option(help="terminal, markdown, latex, latex-pieces (narrow) or csv.")
     ] = "terminal",
     published: Annotated[bool, typer.Option(help="Add the paper's rows.")] = False,
     floors: Annotated[
@@ -150,17 +156,18 @@ def tables(
         Path | None, typer.Option(help="Folder for a file of each table; prints without it.")
     ] = None,
 ) -> None:
-    """Print the paper's tables, or gaps by kind of words, for one or several runs.
+    """Print the paper's tables, failures, or gaps by kind of words, for one or several runs.
 
     Example: roboirg tables runs/first --which main --published
     """
+    from roboirg.evaluation.analysis.tables.diagnostic_tables import DIAGNOSTIC_TABLES
     from roboirg.evaluation.analysis.tables.rendering import get_format
 
     output = get_format(format)
-    if which == _HEARD:
+    if which in DIAGNOSTIC_TABLES:
         if published or floors or by is not None:
-            raise InvalidValueError("--which heard goes without --published, --floors and --by.")
-        found = [_heard_table(runs or [])]
+            raise InvalidValueError(f"--which {which} goes without --published, --floors and --by.")
+        found = [_diagnostic_table(which, runs or [])]
     elif by is None:
         found = _tables(which, _cells(runs or []), published=published, floors=floors)
     elif published or floors or which != _ALL:
@@ -214,6 +221,7 @@ def compare(
 def _tables(which: str, cells: Cells, *, published: bool, floors: str | None) -> list[Table]:
     from roboirg.evaluation.analysis.published import RATE_TABLES
     from roboirg.evaluation.analysis.stats.chance import FLOORS
+    from roboirg.evaluation.analysis.tables.diagnostic_tables import DIAGNOSTIC_TABLES
     from roboirg.evaluation.analysis.tables.paper_tables import WHICH, is_informative, make_table
 
     if which == _ALL:
@@ -223,7 +231,7 @@ def _tables(which: str, cells: Cells, *, published: bool, floors: str | None) ->
     elif which in WHICH:
         wanted = [which]
     else:
-        raise UnknownNameError("table", which, (*WHICH, _HEARD, _ALL))
+        raise UnknownNameError("table", which, (*WHICH, *DIAGNOSTIC_TABLES, _ALL))
     if which not in (_ALL, "coverage") and not published and not cells:
         raise InvalidValueError(
             f"The table {which!r} needs a run; give its folder, or --published."
@@ -252,20 +260,13 @@ def _breakdown_tables(runs: list[str], by: str) -> list[Table]:
     return [table for table in found if table.rows]
 
 
-def _heard_table(runs: list[str]) -> Table:
-    from roboirg.evaluation.analysis.stats.cells import gather, labels, policy_order, sort_cells
-    from roboirg.evaluation.analysis.stats.heard_rates import count_heard
-    from roboirg.evaluation.analysis.tables.heard_table import make_heard_table
+def _diagnostic_table(which: str, runs: list[str]) -> Table:
+    from roboirg.evaluation.analysis.stats.run_data import RunData
+    from roboirg.evaluation.analysis.tables.diagnostic_tables import DIAGNOSTIC_TABLES
 
-    results, planned = _runs(runs)
-    cells = gather(results, planned)
-    names = labels(sort_cells(cells, policy_order(cells, ())))
-    found = count_heard(results, names)
-    if not found:
-        raise InvalidValueError(
-            "No policy of the runs declares how many tokens it reads; prompt_tokens=N does."
-        )
-    return make_heard_table(found, names)
+    if not runs:
+        raise InvalidValueError(f"The table {which!r} needs a run; give its folder.")
+    return DIAGNOSTIC_TABLES[which](RunData.of(*_runs(runs)))
 
 
 def _breakdowns(by: str | None) -> tuple[Breakdown, ...]:

@@ -14,9 +14,10 @@ from roboirg.apps.real.control.interruption import Interruption
 from roboirg.apps.real.study.failure_choices import failure_choices
 from roboirg.apps.real.study.study_plan import read_study
 from roboirg.apps.real.study.trial_log import TrialLog, trial_metadata
-from roboirg.evaluation.analysis.figures import FigureData, write_figures
+from roboirg.evaluation.analysis.figures import write_figures
 from roboirg.evaluation.analysis.figures.real_robot import bar_series
 from roboirg.evaluation.analysis.stats.cells import gather
+from roboirg.evaluation.analysis.stats.run_data import RunData
 from roboirg.evaluation.analysis.tables.paper_tables import make_table
 from roboirg.evaluation.records.store import read_records, read_results
 
@@ -124,7 +125,7 @@ def test_scored_in_a_browser_it_is_the_table_that_the_judge_would_have_given(bro
     assert bars["pi0.5"]["PickByCount", "explicit"].percent == 50.0
     low, high = bars["pi0.5"]["PickByCount", "explicit"][1:]
     assert (low, high) == pytest.approx((23.7, 76.3), abs=0.1)
-    content = FigureData.of([("run", read_results(study))])
+    content = RunData.of([("run", read_results(study))])
     for path in write_figures(content, study / "figure", ["real"], published=True):
         assert path.stat().st_size > 10_000
 

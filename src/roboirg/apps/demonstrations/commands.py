@@ -92,10 +92,11 @@ def export_demonstrations(
 
     load_policy_class(policy)
     # `validated` checks the names that are cast.
+    names_of_tasks = find_tasks(parse_names("task", tasks))
     plan = ExportPlan(
-        tasks=tuple(find_tasks(parse_names("task", tasks))),
+        tasks=names_of_tasks,
         split=split,
-        episodes=parse_episodes(episodes, split),
+        episodes=parse_episodes(episodes, split, names_of_tasks),
         settings=known_settings(settings),
         forms=words.forms(),
         options=words.options(),

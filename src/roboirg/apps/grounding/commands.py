@@ -73,7 +73,7 @@ def export_grounding(
             EpisodeName(task, one, index)
             for task in known_tasks(tasks, options.wordings)
             for one in parse_splits(split)
-            for index in parse_episodes(words.fields.get("episodes", "all"), one)
+            for index in parse_episodes(words.fields.get("episodes", "all"), one, [task])
         ),
         settings=known_settings(settings),
         forms=words.forms(),

@@ -13,7 +13,6 @@ from roboirg.apps.learned_listener.listener_study import HELD_OUT, TEST, VARIANT
 from roboirg.core.episode import ENVIRONMENT_VERSION
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.evaluation.analysis.figures.averages import draw_averages
-from roboirg.evaluation.analysis.figures.figure_data import FigureData, summaries_by_key
 from roboirg.evaluation.analysis.figures.figure_style import save
 from roboirg.evaluation.analysis.stats.cells import (
     CellKey,
@@ -25,6 +24,7 @@ from roboirg.evaluation.analysis.stats.cells import (
     Versions,
 )
 from roboirg.evaluation.analysis.stats.intervals import SEED
+from roboirg.evaluation.analysis.stats.run_data import RunData, summaries_by_key
 from roboirg.evaluation.analysis.stats.run_summary import ALL, SummaryRow, summarize
 from roboirg.evaluation.analysis.tables.rendering.markdown import markdown
 from roboirg.evaluation.analysis.tables.table import NOT_APPLICABLE, Column, Entry, Row, Table
@@ -96,7 +96,7 @@ def save_study_figure(cells: Cells, folder: Path) -> tuple[Path, ...]:
         for key, results in _cells_of(cells, HELD_OUT, has_rival=False).items()
     }
     names = {key.policy_run: key.policy_run.policy for key in own}
-    content = FigureData((), own, summaries_by_key(own), names)
+    content = RunData((), own, summaries_by_key(own), names)
     return save(lambda: draw_averages(content), folder, FIGURE)
 
 

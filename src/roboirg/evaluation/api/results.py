@@ -13,12 +13,13 @@ import numpy as np
 
 from roboirg.core.errors import InvalidValueError, MissingDependencyError, UnknownNameError
 from roboirg.core.plain_text import counted
-from roboirg.evaluation.analysis.figures import FIGURES, FigureData, draw_figure
+from roboirg.evaluation.analysis.figures import FIGURES, draw_figure
 from roboirg.evaluation.analysis.stats.cells import Cells, gather
 from roboirg.evaluation.analysis.stats.comparison import compare
 from roboirg.evaluation.analysis.stats.comparison_text import sentences
 from roboirg.evaluation.analysis.stats.intervals import SEED
 from roboirg.evaluation.analysis.stats.option_labels import options_label
+from roboirg.evaluation.analysis.stats.run_data import RunData
 from roboirg.evaluation.analysis.stats.run_summary import ALL, summarize
 from roboirg.evaluation.analysis.tables.paper_tables import WHICH, is_informative, make_table
 from roboirg.evaluation.analysis.tables.rendering import get_format
@@ -142,7 +143,7 @@ class Results:
         names = tuple(name for name in FIGURES if name != "expressions")
         if which not in names:
             raise UnknownNameError("figure", which, names)
-        content = FigureData.of([("", self.summaries)], self._planned)
+        content = RunData.of([("", self.summaries)], self._planned)
         figure = draw_figure(which, content, published=published)
         if figure is None:
             raise InvalidValueError(f"The run has nothing to draw for {which!r}.")

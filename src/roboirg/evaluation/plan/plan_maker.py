@@ -46,7 +46,7 @@ def make_plan(
         tasks: names separated by commas; ``all`` anywhere selects all.
         settings: names separated by commas; ``all`` anywhere selects all.
         forms: names separated by commas.
-        episodes: ``4`` for the first four, or a list such as ``0,3,5-9``.
+        episodes: ``4`` for the first four, a list such as ``0,3,5-9``, or difficulties: ``hard``.
         policy_seeds: a list of numbers.
         stages: a list of numbers, or several lists separated by semicolons.
         retry_on: kinds of errors separated by commas, or ``none``.
@@ -57,7 +57,7 @@ def make_plan(
         UnknownNameError: a name does not exist; the message suggests the nearest.
         InvalidValueError: a number or combination is out of range.
     """
-    split = str(options.get("split", "test"))
+    split, names = str(options.get("split", "test")), _task_names(tasks)
     if options.get("wordings") == REQUIRED:
         raise InvalidValueError(
             "This plan needs words from outside: make a wording file with `roboirg language "
@@ -69,10 +69,10 @@ def make_plan(
     try:
         plan = Plan(
             policies=parse_policies(policies),
-            tasks=_task_names(tasks),
+            tasks=names,
             settings="all" if means_all(settings) else parse_names("setting", settings),
             forms=parse_names("form", forms),
-            episodes=parse_episodes(episodes, split),
+            episodes=parse_episodes(episodes, split, names),
             policy_seeds=parse_numbers("policy seed", policy_seeds),
             stages=parse_stage_sets(stages),
             retry_on=_error_kinds(retry_on),

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Collection, Iterable, Sequence
+from collections.abc import Collection, Iterable, Iterator, Sequence
 
 from roboirg import language
-from roboirg.core.episode import SPLITS, Split
+from roboirg.core.episode import DIFFICULTIES, SPLITS, Split
 from roboirg.core.errors import InvalidValueError, UnknownNameError
 from roboirg.tasks.splits import splits
 
@@ -83,28 +83,31 @@ def parse_splits(text: str) -> tuple[Split, ...]:
     return SPLITS if means_all(text) else (splits.check_fixed_split(text),)
 
 
-def parse_episodes(text: str, split: str = "test") -> tuple[int, ...]:
+def parse_episodes(text: str, split: str, tasks: Collection[str]) -> tuple[int, ...]:
     """Parse episodes: ``4`` is the first four; with a comma or a dash it is a list of positions.
 
-    ``all`` is every episode of a split of fixed episodes.
+    In a split of fixed episodes ``all`` is every one, and ``easy``, ``medium``, ``hard`` or several
+    of them are those that have such a difficulty in all of the tasks.
 
     Raises:
         UnknownNameError: there is no such split.
         InvalidValueError: the text is neither a number nor a list, or the split has fewer episodes.
     """
     size = splits.split_size(split)
-    if means_all(text):
+    levels = {word.strip() for word in text.split(",")}
+    if means_all(text) or levels <= {*DIFFICULTIES}:
         if split not in SPLITS:
             raise InvalidValueError(
                 f"The split {split!r} has {size:,} episodes; say how many with --episodes."
             )
-        return tuple(range(size))
-    found = re.fullmatch(r"\s*(-?)(\d+)\s*", text)
-    if found is None:
+        found = range(size)
+        return tuple(found if means_all(text) else _of_difficulty(found, split, levels, tasks))
+    single = re.fullmatch(r"\s*(-?)(\d+)\s*", text)
+    if single is None:
         ranges = _parse_ranges("episode", text, _EPISODES_HINT)
     else:
-        count = _number("number of episodes", found[2])
-        if found[1] or count == 0:
+        count = _number("number of episodes", single[2])
+        if single[1] or count == 0:
             alone = "" if count else "; for episode 0 alone write '0,'"
             raise InvalidValueError(
                 f"The number of episodes is {text.strip()}; it must be at least 1{alone}."
@@ -116,6 +119,14 @@ def parse_episodes(text: str, split: str = "test") -> tuple[int, ...]:
                 f"There is no episode {numbers[-1]}: split {split!r} has episodes 0 to {size - 1}."
             )
     return _union(ranges)
+
+
+def _of_difficulty(
+    positions: Iterable[int], split: str, levels: Collection[str], tasks: Collection[str]
+) -> Iterator[int]:
+    for index in positions:
+        if all(splits.get_episode(task, split, index).difficulty in levels for task in tasks):
+            yield index
 
 
 def parse_stages(text: str) -> tuple[int, ...]:

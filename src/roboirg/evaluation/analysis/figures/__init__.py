@@ -7,20 +7,20 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
 from roboirg.core.errors import InvalidValueError, UnknownNameError
-from roboirg.evaluation.analysis.figures.figure_data import FigureData
 from roboirg.evaluation.analysis.figures.figure_style import STYLE, save
+from roboirg.evaluation.analysis.stats.run_data import RunData
 from roboirg.util.figure_files import check_figure_support
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["FIGURES", "FigureData", "draw_figure", "write_figures"]
+__all__ = ["FIGURES", "draw_figure", "write_figures"]
 
 FIGURES = ("averages", "forms", "expressions", "context", "failures", "real")
 
 
 def write_figures(
-    content: FigureData, folder: Path, which: Sequence[str] = FIGURES, *, published: bool = False
+    content: RunData, folder: Path, which: Sequence[str] = FIGURES, *, published: bool = False
 ) -> tuple[Path, ...]:
     """Draw figures as PNG, SVG and PDF; the expressions as PNG and SVG.
 
@@ -40,14 +40,15 @@ def write_figures(
         path for name in which for path in _written(name, content, folder, published=published)
     ]
     if not paths:
+        whose = "The runs have" if content.results else "The paper's tables have"
         raise InvalidValueError(
-            f"The runs have nothing to draw for {', '.join(which)}; `roboirg tables` shows what "
-            "they have."
+            f"{whose} nothing to draw for {', '.join(which)}; `roboirg tables` shows "
+            "what they have."
         )
     return tuple(paths)
 
 
-def _written(name: str, content: FigureData, folder: Path, *, published: bool) -> tuple[Path, ...]:
+def _written(name: str, content: RunData, folder: Path, *, published: bool) -> tuple[Path, ...]:
     from roboirg.evaluation.analysis.figures.expressions import write_expressions
 
     if name == "expressions":
@@ -55,7 +56,7 @@ def _written(name: str, content: FigureData, folder: Path, *, published: bool) -
     return save(lambda: _drawn(name, content, published=published), folder, name)
 
 
-def draw_figure(name: str, content: FigureData, *, published: bool = False) -> Figure | None:
+def draw_figure(name: str, content: RunData, *, published: bool = False) -> Figure | None:
     """Draw one of `FIGURES` but the expressions; return None without data."""
     check_figure_support()
     import matplotlib as mpl
@@ -65,7 +66,7 @@ def draw_figure(name: str, content: FigureData, *, published: bool = False) -> F
         return _drawn(name, content, published=published)
 
 
-def _drawn(name: str, content: FigureData, *, published: bool) -> Figure | None:
+def _drawn(name: str, content: RunData, *, published: bool) -> Figure | None:
     from roboirg.evaluation.analysis.figures.averages import draw_averages
     from roboirg.evaluation.analysis.figures.context import draw_context
     from roboirg.evaluation.analysis.figures.failures import draw_failures

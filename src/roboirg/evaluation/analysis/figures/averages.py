@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING
 
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.core.plain_text import counted
-from roboirg.evaluation.analysis.figures.figure_data import FigureData, summaries_by_key
 from roboirg.evaluation.analysis.figures.figure_style import (
     GHOST,
     PUBLISHED_NOTE,
@@ -19,6 +18,7 @@ from roboirg.evaluation.analysis.figures.figure_style import (
 from roboirg.evaluation.analysis.published import published_rows
 from roboirg.evaluation.analysis.stats.cells import Cells, PolicyRun
 from roboirg.evaluation.analysis.stats.option_labels import has_default_options, setting_sort_key
+from roboirg.evaluation.analysis.stats.run_data import RunData, summaries_by_key
 from roboirg.evaluation.analysis.stats.run_summary import ALL, ScopeKey
 
 if TYPE_CHECKING:
@@ -31,13 +31,14 @@ SPREAD = 0.62
 GHOST_PLACE = 0.42
 
 
-def draw_averages(content: FigureData, *, published: bool = False) -> Figure | None:
+def draw_averages(content: RunData, *, published: bool = False) -> Figure | None:
     """Draw the unweighted means over tasks with their intervals; return None without any.
 
     In each setting all means, the published ones too, are over the tasks that every policy with
-    results in the setting played.
+    results in the setting played; without results the published ones are over all of theirs.
     """
-    shared = _shared_tasks(content.cells)
+    is_alone = published and not content.cells
+    shared = _published_tasks() if is_alone else _shared_tasks(content.cells)
     if not shared:
         return None
     found = summaries_by_key(
@@ -61,9 +62,13 @@ def draw_averages(content: FigureData, *, published: bool = False) -> Figure | N
                 at = place + _offset(number, len(content.names))
                 draw_point(axes, at, float(one.rate), one.interval, number, label)
     for model, setting, average in ghosts:
-        at = settings.index(setting) + GHOST_PLACE
-        draw_ghost(axes, at, average, models.index(model), f"{model} (published)")
-    _set_axes(axes, shared, room=GHOST_PLACE if ghosts else 0.0)
+        at, number = settings.index(setting), models.index(model)
+        if is_alone:
+            place = at + _offset(number, len(models))
+            draw_point(axes, place, average / 100, None, number, f"{model} (published)")
+        else:
+            draw_ghost(axes, at + GHOST_PLACE, average, number, f"{model} (published)")
+    _set_axes(axes, shared, room=GHOST_PLACE if ghosts and not is_alone else 0.0)
     legend_below(figure, axes)
     return figure
 
@@ -82,6 +87,16 @@ def _shared_tasks(cells: Cells) -> dict[str, list[str]]:
         if tasks:
             shared[setting] = tasks
     return shared
+
+
+def _published_tasks() -> dict[str, list[str]]:
+    """Return by setting the tasks that have published rates."""
+    rows = {row.options.setting: row for row in published_rows("main")}
+    settings = sorted(rows, key=setting_sort_key)
+    return {
+        one: [task for task, rate in rows[one].rates.items() if rate is not None]
+        for one in settings
+    }
 
 
 def _ghosts(shared: Mapping[str, Collection[str]]) -> list[tuple[str, str, float]]:

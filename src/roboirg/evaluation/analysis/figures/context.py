@@ -6,7 +6,6 @@ import textwrap
 from typing import TYPE_CHECKING
 
 from roboirg.core.instruction_options import InstructionOptions
-from roboirg.evaluation.analysis.figures.figure_data import FigureData, summaries_by_key
 from roboirg.evaluation.analysis.figures.figure_style import (
     COLORS,
     GHOST,
@@ -16,9 +15,10 @@ from roboirg.evaluation.analysis.figures.figure_style import (
     legend_below,
     rates_figure,
 )
-from roboirg.evaluation.analysis.published import published_rows
+from roboirg.evaluation.analysis.published import published_rows, published_tasks
 from roboirg.evaluation.analysis.stats.cells import CellKey, Cells, PolicyRun
 from roboirg.evaluation.analysis.stats.option_labels import staged_options
+from roboirg.evaluation.analysis.stats.run_data import RunData, summaries_by_key
 from roboirg.evaluation.analysis.stats.run_summary import ALL, ScopeKey
 
 if TYPE_CHECKING:
@@ -31,15 +31,20 @@ LABEL_LETTERS = 62
 """Letters of a line below the axes."""
 
 
-def draw_context(content: FigureData, *, published: bool = False) -> Figure | None:
+def draw_context(content: RunData, *, published: bool = False) -> Figure | None:
     """Draw the means over the tasks played with every set of stages.
 
     Returns:
         None if no policy was played with several sets, or no task with all of them.
     """
+    is_alone = published and not content.cells
     played = _played(content.cells)
-    columns = [one for one in staged_options() if any(one in own for own in played.values())]
+    columns = [
+        one for one in staged_options() if is_alone or any(one in own for own in played.values())
+    ]
     cells, tasks = _shared(content.cells, list(played), columns)
+    if is_alone:
+        tasks = list(published_tasks("context"))
     if not tasks:
         return None
     ghosts = {
@@ -53,14 +58,15 @@ def draw_context(content: FigureData, *, published: bool = False) -> Figure | No
     figure, axes = rates_figure(HEIGHT_INCHES, labels)
     _draw_policies(axes, content, cells, columns)
     for number, model in enumerate(models):
-        _draw_model(axes, model, [ghosts.get((model, options)) for options in columns], number)
+        rates = [ghosts.get((model, options)) for options in columns]
+        _draw_model(axes, f"{model} (published)", rates, number, in_color=is_alone)
     _set_axes(axes, columns, tasks, note=PUBLISHED_NOTE if ghosts else "")
     legend_below(figure, axes)
     return figure
 
 
 def _draw_policies(
-    axes: Axes, content: FigureData, cells: Cells, columns: list[InstructionOptions]
+    axes: Axes, content: RunData, cells: Cells, columns: list[InstructionOptions]
 ) -> None:
     found = summaries_by_key(cells)
     policy_runs = [one for one in content.names if any(key.policy_run == one for key in found)]
@@ -76,11 +82,17 @@ def _draw_policies(
         axes.plot(*zip(*line, strict=True), color=COLORS[number % len(COLORS)], linewidth=0.8)
 
 
-def _draw_model(axes: Axes, model: str, rates: list[float | None], number: int) -> None:
+def _draw_model(
+    axes: Axes, label: str, rates: list[float | None], number: int, *, in_color: bool
+) -> None:
     line = [(place, rate) for place, rate in enumerate(rates) if rate is not None]
     for place, rate in line:
-        draw_ghost(axes, place, rate, number, f"{model} (published)")
-    axes.plot(*zip(*line, strict=True), color=GHOST, linewidth=0.6, linestyle=":", zorder=1)
+        if in_color:
+            draw_point(axes, place, rate / 100, None, number, label)
+        else:
+            draw_ghost(axes, place, rate, number, label)
+    color = COLORS[number % len(COLORS)] if in_color else GHOST
+    axes.plot(*zip(*line, strict=True), color=color, linewidth=0.6, linestyle=":", zorder=1)
 
 
 def _set_axes(

@@ -11,7 +11,7 @@ import msgspec
 
 from roboirg import language
 from roboirg.core.errors import RoboIRGError
-from roboirg.evaluation.analysis.figures.figure_data import FigureData
+from roboirg.evaluation.analysis.stats.run_data import RunData
 from roboirg.evaluation.play.job_instruction import instruct_job
 from roboirg.evaluation.records.record import Job
 from roboirg.language.instruction import Expression, Instruction
@@ -69,7 +69,7 @@ def scene_counts(instructions: Iterable[Instruction]) -> Mapping[str, int]:
     return Counter(setting for setting, _ in scenes)
 
 
-def write_expressions(content: FigureData, folder: Path, name: str) -> tuple[Path, ...]:
+def write_expressions(content: RunData, folder: Path, name: str) -> tuple[Path, ...]:
     """Draw the referring expressions of the runs; return no files without implicit instructions.
 
     Results do not hold the instructions, so they are generated again, if the language has the same

@@ -7,7 +7,6 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 from roboirg.core.instruction_options import InstructionOptions
-from roboirg.evaluation.analysis.figures.figure_data import FigureData
 from roboirg.evaluation.analysis.figures.figure_style import (
     COLUMN_INCHES,
     LEGEND_LINE_INCHES,
@@ -18,8 +17,9 @@ from roboirg.evaluation.analysis.figures.figure_style import (
     new_figure,
 )
 from roboirg.evaluation.analysis.stats.cells import PolicyRun
+from roboirg.evaluation.analysis.stats.failure_counts import UNATTRIBUTED, count_failures
 from roboirg.evaluation.analysis.stats.option_labels import options_label, options_sort_key
-from roboirg.evaluation.records.record import Summary
+from roboirg.evaluation.analysis.stats.run_data import RunData
 from roboirg.judging.failure_attribution import EXECUTION, GROUNDING
 
 if TYPE_CHECKING:
@@ -27,7 +27,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 ROW_INCHES, MARGIN_INCHES = 0.2, 0.55
-UNKNOWN = "not attributed"
 COLORS: Mapping[str, str] = {
     **dict(
         zip(
@@ -43,7 +42,7 @@ COLORS: Mapping[str, str] = {
             strict=True,
         )
     ),
-    UNKNOWN: "#bbbbbb",
+    UNATTRIBUTED: "#bbbbbb",
 }
 """Shades of orange for grounding, of blue for execution."""
 MAX_COLUMNS = 2
@@ -55,7 +54,7 @@ _DARK = frozenset((*GROUNDING[:3], *EXECUTION[:3]))
 Counts = Mapping[tuple[PolicyRun, InstructionOptions], Counter[str]]
 
 
-def draw_failures(content: FigureData) -> Figure | None:
+def draw_failures(content: RunData) -> Figure | None:
     """Draw the shares of episodes by cause of failure; return None without failures."""
     counts, played = _counts(content)
     if not any(counts.values()):
@@ -90,19 +89,13 @@ def draw_failures(content: FigureData) -> Figure | None:
     return figure
 
 
-def failure_name(result: Summary) -> str:
-    """Return the name of a result's failure."""
-    return UNKNOWN if result.attribution is None else result.attribution.failure
-
-
-def _counts(content: FigureData) -> tuple[Counts, Counter[tuple[PolicyRun, InstructionOptions]]]:
+def _counts(content: RunData) -> tuple[Counts, Counter[tuple[PolicyRun, InstructionOptions]]]:
     counts: dict[tuple[PolicyRun, InstructionOptions], Counter[str]] = defaultdict(Counter)
     played: Counter[tuple[PolicyRun, InstructionOptions]] = Counter()
     for key, cell in content.cells.items():
         played[key.policy_run, key.options] += cell.trials
-    for policy_run, result in content.results:
-        if result.outcome == "failure":
-            counts[policy_run, result.column][failure_name(result)] += 1
+    for key, own in count_failures(content).items():
+        counts[key.policy_run, key.options] += own
     return counts, played
 
 

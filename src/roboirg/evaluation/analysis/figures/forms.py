@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
-from roboirg.core.instruction_options import InstructionOptions
-from roboirg.evaluation.analysis.figures.figure_data import FigureData
 from roboirg.evaluation.analysis.figures.figure_style import (
     COLUMN_INCHES,
     PAGE_INCHES,
@@ -14,11 +12,10 @@ from roboirg.evaluation.analysis.figures.figure_style import (
     folded,
     new_figure,
 )
-from roboirg.evaluation.analysis.stats.cells import PolicyRun
-from roboirg.evaluation.analysis.stats.option_labels import default_settings
+from roboirg.evaluation.analysis.stats.form_gaps import FormRow, form_rows
 from roboirg.evaluation.analysis.stats.paired_tests import Gap
 from roboirg.evaluation.analysis.stats.rates import points
-from roboirg.evaluation.analysis.stats.run_summary import ALL, ALL_TASKS, Scope, ScopeKey
+from roboirg.evaluation.analysis.stats.run_data import RunData
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -39,17 +36,9 @@ MAX_COLUMNS = 2
 """Panels side by side."""
 
 
-class FormRow(NamedTuple):
-    """A bar: scope, setting and the gap between the two forms."""
-
-    scope: str
-    setting: str
-    gap: Gap
-
-
-def draw_forms(content: FigureData) -> Figure | None:
+def draw_forms(content: RunData) -> Figure | None:
     """Draw overlap and difference of the two forms; return None unless both were played."""
-    panels = {one: rows for one in content.names if (rows := _rows(content, one))}
+    panels = {one: rows for one in content.names if (rows := form_rows(content, one))}
     if not panels:
         return None
     across = min(MAX_COLUMNS, len(panels))
@@ -72,23 +61,6 @@ def draw_forms(content: FigureData) -> Figure | None:
         ncols=len(PARTS) if across > 1 else 2, columnspacing=1.2, handletextpad=0.4,
     )  # fmt: skip
     return figure
-
-
-def _rows(content: FigureData, policy_run: PolicyRun) -> list[FormRow]:
-    suites = dict.fromkeys(
-        key.scope.suite for key in content.summaries if key.scope.suite is not None
-    )
-    settings = default_settings(key.options for key in content.summaries)
-    scopes = [(suite, Scope(suite=suite)) for suite in suites]
-    if len(scopes) > 1:
-        scopes.append((ALL_TASKS, ALL))
-    return [
-        FormRow(name, setting, one.form_gap)
-        for name, scope in scopes
-        for setting in settings
-        if (key := ScopeKey(policy_run, scope, InstructionOptions(setting))) in content.summaries
-        if (one := content.summaries[key]).form_gap is not None
-    ]
 
 
 def _draw_panel(axes: Axes, rows: list[FormRow]) -> None:

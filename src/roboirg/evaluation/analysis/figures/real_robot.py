@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
-from roboirg.evaluation.analysis.figures.figure_data import FigureData
 from roboirg.evaluation.analysis.figures.figure_style import (
     COLORS,
     PAGE_INCHES,
@@ -16,6 +15,7 @@ from roboirg.evaluation.analysis.figures.figure_style import (
 from roboirg.evaluation.analysis.published import TRIALS
 from roboirg.evaluation.analysis.stats.intervals import wilson_interval
 from roboirg.evaluation.analysis.stats.option_labels import setting_sort_key
+from roboirg.evaluation.analysis.stats.run_data import RunData
 from roboirg.evaluation.analysis.tables.paper_tables import make_table
 from roboirg.evaluation.analysis.tables.table import Row, Table
 
@@ -73,11 +73,15 @@ def bar_series(table: Table) -> tuple[Series, ...]:
     return tuple(sorted(found.values(), key=lambda one: one.published))
 
 
-def draw_real_robot(content: FigureData, *, published: bool) -> Figure | None:
-    """Draw success of real-robot tasks by setting, a panel for each task; None without verdicts."""
+def draw_real_robot(content: RunData, *, published: bool) -> Figure | None:
+    """Draw success of real-robot tasks by setting, a panel for each task; None without verdicts.
+
+    Without results the published ones are drawn.
+    """
     table = make_table("real", content.cells, published=published)
     series = bar_series(table)
-    if not any(one.bars for one in series if not one.published):
+    is_alone = published and not content.cells
+    if not any(one.bars for one in series if is_alone or not one.published):
         return None
     tasks = [column.name for column in table.columns if not column.averages]
     figure = new_figure(PAGE_INCHES, PANEL_HEIGHT)

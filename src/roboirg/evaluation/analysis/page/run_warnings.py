@@ -141,8 +141,7 @@ def _mixed(entries: EpisodeEntries) -> Iterable[str]:
 
 
 def _cut(entries: EpisodeEntries) -> Iterable[str]:
-    runs = {entry.run.name: entry.run for entry in entries.all}
-    counts = count_heard([(name, run.records) for name, run in runs.items()], entries.names)
+    counts = count_heard((entry.policy_run, entry.record) for entry in entries.all)
     return heard_notes(counts, entries.names)
 
 

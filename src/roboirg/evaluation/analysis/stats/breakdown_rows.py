@@ -48,16 +48,18 @@ def break_down(cells: Cells, labels: Labels, rng: np.random.Generator) -> tuple[
     """Return a row for each policy run, set of options and label, in the order of the cells.
 
     Gaps are paired by episode: those of a label are compared with explicit on the very same
-    episodes, whose instruction has no label. The cells are sorted and have the explicit setting.
+    episodes, whose instruction has the same label or none. The cells are sorted and have the
+    explicit setting.
     """
     explicit = {key: cell for key, cell in cells.items() if key.options == REFERENCE}
-    others = {key: cell for key, cell in cells.items() if key.options != REFERENCE}
-    found = [
-        (label, one)
-        for label, part in cells_by_label(others, labels).items()
-        for one in group_by_scope({**explicit, **part})
-        if one.scope == ALL and one.options != REFERENCE
-    ]
+    found = []
+    for label, part in cells_by_label(cells, labels).items():
+        has_explicit = any(key.options == REFERENCE for key in part)
+        found += [
+            (label, one)
+            for one in group_by_scope(part if has_explicit else {**explicit, **part})
+            if one.scope == ALL and (has_explicit or one.options != REFERENCE)
+        ]
     runs = list(dict.fromkeys(key.policy_run for key in cells))
     # Stable: the labels of a setting stay in their order.
     found.sort(key=lambda pair: (runs.index(pair[1].policy_run), options_sort_key(pair[1].options)))

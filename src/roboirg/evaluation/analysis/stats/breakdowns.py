@@ -11,6 +11,7 @@ from roboirg.core.errors import UnknownNameError
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.evaluation.analysis.stats.cells import CellKey, CellResults, Cells, Trial
 from roboirg.evaluation.records.record import Record
+from roboirg.language.settings import EXPLICIT
 
 UNKNOWN = "unknown"
 """Label of instructions whose records do not say what is asked."""
@@ -29,12 +30,14 @@ class Breakdown(NamedTuple):
         labels: returns the labels of an instruction: none if the question does not apply to it,
             `UNKNOWN` if its record does not answer it. With several labels it counts in each.
         note: what the labels mean, a sentence.
+        in_explicit: whether explicit instructions are broken down, too.
     """
 
     name: str
     title: str
     labels: Callable[[Record], tuple[str, ...]]
     note: str
+    in_explicit: bool = False
 
 
 class InstructionKey(NamedTuple):
@@ -141,6 +144,13 @@ BREAKDOWNS: Mapping[str, Breakdown] = {
             "Commands that say “it”: with a recency rival, the last remark before the command "
             "is about one other thing. With a rival: how the words single one of two values out.",
         ),
+        Breakdown(
+            "difficulty",
+            "difficulty",
+            lambda record: (record.difficulty,),
+            "The difficulty is that of the scene: its number of things, swaps or repetitions.",
+            in_explicit=True,
+        ),
     )
 }
 
@@ -166,7 +176,9 @@ def label_instructions(
     for record in records:
         key = InstructionKey.of(record)
         for breakdown in breakdowns:
-            labels, own = breakdown.labels(record), found[breakdown.name]
+            is_asked = breakdown.in_explicit or record.setting != EXPLICIT
+            labels = breakdown.labels(record) if is_asked else ()
+            own = found[breakdown.name]
             if labels != (UNKNOWN,) or key not in own:
                 own[key] = labels
     return dict(found)
@@ -176,13 +188,14 @@ def cells_by_label(cells: Cells, labels: Labels) -> dict[str, Cells]:
     """Return for each label the cells with only the verdicts on its instructions.
 
     Labels that are numbers come by size, then words by letters, then unknown. Trials whose
-    instruction no record describes are unknown. Errors and missing trials are not counted, and
-    cells without a verdict are left out.
+    instruction no record describes are unknown, if it is not explicit. Errors and missing trials
+    are not counted, and cells without a verdict are left out.
     """
     found: dict[str, dict[CellKey, dict[Trial, bool]]] = {}
     for key, cell in cells.items():
+        usual = () if key.options.setting == EXPLICIT else (UNKNOWN,)
         for trial, won in cell.verdicts.items():
-            for label in labels.get(InstructionKey.of_trial(key, trial), (UNKNOWN,)):
+            for label in labels.get(InstructionKey.of_trial(key, trial), usual):
                 found.setdefault(label, {}).setdefault(key, {})[trial] = won
     return {
         label: {key: CellResults(verdicts) for key, verdicts in found[label].items()}

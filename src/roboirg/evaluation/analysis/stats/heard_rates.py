@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 
@@ -62,20 +62,11 @@ class HeardCounts:
 HeardCells = Mapping[CellKey, HeardCounts]
 
 
-def count_heard(
-    runs: Iterable[tuple[str, Iterable[Summary]]], known: Collection[PolicyRun] = ()
-) -> HeardCells:
-    """Count the results of runs by cell; policies that declare no limit are left out.
-
-    `known` are policy runs as `gather` names them; by default none bears the name of its run.
-    """
+def count_heard(results: Iterable[tuple[PolicyRun, Summary]]) -> HeardCells:
+    """Count results by cell; policies that declare no limit are left out."""
     found: defaultdict[CellKey, HeardCounts] = defaultdict(HeardCounts)
-    for name, results in runs:
-        for result in results:
-            policy_run = PolicyRun.of(result)
-            if known and policy_run not in known:
-                policy_run = policy_run._replace(run=name)
-            found[CellKey(policy_run, result.task, result.column)].add(result)
+    for policy_run, result in results:
+        found[CellKey(policy_run, result.task, result.column)].add(result)
     declared = {key.policy_run for key, one in found.items() if one.unknown < one.episodes}
     return {key: one for key, one in found.items() if key.policy_run in declared}
 

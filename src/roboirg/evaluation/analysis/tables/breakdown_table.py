@@ -18,6 +18,7 @@ from roboirg.evaluation.analysis.stats.cells import (
 )
 from roboirg.evaluation.analysis.stats.intervals import SEED
 from roboirg.evaluation.analysis.stats.option_labels import options_label
+from roboirg.evaluation.analysis.stats.paired_tests import Gap
 from roboirg.evaluation.analysis.stats.rates import p_text, percent, points
 from roboirg.evaluation.analysis.tables.table import (
     NOT_APPLICABLE,
@@ -59,19 +60,19 @@ def make_breakdown_table(
     )
 
 
-def interval_text(row: BreakdownRow) -> str:
-    """Return the ends of the gap's interval in points; a dash without one."""
-    if row.gap is None or row.gap.interval is None:
+def interval_text(gap: Gap | None) -> str:
+    """Return the ends of a gap's interval in points; a dash without one."""
+    if gap is None or gap.interval is None:
         return NOT_APPLICABLE
-    low, high = (points(end, 1) for end in row.gap.interval)
+    low, high = (points(end, 1) for end in gap.interval)
     return f"{low} to {high}"
 
 
-def corrected_p_text(row: BreakdownRow) -> str:
-    """Return the corrected p-value without its letter; a dash without one."""
-    if row.p_holm is None:
+def corrected_p_text(p_value: float | None) -> str:
+    """Return a p-value without its letter; a dash without one."""
+    if p_value is None:
         return NOT_APPLICABLE
-    return p_text(row.p_holm).removeprefix("p ").removeprefix("= ")
+    return p_text(p_value).removeprefix("p ").removeprefix("= ")
 
 
 def _entries(row: BreakdownRow) -> tuple[Entry, ...]:
@@ -81,8 +82,8 @@ def _entries(row: BreakdownRow) -> tuple[Entry, ...]:
         Entry(word=str(results.episodes)),
         Entry(percent=None if results.rate is None else percent(results.rate), counts=counts),
         Entry(word=NOT_APPLICABLE if row.gap is None else points(row.gap.value, 1)),
-        Entry(word=interval_text(row)),
-        Entry(word=corrected_p_text(row)),
+        Entry(word=interval_text(row.gap)),
+        Entry(word=corrected_p_text(row.p_holm)),
     )
 
 

@@ -2,19 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from fractions import Fraction
 
-from roboirg.evaluation.analysis.stats.cells import PolicyRun
+from roboirg.core.errors import InvalidValueError
 from roboirg.evaluation.analysis.stats.heard_rates import (
-    HeardCells,
     HeardCounts,
     add_up,
+    count_heard,
     cut_text,
     sorted_keys,
 )
 from roboirg.evaluation.analysis.stats.option_labels import options_label
 from roboirg.evaluation.analysis.stats.rates import percent
+from roboirg.evaluation.analysis.stats.run_data import RunData
 from roboirg.evaluation.analysis.stats.run_summary import ALL_TASKS
 from roboirg.evaluation.analysis.tables.table import (
     NOT_APPLICABLE,
@@ -34,8 +34,18 @@ NOTE = (
 )
 
 
-def make_heard_table(cells: HeardCells, names: Mapping[PolicyRun, str]) -> Table:
-    """Make the table, one row for each cell and for all tasks."""
+def make_heard_table(data: RunData) -> Table:
+    """Make the table, one row for each cell and for all tasks.
+
+    Raises:
+        InvalidValueError: no policy declares how many tokens it reads.
+    """
+    names = data.names
+    cells = count_heard(data.results)
+    if not cells:
+        raise InvalidValueError(
+            "No policy of the runs declares how many tokens it reads; prompt_tokens=N does."
+        )
     rows: list[Row] = []
     totals = add_up(cells)
     keys = sorted_keys(cells, list(names))

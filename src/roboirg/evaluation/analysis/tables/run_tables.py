@@ -87,7 +87,7 @@ def make_run_tables(records: Sequence[Summary], planned: Sequence[Job] = ()) -> 
     policies = list(dict.fromkeys(job.policy for job in (*planned, *records)))
     cells = sort_cells(found, policy_order(found, policies))
     results = {one.key: one for one in group_by_scope(cells)}
-    heard = count_heard([("", records)])
+    heard = count_heard((PolicyRun.of(one), one) for one in records)
     return [
         _make_run_table(
             policy_run,

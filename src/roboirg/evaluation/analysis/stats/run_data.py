@@ -1,4 +1,4 @@
-"""The data of the figures."""
+"""The results of some runs with their summary: what figures and tables of runs are made from."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from roboirg.evaluation.records.record import Job, Summary
 
 
 @dataclass(frozen=True)
-class FigureData:
+class RunData:
     """The results of some runs and their summary.
 
     Attributes:
@@ -39,7 +39,7 @@ class FigureData:
     @classmethod
     def of(
         cls, runs: Sequence[tuple[str, Sequence[Summary]]], planned: Sequence[Job] = ()
-    ) -> FigureData:
+    ) -> RunData:
         """Gather, sort and summarize runs, each with its name.
 
         Policies have the order of the plan, or are sorted by name without one.
