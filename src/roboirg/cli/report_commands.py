@@ -137,7 +137,7 @@ def tables(
         str,
         typer.Option(
             help="main, planner, context, real, other, coverage, or all that apply; or of runs "
-            "alone: forms (implicit against resolved), failures, heard (what was cut of prompts)."
+            "alone: forms (implicit against resolved), failures, subgoals (of planners), heard (cut prompts)."
         ),
     ] = _ALL,
     format: Annotated[  # noqa: A002
@@ -160,11 +160,11 @@ def tables(
 
     Example: roboirg tables runs/first --which main --published
     """
-    from roboirg.evaluation.analysis.tables.diagnostic_tables import DIAGNOSTIC_TABLES
+    from roboirg.evaluation.analysis.tables.diagnostic_tables import DIAGNOSTIC_TABLES, SUBGOALS
     from roboirg.evaluation.analysis.tables.rendering import get_format
 
     output = get_format(format)
-    if which in DIAGNOSTIC_TABLES:
+    if which in (*DIAGNOSTIC_TABLES, SUBGOALS):
         if published or floors or by is not None:
             raise InvalidValueError(f"--which {which} goes without --published, --floors and --by.")
         found = [_diagnostic_table(which, runs or [])]
@@ -221,7 +221,7 @@ def compare(
 def _tables(which: str, cells: Cells, *, published: bool, floors: str | None) -> list[Table]:
     from roboirg.evaluation.analysis.published import RATE_TABLES
     from roboirg.evaluation.analysis.stats.chance import FLOORS
-    from roboirg.evaluation.analysis.tables.diagnostic_tables import DIAGNOSTIC_TABLES
+    from roboirg.evaluation.analysis.tables.diagnostic_tables import DIAGNOSTIC_TABLES, SUBGOALS
     from roboirg.evaluation.analysis.tables.paper_tables import WHICH, is_informative, make_table
 
     if which == _ALL:
@@ -231,7 +231,7 @@ def _tables(which: str, cells: Cells, *, published: bool, floors: str | None) ->
     elif which in WHICH:
         wanted = [which]
     else:
-        raise UnknownNameError("table", which, (*WHICH, *DIAGNOSTIC_TABLES, _ALL))
+        raise UnknownNameError("table", which, (*WHICH, *DIAGNOSTIC_TABLES, SUBGOALS, _ALL))
     if which not in (_ALL, "coverage") and not published and not cells:
         raise InvalidValueError(
             f"The table {which!r} needs a run; give its folder, or --published."
@@ -262,11 +262,19 @@ def _breakdown_tables(runs: list[str], by: str) -> list[Table]:
 
 def _diagnostic_table(which: str, runs: list[str]) -> Table:
     from roboirg.evaluation.analysis.stats.run_data import RunData
-    from roboirg.evaluation.analysis.tables.diagnostic_tables import DIAGNOSTIC_TABLES
+    from roboirg.evaluation.analysis.tables.diagnostic_tables import DIAGNOSTIC_TABLES, SUBGOALS
+    from roboirg.evaluation.analysis.tables.subgoal_table import make_subgoal_table
+    from roboirg.evaluation.records.store import iterate_records
 
     if not runs:
         raise InvalidValueError(f"The table {which!r} needs a run; give its folder.")
-    return DIAGNOSTIC_TABLES[which](RunData.of(*_runs(runs)))
+    data = RunData.of(*_runs(runs))
+    if which != SUBGOALS:
+        return DIAGNOSTIC_TABLES[which](data)
+    return make_subgoal_table(
+        data,
+        ((run, record) for run in dict.fromkeys(runs) for record in iterate_records(Path(run))),
+    )
 
 
 def _breakdowns(by: str | None) -> tuple[Breakdown, ...]:

@@ -6,11 +6,15 @@ from typing import Annotated
 
 import msgspec
 
+from roboirg.core.subgoal_text import MOST_SUBGOAL_LETTERS
+
 MOST_NAME_LETTERS = 1000
 CONTROLS = "\\x00-\\x1f\\x7f-\\x9f\\u200e\\u200f\\u202a-\\u202e\\u2066-\\u2069"
 NAME = f"^[^{CONTROLS}]{{0,{MOST_NAME_LETTERS}}}\\Z"
 """A name in a record: text without characters that control a terminal or reorder what is read."""
 
+SUBGOAL = f"^[^{CONTROLS}]{{1,{MOST_SUBGOAL_LETTERS}}}\\Z"
+Subgoal = Annotated[str, msgspec.Meta(pattern=SUBGOAL)]
 Name = Annotated[str, msgspec.Meta(pattern=NAME)]
 Whole = Annotated[int, msgspec.Meta(ge=-(2**63), le=2**63 - 1)]
 """A whole number that tables and NumPy can hold."""

@@ -16,6 +16,7 @@ from roboirg.core.episode import Episode, Stage
 from roboirg.core.errors import InvalidValueError, MotionPlanningError
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.core.observations import CAMERAS
+from roboirg.core.subgoal_text import Point
 from roboirg.envs.env_options import EnvOptions
 from roboirg.envs.env_settings import RENDER_MODES, EnvSettings, choose_index
 from roboirg.envs.episode_state import EpisodeState
@@ -25,7 +26,7 @@ from roboirg.language import Instruction, instruct_with
 from roboirg.simulation.controllers import make_controller
 from roboirg.simulation.episode_session import EpisodeSession
 from roboirg.simulation.observation_builder import ObservationBuilder
-from roboirg.simulation.pixel_grounding import PixelGrounding
+from roboirg.simulation.pixel_grounding import PixelGrounding, objects_at
 from roboirg.simulation.recording import Recording
 from roboirg.simulation.rendering.render_device import describe_device, find_render_device
 from roboirg.simulation.video.demonstration_cache import replay_or_plan
@@ -257,6 +258,15 @@ class RoboIRGEnv(gymnasium.Env[dict[str, Any], NDArray[np.floating[Any]]]):
     def read_pictures(self, fields: Sequence[str]) -> dict[str, NDArray[Any]]:
         """Return fields of the current observation that are drawn, for example ``front_rgb``."""
         return self._current.observation_builder.read_pictures(fields)
+
+    def objects_at(self, point: Point) -> frozenset[str] | None:
+        """Return the names of the objects at a point of the front picture; None without pictures.
+
+        Args:
+            point: row and column.
+        """
+        world = self.session.world
+        return objects_at(world.bodies, world.cameras, point) if self._renders else None
 
     def set_frame_hook(self, hook: FrameHook, every: int = 1) -> None:
         """Call ``hook(env, is_demonstration)`` after every n-th control step and at the end.

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import re
 from typing import Any, cast
 
 import numpy as np
@@ -12,8 +13,10 @@ from pydantic import JsonValue
 
 from roboirg.core.actions import ActionSpace, check_chunk
 from roboirg.core.errors import InvalidActionError, InvalidValueError
+from roboirg.core.field_types import SUBGOAL
 from roboirg.core.observations import Observation
-from roboirg.core.plain_text import is_encodable
+from roboirg.core.plain_text import clip_text, is_encodable
+from roboirg.core.subgoal_text import MOST_SUBGOAL_LETTERS
 from roboirg.evaluation.records.record import REAL_TRIAL
 from roboirg.policies.contract.base import Policy
 
@@ -56,6 +59,25 @@ def check_rows(rows: Any, space: ActionSpace) -> NDArray[np.float64]:  # noqa: A
     if count > MAX_ROWS:
         raise InvalidActionError(f"{count} actions at once are too many; at most {MAX_ROWS}.")
     return check_chunk(rows, space)
+
+
+def policy_subgoal(policy: Policy) -> str | None:
+    """Return the subgoal that the policy names after its `act`; None if it names none.
+
+    Raises:
+        InvalidValueError: it is no short text, or has characters that control a terminal.
+    """
+    subgoal = getattr(policy, "subgoal", None)
+    if subgoal is None or subgoal == "":
+        return None
+    if not isinstance(subgoal, str) or not re.fullmatch(SUBGOAL, subgoal):
+        raise InvalidValueError(
+            f"The policy's subgoal is {clip_text(repr(subgoal), 80)}; it must be a text of at most "
+            f"{MOST_SUBGOAL_LETTERS} characters, none of which controls a terminal."
+        )
+    if not is_encodable(subgoal):
+        raise InvalidValueError("The policy's subgoal has lone surrogates.")
+    return subgoal
 
 
 def policy_metadata(policy: Policy, *, is_ours: bool = True) -> dict[str, JsonValue]:

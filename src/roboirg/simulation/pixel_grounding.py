@@ -7,11 +7,14 @@ from collections.abc import Mapping
 import numpy as np
 
 from roboirg.core.episode import Stage
+from roboirg.core.subgoal_text import Point
 from roboirg.judging import plain_subgoal
 from roboirg.simulation.bodies import Body
 from roboirg.simulation.cameras import Cameras
 
 CAMERA = "front"
+REACH_PIXELS = 6
+"""How far from an object a point may be that means it; a cube is 10 to 20 pixels wide."""
 
 
 class PixelGrounding:
@@ -52,3 +55,14 @@ class PixelGrounding:
         seen = self._cameras.segmentation(CAMERA) == self._bodies[name].segment
         rows, columns = np.nonzero(seen)
         return (int(rows.mean()), int(columns.mean())) if len(rows) else None
+
+
+def objects_at(bodies: Mapping[str, Body], cameras: Cameras, point: Point) -> frozenset[str]:
+    """Return the names of the objects seen within `REACH_PIXELS` of a point of the picture."""
+    row, column = point
+    top, left = max(row - REACH_PIXELS, 0), max(column - REACH_PIXELS, 0)
+    around = cameras.segmentation(CAMERA)[
+        top : row + REACH_PIXELS + 1, left : column + REACH_PIXELS + 1
+    ]
+    seen = {int(one) for one in np.unique(around)}
+    return frozenset(name for name, body in bodies.items() if body.segment in seen)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 import zipfile
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
@@ -30,6 +29,7 @@ from roboirg.core.episode import ENVIRONMENT_VERSION, Episode
 from roboirg.core.errors import InvalidValueError, MotionPlanningError
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.core.observations import CAMERAS
+from roboirg.core.subgoal_text import split_point
 from roboirg.envs.factory import make
 from roboirg.policies.contract.base import Policy
 from roboirg.policies.contract.play import EpisodeLoop
@@ -39,7 +39,6 @@ from roboirg.util.atomic_write import replacing
 if TYPE_CHECKING:
     from roboirg.envs.environment import RoboIRGEnv
 
-_PIXEL = re.compile(r" at <\d+, \d+>")
 _VIDEO_PARTS = ("demonstration", "policy")
 
 
@@ -342,7 +341,7 @@ def _is_picture(key: str) -> bool:
 
 def without_pixel(subgoal: str) -> str:
     """Return a grounded subgoal without its pixel."""
-    return _PIXEL.sub("", subgoal)
+    return split_point(subgoal)[0]
 
 
 def _with_pixels(templates: list[str], online: list[str]) -> list[str]:

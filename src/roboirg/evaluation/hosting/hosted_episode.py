@@ -17,7 +17,7 @@ from roboirg.evaluation.hosting.messages import (
     map_block,
     unpack_payload,
 )
-from roboirg.evaluation.policy_calls import check_rows, dump_metadata, policy_usage
+from roboirg.evaluation.policy_calls import check_rows, dump_metadata, policy_subgoal, policy_usage
 from roboirg.policies.by_name.loading import make_policy, policy_version
 from roboirg.policies.contract.base import close_policy, tell_policy
 from roboirg.policies.contract.policy_needs import PolicyNeeds
@@ -118,7 +118,8 @@ class HostedEpisode:
         """Return a policy's actions, checked, for a message."""
         chunk = check_rows(rows, self._needs.action_space)
         latency_s = float(getattr(self.policy, "latency_s", 0.0))
-        return Acted(chunk.tobytes(), chunk.shape[1], latency_s)
+        subgoal = policy_subgoal(self.policy)
+        return Acted(chunk.tobytes(), chunk.shape[1], latency_s, subgoal)
 
     def hear(self, call: Call) -> Told:
         """Tell the policy what was said; returns its metadata."""

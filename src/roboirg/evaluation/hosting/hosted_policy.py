@@ -62,6 +62,7 @@ class HostedPolicy:
         metadata: as the policy reports them, from `reset` on.
         waited_s: seconds that its calls waited for others.
         latency_s: seconds that its last actions took on the robot it is meant for, if it tells.
+        subgoal: what it named after its last actions, if anything.
 
     Raises:
         EpisodeError: the policy cannot be made.
@@ -73,6 +74,7 @@ class HostedPolicy:
         self._spec = spec
         self.metadata: dict[str, JsonValue] = {}
         self.waited_s = self.latency_s = 0.0
+        self.subgoal: str | None = None
         self._demonstration: Demonstration = {}
         self._sent: Payload = pack_payload(None)
         self._is_open = True
@@ -101,7 +103,7 @@ class HostedPolicy:
     def act(self, observation: Observation) -> NDArray[np.float64]:
         """Return the next actions (n, 8) or (n, 7)."""
         found = self._call(Acted, self._pack("act", observation))
-        self.latency_s = found.latency_s
+        self.latency_s, self.subgoal = found.latency_s, found.subgoal
         if not found.rows or len(found.rows) % (8 * found.size):
             raise EpisodeError("policy", f"{_SENT} actions in part", "")
         return np.frombuffer(found.rows, np.float64).reshape(-1, found.size).copy()

@@ -19,6 +19,7 @@ import msgspec
 import numpy as np
 from msgspec import Meta, Struct
 
+from roboirg.core.subgoal_text import MOST_SUBGOAL_LETTERS
 from roboirg.evaluation.episode_errors import MAX_DETAILS_LENGTH
 from roboirg.evaluation.policy_calls import MAX_COSTS, MAX_METADATA_LENGTH
 from roboirg.evaluation.records.record import ErrorKind
@@ -84,11 +85,12 @@ class Told(Struct, tag="told", forbid_unknown_fields=True):
 
 
 class Acted(Struct, tag="acted", forbid_unknown_fields=True):
-    """Actions as bytes of float64, the numbers of each, and the seconds that they took."""
+    """Actions as bytes of float64, the numbers of each, the seconds that they took, a subgoal."""
 
     rows: bytes
     size: Annotated[int, Meta(ge=1, le=64)]
     latency_s: Annotated[float, Meta(ge=0, le=1e6)]
+    subgoal: Annotated[str, Meta(max_length=MOST_SUBGOAL_LETTERS)] | None = None
 
 
 class Failure(Struct, tag="failure", forbid_unknown_fields=True):

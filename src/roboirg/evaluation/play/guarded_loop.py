@@ -11,11 +11,13 @@ from numpy.typing import ArrayLike, NDArray
 from roboirg.core.actions import ActionSpace
 from roboirg.core.delivery import SpokenInstruction
 from roboirg.core.observations import Demonstration
+from roboirg.core.subgoal_text import split_point
 from roboirg.evaluation.play.call_guard import CallGuard
 from roboirg.evaluation.play.rollout_result import RolloutResult
 from roboirg.evaluation.play.video_writer import FrameSink
-from roboirg.evaluation.policy_calls import next_actions, policy_metadata
-from roboirg.evaluation.records.record import Job
+from roboirg.evaluation.policy_calls import next_actions, policy_metadata, policy_subgoal
+from roboirg.evaluation.records.record import Job, SubgoalRecord
+from roboirg.judging import judge_subgoal, plain_subgoal
 from roboirg.policies.by_name.loading import is_foreign, is_privileged
 from roboirg.policies.contract.base import Policy
 from roboirg.policies.contract.play import EpisodeLoop
@@ -97,7 +99,26 @@ class GuardedLoop(EpisodeLoop):
     def act(self, observation: dict[str, Any]) -> NDArray[np.float64]:
         """Return the policy's next actions, checked."""
         with self._guard.policy("policy's act()", "policy_act"):
-            return next_actions(self.policy, observation, self._space)
+            rows = next_actions(self.policy, observation, self._space)
+            subgoal = policy_subgoal(self.policy)
+        if subgoal is not None:
+            with self._guard.environment("env_subgoal"):
+                self._note_subgoal(subgoal)
+        return rows
+
+    def _note_subgoal(self, subgoal: str) -> None:
+        """Keep a subgoal if it or the stage that is due is new."""
+        stage, found = self.env.session.judge.published, self._result.subgoals
+        due = None if stage is None else plain_subgoal(stage)
+        if found and (found[-1].text, found[-1].due) == (subgoal, due):
+            return
+        _, point = split_point(subgoal)
+        verdict = judge_subgoal(subgoal, stage, self.env.objects_at(point) if point else None)
+        found.append(
+            SubgoalRecord(
+                step=self._result.steps, text=subgoal, point=point, due=due, verdict=verdict
+            )
+        )
 
     def execute(self, actions: ArrayLike) -> tuple[dict[str, Any], dict[str, Any]]:
         """Execute actions, and keep those that were executed."""

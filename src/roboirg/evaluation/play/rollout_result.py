@@ -40,6 +40,7 @@ from roboirg.evaluation.records.record import (
     Outcome,
     PromptAudit,
     Record,
+    SubgoalRecord,
     UtteranceRecord,
 )
 from roboirg.judging import Event, attribute_failure
@@ -71,6 +72,7 @@ class RolloutResult:
         instruction: what the policy was told; None if the episode did not get that far.
         heard: what the policy has heard so far, in order: ``text`` and ``step``.
         events: facts that became true or ceased to be.
+        subgoals: what the policy's planner named.
         render_device: the driver's name; None if nothing was rendered.
         details: traceback of an error.
         policy: its version and whether it is privileged; None if it was never loaded.
@@ -97,6 +99,7 @@ class RolloutResult:
     instruction: language.Instruction | None = None
     heard: list[Mapping[str, Any]] = field(default_factory=list)
     events: list[EventRecord] = field(default_factory=list)
+    subgoals: list[SubgoalRecord] = field(default_factory=list)
     render_device: str | None = None
     details: str | None = None
     policy: PolicyDescription | None = None
@@ -226,6 +229,7 @@ def make_record(
         action_log=action_log,
         end_state=None if result.end_state is None else result.end_state[1],
         events=tuple(result.events),
+        subgoals=tuple(result.subgoals),
         video=video,
         video_error=video_error,
         **_versions(),

@@ -17,7 +17,7 @@ from typing import Annotated, Any, Literal, Self, get_args
 import msgspec
 
 from roboirg.core.delivery import PromptVerdict
-from roboirg.core.field_types import Cause, Name, Whole
+from roboirg.core.field_types import Cause, Name, Subgoal, Whole
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.core.observations import DemonstrationFrames, DemonstrationSource
 from roboirg.evaluation.records.run_files import RELATIVE_PATH
@@ -195,6 +195,24 @@ class EventRecord(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
     holds: bool = True
 
 
+class SubgoalRecord(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """A subgoal that a planner named, when it or the due stage was new.
+
+    Attributes:
+        step: control steps of the policy before it.
+        text: as the planner said it.
+        point: row and column in the front picture, if it has them.
+        due: the stage that was due, in words; None after the last one.
+        verdict: whether it is what was due, as in `roboirg.judging.subgoal_verdicts`.
+    """
+
+    step: Whole
+    text: Subgoal
+    point: tuple[Whole, Whole] | None = None
+    due: Name | None = None
+    verdict: Name
+
+
 class Attribution(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """Why an episode failed, concluded from its events.
 
@@ -336,6 +354,7 @@ class Record(Summary, frozen=True, kw_only=True, forbid_unknown_fields=True):
         end_state: hash of the state in which the episode left the world and the judge; None if it
             did not come to an end.
         events: facts that became true or false, in order.
+        subgoals: what a planner named, in order.
         usage: what models queried by the policy cost: ``calls``, ``input_tokens``,
             ``output_tokens``, ``cost_usd``.
         timings: wall-clock seconds by phase: ``policy_load``, ``policy_act``, ``env_step``, ….
@@ -354,6 +373,7 @@ class Record(Summary, frozen=True, kw_only=True, forbid_unknown_fields=True):
     policy_metadata: dict[str, Any] = {}
     end_state: str | None = None
     events: tuple[EventRecord, ...] = ()
+    subgoals: tuple[SubgoalRecord, ...] = ()
     usage: dict[str, float] = {}
     timings: dict[str, float] = {}
     video_error: str | None = None

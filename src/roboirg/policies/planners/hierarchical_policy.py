@@ -36,6 +36,7 @@ class HierarchicalPolicy:
 
     Attributes:
         needs: of both.
+        subgoal: the planner's newest, for the records.
 
     Raises:
         InvalidValueError: the policy has no method ``follow``.
@@ -56,6 +57,7 @@ class HierarchicalPolicy:
             self.needs = replace(self.needs, observe_every=1)
         self.needs.declare_on(self)
         self._observed = self._step = self._rows = 0
+        self.subgoal: str | None = None
 
     @property
     def version(self) -> str:
@@ -74,6 +76,7 @@ class HierarchicalPolicy:
 
     def reset(self, instruction: str, demonstration: Demonstration) -> None:
         """Begin an episode with both."""
+        self.subgoal = None
         self._observed = self._step = self._rows = 0
         views = [
             DemonstrationSubset(
@@ -106,6 +109,7 @@ class HierarchicalPolicy:
         subgoal = self.planner.plan(views[0], self._step)
         if subgoal is not None and isinstance(self.policy, SubgoalFollower):
             self.policy.follow(subgoal)
+            self.subgoal = subgoal
         rows = self.policy.act(views[1])
         self._rows = len(np.atleast_2d(rows))
         return rows

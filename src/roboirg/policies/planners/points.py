@@ -8,18 +8,16 @@ from __future__ import annotations
 
 import re
 
+from roboirg.core.subgoal_text import MOST_SUBGOAL_LETTERS
 from roboirg.util.json_reply import UnparsableReplyError
 
 PICTURE_SIZE = 256
 """Rows and columns of the front picture."""
 SCALE = 1000
 """The whole height or width in a model's coordinates."""
-MAX_SUBGOAL_LENGTH = 300
-"""Characters; the policies truncate after 128 tokens."""
 
 _BOX = re.compile(r"(?:<\|box_start\|>)?\(\s*(\d+)\s*,\s*(\d+)\s*\)(?:<\|box_end\|>)?")
 _POINT = re.compile(r"<\s*(\d+)\s*,\s*(\d+)\s*>")
-_PLACE = re.compile(r" at <\d+, \d+>")
 _END = re.compile(r"<\|(?:im_end|endoftext)\|>\s*$")
 _FINISHED = re.compile(r"\b(?:complete|completed|finished|done)\b")
 
@@ -60,11 +58,6 @@ def normalize_subgoal(text: str) -> str:
     return " ".join(_END.sub("", text).split()).lower().strip("\"'`. ")
 
 
-def strip_points(subgoal: str) -> str:
-    """Return a subgoal without its ``at <y, x>``."""
-    return _PLACE.sub("", subgoal)
-
-
 def says_finished(subgoal: str) -> bool:
     """Return whether a subgoal says that the task is complete, which policies do not know."""
     return _FINISHED.search(subgoal) is not None
@@ -80,8 +73,8 @@ def _as_pixels(found: re.Match[str]) -> str:
 def _check_subgoal(subgoal: str) -> str:
     if not subgoal:
         raise UnparsableReplyError("There is no subgoal.")
-    if len(subgoal) > MAX_SUBGOAL_LENGTH:
-        raise UnparsableReplyError(f"A subgoal has at most {MAX_SUBGOAL_LENGTH} characters.")
+    if len(subgoal) > MOST_SUBGOAL_LETTERS:
+        raise UnparsableReplyError(f"A subgoal has at most {MOST_SUBGOAL_LETTERS} characters.")
     rest = re.sub(r"<\d+, \d+>", "", subgoal)
     if any(sign in rest for sign in "<>|{}"):
         raise UnparsableReplyError("The subgoal holds signs that are part of no point.")

@@ -9,7 +9,8 @@ from typing import ClassVar
 from pydantic import BaseModel, ConfigDict, Field, field_validator
 
 from roboirg.core.observations import Demonstration, Observation
-from roboirg.policies.planners.points import normalize_subgoal, parse_boxes, strip_points
+from roboirg.core.subgoal_text import split_point
+from roboirg.policies.planners.points import normalize_subgoal, parse_boxes
 from roboirg.policies.planners.vlm_planner import (
     VLMPlanner,
     VLMPlannerOptions,
@@ -95,7 +96,7 @@ class QwenPlanner(VLMPlanner):
         """Return whether no rule keeps the last subgoal."""
         if self._subgoal is None:
             return True
-        text = strip_points(self._subgoal)
+        text, _ = split_point(self._subgoal)
         return not any(
             step <= hold.until and re.fullmatch(hold.says, text) for hold in self.options.holds
         )
@@ -109,9 +110,8 @@ class QwenPlanner(VLMPlanner):
         if answer is None:
             return None
         text, subgoal = answer
-        if not self._history or strip_points(parse_boxes(self._history[-1])) != strip_points(
-            subgoal
-        ):
+        last = parse_boxes(self._history[-1]) if self._history else ""
+        if not last or split_point(last)[0] != split_point(subgoal)[0]:
             self._history.append(text)
         return subgoal
 

@@ -62,12 +62,12 @@ def draw_averages(content: RunData, *, published: bool = False) -> Figure | None
                 at = place + _offset(number, len(content.names))
                 draw_point(axes, at, float(one.rate), one.interval, number, label)
     for model, setting, average in ghosts:
-        at, number = settings.index(setting), models.index(model)
+        number, label = models.index(model), f"{model} (published)"
         if is_alone:
-            place = at + _offset(number, len(models))
-            draw_point(axes, place, average / 100, None, number, f"{model} (published)")
+            at = settings.index(setting) + _offset(number, len(models))
+            draw_point(axes, at, average / 100, None, number, label)
         else:
-            draw_ghost(axes, at + GHOST_PLACE, average, number, f"{model} (published)")
+            draw_ghost(axes, settings.index(setting) + GHOST_PLACE, average, number, label)
     _set_axes(axes, shared, room=GHOST_PLACE if ghosts and not is_alone else 0.0)
     legend_below(figure, axes)
     return figure

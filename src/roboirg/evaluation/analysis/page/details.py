@@ -11,7 +11,7 @@ from roboirg.core.plain_text import counted
 from roboirg.evaluation.analysis.page.episode_videos import EpisodeVideo
 from roboirg.evaluation.analysis.page.reconstruction import names_of, stages_of
 from roboirg.evaluation.analysis.stats.option_labels import words_label
-from roboirg.evaluation.records.record import EventRecord, Record
+from roboirg.evaluation.records.record import EventRecord, Record, SubgoalRecord
 from roboirg.language.settings import EXPLICIT
 
 EMBEDDED = "#"
@@ -77,6 +77,10 @@ def details_of(
             [one.step, index(event_text(one, names)), int(one.holds)]
             for one in _shown_events(record)
         ],
+        "subgoals": [
+            [one.step, index(_subgoal_text(one)), int(one.verdict == "right")]
+            for one in record.subgoals
+        ],
         "stages": [[index(mark.subgoal), mark.step] for mark in stages_of(record)],
         "traceback": optional_index(record.details),
         "lost": optional_index(record.video_error),
@@ -101,6 +105,12 @@ def event_text(event: EventRecord, names: Mapping[str, str]) -> str:
         return f"{traits.past.format(subject=subject, place=place)}; that is over"
     words = traits.past if event.holds else traits.ceased
     return words.format(subject=subject, place=place)
+
+
+def _subgoal_text(one: SubgoalRecord) -> str:
+    if one.verdict == "right":
+        return one.text
+    return f"{one.text} ({one.verdict.replace('_', ' ')}; due: {one.due or 'nothing'})"
 
 
 def _mentions(record: Record, strings: Strings) -> list[list[int]]:

@@ -48,10 +48,12 @@ class RunData:
         policies = list(dict.fromkeys(job.policy for job in planned))
         cells = sort_cells(found, policy_order(found, policies))
         names = labels(cells)
-        results = [
-            (_policy_run(name, one, names), one) for name, results in runs for one in results
-        ]
+        results = [(_owner(name, one, names), one) for name, results in runs for one in results]
         return cls(tuple(results), cells, summaries_by_key(cells), names)
+
+    def owner(self, run: str, result: Summary) -> PolicyRun:
+        """Return the policy run of a result of a run."""
+        return _owner(run, result, self.names)
 
     def is_complete(self, policy_run: PolicyRun) -> bool:
         """Return whether every planned trial of a policy run has a verdict."""
@@ -69,7 +71,7 @@ def summaries_by_key(cells: Cells) -> Mapping[ScopeKey, SummaryRow]:
     return {one.key: one for one in summarize(cells, np.random.default_rng(SEED))}
 
 
-def _policy_run(run: str, result: Summary, known: Mapping[PolicyRun, str]) -> PolicyRun:
+def _owner(run: str, result: Summary, known: Mapping[PolicyRun, str]) -> PolicyRun:
     """Return the policy run of a result; it names the run if several runs played the policy."""
     policy_run = PolicyRun.of(result)
     return policy_run if policy_run in known else policy_run._replace(run=run)

@@ -125,6 +125,8 @@ def _failure_entries(trials: int, counts: Counter[str], kinds: Iterable[str]) ->
         yield Entry(word=f"{counts[kind]}{share}")
 
 
+SUBGOALS = "subgoals"
+"""Name of one more, which needs whole records."""
 DIAGNOSTIC_TABLES: Mapping[str, Callable[[RunData], Table]] = {
     "forms": make_forms_table,
     "failures": make_failure_table,

@@ -8,6 +8,8 @@ const momentsOf = (details) => {
   const moments = [
     ...(details.events ?? []).map(([step, text, holds]) =>
       ({ step, kind: holds ? "event" : "event ends", words: strings[text] })),
+    ...(details.subgoals ?? []).map(([step, text, right]) =>
+      ({ step, kind: right ? "said" : "said wrong", label: right ? "“" : "?", words: `planner: ${strings[text]}` })),
     ...(details.stages ?? []).map(([text, step], place) =>
       ({ step, kind: "done", label: String(place + 1), words: `stage ${place + 1}: ${strings[text]}` })),
   ].filter(({ step }) => step !== null);
@@ -100,6 +102,7 @@ const legend = (details, moments) => {
   const words = [];
   if (details.shown) words.push("striped: the video shown before");
   if (moments.some(({ kind }) => kind === "done")) words.push("numbers: a stage of the task was completed");
+  if (moments.some(({ kind }) => kind === "said wrong")) words.push("?: a planner’s subgoal that was not due");
   if (open) words.push(`${counted(open, "stage")} never completed`);
   return words.length ? h("p", { class: "aside" }, `${words.join("; ")}.`) : null;
 };

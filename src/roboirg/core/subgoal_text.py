@@ -1,0 +1,18 @@
+"""Subgoals in words, perhaps with a point of the front picture: ``pick up the cube at <y, x>``."""
+
+from __future__ import annotations
+
+import re
+
+MOST_SUBGOAL_LETTERS = 300
+"""Characters; the policies that follow subgoals truncate after 128 tokens."""
+_POINT = re.compile(r" at <(\d{1,4}), (\d{1,4})>")
+
+Point = tuple[int, int]
+"""Row and column in the front picture."""
+
+
+def split_point(subgoal: str) -> tuple[str, Point | None]:
+    """Return the words of a subgoal without points, and its first point."""
+    found = _POINT.search(subgoal)
+    return _POINT.sub("", subgoal), None if found is None else (int(found[1]), int(found[2]))
