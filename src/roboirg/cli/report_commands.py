@@ -137,7 +137,7 @@ def tables(
         str,
         typer.Option(
             help="main, planner, context, real, other, coverage, or all that apply; or of runs "
-            "alone: forms (implicit against resolved), failures, subgoals (of planners), heard (cut prompts)."
+            "alone: forms, failures, subgoals (of planners), heard (how many prompts were cut)."
         ),
     ] = _ALL,
     format: Annotated[  # noqa: A002

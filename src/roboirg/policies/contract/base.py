@@ -29,13 +29,13 @@ class Policy(Protocol):
     ``calibration = True`` their matrices, as in `roboirg.core.observations.Observation`.
 
     All of these are optional, and so are the following. ``version`` (text) and ``metadata``
-    (JSON values by name; read after `reset`) go into the records, and so does ``subgoal`` (a text of
-    at most 300 characters, perhaps with ``at <y, x>``, or None; read after `act`). ``usage()`` is
+    (JSON values by name; read after `reset`) go into the records, and so does ``subgoal`` (None or
+    a text of at most 300 characters, perhaps with ``at <y, x>``; read after `act`). ``usage()`` is
     called at the end of an episode and returns its cost: ``calls``, ``input_tokens``,
-    ``output_tokens``, ``cost_usd``. ``close()`` is called after that. ``deterministic = False`` declares that equal
-    episodes with equal seeds may differ, which `roboirg check-policy` then accepts. With
-    ``grounded = True`` the environment gives the pixels of subgoals, for privileged policies that
-    pass them on.
+    ``output_tokens``, ``cost_usd``. ``close()`` is called after that. ``deterministic = False``
+    declares that equal episodes with equal seeds may differ, which `roboirg check-policy` then
+    accepts. With ``grounded = True`` the environment gives the pixels of subgoals, for privileged
+    policies that pass them on.
 
     If an instruction is delivered in turns, `reset` gets what is said first, and
     ``hear(text, step)``, if the policy has it, each later utterance before the next call of `act`;

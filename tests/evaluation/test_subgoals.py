@@ -1,0 +1,112 @@
+"""What a policy names as its subgoal: checked, in the record, on the page and in the table."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from msgspec.structs import replace
+from typer.testing import CliRunner
+
+import roboirg
+from roboirg.core.errors import InvalidValueError
+from roboirg.core.instruction_options import InstructionOptions
+from roboirg.core.subgoal_text import split_point
+from roboirg.evaluation.analysis.page.report import render
+from roboirg.evaluation.play.rollout import play_episode
+from roboirg.evaluation.play.rollout_result import RolloutResult, make_record
+from roboirg.evaluation.policy_calls import policy_subgoal
+from roboirg.evaluation.records.record import Job, SubgoalRecord
+from roboirg.evaluation.records.record_codec import encode, read_record
+from roboirg.evaluation.records.store import RecordStore, StoreError
+from roboirg.main import app
+
+JOB = Job(
+    policy="random",
+    task="PickXtimes",
+    split="test",
+    episode=0,
+    options=InstructionOptions("direct"),
+    max_steps=30,
+)
+SAID = (
+    SubgoalRecord(
+        step=0, text="pick up the cube at <3, 4>", point=(3, 4), due="pick it up",
+        verdict="wrong_thing",
+    ),
+    SubgoalRecord(step=16, text="pick it up", due="pick it up", verdict="right"),
+    SubgoalRecord(step=32, text="sing", verdict="lost"),
+)  # fmt: skip
+
+
+@pytest.mark.parametrize("subgoal", [3, b"pick", ["pick"], "x" * 301, "a\nb", "\x1b[2J", "\ud800"])
+def test_a_subgoal_is_a_short_text(subgoal: object) -> None:
+    with pytest.raises(InvalidValueError, match="The policy's subgoal"):
+        policy_subgoal(SimpleNamespace(subgoal=subgoal))
+
+
+def test_a_subgoal_is_optional() -> None:
+    assert policy_subgoal(SimpleNamespace()) is policy_subgoal(SimpleNamespace(subgoal="")) is None
+    assert policy_subgoal(SimpleNamespace(subgoal="x" * 300)) == "x" * 300
+
+
+def test_records_keep_them_and_refuse_others() -> None:
+    course = RolloutResult("failure", cause="no", subgoals=list(SAID))
+    record = make_record(JOB, course, started_at="now")
+    assert read_record(encode(record), Path("r"), 1).subgoals == SAID
+    long = replace(record, subgoals=(replace(SAID[0], text="x" * 301),))
+    with pytest.raises(StoreError, match="text"):
+        read_record(encode(long), Path("r"), 1)
+
+
+def test_the_page_and_the_table_show_them(tmp_path: Path) -> None:
+    course = RolloutResult("failure", cause="no", subgoals=list(SAID))
+    record = make_record(JOB, course, started_at="now")
+    with RecordStore(tmp_path) as store:
+        store.append(record)
+    page = render([record])
+    assert "(wrong thing; due: pick it up)" in page
+    assert "sing (lost; due: nothing)" in page
+    words = ["tables", str(tmp_path), "--which", "subgoals", "--format", "markdown"]
+    outcome = CliRunner().invoke(app, words)
+    assert "| 3 | 1 (33 %) | 1 (33 %) | 0 (0 %) | 0 (0 %) | 1 (33 %) |" in outcome.output
+
+
+class Planning:
+    """Points into a corner, then says nothing new, then points at the thing."""
+
+    cameras = ("front",)
+    point = (0, 0)
+
+    def reset(self, instruction: str, demonstration: object) -> None:
+        self.calls, self.subgoal = 0, None
+
+    def act(self, observation: dict) -> np.ndarray:
+        row, column = (0, 0) if self.calls < 2 else self.point
+        self.subgoal = f"pick up the green cube at <{row}, {column}> for the first time"
+        self.calls += 1
+        return np.tile([*observation["joint_positions"], 1.0], (10, 1))
+
+
+@pytest.mark.sim
+def test_a_played_episode_notes_what_is_new_with_the_stage_that_is_due(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(
+        "roboirg.evaluation.play.rollout.load_policy", lambda prepared, secret: Planning()
+    )
+    env = roboirg.make(JOB.task, episode=0, cameras=(), grounded=True)
+    _, info = env.reset()
+    _, point = split_point(info["grounded_subgoal"])
+    env.close()
+    assert point is not None
+    monkeypatch.setattr(Planning, "point", point)
+    result = play_episode(JOB)
+    assert result.outcome == "failure", result.cause
+    words = "pick up the green cube for the first time"
+    assert [(one.step, one.point, one.due, one.verdict) for one in result.subgoals] == [
+        (0, (0, 0), words, "wrong_thing"),
+        (20, point, words, "right"),
+    ]
