@@ -105,8 +105,8 @@ def figures(
     which: Annotated[
         str,
         typer.Option(
-            help="averages, forms, expressions, context, failures, real (several separated by "
-            "commas), or all that apply."
+            help="averages, forms, expressions, context, failures, real, strips (a filmed failure "
+            "in pictures), several separated by commas, or all that apply."
         ),
     ] = _ALL,
     published: Annotated[bool, typer.Option(help="Add the paper's values.")] = False,
@@ -124,7 +124,8 @@ def figures(
         raise InvalidValueError("Figures need a run; give its folder, or --published.")
     names = FIGURES if which == _ALL else tuple(word.strip() for word in which.split(","))
     content = RunData.of(*_runs(runs or []))
-    for path in write_figures(content, out, names, published=published):
+    folders = [Path(run) for run in runs or []]
+    for path in write_figures(content, out, names, published=published, runs=folders):
         typer.echo(path)
 
 

@@ -140,7 +140,7 @@ class Results:
             InvalidValueError: the run has nothing to draw for it.
             MissingDependencyError: matplotlib is not installed.
         """
-        names = tuple(name for name in FIGURES if name != "expressions")
+        names = tuple(name for name in FIGURES if name not in ("expressions", "strips"))
         if which not in names:
             raise UnknownNameError("figure", which, names)
         content = RunData.of([("", self.summaries)], self._planned)

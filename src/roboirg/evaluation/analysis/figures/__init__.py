@@ -16,11 +16,16 @@ if TYPE_CHECKING:
 
 __all__ = ["FIGURES", "draw_figure", "write_figures"]
 
-FIGURES = ("averages", "forms", "expressions", "context", "failures", "real")
+FIGURES = ("averages", "forms", "expressions", "context", "failures", "real", "strips")
 
 
 def write_figures(
-    content: RunData, folder: Path, which: Sequence[str] = FIGURES, *, published: bool = False
+    content: RunData,
+    folder: Path,
+    which: Sequence[str] = FIGURES,
+    *,
+    published: bool = False,
+    runs: Sequence[Path] = (),
 ) -> tuple[Path, ...]:
     """Draw figures as PNG, SVG and PDF; the expressions as PNG and SVG.
 
@@ -29,6 +34,7 @@ def write_figures(
         folder: created if missing.
         which: names out of `FIGURES`; figures without data are left out.
         published: whether to add the paper's values, in gray.
+        runs: folders of the runs, for strips of pictures.
 
     Returns:
         The files.
@@ -37,7 +43,9 @@ def write_figures(
         if name not in FIGURES:
             raise UnknownNameError("figure", name, FIGURES)
     paths = [
-        path for name in which for path in _written(name, content, folder, published=published)
+        path
+        for name in which
+        for path in _written(name, content, folder, published=published, runs=runs)
     ]
     if not paths:
         whose = "The runs have" if content.results else "The paper's tables have"
@@ -48,16 +56,21 @@ def write_figures(
     return tuple(paths)
 
 
-def _written(name: str, content: RunData, folder: Path, *, published: bool) -> tuple[Path, ...]:
+def _written(
+    name: str, content: RunData, folder: Path, *, published: bool, runs: Sequence[Path]
+) -> tuple[Path, ...]:
     from roboirg.evaluation.analysis.figures.expressions import write_expressions
+    from roboirg.evaluation.analysis.figures.strips import draw_strips
 
     if name == "expressions":
         return write_expressions(content, folder, name)
+    if name == "strips":
+        return save(lambda: draw_strips(runs), folder, name)
     return save(lambda: _drawn(name, content, published=published), folder, name)
 
 
 def draw_figure(name: str, content: RunData, *, published: bool = False) -> Figure | None:
-    """Draw one of `FIGURES` but the expressions; return None without data."""
+    """Draw one of `FIGURES` but expressions and strips; return None without data."""
     check_figure_support()
     import matplotlib as mpl
 

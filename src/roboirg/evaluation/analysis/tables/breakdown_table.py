@@ -17,7 +17,7 @@ from roboirg.evaluation.analysis.stats.cells import (
     sort_cells,
 )
 from roboirg.evaluation.analysis.stats.intervals import SEED
-from roboirg.evaluation.analysis.stats.option_labels import options_label
+from roboirg.evaluation.analysis.stats.option_labels import REFERENCE, options_label
 from roboirg.evaluation.analysis.stats.paired_tests import Gap
 from roboirg.evaluation.analysis.stats.rates import p_text, percent, points
 from roboirg.evaluation.analysis.tables.table import (
@@ -96,7 +96,7 @@ def _notes(breakdown: Breakdown, cells: Cells, rows: tuple[BreakdownRow, ...]) -
     )
     if any(row.label == UNKNOWN for row in rows):
         yield "Unknown: the records were written before this was noted."
-    if any(row.gap is None for row in rows):
+    if any(row.gap is None and row.results.options != REFERENCE for row in rows):
         yield f"{NOT_APPLICABLE} without explicit on the same episodes."
     left_out = sum(cell.errors + cell.missing for cell in cells.values())
     if left_out:

@@ -1,0 +1,141 @@
+"""Figure: a failure in pictures, the explicit play above and the implicit one below it."""
+
+from __future__ import annotations
+
+import textwrap
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from roboirg.core.extras import extra_needed
+from roboirg.evaluation.analysis.figures.figure_style import PAGE_INCHES, new_figure
+from roboirg.evaluation.analysis.stats.option_labels import (
+    REFERENCE,
+    options_label,
+    options_sort_key,
+)
+from roboirg.evaluation.records.film import LAST_FRAME_REPEATS, VideoOptions
+from roboirg.evaluation.records.record import Job, Record, Summary
+from roboirg.evaluation.records.run_files import run_file
+from roboirg.evaluation.records.store import iterate_records, read_results
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+PICTURES = 5
+MOMENT_COLOR = "#D62728"
+ROW_INCHES = 2.3
+STEPS_PER_SECOND = 20
+PICTURE_PIXELS = 256
+_SUBGOAL_LETTERS, _TITLE_LETTERS = 26, 118
+
+
+class Strip(NamedTuple):
+    """A played episode and the folder of its run."""
+
+    folder: Path
+    record: Record
+
+
+def draw_strips(folders: Sequence[Path]) -> Figure | None:
+    """Draw for each policy the first failure that was filmed, below its explicit play.
+
+    Returns:
+        None without a failed implicit episode whose explicit twin was filmed as well.
+    """
+    strips = [strip for folder in folders for strip in _strips(folder)]
+    if not strips:
+        return None
+    figure = new_figure(PAGE_INCHES, ROW_INCHES * len(strips))
+    rows = figure.subfigures(len(strips), 1, squeeze=False).ravel()
+    for place, strip in zip(rows, strips, strict=True):
+        _draw_strip(place, strip)
+    return figure
+
+
+def failing_step(record: Record) -> int:
+    """Return the control step at which a failure showed: its attribution's, or the last."""
+    found = None if record.attribution is None else record.attribution.step
+    return record.steps if found is None else found
+
+
+def shown_steps(record: Record) -> list[int]:
+    """Return the control steps that are shown, in order; of a failure its moment among them."""
+    steps = np.linspace(0, record.steps, PICTURES).round().astype(int).tolist()
+    if record.outcome == "failure":
+        moment = failing_step(record)
+        steps[int(np.argmin([abs(one - moment) for one in steps]))] = moment
+    return steps
+
+
+def _strips(folder: Path) -> Iterable[Strip]:
+    """Return the strips of a run, the explicit one before each failure."""
+    results = [one for one in read_results(folder) if one.video is not None]
+    explicit = {_scene(one): one for one in results if one.column == REFERENCE}
+    chosen: dict[str, Summary] = {}
+    for one in sorted(results, key=_place):
+        if one.outcome == "failure" and one.column != REFERENCE and _scene(one) in explicit:
+            chosen.setdefault(one.policy, one)
+    wanted = [job.identity for one in chosen.values() for job in (explicit[_scene(one)], one)]
+    found: dict[Job, Record] = {
+        one.identity: one for one in iterate_records(folder) if one.identity in wanted
+    }
+    return [Strip(folder, found[job]) for job in wanted]
+
+
+def _scene(result: Summary) -> tuple[object, ...]:
+    return result.policy, result.task, result.split, result.episode, result.policy_seed
+
+
+def _place(result: Summary) -> tuple[object, ...]:
+    return (*_scene(result), options_sort_key(result.options))
+
+
+def _draw_strip(place: Any, strip: Strip) -> None:  # noqa: ANN401 - a SubFigure
+    record = strip.record
+    words = " ".join(turn.text for turn in record.instruction)
+    title = f"{record.policy}, {options_label(record.column)}: “{words}”"
+    if record.cause:
+        title += f" {record.cause[0].upper()}{record.cause[1:]}."
+    place.suptitle(textwrap.fill(title, _TITLE_LETTERS), fontsize=7, x=0.01, ha="left")
+    steps = shown_steps(record)
+    pictures = _pictures(run_file(strip.folder, record.video or ""), record, steps)
+    moment = failing_step(record) if record.outcome == "failure" else None
+    for axes, step, picture in zip(
+        place.subplots(1, PICTURES, squeeze=False).ravel(), steps, pictures, strict=True
+    ):
+        axes.imshow(picture)
+        axes.set_xticks([])
+        axes.set_yticks([])
+        is_moment = step == moment
+        for spine in axes.spines.values():
+            spine.set(
+                color=MOMENT_COLOR if is_moment else "#999999", linewidth=2.5 * is_moment + 0.5
+            )
+        text = f"{step / STEPS_PER_SECOND:.1f} s"
+        if subgoal := _subgoal(record, step):
+            text += "\n" + textwrap.fill(f"“{subgoal}”", _SUBGOAL_LETTERS)
+        axes.set_xlabel(text, fontsize=6, color=MOMENT_COLOR if is_moment else "black")
+
+
+def _subgoal(record: Record, step: int) -> str | None:
+    """Return the subgoal that held at a step."""
+    return next((one.text for one in reversed(record.subgoals) if one.step <= step), None)
+
+
+def _pictures(path: Path, record: Record, steps: Sequence[int]) -> list[NDArray[np.uint8]]:
+    """Return the pictures of a film at some control steps; of ours, the front camera's."""
+    with extra_needed("Strips need PyAV", "sim"):
+        import av
+    with av.open(str(path)) as film:
+        frames = [frame.to_ndarray(format="rgb24") for frame in film.decode(video=0)]
+    if record.robot is not None:  # filmed by hand, from the first step to the last
+        last, every = len(frames) - 1, max(record.steps, 1) / max(len(frames) - 1, 1)
+    else:
+        last, every = len(frames) - 1 - LAST_FRAME_REPEATS, float(VideoOptions().every)
+        frames = [frame[:PICTURE_PIXELS, :PICTURE_PIXELS] for frame in frames]
+    places = (round(last - (record.steps - step) / every) for step in steps)
+    return [frames[min(max(place, 0), len(frames) - 1)] for place in places]
