@@ -19,6 +19,7 @@ from hosting_fakes import PaperRunner, PaperWorld, paper_plan, paper_runner
 from msgspec.structs import replace
 
 from roboirg.core.errors import InvalidValueError
+from roboirg.core.field_types import MOST_NAME_LETTERS
 from roboirg.evaluation.episode_errors import EpisodeError, attribute_errors
 from roboirg.evaluation.hosting.host_pool import HostPool, HostSettings
 from roboirg.evaluation.hosting.hosted_policy import HostedPolicy
@@ -30,6 +31,7 @@ from roboirg.evaluation.records.record_codec import StoreError, encode, read_rec
 from roboirg.evaluation.records.store import read_records
 from roboirg.evaluation.run.executor import InProcess, LocalProcesses
 from roboirg.evaluation.run.runner import run_plan
+from roboirg.util.short_hash import short_hash
 
 HONEST = "hosting_fakes:Dice"
 
@@ -193,6 +195,17 @@ def test_a_policy_is_imported_only_in_its_own_process(
     assert imports
     assert any("host_process" not in one for one in imports) == elsewhere
     assert {record.outcome for record in read_records(tmp_path)} == {"success"}
+
+
+def test_a_version_never_controls_a_terminal_nor_closes_the_folder(tmp_path: Path) -> None:
+    specs = tuple(map(hostile_policies.SPEC, ("TerminalVersion", "ChangingVersion")))
+    for episodes in (1, 2):  # the second run goes on with the first one's folder
+        plan = paper_plan("Dice", episodes).model_copy(update={"policies": specs})
+        run_plan(plan, tmp_path, paper_runner(plan, tmp_path), InProcess())
+    versions = {record.policy: record.policy_version for record in read_records(tmp_path)}
+    assert versions[specs[0]].startswith(r"\x1b[2J\u202e\n999")
+    assert len(versions[specs[0]]) == MOST_NAME_LETTERS
+    assert versions[specs[1]] == short_hash(Path(hostile_policies.__file__).read_bytes())
 
 
 def memory_of(pid: int, needle: bytes) -> bool:

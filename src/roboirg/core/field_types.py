@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import re
 from typing import Annotated
 
 import msgspec
+
+from roboirg.core.plain_text import clip_text
 
 MOST_NAME_LETTERS = 1000
 CONTROLS = "\\x00-\\x1f\\x7f-\\x9f\\u200e\\u200f\\u202a-\\u202e\\u2066-\\u2069"
@@ -18,3 +21,9 @@ MOST_STAGES = 100
 Stages = Annotated[tuple[Whole, ...], msgspec.Meta(max_length=MOST_STAGES)]
 MOST_CAUSE_LETTERS = 10_000
 Cause = Annotated[str, msgspec.Meta(max_length=MOST_CAUSE_LETTERS)]
+
+
+def as_name(text: str) -> str:
+    """Return the text of a stranger as a name: what a name may not hold is written as escapes."""
+    shown = re.sub(f"[{CONTROLS}]", lambda one: ascii(one[0])[1:-1], text)
+    return clip_text(shown, MOST_NAME_LETTERS)
