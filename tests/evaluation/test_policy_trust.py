@@ -18,8 +18,8 @@ from evaluation_fakes import FakePlay, comparable, is_alive, small_plan
 from hosting_fakes import PaperRunner, PaperWorld, paper_plan, paper_runner
 from msgspec.structs import replace
 
+from roboirg.cli.options import add_working_directory
 from roboirg.core.errors import InvalidValueError
-from roboirg.core.field_types import MOST_NAME_LETTERS
 from roboirg.evaluation.episode_errors import EpisodeError, attribute_errors
 from roboirg.evaluation.hosting.host_pool import HostPool, HostSettings
 from roboirg.evaluation.hosting.hosted_policy import HostedPolicy
@@ -204,8 +204,29 @@ def test_a_version_never_controls_a_terminal_nor_closes_the_folder(tmp_path: Pat
         run_plan(plan, tmp_path, paper_runner(plan, tmp_path), InProcess())
     versions = {record.policy: record.policy_version for record in read_records(tmp_path)}
     assert versions[specs[0]].startswith(r"\x1b[2J\u202e\n999")
-    assert len(versions[specs[0]]) == MOST_NAME_LETTERS
     assert versions[specs[1]] == short_hash(Path(hostile_policies.__file__).read_bytes())
+
+
+@pytest.mark.parametrize("module", ["json", "multiprocessing", "numpy", "roboirg"])
+def test_files_beside_a_policy_are_imported_in_no_process_but_its_own(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, module: str
+) -> None:
+    (tmp_path / f"{module}.py").write_text(
+        "open('imported', 'w').close()\nraise ImportError('shadowed')\n"
+    )
+    (tmp_path / "neighbor.py").write_text(
+        "import os, sys\nimport numpy as np\n"
+        "class It:\n    cameras = ()\n    def act(self, o): return np.ones((24, 8))\n"
+        "    def reset(self, i, d): self.metadata = {'first': sys.path[0] == os.getcwd()}\n"
+    )
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(sys, "path", [path for path in sys.path if path])
+    add_working_directory(last=True)
+    plan = paper_plan("Dice", 1).model_copy(update={"policies": ("neighbor:It",)})
+    run_plan(plan, tmp_path / "run", paper_runner(plan, tmp_path / "run"), LocalProcesses(1))
+    (record,) = read_records(tmp_path / "run")
+    assert (record.error, record.policy_metadata) == (None, {"first": True})
+    assert not (tmp_path / "imported").exists()
 
 
 def memory_of(pid: int, needle: bytes) -> bool:

@@ -22,6 +22,8 @@ from roboirg.policies.contract.policy_needs import PolicyNeeds
 from roboirg.policies.contract.policy_urls import is_url, parse_query
 from roboirg.util.short_hash import short_hash
 
+_MAX_VERSION_LENGTH = 200
+
 PRIVILEGED = "privileged:"
 """Before the spec of a foreign policy: the user lets it read the simulator's state."""
 
@@ -134,8 +136,8 @@ def policy_version(spec: str) -> str:
     """Return what distinguishes a policy from an earlier one of the same name.
 
     This is the class attribute ``version`` if it is a text or a number (say, the name of a
-    checkpoint), else a fingerprint of the file that defines the class; ``built-in``; or ``unknown`` if neither is found. For a URL it
-    is the option ``version``: no server is asked.
+    checkpoint), else a fingerprint of the file that defines the class; ``built-in``; or ``unknown``
+    if neither is found. For a URL it is the option ``version``: no server is asked.
     """
     name = undeclared(spec)
     if name in BUILTIN:
@@ -147,7 +149,7 @@ def policy_version(spec: str) -> str:
         else:
             version = getattr(policy_class, "version", None)
         if isinstance(version, str | int | float):  # a property differs in each process
-            return as_name(str(version))
+            return as_name(str(version))[:_MAX_VERSION_LENGTH]
         source = Path(inspect.getfile(policy_class)).read_bytes()
     except (InvalidValueError, OSError, TypeError):
         return "unknown"
