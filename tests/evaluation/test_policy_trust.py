@@ -264,6 +264,15 @@ def test_the_memory_of_a_host_holds_no_goal_scene_or_seed() -> None:
         policy.close()
 
 
+def test_a_policy_has_no_terminal() -> None:
+    with HostPool(HostSettings()) as pool:
+        policy = HostedPolicy(pool.connect(), hostile_policies.SPEC("Wanderer"), 0)
+        policy.reset("Pick it.", {})
+        (pid,) = pool.pids  # the first of a session, without a terminal, as is its guard
+        assert os.getsid(pid) == pid
+        policy.close()
+
+
 def test_a_name_with_lone_surrogates_is_refused() -> None:
     with pytest.raises(InvalidValueError, match="name of a policy"):
         make_plan(["x\ud800=random"], tasks="PickXtimes")
