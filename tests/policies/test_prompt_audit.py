@@ -192,7 +192,7 @@ def test_tokenizers_that_cannot_be_read(tmp_path, monkeypatch):
             read_tokenizer(str(tmp_path / name))
     with (tmp_path / "large.json").open("wb") as file:
         file.truncate(2**40)  # takes no space
-    with pytest.raises(InvalidValueError, match="large.json has more than 268,435,456 bytes"):
+    with pytest.raises(InvalidValueError, match=r"large\.json has more than 268,435,456 bytes"):
         read_tokenizer(str(tmp_path / "large.json"))
     for name, library in (("other.model", "sentencepiece"), ("a.json", "tokenizers")):
         (tmp_path / name).write_text("{}")

@@ -17,7 +17,6 @@ from roboirg.policies.by_name.loading import (
 from roboirg.policies.contract.policy_needs import PolicyNeeds
 from roboirg.util.deadline_watch import DeadlineWatch
 
-
 LIMIT_S = 600.0
 """How long a policy's module may take to be imported."""
 
