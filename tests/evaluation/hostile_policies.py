@@ -222,6 +222,10 @@ class ForgesPrivilege(Forger):
     message = ({"type": "opened", "needs": {}, "version": "1", "is_privileged": True},)
 
 
+class ForgesVersion(Forger):
+    message = ({"type": "opened", "needs": {}, "version": "\x1b[2J"},)
+
+
 class ForgesOtherEpisode(Forger):
     message: ClassVar = {"type": "ask", "session": 10**6}
 
@@ -329,12 +333,23 @@ class LateTurncoat(Hostile):
         self.attach = print
 
 
+class TerminalVersion(Hostile):
+    version = "\x1b[2J\u202e\n" + "9" * 5000
+
+
+class ChangingVersion(Hostile):
+    @property
+    def version(self) -> str:  # type: ignore[override]
+        return str(time.time_ns())
+
+
 FORGED = {
     "ForgesLost": "policy: the process sent what is no reply (Invalid value 'lost' - ",
     "ForgesSeconds": "policy: the process sent what is no reply (Object contains unknown field ",
     "ForgesLatency": "policy: the process sent what is no reply (Expected `float` >= 0.0 - at ",
     "ForgesWant": "policy: the process sent what is no reply (Object contains unknown field `want",
     "ForgesPrivilege": "policy: the process sent what is no reply (Object contains unknown field ",
+    "ForgesVersion": "policy: the process sent what is no reply (Expected `str` matching regex ",
     "ForgesOtherEpisode": "policy: the process asked for the video of another episode",
     "Deep210": "policy: the policy's metadata are nested more than 16 deep; make them flat.",
     "Deep300": "policy: the policy's metadata are nested more than 16 deep; make them flat.",

@@ -11,6 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
+from roboirg.core.errors import InvalidValueError
 from roboirg.evaluation.records.action_log import (
     ActionLog,
     action_path,
@@ -74,6 +75,12 @@ def test_float32_actions_take_half_the_space(tmp_path: Path) -> None:
         log = ActionLog("joint_angle", rows, np.array([0], np.int32), np.zeros(3))
         sizes.append(action_path(tmp_path, write_actions(log, tmp_path)).stat().st_size)
     assert sizes[1] < 0.55 * sizes[0] < 20_000
+
+
+def test_a_file_in_place_of_the_folder_is_one_sentence(tmp_path: Path) -> None:
+    (tmp_path / "actions").touch()
+    with pytest.raises(InvalidValueError, match=r"Cannot write .*\.npz: Not a directory\."):
+        write_actions(a_log(), tmp_path)
 
 
 def test_a_changed_file_is_refused(tmp_path: Path) -> None:

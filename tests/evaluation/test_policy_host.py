@@ -21,6 +21,7 @@ from selection import slow_but
 
 from roboirg.core.errors import InvalidValueError, MissingDependencyError
 from roboirg.evaluation.episode_errors import EpisodeError, EpisodeLostError
+from roboirg.evaluation.hosting import policy_descriptions
 from roboirg.evaluation.hosting.host_pool import HostPool, HostSettings
 from roboirg.evaluation.hosting.hosted_policy import HostedPolicy
 from roboirg.evaluation.hosting.messages import BLOCK_SIZE, pack_payload, unpack_payload
@@ -294,6 +295,15 @@ def test_which_policies_get_a_process(tmp_path: Path) -> None:
     assert not any(map(needs_host, ours))
     assert needs_host("lerobot://some/checkpoint")
     assert not is_foreign("lerobot://some/checkpoint")
+
+
+def test_an_import_that_never_ends_is_ended(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(policy_descriptions, "LIMIT_S", 0.5)
+    spec = write_policy(tmp_path, monkeypatch, "endless", "import time\ntime.sleep(3600)")
+    with pytest.raises(InvalidValueError, match=r"not imported within 0[.]5 s"):
+        describe_policy(spec)
 
 
 def test_a_policy_is_described_without_being_imported(

@@ -18,6 +18,7 @@ from evaluation_fakes import FakePlay, comparable, is_alive, small_plan
 from hosting_fakes import PaperRunner, PaperWorld, paper_plan, paper_runner
 from msgspec.structs import replace
 
+from roboirg.cli.options import add_working_directory
 from roboirg.core.errors import InvalidValueError
 from roboirg.evaluation.episode_errors import EpisodeError, attribute_errors
 from roboirg.evaluation.hosting.host_pool import HostPool, HostSettings
@@ -30,6 +31,7 @@ from roboirg.evaluation.records.record_codec import StoreError, encode, read_rec
 from roboirg.evaluation.records.store import read_records
 from roboirg.evaluation.run.executor import InProcess, LocalProcesses
 from roboirg.evaluation.run.runner import run_plan
+from roboirg.util.short_hash import short_hash
 
 HONEST = "hosting_fakes:Dice"
 
@@ -195,6 +197,38 @@ def test_a_policy_is_imported_only_in_its_own_process(
     assert {record.outcome for record in read_records(tmp_path)} == {"success"}
 
 
+def test_a_version_never_controls_a_terminal_nor_closes_the_folder(tmp_path: Path) -> None:
+    specs = tuple(map(hostile_policies.SPEC, ("TerminalVersion", "ChangingVersion")))
+    for episodes in (1, 2):  # the second run goes on with the first one's folder
+        plan = paper_plan("Dice", episodes).model_copy(update={"policies": specs})
+        run_plan(plan, tmp_path, paper_runner(plan, tmp_path), InProcess())
+    versions = {record.policy: record.policy_version for record in read_records(tmp_path)}
+    assert versions[specs[0]].startswith(r"\x1b[2J\u202e\n999")
+    assert versions[specs[1]] == short_hash(Path(hostile_policies.__file__).read_bytes())
+
+
+@pytest.mark.parametrize("module", ["json", "multiprocessing", "numpy", "roboirg"])
+def test_files_beside_a_policy_are_imported_in_no_process_but_its_own(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, module: str
+) -> None:
+    (tmp_path / f"{module}.py").write_text(
+        "open('imported', 'w').close()\nraise ImportError('shadowed')\n"
+    )
+    (tmp_path / "neighbor.py").write_text(
+        "import os, sys\nimport numpy as np\n"
+        "class It:\n    cameras = ()\n    def act(self, o): return np.ones((24, 8))\n"
+        "    def reset(self, i, d): self.metadata = {'first': sys.path[0] == os.getcwd()}\n"
+    )
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(sys, "path", [path for path in sys.path if path])
+    add_working_directory(last=True)
+    plan = paper_plan("Dice", 1).model_copy(update={"policies": ("neighbor:It",)})
+    run_plan(plan, tmp_path / "run", paper_runner(plan, tmp_path / "run"), LocalProcesses(1))
+    (record,) = read_records(tmp_path / "run")
+    assert (record.error, record.policy_metadata) == (None, {"first": True})
+    assert not (tmp_path / "imported").exists()
+
+
 def memory_of(pid: int, needle: bytes) -> bool:
     """Return whether the readable memory of a process holds some bytes."""
     with Path(f"/proc/{pid}/mem").open("rb", 0) as memory:
@@ -227,6 +261,15 @@ def test_the_memory_of_a_host_holds_no_goal_scene_or_seed() -> None:
         assert memory_of(os.getpid(), secret)  # the search finds what is there
         assert memory_of(pid, b"Pick the needle in the haystack.")
         assert not memory_of(pid, secret)
+        policy.close()
+
+
+def test_a_policy_has_no_terminal() -> None:
+    with HostPool(HostSettings()) as pool:
+        policy = HostedPolicy(pool.connect(), hostile_policies.SPEC("Wanderer"), 0)
+        policy.reset("Pick it.", {})
+        (pid,) = pool.pids  # the first of a session, without a terminal, as is its guard
+        assert os.getsid(pid) == pid
         policy.close()
 
 

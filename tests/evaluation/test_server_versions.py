@@ -59,6 +59,11 @@ def test_a_run_stops_when_the_server_is_another_version(tmp_path: Path) -> None:
     assert versions(tmp_path) == ["a"] * 4
 
 
+def test_a_version_that_controls_a_terminal_stops_no_run(tmp_path: Path) -> None:
+    run_plan(plan_of(2), tmp_path, Told(*["\x1b[2J\u202e" + "9" * 5000] * 2), InProcess())
+    assert {one[:12] for one in map(str, versions(tmp_path))} == {r"\x1b[2J\u202e"[:12]}
+
+
 def test_errors_before_the_server_told_its_version_do_not_count(tmp_path: Path) -> None:
     plan = plan_of(3).model_copy(update={"tries": 1})
     run_plan(plan, tmp_path, Told("refused", "a", "refused"), InProcess())

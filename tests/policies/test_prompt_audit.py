@@ -186,9 +186,14 @@ def test_a_json_tokenizer_is_read(tmp_path):
 def test_tokenizers_that_cannot_be_read(tmp_path, monkeypatch):
     with pytest.raises(InvalidValueError, match="is not a file"):
         read_tokenizer(str(tmp_path / "none.model"))
-    (tmp_path / "bad.model").write_text("no model")
-    with pytest.raises(InvalidValueError, match="not a SentencePiece model"):
-        read_tokenizer(str(tmp_path / "bad.model"))
+    for name, content in (("bad.model", "no model"), ("empty.model", "")):
+        (tmp_path / name).write_text(content)
+        with pytest.raises(InvalidValueError, match="not a SentencePiece model"):
+            read_tokenizer(str(tmp_path / name))
+    with (tmp_path / "large.json").open("wb") as file:
+        file.truncate(2**40)  # takes no space
+    with pytest.raises(InvalidValueError, match=r"large\.json has more than 268,435,456 bytes"):
+        read_tokenizer(str(tmp_path / "large.json"))
     for name, library in (("other.model", "sentencepiece"), ("a.json", "tokenizers")):
         (tmp_path / name).write_text("{}")
         monkeypatch.setitem(sys.modules, library, None)

@@ -201,6 +201,10 @@ def check_output_file(path: Path) -> None:
         raise InvalidValueError(f"{str(path)!r} is not a file in an existing folder.")
 
 
-def add_working_directory() -> None:
-    """Add the working directory to the import path, as `python -m` does."""
-    sys.path.insert(0, str(Path.cwd()))
+def add_working_directory(*, last: bool = False) -> None:
+    """Add the working directory to the import path, as `python -m` does.
+
+    Args:
+        last: for commands whose processes hold worlds, which import none of a policy's files.
+    """
+    sys.path.insert(len(sys.path) if last else 0, str(Path.cwd()))

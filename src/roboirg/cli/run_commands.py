@@ -89,7 +89,7 @@ def run(
     from roboirg.evaluation.plan.plan_text import plan_text
     from roboirg.evaluation.run.record_hook import split_command
 
-    add_working_directory()
+    add_working_directory(last=True)
     made = _plan(plan, choices.typed(), usual=("oracle",) if show_plan else ())
     if show_plan:
         typer.echo(plan_text(made), nl=False)

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import re
 from typing import Annotated
 
 import msgspec
 
+from roboirg.core.plain_text import clip_text
 from roboirg.core.subgoal_text import MOST_SUBGOAL_LETTERS
 
 MOST_NAME_LETTERS = 1000
@@ -22,3 +24,9 @@ MOST_STAGES = 100
 Stages = Annotated[tuple[Whole, ...], msgspec.Meta(max_length=MOST_STAGES)]
 MOST_CAUSE_LETTERS = 10_000
 Cause = Annotated[str, msgspec.Meta(max_length=MOST_CAUSE_LETTERS)]
+
+
+def as_name(text: str) -> str:
+    """Return the text of a stranger as a name: what a name may not hold is written as escapes."""
+    shown = re.sub(f"[{CONTROLS}]", lambda one: ascii(one[0])[1:-1], text)
+    return clip_text(shown, MOST_NAME_LETTERS)

@@ -26,6 +26,9 @@ GRACE_S = 2.0
 """How long a child may take to exit once its channel is closed."""
 GUARD_S = 5.0
 """How long a guard may take to end all that an interpreter has started."""
+_SAFE_PATH = "PYTHONSAFEPATH"
+"""Variable that keeps the working directory, where a policy may lie, from the import path."""
+_starting = threading.Lock()
 
 # The first thing the interpreter gets is the import path.
 _BOOT = (
@@ -111,9 +114,10 @@ class ChildProcess:
         process = context.Process(
             target=_begin_work, args=(os.getpid(), work, theirs, args), daemon=daemon
         )
-        resource_tracker.ensure_running()  # which would unblock what is blocked below
-        with _without_interrupts():
-            process.start()
+        with _safe_path():
+            resource_tracker.ensure_running()  # which would unblock what is blocked below
+            with _without_interrupts():
+                process.start()
         # Only the child may keep this end open: then its death reads as end of file.
         theirs.close()
         return cls(process, ours)
@@ -132,7 +136,7 @@ class ChildProcess:
             number = theirs.fileno()
             arguments = (str(number), str(os.getpid()), module, json.dumps(sys.path))
             process = _Interpreter(
-                [sys.executable, "-c", _BOOT, *arguments],
+                [sys.executable, "-P", "-c", _BOOT, *arguments],
                 pass_fds=[number],
                 stdin=subprocess.DEVNULL,
                 stdout=subprocess.PIPE,
@@ -221,9 +225,23 @@ def _without_interrupts() -> Iterator[None]:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
+@contextlib.contextmanager
+def _safe_path() -> Iterator[None]:
+    """Let a process start without the working directory on its path, until it gets ours."""
+    with _starting:
+        before = os.environ.get(_SAFE_PATH)
+        os.environ[_SAFE_PATH] = "1"
+        try:
+            yield
+        finally:
+            if before is None:
+                del os.environ[_SAFE_PATH]
+
+
 def _begin_work(
     parent: int, work: Callable[..., None], connection: Connection, args: tuple[Any, ...]
 ) -> None:
+    os.environ.pop(_SAFE_PATH, None)
     begin(parent)
     work(connection, *args)
 

@@ -38,7 +38,7 @@ def begin(parent: int) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
-    os.setpgid(0, 0)  # what it starts can be ended with it
+    os.setsid()  # what it starts can be ended with it, and cannot reach the user's terminal
     _prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)  # even if it hangs in native code
     if os.getppid() != parent:
         os._exit(1)  # the parent died before the line above

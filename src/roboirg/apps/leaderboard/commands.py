@@ -177,7 +177,7 @@ def repeat(
         raise InvalidValueError(
             f"{run} has no plan.json that can be read, so it cannot be repeated."
         )
-    add_working_directory()
+    add_working_directory(last=True)
     summary = play(
         with_secret(plan, folder).checked(),
         target,

@@ -14,6 +14,7 @@ import sys
 import threading
 from collections.abc import Sequence
 from multiprocessing.connection import Connection
+from pathlib import Path
 from typing import Any
 
 from roboirg.core.errors import MissingDependencyError
@@ -138,6 +139,8 @@ def main(connection: Connection) -> None:
     """Serve a supervisor; runs in a process of its own."""
     if isinstance(sys.stdout, io.TextIOWrapper):
         sys.stdout.reconfigure(line_buffering=True)
+    if sys.path[-1] == str(Path.cwd()):  # where a command puts it: its policy's files come first
+        sys.path.insert(0, sys.path.pop())
     HostProcess(connection).serve()
     with contextlib.suppress(Exception):
         sys.stdout.flush()

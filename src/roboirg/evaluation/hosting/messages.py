@@ -19,6 +19,7 @@ import msgspec
 import numpy as np
 from msgspec import Meta, Struct
 
+from roboirg.core.field_types import Name
 from roboirg.core.subgoal_text import MOST_SUBGOAL_LETTERS
 from roboirg.evaluation.episode_errors import MAX_DETAILS_LENGTH
 from roboirg.evaluation.policy_calls import MAX_COSTS, MAX_METADATA_LENGTH
@@ -72,7 +73,7 @@ class Opened(Struct, tag="opened", forbid_unknown_fields=True):
     """What a policy is: what it needs, whether it takes batches, what episodes read so far."""
 
     needs: PolicyNeeds
-    version: Text
+    version: Name
     together: bool = False
     reads: Names = ()
 

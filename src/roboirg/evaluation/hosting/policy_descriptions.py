@@ -15,6 +15,10 @@ from roboirg.policies.by_name.loading import (
     policy_version,
 )
 from roboirg.policies.contract.policy_needs import PolicyNeeds
+from roboirg.util.deadline_watch import DeadlineWatch
+
+LIMIT_S = 600.0
+"""How long a policy's module may take to be imported."""
 
 
 class PolicyDescription(NamedTuple):
@@ -74,9 +78,13 @@ def _describe_ours(spec: str) -> PolicyDescription:
 def _describe_apart(spec: str) -> PolicyDescription:
     child = PolicyChild.start()
     try:
-        reply = child.exchange([Call("describe", spec=spec)])
+        with DeadlineWatch(child.kill) as watch:
+            watch.begin(LIMIT_S)
+            reply = child.exchange([Call("describe", spec=spec)])
     except ChildLostError as error:
-        raise InvalidValueError(f"Policy {spec!r} cannot be loaded: {error}.") from error
+        late = f"its module was not imported within {LIMIT_S:g} s"
+        why = error if watch.acted_after is None else late
+        raise InvalidValueError(f"Policy {spec!r} cannot be loaded: {why}.") from error
     finally:
         child.end()
     match reply:

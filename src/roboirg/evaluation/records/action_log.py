@@ -83,7 +83,10 @@ def write_actions(log: ActionLog, folder: Path) -> str:
     digest = log.digest
     path = action_path(folder, digest)
     if not path.exists():
-        path.parent.mkdir(parents=True, exist_ok=True)
+        try:
+            path.parent.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise InvalidValueError(f"Cannot write {path}: {error.strerror}.") from error
         write_atomically(path, _pack(log))
     return digest
 

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any, cast
 
 from roboirg.core.errors import InvalidValueError
-from roboirg.core.plain_text import clip_text
+from roboirg.core.field_types import as_name
 from roboirg.policies.by_name import policy_specs
 from roboirg.policies.by_name.policy_classes import (
     BUILTIN,
@@ -135,9 +135,9 @@ def is_privileged(spec: str) -> bool:
 def policy_version(spec: str) -> str:
     """Return what distinguishes a policy from an earlier one of the same name.
 
-    This is the class attribute ``version`` (say, the name of a checkpoint), else a fingerprint of
-    the file that defines the class; ``built-in``; or ``unknown`` if neither is found. For a URL it
-    is the option ``version``: no server is asked.
+    This is the class attribute ``version`` if it is a text or a number (say, the name of a
+    checkpoint), else a fingerprint of the file that defines the class; ``built-in``; or ``unknown``
+    if neither is found. For a URL it is the option ``version``: no server is asked.
     """
     name = undeclared(spec)
     if name in BUILTIN:
@@ -148,8 +148,8 @@ def policy_version(spec: str) -> str:
             version = getattr(policy_class(name), "version", "unknown")
         else:
             version = getattr(policy_class, "version", None)
-        if version is not None:
-            return clip_text(str(version), _MAX_VERSION_LENGTH)
+        if isinstance(version, str | int | float):  # a property differs in each process
+            return as_name(str(version))[:_MAX_VERSION_LENGTH]
         source = Path(inspect.getfile(policy_class)).read_bytes()
     except (InvalidValueError, OSError, TypeError):
         return "unknown"
@@ -182,5 +182,5 @@ def server_version(metadata: Mapping[str, Any]) -> str | None:
     for told in (metadata, metadata.get("policy")):
         if isinstance(told, Mapping) and "server" in told:
             version = told.get("version")
-            return None if version in (None, "", "unknown") else str(version)
+            return None if version in (None, "", "unknown") else as_name(str(version))
     return None

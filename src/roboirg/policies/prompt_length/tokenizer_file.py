@@ -10,8 +10,10 @@ from typing import Any
 from roboirg.core.errors import InvalidValueError
 from roboirg.core.extras import extra_needed
 from roboirg.policies.prompt_length.prompt_audit import LINE_BREAK_TOKENS, Tokenize, Tokens
+from roboirg.util.regular_file import read_regular
 
 JSON = ".json"
+_MAX_BYTES = 256 * 2**20
 
 
 def read_tokenizer(path: str) -> Tokenize:
@@ -29,18 +31,21 @@ def read_tokenizer(path: str) -> Tokenize:
 
 @functools.cache
 def _read(path: str) -> Tokenize:
-    if not Path(path).is_file():
+    try:
+        content = read_regular(Path(path), _MAX_BYTES)  # a policy may name any file
+    except OSError as error:
         raise InvalidValueError(
             f"The tokenizer {path!r} is not a file; give a SentencePiece model or a tokenizer.json."
-        )
-    return _read_json(path) if path.endswith(JSON) else _read_sentencepiece(path)
+        ) from error
+    return (_read_json if path.endswith(JSON) else _read_sentencepiece)(path, content)
 
 
-def _read_sentencepiece(path: str) -> Tokenize:
+def _read_sentencepiece(path: str, content: bytes) -> Tokenize:
     with extra_needed(f"The tokenizer {path!r} needs sentencepiece", "tokens"):
         import sentencepiece
     try:
-        model: Any = sentencepiece.SentencePieceProcessor(model_file=path)
+        model: Any = sentencepiece.SentencePieceProcessor()
+        model.LoadFromSerializedProto(content)
     except (OSError, RuntimeError, ValueError) as error:
         raise _unreadable(path, "a SentencePiece model") from error
 
@@ -58,11 +63,11 @@ def _read_sentencepiece(path: str) -> Tokenize:
     return tokenize
 
 
-def _read_json(path: str) -> Tokenize:
+def _read_json(path: str, content: bytes) -> Tokenize:
     with extra_needed(f"The tokenizer {path!r} needs tokenizers", "tokens"):
         import tokenizers
     try:
-        model: Any = tokenizers.Tokenizer.from_file(path)
+        model: Any = tokenizers.Tokenizer.from_buffer(content)
     except Exception as error:  # the library raises nothing narrower
         raise _unreadable(path, "a tokenizer of the library tokenizers") from error
     model.no_truncation()
