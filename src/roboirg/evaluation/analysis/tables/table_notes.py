@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from decimal import Decimal
 
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.core.plain_text import counted, verb_for
 from roboirg.evaluation.analysis.comparability import AllDifferences, comparison_notes
-from roboirg.evaluation.analysis.published import TRIALS, RateTable
+from roboirg.evaluation.analysis.published import TRIALS, RateTable, published_rows
 from roboirg.evaluation.analysis.stats.cells import (
     FAIRNESS,
     CellResults,
@@ -16,6 +17,7 @@ from roboirg.evaluation.analysis.stats.cells import (
     PolicyRun,
     labels,
 )
+from roboirg.evaluation.analysis.stats.intervals import wilson_interval
 from roboirg.evaluation.analysis.stats.option_labels import (
     has_default_options,
     options_label,
@@ -30,6 +32,7 @@ from roboirg.evaluation.analysis.tables.table import (
     Entry,
     Row,
 )
+from roboirg.language.settings import EXPLICIT
 from roboirg.tasks import every_task
 
 RATES_NOTE = (
@@ -223,10 +226,59 @@ def _published_notes(which: RateTable, rows: Iterable[Row]) -> list[str]:
         return []
     episodes, seeds = TRIALS[which]
     trials = f"{episodes} trials" if seeds == 1 else f"{episodes} episodes × {seeds} seeds"
-    if which == "real":
-        return [f"(published): from the paper, {trials} per cell on its own robot."]
+    where = "on its own robot" if which == "real" else "played in its own simulator"
     suites = " The averages of suites are ours." if which == "main" else ""
-    return [f"(published): from the paper, {trials} per cell, played in its own simulator.{suites}"]
+    low, high = wilson_interval(episodes * seeds // 2, episodes * seeds)
+    source = (
+        f"(published): from the paper, {trials} per cell, {where}. It prints no intervals; at 50 % "
+        f"a cell's is ±{50 * (high - low):.0f} points.{suites}"
+    )
+    return [
+        source,
+        *_unequal_average_notes(which),
+        *_shortest_context_notes(which),
+    ]
+
+
+def _unequal_average_notes(which: RateTable) -> list[str]:
+    """Say where the paper sets an average over some tasks against one over all."""
+    rows = published_rows(which)
+    explicit = {row.model: row for row in rows if row.options.setting == EXPLICIT}
+    notes = []
+    for setting in dict.fromkeys(row.options.setting for row in rows):
+        drops = []
+        for row in rows:
+            defined = [task for task, rate in row.rates.items() if rate is not None]
+            if row.options.setting == setting and len(defined) < len(row.rates):
+                same = explicit[row.model].average_over(defined) or Decimal(0)
+                printed = explicit[row.model].average - row.average
+                drops.append(f"{row.model} {printed} and {same - row.average}")
+        if drops:
+            notes.append(
+                f"The paper sets its {setting} averages, which are over fewer tasks, against the "
+                f"explicit ones over all. Drops as printed, and on the same tasks, as in this "
+                f"table: {', '.join(drops)}."
+            )
+    return notes
+
+
+def _shortest_context_notes(which: RateTable) -> list[str]:
+    """Say how far the paper's shortest context is from its direct setting."""
+    if which != "context":
+        return []
+    direct = {row.model: row for row in published_rows("main") if row.options.setting == "direct"}
+    gaps = [
+        abs(rate - (direct[row.model].rates[task] or Decimal(0)))
+        for row in published_rows(which)
+        if row.options == staged_options()[0]
+        for task, rate in row.rates.items()
+        if rate is not None
+    ]
+    text = (
+        "The published rows with the shortest context differ from the paper's direct setting in "
+        f"{sum(gap > 0 for gap in gaps)} of {len(gaps)} cells, by up to {max(gaps)} points."
+    )
+    return [text]
 
 
 def _range(counts: Sequence[int], noun: str) -> str:
