@@ -167,9 +167,7 @@ def _() -> str:
     )
 
 
-@item(
-    "shortest-context", "the shortest context is up to 14 points off direct, in 8 of 9 cells"
-)
+@item("shortest-context", "the shortest context is up to 14 points off direct, in 8 of 9 cells")
 def _() -> str:
     gaps = [abs(one.change) for *_, one in figures.shortest_context()]
     same(sum(gap > 0 for gap in gaps), 8)

@@ -154,7 +154,6 @@ def words_of(folder, run):
             "PutInBox",
             "--trials",
             "1",
-            "--no-sheet",
             "--demonstrations",
             "1",
             "--out",
