@@ -35,6 +35,8 @@ EXTRA_ACTIONS: tuple[ExtraAction, ...] = get_args(ExtraAction)
 PICTURE_CODINGS: tuple[PictureCoding, ...] = get_args(PictureCoding)
 OUTCOMES: tuple[Outcomes, ...] = get_args(Outcomes)
 ORACLE = "oracle"
+TELEOPERATED = "teleoperation"
+"""The policy of trajectories that people recorded on a robot."""
 
 
 @dataclass(frozen=True)
@@ -122,6 +124,11 @@ class ExportPlan:
             raise InvalidValueError(
                 f"The format 'robomme-hdf5' has one trajectory per episode, not {self.variations}."
             )
+
+    @property
+    def is_teleoperated(self) -> bool:
+        """Whether people recorded the trajectories on a robot."""
+        return self.policy.startswith(TELEOPERATED)
 
     @property
     def recording(self) -> RecordingSpec:
