@@ -44,6 +44,11 @@ class LeRobotFeatures(UrlOptions):
         return tuple(self.joint.format(number) for number in range(1, ARM_JOINTS + 1))
 
     @property
+    def vector(self) -> tuple[str, ...]:
+        """The names of the joints and the gripper."""
+        return (*self.joints, self.gripper)
+
+    @property
     def unit(self) -> float:
         """One radian in the robot's unit."""
         return math.degrees(1.0) if self.degrees else 1.0

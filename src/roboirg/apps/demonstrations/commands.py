@@ -155,7 +155,7 @@ def export_recordings(
         typer.echo(f"roboirg: {problem}", err=True)
     if checked.problems:
         raise typer.Exit(2)
-    frames = sum(one.length for one in recorded.episodes)
+    frames = sum(one["length"] for one in recorded.episodes)
     typer.echo(f"{counted(len(checked.takes), 'demonstration')}, {frames} frames: as planned.")
     if checked.moved:
         typer.echo(

@@ -9,7 +9,8 @@ from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any, Literal, NamedTuple, get_args
 
-from roboirg.apps.demonstrations.trajectory import SUFFIX, TRAJECTORY_VERSION, PictureCoding
+from roboirg.apps.demonstrations.picture_coding import PictureCoding
+from roboirg.apps.demonstrations.trajectory import SUFFIX, TRAJECTORY_VERSION
 from roboirg.apps.demonstrations.trajectory_recorder import RecordingSpec
 from roboirg.core.episode import ENVIRONMENT_VERSION, Episode
 from roboirg.core.errors import InvalidValueError, UnknownNameError

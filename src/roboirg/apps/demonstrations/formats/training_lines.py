@@ -141,7 +141,8 @@ uv run scripts/train.py mme_vla_suite --exp-name=perceptual-framesamp-modul \\
 
 are MME-VLA's builder, which reads these files as RoboMME's own, and its training.
 `waypoint_action` is all NaN, `choice_action` empty and `available_multi_choices` an empty list:
-nothing here acts in these spaces. Recording ends with the success, so that no time step `is_completed`.
+nothing here acts in these spaces. Recording ends with the success, so that no time step
+`is_completed`.
 """
 
 

@@ -6,42 +6,27 @@ import csv
 import math
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
+from itertools import zip_longest
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 
 from roboirg.apps.demonstrations.picture_coding import FRAME_RATE
-from roboirg.apps.demonstrations.teleoperation.teleop_dataset import (
-    ACTION,
-    PICTURES,
-    STATE,
-    TeleopDataset,
-)
+from roboirg.apps.demonstrations.teleoperation.teleop_dataset import ACTION, STATE, TeleopDataset
 from roboirg.core.errors import InvalidValueError
 from roboirg.core.observations import CAMERAS
-from roboirg.core.plain_text import counted
 
 PLAN_FILE = "demonstrations.csv"
-SAID = ("target_color", "repeats")
-"""What the words of a demonstration tell, and so the words' numbers balance."""
-_FEWEST_FRAMES = 2
+FACTORS = ("target_color", "repeats")
+"""What the words of a demonstration tell; sides can be planned, but not be checked."""
 _SHOWN = 3
 _SLACK = 0.25
 """Share of the gripper's range by which its values may leave it."""
 
 
 class PlannedTake(NamedTuple):
-    """A demonstration of the plan.
-
-    Attributes:
-        name: of the demonstration.
-        task: name of the task.
-        split: of the episode.
-        episode: number in the split.
-        text: the instruction.
-        factors: what the words tell.
-    """
+    """A demonstration of the plan: its episode, its instruction, and what that tells."""
 
     name: str
     task: str
@@ -77,7 +62,7 @@ def read_takes(study: Path) -> tuple[PlannedTake, ...]:
             return tuple(
                 PlannedTake(
                     row["demonstration"], row["task"], row["split"], int(row["episode"]),
-                    row["instruction"], {name: row[name] for name in SAID},
+                    row["instruction"], {name: row[name] for name in FACTORS},
                 )
                 for row in csv.DictReader(file)
             )  # fmt: skip
@@ -89,117 +74,87 @@ def read_takes(study: Path) -> tuple[PlannedTake, ...]:
 
 def check_recording(dataset: TeleopDataset, planned: Sequence[PlannedTake]) -> CheckedRecording:
     """Compare a data set with the plan."""
-    texts = [one.text for one in dataset.episodes]
-    found = _matched(texts, planned)
-    problems = [*_form_problems(dataset), *_word_problems(texts, planned)]
-    if not problems:
-        problems = list(_value_problems(dataset))
-    takes = tuple(one for one in found if one is not None)
-    moved = sum(one is not take for one, take in zip(found, planned, strict=False))
+    takes = _matched(dataset.texts, planned)
+    problems = [*_form_problems(dataset), *_word_problems(dataset.texts, planned)]
+    problems = problems or list(_value_problems(dataset))
+    moved = sum(one is not take for one, take in zip(takes, planned, strict=False))
     return CheckedRecording(tuple(problems), takes, moved)
 
 
-def _matched(texts: Sequence[str], planned: Sequence[PlannedTake]) -> list[PlannedTake | None]:
-    """Return each text's demonstration: the one at its place, else the first left with the text."""
-    found = [
-        take if take is not None and take.text == text else None
-        for text, take in zip(texts, [*planned, *[None] * len(texts)], strict=False)
-    ]
-    left = [take for take in planned if take not in found]
-    for index, text in enumerate(texts):
-        if found[index] is None:
-            found[index] = next((take for take in left if take.text == text), None)
-            left = [take for take in left if take is not found[index]]
-    return found
+def _matched(texts: Sequence[str], planned: Sequence[PlannedTake]) -> tuple[PlannedTake, ...]:
+    """Return for each text that has one the demonstration at its place, or the first one left."""
+    left, found = list(planned), []
+    for text, here in zip_longest(texts, planned[: len(texts)]):
+        fitting = [take for take in left if take.text == text]
+        if fitting:
+            found.append(here if here in fitting else fitting[0])
+            left.remove(found[-1])
+    return tuple(found)
 
 
 def _form_problems(dataset: TeleopDataset) -> Iterator[str]:
     """Yield what is wrong with rate, cameras and names."""
-    if dataset.info["fps"] != FRAME_RATE:
-        yield (
-            f"The rate is {dataset.info['fps']} frames per second; the study plays {FRAME_RATE}: "
-            f"record with --dataset.fps={FRAME_RATE}."
-        )
+    rate, root = dataset.info["fps"], dataset.root
+    if rate != FRAME_RATE:
+        yield f"The rate is {rate} frames per second, but the study plays {FRAME_RATE}."
     for camera in CAMERAS:
-        name = getattr(dataset.names, camera)
-        if name not in dataset.cameras:
+        if (name := getattr(dataset.names, camera)) not in dataset.cameras:
             yield (
                 f"There is no {camera} camera {name!r}; the data set has "
-                f"{', '.join(dataset.cameras) or 'none'}. Record it, or name it: "
-                f"{dataset.root}?{camera}=NAME."
+                f"{', '.join(dataset.cameras) or 'none'}. Name it: {root}?{camera}=NAME."
             )
     for feature in (STATE, ACTION):
         has = dataset.columns(feature)
-        lacking = [one for one in (*dataset.names.joints, dataset.names.gripper) if one not in has]
-        if lacking:
+        if lacking := [one for one in dataset.names.vector if one not in has]:
             yield (
                 f"{feature} has no {', '.join(lacking)}; it has {', '.join(has) or 'no names'}. "
-                f"Other names: {dataset.root}?joint=NAME{{}}&gripper=NAME."
+                f"Name them: {root}?joint=NAME{{}}&gripper=NAME."
             )
 
 
 def _word_problems(texts: Sequence[str], planned: Sequence[PlannedTake]) -> Iterator[str]:
     """Yield what is wrong with words and balance."""
     by_text = {take.text: take for take in planned}
-    unknown = [f"{index} ({text!r})" for index, text in enumerate(texts) if text not in by_text]
-    if unknown:
-        yield (
-            f"The plan has no demonstration with the words of "
-            f"{counted(len(unknown), 'episode')}: {_some(unknown)}."
-        )
     recorded = [by_text[text] for text in texts if text in by_text]
-    unbalanced = False
     for task in dict.fromkeys(take.task for take in planned):
-        for factor in SAID:
-            counts, wanted = (
+        for factor in FACTORS:
+            has, wanted = (
                 Counter(one.factors[factor] for one in takes if one.task == task)
                 for takes in (recorded, planned)
             )
-            if counts != wanted:
-                unbalanced = True
-                yield f"{task} has {factor} {_counts(counts)}; the plan has {_counts(wanted)}."
-    by_words, wanted_words = Counter(texts), Counter(take.text for take in planned)
-    differing = [text for text, count in wanted_words.items() if by_words[text] != count]
-    if differing and not unbalanced:
-        listed = [f"{one!r} {by_words[one]} of {wanted_words[one]} times" for one in differing]
-        yield f"Words are not as often as planned: {_some(listed)}."
-    missing = [take.name for take in planned if take not in _matched(texts, planned)]
-    if missing:
-        yield f"Not recorded: {_some(missing)}."
+            if has != wanted:
+                yield f"{task} has {factor} {_counts(has)}; the plan has {_counts(wanted)}."
+    said, to_say = Counter(texts), Counter(take.text for take in planned)
+    differing = [
+        f"{text!r} {said[text]} instead of {to_say[text]} times"
+        for text in dict.fromkeys([*texts, *to_say])
+        if said[text] != to_say[text]
+    ]
+    if differing:
+        more = len(differing) - _SHOWN
+        end = f" and {more} more" if more > 0 else ""
+        yield f"The words are not the plan's: {', '.join(differing[:_SHOWN])}{end}."
 
 
 def _value_problems(dataset: TeleopDataset) -> Iterator[str]:
     """Yield what is wrong with lengths and numbers."""
-    names = dataset.names
-    for one in dataset.episodes:
-        if one.length < _FEWEST_FRAMES:
-            yield f"Episode {one.number} has {counted(one.length, 'frame')}."
-            continue
+    names, root = dataset.names, dataset.root
+    for index, episode in enumerate(dataset.episodes):
+        if episode["length"] == 1:
+            yield f"Episode {index} has a single frame."
         for feature in (STATE, ACTION):
-            values = dataset.vectors(one, feature)
+            values = dataset.vectors(index, feature)
+            grips = values[:, -1]
             if not np.isfinite(values).all():
-                yield f"Episode {one.number}: {feature} is not finite."
+                yield f"Episode {index}: {feature} is not finite."
             elif np.abs(values[:, :-1]).max() / names.unit > 2 * math.pi:
+                yield f"Episode {index}: {feature} is beyond a turn; degrees? {root}?degrees=true"
+            elif np.abs(names.opening(grips) - 0.5).max() > 0.5 + _SLACK:
                 yield (
-                    f"Episode {one.number}: a joint of {feature} is beyond a whole turn; if joints "
-                    f"are in degrees, say {dataset.root}?degrees=true."
+                    f"Episode {index}: the gripper of {feature} is from {grips.min():g} to "
+                    f"{grips.max():g}; say {root}?gripper_closed=NUMBER&gripper_open=NUMBER."
                 )
-            elif np.abs(names.opening(values[:, -1]) - 0.5).max() > 0.5 + _SLACK:
-                yield (
-                    f"Episode {one.number}: the gripper of {feature} is from "
-                    f"{values[:, -1].min():g} to {values[:, -1].max():g}; closed is "
-                    f"{names.gripper_closed:g} and open {names.gripper_open:g}, or say "
-                    f"{dataset.root}?gripper_closed=…&gripper_open=…."
-                )
-    for camera in CAMERAS:
-        if dataset.info["features"][PICTURES + getattr(names, camera)]["shape"][-1] != len("RGB"):
-            yield f"The pictures of the {camera} camera are not RGB."
 
 
 def _counts(counts: Mapping[str, int]) -> str:
     return ", ".join(f"{name or 'none'} {counts[name]}" for name in sorted(counts)) or "nothing"
-
-
-def _some(entries: Sequence[str]) -> str:
-    more = len(entries) - _SHOWN
-    return ", ".join(entries[:_SHOWN]) + (f" and {more} more" if more > 0 else "")

@@ -25,17 +25,8 @@ from roboirg.apps.demonstrations.export_run import (
     run_export,
 )
 from roboirg.apps.demonstrations.teleoperation.recording_check import PlannedTake
-from roboirg.apps.demonstrations.teleoperation.teleop_dataset import (
-    ACTION,
-    STATE,
-    TeleopDataset,
-    TeleopEpisode,
-)
-from roboirg.apps.demonstrations.trajectory import (
-    TrajectoryFacts,
-    TrajectoryFile,
-    stack_texts,
-)
+from roboirg.apps.demonstrations.teleoperation.teleop_dataset import ACTION, STATE, TeleopDataset
+from roboirg.apps.demonstrations.trajectory import TrajectoryFacts, TrajectoryFile, stack_texts
 from roboirg.apps.demonstrations.trajectory_recorder import PictureTracks, RecordingSpec
 from roboirg.core.actions import ARM_JOINTS
 from roboirg.core.episode import ENVIRONMENT_VERSION, Episode
@@ -56,7 +47,7 @@ def export_recording(
     workers: int,
     report: Report,
 ) -> ExportSummary:
-    """Write a checked data set in a trainer's format; works like `run_export`.
+    """Write a checked data set in a trainer's format; see `run_export`.
 
     Args:
         dataset: the recording.
@@ -75,100 +66,81 @@ def export_recording(
         names="openpi" if data_format == "lerobot-v2.1" else "lerobot",
         policy=f"{TELEOPERATED} {short_hash(repr(dataset))}",
     ).validated()
-    jobs, episodes = [], dict[RecordingJob, TeleopEpisode]()
-    for episode, take in zip(dataset.episodes, takes, strict=True):
-        job = RecordingJob(
-            take.task, take.split, take.episode, 0, TELEOPERATED, None, RecordingSpec()
-        )
-        episodes[job] = episode
-        jobs.append((job, _texts(plan, job.episode, take)))
-    source = TrajectorySource(jobs, functools.partial(_convert, dataset, episodes))
+    spec = RecordingSpec()
+    jobs = [
+        RecordingJob(take.task, take.split, take.episode, 0, TELEOPERATED, None, spec)
+        for take in takes
+    ]
+    said = [_texts(plan, job.episode, take) for job, take in zip(jobs, takes, strict=True)]
+    numbers = {job: index for index, job in enumerate(jobs)}
+    convert = functools.partial(_convert, dataset, numbers)
+    source = TrajectorySource(list(zip(jobs, said, strict=True)), convert)
     return run_export(plan, out, workers, report, source=source)
 
 
 def _texts(plan: ExportPlan, episode: Episode, take: PlannedTake) -> tuple[TaskText, ...]:
     """Return the instruction; raises InvalidValueError if this version words it differently."""
-    said = texts_of(plan, episode)
-    if [one.text for one in said] != [take.text]:
+    (said,) = texts_of(plan, episode)
+    if said.text != take.text:
         raise InvalidValueError(
             f"{take.name} was planned as {take.text!r}, which this version words as "
-            f"{said[0].text!r}; convert with the version that planned the study."
+            f"{said.text!r}; convert with the version that planned the study."
         )
-    return said
+    return (said,)
 
 
 def _convert(
-    dataset: TeleopDataset,
-    episodes: Mapping[RecordingJob, TeleopEpisode],
-    folder: Path,
-    job: RecordingJob,
+    dataset: TeleopDataset, numbers: Mapping[RecordingJob, int], folder: Path, job: RecordingJob
 ) -> None:
     """Write the trajectory of one episode.
 
     Its last action has no observation that it led to, and is left out.
     """
-    recorded = episodes[job]
+    index = numbers[job]
     with replacing(job.path(folder)) as part, zipfile.ZipFile(part, "w") as archive:
         file = TrajectoryFile(archive)
         tracks = PictureTracks(file, job.spec)
-        streams = [dataset.pictures(recorded, getattr(dataset.names, one)) for one in CAMERAS]
-        for pictures in zip(*streams, strict=True):
-            squares = [center_square(one) for one in pictures]
-            seen = {f"{one}_rgb": square for one, square in zip(CAMERAS, squares, strict=True)}
+        streams = [dataset.pictures(index, getattr(dataset.names, one)) for one in CAMERAS]
+        for front, wrist in zip(*streams, strict=True):
+            seen = {"front_rgb": center_square(front), "wrist_rgb": center_square(wrist)}
             tracks.add(seen, is_video=False)
-        tracks.finish()
-        arrays = _arrays(dataset, recorded)
+        arrays = _arrays(dataset, index)
         arrays |= {f"{one}_histogram": counts for one, counts in tracks.histograms.items()}
-        file.finish(_facts(job, recorded.length - 1), arrays)
+        file.finish(_facts(job, len(arrays["actions"]) - 1), arrays)
 
 
 def _facts(job: RecordingJob, steps: int) -> TrajectoryFacts:
     return TrajectoryFacts(
-        task=job.task,
-        split=job.split,
-        episode=job.number,
-        seed=job.episode.seed,
-        difficulty=job.episode.difficulty,
-        variation=job.variation,
-        policy=job.policy,
-        status="success",
-        cause="",
-        video_length=0,
-        steps=steps,
-        demonstration_source="none",
-        environment_version=ENVIRONMENT_VERSION,
-        coding=job.spec.coding,
-        depth=False,
-    )
+        task=job.task, split=job.split, episode=job.number, seed=job.episode.seed,
+        difficulty=job.episode.difficulty, variation=0, policy=job.policy, status="success",
+        cause="", video_length=0, steps=steps, demonstration_source="none",
+        environment_version=ENVIRONMENT_VERSION, coding=job.spec.coding, depth=False,
+    )  # fmt: skip
 
 
-def _arrays(dataset: TeleopDataset, recorded: TeleopEpisode) -> dict[str, NDArray[Any]]:
-    """Return the arrays of a trajectory in our units; nobody named subgoals."""
+def _arrays(dataset: TeleopDataset, index: int) -> dict[str, NDArray[Any]]:
+    """Return the arrays of a trajectory in our units; subgoals have no words."""
     names = dataset.names
-    states, targets = (dataset.vectors(recorded, one) for one in (STATE, ACTION))
+    states, aims = (dataset.vectors(index, one) for one in (STATE, ACTION))
     joints = states[:, :ARM_JOINTS] / names.unit
-    fingers = names.opening(states[:, ARM_JOINTS]).clip(0, 1) * FINGER_RANGE
-    aims = targets[:, :ARM_JOINTS] / names.unit
-    grips = 2 * names.opening(targets[:, ARM_JOINTS]).clip(0, 1) - 1
-    actions = np.column_stack([aims, grips]).astype(np.float32).astype(np.float64)
-    # A row's action is the one that led to its observation; to hold the first leads to the first.
-    before = np.append(joints[0], 2 * fingers[0] / FINGER_RANGE - 1)
-    actions = np.vstack([before, actions[:-1]])
-    nothing = stack_texts([""] * len(joints))
-    return {
+    openings = names.opening(states[:, ARM_JOINTS]).clip(0, 1)
+    # A row's action led to its observation: the first comes from holding still.
+    aims = np.vstack([states[0], aims[:-1]])
+    grips = 2 * names.opening(aims[:, ARM_JOINTS]).clip(0, 1) - 1
+    actions = np.column_stack([aims[:, :ARM_JOINTS] / names.unit, grips]).astype(np.float32)
+    found: dict[str, NDArray[Any]] = {
         "joint_positions": joints.astype(np.float32),
-        "gripper": np.column_stack([fingers, fingers]).astype(np.float32),
+        "gripper": np.repeat(openings[:, None] * FINGER_RANGE, 2, axis=1).astype(np.float32),
         "end_effector": _poses(joints),
-        "actions": actions,
+        "actions": actions.astype(np.float64),
         "pose_actions": np.column_stack([_poses(actions[:, :ARM_JOINTS]), actions[:, ARM_JOINTS]]),
-        "subgoals": nothing,
-        "online_subgoals": nothing,
-        "grounded_subgoals": nothing,
-        "grounded_online_subgoals": nothing,
     }
+    nothing = stack_texts([""] * len(joints))
+    kinds = ("", "online_", "grounded_", "grounded_online_")
+    return found | {f"{kind}subgoals": nothing for kind in kinds}
 
 
-def _poses(joints: NDArray[np.float64]) -> NDArray[np.float64]:
+def _poses(joints: NDArray[Any]) -> NDArray[np.float64]:
     """Return the tool's poses (rows, 6) with unwrapped angles."""
     poses = np.stack([end_effector_pose(one) for one in joints])
     poses[:, 3:] = np.unwrap(poses[:, 3:], axis=0)

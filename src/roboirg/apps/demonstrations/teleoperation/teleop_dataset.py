@@ -6,13 +6,13 @@ import json
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from roboirg.apps.demonstrations.parquet_tables import read_rows
-from roboirg.apps.demonstrations.picture_coding import Picture
+from roboirg.apps.demonstrations.picture_coding import Picture, decode_png
 from roboirg.core.errors import InvalidValueError
 from roboirg.policies.contract.option_checking import check_options
 from roboirg.policies.contract.policy_urls import parse_query
@@ -23,58 +23,44 @@ STATE, ACTION, PICTURES = "observation.state", "action", "observation.images."
 _VERSION = "v3.0"
 
 
-class TeleopEpisode(NamedTuple):
-    """One episode of the data set.
-
-    Attributes:
-        number: its index.
-        text: the task that it was recorded with.
-        length: number of frames.
-        places: its row in the table of episodes.
-    """
-
-    number: int
-    text: str
-    length: int
-    places: Mapping[str, Any]
-
-
 @dataclass(frozen=True)
 class TeleopDataset:
-    """A recorded data set; pictures are read when they are asked for.
+    """A recorded data set; frames and pictures are read when they are asked for.
 
     Attributes:
         root: its folder.
         names: of joints, gripper and cameras, and their units.
         info: its metadata.
-        episodes: in order.
+        episodes: rows of its table of episodes, in order.
     """
 
     root: Path
     names: LeRobotFeatures
     info: Mapping[str, Any]
-    episodes: tuple[TeleopEpisode, ...]
+    episodes: tuple[Mapping[str, Any], ...]
 
     @property
     def cameras(self) -> tuple[str, ...]:
         """Names of its cameras."""
-        return tuple(
-            name.removeprefix(PICTURES)
-            for name in self.info["features"]
-            if name.startswith(PICTURES)
-        )
+        features = self.info["features"]
+        return tuple(one.removeprefix(PICTURES) for one in features if one.startswith(PICTURES))
+
+    @property
+    def texts(self) -> tuple[str, ...]:
+        """What each episode was recorded with."""
+        return tuple(" / ".join(episode["tasks"]) for episode in self.episodes)
 
     def columns(self, feature: str) -> list[str]:
         """Return the names of a vector's entries; empty if the data set has no such vector."""
         return list(self.info["features"].get(feature, {}).get("names") or [])
 
-    def vectors(self, episode: TeleopEpisode, feature: str) -> NDArray[np.float64]:
+    def vectors(self, index: int, feature: str) -> NDArray[np.float64]:
         """Return joints and gripper of each frame in the robot's units, (frames, 8)."""
         has = self.columns(feature)
-        order = [has.index(one) for one in (*self.names.joints, self.names.gripper)]
-        return np.array(self._column(episode, feature), dtype=np.float64)[:, order]
+        order = [has.index(one) for one in self.names.vector]
+        return np.array(self._column(index, feature), dtype=np.float64)[:, order]
 
-    def pictures(self, episode: TeleopEpisode, camera: str) -> Iterator[Picture]:
+    def pictures(self, index: int, camera: str) -> Iterator[Picture]:
         """Yield the pictures of an episode, RGB.
 
         Raises:
@@ -82,61 +68,49 @@ class TeleopDataset:
         """
         feature = PICTURES + camera
         if self.info["features"][feature]["dtype"] == "video":
-            yield from self._video(episode, feature)
-            return
-        import cv2
+            yield from self._video(index, feature)
+        else:
+            yield from (decode_png(one["bytes"]) for one in self._column(index, feature))
 
-        for entry in self._column(episode, feature):
-            content = entry["bytes"] or (self.root / entry["path"]).read_bytes()
-            found = cv2.imdecode(np.frombuffer(content, np.uint8), cv2.IMREAD_COLOR)
-            if found is None:
-                raise InvalidValueError(f"A {camera} picture of {self._where(episode)} is damaged.")
-            yield np.asarray(cv2.cvtColor(found, cv2.COLOR_BGR2RGB), dtype=np.uint8)
+    def _path(self, index: int, kind: str, pattern: str, **names: str) -> Path:
+        indices = ("chunk_index", "file_index")
+        place = {one: self.episodes[index][f"{kind}/{one}"] for one in indices}
+        return self.root / str(self.info[pattern]).format(**names, **place)
 
-    def _column(self, episode: TeleopEpisode, name: str) -> list[Any]:
+    def _column(self, index: int, name: str) -> list[Any]:
         from pyarrow import parquet
 
-        place = {key: episode.places[f"data/{key}"] for key in ("chunk_index", "file_index")}
-        path = self.root / self.info["data_path"].format(**place)
-        table = parquet.read_table(
-            path, columns=[name], filters=[("episode_index", "=", episode.number)]
-        )
-        found: list[Any] = table[name].to_pylist()
-        if len(found) != episode.length:
-            raise InvalidValueError(
-                f"{self._where(episode)} has {len(found)} frames in {path.name} instead of "
-                f"{episode.length}."
-            )
-        return found
+        path = self._path(index, "data", "data_path")
+        own = [("episode_index", "=", self.episodes[index]["episode_index"])]
+        found: list[Any] = parquet.read_table(path, columns=[name], filters=own)[name].to_pylist()
+        return self._whole(found, index, path)
 
-    def _video(self, episode: TeleopEpisode, feature: str) -> Iterator[Picture]:
+    def _video(self, index: int, feature: str) -> list[Picture]:
         import av
 
-        key = f"videos/{feature}"
-        place = {one: episode.places[f"{key}/{one}"] for one in ("chunk_index", "file_index")}
-        path = self.root / self.info["video_path"].format(video_key=feature, **place)
-        start, count = float(episode.places[f"{key}/from_timestamp"]), 0
+        kind = f"videos/{feature}"
+        path = self._path(index, kind, "video_path", video_key=feature)
+        start = self.episodes[index][f"{kind}/from_timestamp"]
+        found: list[Picture] = []
         try:
             with av.open(str(path)) as container:
                 stream: Any = container.streams.video[0]
                 container.seek(int(start / stream.time_base), stream=stream)
                 for frame in container.decode(stream):
-                    if frame.time < start - 0.5 / self.info["fps"]:
-                        continue
-                    if count == episode.length:
-                        return
-                    count += 1
-                    yield frame.to_ndarray(format="rgb24")
+                    if frame.time > start - 0.5 / self.info["fps"]:
+                        found.append(frame.to_ndarray(format="rgb24"))
+                    if len(found) == self.episodes[index]["length"]:
+                        break
         except (OSError, av.FFmpegError) as error:
             raise InvalidValueError(f"The video {path} cannot be read: {error}.") from error
-        if count < episode.length:
-            raise InvalidValueError(
-                f"The video {path} ends after {count} of {episode.length} frames of "
-                f"{self._where(episode)}."
-            )
+        return self._whole(found, index, path)
 
-    def _where(self, episode: TeleopEpisode) -> str:
-        return f"episode {episode.number} of {self.root}"
+    def _whole(self, found: list[Any], index: int, path: Path) -> list[Any]:
+        if len(found) != (length := self.episodes[index]["length"]):
+            raise InvalidValueError(
+                f"{path} has {len(found)} of {length} frames of episode {index}."
+            )
+        return found
 
 
 def open_teleop(spec: str) -> TeleopDataset:
@@ -155,18 +129,13 @@ def open_teleop(spec: str) -> TeleopDataset:
     root = Path(folder)
     try:
         info = json.loads((root / "meta/info.json").read_text(encoding="utf-8"))
-        version = info["codebase_version"]
-        if version == _VERSION:
-            tables = sorted((root / "meta/episodes").glob("*/*.parquet"))
-            rows = [row for path in tables for row in read_rows(path)]
-            return TeleopDataset(root, names, info, tuple(map(_episode, rows)))
+        if info["codebase_version"] != _VERSION:
+            raise ValueError(f"its format is {info['codebase_version']}; convert it with LeRobot")
+        tables = sorted((root / "meta/episodes").glob("*/*.parquet"))
+        rows = (row for path in tables for row in read_rows(path))
+        episodes = ({k: v for k, v in row.items() if not k.startswith("stats/")} for row in rows)
+        return TeleopDataset(root, names, info, tuple(episodes))
     except (OSError, ValueError, KeyError) as error:
-        raise InvalidValueError(f"{folder!r} is no data set of LeRobot: {error}.") from error
-    raise InvalidValueError(
-        f"{folder!r} has LeRobot's format {version}; convert it to {_VERSION} with LeRobot first."
-    )
-
-
-def _episode(row: Mapping[str, Any]) -> TeleopEpisode:
-    places = {key: value for key, value in row.items() if not key.startswith("stats/")}
-    return TeleopEpisode(row["episode_index"], " / ".join(row["tasks"]), row["length"], places)
+        raise InvalidValueError(
+            f"{folder!r} is no data set of LeRobot's format {_VERSION}: {error}."
+        ) from error

@@ -162,7 +162,7 @@ class LeRobotArm:
 
     def _check_features(self) -> None:
         options = self._options
-        state = (*options.joints, options.gripper)
+        state = options.vector
         pictures = [name for name in (options.front, options.wrist, options.depth) if name]
         for kind, required in (("observation", (*state, *pictures)), ("action", state)):
             features: Mapping[str, Any] = getattr(self._robot, f"{kind}_features")

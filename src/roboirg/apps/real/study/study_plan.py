@@ -20,7 +20,7 @@ from roboirg.core.episode import Episode
 from roboirg.core.errors import InvalidValueError, RoboIRGError, UnknownNameError
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.evaluation.plan.plan_parsing import name_and_spec
-from roboirg.evaluation.records.record import DEFAULT_MAX_STEPS, Job
+from roboirg.evaluation.records.record import Job
 from roboirg.language.settings import plain_settings, settings_of
 from roboirg.tasks import get_task
 from roboirg.tasks.splits.splits import get_episode
@@ -125,8 +125,6 @@ def make_study(
     trials: int = DEFAULT_TRIALS,
     demonstrations: int = DEFAULT_DEMONSTRATIONS,
     seed: int = 0,
-    split: str = TRIAL_SPLIT,
-    max_steps: int = DEFAULT_MAX_STEPS,
 ) -> StudyPlan:
     """Return a balanced plan in a random order.
 
@@ -137,19 +135,17 @@ def make_study(
         trials: arrangements per task; each policy meets each of them in every setting.
         demonstrations: per task.
         seed: of the orders.
-        split: of the episodes of the trials.
-        max_steps: largest number of control periods of a trial.
 
     Raises:
-        UnknownNameError: a task, setting or split does not exist.
+        UnknownNameError: a task or setting does not exist.
         InvalidValueError: a number is out of range, or a name is given twice.
     """
     named = [name_and_spec(policy) for policy in policies]
     names = [name for name, _ in named]
     settings = _shared_settings(tasks) if settings is None else settings
-    _check(names, tasks, settings, trials, demonstrations, seed, max_steps)
+    _check(names, tasks, settings, trials, demonstrations, seed)
     rng = np.random.default_rng(seed)
-    chosen = {task: counterbalanced_episodes(task, split, trials) for task in tasks}
+    chosen = {task: counterbalanced_episodes(task, TRIAL_SPLIT, trials) for task in tasks}
     conditions = list(product(settings, range(len(named))))
     planned: list[PlannedTrial] = []
     for block, (task, episode) in enumerate(_blocks(chosen, rng), 1):
@@ -160,10 +156,9 @@ def make_study(
                 policy=name,
                 spec=None if spec == name else spec,
                 task=task,
-                split=split,
+                split=TRIAL_SPLIT,
                 episode=episode,
                 options=InstructionOptions(setting),
-                max_steps=max_steps,
             )
             trial_name = f"{task}-{episode:02d}-{setting}-{LETTERS[policy]}"
             planned.append(PlannedTrial(name=trial_name, block=block, job=job))
@@ -253,7 +248,6 @@ def _check(
     trials: int,
     demonstrations: int,
     seed: int,
-    max_steps: int,
 ) -> None:
     for kind, names in (("policy", policies), ("task", tasks), ("setting", settings)):
         if not names:
@@ -267,7 +261,6 @@ def _check(
         ("trials", trials, 1),
         ("demonstrations", demonstrations, 0),
         ("seed", seed, 0),
-        ("max_steps", max_steps, 1),
     ):
         if value < minimum:
             raise InvalidValueError(f"{name} is {value}; it must be at least {minimum}.")
