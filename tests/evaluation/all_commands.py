@@ -159,6 +159,7 @@ def words_of(folder, run):
             "--out",
             f"{folder}/study",
         ],
+        "export recordings": [f"{folder}/study", folder],
         "real run": [f"{folder}/study"],
         "real score": [f"{folder}/study"],
         "language import-robomme": ["--help"],

@@ -8,7 +8,7 @@ from typing import NamedTuple
 from roboirg.apps.demonstrations.export_plan import ExportPlan
 
 
-class Recipe(NamedTuple):
+class TrainingRecipe(NamedTuple):
     """How long and how fast a policy is trained; the rate stays after the warm-up.
 
     Attributes:
@@ -24,9 +24,9 @@ class Recipe(NamedTuple):
     warmup: int
 
 
-SIMULATED = Recipe(80_000, 64, 5e-5, 10_000)
+SIMULATED = TrainingRecipe(80_000, 64, 5e-5, 10_000)
 """As RoboMME trains its policies."""
-ON_ROBOT = Recipe(5_000, 48, 5e-5, 300)
+ON_ROBOT = TrainingRecipe(5_000, 48, 5e-5, 300)
 """As the paper fine-tunes for its study with a real robot."""
 HORIZON = 20
 """Actions that a policy predicts."""
