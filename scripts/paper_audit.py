@@ -9,17 +9,25 @@ differs, and returns what it found.
 
 from __future__ import annotations
 
+import dataclasses
 import re
 import sys
 from collections.abc import Callable, Iterator
 from decimal import Decimal
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import write_published_figures as figures
 import yaml
 
+from roboirg.apps.demonstrations.export_plan import TELEOPERATED, ExportPlan, FormatName
+from roboirg.apps.demonstrations.formats.training_lines import HORIZON as PREDICTED
+from roboirg.apps.demonstrations.formats.training_lines import ON_ROBOT, training_text
+from roboirg.apps.real.control.robot import HORIZON
+from roboirg.apps.real.study.execution_horizon import at_horizon
+from roboirg.apps.real.study.study_plan import DEFAULT_DEMONSTRATIONS, DEFAULT_TRIALS
 from roboirg.core.errors import InvalidValueError
+from roboirg.policies import make_policy
 from roboirg.policies.by_name.systems import all_systems, find_system
 from roboirg.tasks import LEFT_OUT, every_task, find_tasks
 
@@ -144,6 +152,46 @@ def _() -> str:
         if re.search(r"paper's (introductions|instructions) (name|say|hold)", read(page)):
             raise AssertionError(f"{page} says it")
     return f"{len(pages)} pages"
+
+
+@item("horizon", "in the real study pi0.5 and FrameS-Modul predict and execute 20 actions")
+def _() -> str:
+    for name in ("pi0.5", "FrameS-Modul"):
+        policy: Any = make_policy(at_horizon(f"system:{name}"), 0)
+        same(policy.options.execute, 20)
+    return same([HORIZON, PREDICTED], [20, 20])
+
+
+@item("recipe", "the real study trains 5,000 steps, rate 5e-5, batch 48, 300 warm-up steps")
+def _() -> str:
+    return same(tuple(ON_ROBOT), (5_000, 48, 5e-5, 300))
+
+
+@item("recipe-configured", "the generated configurations of recordings have these numbers")
+def _() -> str:
+    wanted: dict[FormatName, tuple[str, ...]] = {
+        "lerobot-v3": ("--steps=5000", "--batch_size=48", "warmup_steps=300", "chunk_size=20"),
+        "lerobot-v2.1": ("num_train_steps=5000", "batch_size=48", "peak_lr=5e-05", "horizon=20"),
+        "robomme-hdf5": ("steps=5000", "batch-size=48", "warmup-steps=300", "peak-lr=5e-05"),
+    }
+    for name, parts in wanted.items():
+        made = ExportPlan(("PutInBox",), "train", (0,), ("explicit",), policy=TELEOPERATED)
+        text = training_text(dataclasses.replace(made, format=name), ROOT)
+        for part in parts:
+            if part not in text:
+                raise AssertionError(f"the configuration of {name} lacks {part}")
+    return ", ".join(wanted)
+
+
+@item("real-study", "the page has cameras, 30 pictures a second, GELLO, recording and checking")
+def _() -> str:
+    parts = "RealSense", "435IF", "GELLO", "30 pictures per second", "roboirg export recordings"
+    return says("docs/real-robot.md", *parts)
+
+
+@item("demonstrations", "50 explicit demonstrations a task and 10 trials a cell are the defaults")
+def _() -> str:
+    return same((DEFAULT_DEMONSTRATIONS, DEFAULT_TRIALS), (50, 10))
 
 
 # What the published figures support
