@@ -20,7 +20,7 @@ from roboirg.core.episode import Episode
 from roboirg.core.errors import InvalidValueError, RoboIRGError, UnknownNameError
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.evaluation.plan.plan_parsing import name_and_spec
-from roboirg.evaluation.records.record import Job
+from roboirg.evaluation.records.record import DEFAULT_MAX_STEPS, Job
 from roboirg.language.settings import plain_settings, settings_of
 from roboirg.tasks import get_task
 from roboirg.tasks.splits.splits import get_episode
@@ -125,6 +125,7 @@ def make_study(
     trials: int = DEFAULT_TRIALS,
     demonstrations: int = DEFAULT_DEMONSTRATIONS,
     seed: int = 0,
+    max_steps: int = DEFAULT_MAX_STEPS,
 ) -> StudyPlan:
     """Return a balanced plan in a random order.
 
@@ -135,6 +136,7 @@ def make_study(
         trials: arrangements per task; each policy meets each of them in every setting.
         demonstrations: per task.
         seed: of the orders.
+        max_steps: largest number of control periods of a trial.
 
     Raises:
         UnknownNameError: a task or setting does not exist.
@@ -143,7 +145,7 @@ def make_study(
     named = [name_and_spec(policy) for policy in policies]
     names = [name for name, _ in named]
     settings = _shared_settings(tasks) if settings is None else settings
-    _check(names, tasks, settings, trials, demonstrations, seed)
+    _check(names, tasks, settings, trials, demonstrations, seed, max_steps)
     rng = np.random.default_rng(seed)
     chosen = {task: counterbalanced_episodes(task, TRIAL_SPLIT, trials) for task in tasks}
     conditions = list(product(settings, range(len(named))))
@@ -159,6 +161,7 @@ def make_study(
                 split=TRIAL_SPLIT,
                 episode=episode,
                 options=InstructionOptions(setting),
+                max_steps=max_steps,
             )
             trial_name = f"{task}-{episode:02d}-{setting}-{LETTERS[policy]}"
             planned.append(PlannedTrial(name=trial_name, block=block, job=job))
@@ -248,6 +251,7 @@ def _check(
     trials: int,
     demonstrations: int,
     seed: int,
+    max_steps: int,
 ) -> None:
     for kind, names in (("policy", policies), ("task", tasks), ("setting", settings)):
         if not names:
@@ -261,6 +265,7 @@ def _check(
         ("trials", trials, 1),
         ("demonstrations", demonstrations, 0),
         ("seed", seed, 0),
+        ("max_steps", max_steps, 1),
     ):
         if value < minimum:
             raise InvalidValueError(f"{name} is {value}; it must be at least {minimum}.")
