@@ -9,14 +9,7 @@ from roboirg.apps.demonstrations.export_plan import ExportPlan
 
 
 class TrainingRecipe(NamedTuple):
-    """How long and how fast a policy is trained; the rate stays after the warm-up.
-
-    Attributes:
-        steps: of training.
-        batch: samples in a step.
-        rate: of learning.
-        warmup: steps until the rate is reached.
-    """
+    """Steps of training, samples in a step, rate of learning, and steps until it is reached."""
 
     steps: int
     batch: int

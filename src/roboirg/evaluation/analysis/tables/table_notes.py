@@ -244,22 +244,19 @@ def _unequal_average_notes(which: RateTable) -> list[str]:
     """Say where the paper sets an average over some tasks against one over all."""
     rows = published_rows(which)
     explicit = {row.model: row for row in rows if row.options.setting == EXPLICIT}
-    notes = []
-    for setting in dict.fromkeys(row.options.setting for row in rows):
-        drops = []
-        for row in rows:
-            defined = [task for task, rate in row.rates.items() if rate is not None]
-            if row.options.setting == setting and len(defined) < len(row.rates):
-                same = explicit[row.model].average_over(defined) or Decimal(0)
-                printed = explicit[row.model].average - row.average
-                drops.append(f"{row.model} {printed} and {same - row.average}")
-        if drops:
-            notes.append(
-                f"The paper sets its {setting} averages, which are over fewer tasks, against the "
-                f"explicit ones over all. Drops as printed, and on the same tasks, as in this "
-                f"table: {', '.join(drops)}."
-            )
-    return notes
+    drops: dict[str, list[str]] = {}
+    for row in rows:
+        tasks = [task for task, rate in row.rates.items() if rate is not None]
+        if len(tasks) < len(row.rates) and (same := explicit[row.model].average_over(tasks)):
+            printed = explicit[row.model].average - row.average
+            text = f"{row.model} {printed} and {same - row.average}"
+            drops.setdefault(row.options.setting, []).append(text)
+    return [
+        f"The paper sets its {setting} averages, which are over fewer tasks, against the explicit "
+        "ones over all. Drops as printed, and on the same tasks, as in this table: "
+        f"{', '.join(texts)}."
+        for setting, texts in drops.items()
+    ]
 
 
 def _shortest_context_notes(which: RateTable) -> list[str]:
@@ -268,15 +265,14 @@ def _shortest_context_notes(which: RateTable) -> list[str]:
         return []
     direct = {row.model: row for row in published_rows("main") if row.options.setting == "direct"}
     gaps = [
-        abs(rate - (direct[row.model].rates[task] or Decimal(0)))
+        abs((rate or Decimal(0)) - (direct[row.model].rates[task] or Decimal(0)))
         for row in published_rows(which)
         if row.options == staged_options()[0]
         for task, rate in row.rates.items()
-        if rate is not None
     ]
     text = (
         "The published rows with the shortest context differ from the paper's direct setting in "
-        f"{sum(gap > 0 for gap in gaps)} of {len(gaps)} cells, by up to {max(gaps)} points."
+        f"{sum(map(bool, gaps))} of {len(gaps)} cells, by up to {max(gaps)} points."
     )
     return [text]
 
