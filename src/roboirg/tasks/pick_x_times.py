@@ -91,7 +91,6 @@ def stages(scene: Scene, goal: Goal) -> tuple[Stage, ...]:
 
 
 COMMANDS = Commands(
-    patterns=("color exclusion", "number deduction"),
     wordings=Pools(
         train=(
             Wording("Put {color} on the target {repeats}, then press the button."),

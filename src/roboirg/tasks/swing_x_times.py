@@ -140,7 +140,6 @@ def _swing(cube: str, side: str, ordinal: str, wrong: tuple[Fact | Rule, ...]) -
 
 
 COMMANDS = Commands(
-    patterns=("color exclusion", "number deduction"),
     wordings=Pools(
         train=(
             Wording(

@@ -176,7 +176,6 @@ def _early_press(timer: str) -> Rule:
 
 
 COMMANDS = Commands(
-    patterns=("number deduction",),
     wordings=Pools(
         train=(
             Wording(

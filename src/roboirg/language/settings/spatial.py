@@ -7,9 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from roboirg.core.episode import Goal
-from roboirg.core.goal_slots import COLOR_SLOTS
-from roboirg.language.instruction import Expression, Instruction
+from roboirg.language.instruction import Expression
 from roboirg.language.landmarks import FRAMES, SIMPLE, Landmark, landmarks
 from roboirg.language.phrases import Phrase, anaphor, antecedent, fill, listed
 from roboirg.language.request import GoalValue, InstructionRequest, InstructionSpec, UtteranceSpec
@@ -131,10 +129,6 @@ def introduction(
     return UtteranceSpec("introduction", fill(template, {"things": things}, plural=several))
 
 
-def _hidden_slots(_instruction: Instruction, goal: Goal) -> frozenset[str]:
-    return frozenset(goal.as_mapping()) & frozenset(COLOR_SLOTS)
-
-
 SETTING = Setting(
     name="spatial",
     order=4,
@@ -143,9 +137,7 @@ SETTING = Setting(
     say=say,
     applies_to=lambda task: task.spatial,
     refusal=refusal,
-    hidden_slots=_hidden_slots,
     reads=frozenset({"frame", "delivery"}),
     variants=tuple({"frame": frame} for frame in FRAMES),
-    hides_only_color=lambda _instruction: True,
     example=6,
 )

@@ -7,8 +7,8 @@ from collections.abc import Collection
 from typing import cast
 
 from roboirg.core.episode import ALL_COLORS, Goal, SlotValue
-from roboirg.language.instruction import Instruction
-from roboirg.language.settings import all_settings, reasoning_open
+from roboirg.language.instruction import Instruction, hidden_slots
+from roboirg.language.settings import reasoning_open
 from roboirg.language.worded_command import FIELD
 from roboirg.language.wordings.wording_store import find_wordings
 
@@ -32,7 +32,7 @@ def find_leaks(instruction: Instruction, goal: Goal) -> frozenset[str]:
     """Return the words and landmarks of an implicit command that give a hidden value away."""
     text = _without_ranks(instruction).lower().replace("before or after", "")
     words = frozenset(re.findall(r"[a-z0-9]+", text))
-    hidden = all_settings()[instruction.setting].hidden_slots(instruction, goal)
+    hidden = hidden_slots(instruction, goal)
     words -= _template_words(instruction, hidden) | _relation_words(instruction)
     found = [words & _spellings(goal[slot]) for slot in hidden]
     places = cast("list[str]", instruction.metadata["landmarks"])
