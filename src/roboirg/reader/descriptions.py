@@ -38,7 +38,7 @@ _CHOSEN = Phrases({
 _OTHERS = Phrases({
     "the other one":
         r"\bthe (?:other (?P<noun>cubes?|ones?|box|container|tape|place|spot)|others)\b"
-        r"(?! (?:of|in|from|than)\b)",
+        r"(?! (?:of|from|than)\b| in (?:those|these|them|the two)\b)",
 })  # fmt: skip
 
 DescriptionKind = Literal[
