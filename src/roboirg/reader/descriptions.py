@@ -94,6 +94,7 @@ _THAN = Phrases(
     after=r"\b",
 )  # fmt: skip
 _COMPLEMENT = Phrases({
+    "the cube in the other color": r"\bin the other color\b(?! (?:of|in|from)\b)",
     "the other color of those two":
         rf"\bthe other (?:one |color |(?:{THING}|{THINGS}) )?(?:of|in|from)\b"
         r"(?! (?:the |those |these )?(?:two )?moments)",

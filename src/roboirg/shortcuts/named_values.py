@@ -115,9 +115,10 @@ def part_count(text: str, thing: str, vocabulary: GoalVocabulary) -> int:
     ]
     if any(pair in ALL_PARTS for pair in itertools.pairwise(words)):
         stated.append(_introduced(text, vocabulary))
+    ranks = len(command_ranks(text))
     longest = max((one.longest for one in vocabulary.values()), default=1)
     nouns = sum(word in (thing, f"{thing}s", f"{thing}es") for word in words)
-    return max(1, min(longest, max((*stated, *_ranks(words), nouns))))
+    return max(1, min(longest, max((*stated, ranks, nouns))))
 
 
 def _introduced(text: str, vocabulary: GoalVocabulary) -> int:
@@ -130,14 +131,17 @@ def _introduced(text: str, vocabulary: GoalVocabulary) -> int:
     return 1
 
 
-def _ranks(words: Sentence) -> Iterator[int]:
-    """Yield the ranks of introduced things: *the former*, *the third*."""
+def command_ranks(text: str) -> tuple[int, ...]:
+    """Return the places of introduced things that the command takes: 0 for *the former*."""
+    words = command_words(text)
+    found: list[int] = []
     for before, word, after in zip(("", *words), words, (*words[1:], ""), strict=False):
-        if word in ("former", "latter"):
-            yield 2
         rank = ordinal_of(word)
-        if rank is not None and before == "the" and after not in ("from", "closest", "farthest"):
-            yield rank
+        if word in ("former", "latter"):
+            found.append(POINTERS[word])
+        elif rank is not None and before == "the" and after in ("of", "color", "place"):
+            found.append(rank - 1)
+    return tuple(found)
 
 
 def _values(words: Sentence, slot: str, vocabulary: SlotVocabulary) -> Iterator[tuple[int, Value]]:

@@ -151,13 +151,13 @@ COMMANDS = Commands(
                 "it down and press the button."
             ),
             Wording(
-                "Carry {color} over from your right to your left target {repeats}, "
+                "Carry {color} from your right to your left target {repeats}, "
                 "set it down and press the button."
             ),
         ),
         test=(
             Wording(
-                "Swing {color} over from your right to your left target "
+                "Take {color} and swing it from your right to your left target "
                 "{repeats}, lay it down and push the button."
             ),
             Wording(

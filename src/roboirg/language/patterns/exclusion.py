@@ -81,7 +81,7 @@ def _other(request: InstructionRequest, goal_value: GoalValue, pair: tuple[str, 
     if request.resolved:
         words = f"{' or '.join(pair)}, not {_rejected(goal_value, pair)}"
         return antecedent(words, goal_value.slot, goal_value.value)
-    return anaphor("the other of those colors", "other", goal_value.slot, goal_value.value)
+    return anaphor("the other color", "other", goal_value.slot, goal_value.value)
 
 
 def _rejected(goal_value: GoalValue, pair: tuple[str, ...]) -> str:

@@ -5,6 +5,7 @@ Counts stay explicit.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 
 from roboirg.language.instruction import Expression
@@ -21,6 +22,8 @@ POINTING: Mapping[int, tuple[Pointer, ...]] = {
     2: (("the former", "former"), ("the latter", "latter")),
     3: (("the first", "first"), ("the second", "second"), ("the third", "third")),
 }
+_STANDS_ALONE = re.compile(r"the (?P<noun>\w+) \{place\}")
+"""Words for a thing at a place, with nothing in between or after it."""
 NO_LANDMARK = "no landmark singles out a target"
 LONGEST = {1: 12, 2: 6, 3: 5}
 """The length that a landmark should have beside others, in `_length`; see `templates`."""
@@ -110,6 +113,17 @@ def _pointed(
         words = f"at {words} place" if several and not ranked else words
         place = anaphor(words, expression, color.slot, color.value)
     template = request.task.commands.by_rank if ranked else None
+    stands_alone = _STANDS_ALONE.fullmatch(request.task.commands.by_place)
+    if not several and request.wordings is None and stands_alone:
+        # "The one there": the noun is that of the introduction.
+        noun = request.sampler.pick("noun there", (stands_alone["noun"], "one"))
+        named = f"the {stands_alone['noun']} {landmark.phrase}"
+        place = (
+            antecedent(named, color.slot, color.value)
+            if request.resolved
+            else anaphor(f"the {noun} there", expression, color.slot, color.value)
+        )
+        template = "{place}"
     return request.by_place(color, place, plural=request.count_of(color) > 1, template=template)
 
 

@@ -82,7 +82,7 @@ def _reduced(request: InstructionRequest, goal_values: tuple[GoalValue, ...]) ->
             f"of {words.replace(' of them', ' color')}", expression, shade.slot, shade.value
         )
         return _described(request, goal_values, [thing])
-    pointers = THEM if len(matched) == 1 else color.LISTS[len(matched)][0]
+    pointers = THEM if len(matched) == 1 else color.LISTS[len(matched)]
     items = [
         amount(
             anaphor("that many", "that", count.slot, count.value),
@@ -111,7 +111,7 @@ def _introduce(request: InstructionRequest, goal_values: tuple[GoalValue, ...]) 
     if _counts_said(request, goal_values):
         shades = tuple(shade for shade, _ in pairs(goal_values))
         reference = _color_reference(request, goal_values)
-        return color.introduce_colors(request, shades, reference, noun(2))
+        return color.introduce_colors(request, shades, reference, many=True)
     template = request.pick("amount introduction", introductions.AMOUNT_INTRODUCTIONS)
     # "One of the red cubes": "them" then also fits a count of one.
     *others, last = pairs(goal_values)

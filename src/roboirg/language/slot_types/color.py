@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 from roboirg.language.instruction import REFERENCE, Expression
 from roboirg.language.number_words import plural
-from roboirg.language.phrases import Phrase, anaphor, antecedent, fill, listed
+from roboirg.language.phrases import Phrase, anaphor, antecedent, fill, listed, plain
 from roboirg.language.request import GoalValue, InstructionRequest
 from roboirg.language.slot_types.slot_type import Fields, SlotType, competing_remarks
 from roboirg.language.templates import introductions, remarks
@@ -29,7 +29,7 @@ SINGLE: tuple[Pointer, ...] = (
     ("it", "it"), ("the one I mentioned", "one"), ("the one I mentioned earlier", "one"),
 )  # fmt: skip
 """For the only thing that was introduced."""
-LISTS: Mapping[int, tuple[tuple[Pointer, ...], ...]] = {2: (FORMER, RANKS[:2]), 3: (RANKS,)}
+LISTS: Mapping[int, tuple[Pointer, ...]] = {2: FORMER, 3: RANKS}
 """For two or three introduced things, in their order."""
 
 
@@ -57,34 +57,31 @@ def draw_reference(
     if request.sampler.pick("introduced colors", manners) == "alone":
         if len(colors) == 1:
             return ColorReference(colors, (request.sampler.pick("color anaphor", single),))
-        return ColorReference(colors, LISTS[len(colors)][0])
+        return ColorReference(colors, LISTS[len(colors)])
     size = request.sampler.pick("list length", sizes)
     others = [color for color in request.scene_colors if color not in colors]
     left = next(request.sampler.cycle("listed colors", list(itertools.permutations(others))))
     members = [*colors, *left[: size - len(colors)]]
     order = request.sampler.pick("list order", list(itertools.permutations(range(size))))
     introduced = tuple(members[at] for at in order)
-    words = request.sampler.pick("list words", LISTS[size])
-    return ColorReference(introduced, tuple(words[introduced.index(one)] for one in colors))
+    return ColorReference(introduced, tuple(LISTS[size][introduced.index(one)] for one in colors))
 
 
 def introduce_colors(
     request: InstructionRequest,
     goal_values: tuple[GoalValue, ...],
     reference: ColorReference,
-    noun: str,
+    *,
+    many: bool = False,
 ) -> Phrase:
-    """Return a sentence that names colors, for example three of them in a list."""
+    """Return a sentence that names colors: ``I like the red, green and blue cubes``."""
     slots = {goal_value.color: goal_value.slot for goal_value in goal_values}
-    *others, last = reference.introduced
-    names = [*(f"the {color}" for color in others), f"the {last} {noun}"]
-    things = [
-        antecedent(name, slots.get(color, REFERENCE), color)
-        for name, color in zip(names, reference.introduced, strict=True)
-    ]
+    colors = [antecedent(one, slots.get(one, REFERENCE), one) for one in reference.introduced]
+    several = many or len(colors) > 1
+    noun = request.task.commands.colored
+    things = (*plain("the "), *listed(colors), *plain(f" {plural(noun) if several else noun}"))
     template = request.pick("color introduction", introductions.COLOR_INTRODUCTIONS)
-    several = bool(others) or noun != request.task.commands.colored
-    return fill(template, {"things": listed(things)}, plural=several)
+    return fill(template, {"things": things}, plural=several)
 
 
 def named(request: InstructionRequest, goal_value: GoalValue) -> Phrase:
@@ -114,7 +111,7 @@ def _reduced(request: InstructionRequest, goal_values: tuple[GoalValue, ...]) ->
 
 def _introduce(request: InstructionRequest, goal_values: tuple[GoalValue, ...]) -> Phrase:
     reference = draw_reference(request, goal_values)
-    return introduce_colors(request, goal_values, reference, request.task.commands.colored)
+    return introduce_colors(request, goal_values, reference)
 
 
 def _pointing(request: InstructionRequest, goal_values: tuple[GoalValue, ...]) -> Phrase:

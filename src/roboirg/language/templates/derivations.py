@@ -86,7 +86,7 @@ TAKEN_REMARKS = Pools(
 OTHERS = {
     "color": Pools(
         train=("the other {noun}", "the one of the two other than that"),
-        test=("the other {noun} of the two", "the one of them other than that"),
+        test=("the other {noun} of those", "the one of them other than that"),
     ),
     "amount": Pools(train=("of the other {noun}",), test=("of the others",)),
     "number": Pools(
@@ -95,11 +95,11 @@ OTHERS = {
     "count": Pools(train=("the other number",), test=("the other number",)),
     "visit": Pools(
         train=("the other {noun}", "the {noun} that is left"),
-        test=("the other {noun} of the two", "the {noun} other than that"),
+        test=("the other {noun} of those", "the {noun} other than that"),
     ),
     "placement": Pools(
         train=("the other {noun}",),
-        test=("the other {noun} of the two", "the {noun} that is left"),
+        test=("the other {noun} of those", "the {noun} that is left"),
     ),
 }
 """The value that is left, by kind of words."""
