@@ -112,5 +112,5 @@ def hidden_slots(instruction: Instruction, goal: Goal) -> frozenset[str]:
         for mention in instruction.mentions
         if mention.utterance == last and mention.role == "antecedent"
     }
-    said = cast("list[str]", instruction.metadata["template_slots"])
+    said = cast("list[str]", instruction.metadata.get("template_slots", []))
     return frozenset(goal.as_mapping()) - stated - set(said)

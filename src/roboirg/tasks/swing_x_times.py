@@ -147,22 +147,22 @@ COMMANDS = Commands(
                 "down and press the button."
             ),
             Wording(
-                "Take {color}, swing it from your right to your left target {repeats}, put "
+                "Move {color} from your right to your left target {repeats}, put "
                 "it down and press the button."
             ),
             Wording(
-                "Carry {color} from your right to your left target {repeats}, "
+                "Bring {color} from your right to your left target {repeats}, "
                 "set it down and press the button."
             ),
         ),
         test=(
             Wording(
-                "Take {color} and swing it from your right to your left target "
+                "Carry {color} from your right to your left target "
                 "{repeats}, lay it down and push the button."
             ),
             Wording(
                 "Grab {color}, swing it from your right to your left target {repeats}, "
-                "then lower it and push the button."
+                "lower it and push the button."
             ),
             Wording(
                 "Swing {color} from your right to your left target {repeats}, "
