@@ -106,7 +106,8 @@ def test_a_file_by_hand(tmp_path):
     ]
     direct = instruct(once, "direct", wordings=identity)
     assert direct.command == (
-        f"Could you put {pointer(direct)} on the target {same_number(direct)}, and press the button?"
+        f"Could you put {pointer(direct)} on the target {same_number(direct)}, "
+        "and press the button?"
     )
     assert interpret(direct.text, once.scene, "PickXtimes").goals == (once.goal,)
     hidden = instruct(episode_with("VideoUnmask", colors=("red",)), "direct", wordings=identity)
@@ -475,8 +476,8 @@ def test_words_around_brackets_stay():
         "then press the button"
     )
     assert thrice.command == (
-        f"put our friend {pointer(thrice)} on the table on the target exactly {same_number(thrice)}, "
-        "then press the button"
+        f"put our friend {pointer(thrice)} on the table on the target exactly "
+        f"{same_number(thrice)}, then press the button"
     )
     said = instruct(red[0], "spatial", wordings=identity).command
     assert re.search(r"put our friend the cube .* on the table on the target twice please", said)

@@ -141,10 +141,16 @@ def test_referring_expressions_take_the_place_of_the_phrases():
     assert command("VideoUnmask", "spatial", colors=("red",)) == "Lift the container there"
 
 
+POINTED = (
+    r"(?:it|the former|the latter|the \w+ of them|the one I mentioned(?: earlier)?|the .*cube.*)"
+)
+"""Words for a thing, as a regular expression."""
+
 UNSPOILED = {
     "StopCube": (
         r"Use the button to stop the cube exactly as it reaches the target "
-        r"(?:during (?:that visit|the (?:visit|other) .*|the .* visit but not .*)|(?:one|two) visits? (?:earlier|later) than .*)"
+        r"(?:during (?:that visit|the (?:visit|other) .*|the .* visit but not .*)"
+        r"|(?:one|two) visits? (?:earlier|later) than .*)"
     ),
     "VideoRepick": (
         r"Pick up and put back down the cube that was picked up in the video, "
@@ -152,7 +158,8 @@ UNSPOILED = {
     ),
     "VideoPlaceOrder": (
         rf"After watching the video, place {POINTED} on "
-        r"the target of (?:that placement|the placement (?!.* it was ).*)\."
+        r"the target (?:of (?:that placement|the (?:other )?placement (?!.* it was ).*"
+        r"|the .* placement but not .*)|used (?:one|two) placements? (?:earlier|later) than .*)\."
     ),
     "VideoPlaceButton": (
         rf"After watching the video, place {POINTED} on "
@@ -208,12 +215,6 @@ def test_no_expression_spoils_the_sentence_in_any_training_episode(task):
     commands = {one.command for one in pointed_commands(task, 100)}
     assert len(commands) > 20
     assert not [one for one in commands if not re.fullmatch(UNSPOILED[task], one)]
-
-
-POINTED = (
-    r"(?:it|the former|the latter|the \w+ of them|the one I mentioned(?: earlier)?|the .*cube.*)"
-)
-"""Words for a thing, as a regular expression."""
 
 
 @pytest.mark.parametrize(
