@@ -119,7 +119,8 @@ def _pointed_values(words: SlotWords, named: tuple[Value, ...]) -> list[Candidat
     if words.ranks and not words.is_number and max(words.ranks) < len(named):
         return [(named[rank],) for rank in words.ranks]
     if words.parts == 1 and len(named) < len(words.named) and not REST.isdisjoint(words.command):
-        return [(value,) for value in named if value != words.named[-1]][:1]
+        rest = [value for value in named if value != words.named[-1]]
+        return [(rest[0],)] if rest else []
     if words.pointed is not None and len(named) == PAIR:
         return [(named[words.pointed],), (named[1 - words.pointed],)]
     return []
