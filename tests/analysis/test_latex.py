@@ -1,11 +1,13 @@
-"""LaTeX tables fit the text of articles with one and with two columns, whatever they hold."""
+"""LaTeX tables fit IEEEtran's conference class, in pieces any article, whatever they hold."""
 
 from __future__ import annotations
 
+import csv
 import re
 import shutil
 import subprocess
 from decimal import Decimal
+from importlib import resources
 from pathlib import Path
 
 import pytest
@@ -13,23 +15,27 @@ from msgspec.structs import replace
 
 from roboirg.evaluation.analysis.stats.cells import gather
 from roboirg.evaluation.analysis.tables.paper_tables import WHICH, make_table
-from roboirg.evaluation.analysis.tables.rendering.latex import MOST_LINES, latex
+from roboirg.evaluation.analysis.tables.rendering.latex import latex
+from roboirg.evaluation.analysis.tables.rendering.latex_layout import PAGE, PIECES, Layout
 from roboirg.evaluation.analysis.tables.table import Column, Entry, Row, Table
 
 DOCUMENT = r"""
-\documentclass%s{article}
+\documentclass%s
 \usepackage[utf8]{inputenc}
-\usepackage{booktabs}
+\usepackage{booktabs,xcolor,amssymb}
 \begin{document}
 %s
 \end{document}
 """
+FILES = {"real": "real_world"}
 LONG = "my_package.policies:NetWithAVeryLongName, 600 steps, frames of the video none (privileged)"
 
 
 def crowded(policies: int, tasks: int) -> Table:
     """A table of which every entry has all that an entry can have."""
-    entry = Entry(Decimal("100.00"), change="down", best=True, marks="!…", differences=("split",))
+    entry = Entry(
+        Decimal("100.00"), change=Decimal("-100.00"), best=True, marks="!…", differences=("split",)
+    )
     columns = [Column(f"MyVeryOwnTask{number}", f"Suite {number // 4}") for number in range(tasks)]
     return Table(
         key="crowded",
@@ -56,17 +62,89 @@ def all_tables(like) -> list[Table]:
     ]
 
 
-def test_every_name_and_rate_is_there_once() -> None:
+@pytest.mark.parametrize("layout", [PAGE, PIECES])
+def test_every_name_and_rate_is_there_once(layout: Layout) -> None:
     table = crowded(policies=30, tasks=5)
-    text = latex(table)
+    text = latex(table, layout)
     plain = text.replace(r"\allowbreak{}", "").replace("\\_", "_")
     parts = text.count(r"\begin{table*}")
-    assert parts > 4
-    assert plain.count(r"\textbf{100.00}") == len(table.rows) * len(table.columns)
+    assert parts > 2
+    rate = r"\textbf{100.00}\roboirgdown{100.00}"
+    assert plain.count(rate) == len(table.rows) * len(table.columns)
     for row in table.rows:
-        assert plain.count(f"{row.label} &") == parts / len(blocks_of(text, table))
+        assert plain.count(f"{row.name} &") == parts / len(blocks_of(text, table))
     assert len(set(re.findall(r"\\label\{(.*?)\}", text))) == parts
     assert text.count("folder") == 30  # the notes stand below the last one
+
+
+ARROWS = {"up": 1, "down": -1, "same": 0}
+REFERENCES = {"main": "explicit", "planner": "explicit", "real": "explicit", "context": "1,5"}
+
+
+def shown(cell: str) -> tuple[str, float | None]:
+    """The rate of a cell as printed, and its change with its sign."""
+    rate, arrow, size = re.fullmatch(
+        r"\s*(?:\\textbf\{)?([\d.]+|--)\}?(?:\\roboirg(\w+)\{([\d.]+)\})?\s*(?:\\\\)?", cell
+    ).groups()
+    return rate, None if arrow is None else ARROWS[arrow] * float(size)
+
+
+def printed(which: str) -> dict[tuple[str, str, str], str]:
+    """The published rates by model, setting or stages, and task, read without the package."""
+    file = FILES.get(which, which)
+    folder = resources.files("roboirg.evaluation.analysis") / "published_results"
+    lines = csv.DictReader((folder / f"{file}.csv").read_text().splitlines())
+    return {
+        (
+            line.get("model") or line["planner"],
+            line.get("stages") or line["setting"],
+            line["task"],
+        ): line["success_rate_percent"]
+        for line in lines
+    }
+
+
+@pytest.mark.parametrize("which", REFERENCES)
+def test_a_published_table_is_one_and_has_every_printed_figure(which: str) -> None:
+    text = latex(make_table(which, {}, published=True))
+    assert text.count(r"\begin{table*}") == 1
+    rates = printed(which)
+    tasks = list(dict.fromkeys(task for _, _, task in rates))
+    body = text.split(r"\midrule", 1)[1].split(r"\bottomrule")[0]
+    found, group = 0, ""
+    for line in body.splitlines():
+        if heading := re.search(r"\\emph\{(.*?)\}+ ", line):
+            group = plain(heading[1])
+        elif "&" in line:
+            names, cells = line.split(" & ")[: -len(tasks)], line.split(" & ")[-len(tasks) :]
+            if which == "context":
+                name = ",".join(str(at) for at, one in enumerate(names, 1) if "check" in one)
+            else:
+                name = plain(names[0].removeprefix(r"\raggedright "))
+            model, row = (name, group) if which in ("main", "real") else (group, name)
+            for task, cell in zip(tasks, cells, strict=True):
+                assert shown(cell) == expected(rates, model, row, task, REFERENCES[which])
+                found += 1
+    assert found == len(rates)
+
+
+def plain(text: str) -> str:
+    return re.sub(r"\\textsuperscript\{.*|\\allowbreak\{\}", "", text)
+
+
+def expected(rates, model: str, row: str, task: str, reference: str):
+    """A rate and its change; that of an average is on equal tasks."""
+    rate = rates[model, row, task]
+    if not rate:
+        return "--", None
+    if row == reference:
+        return f"{float(rate):.2f}", None
+    before = rates[model, reference, task]
+    if task == "Avg":
+        has = [name for one, own, name in rates if (one, own) == (model, row) and name != "Avg"]
+        same = [float(rates[model, reference, name]) for name in has if rates[model, row, name]]
+        before = round(sum(same) / len(same) + 1e-9, 2)
+    return f"{float(rate):.2f}", round(float(rate) - float(before), 2)
 
 
 def blocks_of(text: str, table: Table) -> set[str]:
@@ -79,17 +157,28 @@ def blocks_of(text: str, table: Table) -> set[str]:
 
 def test_long_tables_are_divided_between_groups_if_that_is_possible() -> None:
     table = make_table("coverage", {})
-    few, many = latex(table), latex(crowded(policies=MOST_LINES, tasks=1))
+    few, many = latex(table), latex(crowded(policies=PAGE.lines, tasks=1))
     assert few.count(r"\begin{table*}") == 1
     assert many.count(r"\begin{table*}") > 3
 
 
-@pytest.mark.skipif(shutil.which("pdflatex") is None, reason="no TeX: texlive-latex-recommended")
-@pytest.mark.parametrize("layout", ["", "[twocolumn]"])
-def test_no_box_is_overfull(tmp_path: Path, published_like, layout: str) -> None:
+@pytest.mark.skipif(
+    shutil.which("pdflatex") is None
+    or subprocess.run(["kpsewhich", "IEEEtran.cls"], check=False, capture_output=True).returncode,
+    reason="no TeX: texlive-latex-recommended, texlive-publishers",
+)
+@pytest.mark.parametrize(
+    ("document", "layout"),
+    [
+        ("[conference]{IEEEtran}", PAGE),
+        ("{article}", PIECES),
+        ("[twocolumn]{article}", PIECES),
+    ],
+)
+def test_no_box_is_overfull(tmp_path: Path, published_like, document: str, layout: Layout) -> None:
     tables = all_tables(published_like)
-    text = "\n\\clearpage\n".join(latex(table) for table in tables)
-    (tmp_path / "paper.tex").write_text(DOCUMENT % (layout, text), encoding="utf-8")
+    text = "\n\\clearpage\n".join(latex(table, layout) for table in tables)
+    (tmp_path / "paper.tex").write_text(DOCUMENT % (document, text), encoding="utf-8")
     subprocess.run(
         ["pdflatex", "-interaction=nonstopmode", "-halt-on-error", "paper.tex"],
         cwd=tmp_path, check=True, capture_output=True,

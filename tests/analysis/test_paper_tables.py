@@ -19,7 +19,7 @@ from roboirg.core.errors import UnknownNameError
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.evaluation.analysis.stats.cells import gather
 from roboirg.evaluation.analysis.stats.chance import CHANCE, FLOORS
-from roboirg.evaluation.analysis.stats.rates import change, mean_percent, percent
+from roboirg.evaluation.analysis.stats.rates import change_text, mean_percent, percent
 from roboirg.evaluation.analysis.tables.paper_tables import is_informative, make_table
 from roboirg.evaluation.analysis.tables.rendering import FORMATS, get_format
 from roboirg.evaluation.analysis.tables.rendering.terminal import renderable
@@ -42,7 +42,8 @@ def test_rounding_by_hand() -> None:
     assert percent(Fraction(1, 16)) == Decimal("6.25")
     assert percent(Fraction(1, 32)) == Decimal("3.13")  # 3.125
     assert mean_percent([Decimal("0.01"), Decimal("0.00")]) == Decimal("0.01")
-    assert change(Decimal("1.00"), Decimal("1.01")) == "down"
+    texts = [change_text(Decimal(one)) for one in ("1.33", "-0.67", "0.00", "-0.00")]
+    assert texts == ["↑1.33", "↓0.67", "→0.00", "→0.00"]
 
 
 def entries(table, group: str, name: str | None = None, source: str = "ours") -> dict[str, Entry]:
@@ -72,7 +73,7 @@ def test_a_complete_run_has_no_marks(result) -> None:
     table = make_table("main", gather([("run", whole(result))]))
     assert {entry.text for row in table.rows for entry in row.entries} == {"50.00"}
     assert not any(entry.marks for row in table.rows for entry in row.entries)
-    assert {entry.change for entry in entries(table, "direct").values()} == {"same"}
+    assert {entry.change for entry in entries(table, "direct").values()} == {0}
     assert "One policy was played" in notes(table)
     assert "2 episodes per cell, each played once" in notes(table)
     assert "Bold" not in notes(table)
@@ -89,8 +90,8 @@ def test_an_error_marks_its_cell_and_every_average_over_it(result) -> None:
     }
     assert (direct["BinFill"].text, direct["BinFill"].marks) == ("50.00", "!")
     assert {direct[name].marks for name in ("Counting Avg", "Avg")} == {"*"}
-    assert not any(direct[name].change for name in ("BinFill", "Counting Avg", "Avg"))
-    assert direct["StopCube"].change == "same"
+    assert {direct[name].change for name in ("BinFill", "Counting Avg", "Avg")} == {None}
+    assert direct["StopCube"].change == 0
     assert "! 1 trial ended in an error" in notes(table)
 
 
@@ -182,7 +183,7 @@ def test_spatial_is_compared_with_explicit_on_the_tasks_that_have_it(result) -> 
     table = make_table("main", gather([("run", results)]))
     assert entries(table, "explicit")["Avg"].percent > Decimal(60)
     average = entries(table, "spatial")["Avg"]
-    assert (average.text, average.change, average.marks) == ("50.00", "same", "")
+    assert (average.text, average.change, average.marks) == ("50.00", 0, "")
     assert entries(table, "spatial")["Reference Avg"].text == "–"
 
 
@@ -257,7 +258,7 @@ def test_latex_is_balanced_and_markdown_rectangular(result) -> None:
     odd = "my_pkg:Net & 50% #1|{x}\\*"
     cells = gather([("run", [*whole(result, odd), *whole(result, "b", settings=("spatial",))])])
     table = make_table("main", cells, published=True)
-    latex = FORMATS["latex"].draw(table)
+    latex = FORMATS["latex-pieces"].draw(table)
     rows = [
         line for line in latex.splitlines() if line.endswith(r"\\") and "multicolumn" not in line
     ]
@@ -277,7 +278,7 @@ def test_latex_is_balanced_and_markdown_rectangular(result) -> None:
 
 
 def test_other_names_are_refused() -> None:
-    with pytest.raises(UnknownNameError, match="terminal, markdown, latex, csv"):
+    with pytest.raises(UnknownNameError, match="terminal, markdown, latex, latex-pieces, csv"):
         get_format("html")
     with pytest.raises(UnknownNameError, match="Did you mean 'main'"):
         make_table("mian", {})

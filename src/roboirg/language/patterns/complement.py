@@ -1,4 +1,4 @@
-"""Contextual logic: of two introduced values, the one that somebody else did not take."""
+"""Contextual logic: of two introduced values, the one that was not taken."""
 
 from __future__ import annotations
 

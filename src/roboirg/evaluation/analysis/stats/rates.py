@@ -10,13 +10,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from decimal import ROUND_HALF_UP, Decimal
 from fractions import Fraction
-from typing import Literal
 
 DIGITS = Decimal("0.01")
 
 _SMALLEST_P = 0.001
-
-Change = Literal["up", "down", "same"]
 
 
 def percent(rate: Fraction) -> Decimal:
@@ -29,9 +26,10 @@ def mean_percent(cells: Sequence[Decimal]) -> Decimal:
     return _rounded(sum(map(Fraction, cells), Fraction(0)) / len(cells))
 
 
-def change(value: Decimal, reference: Decimal) -> Change:
-    """Return whether a printed rate is above or below another, or the same."""
-    return "same" if value == reference else "up" if value > reference else "down"
+def change_text(change: Decimal) -> str:
+    """Return the difference of two printed rates with an arrow: ``↑1.33``, ``→0.00``."""
+    arrow = "→" if not change else "↑" if change > 0 else "↓"
+    return f"{arrow}{abs(change)}"
 
 
 def whole_percent(rate: float | Fraction) -> str:

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from fractions import Fraction
 from typing import Literal, NamedTuple, get_args
 
 import numpy as np
 
 from roboirg.core.errors import UnknownNameError
-from roboirg.core.instruction_options import InstructionOptions
+from roboirg.core.instruction_options import ALL_STAGES, InstructionOptions
 from roboirg.evaluation.analysis.comparability import AllDifferences, differences_of
 from roboirg.evaluation.analysis.published import (
     AVERAGE,
@@ -28,6 +29,7 @@ from roboirg.evaluation.analysis.stats.rates import percent
 from roboirg.evaluation.analysis.tables.table import (
     ERROR_MARK,
     MISSING_MARK,
+    POLICY,
     Column,
     Counts,
     Entry,
@@ -37,7 +39,12 @@ from roboirg.evaluation.analysis.tables.table import (
     with_best,
     with_changes,
 )
-from roboirg.evaluation.analysis.tables.table_notes import TWIN_MARK, is_shown, notes_of
+from roboirg.evaluation.analysis.tables.table_notes import (
+    TWIN_MARK,
+    average_notes,
+    is_shown,
+    notes_of,
+)
 from roboirg.evaluation.records.record import Job
 from roboirg.language.settings import EXPLICIT, all_settings, settings_of
 from roboirg.tasks import all_tasks, every_task
@@ -118,15 +125,25 @@ def _rate_table(which: RateTable, cells: Cells, *, published: bool, floors: Sequ
         rows += _floor_rows(floor, which, columns, cells)
     if shows_published:
         rows += [_published_row(which, columns, row) for row in published_rows(which)]
-    rows = with_best(with_changes(columns, _grouped(which, rows), _reference_finder(which, rows)))
+    reference_of = _reference_finder(which, rows)
+    rows = with_best(with_changes(columns, _grouped(which, rows), reference_of))
     return Table(
         key=which,
         title=TITLES[which],
-        heads=("policy", "stages") if which == "context" else ("setting", "policy"),
+        heads=_heads(which),
         columns=columns,
-        rows=tuple(rows),
-        notes=notes_of(which, rows, cells, tasks, differences),
+        rows=tuple(_by_policy(rows) if which == "planner" else rows),
+        notes=(
+            *notes_of(which, rows, cells, tasks, differences),
+            *average_notes(columns, rows, reference_of),
+        ),
     )
+
+
+def _heads(which: RateTable) -> tuple[str, ...]:
+    if which == "context":
+        return (POLICY, *map(str, ALL_STAGES))
+    return (POLICY, "setting") if which == "planner" else ("setting", POLICY)
 
 
 def _tasks(which: RateTable, cells: Cells) -> tuple[str, ...]:
@@ -270,6 +287,13 @@ def _grouped(which: RateTable, rows: Iterable[Row]) -> list[Row]:
     if which != "context":
         groups.sort(key=setting_sort_key)
     return [row for group in groups for row in found if row.group == group]
+
+
+def _by_policy(rows: Sequence[Row]) -> list[Row]:
+    """Return rows that are grouped by setting grouped by policy instead."""
+    owners = list(dict.fromkeys((row.source, row.name) for row in rows))
+    found = sorted(rows, key=lambda row: owners.index((row.source, row.name)))
+    return [replace(row, group=row.name, name=row.group) for row in found]
 
 
 def _reference_finder(which: RateTable, rows: Sequence[Row]) -> Callable[[Row], Row | None]:

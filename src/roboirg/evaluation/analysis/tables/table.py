@@ -9,7 +9,7 @@ from typing import Literal, NamedTuple
 
 from roboirg.evaluation.analysis.comparability import Differences, comparison_sign, merged
 from roboirg.evaluation.analysis.stats.intervals import Interval
-from roboirg.evaluation.analysis.stats.rates import Change, change, mean_percent
+from roboirg.evaluation.analysis.stats.rates import change_text, mean_percent
 
 Source = Literal["ours", "published", "cited", "chance"]
 """Origin of a row: the run, the paper's results, a citation of the paper, or computed."""
@@ -18,6 +18,10 @@ NOT_APPLICABLE = "–"
 ERROR_MARK = "!"
 MISSING_MARK = "…"
 PARTIAL_MARK = "*"
+CHECK_MARK = "✓"
+PUBLISHED_MARK = " (published)"
+POLICY = "policy"
+"""Heading of policies, whose names are marked if their rows are published."""
 
 
 class Counts(NamedTuple):
@@ -48,8 +52,8 @@ class Entry:
         percent: as printed; None if there is nothing to print.
         word: printed instead of a rate; empty in tables of rates.
         applies: False if the setting is not defined for the task.
-        change: compared with the row's reference; None without a reference or if either is
-            incomplete.
+        change: difference of the printed rate from the reference's; None without a reference or if
+            either is incomplete.
         best: whether it is the best, or among the best, of its group.
         marks: of incomplete entries, as in the constants above.
         counts: behind the rate; None if they are unknown.
@@ -59,11 +63,16 @@ class Entry:
     percent: Decimal | None = None
     word: str = ""
     applies: bool = True
-    change: Change | None = None
+    change: Decimal | None = None
     best: bool = False
     marks: str = ""
     counts: Counts | None = None
     differences: Differences | None = None
+
+    @property
+    def change_text(self) -> str:
+        """The change with its arrow; empty without one."""
+        return "" if self.change is None else change_text(self.change)
 
     @property
     def signs(self) -> str:
@@ -110,11 +119,6 @@ class Row:
     source: Source
     entries: tuple[Entry, ...]
 
-    @property
-    def label(self) -> str:
-        """The name, marked if the row is published."""
-        return f"{self.name} (published)" if self.source == "published" else self.name
-
 
 @dataclass(frozen=True, slots=True)
 class Table:
@@ -123,25 +127,44 @@ class Table:
     Attributes:
         key: a short name, usable as a file name.
         title: of the table.
-        heads: headings of the groups and of the names of the rows.
+        heads: headings of the groups, and of the names of the rows. With several of these a name
+            lists headings, and each has a check mark or none.
         columns: of the entries.
         rows: in groups.
         notes: sentences below the table.
+        published_mark: behind the names of policies in published rows.
     """
 
     key: str
     title: str
-    heads: tuple[str, str]
+    heads: tuple[str, ...]
     columns: tuple[Column, ...]
     rows: tuple[Row, ...]
     notes: tuple[str, ...] = ()
+    published_mark: str = PUBLISHED_MARK
 
     def groups(self) -> dict[str, list[Row]]:
-        """Return the rows by group, in order."""
+        """Return the rows by the label of their group, in order."""
         groups: dict[str, list[Row]] = {}
         for row in self.rows:
-            groups.setdefault(row.group, []).append(row)
+            label = row.group + self._mark(row, is_policy=self._is_by_policy)
+            groups.setdefault(label, []).append(row)
         return groups
+
+    def names(self, row: Row) -> tuple[str, ...]:
+        """Return the label of a row, or its check marks, one for each heading of names."""
+        heads = self.heads[1:]
+        if len(heads) > 1:
+            listed = row.name.split(",")
+            return tuple(CHECK_MARK if head in listed else "" for head in heads)
+        return (row.name + self._mark(row, is_policy=not self._is_by_policy),)
+
+    @property
+    def _is_by_policy(self) -> bool:
+        return self.heads[0] == POLICY
+
+    def _mark(self, row: Row, *, is_policy: bool) -> str:
+        return self.published_mark if is_policy and row.source == "published" else ""
 
 
 def with_averages(columns: Sequence[Column], entries: Mapping[str, Entry]) -> tuple[Entry, ...]:
@@ -195,7 +218,7 @@ def with_changes(
     ]
 
 
-def _change(columns: Sequence[Column], index: int, row: Row, reference: Row) -> Change | None:
+def _change(columns: Sequence[Column], index: int, row: Row, reference: Row) -> Decimal | None:
     entry, other = row.entries[index], reference.entries[index]
     if columns[index].averages:
         by_name = dict(zip((column.name for column in columns), row.entries, strict=True))
@@ -204,7 +227,7 @@ def _change(columns: Sequence[Column], index: int, row: Row, reference: Row) -> 
         other = _average([others[name] for name in applying])
     if entry.marks or other.marks or entry.percent is None or other.percent is None:
         return None
-    return change(entry.percent, other.percent)
+    return entry.percent - other.percent
 
 
 def with_best(rows: Sequence[Row]) -> list[Row]:

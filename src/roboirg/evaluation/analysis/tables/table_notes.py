@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from decimal import Decimal
 
 from roboirg.core.instruction_options import InstructionOptions
@@ -24,11 +24,14 @@ from roboirg.evaluation.analysis.stats.option_labels import (
     options_sort_key,
     staged_options,
 )
+from roboirg.evaluation.analysis.stats.rates import change_text
 from roboirg.evaluation.analysis.tables.table import (
     ERROR_MARK,
     MISSING_MARK,
     NOT_APPLICABLE,
     PARTIAL_MARK,
+    PUBLISHED_MARK,
+    Column,
     Entry,
     Row,
 )
@@ -39,7 +42,6 @@ RATES_NOTE = (
     "Success rate in percent, the mean over policy seeds; averages are unweighted means over tasks."
 )
 TWIN_MARK = " (twin)"
-ARROWS = {"up": "↑", "down": "↓", "same": "→"}
 
 
 def notes_of(
@@ -81,17 +83,50 @@ def is_shown(which: RateTable, options: InstructionOptions) -> bool:
 
 def _sign_notes(which: RateTable, entries: Sequence[Entry]) -> list[str]:
     notes = []
-    if any(entry.change for entry in entries):
+    if any(entry.change is not None for entry in entries):
         reference = "the shortest context" if which == "context" else "explicit"
         notes.append(
-            f"{ARROWS['up']} above, {ARROWS['down']} below, {ARROWS['same']} equal to {reference} "
-            "of the same policy, as printed, on the same tasks; an arrow does not imply a "
-            "significant difference."
+            f"↑ above, ↓ below, → equal to {reference} of the same policy, by how many points, as "
+            "printed, on the same tasks; an arrow does not imply a significant difference."
         )
     if any(entry.best for entry in entries):
-        notes.append("Bold: the best of its group.")
+        whose = "policy in a setting" if which == "planner" else "of its group"
+        notes.append(f"Bold: the best {whose}.")
     if any(not entry.applies for entry in entries):
         notes.append(f"{NOT_APPLICABLE} the setting is not defined for the task.")
+    return notes
+
+
+def average_notes(
+    columns: Sequence[Column], rows: Sequence[Row], reference_of: Callable[[Row], Row | None]
+) -> list[str]:
+    """Say which changes of averages are over fewer tasks than the reference's own average.
+
+    The paper subtracts averages over different tasks; what it prints is given, too.
+    """
+    notes = []
+    tasks = columns[-1].averages
+    own = [index for index, column in enumerate(columns) if not column.averages]
+    fewer = {row.group: sum(row.entries[index].applies for index in own) for row in rows}
+    for group, number in fewer.items():
+        if 0 < number < len(tasks):
+            notes.append(
+                f"Averages of {group} are over the {number} of {len(tasks)} tasks that have it; "
+                "their changes are from the average over the same tasks."
+            )
+            printed = [
+                f"{row.name} {change_text(last - before)}"
+                for row in rows
+                if row.group == group and row.source == "published"
+                if (last := row.entries[-1].percent) is not None
+                if (reference := reference_of(row)) is not None
+                if (before := reference.entries[-1].percent) is not None
+            ]
+            if printed:
+                notes[-1] += (
+                    f" The paper's changes are from the average over all {len(tasks)}: "
+                    f"{', '.join(printed)}."
+                )
     return notes
 
 
@@ -227,10 +262,10 @@ def _published_notes(which: RateTable, rows: Iterable[Row]) -> list[str]:
     episodes, seeds = TRIALS[which]
     trials = f"{episodes} trials" if seeds == 1 else f"{episodes} episodes × {seeds} seeds"
     where = "on its own robot" if which == "real" else "played in its own simulator"
-    suites = " The averages of suites are ours." if which == "main" else ""
+    suites = " Averages of suites, where they are shown, are ours." if which == "main" else ""
     low, high = wilson_interval(episodes * seeds // 2, episodes * seeds)
     source = (
-        f"(published): from the paper, {trials} per cell, {where}. It prints no intervals; at 50 % "
+        f"{PUBLISHED_MARK.strip()}: from the paper, {trials} per cell, {where}. It prints no intervals; at 50 % "
         f"a cell's is ±{50 * (high - low):.0f} points.{suites}"
     )
     return [

@@ -68,7 +68,7 @@ def _line(table: Table, row: Row, column: Column, entry: Entry) -> list[object]:
         "" if entry.percent is None else entry.percent,
         entry.word,
         _flag(entry.applies),
-        entry.change or "",
+        "" if entry.change is None else entry.change,
         _flag(entry.best),
         " ".join(_MARK_NAMES[mark] for mark in entry.marks),
         *(["", "", "", "", ""] if counts is None else counts[:5]),

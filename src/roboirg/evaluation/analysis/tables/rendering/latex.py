@@ -1,34 +1,39 @@
-"""Tables in LaTeX; the document needs the package booktabs.
+"""Tables in LaTeX; the document needs the packages booktabs, xcolor and amssymb.
 
-A table is no wider than the text of a one-column article, so it fits there, and across both columns
-of a two-column one. What is wider or longer becomes several tables: by groups of columns, as on the
-terminal, and by groups of rows.
+A table is as wide as both columns of IEEEtran's conference class, or, in pieces, no wider than the
+text of a one-column article. What is wider or longer becomes several tables: by groups of columns,
+as on the terminal, and by groups of rows.
 """
 
 from __future__ import annotations
 
+import dataclasses
 import itertools
-import math
-import re
 from collections.abc import Iterator, Sequence
-from typing import NamedTuple
 
-from roboirg.evaluation.analysis.tables.rendering.column_parts import split_columns
-from roboirg.evaluation.analysis.tables.table import NOT_APPLICABLE, Column, Entry, Row, Table
+from roboirg.evaluation.analysis.tables.rendering.latex_layout import (
+    HUMPS,
+    PAGE,
+    Layout,
+    Part,
+    parts_of,
+)
+from roboirg.evaluation.analysis.tables.table import (
+    CHECK_MARK,
+    NOT_APPLICABLE,
+    PUBLISHED_MARK,
+    Column,
+    Entry,
+    Table,
+)
 
-TEXT_WIDTH_PT = 343.0
-"""Width of a table: a little less than the 345 pt of a one-column article in 10 pt."""
-MOST_LINES = 42
-"""Lines of rows in one table, in \\footnotesize; with caption and notes they fill a page."""
-_LETTER_PT, _DIGIT_PT, _SIGN_PT, _GAP_PT = 5.2, 4.9, 7.0, 6.0
-"""Generous widths in \\footnotesize: of a letter, of a digit in bold, of a sign or arrow, and
-between columns."""
-_ARROW_PT = {"up": 6.0, "down": 6.0, "same": 10.0}
-_NAMES_PT, _NARROW_NAMES_PT = 130.0, 70.0
-"""Widths of the rows' names, if they need as much, and if the columns of a group need the room;
-longer ones are folded."""
-
-_ARROWS = {"up": r"$\uparrow$", "down": r"$\downarrow$", "same": r"$\rightarrow$"}
+_PREAMBLE = r"""% needs \usepackage{booktabs,xcolor,amssymb}
+\providecommand{\roboirgup}[1]{{\tiny\textcolor[rgb]{0,.42,.25}{$\uparrow$#1}}}
+\providecommand{\roboirgdown}[1]{{\tiny\textcolor[rgb]{.75,.1,.1}{$\downarrow$#1}}}
+\providecommand{\roboirgsame}[1]{{\tiny\textcolor[gray]{.4}{$\rightarrow$#1}}}"""
+DAGGER = "†"
+"""Marks published rows."""
+_CHANGES = {"↑": r"\roboirgup", "↓": r"\roboirgdown", "→": r"\roboirgsame"}
 _SPECIAL = {
     "\\": r"\textbackslash{}",
     "~": r"\textasciitilde{}",
@@ -47,94 +52,52 @@ _SPECIAL = {
     "↓": r"$\downarrow$",
     "→": r"$\rightarrow$",
     "≠": r"$\neq$",
+    CHECK_MARK: r"$\checkmark$",
+    DAGGER: r"\textsuperscript{\dag}",
 }
-_HUMPS = re.compile(r"(?<=[a-z])(?=[A-Z])|(?<=_)|\s+")
-"""Where a heading may be broken: before a capital, behind an underscore, at blanks."""
 _BREAKS = frozenset("./:_-,=?&")
 """Signs behind which a long name may be broken."""
 _MOST_LETTERS = 14
 """Letters of a name behind which it may be broken in any case."""
 
 
-class _Part(NamedTuple):
-    """One of the tables that a wide or long table becomes."""
-
-    indices: Sequence[int]
-    rows: Sequence[Row]
-    names_pt: float
-
-
-def latex(table: Table) -> str:
+def latex(table: Table, layout: Layout = PAGE) -> str:
     """Return table environments with rules between groups of columns and of rows."""
-    lines = ["% needs \\usepackage{booktabs}"]
-    parts = _parts(table)
+    mark = PUBLISHED_MARK.strip()
+    notes = tuple(note.replace(mark, DAGGER) for note in table.notes)
+    table = dataclasses.replace(table, published_mark=DAGGER, notes=notes)
+    lines = [_PREAMBLE]
+    parts = parts_of(table, layout)
     for number, part in enumerate(parts, start=1):
-        lines += _float(table, part, number, len(parts))
+        lines += _float(table, part, layout, number, len(parts))
     return "\n".join(lines) + "\n"
 
 
-def _parts(table: Table) -> list[_Part]:
-    # Whole numbers, whose sums are exact.
-    widths = [
-        math.ceil(_column_width(table, index) + _GAP_PT) for index in range(len(table.columns))
-    ]
-    # An average over all columns stands with the last group.
-    groups: list[str] = []
-    for column in table.columns:
-        groups.append(column.group or (groups[-1] if groups else ""))
-    needed = max((_width(row.label) for row in table.rows), default=0.0)
-    together = max(
-        sum(width for width, own in zip(widths, groups, strict=True) if own == group)
-        for group in groups
-    )
-    room = max(_NARROW_NAMES_PT, math.floor(TEXT_WIDTH_PT - _GAP_PT - together))
-    names = max(min(_NAMES_PT, needed, room), _width(table.heads[1]))
-    columns = split_columns(groups, widths, TEXT_WIDTH_PT - names - _GAP_PT)
-    blocks = _blocks(table, names)
-    return [_Part(indices, rows, names) for indices in columns for rows in blocks]
-
-
-def _blocks(table: Table, names_pt: float) -> list[list[Row]]:
-    """Return the rows of each table; a group is divided only if it is longer than a table."""
-    blocks: list[list[Row]] = [[]]
-    used = 0
-    for rows in table.groups().values():
-        heights = [-(-_width(row.label) // names_pt) for row in rows]
-        if used and used + sum(heights) + 1 > MOST_LINES:
-            blocks.append([])
-            used = 0
-        used += 1
-        for row, height in zip(rows, heights, strict=True):
-            if used + height > MOST_LINES:
-                blocks.append([])
-                used = 1
-            blocks[-1].append(row)
-            used += int(height)
-    return blocks
-
-
-def _float(table: Table, part: _Part, number: int, count: int) -> Iterator[str]:
+def _float(table: Table, part: Part, layout: Layout, number: int, count: int) -> Iterator[str]:
     columns = [table.columns[index] for index in part.indices]
+    heads = table.heads[1:]
     caption, label = _escaped(table.title), f"tab:{table.key}"
     if count > 1:
         caption += f" ({number} of {count})"
         label += f"-{number}" if number > 1 else ""
-    first = rf"p{{{part.names_pt:.0f}pt}}"
+    first = rf"p{{{part.names_pt:.0f}pt}}" if len(heads) == 1 else "c" * len(heads)
     yield r"\begin{table*}"
-    yield r"\centering\footnotesize"
-    yield rf"\setlength{{\tabcolsep}}{{{_GAP_PT / 2:.0f}pt}}"
+    yield rf"\centering\{layout.size}"
+    yield rf"\setlength{{\tabcolsep}}{{{layout.gap / 2:.0f}pt}}"
     yield rf"\caption{{{caption}.}}"
     yield rf"\label{{{label}}}"
     yield rf"\begin{{tabular}}{{{first}{'r' * len(columns)}}}"
     yield r"\toprule"
-    yield from _column_groups(columns)
-    yield _line([_escaped(table.heads[1]), *(_head(column.name) for column in columns)])
-    for group, rows in itertools.groupby(part.rows, key=lambda row: row.group):
+    yield from _column_groups(columns, len(heads))
+    yield _line([*map(_escaped, heads), *(_head(column.name) for column in columns)])
+    block = dataclasses.replace(table, rows=tuple(part.rows))
+    for group, rows in block.groups().items():
         yield r"\midrule"
-        yield rf"\multicolumn{{{len(columns) + 1}}}{{l}}{{\emph{{{_escaped(group)}}}}} \\"
+        width = len(heads) + len(columns)
+        yield rf"\multicolumn{{{width}}}{{l}}{{\emph{{{_escaped(group)}}}}} \\"
         for row in rows:
             cells = [_cell(row.entries[index]) for index in part.indices]
-            yield _line([rf"\raggedright {_foldable(row.label)}", *cells])
+            yield _line([*_names(table.names(row)), *cells])
     yield r"\bottomrule"
     yield r"\end{tabular}"
     if number == count:
@@ -142,10 +105,16 @@ def _float(table: Table, part: _Part, number: int, count: int) -> Iterator[str]:
     yield r"\end{table*}"
 
 
-def _column_groups(columns: Sequence[Column]) -> list[str]:
+def _names(labels: Sequence[str]) -> list[str]:
+    if len(labels) > 1:
+        return [_escaped(label) for label in labels]
+    return [rf"\raggedright {_foldable(labels[0])}"]
+
+
+def _column_groups(columns: Sequence[Column], names: int) -> list[str]:
     if not any(column.group for column in columns):
         return []
-    cells, rules, place = [""], [], 2
+    cells, rules, place = [""] * names, [], names + 1
     for name, members in itertools.groupby(column.group for column in columns):
         width = len(list(members))
         cells.append(
@@ -157,26 +126,11 @@ def _column_groups(columns: Sequence[Column]) -> list[str]:
     return [_line(cells), "".join(rules)]
 
 
-def _column_width(table: Table, index: int) -> float:
-    """Return an upper bound of the width of a column, pt."""
-    head = max(_width(word) for word in _HUMPS.split(table.columns[index].name))
-    return max(head, *(_entry_width(row.entries[index]) for row in table.rows), 0.0)
-
-
-def _entry_width(entry: Entry) -> float:
-    arrow = _ARROW_PT[entry.change] if entry.change else 0.0
-    return _width(entry.text) + arrow + _SIGN_PT * len(entry.signs)
-
-
-def _width(text: str) -> float:
-    return sum(_DIGIT_PT if sign.isdigit() or sign in " .,:" else _LETTER_PT for sign in text)
-
-
 def _head(name: str) -> str:
     """Return a heading with a line for each of its words."""
-    words = [_escaped(word) for word in _HUMPS.split(name)]
-    stacked = r"\\".join(words)
-    return stacked if len(words) == 1 else rf"\shortstack[r]{{{stacked}}}"
+    words = [_escaped(word) for word in HUMPS.split(name)]
+    stacked = r"\\".join(rf"{word}\vphantom{{Ag}}" for word in words)
+    return words[0] if len(words) == 1 else rf"\shortstack[r]{{{stacked}}}"
 
 
 def _line(cells: list[str]) -> str:
@@ -187,8 +141,8 @@ def _cell(entry: Entry) -> str:
     text = "--" if entry.text == NOT_APPLICABLE else _escaped(entry.text)
     if entry.best:
         text = rf"\textbf{{{text}}}"
-    if entry.change:
-        text += rf"\,{_ARROWS[entry.change]}"
+    if change := entry.change_text:
+        text += rf"{_CHANGES[change[0]]}{{{change[1:]}}}"
     if entry.signs:
         text += rf"\textsuperscript{{{_escaped(entry.signs)}}}"
     return text

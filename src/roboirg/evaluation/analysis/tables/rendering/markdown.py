@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from roboirg.evaluation.analysis.tables.table import Entry, Table
-from roboirg.evaluation.analysis.tables.table_notes import ARROWS
 
 _SPECIAL = str.maketrans({sign: f"\\{sign}" for sign in "\\|*_`<[]"})
 
@@ -16,7 +15,8 @@ def markdown(table: Table) -> str:
     for group, rows in table.groups().items():
         for number, row in enumerate(rows):
             name = "" if number else _escaped(group)
-            lines.append(_line([name, _escaped(row.label), *map(_cell, row.entries)]))
+            names = map(_escaped, table.names(row))
+            lines.append(_line([name, *names, *map(_cell, row.entries)]))
     notes = [line for note in table.notes for line in ("", _escaped(note))]
     return "\n".join([*lines, *notes]) + "\n"
 
@@ -27,8 +27,7 @@ def _line(cells: list[str]) -> str:
 
 def _cell(entry: Entry) -> str:
     text = f"**{entry.text}**" if entry.best else entry.text
-    parts = (text, ARROWS[entry.change] if entry.change else "", _escaped(entry.signs))
-    return " ".join(filter(None, parts))
+    return " ".join(filter(None, (text, entry.change_text, _escaped(entry.signs))))
 
 
 def _escaped(text: str) -> str:

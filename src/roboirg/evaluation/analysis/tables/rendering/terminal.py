@@ -12,11 +12,7 @@ from rich.text import Text
 from roboirg.evaluation.analysis.stats.run_summary import ALL_TASKS
 from roboirg.evaluation.analysis.tables.rendering.column_parts import BORDERS, split_columns
 from roboirg.evaluation.analysis.tables.table import Entry, Row, Table
-from roboirg.evaluation.analysis.tables.table_notes import ARROWS
 from roboirg.util.console_width import LINE_WIDTH, line_width, widen
-
-_NARROWEST = 9
-"""Characters of a rate with its arrow and mark."""
 
 
 def renderable(table: Table, console: Console) -> RenderableType:
@@ -45,13 +41,13 @@ def plain(table: Table) -> str:
 
 def _parts(table: Table, width: int) -> list[list[int]]:
     """Return the columns of each part."""
-    heads = sum(
-        max(map(len, (head, *words))) + BORDERS
-        for head, words in zip(
-            table.heads, ([*table.groups()], [row.label for row in table.rows]), strict=True
-        )
-    )
-    widths = [max(len(column.name), _NARROWEST) + BORDERS for column in table.columns]
+    labels = [(group, *table.names(row)) for group, rows in table.groups().items() for row in rows]
+    heads = sum(max(map(len, words)) + BORDERS for words in zip(table.heads, *labels, strict=True))
+    widths = [
+        max(len(column.name), *(len(_cell(row, row.entries[index])) for row in table.rows), 0)
+        + BORDERS
+        for index, column in enumerate(table.columns)
+    ]
     return split_columns([one.group for one in table.columns], widths, width - heads - 1)
 
 
@@ -65,20 +61,20 @@ def _grid(table: Table, indices: Sequence[int]) -> Grid:
     for head in table.heads:
         grid.add_column(head, overflow="fold")
     for index in indices:
-        name = table.columns[index].name
-        grid.add_column(name, justify="right", min_width=_NARROWEST, no_wrap=True)
+        grid.add_column(table.columns[index].name, justify="right", no_wrap=True)
     for group, rows in table.groups().items():
         grid.add_section()
         for number, row in enumerate(rows):
             cells = [_cell(row, row.entries[index]) for index in indices]
-            grid.add_row(Text("" if number else group), Text(row.label, _style(row)), *cells)
+            names = (Text(name, _style(row)) for name in table.names(row))
+            grid.add_row(Text("" if number else group), *names, *cells)
     return grid
 
 
 def _cell(row: Row, entry: Entry) -> Text:
     text = Text(entry.text, "bold" if entry.best else "")
-    if entry.change:
-        text.append(f" {ARROWS[entry.change]}")
+    if entry.change is not None:
+        text.append(f" {entry.change_text}")
     if entry.signs:
         text.append(f" {entry.signs}" if entry.text else entry.signs, "bold yellow")
     text.stylize(_style(row))
