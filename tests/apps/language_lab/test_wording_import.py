@@ -158,7 +158,7 @@ UNSPOILED = {
     ),
     "VideoPlaceOrder": (
         rf"After watching the video, place {POINTED} on "
-        r"the target (?:of (?:that placement|the (?:other )?placement (?!.* it was ).*"
+        r"the target (?:of (?:that placement|the (?:other )?placement(?: (?!.* it was ).*)?"
         r"|the .* placement but not .*)|used (?:one|two) placements? (?:earlier|later) than .*)\."
     ),
     "VideoPlaceButton": (

@@ -265,8 +265,8 @@ def _published_notes(which: RateTable, rows: Iterable[Row]) -> list[str]:
     suites = " Averages of suites, where they are shown, are ours." if which == "main" else ""
     low, high = wilson_interval(episodes * seeds // 2, episodes * seeds)
     source = (
-        f"{PUBLISHED_MARK.strip()}: from the paper, {trials} per cell, {where}. It prints no intervals; at 50 % "
-        f"a cell's is ±{50 * (high - low):.0f} points.{suites}"
+        f"{PUBLISHED_MARK.strip()}: from the paper, {trials} per cell, {where}. It prints no "
+        f"intervals; at 50 % a cell's is ±{50 * (high - low):.0f} points.{suites}"
     )
     return [
         source,
