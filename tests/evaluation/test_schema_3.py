@@ -68,7 +68,7 @@ def test_its_pack_is_read_and_only_its_language_is_another(run: Path) -> None:
         assert result.exit_code == 2
         text = " ".join(result.output.split())
         named = f"language_version: the record says {LANGUAGE_OF_RUN}"
-        assert text.count(named) == text.count("does not hold:") > 0
+        assert text.count(named) == text.count("does not hold:") > 10
         assert "33 things do not hold." in text
 
 
