@@ -10,6 +10,7 @@ differs, and returns what it found.
 from __future__ import annotations
 
 import dataclasses
+import itertools
 import re
 import sys
 from collections.abc import Callable, Iterator
@@ -23,13 +24,23 @@ import yaml
 from roboirg.apps.demonstrations.export_plan import TELEOPERATED, ExportPlan, FormatName
 from roboirg.apps.demonstrations.formats.training_lines import HORIZON as PREDICTED
 from roboirg.apps.demonstrations.formats.training_lines import ON_ROBOT, training_text
+from roboirg.apps.language_lab.corpus_statistics import (
+    PAPER_PHRASES,
+    pattern_counts,
+    phrase_counts,
+)
 from roboirg.apps.real.control.robot import HORIZON
 from roboirg.apps.real.study.execution_horizon import at_horizon
 from roboirg.apps.real.study.study_plan import DEFAULT_DEMONSTRATIONS, DEFAULT_TRIALS
 from roboirg.core.errors import InvalidValueError
+from roboirg.core.instruction_options import InstructionOptions
+from roboirg.core.word_pools import POOLS
+from roboirg.language.instruction import Instruction
+from roboirg.language.variants import instructions
 from roboirg.policies import make_policy
 from roboirg.policies.by_name.systems import all_systems, find_system
-from roboirg.tasks import LEFT_OUT, every_task, find_tasks
+from roboirg.tasks import LEFT_OUT, all_tasks, every_task, find_tasks
+from roboirg.tasks.splits.splits import split_episodes
 
 ROOT = Path(__file__).parents[1]
 LIMITS = ROOT / "docs" / "paper.md"
@@ -275,6 +286,46 @@ def _() -> str:
     if figures.PAGE.read_text(encoding="utf-8") != figures.page():
         raise AssertionError("run: python scripts/write_published_figures.py")
     return str(figures.PAGE.relative_to(ROOT))
+
+
+@item("phrases", "every phrase that the paper quotes comes up in its own setting, in both pools")
+def _() -> str:
+    counts = {pool: phrase_counts(_told("implicit", pool)) for pool in POOLS}
+    lacking = [
+        (pool, setting, phrase)
+        for pool, setting in itertools.product(POOLS, PAPER_PHRASES)
+        for phrase, _ in PAPER_PHRASES[setting]
+        if not counts[pool][setting][phrase]
+    ]
+    same(lacking, [])
+    return ", ".join(f"{name} {sum(one.values())}" for name, one in counts["test"].items())
+
+
+@item("resolved-phrases", "resolved commands say 'at the far right' and 'different from blue'")
+def _() -> str:
+    counts = phrase_counts(_told("resolved"))
+    far = counts["spatial, resolved"]["at the far right"]
+    different = counts["reasoning, resolved"]["different from blue"]
+    if not far or not different:
+        raise AssertionError(f"{far} and {different} times")
+    return f"{far} and {different} times"
+
+
+@item("patterns", "contextual logic in every task, color exclusion where cubes have colors")
+def _() -> str:
+    counts = pattern_counts(one for one in _told("implicit") if one.setting == "reasoning")
+    found = {task: set(by_pattern) for task, by_pattern in counts.items()}
+    same({task for task, names in found.items() if "contextual logic" not in names}, set())
+    colorless = {task for task, names in found.items() if "color exclusion" not in names}
+    return same(colorless, {"StopCube", "VideoRepick"})
+
+
+def _told(form: str, pool: str | None = None) -> Iterator[Instruction]:
+    """Yield the instructions of the test split in the settings that the paper quotes."""
+    episodes = split_episodes(tuple(all_tasks()), ("test",))
+    options = InstructionOptions(wordings=pool)
+    told = instructions(episodes, tuple(PAPER_PHRASES), (form,), options)
+    yield from (instruction for _, instruction in told)
 
 
 def main(word: str = "") -> int:
