@@ -9,10 +9,16 @@ import itertools
 from collections.abc import Iterator
 from pathlib import Path
 
+from roboirg.apps.language_lab.corpus_statistics import (
+    PAPER_PHRASES,
+    pattern_counts,
+    phrase_counts,
+)
 from roboirg.core.episode import Episode
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.language.generator import find_refusal, instruct
 from roboirg.language.instruction import Instruction, Mention
+from roboirg.language.patterns import PATTERNS
 from roboirg.language.settings import all_settings, settings_of
 from roboirg.language.templates import LANGUAGE_VERSION
 from roboirg.language.variants import all_variants
@@ -40,9 +46,53 @@ def language_card() -> str:
     for task in all_tasks().values():
         parts.append(f"## {task.name}")
         parts += [_example(task.name, one.setting) for one in variants if one.task == task.name]
+    parts += [_patterns_by_task(), _phrases()]
     parts.append("## Harder settings\n\nWith a rival, and with open reasoning.")
     parts += [_harder_example(*one) for one in _harder_variants()]
     return "\n\n".join(parts) + "\n"
+
+
+def _patterns_by_task() -> str:
+    """Return how many test episodes of each task have each reasoning pattern."""
+    counts = pattern_counts(_told("reasoning"))
+    lines = [
+        "## Reasoning patterns by task",
+        "",
+        "Episodes of the test split; a dash where no episode of the task allows the pattern.",
+        "",
+        f"| task | {' | '.join(PATTERNS)} |",
+        f"| --- {'| --- ' * len(PATTERNS)}|",
+    ]
+    for task in all_tasks():
+        cells = (str(counts[task].get(pattern) or "–") for pattern in PATTERNS)
+        lines.append(f"| {task} | {' | '.join(cells)} |")
+    return "\n".join(lines)
+
+
+def _phrases() -> str:
+    """Return how often the phrases of the paper occur in the commands of the test split."""
+    lines = [
+        "## Phrases of the paper",
+        "",
+        "Commands of the test split that have a phrase that the paper quotes or lists.",
+        "",
+        "| setting | phrase | texts |",
+        "| --- | --- | --- |",
+    ]
+    told = [one for setting in PAPER_PHRASES for one in _told(setting)]
+    resolved = [one for setting in ("reasoning", "spatial") for one in _told(setting, "resolved")]
+    for setting, by_phrase in phrase_counts([*told, *resolved]).items():
+        lines += [
+            f"| {setting} | *{name}* | {count} |" for name, count in by_phrase.items() if count
+        ]
+    return "\n".join(lines)
+
+
+def _told(setting: str, form: str = "implicit") -> Iterator[Instruction]:
+    for task in all_tasks():
+        if setting in settings_of(get_task(task)):
+            episodes = (get_episode(task, SPLIT, index) for index in range(split_size(SPLIT)))
+            yield from (instruct(episode, setting, form) for episode in episodes)
 
 
 def example_episode(task: str, setting: str) -> Episode:

@@ -45,7 +45,7 @@ NEEDS = {
     "bench": "sim", "run": "sim", "show": "sim", "demo": "report", "report": "report",
     "figures": "report", "compare": "report", "serve": "remote",
     "records export": "export", "real run": "sim", "real score": "pages",
-    "export demonstrations": "sim", "export grounding": "sim",
+    "export demonstrations": "sim", "export recordings": "sim", "export grounding": "sim",
     "leaderboard repeat": "sim", "leaderboard board": "report",
     "language shortcuts": "report",
     "listen plan": "sim",

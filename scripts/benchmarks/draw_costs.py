@@ -10,7 +10,8 @@ from pathlib import Path
 
 from roboirg.apps.bench.reset_times import cache_folder, reset_time
 from roboirg.apps.bench.step_times import CHUNK, Action, Workload, median_time
-from roboirg.apps.demonstrations.trajectory import PictureCoding, TrajectoryFile
+from roboirg.apps.demonstrations.picture_coding import PictureCoding
+from roboirg.apps.demonstrations.trajectory import TrajectoryFile
 from roboirg.apps.demonstrations.trajectory_recorder import PictureTracks, RecordingSpec
 from roboirg.core.episode import Episode
 from roboirg.core.observations import CAMERAS

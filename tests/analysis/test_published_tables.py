@@ -269,3 +269,18 @@ def test_all_can_be_drawn_from_the_published_rows_alone(which: str, name: str) -
     text = FORMATS[name].draw(make_table(which, {}, published=True))
     assert text.endswith("\n")
     assert not text.endswith("\n\n")
+
+
+@pytest.mark.parametrize(
+    ("which", "said"),
+    [
+        ("main", ("±8 points", "MemER 16.62 and 29.04", "pi0.5 10.35 and 14.48")),
+        ("context", ("±8 points", "in 8 of 9 cells, by up to 14.00 points")),
+        ("real", ("±26 points",)),
+    ],
+)
+def test_notes_name_what_would_mislead(which, said):
+    notes = " ".join(make_table(which, {}, published=True).notes)
+    for words in said:
+        assert words in notes
+    assert ("over fewer tasks" in notes) == (which == "main")

@@ -71,7 +71,7 @@ def test_hands_that_do_another_task_well_fail_by_grounding(task: str) -> None:
     [
         ("VideoUnmask", 0, "wrong_object", "container"),
         ("PickXtimes", 0, "wrong_count", "cube"),
-        ("VideoPlaceOrder", 0, "wrong_place", "cube"),
+        ("VideoPlaceOrder", 1, "wrong_place", "cube"),
     ],
 )
 def test_the_forgetful_listener(task: str, episode: int, failure: str, subject: str) -> None:

@@ -34,6 +34,7 @@ PLACES = st.lists(st.tuples(GRID, GRID), min_size=1, max_size=8, unique=True)
 """Centimeter grid: ties, exact margins and collinear rows are common."""
 LONGEST = {"robot": 12, "camera": 14}
 """Words of the shortest landmark, which is used where none is short: prompts must stay short."""
+FAR_SIDES = {"at your far left", "at your far right"}
 EXTREMES = {
     "farthest to your left",
     "farthest to your right",
@@ -172,13 +173,19 @@ def test_extremes_win_by_the_margin(places):
 
 def test_a_single_candidate_is_every_extreme():
     scene = cubes([(0.0, 0.0)])
-    assert best(scene, "cube_red", "cube") == EXTREMES
+    assert best(scene, "cube_red", "cube") == EXTREMES | FAR_SIDES
 
 
 def test_ties_have_no_landmark_of_that_direction():
     scene = containers([(0.0, 0.1), (0.1, 0.1), (0.05, -0.1)])
     assert best(scene, "container_0") == {"closest to you"}
-    assert best(scene, "container_2") == {"farthest to your right"}
+    assert best(scene, "container_2") == {"farthest to your right", "at your far right"}
+
+
+def test_a_far_side_is_said_where_it_is_no_other_corner():
+    scene = containers([(0.1, 0.0), (-0.2, -0.15)])
+    assert "farthest to your right" in best(scene, "container_1")
+    assert "at your far right" not in best(scene, "container_1")  # perhaps the far corner
 
 
 def test_collinear_things_are_told_by_rank():
@@ -222,7 +229,7 @@ def test_a_group_ends_clearly(gap):
 
 def test_left_is_the_robots_and_mirrored_for_the_camera():
     scene = containers([(0.0, 0.15), (0.0, -0.15)])
-    assert best(scene, "container_0") == {"farthest to your left"}
+    assert best(scene, "container_0") == {"farthest to your left", "at your far left"}
     assert best(scene, "container_0", frame="camera") == {"farthest to the camera's right"}
 
 
@@ -333,7 +340,7 @@ def test_the_camera_frame_mixes_no_points_of_view(task, pool):
 def test_cubes_that_come_later_are_no_candidates():
     scene = cubes([(0.0, 0.15), (0.0, -0.15), (0.1, 0.0)])
     late = Scene(scene.objects, motions=(Away("cube_red", 0, 50),))
-    assert best(scene, "cube_red", "cube") == {"farthest to your left"}
+    assert best(scene, "cube_red", "cube") == {"farthest to your left", "at your far left"}
     assert not phrases(late, "cube_red", "cube")
     assert "farthest to your left" in phrases(late, "cube_blue", "cube")
 
@@ -341,7 +348,9 @@ def test_cubes_that_come_later_are_no_candidates():
 def test_containers_appear_and_are_candidates_all_the_same():
     scene = containers([(0.0, 0.15), (0.0, -0.15)])
     appearing = tuple(Away(one.name, 0, 32) for one in scene.objects)
-    assert best(Scene(scene.objects, motions=appearing), "container_0") == {"farthest to your left"}
+    assert best(Scene(scene.objects, motions=appearing), "container_0") == {
+        "farthest to your left", "at your far left",
+    }  # fmt: skip
 
 
 def test_the_bin_is_a_fixture():

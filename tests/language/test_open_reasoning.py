@@ -74,7 +74,9 @@ def test_every_pattern_and_step_occurs():
                 name, step = said.metadata["relation"].split(", ")
                 notes.add(step)
                 relations_.add(name)
-    assert patterns == {"color exclusion", "number deduction", "contextual logic"}
+    assert patterns == {
+        "color exclusion", "number deduction", "sequential relation", "contextual logic",
+    }  # fmt: skip
     assert notes == {"total", "difference"}
     assert relations_ >= {"one fewer", "two fewer", "half", "twice"}
 

@@ -11,12 +11,15 @@ from language_variants import SPATIAL_TASKS, TASKS, split_episodes
 from selection import slow_but
 
 from roboirg.core.episode import ALL_COLORS
+from roboirg.core.instruction_options import InstructionOptions
 from roboirg.core.word_pools import POOLS, pool_of
 from roboirg.language import FORMS, LANGUAGE_VERSION, STAGE_SETS, instruct, instruct_with
 from roboirg.language.number_words import CARDINALS, ORDINALS
 from roboirg.language.patterns import deduction, sequence
-from roboirg.language.settings import settings_of
+from roboirg.language.request import InstructionRequest
+from roboirg.language.settings import reasoning, settings_of
 from roboirg.language.slot_types.number import SAME_NUMBER
+from roboirg.language.template_sampler import TemplateSampler
 from roboirg.language.templates import derivations, introductions, remarks
 from roboirg.language.variants import expressible_options
 from roboirg.tasks import every_task, get_task
@@ -26,7 +29,6 @@ COLOR_NAMES = frozenset(ALL_COLORS)
 SAID_AS = {
     "that": ("that", *SAME_NUMBER.everything),
     "them": ("them", "those"),
-    "pair": tuple(derivations.PAIR_ANAPHORS.everything),
 }
 """The words for a class of expressions, if they are not its name."""
 OF_SEVERAL = ("them", "each")
@@ -78,9 +80,9 @@ def check_values(instruction, goal):
         assert mention.slot == "reference" or mention.value in values_of(goal, mention), mention
         if mention.role == "antecedent":
             introduced.add((mention.slot, mention.value))
-        elif instruction.metadata["rival_slot"] and mention.expression == "them":
-            # The value that is meant, and its rival.
-            assert set(mention.value.split(" and ")) == {str(value) for _, value in introduced}
+        elif mention.slot == "reference" and mention.expression == "them":
+            # The value that is meant, and the others of the list.
+            assert set(mention.value.split(" and ")) <= {str(value) for _, value in introduced}
         else:
             assert referents(mention) <= introduced, (instruction.text, mention)
         if mention.expression == "other" and not instruction.metadata["rival_slot"]:
@@ -110,9 +112,10 @@ def check_other(instruction, mention):
             (one.slot, one.value) for one in instruction.mentions if one.role == "antecedent"
         } or mention.slot == "relation"
         return
-    pair, chosen = (one.value for one in instruction.mentions[:2])
-    assert {chosen, mention.value} == set(pair.split(" and "))
-    assert {one.slot for one in instruction.mentions[:2]} == {"reference"}
+    *pair, chosen = (one for one in instruction.mentions if one.utterance == 0)
+    assert {one.slot for one in (*pair, chosen)} == {"reference"}
+    values = {value for one in pair for value in str(one.value).split(" and ")}
+    assert {str(chosen.value), str(mention.value)} == values
 
 
 @pytest.mark.parametrize("task", TASKS)
@@ -127,12 +130,16 @@ def test_every_choice_is_noted(task):
         rivals = instruct(episode, "contextual", distractor="competing", distractors=5)
         assert len(noted(rivals, "competing distractor/")) == 5
         derived = instruct(episode, "reasoning")
-        if noted(derived, "pair anaphor/"):
-            (index,) = (int(one[-1]) for one in noted(derived, "pair anaphor/"))
-            assert derivations.PAIR_ANAPHORS.of(pool)[index] in derived.command
+        if noted(derived, "exclusion/"):
+            (index,) = (int(one[-1]) for one in noted(derived, "exclusion/"))
+            names = str(derived.mentions[0].value)
+            pools = (derivations.EXCLUSIONS, derivations.SINGLE_EXCLUSIONS)[" and " not in names]
+            assert pools.of(pool)[index].words in derived.command
         else:
             purposes = (
-                ("relation/", "neighbor introduction/") if named(derived) else ("two moments/",)
+                ("relation/", "neighbor introduction/")
+                if named(derived)
+                else ("two moments/", "complement/")
             )
             assert sum(len(noted(derived, one)) for one in purposes) == 1
         if "spatial" in settings_of(get_task(task)):
@@ -230,32 +237,79 @@ def test_there_are_enough_paraphrases(pool):
     for task in every_task().values():
         by_parts = Counter(wording.parts for wording in task.commands.wordings.of(pool))
         assert min(by_parts.values()) >= 2
-        assert task.commands.patterns
 
 
-@pytest.mark.parametrize("task", [task for task in TASKS if task != "BinFill"])
-def test_patterns_are_balanced_in_every_difficulty(task):
-    names = get_task(task).commands.patterns
-    found: dict[str, Counter] = {}
-    for index in range(48):
-        episode = get_episode(task, "test", index)
-        pattern = instruct(episode, "reasoning").metadata["pattern"]
-        found.setdefault(episode.difficulty, Counter())[pattern] += 1
-    for counts in found.values():
+@pytest.mark.parametrize("task", TASKS)
+def test_the_patterns_that_an_episode_allows_come_up_alike(task):
+    found: dict[tuple, Counter] = {}
+    for index in range(192):
+        episode = get_episode(task, "random", index)
+        request = request_of(episode)
+        names = tuple(name for name, _ in reasoning.possible_patterns(request))
+        counts = found.setdefault((episode.difficulty, names), Counter(dict.fromkeys(names, 0)))
+        counts[instruct(episode, "reasoning").metadata["pattern"]] += 1
+    for (_, names), counts in found.items():
         assert set(counts) == set(names)
-        assert max(counts.values()) - min(counts.values()) <= 2
+        if counts.total() >= 24:
+            assert min(counts.values()) >= 0.5 * counts.total() / len(names)
 
 
-def test_the_patterns_of_amounts_go_by_the_number_of_colors():
-    found: dict[int, Counter] = {}
-    for episode in split_episodes("BinFill"):
-        pattern = instruct(episode, "reasoning").metadata["pattern"]
-        found.setdefault(len(episode.goal.texts("colors")), Counter())[pattern] += 1
-    assert set(found[1]) == {"color exclusion", "number deduction"}
-    assert set(found[2]) == {"contextual logic", "number deduction"}
-    assert set(found[3]) == {"number deduction"}
-    for colors in (1, 2):
-        assert min(found[colors].values()) > 0.3 * found[colors].total()
+PATTERNS_OF = {
+    "BinFill": {"color exclusion", "number deduction", "contextual logic"},
+    "PickXtimes": {"color exclusion", "number deduction", "contextual logic"},
+    "SwingXtimes": {"color exclusion", "number deduction", "contextual logic"},
+    "StopCube": {"number deduction", "sequential relation", "contextual logic"},
+    "VideoUnmask": {"color exclusion", "contextual logic"},
+    "ButtonUnmask": {"color exclusion", "contextual logic"},
+    "VideoUnmaskSwap": {"color exclusion", "contextual logic"},
+    "ButtonUnmaskSwap": {"color exclusion", "contextual logic"},
+    "VideoRepick": {"number deduction", "contextual logic"},
+    "VideoPlaceButton": {"color exclusion", "sequential relation", "contextual logic"},
+    "VideoPlaceOrder": {
+        "color exclusion", "number deduction", "sequential relation", "contextual logic",
+    },
+    "PutInBox": {"color exclusion", "contextual logic"},
+    "PickByCount": {"color exclusion", "number deduction", "contextual logic"},
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(("task", "patterns"), PATTERNS_OF.items())
+def test_every_pattern_that_makes_sense_for_a_task_is_in_the_test_split(task, patterns):
+    found = {instruct(get_episode(task, "test", index), "reasoning").metadata["pattern"]
+             for index in range(50)}  # fmt: skip
+    assert found == patterns
+
+
+def request_of(episode):
+    options = InstructionOptions("reasoning")
+    return InstructionRequest(episode, get_task(episode.task), options, TemplateSampler("any"))
+
+
+def test_as_few_colors_are_excluded_as_leave_one():
+    """In BinFill, PickXtimes and SwingXtimes scenes have one, two or three colors."""
+    found = Counter()
+    for task, index in itertools.product(("BinFill", "PickXtimes", "SwingXtimes"), range(96)):
+        episode = get_episode(task, "test", index % 50)
+        said = instruct(episode, "reasoning")
+        if said.metadata["pattern"] != "color exclusion":
+            continue
+        present = {cube.color for cube in episode.scene.of_kind("cube")}
+        (target,) = {*episode.goal.as_mapping().get("colors", ())} or {episode.goal["color"]}
+        excluded = set(said.mentions[0].value.split(" and "))
+        assert target not in excluded
+        assert present - excluded == {target}
+        assert len(excluded) == max(1, len(present) - 1)
+        found[len(present)] += 1
+    assert set(found) == {1, 2, 3}
+
+
+def test_goals_of_both_of_two_colors_exclude_none():
+    for index in range(200):
+        episode = get_episode("BinFill", "random", index)
+        colors = {cube.color for cube in episode.scene.of_kind("cube")}
+        if len(colors) == 2 == len(episode.goal.texts("colors")):
+            names = [name for name, _ in reasoning.possible_patterns(request_of(episode))]
+            assert names == ["number deduction"]
 
 
 def test_of_two_placements_none_is_told_by_its_direction():

@@ -41,13 +41,13 @@ def test_what_the_words_leave_open_is_drawn_by_seed():
 
 
 def status(rule, setting):
-    env = roboirg.make("PickXtimes", setting=setting, episode=2, cameras=(), max_steps=600)
+    env = roboirg.make("PickXtimes", setting=setting, episode=6, cameras=(), max_steps=600)
     return play(env, make_policy(rule, 0))["status"]
 
 
 @pytest.mark.sim
 def test_first_mention_solves_direct_and_fails_in_reasoning():
-    """The blue cube, once: in reasoning the words name red and green."""
+    """The green cube, once: in reasoning the words name another number."""
     assert status("first-mention", "direct") == "success"
     assert status("first-mention", "reasoning") == "failure"
 

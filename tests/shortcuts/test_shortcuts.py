@@ -245,7 +245,6 @@ def test_shares_of_every_setting(task, setting, episodes):
             if not get_setting(setting, get_task(task)).implicit:
                 assert all(score_rule(rule, told).goal == 1 for rule in SURFACE_RULES)
             elif setting in ("direct", "contextual"):
-                assert score_rule("first-mention", told).goal == 1
                 assert score_rule("surface", told).goal == 1
                 if options.form == "resolved":
                     assert score_rule("elimination", told).goal == 1
@@ -269,7 +268,11 @@ def test_a_rule_sees_no_goal_and_no_scene():
 
 
 def test_shares_by_hand():
-    episode = get_episode("VideoPlaceButton", "test", 3)
+    episode = next(
+        one for one in first_episodes("VideoPlaceButton", "test", 50)
+        if not instruct(one, "direct").turns[0].count(" and ")
+        and instruct(one, "reasoning").metadata["templates"][0].startswith("two moments")
+    )  # fmt: skip
     told = episode, instruct(episode, "direct")
     assert hidden_slots(told) == ("color", "relation")
     assert score_rule("first-mention", told).slots == (1, 1)
@@ -284,21 +287,20 @@ def test_shares_by_hand():
 
 
 def test_the_table_of_the_documentation():
-    """The rules solve direct and contextual, and one of them reasoning; none solves spatial."""
+    """One rule solves direct, contextual and most of reasoning; none solves spatial."""
     rows = {row.group: row.shares for row in shortcut_rows(
         ("PickXtimes", "VideoUnmask"), ("test",), ("direct", "reasoning", "contextual", "spatial"),
         InstructionOptions(distractor="competing"),
     )}  # fmt: skip
     assert list(rows) == [("direct",), ("reasoning",), ("contextual",), ("spatial",)]
     for setting in ("direct", "contextual"):
-        assert rows[setting,]["first-mention"] == rows[setting,]["surface"] == (1, 1)
-    assert rows["direct",]["last-mention"] == (1, 1)
+        assert rows[setting,]["surface"] == (1, 1)
+        assert rows[setting,]["first-mention"].goals < 0.9
     assert rows["contextual",]["last-mention"].goals == 0
-    assert rows["reasoning",]["surface"] == (1, 1)
-    assert rows["reasoning",]["first-mention"].goals == 0
-    assert rows["reasoning",]["elimination"].slots > 0.7
+    assert 0.9 < rows["reasoning",]["surface"].goals < 1
+    assert rows["reasoning",]["first-mention"].goals < 0.5
     for rule in SURFACE_RULES:
-        assert rows["spatial",][rule].slots == pytest.approx(1 / 3, abs=0.011)
+        assert rows["spatial",][rule].slots == pytest.approx(1 / 3, abs=0.02)
         assert rows["spatial",][rule].goals < rows["spatial",][CHANCE].goals
 
 
@@ -334,7 +336,8 @@ def test_rows_by_pattern_have_all_instructions():
     told = list(instructions(first_episodes("BinFill", "test", 20), ["reasoning"], ["implicit"]))
     groups = group_told(told, "pattern")
     assert set(groups) == {
-        ("reasoning", pattern) for pattern in get_task("BinFill").commands.patterns
+        ("reasoning", pattern)
+        for pattern in ("color exclusion", "number deduction", "contextual logic")
     }
     assert sum(map(len, groups.values())) == len(told) == 20
     assert set(group_told(told, "task")) == {("reasoning", "BinFill")}
@@ -351,8 +354,8 @@ def test_the_learned_floor_is_deterministic_and_learns():
     texts = [instruction.text for _, instruction in tested]
     first, second = learned("VideoUnmask", "direct"), learned("VideoUnmask", "direct")
     assert first.predict(texts) == second.predict(texts)
-    assert mean_shares(first.scores(tested)).goals > 0.9
-    assert mean_shares(learned("VideoUnmask", "explicit").scores(tested)).goals < 0.9
+    assert mean_shares(first.scores(tested)).goals > 0.6
+    assert mean_shares(learned("VideoUnmask", "explicit").scores(tested)).goals < 0.6
     assert first.scores([]) == []
     with pytest.raises(InvalidValueError, match="no instruction to learn from"):
         LearnedFloor([])

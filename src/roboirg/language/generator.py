@@ -17,7 +17,7 @@ from roboirg.core.instruction_options import (
     as_fields,
 )
 from roboirg.core.word_pools import POOLS
-from roboirg.language.instruction import FORMS, Instruction, Mention, Utterance
+from roboirg.language.instruction import FORMS, Instruction, Mention, Utterance, hidden_slots
 from roboirg.language.landmarks import FRAMES
 from roboirg.language.phrases import speak
 from roboirg.language.request import (
@@ -55,6 +55,7 @@ _DEFAULT_METADATA: dict[str, object] = {
     "candidates": {},
     "wordings": None,
     "command": "own",
+    "template_slots": [],
 }
 """The metadata that apply to some settings only."""
 
@@ -200,7 +201,9 @@ def _instruction(request: InstructionRequest, spec: InstructionSpec) -> Instruct
     utterances, mentions = _spoken(spec, as_written=bool(request.filled))
     notes: dict[str, object] = {"wordings": request.options.wordings, "pool": request.pool}
     if request.filled:
-        notes["command"] = request.filled[-1].text
+        command = request.filled[-1]
+        notes["command"] = command.text
+        notes["template_slots"] = sorted(command.slots_said(request.episode.goal))
     found = Instruction(
         task=request.task.name,
         episode=request.episode.key,
@@ -222,10 +225,9 @@ def _instruction(request: InstructionRequest, spec: InstructionSpec) -> Instruct
 
 def _hidden_slots(request: InstructionRequest, instruction: Instruction) -> int:
     """Return how many values of the goal the command leaves to its context."""
-    setting = all_settings()[instruction.setting]
-    if request.resolved or not setting.implicit:
+    if request.resolved:
         return 0
-    hidden = setting.hidden_slots(instruction, request.episode.goal)
+    hidden = hidden_slots(instruction, request.episode.goal)
     return sum(value.slot in hidden for value in request.goal_values)
 
 

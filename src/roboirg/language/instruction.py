@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Literal, get_args
+from typing import Literal, cast, get_args
+
+from roboirg.core.episode import Goal
 
 Form = Literal["implicit", "resolved"]
 UtteranceStage = Literal["introduction", "reinforcement", "distractor", "cue", "command"]
@@ -100,3 +102,15 @@ class Instruction:
     def span(self, mention: Mention) -> str:
         """Return the text of a mention."""
         return self.utterances[mention.utterance].text[mention.start : mention.end]
+
+
+def hidden_slots(instruction: Instruction, goal: Goal) -> frozenset[str]:
+    """Return the slots of the goal that the command leaves to its context."""
+    last = len(instruction.utterances) - 1
+    stated = {
+        mention.slot
+        for mention in instruction.mentions
+        if mention.utterance == last and mention.role == "antecedent"
+    }
+    said = cast("list[str]", instruction.metadata.get("template_slots", []))
+    return frozenset(goal.as_mapping()) - stated - set(said)

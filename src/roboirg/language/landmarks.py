@@ -163,7 +163,7 @@ def selectors(scene: Scene, thing: ObjectKind, frame: Frame) -> Iterator[Selecto
         return
     named = (*_extremes(candidates, frame), *_corners(candidates, frame))
     ranked = tuple(_ranks(candidates, frame))
-    yield from (*named, *ranked)
+    yield from (*named, *_far_sides(candidates, frame), *ranked)
     fixtures = tuple(_fixtures(scene, candidates))
     yield from fixtures
     yield from _other_colors(candidates)
@@ -245,6 +245,17 @@ def _sides(candidates: tuple[SceneObject, ...], frame: Frame) -> Iterator[Select
             (ranking,),
             candidates,
         )
+
+
+def _far_sides(candidates: tuple[SceneObject, ...], frame: Frame) -> Iterator[Selector]:
+    """Yield *at your far right*, where the side and the far corner mean the same object."""
+    if frame != "robot":
+        return
+    left, right = (direction.ranking for direction in _directions(frame) if direction.sided)
+    for side, ranking in (("left", left), ("right", right)):
+        corners = tuple(_nearness((area["far"], area[side])) for area in (WORK_AREA, TABLE))
+        landmark = Landmark(f"at your far {side}", LandmarkClass.EXTREME, sided=True)
+        yield Selector(landmark, (ranking, *corners), candidates)
 
 
 def _corners(candidates: tuple[SceneObject, ...], frame: Frame) -> Iterator[Selector]:

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Literal, NamedTuple, TypeVar, cast
 
-from roboirg.core.episode import Color, Episode, Goal, Scene, SceneObject
+from roboirg.core.episode import Color, Episode, Goal, Scene, SceneObject, SlotValue
 from roboirg.core.errors import InvalidValueError
 from roboirg.core.goal_slots import COLOR_SLOTS, SLOT_TYPE_NAMES, SlotTypeName
 from roboirg.core.instruction_options import InstructionOptions
@@ -21,6 +21,8 @@ from roboirg.tasks import Task, get_task
 
 Distractor = Literal["neutral", "competing"]
 Option = TypeVar("Option")
+SlotContent = tuple[str, ...] | tuple[int, ...] | tuple[str | int, ...]
+"""The values of a slot, one or several."""
 DISTRACTORS: tuple[Distractor, ...] = ("neutral", "competing")
 MOST_DISTRACTORS = 100
 STAGE_SETS: tuple[tuple[int, ...], ...] = ((1, 5), (1, 2, 5), (1, 2, 3, 5), (1, 2, 3, 4, 5))
@@ -124,9 +126,18 @@ class InstructionRequest:
         counts = {one.field: one for one in self.goal_values if one.slot == "counts"}
         return counts[f"counts.{index}"].number if counts else 1
 
+    def alternatives(self, slot: str) -> tuple[SlotContent, ...]:
+        """Return all that a slot can hold in this scene if the other slots keep their values."""
+        return _alternatives(self.task.name, self.episode.scene, self.episode.goal, slot)
+
     def alternative_numbers(self, slot: str) -> tuple[tuple[int, ...], ...]:
-        """Return all numbers that a slot can hold in this scene if the other slots keep theirs."""
-        return _alternative_numbers(self.task.name, self.episode.scene, self.episode.goal, slot)
+        """Return the alternatives of a slot that holds numbers."""
+        return tuple(tuple(map(int, content)) for content in self.alternatives(slot))
+
+    @property
+    def scene_colors(self) -> tuple[str, ...]:
+        """The colors that goals of this scene can have, in the order of the task's vocabulary."""
+        return _scene_colors(self.task.name, self.episode.scene)
 
     def other_colors(self, color: str) -> tuple[Color, ...]:
         """Return the colors in the task's vocabulary, without this one."""
@@ -288,13 +299,21 @@ def _goal_values(goal: Goal) -> tuple[GoalValue, ...]:
 
 
 @functools.lru_cache(maxsize=64)
-def _alternative_numbers(
-    task: str, scene: Scene, goal: Goal, slot: str
-) -> tuple[tuple[int, ...], ...]:
+def _alternatives(task: str, scene: Scene, goal: Goal, slot: str) -> tuple[SlotContent, ...]:
     same = dict(goal.slots) | {slot: 0}
     goals = [dict(one.slots) for one in get_task(task).goals(scene)]
     values = [one[slot] for one in goals if one | {slot: 0} == same]
-    return tuple(
-        tuple(int(one) for one in (value if isinstance(value, tuple) else (value,)))
-        for value in values
-    )
+    return tuple(value if isinstance(value, tuple) else (value,) for value in values)
+
+
+@functools.lru_cache(maxsize=64)
+def _scene_colors(task: str, scene: Scene) -> tuple[str, ...]:
+    goals = [dict(one.slots) for one in get_task(task).goals(scene)]
+    found = {color for goal in goals for slot in COLOR_SLOTS for color in _texts(goal.get(slot))}
+    return tuple(color for color in get_task(task).commands.colors if color in found)
+
+
+def _texts(content: SlotValue | None) -> tuple[str, ...]:
+    if content is None:
+        return ()
+    return tuple(map(str, content)) if isinstance(content, tuple) else (str(content),)

@@ -102,6 +102,11 @@ class WordedCommand:
             for phrase in self._table(name).values()
         )
 
+    def slots_said(self, goal: Goal) -> set[str]:
+        """Return the slots whose values the words around the fields say."""
+        left = {name for name in goal_fields(goal) if name not in self.fields}
+        return set().union(*map(_slots_of, left)) & set(self.when)
+
     def state(self, goal: Goal) -> str:
         """Return the explicit command for a goal that the template fits."""
         values = goal_fields(goal)

@@ -12,6 +12,7 @@ from collections.abc import Iterable
 from typing import NamedTuple
 
 from roboirg.core.episode import Goal, Scene
+from roboirg.reader.alternatives import take_remaining
 from roboirg.reader.command import is_command, read_command
 from roboirg.reader.comprehension import ComprehensionGap, find_gaps, is_unknown_command
 from roboirg.reader.constraints import goal_constraints
@@ -58,7 +59,7 @@ def interpret(text: str, scene: Scene, task: str) -> Interpretation:
         UnknownNameError: there is no such task.
     """
     candidates = _possible_goals(scene, task)
-    sentences = split_sentences(text)
+    sentences = tuple(map(take_remaining, split_sentences(text)))
     first, last = _command_span(sentences)
     gaps = _command_gaps(sentences, first, last)
     if gaps:

@@ -15,7 +15,7 @@ from roboirg.reader.phrases import Phrases
 from roboirg.reader.places import place_mentions
 from roboirg.reader.quantities import quantities
 from roboirg.reader.several_amounts import several_amounts
-from roboirg.reader.tokens import COLOR, Sentence, color_of, number_of, word_set
+from roboirg.reader.tokens import Sentence, color_of, number_of, word_set
 from roboirg.reader.vocabulary import (
     DETERMINERS,
     PLACE_WORDS,
@@ -61,7 +61,6 @@ _HIDDEN = Phrases({
     "the container that the red cube is hidden":
         r"(?:^| )(?!(?:that|which) )\w+ (?:is|was|are|were)(?: hidden)?$",
 })  # fmt: skip
-_COLORS_WITHOUT_ONE = Phrases({"green , not green": rf"{COLOR} , not {COLOR}\b"})
 _BELOW = word_set("under below beneath underneath")
 _AFTER_BELOW = ((), (",",), (";",), ("and",), ("then",))
 _LOCATING = PREPOSITIONS | PLACE_WORDS
@@ -107,11 +106,9 @@ def _unknown_words(words: Sentence) -> Iterator[ComprehensionGap]:
 
 
 def _is_read_alternative(words: Sentence, at: int) -> bool:
-    """Return whether a word is the *or* of *before or after* or of two colors without one."""
+    """Return whether a word is the *or* of *before or after*, or the *nor* of *neither*."""
     return words[at] in ("or", "nor") and (
-        words[at - 1 : at + 2 : 2] == ("before", "after")
-        or _COLORS_WITHOUT_ONE.match(" ".join(words[at + 1 : at + 5])) is not None
-        or "neither" in words[max(0, at - 2) : at]
+        words[at - 1 : at + 2 : 2] == ("before", "after") or "neither" in words[max(0, at - 2) : at]
     )
 
 

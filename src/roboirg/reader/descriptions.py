@@ -8,13 +8,27 @@ from roboirg.reader.comparisons import PlaceComparison, read_comparison
 from roboirg.reader.phrases import Phrases
 from roboirg.reader.places import NamedPlace, read_places
 from roboirg.reader.temporal_relations import Time, mentioned_times
-from roboirg.reader.tokens import COLOR, Sentence, color_of, colors_in, ordinal_of, word_set
+from roboirg.reader.tokens import (
+    COLOR,
+    THING,
+    THINGS,
+    Sentence,
+    color_of,
+    colors_in,
+    ordinal_of,
+    word_set,
+)
 
 _PRONOUNS = word_set("it them")
 _POINTED = word_set("cube box tape one color")
 _PLACE_NOUNS = word_set("place spot position location")
 _SERIES_NOUNS = word_set("visit placement time pass placing stay occasion")
 _FORMER = {"former": 0, "latter": -1}
+_MENTIONED = Phrases({
+    "the one I mentioned earlier":
+        r"\bthe (?:cubes?|box|container|tapes?|ones?) (?:that )?i (?:just )?"
+        r"(?:mentioned|named|spoke of)\b",
+})  # fmt: skip
 _CHOSEN = Phrases({
     "the cube I want":
         r"\b(?:the|my) (?P<noun>cubes?|box|container|tapes?|ones?|color|place|spot) i "
@@ -24,11 +38,19 @@ _CHOSEN = Phrases({
 _OTHERS = Phrases({
     "the other one":
         r"\bthe (?:other (?P<noun>cubes?|ones?|box|container|tape|place|spot)|others)\b"
-        r"(?! (?:of|in|from|than)\b)",
+        r"(?! (?:of|from|than)\b| in (?:those|these|them|the two)\b)",
 })  # fmt: skip
 
 DescriptionKind = Literal[
-    "any", "color", "not", "other", "place", "introduced", "introduced place", "compared"
+    "any",
+    "color",
+    "not",
+    "other",
+    "place",
+    "introduced",
+    "introduced place",
+    "compared",
+    "remaining",
 ]
 
 
@@ -38,8 +60,8 @@ class Description(NamedTuple):
     Attributes:
         kind: ``any`` describes nothing; ``color`` names a color; ``not`` excludes colors; ``other``
             is the remaining one of some colors; ``place`` names a place; ``introduced`` and
-            ``introduced place`` point at an earlier color or place; ``compared`` is the foremost
-            one of those that ``not`` leaves.
+            ``introduced place`` point at an earlier color or place; ``remaining`` is the other one
+            of two introduced ones; ``compared`` is the foremost one of those that ``not`` leaves.
         colors: named colors; empty if the words point at those of the context.
         excluded: for ``other``, the excluded color; None if the words only point at it.
         place: the named place.
@@ -72,12 +94,12 @@ _THAN = Phrases(
     after=r"\b",
 )  # fmt: skip
 _COMPLEMENT = Phrases({
+    "the cube in the other color": r"\bin the other color\b(?! (?:of|in|from)\b)",
     "the other color of those two":
-        r"\bthe other (?:one |color )?(?:of|in|from)\b"
+        rf"\bthe other (?:one |color |(?:{THING}|{THINGS}) )?(?:of|in|from)\b"
         r"(?! (?:the |those |these )?(?:two )?moments)",
     "the one of these two that is not red":
         r"\bthe (?:one|color) (?:of|in|from)\b.*\b(?:not|other than|except)\b",
-    "red or green, not green": rf"\b{COLOR} or {COLOR} , not {COLOR}\b",
 })  # fmt: skip
 _NOT = Phrases({
     "the one of these two that is not red":
@@ -113,11 +135,13 @@ def _complement(text: str, colors: tuple[str, ...]) -> Description:
 
 def _choice(text: str) -> Description | None:
     """Read ``the cube I want`` and ``the other one``: the chosen value comes first."""
+    if _MENTIONED.search(text):
+        return Description("introduced", times=mentioned_times(text))
     for phrases, position in ((_CHOSEN, 0), (_OTHERS, 1)):
         found = phrases.search(text)
         if found:
-            placed = found["noun"] in _PLACE_NOUNS
-            kind: DescriptionKind = "introduced place" if placed else "introduced"
+            plain: DescriptionKind = "remaining" if position else "introduced"
+            kind = "introduced place" if found["noun"] in _PLACE_NOUNS else plain
             return Description(kind, times=mentioned_times(text), position=position)
     return None
 

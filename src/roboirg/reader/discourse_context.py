@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Iterable
-from typing import NamedTuple
+from typing import NamedTuple, TypeVar
 
 from roboirg.reader.ordinals import named_positions
 from roboirg.reader.phrases import Phrases
@@ -12,6 +12,8 @@ from roboirg.reader.places import NamedPlace, read_places
 from roboirg.reader.quantities import plain_numbers, quantities
 from roboirg.reader.temporal_relations import PressRelation, Time, mentioned_times, named_moments
 from roboirg.reader.tokens import COLOR, Sentence, colors_in
+
+Value = TypeVar("Value")
 
 _DISMISSAL = Phrases(
     {
@@ -50,8 +52,10 @@ class DiscourseContext(NamedTuple):
         colors: introduced colors.
         preferred_color: an introduced color that a later sentence names again, alone.
         numbers: introduced numbers.
+        preferred_number: an introduced number that a later sentence names again, alone.
         amounts: introduced numbers of cubes, with their color.
         positions: introduced elements of a series, 1 for the first.
+        preferred_position: an introduced element that a later sentence names again, alone.
         moments: introduced moments of the video.
         preferred_moment: an introduced moment that a later sentence names again, alone.
         places: introduced places.
@@ -62,8 +66,10 @@ class DiscourseContext(NamedTuple):
     colors: tuple[str, ...] = ()
     preferred_color: str | None = None
     numbers: tuple[int, ...] = ()
+    preferred_number: int | None = None
     amounts: tuple[tuple[str, int], ...] = ()
     positions: tuple[int, ...] = ()
+    preferred_position: int | None = None
     moments: tuple[PressRelation, ...] = ()
     preferred_moment: PressRelation | None = None
     places: tuple[NamedPlace, ...] = ()
@@ -115,17 +121,23 @@ def read_discourse(sentences: Iterable[Sentence]) -> DiscourseContext:
     return context
 
 
+def _again(introduced: tuple[Value, ...], named: tuple[Value, ...]) -> Value | None:
+    """Return the value that a sentence names alone, if it was introduced before."""
+    return named[0] if len(named) == 1 and named[0] in introduced else None
+
+
 def _with_remark(context: DiscourseContext, remark: Remark) -> DiscourseContext:
-    fresh = [color for color in remark.colors if color not in context.colors]
-    again = not fresh and len(remark.colors) == 1
     moments = (*context.moments, *remark.moments)
     introduced = tuple(dict.fromkeys(moments))
     return DiscourseContext(
-        colors=tuple(dict.fromkeys((*context.colors, *fresh))),
-        preferred_color=remark.colors[0] if again else context.preferred_color,
+        colors=tuple(dict.fromkeys((*context.colors, *remark.colors))),
+        preferred_color=_again(context.colors, remark.colors) or context.preferred_color,
         numbers=tuple(dict.fromkeys((*context.numbers, *remark.numbers))),
+        preferred_number=_again(context.numbers, remark.numbers) or context.preferred_number,
         amounts=tuple(dict.fromkeys((*context.amounts, *remark.amounts))),
         positions=tuple(dict.fromkeys((*context.positions, *remark.positions))),
+        preferred_position=_again(context.positions, remark.positions)
+        or context.preferred_position,
         moments=introduced,
         preferred_moment=moments[-1] if len(moments) > len(introduced) > 1 else None,
         places=(*context.places, *remark.places),

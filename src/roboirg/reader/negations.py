@@ -73,8 +73,6 @@ _READ_ELSEWHERE = Phrases({
     "Stop the cube on visit no 3.": rf"\bno {NUMBER}\b",
     "Take the cube that is neither red nor blue.": rf"{_OF_COLORS} {COLOR} n?or {COLOR}\b",
     "Take the cube that is neither of those.": rf"{_OF_COLORS} of (?:those|these|them|the two)\b",
-    "Take the cube in the other color, so red or green, not green.":
-        rf"\b{COLOR} or {COLOR} , not {COLOR}\b",
     "Stop the cube on the visit whose number is that minus 4.":
         rf"\b(?:that|it|this|{NUMBER}) minus\b",
 })  # fmt: skip

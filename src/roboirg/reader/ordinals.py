@@ -10,7 +10,7 @@ from roboirg.reader.phrases import Phrases
 from roboirg.reader.quantities import CountExpression, read_value
 from roboirg.reader.tokens import NUMBER, ORDINAL, number_of, ordinal_of
 
-Base = int | Literal["that", "last"]
+Base = int | Literal["that", "last", "other"]
 
 _NOUN = r"(?:visit|placement|pass|passage|stay|time|occasion|placing)"
 _ELEMENT = Phrases({
@@ -53,6 +53,12 @@ _POINTER = Phrases({
     "during that very visit": rf"\b(?:that|this|the same) (?:very )?(?:one|number|{_NOUN})\b",
     "during the visit I mentioned": rf"\bthe {_NOUN} i\b",
 })  # fmt: skip
+_OTHER = Phrases({
+    "during the other visit": rf"\bthe other {_NOUN}\b",
+    "during the visit that is left": rf"\bthe {_NOUN} that is left\b",
+    "during the visit other than that":
+        rf"\bthe {_NOUN} (?:of (?:the two|them|those) )?other than that\b",
+})  # fmt: skip
 _LATER = ("after", "following", "later than", "behind", "next")
 
 
@@ -60,7 +66,8 @@ class OrdinalExpression(NamedTuple):
     """A description of an element of a series.
 
     Attributes:
-        base: the number of an element; ``that`` for an introduced one, ``last`` for the last.
+        base: the number of an element; ``that`` for an introduced one, ``other`` for the other of
+            two introduced ones, ``last`` for the last.
         offsets: the possible distances from the base to the element.
         value: an expression for the number of the element, instead of base and offsets.
     """
@@ -81,7 +88,7 @@ class OrdinalExpression(NamedTuple):
             values = self.value.results(numbers or positions)
             return None if values is None else values & elements
         bases = self._bases(positions or numbers, length)
-        if not bases and self.base == "that":
+        if not bases and self.base in ("that", "other"):
             if self.offsets == (0,):
                 return None
             bases = elements
@@ -89,14 +96,16 @@ class OrdinalExpression(NamedTuple):
         return {base + offset for base in bases & elements for offset in self.offsets} & elements
 
     def _bases(self, introduced: Collection[int], length: int) -> set[int]:
-        if self.base == "that":
+        if self.base in ("that", "other"):
             return set(introduced)
-        return {length if self.base == "last" else self.base}
+        return {length if isinstance(self.base, str) else self.base}
 
     @property
     def points(self) -> bool:
         """Whether the context must introduce an element or a number."""
-        return self.value.quantity is None if self.value is not None else self.base == "that"
+        if self.value is not None:
+            return self.value.quantity is None
+        return self.base in ("that", "other")
 
 
 def named_positions(text: str) -> tuple[int, ...]:
@@ -138,6 +147,8 @@ def _read_last(text: str) -> OrdinalExpression | None:
 
 
 def _read_named(text: str) -> OrdinalExpression | None:
+    if _OTHER.search(text):
+        return OrdinalExpression("other")
     found = _ELEMENT.search(text)
     if found is None and not _POINTER.search(text):
         found = _BARE.search(text)

@@ -19,13 +19,15 @@ Combination = Literal["total", "difference"]
 class CountExpression(NamedTuple):
     """The number ``factor * quantity + offset``; the context gives a missing quantity.
 
-    With a combination, the missing quantity is the total or difference of two introduced numbers.
+    With a combination, the missing quantity is the total or difference of two introduced numbers;
+    a remaining one is the other of two.
     """
 
     factor: float = 1.0
     offset: int = 0
     quantity: int | None = None
     combination: Combination | None = None
+    remaining: bool = False
 
     @property
     def derived(self) -> bool:
@@ -81,6 +83,10 @@ _SAME = Phrases({
     "the same number of blue cubes": r"\b(?:that|this|the same) (?:number|amount) of\b",
     "my lucky number of blue cubes": r"\bmy (?:\w+ )?number of\b",
     "the number of times I mentioned": r"\bthe number of times(?= i\b)",
+})  # fmt: skip
+_REMAINING = Phrases({
+    "the other number of times": r"\bthe other number\b(?: of times)?",
+    "the number of times that is left": r"\bthe number(?: of times)? that is left\b",
 })  # fmt: skip
 _SOME = Phrases({"a couple of red cubes": r"\ba (?:couple|pair) of\b"})
 _ADVERB = Phrases({
@@ -139,6 +145,7 @@ _DERIVED: tuple[Reading, ...] = ((_STEP, _stepped, False), (_PLUS, _stepped, Fal
                                  (_SCALED, _scaled, False))  # fmt: skip
 _READINGS: tuple[Reading, ...] = (
     *_DERIVED,
+    (_REMAINING, lambda _found: CountExpression(remaining=True), False),
     (_SAME, lambda _found: CountExpression(), False),
     (_SOME, lambda _found: CountExpression(quantity=2), True),
     (_ADVERB, lambda found: CountExpression(quantity=ADVERBS[found[0]]), True),

@@ -70,7 +70,7 @@ class ReferenceResolver:
             return self._at(thing.place, thing.times)
         if thing.kind == "introduced place":
             return self._introduced_place(thing)
-        if thing.kind == "introduced":
+        if thing.kind in ("introduced", "remaining"):
             return self._introduced(thing)
         return self._derived(thing)
 
@@ -104,6 +104,8 @@ class ReferenceResolver:
             return ()
         of_color = tuple(number for shade, number in self._context.amounts if shade == color)
         numbers = of_color or self._context.numbers
+        if count.remaining:
+            numbers = tuple(one for one in numbers if one != self._context.preferred_number)
         if not numbers:
             self._complain("a number")
         return numbers
@@ -113,6 +115,9 @@ class ReferenceResolver:
         if position is None:
             return None
         positions, numbers = self._context.positions, self._context.numbers
+        if position.base == "other":
+            preferred = self._context.preferred_position
+            positions = tuple(one for one in positions if one != preferred)
         if position.points and not positions and not numbers:
             self._complain("an element of a series")
         return position.results(positions, numbers, self._series_length())
@@ -161,6 +166,9 @@ class ReferenceResolver:
         return (named or self._colors()) - {str(excluded)}
 
     def _introduced(self, thing: Description) -> set[str] | None:
+        preferred = self._context.preferred_color
+        if thing.kind == "remaining" and preferred is not None:
+            return set(self._context.colors) - {preferred}
         if self._context.places and not self._context.colors:
             return self._introduced_place(thing)
         chosen = _chosen(self._context.colors, thing.position)

@@ -31,13 +31,14 @@ _NEIGHBOR = Phrases({
     "at the placement next to that": r"\b(?:neighbor\w*|adjacent|next to|beside)\b",
     "at the placement right before or after that": _EITHER_SIDE,
 })  # fmt: skip
-NOT_THAT = r"\bnot (?:at |in )?(?:that|this|it|the one|the moment|when)\b"
+NOT_THAT = r"\bnot (?:at |in )?(?:that|this|it|the one|the moment|when)\b(?! pair)"
 """A regular expression for ``not at that moment``."""
 NOT_NAMED = r"\bnot (?:the |one |right |just |moment |at |directly )*(before|after)\b"
 """A regular expression for ``not the one right before the press``; a group has the moment."""
 _OTHER = Phrases({
     "at the other of the two moments":
-        r"(?<!\bcolor )\bother (?:one |moment )?(?:of|moment|time|point|than)\b",
+        r"(?<!\bcolor )(?<!\bthem )(?<!\btwo )\bother (?:one |moment )?"
+        r"(?:of|moment|time|point|than)\b",
     "I named one moment; put it where it was at the other one.": r"\bthe other one\b",
     "not at that moment": NOT_THAT,
     "at whichever he would not choose": r"\bwhichever\b.*\bnot\b",

@@ -46,6 +46,13 @@ OPPOSITES = word_set("other not no")
 SAYING = word_set("mentioned named")
 """Next to *first*, *last*, *earlier* and *later* they say that these are no ordinals or places."""
 
+_SAME = (
+    ("before or after", NEIGHBOR),
+    ("the one i mentioned earlier", "it"),
+    ("the one i mentioned", "it"),
+    ("the other number", "the number left"),
+)
+"""Words whose parts would mislead a rule, each with words that say the same."""
 _REACH = 5
 """Words before a value that may exclude it: *not the one right before*."""
 _NUMBER_REACH = 3
@@ -79,7 +86,10 @@ def named_values(text: str, slot: str, vocabulary: SlotVocabulary) -> tuple[Name
 # Cached: every slot and every rule reads the same text.
 @functools.lru_cache(maxsize=1024)
 def _sentences(text: str) -> tuple[Sentence, ...]:
-    return split_sentences(text.replace("before or after", NEIGHBOR))
+    text = text.lower()
+    for words, same in _SAME:
+        text = text.replace(words, same)
+    return split_sentences(text)
 
 
 def command_words(text: str) -> Sentence:
@@ -115,9 +125,10 @@ def part_count(text: str, thing: str, vocabulary: GoalVocabulary) -> int:
     ]
     if any(pair in ALL_PARTS for pair in itertools.pairwise(words)):
         stated.append(_introduced(text, vocabulary))
+    ranks = len(command_ranks(text))
     longest = max((one.longest for one in vocabulary.values()), default=1)
     nouns = sum(word in (thing, f"{thing}s", f"{thing}es") for word in words)
-    return max(1, min(longest, max((*stated, *_ranks(words), nouns))))
+    return max(1, min(longest, max((*stated, ranks, nouns))))
 
 
 def _introduced(text: str, vocabulary: GoalVocabulary) -> int:
@@ -130,14 +141,17 @@ def _introduced(text: str, vocabulary: GoalVocabulary) -> int:
     return 1
 
 
-def _ranks(words: Sentence) -> Iterator[int]:
-    """Yield the ranks of introduced things: *the former*, *the third*."""
+def command_ranks(text: str) -> tuple[int, ...]:
+    """Return the places of introduced things that the command takes: 0 for *the former*."""
+    words = command_words(text)
+    found: list[int] = []
     for before, word, after in zip(("", *words), words, (*words[1:], ""), strict=False):
-        if word in ("former", "latter"):
-            yield 2
         rank = ordinal_of(word)
-        if rank is not None and before == "the" and after not in ("from", "closest", "farthest"):
-            yield rank
+        if word in ("former", "latter"):
+            found.append(POINTERS[word])
+        elif rank is not None and before == "the" and after in ("of", "color", "place"):
+            found.append(rank - 1)
+    return tuple(found)
 
 
 def _values(words: Sentence, slot: str, vocabulary: SlotVocabulary) -> Iterator[tuple[int, Value]]:
@@ -151,15 +165,18 @@ def _values(words: Sentence, slot: str, vocabulary: SlotVocabulary) -> Iterator[
         return
     ordinals = SLOT_TYPE_NAMES.get(slot) in ORDINAL_TYPES
     for place, word in enumerate(words):
-        number = _number(words, place, ordinals=ordinals)
+        number = _number(words, place, ordinals=ordinals, counts=slot == "counts")
         if number is not None:
             yield place, number
-        elif ordinals and ordinal_of(word) is not None:
+        elif ordinals and ordinal_of(word) is not None and "of" not in words[place + 1 : place + 2]:
             yield place, int(ordinal_of(word) or 0)
 
 
-def _number(words: Sentence, place: int, *, ordinals: bool) -> int | None:
-    """Return the number that a cardinal or adverb names, if it counts things."""
+def _number(words: Sentence, place: int, *, ordinals: bool, counts: bool) -> int | None:
+    """Return the number that a cardinal or adverb names, if it counts things.
+
+    Where cubes are counted, *one of them* is one cube; elsewhere it points at a thing.
+    """
     word, following = words[place], words[place + 1 : place + 3]
     if word in ADVERBS:
         multiplies = following[:1] and (
@@ -168,7 +185,7 @@ def _number(words: Sentence, place: int, *, ordinals: bool) -> int | None:
         return None if multiplies else ADVERBS[word]
     differences = COMPARISONS | STEPS if ordinals else COMPARISONS
     is_pronoun = (place and words[place - 1] in POINTING) or (
-        following[:1] == ("of",) and not PRONOUNS.isdisjoint(following)
+        not counts and following[:1] == ("of",) and not PRONOUNS.isdisjoint(following)
     )
     if is_pronoun or not differences.isdisjoint(following):
         return None

@@ -9,7 +9,7 @@ from typing import Literal, NamedTuple, get_args
 
 from roboirg.core.episode import Episode, Goal
 from roboirg.language.instruction import Instruction
-from roboirg.language.settings import all_settings
+from roboirg.language.instruction import hidden_slots as hidden_in
 from roboirg.shortcuts.command_chance import blind_goals, right_share
 from roboirg.shortcuts.goal_vocabulary import values_in
 from roboirg.shortcuts.surface_rules import SURFACE_RULES
@@ -53,7 +53,7 @@ Scorer = Callable[[Told], ShortcutScore]
 def hidden_slots(told: Told) -> tuple[str, ...]:
     """Return the slots that the command leaves out, in the order of the goal."""
     episode, instruction = told
-    hidden = all_settings()[instruction.setting].hidden_slots(instruction, episode.goal)
+    hidden = hidden_in(instruction, episode.goal)
     return tuple(slot for slot, _ in episode.goal.slots if slot in hidden)
 
 

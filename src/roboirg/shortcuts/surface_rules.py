@@ -24,6 +24,8 @@ ONLY_ORDINAL = frozenset({"before", "after", "following", "preceding"})
 TOTALS = frozenset({"total", "sum", "together"})
 DIFFERENCES = frozenset({"difference", "gap"})
 """Made of two named numbers. A rule takes one step: it does not go on to *one fewer than that*."""
+REST = frozenset({"other", "others", "left"})
+"""Words for what remains when one of two is taken."""
 PAIR = 2
 _REACH = 2
 """Words between a difference and its number: *two visits before*."""
@@ -39,6 +41,7 @@ class SlotWords(NamedTuple):
         command: the words of the last sentence.
         parts: the number of values to find.
         pointed: which of two named values the words before the command point at.
+        ranks: the places of named values at which the command points.
     """
 
     slot: str
@@ -47,6 +50,7 @@ class SlotWords(NamedTuple):
     command: Sentence
     parts: int
     pointed: int | None = None
+    ranks: tuple[int, ...] = ()
 
     @property
     def is_number(self) -> bool:
@@ -85,15 +89,17 @@ def take_unnamed(words: SlotWords) -> list[Candidates]:
 def take_by_cues(words: SlotWords) -> list[Candidates]:
     """Choose among four rules by key words of the command and of what points at one of two values.
 
-    After a pointer, such as *former* or *latter*, the value at its place, and then the other one.
+    *The former*, *the third of them* in the command: the values at those places. *Other* or *left*
+    after a value that is named again: of the values, the first one that is not that. After a
+    pointer, such as *former* or *latter*, the value at its place, and then the other one.
     *Other*, *different*, *not* or *neighbor*: the value that is not named, then the one that is
     named but not last. *One fewer*, *twice*, *right after* and the like: the number that is named
     first, changed by the difference. Otherwise the first value.
     """
     pair = tuple(dict.fromkeys(words.named))
-    if words.pointed is not None and len(pair) == PAIR:
-        places: list[Candidates] = [(pair[words.pointed],), (pair[1 - words.pointed],)]
-        return places[: words.parts]
+    pointed = _pointed_values(words, pair)
+    if pointed:
+        return pointed[: words.parts]
     if words.is_number and not (TOTALS | DIFFERENCES).isdisjoint(words.command):
         left, right = (int(one) for one in (*words.named, 0, 0)[:PAIR])
         return [(abs(left - right if TOTALS.isdisjoint(words.command) else left + right),)]
@@ -106,6 +112,18 @@ def take_by_cues(words: SlotWords) -> list[Candidates]:
     unnamed = take_unnamed(words)[:1] if set(words.vocabulary.values) - set(words.named) else []
     complement = tuple(value for value in dict.fromkeys(words.named) if value != words.named[-1])
     return [*unnamed, complement]
+
+
+def _pointed_values(words: SlotWords, named: tuple[Value, ...]) -> list[Candidates]:
+    """Return the named values at which the words point; none if they point at none."""
+    if words.ranks and not words.is_number and max(words.ranks) < len(named):
+        return [(named[rank],) for rank in words.ranks]
+    if words.parts == 1 and len(named) < len(words.named) and not REST.isdisjoint(words.command):
+        rest = [value for value in named if value != words.named[-1]]
+        return [(rest[0],)] if rest else []
+    if words.pointed is not None and len(named) == PAIR:
+        return [(named[words.pointed],), (named[1 - words.pointed],)]
+    return []
 
 
 def _change(words: SlotWords) -> Callable[[int], Candidates] | None:

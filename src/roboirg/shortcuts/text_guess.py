@@ -20,7 +20,13 @@ from roboirg.shortcuts.goal_vocabulary import (
     orders,
     values_in,
 )
-from roboirg.shortcuts.named_values import command_words, named_values, part_count, pointed_value
+from roboirg.shortcuts.named_values import (
+    command_ranks,
+    command_words,
+    named_values,
+    part_count,
+    pointed_value,
+)
 from roboirg.shortcuts.surface_rules import SURFACE_RULES, Candidates, SlotWords
 from roboirg.tasks import get_task
 
@@ -48,7 +54,8 @@ def _candidates(
     found: list[Candidates] = [(one.value,) for one in named if one.stated]
     if not found:
         values = tuple(one.value for one in named)
-        words = SlotWords(slot, vocabulary, values, command_words(text), parts, pointed_value(text))
+        command, ranks = command_words(text), command_ranks(text)
+        words = SlotWords(slot, vocabulary, values, command, parts, pointed_value(text), ranks)
         found = SURFACE_RULES[rule](words)
     # Where a rule has nothing to go by, every value is as likely.
     padded = itertools.chain(found, itertools.repeat(()))

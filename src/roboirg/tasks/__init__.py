@@ -23,6 +23,8 @@ __all__ = ["Task", "all_suites", "all_tasks", "every_task", "find_tasks", "get_t
 ALL = "all"
 """Stands for all tasks of the benchmark wherever tasks are named."""
 ENTRY_POINTS = "roboirg.tasks"
+LEFT_OUT = ("PickHighlight", "MoveCube", "InsertPeg", "PatternLock", "RouteStick")
+"""Tasks of RoboMME whose instructions hold no variable that could be referred to."""
 
 
 @functools.cache
@@ -48,7 +50,7 @@ def get_task(name: str) -> Task:
     try:
         return every_task()[name]
     except KeyError:
-        raise UnknownNameError("task", name, every_task()) from None
+        raise _unknown_task(name, every_task()) from None
 
 
 def find_tasks(words: Iterable[str]) -> tuple[str, ...]:
@@ -95,5 +97,14 @@ def _expand(word: str) -> tuple[str, ...]:
     if suite is not None:
         return tuple(all_tasks((suite,)))
     if word not in every_task():
-        raise UnknownNameError("task", word, (*every_task(), *all_suites()))
+        raise _unknown_task(word, (*every_task(), *all_suites()))
     return (word,)
+
+
+def _unknown_task(name: str, known: Iterable[str]) -> InvalidValueError:
+    if name.lower() in map(str.lower, LEFT_OUT):
+        return InvalidValueError(
+            f"RoboMME's task {name!r} is left out: its instructions hold no variable to refer to. "
+            f"So are {', '.join(one for one in LEFT_OUT if one.lower() != name.lower())}."
+        )
+    return UnknownNameError("task", name, known)

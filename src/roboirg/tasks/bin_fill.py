@@ -225,7 +225,6 @@ def _binned(cubes: Iterable[str]) -> tuple[Fact, ...]:
 COMMANDS = Commands(
     by_place="cube[|s] like the one {place}",
     by_rank="cube[|s] like {place}",
-    patterns=("color exclusion", "number deduction", "contextual logic"),
     wordings=Pools(
         train=(
             Wording("Put {cubes} into the bin and press the button."),

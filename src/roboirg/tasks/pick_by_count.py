@@ -104,7 +104,6 @@ COMMANDS = Commands(
     by_place="the tape {place}",
     pointed="tape",
     things_at="the tape[|s] {place}",
-    patterns=("number deduction",),
     wordings=Pools(
         train=(
             Wording("Take {color} and place it on the target {repeats}."),

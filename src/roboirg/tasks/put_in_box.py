@@ -88,7 +88,6 @@ COMMANDS = Commands(
     by_place="the box {place}",
     pointed="box",
     things_at="the box[|es] {place}",
-    patterns=("color exclusion",),
     wordings=Pools(
         train=(
             Wording("Put the tape into {color}."),

@@ -133,7 +133,6 @@ def _wrong(
 
 
 COMMANDS = Commands(
-    patterns=("number deduction", "sequential relation"),
     wordings=Pools(
         train=(
             Wording("Press the button to stop the cube on the target {visit}."),

@@ -140,7 +140,6 @@ def _swing(cube: str, side: str, ordinal: str, wrong: tuple[Fact | Rule, ...]) -
 
 
 COMMANDS = Commands(
-    patterns=("color exclusion", "number deduction"),
     wordings=Pools(
         train=(
             Wording(
@@ -148,22 +147,22 @@ COMMANDS = Commands(
                 "down and press the button."
             ),
             Wording(
-                "Take {color}, swing it from your right to your left target {repeats}, put "
+                "Move {color} from your right to your left target {repeats}, put "
                 "it down and press the button."
             ),
             Wording(
-                "Carry {color} over from your right to your left target {repeats}, "
+                "Bring {color} from your right to your left target {repeats}, "
                 "set it down and press the button."
             ),
         ),
         test=(
             Wording(
-                "Swing {color} over from your right to your left target "
+                "Carry {color} from your right to your left target "
                 "{repeats}, lay it down and push the button."
             ),
             Wording(
                 "Grab {color}, swing it from your right to your left target {repeats}, "
-                "then lower it and push the button."
+                "lower it and push the button."
             ),
             Wording(
                 "Swing {color} from your right to your left target {repeats}, "

@@ -35,7 +35,6 @@ class Commands:
     """The commands of a task; the settings of the language fill the fields.
 
     Attributes:
-        patterns: reasoning patterns, in the order in which the episodes cycle through them.
         wordings: at least two for each number of parts, in each pool.
         thing: kind of object that the goal selects, and its name in words.
         colored: kind of object that has the goal's color: the same, or the cube in a container.
@@ -50,7 +49,6 @@ class Commands:
         things_at: how to introduce one or more of them by their places.
     """
 
-    patterns: tuple[str, ...]
     wordings: Pools[Wording]
     thing: ObjectKind = "cube"
     colored: ObjectKind = "cube"

@@ -52,7 +52,6 @@ def stages(scene: Scene, goal: Goal) -> tuple[Stage, ...]:
 
 
 COMMANDS = Commands(
-    patterns=("contextual logic", "sequential relation"),
     wordings=Pools(
         train=(
             Wording("Put {color} on {relation} in the video."),

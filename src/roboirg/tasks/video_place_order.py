@@ -55,7 +55,6 @@ def stages(scene: Scene, goal: Goal) -> tuple[Stage, ...]:
 
 
 COMMANDS = Commands(
-    patterns=("sequential relation",),
     wordings=Pools(
         train=(
             Wording("Put {color} on {placement} in the video."),

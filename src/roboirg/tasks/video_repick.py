@@ -176,7 +176,6 @@ def _early_press(timer: str) -> Rule:
 
 
 COMMANDS = Commands(
-    patterns=("number deduction",),
     wordings=Pools(
         train=(
             Wording(
@@ -184,7 +183,7 @@ COMMANDS = Commands(
                 "press the button."
             ),
             Wording(
-                "Find the cube lifted in the video, raise it and set it down {repeats}, then press "
+                "Find the cube lifted in the video and repeat the action {repeats}, then press "
                 "the button."
             ),
             Wording(
@@ -194,7 +193,7 @@ COMMANDS = Commands(
         ),
         test=(
             Wording(
-                "Grab the cube raised in the video, lift it and lay it down {repeats}, then push "
+                "Grab the cube raised in the video and repeat the action {repeats}, then push "
                 "the button."
             ),
             Wording(

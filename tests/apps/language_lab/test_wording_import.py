@@ -141,21 +141,28 @@ def test_referring_expressions_take_the_place_of_the_phrases():
     assert command("VideoUnmask", "spatial", colors=("red",)) == "Lift the container there"
 
 
+POINTED = (
+    r"(?:it|the former|the latter|the \w+ of them|the one I mentioned(?: earlier)?|the .*cube.*)"
+)
+"""Words for a thing, as a regular expression."""
+
 UNSPOILED = {
     "StopCube": (
         r"Use the button to stop the cube exactly as it reaches the target "
-        r"(?:during (?:that visit|the visit .*)|(?:one|two) visits? (?:earlier|later) than .*)"
+        r"(?:during (?:that visit|the (?:visit|other) .*|the .* visit but not .*)"
+        r"|(?:one|two) visits? (?:earlier|later) than .*)"
     ),
     "VideoRepick": (
         r"Pick up and put back down the cube that was picked up in the video, "
         r"doing so .*, then press the button"
     ),
     "VideoPlaceOrder": (
-        r"After watching the video, place (?:it|the \w+ cube) on "
-        r"the target of (?:that placement|the placement (?!.* it was ).*)\."
+        rf"After watching the video, place {POINTED} on "
+        r"the target (?:of (?:that placement|the (?:other )?placement(?: (?!.* it was ).*)?"
+        r"|the .* placement but not .*)|used (?:one|two) placements? (?:earlier|later) than .*)\."
     ),
     "VideoPlaceButton": (
-        r"After watching the video, place (?:it|the \w+ cube) on "
+        rf"After watching the video, place {POINTED} on "
         r"the target (?:used (?:then|at .*)|of the placement just before or after .*)\."
     ),
 }
@@ -227,12 +234,12 @@ def test_no_expression_spoils_the_sentence_in_any_training_episode(task):
         ),
         (
             "VideoPlaceOrder",
-            {"After watching the video, place it on the target of that placement."},
+            {"After watching the video, place @ on the target of that placement."},
         ),
         (
             "VideoPlaceButton",
             {
-                f"After watching the video, place it on the target used {moment}."
+                f"After watching the video, place @ on the target used {moment}."
                 for moment in ("then", "at that moment")
             },
         ),
@@ -240,7 +247,8 @@ def test_no_expression_spoils_the_sentence_in_any_training_episode(task):
 )
 def test_the_direct_command_is_good_english(task, commands):
     direct = InstructionOptions("direct", wordings=in_digits(task).identity)
-    assert {instruct_with(one, direct).command for one in train_episodes(task, 0, 12)} == commands
+    found = {instruct_with(one, direct).command for one in train_episodes(task, 0, 12)}
+    assert {re.sub(rf"place {POINTED} on", "place @ on", one) for one in found} == commands
 
 
 def test_a_pronoun_stands_between_verb_and_particle():
@@ -254,8 +262,12 @@ def test_a_pronoun_stands_between_verb_and_particle():
     assert found is not None
     assert (refused, found.own) == ([], frozenset())
     identity = opened("PickXtimes", found)
-    (episode,) = train_episodes("PickXtimes", 0, 1)
-    said = instruct_with(episode, InstructionOptions("direct", wordings=identity))
+    said = next(
+        one for episode in train_episodes("PickXtimes", 0, 50)
+        if "it" in map((one := instruct_with(
+            episode, InstructionOptions("direct", wordings=identity)
+        )).span, one.mentions)
+    )  # fmt: skip
     assert said.command == (
         f"pick it up, place it on the target {same_number(said)}, then press the button"
     )

@@ -1,4 +1,4 @@
-"""The check finds nothing in the paper's seven systems, whose servers do as they were trained.
+"""The check finds nothing in the systems that come along, whose servers do as they were trained.
 
 The servers stand in for the models: they speak the protocol, keep what they are shown, read as many
 words as the model, and answer with changes of the state that they were sent.

@@ -4,10 +4,10 @@ import lab_arm
 import numpy as np
 import pytest
 
+from roboirg.apps.real.control.clock import RealClock, VirtualClock
 from roboirg.apps.real.control.lerobot_arm import (
     LeRobotArm,
     LeRobotArmOptions,
-    center_square,
     make_arm,
 )
 from roboirg.apps.real.control.limits import Limits
@@ -17,6 +17,7 @@ from roboirg.apps.real.study.study_plan import make_study
 from roboirg.apps.real.study.study_run import Study, select_scorer
 from roboirg.apps.real.study.trial_log import TrialLog
 from roboirg.core.errors import InvalidValueError, UnknownNameError
+from roboirg.policies.lerobot_features import center_square
 
 WATCHING, STILL = "faulty_policies:Watcher", "faulty_policies:Still"
 # A busy machine is slow: what is tested here is not how quick it is.
@@ -102,8 +103,8 @@ def test_a_robot_that_lacks_something_is_refused():
     with pytest.raises(InvalidValueError, match=r"write lerobot:package\.module:function"):
         make_arm("lerobot:nowhere:make", lambda job: None)
     with pytest.raises(UnknownNameError, match="no robot 'arm'"):
-        make_robot("arm", real_time=False, arrange=lambda job: None)
-    arm = make_robot("lerobot:lab_arm:make", real_time=False, arrange=lambda job: None)
+        make_robot("arm", lambda job: None)
+    arm = make_robot("lerobot:lab_arm:make", lambda job: None)
     assert not isinstance(arm, JudgingRobot)
     assert select_scorer("", arm) == "operator"
     with pytest.raises(InvalidValueError, match="cannot judge"):
@@ -128,3 +129,10 @@ def test_pictures_are_cut_to_the_middle():
     assert (center_square(picture) == 200).all()
     depth = np.full((480, 640), 1234, np.uint16)
     assert (center_square(depth, smooth=False) == 1234).all()
+
+
+def test_the_twin_takes_real_time_as_an_option():
+    assert isinstance(make_robot("twin", print).clock, VirtualClock)
+    assert isinstance(make_robot("twin?real_time=true", print).clock, RealClock)
+    with pytest.raises(UnknownNameError, match="realtime"):
+        make_robot("twin?realtime=true", print)

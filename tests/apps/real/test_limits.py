@@ -5,9 +5,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from roboirg.apps.real.control.kinematics import tool_pose
 from roboirg.apps.real.control.limits import HIGH, LOW, Limits, read_limits
 from roboirg.core.errors import InvalidActionError, InvalidValueError
+from roboirg.core.kinematics import tool_pose
 
 HOME = np.array([0.0, 0.0, 0.0, -np.pi / 2, 0.0, np.pi / 2, np.pi / 4])
 PERIOD = 0.05

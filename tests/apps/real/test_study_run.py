@@ -172,9 +172,7 @@ def test_a_signal_ends_the_run_also_where_python_drops_the_exception(sign, monke
 
 @pytest.mark.parametrize("sign", slow_but([signal.SIGTERM], [signal.SIGINT, signal.SIGTERM]))
 def test_a_run_that_is_told_to_end_keeps_what_was_played(sign, tmp_path):
-    finished(
-        "plan", *OPTIONS, "--trials", 1, "--demonstrations", 0, "--no-sheet", "--out", tmp_path
-    )
+    finished("plan", *OPTIONS, "--trials", 1, "--demonstrations", 0, "--out", tmp_path)
     process = start("run", tmp_path)
     assert process.stdout.readline().startswith("1. ")
     process.send_signal(sign)

@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 
 from roboirg.apps.real.control.clock import VirtualClock
-from roboirg.apps.real.control.kinematics import end_effector_pose, tool_pose
 from roboirg.apps.real.control.limits import Limits
 from roboirg.apps.real.control.robot import CAMERA_RATE, JudgingRobot
 from roboirg.apps.real.control.twin import Twin
 from roboirg.apps.real.study.study_plan import make_study
 from roboirg.apps.real.study.study_run import Study
+from roboirg.core.kinematics import end_effector_pose, tool_pose
 from roboirg.evaluation.play.rollout import EpisodeRunner
 from roboirg.evaluation.records.record import NON_DETERMINISTIC_FIELDS
 

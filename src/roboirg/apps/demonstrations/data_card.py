@@ -114,9 +114,10 @@ def _histogram(rows: NDArray[np.int64]) -> Iterator[str]:
 
 
 def _content_lines(plan: ExportPlan, facts: Sequence[TrajectoryFacts]) -> Iterator[str]:
+    origin = "recorded on a robot" if plan.is_teleoperated else "exactly what was executed"
     yield (
         "State: seven joint angles (rad) and the first finger (m). Action: absolute joint targets "
-        "(rad) and the gripper, +1 open to -1 closed; exactly what was executed."
+        f"(rad) and the gripper, +1 open to -1 closed; {origin}."
     )
     if plan.video == "prefix":
         yield "Frames of the video come before the policy's, with `is_video_demo`."

@@ -9,7 +9,8 @@ from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any, Literal, NamedTuple, get_args
 
-from roboirg.apps.demonstrations.trajectory import SUFFIX, TRAJECTORY_VERSION, PictureCoding
+from roboirg.apps.demonstrations.picture_coding import PictureCoding
+from roboirg.apps.demonstrations.trajectory import SUFFIX, TRAJECTORY_VERSION
 from roboirg.apps.demonstrations.trajectory_recorder import RecordingSpec
 from roboirg.core.episode import ENVIRONMENT_VERSION, Episode
 from roboirg.core.errors import InvalidValueError, UnknownNameError
@@ -35,6 +36,8 @@ EXTRA_ACTIONS: tuple[ExtraAction, ...] = get_args(ExtraAction)
 PICTURE_CODINGS: tuple[PictureCoding, ...] = get_args(PictureCoding)
 OUTCOMES: tuple[Outcomes, ...] = get_args(Outcomes)
 ORACLE = "oracle"
+TELEOPERATED = "teleoperation"
+"""The policy of trajectories that people recorded on a robot."""
 
 
 @dataclass(frozen=True)
@@ -122,6 +125,11 @@ class ExportPlan:
             raise InvalidValueError(
                 f"The format 'robomme-hdf5' has one trajectory per episode, not {self.variations}."
             )
+
+    @property
+    def is_teleoperated(self) -> bool:
+        """Whether people recorded the trajectories on a robot."""
+        return self.policy.startswith(TELEOPERATED)
 
     @property
     def recording(self) -> RecordingSpec:

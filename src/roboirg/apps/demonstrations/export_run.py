@@ -61,6 +61,18 @@ Report = Callable[[str, int, int, int], None]
 Jobs = Sequence[tuple[RecordingJob, tuple[TaskText, ...]]]
 
 
+class TrajectorySource(NamedTuple):
+    """Where the trajectories of an export come from.
+
+    Attributes:
+        jobs: the trajectories with their instructions, in the order of the data set.
+        record: writes the file of one into a folder; can be pickled.
+    """
+
+    jobs: Jobs
+    record: Callable[[Path, RecordingJob], None]
+
+
 class ExportSummary(NamedTuple):
     """What an export did.
 
@@ -94,6 +106,7 @@ def run_export(
     workers: int,
     report: Report,
     trajectories: Path | None = None,
+    source: TrajectorySource | None = None,
 ) -> ExportSummary:
     """Export a plan into a folder, or continue an export that was stopped.
 
@@ -104,6 +117,7 @@ def run_export(
         report: told the progress.
         trajectories: folder that keeps the recorded trajectories, for other formats and settings;
             None for one in `out` that is deleted at the end.
+        source: of the trajectories; None to play the plan's episodes.
 
     Raises:
         InvalidValueError: the folder holds something else, another export uses it, or no
@@ -111,17 +125,18 @@ def run_export(
         MissingDependencyError: a package is not installed.
     """
     check_support(plan)
+    jobs, record = source or _played(plan)
     with _opened(plan, out) as work:
         folder = work / "trajectories" if trajectories is None else trajectories
         folder.mkdir(parents=True, exist_ok=True)
-        jobs = recording_jobs(plan)
         parts_folder = work / "parts"
         missing = [
             job
             for job, _ in jobs
             if not _is_usable(plan, job, folder, may_lack_pictures=parts_folder.exists())
         ]
-        _record(plan, missing, len(jobs), folder, workers, report)
+        work_on = functools.partial(record, folder)
+        _record(work_on, missing, len(jobs), folder, workers, report)
         facts = [load_facts(job.path(folder)) for job, _ in jobs]
         kept = [
             RecordedTexts(job.path(folder), said)
@@ -187,8 +202,14 @@ def _remove_partial_files(out: Path) -> None:
         path.unlink(missing_ok=True)
 
 
+def _played(plan: ExportPlan) -> TrajectorySource:
+    only_successes = plan.outcomes == "successes"
+    record = functools.partial(_record_job, only_successes=only_successes)
+    return TrajectorySource(recording_jobs(plan), record)
+
+
 def _record(
-    plan: ExportPlan,
+    record: Callable[[RecordingJob], None],
     missing: Sequence[RecordingJob],
     total: int,
     folder: Path,
@@ -198,8 +219,7 @@ def _record(
     """Record the trajectories that are missing."""
     done, size = total - len(missing), folder_size(folder)
     report("record", done, total, size)
-    work = functools.partial(_record_job, folder, only_successes=plan.outcomes == "successes")
-    for job, _ in parallel_map(work, missing, workers):
+    for job, _ in parallel_map(record, missing, workers):
         done, size = done + 1, size + job.path(folder).stat().st_size
         report("record", done, total, size)
 

@@ -12,12 +12,13 @@ import zipfile
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from roboirg.apps.demonstrations.picture_coding import PictureCoding, decode_png
 from roboirg.core.errors import InvalidValueError
 from roboirg.core.observations import CAMERAS
 from roboirg.util.atomic_write import replacing
@@ -25,8 +26,6 @@ from roboirg.util.atomic_write import replacing
 TRAJECTORY_VERSION = 1
 """Increases with any change of what a file holds."""
 SUFFIX = ".zip"
-
-PictureCoding = Literal["png", "lossless-video", "lossy-video", "none"]
 
 _FACTS = "facts.json"
 _ARRAY = ".npy"
@@ -225,9 +224,7 @@ class PictureFile:
 
     def picture(self, camera: str, row: int) -> NDArray[np.uint8]:
         """Return a row's picture, RGB, (256, 256, 3)."""
-        data = np.frombuffer(self.encoded(camera, row), np.uint8)
-        found = np.asarray(cv2.imdecode(data, cv2.IMREAD_COLOR))
-        return np.asarray(cv2.cvtColor(found, cv2.COLOR_BGR2RGB), dtype=np.uint8)
+        return decode_png(self.encoded(camera, row))
 
     def depth(self, camera: str, row: int) -> NDArray[np.int16]:
         """Return a row's depth, mm, (256, 256, 1)."""

@@ -12,13 +12,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from roboirg.apps.demonstrations.picture_coding import (
+    PictureCoding,
     VideoEncoder,
     count_values,
     encode_depth,
     encode_png,
 )
 from roboirg.apps.demonstrations.trajectory import (
-    PictureCoding,
     TrajectoryFacts,
     TrajectoryFile,
     picture_name,

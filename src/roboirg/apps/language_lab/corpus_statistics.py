@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import statistics
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -61,6 +62,44 @@ def token_counts(instructions: Iterable[Instruction]) -> Mapping[str, TokenCount
         )
         for setting, counts in found.items()
     }
+
+
+PAPER_PHRASES: Mapping[str, tuple[tuple[str, str], ...]] = {
+    "direct": (
+        ("it", "it"), ("one of them", "one of them"), ("them", "them"),
+        ("the former", "the former"), ("the latter", "the latter"),
+        ("the first", "the first"), ("the second", "the second"), ("the third", "the third"),
+        ("that", "that"), ("the one I mentioned earlier", "the one i mentioned earlier"),
+    ),
+    "reasoning": (
+        ("neither of those", "neither of (?:those|these)"),
+        ("whose color is not in that pair", "not in that pair"),
+        ("different from that", "different from that"),
+        ("one time fewer than that", "one time fewer than that"), ("the action", "the action"),
+        ("before", "before"), ("after", "after"), ("other than that", "other than that"),
+        ("the other one", "the other (?:one|cube|visit|placement|moment|number)"),
+    ),
+    "contextual": (("the one I mentioned earlier", "the one i mentioned earlier"),),
+    "spatial": (("the cube there", "the cube (?:now )?there"), ("the one there", "the one there")),
+}  # fmt: skip
+"""Phrases that the paper quotes or lists, by setting, each with its pattern in our commands."""
+RESOLVED_PHRASES = (("at the far right", "at your far right"), ("different from blue",
+                    "different from (?:red|green|blue|purple|yellow|gray)"))  # fmt: skip
+"""The same of resolved commands."""
+
+
+def phrase_counts(instructions: Iterable[Instruction]) -> ClassCounts:
+    """Count the commands of each setting that have a phrase of the paper."""
+    counts: dict[str, Counter[str]] = {}
+    for instruction in instructions:
+        implicit = instruction.form == "implicit"
+        phrases = PAPER_PHRASES.get(instruction.setting, ()) if implicit else RESOLVED_PHRASES
+        name = instruction.setting if implicit else f"{instruction.setting}, resolved"
+        text = instruction.command.lower()
+        for phrase, pattern in phrases:
+            found = re.search(rf"\b{pattern}\b", text) is not None
+            counts.setdefault(name, Counter()).update([phrase] * found)
+    return counts
 
 
 def pattern_counts(instructions: Iterable[Instruction]) -> ClassCounts:

@@ -25,6 +25,7 @@ def overview_tables(instructions: Sequence[Instruction]) -> Iterator[Table]:
     yield _lengths(corpus_statistics.word_counts(instructions))
     yield _tokens(corpus_statistics.token_counts(instructions))
     yield expression_table(expression_counts(instructions))
+    yield from phrase_tables(corpus_statistics.phrase_counts(instructions))
     by_task = (
         ("Reasoning patterns (scenes)", corpus_statistics.pattern_counts(instructions), None),
         ("Relations (scenes)", corpus_statistics.relation_counts(instructions), _RELATIONS),
@@ -55,6 +56,15 @@ def expression_table(counts: ClassCounts) -> Table:
     classes = expression_order(counts)
     title = "Referring expressions (each once per scene)"
     return _count_table(title, "setting", counts, setting_names(), classes)
+
+
+def phrase_tables(counts: ClassCounts) -> Iterator[Table]:
+    """Yield how often each phrase of the paper occurs, a table for each setting."""
+    for setting, by_phrase in counts.items():
+        table = _table(f"Phrases of the paper, {setting} (commands)", "phrase", ("texts",))
+        for phrase, count in by_phrase.items():
+            table.add_row(phrase, str(count))
+        yield table
 
 
 def _lengths(lengths: Mapping[str, corpus_statistics.Lengths]) -> Table:

@@ -42,21 +42,15 @@ def plan(
         int, typer.Option(help="Demonstrations per task, explicit setting only.")
     ] = 50,
     seed: Annotated[int, typer.Option(help="Random seed of the trial order.")] = 0,
-    split: Annotated[str, typer.Option(help="Split that the episodes are taken from.")] = "val",
-    max_steps: Annotated[int, typer.Option(help="Limit of a trial in control steps.")] = 1300,
-    sheet: Annotated[bool, typer.Option(help="Write the printable sheet.")] = True,
 ) -> None:
     """Plan a study: write plan.json, CSV files and a sheet to print.
 
     Example: roboirg real plan --policy my_policy:MyPolicy --out study
     """
-    from roboirg.apps.real.pages.trial_sheet import check_sheet_support
     from roboirg.apps.real.study.study_plan import make_study
     from roboirg.evaluation.plan.plan_parsing import means_all, parse_names
     from roboirg.tasks import find_tasks
 
-    if sheet:
-        check_sheet_support()
     made = make_study(
         policy,
         tasks=find_tasks(parse_names("task", tasks)),
@@ -64,17 +58,16 @@ def plan(
         trials=trials,
         demonstrations=demonstrations,
         seed=seed,
-        split=split,
-        max_steps=max_steps,
     )
-    _write(made, Path(out), sheet=sheet)
+    _write(made, Path(out))
 
 
-def _write(made: StudyPlan, folder: Path, *, sheet: bool) -> None:
+def _write(made: StudyPlan, folder: Path) -> None:
     """Write the files of a plan and print their names."""
     from roboirg.apps.real.pages.trial_sheet import SHEET_FILE, write_sheet
     from roboirg.apps.real.study import plan_csv
     from roboirg.apps.real.study.study_plan import write_study
+    from roboirg.core.errors import MissingDependencyError
     from roboirg.util.atomic_write import write_atomically
 
     typer.echo(write_study(made, folder))
@@ -85,9 +78,11 @@ def _write(made: StudyPlan, folder: Path, *, sheet: bool) -> None:
         if text:
             write_atomically(folder / name, text)
             typer.echo(folder / name)
-    if sheet:
+    try:
         count = write_sheet(made, folder / SHEET_FILE)
         typer.echo(f"{folder / SHEET_FILE} ({counted(count, 'page')})")
+    except MissingDependencyError as error:
+        typer.echo(f"roboirg: no sheet to print: {error}", err=True)
     typer.echo(_size(made))
 
 
@@ -110,9 +105,8 @@ def run(
         ),
     ] = None,
     robot: Annotated[
-        str, typer.Option(help="Robot: twin, or lerobot:MODULE:FUNCTION and options.")
+        str, typer.Option(help="Robot: twin, twin?real_time=true, or lerobot:MODULE:FUNCTION?….")
     ] = "twin",
-    real_time: Annotated[bool, typer.Option(help="Run the twin in real time.")] = False,
     limits: Annotated[
         Path | None, typer.Option(help="JSON file that overrides default limits.")
     ] = None,
@@ -128,6 +122,7 @@ def run(
     Example: roboirg real run study --robot twin
     """
     from roboirg.apps.real.control.limits import read_limits
+    from roboirg.apps.real.control.robot import JudgingRobot
     from roboirg.apps.real.control.robot_loading import make_robot
     from roboirg.apps.real.pages.operator_console import OperatorConsole
     from roboirg.apps.real.study.study_plan import read_study
@@ -136,14 +131,14 @@ def run(
     path = Path(folder)
     made = read_study(path)
     console = OperatorConsole(made)
-    device = make_robot(robot, real_time=real_time, arrange=console.request_arrangement)
+    device = make_robot(robot, console.request_arrangement)
     study = Study(
         made,
         path,
         device,
         read_limits(limits),
         select_scorer(score, device),
-        console.stop_requested if robot != "twin" else lambda: False,
+        (lambda: False) if isinstance(device, JudgingRobot) else console.stop_requested,
         console.report,
     )
     _play(study, console, policy or [], retry=retry_errors)

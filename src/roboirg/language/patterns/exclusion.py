@@ -1,4 +1,8 @@
-"""Color exclusion, and contextual logic on the two excluded colors."""
+"""Color exclusion: as few colors are named as leave exactly one in the scene.
+
+Two are where three are there, one where two are. In a scene of a single color, one is named that
+nothing there has.
+"""
 
 from __future__ import annotations
 
@@ -12,32 +16,49 @@ from roboirg.language.slot_types import described
 from roboirg.language.templates import derivations
 
 
+def excluded_colors(request: InstructionRequest) -> tuple[str, ...]:
+    """Return the colors to exclude; the first color of the goal is left."""
+    target = request.color_values[0].color
+    others = [color for color in request.scene_colors if color != target]
+    if not others:
+        return (request.sampler.pick("absent color", request.other_colors(target)),)
+    return request.sampler.pick("excluded colors", list(itertools.permutations(others)))
+
+
 def _exclude(request: InstructionRequest) -> Derived:
-    """Derive a color as the one outside a pair, and a second one as the other of the pair."""
+    """Derive a color as the one that is left, and a second one as the other of two excluded."""
     target, *rest = request.color_values
-    others = request.other_colors(target.color)
-    pair = request.sampler.pick("pair", list(itertools.permutations(others)))
-    both = " and ".join(pair)
-    template = request.pick("pair introduction", derivations.PAIR_INTRODUCTIONS)
-    context = [fill(template, {"pair": antecedent(both, REFERENCE, both)})]
-    counted = bool(request.values_of("amount"))
-    word = request.pick("pair anaphor", derivations.PAIR_ANAPHORS)
-    reference = (
-        antecedent(" nor ".join(pair), REFERENCE, both)
-        if request.resolved
-        else anaphor(word, "pair", REFERENCE, both)
-    )
-    exclusions = derivations.AMOUNT_EXCLUSIONS if counted else derivations.EXCLUSIONS
-    exclusion = request.pick("exclusion", exclusions)
-    things = [_thing(request, target, exclusion, {"pair": reference})]
+    colors = excluded_colors(request)
+    context = [_introduction(request, colors)]
+    things = [_excluding(request, target, colors)]
     patterns = ["color exclusion"]
+    counted = bool(request.values_of("amount"))
     for goal_value in rest:
-        context.append(_singled(request, goal_value, pair))
+        context.append(_singled(request, goal_value, colors))
         complement = derivations.AMOUNT_COMPLEMENT if counted else derivations.COMPLEMENT
-        other = _other(request, goal_value, pair)
+        other = _other(request, goal_value, colors)
         things.append(_thing(request, goal_value, complement, {"other": other}))
         patterns.append("contextual logic")
     return Derived(sentences(context), described(request, things), {"patterns": patterns})
+
+
+def _introduction(request: InstructionRequest, colors: tuple[str, ...]) -> Phrase:
+    template = request.pick("pair introduction", derivations.EXCLUDED_INTRODUCTIONS)
+    words = " and ".join(colors)
+    return fill(template, {"colors": antecedent(words, REFERENCE, words)}, plural=len(colors) > 1)
+
+
+def _excluding(request: InstructionRequest, target: GoalValue, colors: tuple[str, ...]) -> Phrase:
+    """Return ``the cube that is neither of those``, ``two cubes of a color other than that``."""
+    options = derivations.EXCLUSIONS if len(colors) > 1 else derivations.SINGLE_EXCLUSIONS
+    frame, words, resolved = request.pick("exclusion", options)
+    excluded = (
+        antecedent(resolved.format(colors=" nor ".join(colors)), REFERENCE, " and ".join(colors))
+        if request.resolved
+        else anaphor(words, "pair" if len(colors) > 1 else "that", REFERENCE, " and ".join(colors))
+    )
+    article = "" if request.values_of("amount") else "the "
+    return _thing(request, target, f"{article}{frame}", {"excluded": excluded})
 
 
 def _thing(
@@ -60,21 +81,26 @@ def _other(request: InstructionRequest, goal_value: GoalValue, pair: tuple[str, 
     if request.resolved:
         words = f"{' or '.join(pair)}, not {_rejected(goal_value, pair)}"
         return antecedent(words, goal_value.slot, goal_value.value)
-    return anaphor("the other of those colors", "other", goal_value.slot, goal_value.value)
+    return anaphor("the other color", "other", goal_value.slot, goal_value.value)
 
 
 def _rejected(goal_value: GoalValue, pair: tuple[str, ...]) -> str:
     return next(color for color in pair if color != goal_value.value)
 
 
-def _allows_one(request: InstructionRequest) -> bool:
-    # The pair of the first pick determines the second one too, whatever the main pattern.
-    return bool(request.values_of("color")) or len(request.color_values) == 1
+def _allows(request: InstructionRequest) -> bool:
+    colors = len(request.color_values)
+    # A second pick is the other one of two excluded colors, so both of them must be there.
+    return colors == 1 or (colors == 2 and len(request.scene_colors) == 3)  # noqa: PLR2004
 
 
-def _allows_two_amounts(request: InstructionRequest) -> bool:
-    return bool(request.values_of("amount")) and len(request.color_values) == 2  # noqa: PLR2004
+COLOR_LEFT = Pattern(lambda request: _allows(request) and not _two_amounts(request), _exclude)
+"""The first color of the goal is the one that is left."""
 
 
-ONE_COLOR = Pattern(_allows_one, _exclude)
-TWO_AMOUNTS = Pattern(_allows_two_amounts, _exclude)
+def _two_amounts(request: InstructionRequest) -> bool:
+    return bool(request.values_of("amount")) and len(request.color_values) > 1
+
+
+TWO_AMOUNTS = Pattern(lambda request: _allows(request) and _two_amounts(request), _exclude)
+"""The same, and then the other of the two excluded ones."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 from roboirg.language.instruction import REFERENCE
 from roboirg.language.number_words import ordinal as ordinal_word
@@ -53,11 +53,21 @@ def _steps(request: InstructionRequest, goal_value: GoalValue) -> list[derivatio
     return steps(goal_value.number, length, _choices(request, goal_value))
 
 
-def _counted_steps(request: InstructionRequest) -> list[derivations.Step]:
-    """Return the steps of visits that are told as numbers: *one visit earlier than that*."""
+def _steps_to_all(request: InstructionRequest, goal_value: GoalValue) -> list[derivations.Step]:
+    """Return the steps that lead to every position that is possible in the scene."""
+    length, choices = ordinal.series_length(request, goal_value), _choices(request, goal_value)
     return [
         step
-        for goal_value in request.values_of("visit")
+        for step in _steps(request, goal_value)
+        if all(_leads(step, choice, length) for choice in choices)
+    ]
+
+
+def _counted_steps(request: InstructionRequest) -> list[derivations.Step]:
+    """Return the steps that are said as numbers: *one visit earlier than that*."""
+    return [
+        step
+        for goal_value in _goal_values(request)
         for step in _open_steps(
             derivations.COUNTED_STEPS,
             goal_value.number,
@@ -67,13 +77,20 @@ def _counted_steps(request: InstructionRequest) -> list[derivations.Step]:
     ]
 
 
-def _goal_value(request: InstructionRequest) -> GoalValue | None:
-    return next(iter((*request.values_of("visit"), *request.values_of("placement"))), None)
+def _goal_values(request: InstructionRequest) -> list[GoalValue]:
+    """Return the goal's visit or placement, if it has one."""
+    return [*request.values_of("visit"), *request.values_of("placement")]
 
 
-def _allows(request: InstructionRequest) -> bool:
-    goal_value = _goal_value(request)
-    return goal_value is not None and bool(_steps(request, goal_value))
+Steps = Callable[[InstructionRequest, GoalValue], list[derivations.Step]]
+
+
+def _rule(steps_of: Steps) -> Pattern:
+    """Return the rule that derives an element from its distance: *right before that*."""
+    return Pattern(
+        lambda request: any(steps_of(request, one) for one in _goal_values(request)),
+        lambda request: _ordinal(request, steps_of),
+    )
 
 
 def _reference(request: InstructionRequest, position: int) -> Phrase:
@@ -85,17 +102,16 @@ def _reference(request: InstructionRequest, position: int) -> Phrase:
 def _derived(
     request: InstructionRequest, pattern: str, step: derivations.Step, fields: Fields
 ) -> Derived:
-    (goal_value,) = (*request.values_of("visit"), *request.values_of("placement"))
+    (goal_value,) = _goal_values(request)
     position = goal_value.number - step.offset
     context = ordinal.introduce_position(request, goal_value, REFERENCE, position)
     notes = {"patterns": [pattern], "relation": step.name, "reference": position}
     return Derived(context, fields, notes)
 
 
-def _ordinal(request: InstructionRequest) -> Derived:
-    """Derive an element from its distance to another one: *right before that*."""
-    (goal_value,) = (*request.values_of("visit"), *request.values_of("placement"))
-    step = request.sampler.pick("relation", _steps(request, goal_value))
+def _ordinal(request: InstructionRequest, steps_of: Steps) -> Derived:
+    (goal_value,) = _goal_values(request)
+    step = request.sampler.pick("relation", steps_of(request, goal_value))
     reference = _reference(request, goal_value.number - step.offset)
     element = (
         *plain(f"the {goal_value.slot_type} "),
@@ -106,13 +122,19 @@ def _ordinal(request: InstructionRequest) -> Derived:
 
 
 def _counted(request: InstructionRequest) -> Derived:
-    """Derive a visit from a number of visits: *one visit earlier than that*."""
-    (goal_value,) = request.values_of("visit")
+    """Derive an element from a number of others: *one visit earlier than that*."""
+    (goal_value,) = _goal_values(request)
     step = request.sampler.pick("relation", _counted_steps(request))
+    noun = plain(goal_value.slot_type)
     reference = _reference(request, goal_value.number - step.offset)
-    words = request.around(goal_value.field, fill(step.words, {"reference": reference}))
-    return _derived(request, "number deduction", step, {goal_value.field: words})
+    words = fill(step.words, {"noun": noun, "reference": reference})
+    if goal_value.slot_type == "placement":
+        words = (*plain("the target used "), *words)
+    fields = {goal_value.field: request.around(goal_value.field, words)}
+    return _derived(request, "number deduction", step, fields)
 
 
-ORDINAL = Pattern(_allows, _ordinal)
-COUNTED_VISIT = Pattern(lambda request: bool(_counted_steps(request)), _counted)
+ORDINAL = _rule(_steps)
+OPEN_ORDINAL = _rule(_steps_to_all)
+"""By steps that lead to every element that a goal of the scene can ask for."""
+COUNTED = Pattern(lambda request: bool(_counted_steps(request)), _counted)

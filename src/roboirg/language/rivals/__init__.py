@@ -11,7 +11,6 @@ from roboirg.language.rivals.pair_words import (
 from roboirg.language.rivals.value_pair import (
     ValuePair,
     draw_pair,
-    hidden_by_pair,
     pair_refusal,
 )
 
@@ -22,7 +21,6 @@ __all__ = [
     "RIVAL_SETTINGS",
     "ValuePair",
     "draw_pair",
-    "hidden_by_pair",
     "pair_command",
     "pair_introduction",
     "pair_notes",

@@ -10,7 +10,7 @@ from roboirg.language.number_words import cardinal, ordinal, plural
 from roboirg.language.phrases import Phrase, anaphor, antecedent, fill, plain, sentences
 from roboirg.language.request import GoalValue, InstructionRequest, UtteranceSpec
 from roboirg.language.rivals import rival_templates as templates
-from roboirg.language.rivals.value_pair import PairDraw
+from roboirg.language.rivals.value_pair import PairDraw, ValuePair
 from roboirg.language.slot_types import Fields, amount, described, relation, stated
 from roboirg.language.slot_types.ordinal import wrapped
 from roboirg.language.templates.derivations import MOMENTS
@@ -38,7 +38,7 @@ def pair_introduction(request: InstructionRequest, draw: PairDraw) -> UtteranceS
         antecedent(name, value.slot, value.value)
         for name, value in zip(names, draw.introduced, strict=True)
     )
-    pools = INTRODUCTIONS[_word_kind(draw)]
+    pools = INTRODUCTIONS[draw.pair.word_kind]
     template = request.pick("pair introduction of rivals", pools)
     words = fill(template, {"pair": (*first, *plain(" and "), *second)})
     return UtteranceSpec("introduction", words)
@@ -47,7 +47,7 @@ def pair_introduction(request: InstructionRequest, draw: PairDraw) -> UtteranceS
 def pair_reinforcement(request: InstructionRequest, draw: PairDraw) -> UtteranceSpec:
     """Return one more remark on both values."""
     values = " and ".join(str(value.value) for value in draw.introduced)
-    nouns = noun(request, draw) if _many(draw) else plural(noun(request, draw))
+    nouns = pair_noun(request, draw.pair) if _many(draw) else plural(pair_noun(request, draw.pair))
     ref = anaphor(f"those {nouns}", "them", REFERENCE, values)
     template = request.pick("pair reinforcement", templates.PAIR_REINFORCEMENTS)
     return UtteranceSpec("reinforcement", fill(template, {"ref": ref}))
@@ -55,7 +55,7 @@ def pair_reinforcement(request: InstructionRequest, draw: PairDraw) -> Utterance
 
 def pair_command(request: InstructionRequest, draw: PairDraw) -> UtteranceSpec:
     """Return the remark that chooses, and a command that states the other slots."""
-    remark = choosing_remark(request, draw, lambda value: _full_name(request, draw, value))
+    remark = choosing_remark(request, draw, lambda value: value_name(request, draw.pair, value))
     fields = stated(request)
     if draw.pair.slot == "counts":
         fields |= _counted(request, draw)
@@ -71,7 +71,7 @@ def choosing_remark(
 
     `thing` is the noun for a value; None for that of its kind.
     """
-    thing = thing or noun(request, draw)
+    thing = thing or pair_noun(request, draw.pair)
     meant, rival = draw.pair
     at_meant = draw.fill == "both" or draw.points_at_meant
     at_rival = draw.fill == "both" or not draw.points_at_meant
@@ -110,24 +110,30 @@ def pair_notes(draw: PairDraw) -> dict[str, object]:
     }
 
 
-def noun(request: InstructionRequest, draw: PairDraw) -> str:
+def pair_noun(request: InstructionRequest, pair: ValuePair) -> str:
     """Return the noun for what the values are: ``cube``, ``number``, ``visit``."""
-    kind = _word_kind(draw)
-    if kind == "amount":
+    if pair.word_kind == "amount":
         return "cubes"
-    if kind == "color":
+    if pair.word_kind == "color":
         return request.task.commands.colored
-    return {"relation": "moment"}.get(kind, kind)
+    return {"relation": "moment"}.get(pair.word_kind, pair.word_kind)
 
 
-def _word_kind(draw: PairDraw) -> str:
-    meant = draw.pair.meant
-    return "number" if meant.slot == "counts" else meant.slot_type
+def value_name(request: InstructionRequest, pair: ValuePair, value: GoalValue) -> str:
+    """Return the full words for one of the values: ``the red cube``."""
+    kind = pair.word_kind
+    if kind in ("color", "amount"):
+        return f"the {value.value} {pair_noun(request, pair)}"
+    if kind == "number":
+        return cardinal(value.number)
+    if kind == "relation":
+        return f"the moment {MOMENTS[str(value.value)]}"
+    return f"the {ordinal(value.number)} {kind}"
 
 
 def _many(draw: PairDraw) -> bool:
     """Return whether each of the two values is several things."""
-    return _word_kind(draw) == "amount"
+    return draw.pair.word_kind == "amount"
 
 
 def _pointer(draw: PairDraw, value: GoalValue, thing: str, *, points: bool) -> Phrase:
@@ -143,33 +149,22 @@ def _pointer(draw: PairDraw, value: GoalValue, thing: str, *, points: bool) -> P
 
 def _introduced(request: InstructionRequest, draw: PairDraw, value: GoalValue) -> str:
     """Return the words of the introduction, where the second moment has the words of both."""
-    if _word_kind(draw) != "relation":
-        return _full_name(request, draw, value)
+    if draw.pair.word_kind != "relation":
+        return value_name(request, draw.pair, value)
     return MOMENTS[str(value.value)] if value is draw.introduced[1] else f"right {value.value}"
-
-
-def _full_name(request: InstructionRequest, draw: PairDraw, value: GoalValue) -> str:
-    kind = _word_kind(draw)
-    if kind in ("color", "amount"):
-        return f"the {value.value} {noun(request, draw)}"
-    if kind == "number":
-        return cardinal(value.number)
-    if kind == "relation":
-        return f"the moment {MOMENTS[str(value.value)]}"
-    return f"the {ordinal(value.number)} {kind}"
 
 
 def _chosen_fields(request: InstructionRequest, draw: PairDraw) -> Fields:
     """Return the fields of the command that point at the choice."""
-    kind, (meant, rival) = _word_kind(draw), draw.pair
+    kind, (meant, rival) = draw.pair.word_kind, draw.pair
     if kind == "color":
-        words = chosen(request, draw, f"the {noun(request, draw)}")
+        words = chosen(request, draw, f"the {pair_noun(request, draw.pair)}")
         fields = {meant.field: request.by_color(meant, words)}
         if draw.pair.ordered:
             fields[rival.field] = request.by_color(rival, the_other(rival, "the other one"))
         return fields
     if kind == "amount":
-        words = chosen(request, draw, f"of the {noun(request, draw)}")
+        words = chosen(request, draw, f"of the {pair_noun(request, draw.pair)}")
         return described(request, [words])
     if kind == "number":
         return {meant.field: chosen(request, draw, "the number of times")}

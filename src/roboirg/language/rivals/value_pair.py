@@ -6,10 +6,10 @@ import functools
 from collections.abc import Callable, Iterator, Mapping
 from typing import Literal, NamedTuple
 
-from roboirg.core.episode import Difficulty, Goal, SlotValue, Split
+from roboirg.core.episode import Difficulty, Goal, Split
 from roboirg.core.goal_slots import COLOR_SLOTS
 from roboirg.language.balanced_draw import draw_balanced
-from roboirg.language.instruction import REFERENCE, Instruction
+from roboirg.language.instruction import REFERENCE
 from roboirg.language.landmarks import Landmark
 from roboirg.language.request import GoalValue, InstructionRequest
 from roboirg.language.rivals import rival_templates as templates
@@ -41,6 +41,11 @@ class ValuePair(NamedTuple):
     def slot(self) -> str:
         """The goal slot of the meant value."""
         return self.meant.slot
+
+    @property
+    def word_kind(self) -> str:
+        """The kind of words for the values: a slot type, where a count is a number."""
+        return "number" if self.meant.slot == "counts" else self.meant.slot_type
 
     @property
     def ordered(self) -> bool:
@@ -77,11 +82,6 @@ class PairDraw(NamedTuple):
         return (meant, rival) if self.meant_first else (rival, meant)
 
 
-def hidden_by_pair(instruction: Instruction, _goal: Goal) -> frozenset[str]:
-    """Return the slot that an instruction with a rival leaves open."""
-    return frozenset((str(instruction.metadata["rival_slot"]),))
-
-
 def pair_refusal(request: InstructionRequest, locate: Locate | None = None) -> str | None:
     """Return why an episode can have no rival; None if it can."""
     if request.wordings is not None:
@@ -93,7 +93,7 @@ def _lack(request: InstructionRequest, locate: Locate | None) -> str:
     """Return what a scene lacks for a rival."""
     if len(request.values_of("amount")) > 2:  # noqa: PLR2004 - a color and its count
         return "a goal that counts cubes of several colors leaves no rival"
-    if locate is None or not any(pair.slot in COLOR_SLOTS for pair in _possible(request)):
+    if locate is None or not any(pair.slot in COLOR_SLOTS for pair in possible_pairs(request)):
         return "the scene has no second value that the goal could ask for"
     return "no landmark singles out a second thing that the goal could ask for"
 
@@ -142,13 +142,13 @@ def _remark(
 
 
 def _pairs(request: InstructionRequest, locate: Locate | None) -> list[ValuePair]:
-    found = [pair for pair in _possible(request) if locate is None or pair.slot in COLOR_SLOTS]
+    found = [pair for pair in possible_pairs(request) if locate is None or pair.slot in COLOR_SLOTS]
     if locate is None:
         return found
     return [pair for pair in found if all(locate(request, value) for value in pair)]
 
 
-def _possible(request: InstructionRequest) -> Iterator[ValuePair]:
+def possible_pairs(request: InstructionRequest) -> Iterator[ValuePair]:
     """Yield a pair for every other value that a goal of the scene has in one slot."""
     goal = request.episode.goal
     if len(request.values_of("amount")) > 2:  # noqa: PLR2004 - a color and its count
@@ -156,7 +156,11 @@ def _possible(request: InstructionRequest) -> Iterator[ValuePair]:
     for slot, _ in goal.slots:
         values = [one for one in request.goal_values if one.slot == slot]
         meant = values[0]
-        others = _alternatives(request, slot)
+        others = [
+            one
+            for one in request.alternatives(slot)
+            if len(one) == len(values) and one != tuple(value.value for value in values)
+        ]
         if len(values) > 1:
             swapped = tuple(one.value for one in reversed(values))
             if swapped in others:
@@ -167,22 +171,6 @@ def _possible(request: InstructionRequest) -> Iterator[ValuePair]:
             if slot not in NUMBER_SLOTS or value in usual:
                 rival = meant._replace(field="rival", slot=REFERENCE, value=value)
                 yield ValuePair(meant, rival)
-
-
-def _alternatives(request: InstructionRequest, slot: str) -> list[tuple[str | int, ...]]:
-    """Return the other contents of a slot in goals of the scene that agree in all other slots."""
-    goal = request.episode.goal
-    own = _contents(goal, slot)
-    found = [
-        _contents(one, slot)
-        for one in request.task.goals(request.episode.scene)
-        if _without(one, slot) == _without(goal, slot)
-    ]
-    return [one for one in found if one != own and len(one) == len(own)]
-
-
-def _without(goal: Goal, slot: str) -> dict[str, SlotValue]:
-    return {name: value for name, value in goal.slots if name != slot}
 
 
 def _contents(goal: Goal, slot: str) -> tuple[str | int, ...]:

@@ -67,7 +67,7 @@ def reinforcement(request: InstructionRequest) -> UtteranceSpec:
     slot_type, goal_values = request.sampler.pick("reinforced", [*slot_types_in(request)])
     template = request.pick(f"{slot_type.name} reinforcement", slot_type.reinforcements)
     pointing = slot_type.pointing(request, goal_values)
-    remark = fill(template, {"ref": pointing}, plural=slot_type.plural(goal_values))
+    remark = fill(template, {"ref": pointing}, plural=slot_type.plural(request, goal_values))
     return UtteranceSpec("reinforcement", remark)
 
 

@@ -6,7 +6,6 @@ from roboirg.core.instruction_options import DEFAULT_DISTRACTOR
 from roboirg.language.request import STAGE_SETS, InstructionRequest, InstructionSpec
 from roboirg.language.rivals import (
     draw_pair,
-    hidden_by_pair,
     pair_command,
     pair_introduction,
     pair_notes,
@@ -37,7 +36,6 @@ SETTING = Setting(
     color="#117733",
     say=say,
     refusal=pair_refusal,
-    hidden_slots=hidden_by_pair,
     reads=contextual.SETTING.reads - {"distractor"},
     variants=tuple({"stages": stages} for stages in STAGE_SETS),
     example=1,

@@ -5,7 +5,6 @@ from __future__ import annotations
 from roboirg.language.request import InstructionRequest, InstructionSpec
 from roboirg.language.rivals import (
     draw_pair,
-    hidden_by_pair,
     pair_command,
     pair_introduction,
     pair_notes,
@@ -29,7 +28,6 @@ SETTING = Setting(
     color="#56B4E9",
     say=say,
     refusal=pair_refusal,
-    hidden_slots=hidden_by_pair,
     reads=direct.SETTING.reads,
     example=2,
     plain=direct.SETTING.name,

@@ -18,6 +18,5 @@ SETTING = Setting(
     summary="one command states every value",
     color="#000000",
     say=say,
-    hidden_slots=lambda _instruction, _goal: frozenset(),
     implicit=False,
 )

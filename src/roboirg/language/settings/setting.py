@@ -6,7 +6,6 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from roboirg.core.episode import Goal
 from roboirg.core.errors import UnknownNameError
 from roboirg.core.instruction_options import OPTION_NAMES, InstructionOptions
 from roboirg.language.instruction import Instruction
@@ -20,11 +19,6 @@ Instruct = Callable[[InstructionOptions], Instruction]
 def never_refuses(_request: InstructionRequest) -> str | None:
     """Return None: the setting can express every episode of its tasks."""
     return None
-
-
-def all_slots(_instruction: Instruction, goal: Goal) -> frozenset[str]:
-    """Return every slot of the goal."""
-    return frozenset(goal.as_mapping())
 
 
 def no_pairing_rules(_instruct: Instruct) -> Iterable[str]:
@@ -46,13 +40,10 @@ class Setting:
         applies_to: whether a task has the setting.
         refusal: returns why the setting cannot express a request, in words that follow "cannot
             express the episode:" and name no object of the scene; None if it can.
-        hidden_slots: the goal slots that the command of an implicit form must not state.
         implicit: whether the command leaves something to its context.
         reads: names of the options that change its words, and ``delivery`` if it has several
             utterances.
         variants: every combination of options that change its words, for validation.
-        hides_only_color: whether an instruction states numbers and hides colors, so that the
-            command gives the goal away where the scene has one such goal.
         pairing_rules: yields how the words of an episode differ from those of another setting
             with which they must agree; nothing if they agree.
         example: index of the test episode that shows the setting in the language card.
@@ -70,11 +61,9 @@ class Setting:
     say: Callable[[InstructionRequest], InstructionSpec]
     applies_to: Callable[[Task], bool] = lambda _task: True
     refusal: Callable[[InstructionRequest], str | None] = never_refuses
-    hidden_slots: Callable[[Instruction, Goal], frozenset[str]] = all_slots
     implicit: bool = True
     reads: frozenset[str] = frozenset()
     variants: Sequence[Mapping[str, Any]] = ({},)
-    hides_only_color: Callable[[Instruction], bool] = lambda _instruction: False
     pairing_rules: Callable[[Instruct], Iterable[str]] = no_pairing_rules
     example: int = 0
     plain: str | None = None

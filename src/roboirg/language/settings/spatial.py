@@ -5,11 +5,10 @@ Counts stay explicit.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 
-from roboirg.core.episode import Goal
-from roboirg.core.goal_slots import COLOR_SLOTS
-from roboirg.language.instruction import Expression, Instruction
+from roboirg.language.instruction import Expression
 from roboirg.language.landmarks import FRAMES, SIMPLE, Landmark, landmarks
 from roboirg.language.phrases import Phrase, anaphor, antecedent, fill, listed
 from roboirg.language.request import GoalValue, InstructionRequest, InstructionSpec, UtteranceSpec
@@ -23,6 +22,8 @@ POINTING: Mapping[int, tuple[Pointer, ...]] = {
     2: (("the former", "former"), ("the latter", "latter")),
     3: (("the first", "first"), ("the second", "second"), ("the third", "third")),
 }
+_STANDS_ALONE = re.compile(r"the (?P<noun>\w+) \{place\}")
+"""Words for a thing at a place, with nothing in between or after it."""
 NO_LANDMARK = "no landmark singles out a target"
 LONGEST = {1: 12, 2: 6, 3: 5}
 """The length that a landmark should have beside others, in `_length`; see `templates`."""
@@ -112,6 +113,17 @@ def _pointed(
         words = f"at {words} place" if several and not ranked else words
         place = anaphor(words, expression, color.slot, color.value)
     template = request.task.commands.by_rank if ranked else None
+    stands_alone = _STANDS_ALONE.fullmatch(request.task.commands.by_place)
+    if not several and request.wordings is None and stands_alone:
+        # "The one there": the noun is that of the introduction.
+        noun = request.sampler.pick("noun there", (stands_alone["noun"], "one"))
+        named = f"the {stands_alone['noun']} {landmark.phrase}"
+        place = (
+            antecedent(named, color.slot, color.value)
+            if request.resolved
+            else anaphor(f"the {noun} there", expression, color.slot, color.value)
+        )
+        template = "{place}"
     return request.by_place(color, place, plural=request.count_of(color) > 1, template=template)
 
 
@@ -131,10 +143,6 @@ def introduction(
     return UtteranceSpec("introduction", fill(template, {"things": things}, plural=several))
 
 
-def _hidden_slots(_instruction: Instruction, goal: Goal) -> frozenset[str]:
-    return frozenset(goal.as_mapping()) & frozenset(COLOR_SLOTS)
-
-
 SETTING = Setting(
     name="spatial",
     order=4,
@@ -143,9 +151,7 @@ SETTING = Setting(
     say=say,
     applies_to=lambda task: task.spatial,
     refusal=refusal,
-    hidden_slots=_hidden_slots,
     reads=frozenset({"frame", "delivery"}),
     variants=tuple({"frame": frame} for frame in FRAMES),
-    hides_only_color=lambda _instruction: True,
     example=6,
 )

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from roboirg.language.landmarks import Landmark
 from roboirg.language.phrases import Phrase, antecedent, fill, plain, sentences
 from roboirg.language.request import GoalValue, InstructionRequest, InstructionSpec, UtteranceSpec
-from roboirg.language.rivals import draw_pair, hidden_by_pair, pair_notes, pair_refusal
+from roboirg.language.rivals import draw_pair, pair_notes, pair_refusal
 from roboirg.language.rivals.pair_words import choosing_remark, chosen, the_other
 from roboirg.language.settings import spatial
 from roboirg.language.settings.setting import Setting
@@ -83,10 +83,8 @@ SETTING = Setting(
     say=say,
     applies_to=spatial.SETTING.applies_to,
     refusal=refusal,
-    hidden_slots=hidden_by_pair,
     reads=spatial.SETTING.reads,
     variants=spatial.SETTING.variants,
-    hides_only_color=spatial.SETTING.hides_only_color,
     example=6,
     plain=spatial.SETTING.name,
 )

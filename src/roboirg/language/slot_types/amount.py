@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from roboirg.language.instruction import Expression
 from roboirg.language.number_words import cardinal
 from roboirg.language.phrases import Phrase, anaphor, antecedent, fill, listed, plain
 from roboirg.language.request import AMOUNT_FIELD, GoalValue, InstructionRequest
 from roboirg.language.slot_types import color, number
 from roboirg.language.slot_types.slot_type import Fields, SlotType
 from roboirg.language.templates import introductions, remarks
+
+THEM: tuple[color.Pointer, ...] = (("them", "them"),)
 
 
 def pairs(goal_values: tuple[GoalValue, ...]) -> tuple[tuple[GoalValue, GoalValue], ...]:
@@ -54,14 +55,34 @@ def _stated(request: InstructionRequest, goal_values: tuple[GoalValue, ...]) -> 
     return _described(request, goal_values, things)
 
 
+def _counts_said(request: InstructionRequest, goal_values: tuple[GoalValue, ...]) -> bool:
+    """Draw whether the command says how many cubes, and points back at the color alone."""
+    if len(pairs(goal_values)) > 1:
+        return False
+    return request.sampler.pick("said in the command", ("color", "count")) == "count"
+
+
+def _color_reference(
+    request: InstructionRequest, goal_values: tuple[GoalValue, ...]
+) -> color.ColorReference:
+    shades = tuple(shade for shade, _ in pairs(goal_values))
+    return color.draw_reference(request, shades, THEM)
+
+
 def _reduced(request: InstructionRequest, goal_values: tuple[GoalValue, ...]) -> Fields:
-    """Return ``that many of them``, or ``exactly those`` for several colors.
+    """Return ``that many of them``, ``two of them``, or ``exactly those`` for several colors.
 
     The parts of a command from outside are ``that many of the former`` and so on.
     """
     matched = pairs(goal_values)
-    them: tuple[tuple[str, Expression], ...] = (("them", "them"),)
-    pointers = them if len(matched) == 1 else color.REDUCED[len(matched)]
+    if _counts_said(request, goal_values):
+        ((words, expression),) = _color_reference(request, goal_values).pointers
+        ((shade, _),) = matched
+        thing = anaphor(
+            f"of {words.replace(' of them', ' color')}", expression, shade.slot, shade.value
+        )
+        return _described(request, goal_values, [thing])
+    pointers = THEM if len(matched) == 1 else color.LISTS[len(matched)]
     items = [
         amount(
             anaphor("that many", "that", count.slot, count.value),
@@ -87,6 +108,10 @@ def _after(request: InstructionRequest, index: int) -> Phrase:
 
 
 def _introduce(request: InstructionRequest, goal_values: tuple[GoalValue, ...]) -> Phrase:
+    if _counts_said(request, goal_values):
+        shades = tuple(shade for shade, _ in pairs(goal_values))
+        reference = _color_reference(request, goal_values)
+        return color.introduce_colors(request, shades, reference, many=True)
     template = request.pick("amount introduction", introductions.AMOUNT_INTRODUCTIONS)
     # "One of the red cubes": "them" then also fits a count of one.
     *others, last = pairs(goal_values)
@@ -123,7 +148,11 @@ def references(goal_values: tuple[GoalValue, ...], slot: str, quantities: Sequen
 
 
 def _pointing(request: InstructionRequest, goal_values: tuple[GoalValue, ...]) -> Phrase:
-    return color.those(request, tuple(shade for shade, _ in pairs(goal_values)))
+    shades = tuple(shade for shade, _ in pairs(goal_values))
+    introduced = tuple(shade.color for shade in shades)
+    if _counts_said(request, goal_values):
+        introduced = _color_reference(request, goal_values).introduced
+    return color.those(request, shades, introduced)
 
 
 def _competing(request: InstructionRequest, goal_values: tuple[GoalValue, ...]) -> list[Phrase]:
@@ -150,7 +179,7 @@ AMOUNT = SlotType(
     reduced=_reduced,
     introduce=_introduce,
     pointing=_pointing,
-    plural=lambda _parts: True,
+    plural=lambda _request, _parts: True,
     reinforcements=remarks.COLOR_REINFORCEMENTS,
     competing=_competing,
     described=_described,

@@ -1,22 +1,87 @@
-"""Colors: which cube, box or tape to handle, or which cube's container."""
+"""Colors: which cube, box or tape to handle, or which cube's container.
+
+The introduction names the goal's colors alone, or among others that the scene could ask for; then
+the command takes them by their place in the list.
+"""
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Mapping, Sequence
+from typing import NamedTuple
 
-from roboirg.language.instruction import Expression
+from roboirg.language.instruction import REFERENCE, Expression
 from roboirg.language.number_words import plural
-from roboirg.language.phrases import Phrase, anaphor, antecedent, fill, listed
+from roboirg.language.phrases import Phrase, anaphor, antecedent, fill, listed, plain
 from roboirg.language.request import GoalValue, InstructionRequest
 from roboirg.language.slot_types.slot_type import Fields, SlotType, competing_remarks
 from roboirg.language.templates import introductions, remarks
 
-REDUCED: Mapping[int, tuple[tuple[str, Expression], ...]] = {
-    1: (("it", "it"),),
-    2: (("the former", "former"), ("the latter", "latter")),
-    3: (("the first", "first"), ("the second", "second"), ("the third", "third")),
-}
-"""The words that point back at one, two or three introduced cubes."""
+Pointer = tuple[str, Expression]
+"""Words that point back, and their class."""
+FORMER: tuple[Pointer, ...] = (("the former", "former"), ("the latter", "latter"))
+RANKS: tuple[Pointer, ...] = (
+    ("the first of them", "first"), ("the second of them", "second"),
+    ("the third of them", "third"),
+)  # fmt: skip
+"""With *of them*: "the third from your right" would be a place."""
+SINGLE: tuple[Pointer, ...] = (
+    ("it", "it"), ("the one I mentioned", "one"), ("the one I mentioned earlier", "one"),
+)  # fmt: skip
+"""For the only thing that was introduced."""
+LISTS: Mapping[int, tuple[Pointer, ...]] = {2: FORMER, 3: RANKS}
+"""For two or three introduced things, in their order."""
+
+
+class ColorReference(NamedTuple):
+    """How the words point back at the goal's colors.
+
+    Attributes:
+        introduced: the colors that the introduction names, in its order.
+        pointers: the words for each color of the goal.
+    """
+
+    introduced: tuple[str, ...]
+    pointers: tuple[Pointer, ...]
+
+
+def draw_reference(
+    request: InstructionRequest,
+    goal_values: tuple[GoalValue, ...],
+    single: Sequence[Pointer] = SINGLE,
+) -> ColorReference:
+    """Draw whether other colors are introduced, too, and the words that point back."""
+    colors = tuple(goal_value.color for goal_value in goal_values)
+    sizes = [size for size in LISTS if len(colors) < size <= len(request.scene_colors)]
+    manners = ["alone", *(["list"] if sizes else [])]
+    if request.sampler.pick("introduced colors", manners) == "alone":
+        if len(colors) == 1:
+            return ColorReference(colors, (request.sampler.pick("color anaphor", single),))
+        return ColorReference(colors, LISTS[len(colors)])
+    size = request.sampler.pick("list length", sizes)
+    others = [color for color in request.scene_colors if color not in colors]
+    left = next(request.sampler.cycle("listed colors", list(itertools.permutations(others))))
+    members = [*colors, *left[: size - len(colors)]]
+    order = request.sampler.pick("list order", list(itertools.permutations(range(size))))
+    introduced = tuple(members[at] for at in order)
+    return ColorReference(introduced, tuple(LISTS[size][introduced.index(one)] for one in colors))
+
+
+def introduce_colors(
+    request: InstructionRequest,
+    goal_values: tuple[GoalValue, ...],
+    reference: ColorReference,
+    *,
+    many: bool = False,
+) -> Phrase:
+    """Return a sentence that names colors: ``I like the red, green and blue cubes``."""
+    slots = {goal_value.color: goal_value.slot for goal_value in goal_values}
+    colors = [antecedent(one, slots.get(one, REFERENCE), one) for one in reference.introduced]
+    several = many or len(colors) > 1
+    noun = request.task.commands.colored
+    things = (*plain("the "), *listed(colors), *plain(f" {plural(noun) if several else noun}"))
+    template = request.pick("color introduction", introductions.COLOR_INTRODUCTIONS)
+    return fill(template, {"things": things}, plural=several)
 
 
 def named(request: InstructionRequest, goal_value: GoalValue) -> Phrase:
@@ -35,36 +100,35 @@ def _stated(request: InstructionRequest, goal_values: tuple[GoalValue, ...]) -> 
 
 def _reduced(request: InstructionRequest, goal_values: tuple[GoalValue, ...]) -> Fields:
     """Return ``it``, ``the former`` and ``the latter``, or ``the first``, etc."""
+    pointers = draw_reference(request, goal_values).pointers
     return {
         goal_value.field: request.by_color(
             goal_value, anaphor(words, expression, goal_value.slot, goal_value.value)
         )
-        for goal_value, (words, expression) in zip(
-            goal_values, REDUCED[len(goal_values)], strict=True
-        )
+        for goal_value, (words, expression) in zip(goal_values, pointers, strict=True)
     }
 
 
 def _introduce(request: InstructionRequest, goal_values: tuple[GoalValue, ...]) -> Phrase:
-    template = request.pick("color introduction", introductions.COLOR_INTRODUCTIONS)
-    *others, last = goal_values
-    shades = [antecedent(f"the {one.color}", one.slot, one.value) for one in others]
-    things = listed([*shades, named(request, last)])
-    return fill(template, {"things": things}, plural=len(goal_values) > 1)
+    reference = draw_reference(request, goal_values)
+    return introduce_colors(request, goal_values, reference)
 
 
 def _pointing(request: InstructionRequest, goal_values: tuple[GoalValue, ...]) -> Phrase:
-    if len(goal_values) == 1:
+    introduced = draw_reference(request, goal_values).introduced
+    if len(introduced) == 1:
         words = f"that {request.task.commands.colored}"
         return anaphor(words, "that", goal_values[0].slot, goal_values[0].value)
-    return those(request, goal_values)
+    return those(request, goal_values, introduced)
 
 
-def those(request: InstructionRequest, goal_values: tuple[GoalValue, ...]) -> Phrase:
-    """Return a plural that refers to the things of all colors of the goal."""
-    values = " and ".join(goal_value.color for goal_value in goal_values)
+def those(
+    request: InstructionRequest, goal_values: tuple[GoalValue, ...], introduced: tuple[str, ...]
+) -> Phrase:
+    """Return a plural that refers to the things of all introduced colors."""
+    slot = goal_values[0].slot if len(introduced) == len(goal_values) else REFERENCE
     words = f"those {plural(request.task.commands.colored)}"
-    return anaphor(words, "them", goal_values[0].slot, values)
+    return anaphor(words, "them", slot, " and ".join(introduced))
 
 
 def competing(request: InstructionRequest, goal_values: tuple[GoalValue, ...]) -> list[Phrase]:
@@ -88,5 +152,6 @@ COLOR = SlotType(
     pointing=_pointing,
     reinforcements=remarks.COLOR_REINFORCEMENTS,
     competing=competing,
+    plural=lambda request, goal_values: len(draw_reference(request, goal_values).introduced) > 1,
     described=_described,
 )

@@ -38,7 +38,9 @@ class SlotType:
     pointing: Callable[[InstructionRequest, tuple[GoalValue, ...]], Phrase]
     reinforcements: Pools[str]
     competing: Callable[[InstructionRequest, tuple[GoalValue, ...]], list[Phrase]]
-    plural: Callable[[tuple[GoalValue, ...]], bool] = lambda goal_values: len(goal_values) > 1
+    plural: Callable[[InstructionRequest, tuple[GoalValue, ...]], bool] = (
+        lambda _request, goal_values: len(goal_values) > 1
+    )
     described: (
         Callable[[InstructionRequest, tuple[GoalValue, ...], Sequence[Phrase]], Fields] | None
     ) = None

@@ -5,4 +5,4 @@ trained on. Training and test have wordings of their own (`roboirg.core.word_poo
 short, because many policies cut what they hear after 64 tokens, some after 48; a test counts.
 """
 
-LANGUAGE_VERSION = "2.0.0"
+LANGUAGE_VERSION = "2.1.0"

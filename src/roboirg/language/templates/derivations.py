@@ -6,36 +6,111 @@ from typing import NamedTuple
 
 from roboirg.core.word_pools import Pools
 
-PAIR_INTRODUCTIONS = Pools(
+EXCLUDED_INTRODUCTIONS = Pools(
     train=(
-        "I like {pair}.",
-        "My room is {pair}.",
-        "{pair} look good.",
-        "I use {pair}.",
+        "I like {colors}.",
+        "My room is {colors}.",
+        "{colors} [looks|look] good.",
+        "I use {colors}.",
     ),
     test=(
-        "{pair} suit me.",
-        "My hat is {pair}.",
-        "The flag is {pair}.",
-        "I wear {pair}.",
+        "{colors} [suits|suit] me.",
+        "My hat is {colors}.",
+        "The flag is {colors}.",
+        "I wear {colors}.",
     ),
 )
 SINGLED_INTRODUCTIONS = Pools(
     train=("I prefer {single}.", "{single} is better.", "I want {single}."),
     test=("I choose {single}.", "{single} is nice.", "{single} is best."),
 )
+
+
+class Exclusion(NamedTuple):
+    """Words for a thing that has none of the named colors.
+
+    Attributes:
+        frame: the thing, with the field ``{excluded}``.
+        words: for that field; they point back at the colors.
+        resolved: the same with the colors, ``{colors}``.
+    """
+
+    frame: str
+    words: str
+    resolved: str
+
+
 EXCLUSIONS = Pools(
-    train=("the {thing} that is neither {pair}", "the {thing} whose color is neither {pair}"),
-    test=("the {thing} which is neither {pair}",),
+    train=(
+        Exclusion("{thing}[|s] that [is|are] {excluded}", "neither of those", "neither {colors}"),
+        Exclusion("{thing}[|s] that [is|are] {excluded}", "neither of them", "neither {colors}"),
+        Exclusion("{thing}[|s] whose color is {excluded}", "neither of those", "neither {colors}"),
+        Exclusion("{thing}[|s] whose color is {excluded}", "not in that pair", "neither {colors}"),
+    ),
+    test=(
+        Exclusion("{thing}[|s] which [is|are] {excluded}", "neither of these", "neither {colors}"),
+        Exclusion(
+            "{thing}[|s] which [is|are] {excluded}", "neither of the two", "neither {colors}"
+        ),
+        Exclusion(
+            "{thing}[|s] with a color that is {excluded}", "not in that pair", "neither {colors}"
+        ),
+    ),
 )
-AMOUNT_EXCLUSIONS = Pools(
-    train=("{thing}[|s] that [is|are] neither {pair}", "{thing}[|s] whose color is neither {pair}"),
-    test=("{thing}[|s] which [is|are] neither {pair}",),
+"""For two colors."""
+_DIFFERENT = ("different from that", "different from {colors}")
+_OTHER_THAN = ("other than that", "other than {colors}")
+SINGLE_EXCLUSIONS = Pools(
+    train=(
+        Exclusion(
+            "{thing}[|s] whose color is {excluded}",
+            "different from that",
+            "different from {colors}",
+        ),
+        Exclusion("{thing}[|s] of a color {excluded}", "other than that", "other than {colors}"),
+    ),
+    test=(
+        Exclusion("{thing}[|s] with a color {excluded}", *_DIFFERENT),
+        Exclusion("{thing}[|s] in a color {excluded}", *_OTHER_THAN),
+    ),
 )
-PAIR_ANAPHORS = Pools(train=("of those", "of them"), test=("of these", "of the two"))
 COMPLEMENT = "the {thing} in {other}"
 """For the second pick: of the two excluded colors, the one that was not chosen."""
 AMOUNT_COMPLEMENT = "{thing}[|s] in {other}"
+
+TAKEN_REMARKS = Pools(
+    train=("My brother chose {single}.", "My sister wants {single}.", "Last time it was {single}."),
+    test=("My friend chose {single}.", "My uncle wants {single}.", "Yesterday it was {single}."),
+)
+"""Said of the one of two values that is not meant."""
+OTHERS = {
+    "color": Pools(
+        train=("the other {noun}", "the one of the two other than that"),
+        test=("the other {noun} of those", "the one of them other than that"),
+    ),
+    "amount": Pools(train=("of the other {noun}",), test=("of the others",)),
+    "number": Pools(
+        train=("the other number of times",), test=("the number of times that is left",)
+    ),
+    "count": Pools(train=("the other number",), test=("the other number",)),
+    "visit": Pools(
+        train=("the other {noun}", "the {noun} that is left"),
+        test=("the other {noun} of those", "the {noun} other than that"),
+    ),
+    "placement": Pools(
+        train=("the other {noun}",),
+        test=("the other {noun} of those", "the {noun} that is left"),
+    ),
+}
+"""The value that is left, by kind of words."""
+RESOLVED_OTHERS = {
+    "color": "the {noun} in {both} but not {left}",
+    "amount": "{noun} in {both} but not {left}",
+    "count": "{both} but not {left}",
+    "number": "{both} times but not {left}",
+    "visit": "the {both} {noun} but not the {left}",
+    "placement": "the {both} {noun} but not the {left}",
+}
 
 MOMENTS = {"before": "right before the button press", "after": "right after the button press"}
 MOMENT_ANAPHORS = ("at that moment", "then")
@@ -184,9 +259,9 @@ NEIGHBORS = {
 }
 """The steps in a series of two elements, by position."""
 COUNTED_STEPS = (
-    Step("one earlier", "one visit earlier than {reference}", -1, spells=1),
-    Step("one later", "one visit later than {reference}", 1, spells=1),
-    Step("two earlier", "two visits earlier than {reference}", -2, spells=2),
-    Step("two later", "two visits later than {reference}", 2, spells=2),
+    Step("one earlier", "one {noun} earlier than {reference}", -1, spells=1),
+    Step("one later", "one {noun} later than {reference}", 1, spells=1),
+    Step("two earlier", "two {noun}s earlier than {reference}", -2, spells=2),
+    Step("two later", "two {noun}s later than {reference}", 2, spells=2),
 )
 """The same as numbers: *one visit earlier than that*."""

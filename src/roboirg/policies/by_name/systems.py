@@ -1,4 +1,4 @@
-"""Systems: configurations of a policy and an optional planner, such as the paper's seven."""
+"""Systems: configurations of a policy and an optional planner, such as the paper's six."""
 
 from __future__ import annotations
 

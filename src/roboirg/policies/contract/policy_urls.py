@@ -69,12 +69,12 @@ def parse_query(spec: str, query: str) -> dict[str, str]:
         pairs = parse_qsl(query, keep_blank_values=True, strict_parsing=bool(query))
     except ValueError as error:
         raise InvalidValueError(
-            f"Policy {spec!r}: options are written ?name=value&name=value, not {query!r}."
+            f"{spec!r}: options are written ?name=value&name=value, not {query!r}."
         ) from error
     names = [name for name, _ in pairs]
     for name in names:
         if names.count(name) > 1:
-            raise InvalidValueError(f"Policy {spec!r} gives the option {name!r} twice.")
+            raise InvalidValueError(f"{spec!r} gives the option {name!r} twice.")
     return dict(pairs)
 
 

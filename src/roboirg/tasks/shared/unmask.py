@@ -160,7 +160,6 @@ def hidden_commands(wordings: Pools[Wording]) -> Commands:
         by_place="the container {place}",
         pointed="container",
         things_at="the container[|s] {place}",
-        patterns=("color exclusion",),
         wordings=wordings,
     )
 
@@ -172,7 +171,6 @@ def seen_commands(wordings: Pools[Wording]) -> Commands:
         by_color="the container over {cube}",
         by_place="the container over the cube {place}",
         pointed="hidden_cube",
-        patterns=("color exclusion",),
         wordings=wordings,
     )
 

@@ -3,8 +3,26 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import NamedTuple
 
 from roboirg.apps.demonstrations.export_plan import ExportPlan
+
+
+class TrainingRecipe(NamedTuple):
+    """Steps of training, samples in a step, rate of learning, and steps until it is reached."""
+
+    steps: int
+    batch: int
+    rate: float
+    warmup: int
+
+
+SIMULATED = TrainingRecipe(80_000, 64, 5e-5, 10_000)
+"""As RoboMME trains its policies."""
+ON_ROBOT = TrainingRecipe(5_000, 48, 5e-5, 300)
+"""As the paper fine-tunes for its study with a real robot."""
+HORIZON = 20
+"""Actions that a policy predicts."""
 
 _LEROBOT = """\
 ```sh
@@ -20,6 +38,22 @@ ACT and Diffusion Policy of LeRobot do not read the instruction: train them on o
 The weights of ACT's ResNet are not downloaded with `null`.
 """
 
+_LEROBOT_ON_ROBOT = """\
+```sh
+lerobot-train --dataset.repo_id=local/roboirg --dataset.root={root} \\
+    --policy.type=pi05 --policy.pretrained_path=lerobot/pi05_base --policy.push_to_hub=false \\
+    --policy.device=cuda --policy.chunk_size={horizon} --policy.n_action_steps={horizon} \\
+    --policy.optimizer_lr={recipe.rate} --policy.scheduler_decay_lr={recipe.rate} \\
+    --policy.scheduler_warmup_steps={recipe.warmup} --policy.scheduler_decay_steps={recipe.steps} \\
+    --batch_size={recipe.batch} --steps={recipe.steps} --output_dir=outputs/pi05
+roboirg real plan --out study \\
+    --policy 'pi05=lerobot://outputs/pi05/checkpoints/last/pretrained_model?device=cuda'
+```
+
+Export with `--format lerobot-v2.1` to train with openpi, and with `robomme-hdf5` for MME-VLA. These
+lines have not been run here: the weights and a GPU were not at hand.
+"""
+
 _OPENPI = """\
 openpi reads this data set with the LeRobot that it pins. Save the following as
 `roboirg_config.py` beside openpi's `scripts/`, and start training through it:
@@ -33,6 +67,7 @@ import sys
 import openpi.models.pi0_config as pi0_config
 import openpi.policies.libero_policy as libero_policy
 import openpi.training.config as configs
+import openpi.training.optimizer as optimizer
 import openpi.training.weight_loaders as weight_loaders
 import openpi.transforms as transforms
 
@@ -64,11 +99,14 @@ class FirstEight(transforms.DataTransformFn):
 
 configs._CONFIGS_DICT["pi05_roboirg"] = configs.TrainConfig(
     name="pi05_roboirg",
-    model=pi0_config.Pi0Config(pi05=True, action_horizon=20, max_token_len=160),
+    model=pi0_config.Pi0Config(pi05=True, action_horizon={horizon}, max_token_len=160),
     data=RoboIRGData(repo_id="roboirg", base_config=configs.DataConfig(prompt_from_task=True)),
     weight_loader=weight_loaders.CheckpointWeightLoader(
         "gs://openpi-assets/checkpoints/pi05_base/params"),
-    num_train_steps=80_000, batch_size=64)
+    num_train_steps={recipe.steps}, batch_size={recipe.batch},
+    lr_schedule=optimizer.CosineDecaySchedule(
+        warmup_steps={recipe.warmup}, peak_lr={recipe.rate}, decay_steps={recipe.steps},
+        decay_lr={recipe.rate}))
 runpy.run_path(sys.argv.pop(1), run_name="__main__")
 ```
 
@@ -86,11 +124,18 @@ a GPU and packages from git. GR00T reads `meta/modality.json`; it needs videos, 
 _MME_VLA = """\
 ```sh
 python scripts/build_dataset.py --raw_data_path {root}
+uv run scripts/train.py mme_vla_suite --exp-name=perceptual-framesamp-modul \\
+    --dataset-path=data/robomme_preprocessed_data --model.use_history \\
+    --model.history_config=perceptual-framesamp-modul.yaml \\
+    --num-train-steps={recipe.steps} --batch-size={recipe.batch} \\
+    --lr-schedule.peak-lr={recipe.rate} --lr-schedule.decay-lr={recipe.rate} \\
+    --lr-schedule.warmup-steps={recipe.warmup}
 ```
 
-is MME-VLA's builder; it reads these files as RoboMME's own. `waypoint_action` is all NaN,
-`choice_action` empty and `available_multi_choices` an empty list: our oracle does not act in these
-spaces. Recording ends with the success, so that no time step `is_completed`.
+are MME-VLA's builder, which reads these files as RoboMME's own, and its training.
+`waypoint_action` is all NaN, `choice_action` empty and `available_multi_choices` an empty list:
+nothing here acts in these spaces. Recording ends with the success, so that no time step
+`is_completed`.
 """
 
 
@@ -103,11 +148,14 @@ def training_text(plan: ExportPlan, root: Path) -> str:
     """
     from roboirg.apps.demonstrations.frame_columns import FrameColumns
 
-    place = root.resolve()
+    place, recipe = root.resolve(), ON_ROBOT if plan.is_teleoperated else SIMULATED
     if plan.format == "robomme-hdf5":
-        return _MME_VLA.format(root=place)
+        return _MME_VLA.format(root=place, recipe=recipe)
     if plan.format == "lerobot-v2.1":
-        return _OPENPI.format(parent=place.parent, **FrameColumns(plan).keys)
+        keys = FrameColumns(plan).keys
+        return _OPENPI.format(parent=place.parent, recipe=recipe, horizon=HORIZON, **keys)
+    if plan.is_teleoperated:
+        return _LEROBOT_ON_ROBOT.format(root=place, recipe=recipe, horizon=HORIZON)
     text = _LEROBOT.format(root=place, task=plan.tasks[0])
     if plan.names == "openpi":
         keys = FrameColumns(plan).keys

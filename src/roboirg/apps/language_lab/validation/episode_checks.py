@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import functools
 from collections import Counter
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Collection, Iterator, Mapping
 from dataclasses import replace
 
 from roboirg.apps.language_lab.validation.leaks import find_leaks
@@ -20,7 +20,7 @@ from roboirg.apps.language_lab.validation.validation_results import (
 from roboirg.core.episode import Episode, Goal
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.language.generator import expressible, find_refusal, instruct_with
-from roboirg.language.instruction import Instruction
+from roboirg.language.instruction import Instruction, hidden_slots
 from roboirg.language.settings import ACCEPTANCE_SETTINGS, all_settings, settings_of
 from roboirg.language.settings.setting import Setting
 from roboirg.language.variants import expressible_options
@@ -149,25 +149,22 @@ def _add_violations(
     ]
 
 
-_NUMBER_SLOTS = ("repeats", "counts")
-
-
 def only_candidate(episode: Episode, instruction: Instruction) -> bool:
-    """Return whether the scene leaves one goal with the numbers that the command states.
+    """Return whether the scene leaves one goal with the values that the command states.
 
-    It does if all cubes have the same color. In BinFill it also does if only one choice of colors
-    has enough cubes, or if the goal wants all colors in equal numbers.
+    It does if all cubes have the same color, and only the color is hidden. In BinFill it also does
+    if only one choice of colors has enough cubes, or if the goal wants all colors in equal numbers.
     """
-    if not all_settings()[instruction.setting].hides_only_color(instruction):
-        return False
+    stated = frozenset(episode.goal.as_mapping()) - hidden_slots(instruction, episode.goal)
     candidates = get_task(episode.task).goals(episode.scene)
-    wanted = _numbers(episode.goal)
-    return sum(_numbers(goal) == wanted for goal in candidates) == 1
+    wanted = _contents(episode.goal, stated)
+    return sum(_contents(goal, stated) == wanted for goal in candidates) == 1
 
 
-def _numbers(goal: Goal) -> Counter[int]:
-    found: Counter[int] = Counter()
-    for slot, value in goal.slots:
-        if slot in _NUMBER_SLOTS:
-            found.update(goal.numbers(slot) if isinstance(value, tuple) else [goal.number(slot)])
-    return found
+def _contents(goal: Goal, slots: Collection[str]) -> Mapping[str, Counter[str]]:
+    """Return the values of some slots, in any order."""
+    return {
+        slot: Counter(map(str, value if isinstance(value, tuple) else (value,)))
+        for slot, value in goal.slots
+        if slot in slots
+    }

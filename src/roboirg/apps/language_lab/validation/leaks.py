@@ -7,8 +7,8 @@ from collections.abc import Collection
 from typing import cast
 
 from roboirg.core.episode import ALL_COLORS, Goal, SlotValue
-from roboirg.language.instruction import Instruction
-from roboirg.language.settings import all_settings, reasoning_open
+from roboirg.language.instruction import Instruction, hidden_slots
+from roboirg.language.settings import reasoning_open
 from roboirg.language.worded_command import FIELD
 from roboirg.language.wordings.wording_store import find_wordings
 
@@ -25,14 +25,14 @@ _COLOR_WORDS = frozenset(
 _TIME_WORDS = frozenset(
     ("before", "after", "earlier", "later", "previous", "previously", "next", "following")
 )
-_RANKS = ("first", "second", "third")
+_POINTERS = ("first", "second", "third", "one")
 
 
 def find_leaks(instruction: Instruction, goal: Goal) -> frozenset[str]:
     """Return the words and landmarks of an implicit command that give a hidden value away."""
-    text = _without_ranks(instruction).lower().replace("before or after", "")
+    text = _without_pointers(instruction).lower().replace("before or after", "")
     words = frozenset(re.findall(r"[a-z0-9]+", text))
-    hidden = all_settings()[instruction.setting].hidden_slots(instruction, goal)
+    hidden = hidden_slots(instruction, goal)
     words -= _template_words(instruction, hidden) | _relation_words(instruction)
     found = [words & _spellings(goal[slot]) for slot in hidden]
     places = cast("list[str]", instruction.metadata["landmarks"])
@@ -69,11 +69,14 @@ def _spellings(value: SlotValue) -> frozenset[str]:
     return _COLOR_WORDS if value in ALL_COLORS else _TIME_WORDS
 
 
-def _without_ranks(instruction: Instruction) -> str:
-    """Return the command without words that rank introduced values: *the first* of three."""
+def _without_pointers(instruction: Instruction) -> str:
+    """Return the command without *the first of them* and *the one I mentioned*.
+
+    Their numbers say nothing about the goal's.
+    """
     text = instruction.command
     last = len(instruction.utterances) - 1
     for mention in reversed(instruction.mentions):
-        if mention.utterance == last and mention.expression in _RANKS:
+        if mention.utterance == last and mention.expression in _POINTERS:
             text = text[: mention.start] + text[mention.end :]
     return text

@@ -13,70 +13,41 @@ from __future__ import annotations
 
 import contextlib
 import importlib
-import math
 import threading
 import time
 import traceback
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
-from urllib.parse import parse_qsl
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import Field
 
 from roboirg.apps.real.control.clock import Clock, RealClock
-from roboirg.apps.real.control.kinematics import end_effector_pose
 from roboirg.apps.real.control.robot import COMMAND_RATE, Command, SensorReading
 from roboirg.core.actions import ARM_JOINTS
 from roboirg.core.errors import InvalidValueError
+from roboirg.core.kinematics import end_effector_pose
 from roboirg.evaluation.records.record import Job
+from roboirg.policies.contract.option_checking import check_options
+from roboirg.policies.contract.policy_urls import parse_query
+from roboirg.policies.lerobot_features import FINGER_RANGE, LeRobotFeatures, center_square
 
 PREFIX = "lerobot:"
-SIZE = 256
-"""Width and height of the pictures in observations, pixels."""
-FINGER_RANGE = 0.04
-"""Largest opening of each finger, m."""
 FIRST_OBSERVATION_TIMEOUT_S = 10.0
 METHODS = ("connect", "disconnect", "get_observation", "send_action")
 
 
-class LeRobotArmOptions(BaseModel):
-    """Names and units of a robot's features, after ``?`` in its spec.
+class LeRobotArmOptions(LeRobotFeatures):
+    """Options of a robot, after ``?`` in its spec.
 
     Attributes:
-        joint: name of a joint's position in observations and actions; ``{}`` is 1 to 7.
-        gripper: name of the gripper's position.
-        gripper_closed: its value when closed.
-        gripper_open: its value when open.
-        degrees: whether joints are in degrees rather than radians.
-        front: name of the front picture.
-        wrist: name of the wrist picture.
         depth: name of the front camera's depth picture, mm; empty for none.
         rate: commands per second.
     """
 
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
-
-    joint: str = "joint_{}.pos"
-    gripper: str = "gripper.pos"
-    gripper_closed: float = 0.0
-    gripper_open: float = 1.0
-    degrees: bool = False
-    front: str = "front"
-    wrist: str = "wrist"
     depth: str = ""
     rate: float = Field(default=COMMAND_RATE, gt=0)
-
-    @property
-    def joints(self) -> tuple[str, ...]:
-        """The names of the arm's joints."""
-        return tuple(self.joint.format(number) for number in range(1, ARM_JOINTS + 1))
-
-    @property
-    def unit(self) -> float:
-        """One radian in the robot's unit."""
-        return math.degrees(1.0) if self.degrees else 1.0
 
 
 class LeRobotArm:
@@ -133,8 +104,7 @@ class LeRobotArm:
         raw, taken = self._require_reader().newest(0.0)
         options = self._options
         joints = np.array([float(raw[name]) for name in options.joints]) / options.unit
-        span = options.gripper_open - options.gripper_closed
-        opening = (float(raw[options.gripper]) - options.gripper_closed) / span
+        opening = options.opening(float(raw[options.gripper]))
         fields: dict[str, Any] = {}
         for camera in self._cameras:
             fields[f"{camera}_rgb"] = center_square(
@@ -192,7 +162,7 @@ class LeRobotArm:
 
     def _check_features(self) -> None:
         options = self._options
-        state = (*options.joints, options.gripper)
+        state = options.vector
         pictures = [name for name in (options.front, options.wrist, options.depth) if name]
         for kind, required in (("observation", (*state, *pictures)), ("action", state)):
             features: Mapping[str, Any] = getattr(self._robot, f"{kind}_features")
@@ -258,18 +228,6 @@ class _ObservationThread:
             self._arrived.set()
 
 
-def center_square(picture: NDArray[Any], *, smooth: bool = True) -> NDArray[Any]:
-    """Crop a picture to its central square and scale it to 256 x 256 pixels."""
-    import cv2
-
-    height, width = picture.shape[:2]
-    side = min(height, width)
-    top, left = (height - side) // 2, (width - side) // 2
-    square = picture[top : top + side, left : left + side]
-    method = cv2.INTER_AREA if smooth else cv2.INTER_NEAREST
-    return np.asarray(cv2.resize(square, (SIZE, SIZE), interpolation=method))
-
-
 def make_arm(spec: str, arrange: Callable[[Job], None]) -> LeRobotArm:
     """Return the robot of a spec such as ``lerobot:my_lab.arm:make?degrees=true``.
 
@@ -279,14 +237,9 @@ def make_arm(spec: str, arrange: Callable[[Job], None]) -> LeRobotArm:
     """
     address, _, query = spec.removeprefix(PREFIX).partition("?")
     module_name, _, name = address.partition(":")
+    options = check_options(LeRobotArmOptions, parse_query(spec, query), f"robot {spec!r}")
     try:
-        given = dict(parse_qsl(query, keep_blank_values=True, strict_parsing=bool(query)))
-        options = LeRobotArmOptions.model_validate(given)
         make = getattr(importlib.import_module(module_name), name)
-    except ValidationError as error:
-        first = error.errors()[0]
-        message = f"option {first['loc'][0]}: {first['msg']}"
-        raise InvalidValueError(f"Robot {spec!r}: {message}.") from error
     except (ValueError, ImportError, AttributeError) as error:
         raise InvalidValueError(
             f"Robot {spec!r}: {error}; write lerobot:package.module:function?option=value."

@@ -8,10 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from roboirg.apps.real.control.kinematics import tool_pose
 from roboirg.apps.real.control.robot import Command
 from roboirg.core.actions import ARM_JOINTS, JOINT_HIGH, JOINT_LOW
 from roboirg.core.errors import InvalidActionError, InvalidValueError
+from roboirg.core.kinematics import tool_pose
 
 FR3_LOW = np.array([-2.7437, -1.7837, -2.9007, -3.0421, -2.8065, 0.5445, -3.0159])
 FR3_HIGH = np.array([2.7437, 1.7837, 2.9007, -0.1518, 2.8065, 4.5169, 3.0159])

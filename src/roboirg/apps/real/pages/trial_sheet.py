@@ -44,16 +44,6 @@ LOWEST = 0.05
 DEMONSTRATIONS_PER_PAGE = 6
 
 
-def check_sheet_support() -> None:
-    """Check that the sheet can be drawn.
-
-    Raises:
-        MissingDependencyError: matplotlib is not installed.
-    """
-    with extra_needed("The sheet needs matplotlib", "report"):
-        import matplotlib as mpl  # noqa: F401
-
-
 def write_sheet(plan: StudyPlan, path: Path) -> int:
     """Draw the sheet as PDF; returns its number of pages.
 
@@ -61,8 +51,8 @@ def write_sheet(plan: StudyPlan, path: Path) -> int:
         MissingDependencyError: matplotlib is not installed.
         InvalidValueError: the file cannot be written.
     """
-    check_sheet_support()
-    from matplotlib.backends.backend_pdf import PdfPages
+    with extra_needed("The sheet needs matplotlib", "report"):
+        from matplotlib.backends.backend_pdf import PdfPages
 
     # Without the date, so that the same plan gives the same file.
     metadata = {"CreationDate": None, "Title": "Trials"}

@@ -125,7 +125,6 @@ def make_study(
     trials: int = DEFAULT_TRIALS,
     demonstrations: int = DEFAULT_DEMONSTRATIONS,
     seed: int = 0,
-    split: str = TRIAL_SPLIT,
     max_steps: int = DEFAULT_MAX_STEPS,
 ) -> StudyPlan:
     """Return a balanced plan in a random order.
@@ -137,11 +136,10 @@ def make_study(
         trials: arrangements per task; each policy meets each of them in every setting.
         demonstrations: per task.
         seed: of the orders.
-        split: of the episodes of the trials.
         max_steps: largest number of control periods of a trial.
 
     Raises:
-        UnknownNameError: a task, setting or split does not exist.
+        UnknownNameError: a task or setting does not exist.
         InvalidValueError: a number is out of range, or a name is given twice.
     """
     named = [name_and_spec(policy) for policy in policies]
@@ -149,7 +147,7 @@ def make_study(
     settings = _shared_settings(tasks) if settings is None else settings
     _check(names, tasks, settings, trials, demonstrations, seed, max_steps)
     rng = np.random.default_rng(seed)
-    chosen = {task: counterbalanced_episodes(task, split, trials) for task in tasks}
+    chosen = {task: counterbalanced_episodes(task, TRIAL_SPLIT, trials) for task in tasks}
     conditions = list(product(settings, range(len(named))))
     planned: list[PlannedTrial] = []
     for block, (task, episode) in enumerate(_blocks(chosen, rng), 1):
@@ -160,7 +158,7 @@ def make_study(
                 policy=name,
                 spec=None if spec == name else spec,
                 task=task,
-                split=split,
+                split=TRIAL_SPLIT,
                 episode=episode,
                 options=InstructionOptions(setting),
                 max_steps=max_steps,

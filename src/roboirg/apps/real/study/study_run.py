@@ -18,6 +18,7 @@ from roboirg.apps.real.control.control_loop import ControlLoop
 from roboirg.apps.real.control.limits import Limits
 from roboirg.apps.real.control.policy_workers import PolicyProcess, PolicyThread
 from roboirg.apps.real.control.robot import JudgingRobot, Robot
+from roboirg.apps.real.study.execution_horizon import at_horizon
 from roboirg.apps.real.study.study_plan import PlannedTrial, StudyPlan
 from roboirg.apps.real.study.trial_log import UNSCORED, TrialLog
 from roboirg.core.actions import JOINT_ANGLE
@@ -150,7 +151,9 @@ class Study:
         for name, spec in map(name_and_spec, policies or self.plan.policies):
             if name not in planned:
                 raise UnknownNameError("policy in the plan", name, planned)
-            specs[name] = planned[name] if spec == name else spec
+            chosen = planned[name] or name if spec == name else spec
+            played = at_horizon(chosen)
+            specs[name] = None if played == name else played
         return specs
 
     def _check_policy(self, spec: str) -> tuple[str, ...]:

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
+from decimal import Decimal
 
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.core.plain_text import counted, verb_for
 from roboirg.evaluation.analysis.comparability import AllDifferences, comparison_notes
-from roboirg.evaluation.analysis.published import TRIALS, RateTable
+from roboirg.evaluation.analysis.published import TRIALS, RateTable, published_rows
 from roboirg.evaluation.analysis.stats.cells import (
     FAIRNESS,
     CellResults,
@@ -16,6 +17,7 @@ from roboirg.evaluation.analysis.stats.cells import (
     PolicyRun,
     labels,
 )
+from roboirg.evaluation.analysis.stats.intervals import wilson_interval
 from roboirg.evaluation.analysis.stats.option_labels import (
     has_default_options,
     options_label,
@@ -33,6 +35,7 @@ from roboirg.evaluation.analysis.tables.table import (
     Entry,
     Row,
 )
+from roboirg.language.settings import EXPLICIT
 from roboirg.tasks import every_task
 
 RATES_NOTE = (
@@ -258,11 +261,55 @@ def _published_notes(which: RateTable, rows: Iterable[Row]) -> list[str]:
         return []
     episodes, seeds = TRIALS[which]
     trials = f"{episodes} trials" if seeds == 1 else f"{episodes} episodes × {seeds} seeds"
-    if which == "real":
-        return [f"{PUBLISHED_MARK.strip()}: from the paper, {trials} per cell on its own robot."]
+    where = "on its own robot" if which == "real" else "played in its own simulator"
     suites = " Averages of suites, where they are shown, are ours." if which == "main" else ""
-    where = "played in its own simulator"
-    return [f"{PUBLISHED_MARK.strip()}: from the paper, {trials} per cell, {where}.{suites}"]
+    low, high = wilson_interval(episodes * seeds // 2, episodes * seeds)
+    source = (
+        f"{PUBLISHED_MARK.strip()}: from the paper, {trials} per cell, {where}. It prints no "
+        f"intervals; at 50 % a cell's is ±{50 * (high - low):.0f} points.{suites}"
+    )
+    return [
+        source,
+        *_unequal_average_notes(which),
+        *_shortest_context_notes(which),
+    ]
+
+
+def _unequal_average_notes(which: RateTable) -> list[str]:
+    """Say where the paper sets an average over some tasks against one over all."""
+    rows = published_rows(which)
+    explicit = {row.model: row for row in rows if row.options.setting == EXPLICIT}
+    drops: dict[str, list[str]] = {}
+    for row in rows:
+        tasks = [task for task, rate in row.rates.items() if rate is not None]
+        if len(tasks) < len(row.rates) and (same := explicit[row.model].average_over(tasks)):
+            printed = explicit[row.model].average - row.average
+            text = f"{row.model} {printed} and {same - row.average}"
+            drops.setdefault(row.options.setting, []).append(text)
+    return [
+        f"The paper sets its {setting} averages, which are over fewer tasks, against the explicit "
+        "ones over all. Drops as printed, and on the same tasks, as in this table: "
+        f"{', '.join(texts)}."
+        for setting, texts in drops.items()
+    ]
+
+
+def _shortest_context_notes(which: RateTable) -> list[str]:
+    """Say how far the paper's shortest context is from its direct setting."""
+    if which != "context":
+        return []
+    direct = {row.model: row for row in published_rows("main") if row.options.setting == "direct"}
+    gaps = [
+        abs((rate or Decimal(0)) - (direct[row.model].rates[task] or Decimal(0)))
+        for row in published_rows(which)
+        if row.options == staged_options()[0]
+        for task, rate in row.rates.items()
+    ]
+    text = (
+        "The published rows with the shortest context differ from the paper's direct setting in "
+        f"{sum(map(bool, gaps))} of {len(gaps)} cells, by up to {max(gaps)} points."
+    )
+    return [text]
 
 
 def _range(counts: Sequence[int], noun: str) -> str:

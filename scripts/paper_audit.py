@@ -1,0 +1,347 @@
+"""Check the program against the paper, item by item; exits with 1 if an item fails.
+
+python scripts/paper_audit.py [WORD of the items to check]
+
+An item holds, fails, or is a limit: it stands under its name on docs/paper.md, with the reason.
+To add items, write a function with `@item(...)`: it raises `AssertionError` where the program
+differs, and returns what it found.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import itertools
+import re
+import sys
+from collections.abc import Callable, Iterator
+from decimal import Decimal
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import write_published_figures as figures
+import yaml
+
+from roboirg.apps.demonstrations.export_plan import TELEOPERATED, ExportPlan, FormatName
+from roboirg.apps.demonstrations.formats.training_lines import HORIZON as PREDICTED
+from roboirg.apps.demonstrations.formats.training_lines import ON_ROBOT, training_text
+from roboirg.apps.language_lab.corpus_statistics import (
+    PAPER_PHRASES,
+    pattern_counts,
+    phrase_counts,
+)
+from roboirg.apps.real.control.robot import HORIZON
+from roboirg.apps.real.study.execution_horizon import at_horizon
+from roboirg.apps.real.study.study_plan import DEFAULT_DEMONSTRATIONS, DEFAULT_TRIALS
+from roboirg.core.errors import InvalidValueError
+from roboirg.core.instruction_options import InstructionOptions
+from roboirg.core.word_pools import POOLS
+from roboirg.language.instruction import Instruction
+from roboirg.language.variants import instructions
+from roboirg.policies import make_policy
+from roboirg.policies.by_name.systems import all_systems, find_system
+from roboirg.tasks import LEFT_OUT, all_tasks, every_task, find_tasks
+from roboirg.tasks.splits.splits import split_episodes
+
+ROOT = Path(__file__).parents[1]
+LIMITS = ROOT / "docs" / "paper.md"
+
+Check = Callable[[], str]
+
+
+class Item(NamedTuple):
+    """One thing that the paper says, or that its figures say of it.
+
+    Attributes:
+        name: short and unique; of a limit, its heading on the page of limits.
+        claim: what should be so.
+        check: returns what was found; None for a limit.
+    """
+
+    name: str
+    claim: str
+    check: Check | None
+
+
+ITEMS: list[Item] = []
+
+
+def item(name: str, claim: str) -> Callable[[Check], Check]:
+    """Add a check to the items."""
+
+    def add(check: Check) -> Check:
+        ITEMS.append(Item(name, claim, check))
+        return check
+
+    return add
+
+
+def limits() -> Iterator[Item]:
+    """Yield the limits of the page."""
+    for name, text in re.findall(r"^### (\S+)\n\n(.+?)(?=\n#|\Z)", LIMITS.read_text(), re.M | re.S):
+        yield Item(name, " ".join(text.split()), None)
+
+
+def read(name: str) -> str:
+    """Return the text of a file of the repository."""
+    return " ".join((ROOT / name).read_text(encoding="utf-8").split())
+
+
+def same(found: object, wanted: object) -> str:
+    """Return what was found; raises AssertionError if it is not what is wanted."""
+    if found != wanted:
+        raise AssertionError(f"{found} instead of {wanted}")
+    return str(found)
+
+
+def says(name: str, *parts: str) -> str:
+    """Return the name of a file that has all of some texts."""
+    text = read(name)
+    for part in parts:
+        if part not in text:
+            raise AssertionError(f"{name} lacks {part!r}")
+    return name
+
+
+# Facts
+
+
+@item("planner", "GroundSG-Gemini plans with Gemini 3.1 Pro")
+def _() -> str:
+    planner = find_system("GroundSG-Gemini", {}).planner or {}
+    return same(planner["model"]["model"], "gemini-3.1-pro-preview")
+
+
+@item("systems", "the paper has six systems; GroundSG-oracle is RoboMME's")
+def _() -> str:
+    paper = {"pi0.5", "TTT-Expert", "FrameS-Modul", "GroundSG-QwenVL", "GroundSG-Gemini", "MemER"}
+    same(set(all_systems()), paper | {"GroundSG-oracle"})
+    for page in ("README.md", "docs/policies.md", "docs/planners.md", "CHANGELOG.md"):
+        if "seven systems" in read(page):
+            raise AssertionError(f"{page} speaks of seven systems")
+    return says("docs/planners.md", "GroundSG with the oracle is RoboMME's.")
+
+
+@item("left-out", "five tasks of RoboMME are left out, because they have nothing to refer to")
+def _() -> str:
+    names = {"PickHighlight", "MoveCube", "InsertPeg", "PatternLock", "RouteStick"}
+    same(set(LEFT_OUT), names)
+    same(names & every_task().keys(), set())
+    for name in names:
+        try:
+            find_tasks([name])
+        except InvalidValueError as error:
+            if "no variable to refer to" not in str(error):
+                raise AssertionError(f"asked for {name}: {error}") from error
+    return says("docs/tasks.md", *names)
+
+
+@item("cite", "paper and RoboMME with their authors, and the project page, are cited everywhere")
+def _() -> str:
+    cff = yaml.safe_load((ROOT / "CITATION.cff").read_text(encoding="utf-8"))
+    paper, robomme = cff["preferred-citation"], cff["references"][0]
+    same(
+        [one["family-names"] for one in paper["authors"]],
+        ["Akelijiang", "Li", "Chen", "Chen", "Zhu"],
+    )
+    same([len(robomme["authors"]), robomme["authors"][0]["family-names"]], [9, "Dai"])
+    numbers = "arXiv:2609.34384", "arXiv:2603.04639"
+    same(tuple(one["identifiers"][0]["value"] for one in (paper, robomme)), numbers)
+    return says("README.md", *numbers, "aernar.github.io/RoboIRGBench/")
+
+
+@item("independent", "the first sentence says that this is an independent implementation")
+def _() -> str:
+    before = read("README.md").partition("An independent implementation")[0]
+    same(before, "# RoboIRGBench *")
+    return says("docs/paper.md", "this is an independent implementation")
+
+
+@item("introductions", "no page says what the paper's unpublished introductions name")
+def _() -> str:
+    pages = ["README.md", *(f"docs/{path.name}" for path in ROOT.glob("docs/*.md"))]
+    for page in pages:
+        if re.search(r"paper's (introductions|instructions) (name|say|hold)", read(page)):
+            raise AssertionError(f"{page} says it")
+    return f"{len(pages)} pages"
+
+
+@item("horizon", "in the real study pi0.5 and FrameS-Modul predict and execute 20 actions")
+def _() -> str:
+    for name in ("pi0.5", "FrameS-Modul"):
+        policy: Any = make_policy(at_horizon(f"system:{name}"), 0)
+        same(policy.options.execute, 20)
+    return same([HORIZON, PREDICTED], [20, 20])
+
+
+@item("recipe", "the real study trains 5,000 steps, rate 5e-5, batch 48, 300 warm-up steps")
+def _() -> str:
+    return same(tuple(ON_ROBOT), (5_000, 48, 5e-5, 300))
+
+
+@item("recipe-configured", "the generated configurations of recordings have these numbers")
+def _() -> str:
+    wanted: dict[FormatName, tuple[str, ...]] = {
+        "lerobot-v3": ("--steps=5000", "--batch_size=48", "warmup_steps=300", "chunk_size=20"),
+        "lerobot-v2.1": ("num_train_steps=5000", "batch_size=48", "peak_lr=5e-05", "horizon=20"),
+        "robomme-hdf5": ("steps=5000", "batch-size=48", "warmup-steps=300", "peak-lr=5e-05"),
+    }
+    for name, parts in wanted.items():
+        made = ExportPlan(("PutInBox",), "train", (0,), ("explicit",), policy=TELEOPERATED)
+        text = training_text(dataclasses.replace(made, format=name), ROOT)
+        for part in parts:
+            if part not in text:
+                raise AssertionError(f"the configuration of {name} lacks {part}")
+    return ", ".join(wanted)
+
+
+@item("real-study", "the page has cameras, 30 pictures a second, GELLO, recording and checking")
+def _() -> str:
+    parts = "RealSense", "435IF", "GELLO", "30 pictures per second", "roboirg export recordings"
+    return says("docs/real-robot.md", *parts)
+
+
+@item("demonstrations", "50 explicit demonstrations a task and 10 trials a cell are the defaults")
+def _() -> str:
+    return same((DEFAULT_DEMONSTRATIONS, DEFAULT_TRIALS), (50, 10))
+
+
+# What the published figures support
+
+
+@item("spatial-drops", "spatial drops on the same tasks are larger than printed")
+def _() -> str:
+    found = {
+        model: (str(printed), str(-one.change))
+        for model, (printed, one) in figures.spatial_drops().items()
+    }
+    return same(
+        found,
+        {
+            "pi0.5": ("10.35", "14.48"),
+            "TTT-Expert": ("7.38", "10.86"),
+            "FrameS-Modul": ("25.92", "26.48"),
+            "GroundSG-QwenVL": ("11.70", "17.91"),
+            "MemER": ("16.62", "29.04"),
+        },
+    )
+
+
+@item("shortest-context", "the shortest context is up to 14 points off direct, in 8 of 9 cells")
+def _() -> str:
+    gaps = [abs(one.change) for *_, one in figures.shortest_context()]
+    same(sum(gap > 0 for gap in gaps), 8)
+    return same(max(gaps), Decimal("14.00"))
+
+
+@item("hardest", "reasoning is the hardest for two of five; spatial for two, contextual for one")
+def _() -> str:
+    lowest = {
+        "pi0.5": "spatial",
+        "TTT-Expert": "contextual",
+        "FrameS-Modul": "reasoning",
+        "GroundSG-QwenVL": "spatial",
+        "MemER": "reasoning",
+    }
+    rows = figures.rows_of("main")
+    shared = figures.defined_tasks(rows["MemER", "spatial"])
+    same(figures.lowest_settings(shared), lowest)
+    return same(figures.lowest_settings(), lowest)
+
+
+@item("kept", "MemER keeps 76, 44, 55 % in direct, reasoning, contextual; pi0.5 93, 60, 76 %")
+def _() -> str:
+    changes = figures.setting_changes()
+    kept = {
+        model: [round(changes[model, name].kept[0]) for name in figures.IMPLICIT[:3]]
+        for model in ("MemER", "pi0.5")
+    }
+    return same(kept, {"MemER": [76, 44, 55], "pi0.5": [93, 60, 76]})
+
+
+@item("small-drops", "TTT-Expert and GroundSG lose 1.76 and 0.85 points in direct")
+def _() -> str:
+    changes = figures.setting_changes()
+    found = [str(-changes[one, "direct"].change) for one in ("TTT-Expert", "GroundSG-QwenVL")]
+    return same(found, ["1.76", "0.85"])
+
+
+@item("trend", "two steps to a longer context go up")
+def _() -> str:
+    rises = [
+        (model, str(one.first), str(one.second))
+        for model, _, _, one in figures.context_steps()
+        if one.change > 0
+    ]
+    return same(rises, [("FrameS-Modul", "29.11", "30.22"), ("GroundSG-QwenVL", "34.66", "35.11")])
+
+
+@item("intervals", "a cell of 150 trials has an interval of ± 5 to 8 points")
+def _() -> str:
+    widths = [width for rate, width in figures.half_widths() if 10 <= rate <= 90]  # noqa: PLR2004
+    return same([round(min(widths)), round(max(widths))], [5, 8])
+
+
+@item("figures-page", "the page of the figures is what the script computes")
+def _() -> str:
+    if figures.PAGE.read_text(encoding="utf-8") != figures.page():
+        raise AssertionError("run: python scripts/write_published_figures.py")
+    return str(figures.PAGE.relative_to(ROOT))
+
+
+@item("phrases", "every phrase that the paper quotes comes up in its own setting, in both pools")
+def _() -> str:
+    counts = {pool: phrase_counts(_told("implicit", pool)) for pool in POOLS}
+    lacking = [
+        (pool, setting, phrase)
+        for pool, setting in itertools.product(POOLS, PAPER_PHRASES)
+        for phrase, _ in PAPER_PHRASES[setting]
+        if not counts[pool][setting][phrase]
+    ]
+    same(lacking, [])
+    return ", ".join(f"{name} {sum(one.values())}" for name, one in counts["test"].items())
+
+
+@item("resolved-phrases", "resolved commands say 'at the far right' and 'different from blue'")
+def _() -> str:
+    counts = phrase_counts(_told("resolved"))
+    far = counts["spatial, resolved"]["at the far right"]
+    different = counts["reasoning, resolved"]["different from blue"]
+    if not far or not different:
+        raise AssertionError(f"{far} and {different} times")
+    return f"{far} and {different} times"
+
+
+@item("patterns", "contextual logic in every task, color exclusion where cubes have colors")
+def _() -> str:
+    counts = pattern_counts(one for one in _told("implicit") if one.setting == "reasoning")
+    found = {task: set(by_pattern) for task, by_pattern in counts.items()}
+    same({task for task, names in found.items() if "contextual logic" not in names}, set())
+    colorless = {task for task, names in found.items() if "color exclusion" not in names}
+    return same(colorless, {"StopCube", "VideoRepick"})
+
+
+def _told(form: str, pool: str | None = None) -> Iterator[Instruction]:
+    """Yield the instructions of the test split in the settings that the paper quotes."""
+    episodes = split_episodes(tuple(all_tasks()), ("test",))
+    options = InstructionOptions(wordings=pool)
+    told = instructions(episodes, tuple(PAPER_PHRASES), (form,), options)
+    yield from (instruction for _, instruction in told)
+
+
+def main(word: str = "") -> int:
+    """Print each item with its verdict; returns the exit code."""
+    failed = 0
+    for name, claim, check in [*ITEMS, *limits()]:
+        if word not in name:
+            continue
+        try:
+            found, verdict = ("docs/paper.md", "limit") if check is None else (check(), "holds")
+        except AssertionError as error:
+            found, verdict, failed = str(error), "FAILS", failed + 1
+        print(f"{verdict:6} {name}: {claim}\n       {found}")
+    print(f"{failed} of {len(ITEMS)} items fail; {len(list(limits()))} limits")
+    return int(failed > 0)
+
+
+if __name__ == "__main__":
+    sys.exit(main(*sys.argv[1:2]))

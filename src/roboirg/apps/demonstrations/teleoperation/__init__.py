@@ -1,0 +1,1 @@
+"""Demonstrations that people recorded on a robot: read, checked and converted."""
