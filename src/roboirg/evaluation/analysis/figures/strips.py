@@ -64,10 +64,11 @@ def failing_step(record: Record) -> int:
 
 def shown_steps(record: Record) -> list[int]:
     """Return the control steps that are shown, in order; of a failure its moment among them."""
-    steps = np.linspace(0, record.steps, PICTURES).round().astype(int).tolist()
+    steps = [round(record.steps * place / (PICTURES - 1)) for place in range(PICTURES)]
     if record.outcome == "failure":
         moment = failing_step(record)
-        steps[int(np.argmin([abs(one - moment) for one in steps]))] = moment
+        nearest = min(range(PICTURES), key=lambda place: abs(steps[place] - moment))
+        steps[nearest] = moment
     return steps
 
 
@@ -131,7 +132,9 @@ def _pictures(path: Path, record: Record, steps: Sequence[int]) -> list[NDArray[
     with extra_needed("Strips need PyAV", "sim"):
         import av
     with av.open(str(path)) as film:
-        frames = [frame.to_ndarray(format="rgb24") for frame in film.decode(video=0)]
+        frames = [
+            frame.to_ndarray(format="rgb24").astype(np.uint8) for frame in film.decode(video=0)
+        ]
     if record.robot is not None:  # filmed by hand, from the first step to the last
         last, every = len(frames) - 1, max(record.steps, 1) / max(len(frames) - 1, 1)
     else:
