@@ -245,13 +245,13 @@ class InstructionRequest:
             return (*plain(phrase.before), *core, *plain(phrase.after))
         count, color = values[f"counts.{index}"], values[f"colors.{index}"]
         return (
-            *_tagged_words(phrase.before, count),
+            *tagged_words(phrase.before, count),
             *antecedent(phrase.core, color.slot, color.value),
             *plain(phrase.after),
         )
 
 
-def _tagged_words(text: str, value: GoalValue) -> Phrase:
+def tagged_words(text: str, value: GoalValue) -> Phrase:
     """Return words that name a value, with the spaces around them outside the mention."""
     words = text.strip()
     if not words:

@@ -130,7 +130,7 @@ def export_demonstrations(
 def export_recordings(
     study: Annotated[Path, typer.Argument(help="Folder of the study, made by roboirg real plan.")],
     dataset: Annotated[
-        str, typer.Argument(help="Folder of LeRobot's recording; DIR?front=NAME… names features.")
+        str, typer.Argument(help="Folder of LeRobot's recording; DIR?front=NAME names a feature.")
     ],
     out: Annotated[
         Path | None, typer.Option(help="Folder of the new data set.  (only check)")

@@ -105,7 +105,7 @@ def run(
         ),
     ] = None,
     robot: Annotated[
-        str, typer.Option(help="Robot: twin, twin?real_time=true, or lerobot:MODULE:FUNCTION?….")
+        str, typer.Option(help="Robot: twin, twin?real_time=true, or lerobot:MODULE:FUNCTION.")
     ] = "twin",
     limits: Annotated[
         Path | None, typer.Option(help="JSON file that overrides default limits.")

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from roboirg.language.number_words import cardinal
 from roboirg.language.phrases import Phrase, anaphor, antecedent, fill, listed, plain
-from roboirg.language.request import AMOUNT_FIELD, GoalValue, InstructionRequest
+from roboirg.language.request import AMOUNT_FIELD, GoalValue, InstructionRequest, tagged_words
 from roboirg.language.slot_types import color, number
 from roboirg.language.slot_types.slot_type import Fields, SlotType
 from roboirg.language.templates import introductions, remarks
@@ -166,7 +166,7 @@ def _described(
     for index, ((_, count), thing) in enumerate(zip(pairs(goal_values), things, strict=True)):
         outside = request.outside_phrase(f"{AMOUNT_FIELD}.{index}")
         if outside is not None and outside.before:
-            item = (*plain(outside.before), *thing)
+            item = (*tagged_words(outside.before, count), *thing)
         else:
             item = amount(_count(count), thing)
         items.append((*item, *_after(request, index)))

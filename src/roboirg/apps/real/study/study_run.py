@@ -12,7 +12,6 @@ from pathlib import Path
 from typing import Literal, get_args
 
 import msgspec
-import numpy as np
 
 from roboirg.apps.real.control.control_loop import ControlLoop
 from roboirg.apps.real.control.limits import Limits
@@ -32,6 +31,7 @@ from roboirg.evaluation.play.rollout_result import make_record, utc_now
 from roboirg.evaluation.records.record import Job, Record
 from roboirg.language import LANGUAGE_VERSION
 from roboirg.policies.by_name.loading import is_privileged
+from roboirg.policies.contract.random_state import episode_policy_seed
 
 ROBOT_LOCK = ".robot.lock"
 
@@ -114,7 +114,8 @@ class Study:
         loop = ControlLoop(
             self.robot, worker, self.limits, cameras[job.policy], self.stop_requested
         )
-        result = loop.play(job, job.policy_spec, policy_seed(trial), instruct_job(job).text)
+        seed = episode_policy_seed(job.policy_seed, trial.episode.seed)
+        result = loop.play(job, job.policy_spec, seed, instruct_job(job).text)
         if result.error is not None:
             # The worker may be dead or still busy: the next trial gets a new one.
             worker.close()
@@ -211,12 +212,6 @@ def select_scorer(name: str, robot: Robot) -> Scorer:
             found: Scorer = scorer
             return found
     raise UnknownNameError("scorer", name, get_args(Scorer))
-
-
-def policy_seed(trial: PlannedTrial) -> int:
-    """Return the policy's seed in a trial, the same as in simulation."""
-    seeds = np.random.SeedSequence((trial.job.policy_seed, trial.episode.seed))
-    return int(seeds.generate_state(1)[0])
 
 
 def _check_versions(trial_log: TrialLog, policies: Mapping[str, str | None]) -> None:
