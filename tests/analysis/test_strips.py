@@ -1,0 +1,127 @@
+"""Strips of pictures: the failure under its explicit play, with the moment at which it failed."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from msgspec.structs import replace
+
+from roboirg.evaluation.analysis.figures import write_figures
+from roboirg.evaluation.analysis.figures.strips import PICTURES, draw_strips, shown_steps
+from roboirg.evaluation.analysis.stats.run_data import RunData
+from roboirg.evaluation.plan.plan import Plan
+from roboirg.evaluation.play.rollout_result import RolloutResult, make_record
+from roboirg.evaluation.play.video_writer import VideoWriter
+from roboirg.evaluation.records.record import Attribution, Record, SubgoalRecord
+from roboirg.evaluation.records.store import RecordStore
+
+pytest.importorskip("matplotlib")
+pytest.importorskip("av")
+
+from matplotlib.figure import Figure
+
+STEPS, MOMENT = 160, 72
+PLAN = Plan(
+    policies=("forgetful",), tasks=("PickXtimes",), settings=("explicit", "direct"), episodes=(0,)
+)
+
+
+class Clock:
+    """A world whose pictures are as bright as the step is late."""
+
+    step = 0
+
+    def picture(self, camera: str) -> np.ndarray:
+        return np.full((256, 256, 3), self.step + 40, np.uint8)
+
+
+def film(path: Path, demonstration: int = 0) -> None:
+    """Write the film of an episode, with a video of what happened before it."""
+    writer = VideoWriter(path)
+    writer.caption = "Do it."
+    world = Clock()
+    for _ in range(demonstration):
+        writer.add_frame(world, is_demonstration=True)  # type: ignore[arg-type]
+    for step in range(0, STEPS + 1, writer.options.every):
+        world.step = step
+        writer.add_frame(world)  # type: ignore[arg-type]
+    assert writer.finish()
+
+
+def records() -> list[Record]:
+    """The explicit record, then the one that failed."""
+    found = []
+    for job in sorted(PLAN.jobs(), key=lambda one: one.setting != "explicit"):
+        lost = job.setting != "explicit"
+        result = RolloutResult("success", steps=STEPS, cause=None)
+        if lost:
+            result = RolloutResult("failure", steps=STEPS, cause="picked the wrong")
+        made = make_record(job, result, started_at="2026-01-02T03:04:05+00:00")
+        wrong = Attribution(kind="grounding", failure="wrong_object", step=MOMENT, sentence="So.")
+        subgoal = SubgoalRecord(step=50, text="lift the red cube", verdict="wrong_thing")
+        found.append(
+            replace(
+                made,
+                video=f"videos/{job.setting}.mp4",
+                attribution=wrong if lost else None,
+                subgoals=(subgoal,) if lost else (),
+            )
+        )
+    return found
+
+
+def a_run(folder: Path, found: list[Record]) -> Path:
+    for number, record in enumerate(found):
+        if record.video is not None:
+            film(folder / record.video, demonstration=5 * number)
+    with RecordStore(folder) as store:
+        for record in found:
+            store.append(record)
+    return folder
+
+
+def drawn(figure: Figure | None) -> list[list[tuple[str, float, bool]]]:
+    """Return what stands below each picture, its brightness, and whether it is marked."""
+    assert figure is not None
+    return [
+        [
+            (
+                one.get_xlabel(),
+                float(one.images[0].get_array()[100:150, 100:150].mean()),  # type: ignore[index]
+                one.spines["left"].get_linewidth() > 1,
+            )
+            for one in row.axes
+        ]
+        for row in figure.subfigs
+    ]
+
+
+def test_a_strip_shows_the_pictures_of_its_steps_and_marks_the_moment(tmp_path: Path) -> None:
+    found = records()
+    explicit, failed = drawn(draw_strips([a_run(tmp_path, found)]))
+    for row, record in ((explicit, found[0]), (failed, found[1])):
+        steps = shown_steps(record)
+        assert len(row) == len(steps) == PICTURES
+        for (label, brightness, _), step in zip(row, steps, strict=True):
+            assert label.startswith(f"{step / 20:.1f} s")
+            assert abs(brightness - step - 40) < 6  # half the time between two frames, and H.264
+    assert not any(marked for *_, marked in explicit)
+    assert [label.partition("\n")[0] for label, _, marked in failed if marked] == ["3.6 s"]
+    assert ["lift the red" in label for label, *_ in failed] == [False, False, True, True, True]
+
+
+def test_without_the_explicit_film_there_is_no_strip(tmp_path: Path) -> None:
+    explicit, failed = records()
+    assert draw_strips([a_run(tmp_path / "a", [replace(explicit, video=None), failed])]) is None
+    assert draw_strips([a_run(tmp_path / "b", [explicit])]) is None
+
+
+def test_the_figure_is_written_from_a_folder(tmp_path: Path) -> None:
+    found = records()
+    folder = a_run(tmp_path / "run", found)
+    content = RunData.of([("run", found)])
+    paths = write_figures(content, tmp_path / "figures", ["strips"], runs=[folder])
+    assert {path.name for path in paths} == {"strips.png", "strips.svg", "strips.pdf"}
+    assert "Picked the wrong." in (tmp_path / "figures" / "strips.svg").read_text()
