@@ -458,5 +458,6 @@ def test_difficulty_has_rows_for_explicit_and_gaps_on_the_same_episodes(
         ]  # fmt: skip
         rate = 100 * sum(one.outcome == "success" for one in own) / len(own)
         assert texts["forgetful, direct", level][:2] == [episodes, f"{rate:.2f}"]
-        assert texts["forgetful, direct", level][2] == f"{rate - 100:+.1f}".replace("-", "−")
+        gap = f"{rate - 100:+.1f}".replace("-", "−").replace("+0.0", "±0.0")
+        assert texts["forgetful, direct", level][2] == gap
     assert "forgetful, explicit" not in call("tables", run, "--by", "slots", "--format", "csv")

@@ -12,6 +12,7 @@ from planning_fakes import decoded
 
 from roboirg.core.errors import InvalidValueError
 from roboirg.core.observations import DemonstrationFrames
+from roboirg.core.subgoal_text import MOST_SUBGOAL_LETTERS, split_point
 from roboirg.policies.contract.policy_needs import (
     merge_cameras,
     merge_demonstration_frames,
@@ -23,11 +24,9 @@ from roboirg.policies.planners.observation_merging import (
     select_history,
 )
 from roboirg.policies.planners.points import (
-    MAX_SUBGOAL_LENGTH,
     parse_boxes,
     parse_points,
     says_finished,
-    strip_points,
     to_pixel,
 )
 from roboirg.policies.vlm.model_content import summary_clip
@@ -67,7 +66,7 @@ def test_examples_of_points():
     "text",
     [
         *("", "  \n", "go at <1001, 3>", "go at <3>", "go at <|box_start|>(3)<|box_end|>", "{}"),
-        *("<y, x>", "x" * (MAX_SUBGOAL_LENGTH + 1)),
+        *("<y, x>", "x" * (MOST_SUBGOAL_LETTERS + 1)),
     ],
 )
 def test_broken_subgoals_are_unparsable(text):
@@ -79,7 +78,10 @@ def test_broken_subgoals_are_unparsable(text):
 
 
 def test_places_are_left_out_to_compare():
-    assert strip_points("press the button at <3, 200> to stop") == "press the button to stop"
+    assert split_point("press the button at <3, 200> to stop") == (
+        "press the button to stop",
+        (3, 200),
+    )
 
 
 @given(st.lists(st.integers(0, 200)), st.integers(0, 20))

@@ -24,6 +24,7 @@ def describe_end_state(replay: EpisodeReplay) -> FailureAttribution:
     | the end | is |
     | --- | --- |
     | an act stands that is not expected | as `classify_grounding_error` says |
+    | the expected object is in the hand, and nothing above or below fits | ``out_of_time`` |
     | an object that was to be carried is not in the hand | ``dropped`` or ``misplaced`` |
     | an object that was to be picked was reached, or held, and is not in the hand | \
 ``missed_grasp`` |
@@ -96,7 +97,11 @@ def _classify(replay: EpisodeReplay, fact: Fact, wanted: tuple[Fact, ...]) -> Fa
 
 
 def _future_violation(replay: EpisodeReplay, name: str) -> FailureName | None:
-    """Return the failure of the rule that an object would violate for good at its places."""
+    """Return the failure of the rule that an object would violate for good at its places.
+
+    The object is thought to be where the coming stages want it; None if no stage does, or if it
+    may be there.
+    """
     ahead = replay.stages[replay.expected_stage :]
     expected = {fact for stage in ahead for fact in facts_of(stage.expects)}
     placed = {fact for fact in expected if fact.subject == name and fact.traits.lasts}
@@ -109,8 +114,12 @@ def _future_violation(replay: EpisodeReplay, name: str) -> FailureName | None:
 
 
 def _is_violated(rule: Rule, placed: set[Fact], history: FactHistory) -> bool:
-    """Return whether placed objects violate a rule; they cannot violate one against too few."""
-    least = getattr(rule.condition, "least", 1)
+    """Return whether placed objects violate a rule.
+
+    A rule whose condition needs none of its facts is violated by too few of them, which objects at
+    their places cannot do.
+    """
+    least = getattr(rule.condition, "least", 1)  # only counts and times have one
     return bool(least and placed & set(facts_of(rule)) and history.holds(rule.condition))
 
 
@@ -143,18 +152,23 @@ def _released(replay: EpisodeReplay, wanted: tuple[Fact, ...]) -> FailureAttribu
 
 
 def _stopped_short(replay: EpisodeReplay) -> FailureAttribution | None:
-    """Return ``wrong_count`` if the robot stopped where a shorter task would have ended."""
-    acts = [
+    """Return ``wrong_count`` if the robot stopped where a shorter task would have ended.
+
+    A shorter task would have ended with an act like the last stage's, so the stage before must have
+    asked for one; letting go does not count as an act. A task that ends by leaving all alone for a
+    time could have ended after any stage.
+    """
+    acts_before = [
         {fact.kind for fact in facts_of(stage.expects)}
         for stage in replay.stages[: replay.expected_stage]
         if not all(fact.traits.role is FactRole.RELEASE for fact in facts_of(stage.expects))
     ]
     last = replay.stages[-1].expects
-    if not acts:
+    if not acts_before:
         return None
     if isinstance(last, Elapsed):
         since = _untouched_since(replay, last.least)
-    elif acts[-1] == {fact.kind for fact in facts_of(last)}:
+    elif acts_before[-1] == {fact.kind for fact in facts_of(last)}:
         since = _at_rest_since(replay)
     else:
         return None
@@ -181,7 +195,10 @@ def _at_rest_since(replay: EpisodeReplay) -> int | None:
 
 
 def _nothing_done(replay: EpisodeReplay, wanted: tuple[Fact, ...]) -> FailureAttribution:
-    """Return ``nothing_reached`` or ``out_of_time``."""
+    """Return ``nothing_reached`` or ``out_of_time``.
+
+    An object or place is reached when the hand is above it, an APPROACH fact with it as the place.
+    """
     names = {fact.subject for fact in wanted} | {fact.place for fact in wanted}
     start = replay.policy_start_step
     tried = any(

@@ -57,7 +57,8 @@ class DiscourseContext(NamedTuple):
         positions: introduced elements of a series, 1 for the first.
         preferred_position: an introduced element that a later sentence names again, alone.
         moments: introduced moments of the video.
-        preferred_moment: an introduced moment that a later sentence names again, alone.
+        preferred_moment: of several introduced moments the one named twice, even in one
+            sentence: *before and after, the one before*; None after a further sentence.
         places: introduced places.
         times: whether the places are those before or after things move.
         mirrored: whether left and right are those of the front camera's picture.

@@ -23,7 +23,6 @@ ROWS_PER_GROUP = 256
 _DICTIONARY_LIMIT = 1 << 30
 """Bytes of a column's distinct values in a row group: so that each picture is stored once in it."""
 
-PICTURE_COLUMNS = ("picture", "frames")
 _NUMBERS = ("episode", "distractors", "video_steps", "words_back", "environment_version")
 _FLOATS = ("command_chance", "meters")
 _TEXT_LISTS = (
