@@ -23,9 +23,14 @@ from roboirg.envs.env_options import EnvOptions
 from roboirg.envs.env_settings import EnvSettings, choose_index
 from roboirg.envs.environment import RoboIRGEnv
 from roboirg.envs.vector.drawn_on_demand import LazyObservation, WorkerVideo
-from roboirg.envs.vector.shared_arrays import SharedArrays, picture_fields
 from roboirg.envs.vector.vector_infos import stack_infos
-from roboirg.envs.vector.vector_workers import Recipe, Request, Transition, WorkerProcesses
+from roboirg.envs.vector.vector_workers import (
+    Recipe,
+    Request,
+    SharedArrays,
+    Transition,
+    WorkerProcesses,
+)
 
 Chunks = ArrayLike | Sequence[ArrayLike]
 Batch = Mapping[str, Any]
@@ -85,11 +90,14 @@ class RoboIRGVectorEnv(gymnasium.vector.VectorEnv[Batch, Any, NDArray[Any]]):
         self._moment, self._starts = 0, [0] * num_envs
         # Spawned, because the threads of the renderer do not survive a fork.
         context = multiprocessing.get_context("spawn")
-        shared = SharedArrays(single.observation_space, num_envs, context)
-        self._arrays = shared.open()
-        self._pictures = picture_fields(self._arrays)
+        # Kept: the workers open its locks by name when they start.
+        self._shared = SharedArrays.of(single.observation_space, num_envs, context)
+        self._arrays = self._shared.open()
+        self._pictures = frozenset(
+            field for field in self._arrays if field.endswith(("_rgb", "_depth"))
+        )
         self._processes = WorkerProcesses(
-            Recipe(task, options, shared, eager=not lazy),
+            Recipe(task, options, self._shared, self._pictures, eager=not lazy),
             num_envs,
             min(num_envs, workers or os.cpu_count() or 1),
         )

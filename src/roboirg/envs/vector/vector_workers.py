@@ -5,20 +5,47 @@ from __future__ import annotations
 import traceback
 from collections.abc import Callable, Mapping, Sequence
 from multiprocessing.connection import Connection
+from multiprocessing.context import BaseContext
 from typing import Any, NamedTuple
 
+from gymnasium import spaces
+from gymnasium.vector.utils import create_shared_memory, read_from_shared_memory
 from numpy.typing import NDArray
 
 from roboirg.core.episode import Episode
 from roboirg.core.errors import RoboIRGError
 from roboirg.envs.env_options import EnvOptions
 from roboirg.envs.environment import RoboIRGEnv
-from roboirg.envs.vector.shared_arrays import SharedArrays, picture_fields
 from roboirg.util.child_process import ChildExit, ChildProcess, serve
 
 
 class SubEnvironmentError(RoboIRGError):
     """A sub-environment raised, or the process that plays it was lost."""
+
+
+class SharedArrays(NamedTuple):
+    """One array (n, ...) for each `Box` of an observation, in memory that processes share.
+
+    Can be sent to a child process when it is started.
+    """
+
+    boxes: spaces.Dict
+    memory: Any
+    count: int
+
+    @classmethod
+    def of(cls, space: spaces.Dict, count: int, context: BaseContext) -> SharedArrays:
+        """Return those of `count` observations."""
+        fields = {name: one for name, one in space.items() if isinstance(one, spaces.Box)}
+        boxes = spaces.Dict(fields)
+        return cls(boxes, create_shared_memory(boxes, count, context), count)
+
+    def open(self) -> dict[str, NDArray[Any]]:
+        """Return the arrays as views of the shared memory."""
+        found: dict[str, NDArray[Any]] = read_from_shared_memory(
+            self.boxes, self.memory, self.count
+        )
+        return found
 
 
 class Recipe(NamedTuple):
@@ -28,12 +55,14 @@ class Recipe(NamedTuple):
         task: task, or an episode.
         options: of each environment.
         arrays: where observations are written.
-        eager: whether pictures are drawn at every observation.
+        pictures: the fields of an observation that are drawn.
+        eager: whether they are drawn at every observation.
     """
 
     task: str | Episode
     options: EnvOptions
     arrays: SharedArrays
+    pictures: frozenset[str]
     eager: bool
 
 
@@ -87,7 +116,7 @@ class SubEnvironment:
         self._env = RoboIRGEnv(recipe.task, **recipe.options)
         self._env.draws = False
         self._arrays, self._index = arrays, index
-        self._drawn = tuple(sorted(picture_fields(arrays)))
+        self._drawn = tuple(sorted(recipe.pictures))
         self._eager = recipe.eager
         self._video: Mapping[str, NDArray[Any]] = {}
 
