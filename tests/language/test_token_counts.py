@@ -64,6 +64,7 @@ def test_other_words_are_not_counted_too_low(tokenizer, text):
     assert count_tokens(text) >= len(tokenizer.encode(text)) + ADDED_TOKENS
 
 
+@pytest.mark.slow
 def test_every_instruction_is_heard_by_a_policy_that_reads_64_tokens(said):
     long = {
         (instruction.episode, instruction.form)

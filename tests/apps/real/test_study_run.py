@@ -141,6 +141,7 @@ def test_two_loops_do_not_share_a_robot(study):
     assert "Another process plays the study" in text
 
 
+@pytest.mark.slow
 def test_a_policy_outside_the_plan_is_refused(study):
     process = start("run", study, "--policy", "oracle")
     text, _ = process.communicate(timeout=120)
