@@ -6,7 +6,7 @@ import traceback
 from collections.abc import Callable, Mapping, Sequence
 from multiprocessing.connection import Connection
 from multiprocessing.context import BaseContext
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, cast
 
 from gymnasium import spaces
 from gymnasium.vector.utils import create_shared_memory, read_from_shared_memory
@@ -31,21 +31,20 @@ class SharedArrays(NamedTuple):
 
     boxes: spaces.Dict
     memory: Any
-    count: int
+    rows: int
 
     @classmethod
     def of(cls, space: spaces.Dict, count: int, context: BaseContext) -> SharedArrays:
         """Return those of `count` observations."""
-        fields = {name: one for name, one in space.items() if isinstance(one, spaces.Box)}
-        boxes = spaces.Dict(fields)
-        return cls(boxes, create_shared_memory(boxes, count, context), count)
+        boxes = spaces.Dict(
+            [(name, one) for name, one in space.items() if isinstance(one, spaces.Box)]
+        )
+        return cls(boxes, create_shared_memory(boxes, count, cast("Any", context)), count)
 
     def open(self) -> dict[str, NDArray[Any]]:
         """Return the arrays as views of the shared memory."""
-        found: dict[str, NDArray[Any]] = read_from_shared_memory(
-            self.boxes, self.memory, self.count
-        )
-        return found
+        views = read_from_shared_memory(self.boxes, self.memory, self.rows)
+        return cast("dict[str, NDArray[Any]]", views)
 
 
 class Recipe(NamedTuple):
