@@ -76,7 +76,7 @@ class InstructionRequest:
         wordings: commands from outside; None for our own.
         phrases_of: the command from outside whose phrases are used; None for the one that states
             the goal, and where it has none, the others.
-        filled: the commands from outside that `command` has filled.
+        filled: the commands from outside that `command` has filled, in order; grows.
     """
 
     episode: Episode
@@ -182,6 +182,7 @@ class InstructionRequest:
             NoCommandError: the words from outside have no phrase for the object, only for its cube.
         """
         outside, commands = self.outside_phrase(color.field), self.task.commands
+        # What has the color is covered by what is handled: cubes under containers.
         covered = commands.thing != commands.colored
         if covered and outside is not None and commands.thing not in outside.text:
             raise NoCommandError
@@ -194,8 +195,8 @@ class InstructionRequest:
             return words
         return self.around(color.field, words)
 
-    def pointed(self, color: GoalValue) -> tuple[SceneObject, ...]:
-        """Return the objects to point at for a color: the cubes, or the containers over them."""
+    def objects_to_point_at(self, color: GoalValue) -> tuple[SceneObject, ...]:
+        """Return the cubes of a color, or the containers over them."""
         scene = self.episode.scene
         cubes = [item for item in scene.objects if item.color == color.value]
         kind = self.task.commands.pointed
@@ -221,14 +222,14 @@ class InstructionRequest:
         goal = self.episode.goal
         names = goal_fields(goal)
         stated = {name: self.outside_stated(name) for name in names}
-        pointed = {name for name in names if fields.get(name, stated[name]) != stated[name]}
-        command = wordings.find(goal, pointed)
+        replaced = {name for name in names if fields.get(name, stated[name]) != stated[name]}
+        command = wordings.find(goal, replaced)
         if command is None:
             raise NoCommandError
         self.filled.append(command)
         self.sampler.log.append(f"wordings/{wordings.commands.index(command)}")
-        words = stated | {name: fields[name] for name in pointed}
-        for number in {one.field for one in self.values_of("number")} & pointed:
+        words = stated | {name: fields[name] for name in replaced}
+        for number in {one.field for one in self.values_of("number")} & replaced:
             words[number] = self.around(number, words[number])
         return swap_particles(fill(command.text, words))
 

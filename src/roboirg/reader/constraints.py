@@ -36,7 +36,7 @@ def goal_constraints(
         constraints.append(Constraint(_things_in_order(command, resolver), _no_goal("things")))
     if "color" in slots:
         things = command.boxes if resolver.chooses_box else command.things
-        constraints.append(_text("color", common_options(map(resolver.objects, things))))
+        constraints.append(_text("color", common_options(map(resolver.colors_of, things))))
     constraints += _numbers(slots, candidates, command, resolver)
     if "relation" in slots:
         moments = resolver.moments(read_temporal_relation(command.text))
@@ -52,7 +52,7 @@ def _numbers(
 ) -> Iterator[Constraint]:
     """Yield the constraints of the slots that hold one number."""
     if "repeats" in slots:
-        yield _number("repeats", resolver.times(read_times(command.text)), candidates)
+        yield _number("repeats", resolver.repeats(read_times(command.text)), candidates)
     for series in ("visit", "placement"):
         if series in slots:
             options = resolver.positions(read_position(command.text))
@@ -77,7 +77,7 @@ def _no_goal(part: str) -> str:
 
 def _things_in_order(command: Command, resolver: ReferenceResolver) -> GoalTest:
     """Return a test for as many colors as things, each among those that its words allow."""
-    wanted = [resolver.objects(thing) for thing in command.things_in_order]
+    wanted = [resolver.colors_of(thing) for thing in command.things_in_order]
 
     def fits(goal: Goal) -> bool:
         colors = goal.texts("colors")

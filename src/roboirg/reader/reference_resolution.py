@@ -60,7 +60,7 @@ class ReferenceResolver:
         """Whether commands choose among boxes."""
         return self._kind == "box"
 
-    def objects(self, thing: Description) -> set[str] | None:
+    def colors_of(self, thing: Description) -> set[str] | None:
         """Return the colors that fit a description."""
         if thing.kind == "any":
             return None
@@ -76,7 +76,7 @@ class ReferenceResolver:
 
     def amounts(self, item: Item) -> Amounts:
         """Return the colors that fit an item, with the numbers that fit it."""
-        colors = self.objects(item.thing)
+        colors = self.colors_of(item.thing)
         if colors is None:
             colors = self._colors()
         count = item.number
@@ -92,7 +92,7 @@ class ReferenceResolver:
             self._complain("amounts")
         return [{color: numbers} for color, numbers in words.results(self._context.amounts)]
 
-    def times(self, count: CountExpression | None) -> set[int] | None:
+    def repeats(self, count: CountExpression | None) -> set[int] | None:
         """Return the numbers of repetitions that fit an expression; once, without any number."""
         if count is None:
             return None if set(self._context.numbers) - {1} else {1}
@@ -138,12 +138,14 @@ class ReferenceResolver:
         return moments
 
     def _introduced_moments(self, when: TemporalRelation) -> set[PressRelation]:
+        """Return the moments to start from: the preferred one, if a choice has to be made."""
         preferred = self._context.preferred_moment
         if preferred and (when.kind != "introduced" or len(self._context.moments) > 1):
             return {preferred}
         return set(self._context.moments)
 
     def _series_length(self) -> int:
+        """Return how many visits a shuttle makes, or placements on discs the video shows."""
         passes = [motion.passes for motion in self._scene.motions if isinstance(motion, Shuttle)]
         discs = {disc.name for disc in self._scene.of_kind("target")}
         placed = [fact for fact in self._scene.past if fact.kind == "placed"]

@@ -65,7 +65,7 @@ class SwingingPolicy:
 
     def act(self, observation: Observation) -> NDArray[np.floating[Any]]:
         """Return actions that swing the arm, shape (CHUNK, 8)."""
-        for camera in CAMERAS:
+        for camera in CAMERAS:  # a picture is drawn when it is read
             np.asarray(observation[f"{camera}_rgb"])  # type: ignore[literal-required]
         if self._step == 0:
             self._start = np.append(observation["joint_positions"], 1.0)
@@ -106,6 +106,6 @@ def measure_world(jobs: Sequence[Job]) -> WorldSpeed:
 
 def _timings(job: Job) -> dict[str, float]:
     result = RolloutResult()
-    still = msgspec.structs.replace(job, max_steps=MEASURED_STEPS, actions=None)
-    play_with(SwingingPolicy(), still, PolicyNeeds(), result, CallGuard(result, None))
+    short = msgspec.structs.replace(job, max_steps=MEASURED_STEPS, actions=None)
+    play_with(SwingingPolicy(), short, PolicyNeeds(), result, CallGuard(result, None))
     return result.timings

@@ -30,7 +30,9 @@ def _allows_amount(request: InstructionRequest) -> bool:
         return False
     (color,), colors = request.color_values, _present(request)
     wanted = request.count_of(color)
-    enough = all(len(request.pointed(color._replace(value=one))) >= wanted for one in colors)
+    enough = all(
+        len(request.objects_to_point_at(color._replace(value=one))) >= wanted for one in colors
+    )
     return len(colors) == TWO and enough
 
 
@@ -61,7 +63,8 @@ def _comparatives(request: InstructionRequest, left: str) -> list[templates.Comp
     """Return the words that tell the goal's thing from the one of another color."""
     meant = request.color_values[0]
     places = [
-        request.pointed(meant._replace(value=color))[0].position for color in (meant.value, left)
+        request.objects_to_point_at(meant._replace(value=color))[0].position
+        for color in (meant.value, left)
     ]
     return [
         one

@@ -39,7 +39,7 @@ def usable(
     """
     found = [
         landmark
-        for target in request.pointed(goal_value)
+        for target in request.objects_to_point_at(goal_value)
         for landmark in landmarks(
             request.episode.scene, request.task.commands.pointed, target, request.frame
         )

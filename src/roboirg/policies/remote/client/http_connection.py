@@ -1,4 +1,4 @@
-"""Requests over HTTP, as in the second interface of the RoboMME challenge."""
+"""Requests over HTTP, the RoboMME challenge's alternative to its WebSocket."""
 
 from __future__ import annotations
 
