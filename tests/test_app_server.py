@@ -6,6 +6,7 @@ import socket
 import subprocess
 import sys
 import threading
+import time
 from contextlib import contextmanager
 
 import pytest
@@ -158,6 +159,9 @@ def test_an_error_of_ours_logs_its_traceback(tmp_path, caplog):
     server = PageServer(tmp_path, fail)
     with running(server):
         assert get(server, "/").status == 500
+        deadline = time.monotonic() + 60  # the log follows the response
+        while "RuntimeError: a bug" not in caplog.text and time.monotonic() < deadline:
+            time.sleep(0.05)
     assert "RuntimeError: a bug" in caplog.text
 
 
