@@ -1,5 +1,8 @@
 from __future__ import annotations
 
+import os
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -96,3 +99,31 @@ def test_a_caption_that_grows_has_room_for_all_of_it(tmp_path: Path) -> None:
     assert len(compose_frame(pictures, first)) < len(short)
     dark = [int((frame[256:] < 128).sum()) for frame in (short, long)]
     assert 0 < dark[0] < dark[1] / 10
+
+
+ENCODE = """
+import sys
+from pathlib import Path
+import numpy as np
+from roboirg.evaluation.play.video_writer import VideoWriter
+tiles = np.random.default_rng(0).integers(0, 255, (39, 65, 3), dtype=np.uint8)
+picture = tiles.repeat(8, 0).repeat(8, 1)[:310, :516]
+class Source:
+    shift = 0
+    def picture(self, camera):
+        self.shift += 1
+        return np.roll(picture, self.shift, 1)[:, :256] if camera == "front" else picture[:, 260:]
+writer, source = VideoWriter(Path(sys.argv[1])), Source()
+for _ in range(30):
+    writer.add_frame(source)
+assert writer.finish(), writer.error
+"""
+
+
+def test_equal_pictures_give_equal_files_whatever_was_in_memory(tmp_path: Path) -> None:
+    files = [tmp_path / f"{byte}.mp4" for byte in (50, 150, 200)]
+    for file in files:
+        environment = os.environ | {"MALLOC_PERTURB_": file.stem}
+        command = [sys.executable, "-c", ENCODE, str(file)]
+        subprocess.run(command, env=environment, check=True)
+    assert len({file.read_bytes() for file in files}) == 1

@@ -222,7 +222,9 @@ class VideoWriter:
         stream = container.add_stream("libx264", rate=Fraction(self.options.rate))
         stream.height, stream.width = frame.shape[:2]
         stream.pix_fmt = "yuv420p"
-        stream.options = {"crf": str(self.options.quality), "preset": "veryfast"}
+        # x264's macroblock tree reads memory that it has not written if the width is no multiple of
+        # 128: equal pictures would give files that differ.
+        stream.options = {"crf": str(self.options.quality), "preset": "veryfast", "mbtree": "0"}
         stream.codec_context.thread_count = 1
         self._container, self._stream = container, stream
         return container, stream
