@@ -8,6 +8,7 @@ import signal
 import subprocess
 import sys
 import time
+from collections import deque
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -486,6 +487,6 @@ class It:
     monkeypatch.setattr("roboirg.evaluation.play.rollout.MAX_LOSSES", 2)
     plan = paper_plan(spec, 1)
     runner: PaperRunner = paper_runner(plan, tmp_path, seconds=0.2)
-    (record,) = InProcess().run(plan.jobs(), runner)
+    (record,) = InProcess().run(deque(plan.jobs()), runner)
     assert (record.outcome, record.error) == ("error", "policy")
     assert "the process ended with exit code 5" in str(record.cause)

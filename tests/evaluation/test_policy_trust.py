@@ -8,6 +8,7 @@ import resource
 import sys
 import tempfile
 import time
+from collections import deque
 from pathlib import Path
 from typing import Any
 
@@ -61,7 +62,7 @@ def test_what_a_policy_breaks_is_its_own(
     names = (*hostile_policies.SPOILED, *hostile_policies.HARMLESS)
     found = play(tmp_path / "run", names)
     plan = paper_plan("Dice", 3, policy_process="shared")
-    alone = InProcess().run(plan.jobs(), paper_runner(plan, tmp_path))
+    alone = InProcess().run(deque(plan.jobs()), paper_runner(plan, tmp_path))
     expected = {record.episode: record.outcome for record in alone}
     for name in names:
         records = found[hostile_policies.SPEC(name)]
@@ -121,7 +122,7 @@ def test_what_is_forged_is_an_error_of_its_own_episode_and_nothing_started_survi
 def test_what_is_played_again_is_counted(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("HOSTILE_NOTES", str(tmp_path))
     plan = paper_plan(hostile_policies.SPEC("Quitter"), 1)
-    (record,) = InProcess().run(plan.jobs(), paper_runner(plan, tmp_path, seconds=1.5))
+    (record,) = InProcess().run(deque(plan.jobs()), paper_runner(plan, tmp_path, seconds=1.5))
     assert (record.outcome, record.attempt) == ("failure", 2)
 
 
@@ -321,7 +322,7 @@ def test_in_a_worker_an_interrupt_is_the_policys(tmp_path: Path) -> None:
 def test_records_of_honest_policies_are_the_same_beside_any_cheat(tmp_path: Path) -> None:
     beside = play(tmp_path / "beside", ("Leaker",))["Leaker+1"]
     plan = paper_plan("Dice", 3)
-    alone = InProcess().run(plan.jobs(), paper_runner(plan, tmp_path))
+    alone = InProcess().run(deque(plan.jobs()), paper_runner(plan, tmp_path))
     changed = {"policy": "", "policy_version": ""}
     assert sorted((comparable(one) | changed for one in beside), key=str) == sorted(
         (comparable(one) | changed for one in alone), key=str

@@ -15,12 +15,13 @@ import pytest
 from evaluation_fakes import FakePlayer, comparable, is_alive, small_plan, worker_pids
 from hosting_fakes import PatientRunner, paper_plan, paper_runner
 
-from roboirg.core.errors import InvalidValueError, RenderDeviceError, RoboIRGError
+from roboirg.core.errors import InvalidValueError, RoboIRGError
 from roboirg.evaluation.hosting.host_pool import HostSettings
 from roboirg.evaluation.hosting.hosted_policy import HostedPolicy
 from roboirg.evaluation.records.store import RECORDS_FILE, read_records
 from roboirg.evaluation.run.executor import InProcess, LocalProcesses
-from roboirg.evaluation.run.ray_cluster import RayCluster, _MachineHosts
+from roboirg.evaluation.run.ray_cluster import RayCluster
+from roboirg.evaluation.run.ray_machines import MachineAgent, MachineVersions
 from roboirg.evaluation.run.runner import run_plan
 
 pytestmark = pytest.mark.slow
@@ -85,8 +86,8 @@ def test_records_are_those_of_one_process_even_if_a_node_is_killed_half_way(
     for record in read_records(tmp_path):
         assert (tmp_path / str(record.video)).read_text() == record.slug
 
-    # What would end every episode ends the run, from far away too.
-    with pytest.raises(RenderDeviceError, match="No Vulkan device"):
+    # What would end every episode ends the run if all machines say so.
+    with pytest.raises(RoboIRGError, match=r"No machine of the Ray cluster.*No Vulkan device"):
         run_plan(PLAN, tmp_path / "b", FakePlayer(tmp_path, fatal=0), RayCluster(1))
 
 
@@ -125,7 +126,7 @@ class Homebound:
 
 def test_what_the_machines_do_not_have_is_told(tmp_path: Path) -> None:
     with pytest.raises(
-        RoboIRGError, match=r"No worker of the Ray cluster can start \(.*only_at_home"
+        RoboIRGError, match=r"No machine of the Ray cluster can play \(.*only_at_home"
     ):
         run_plan(PLAN, tmp_path, Homebound(), RayCluster(1))  # type: ignore[arg-type]
 
@@ -146,9 +147,10 @@ def test_no_workers_is_one_sentence() -> None:
         RayCluster(0)
 
 
-def test_only_who_has_the_key_reaches_the_hosts_of_a_machine() -> None:
-    hosts = _MachineHosts(HostSettings())
-    address = hosts.address()
+def test_only_who_has_the_key_reaches_the_hosts_of_a_machine(tmp_path: Path) -> None:
+    hosts = MachineAgent(tmp_path / "agent", HostSettings())
+    address = hosts.check(MachineVersions.here(())).hosts
+    assert address is not None
     try:
         with address._replace(key=b"x" * 32).connect() as stranger:
             assert stranger.recv(1) == b""

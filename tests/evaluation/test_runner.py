@@ -16,7 +16,7 @@ from msgspec.structs import replace
 
 from roboirg.core.errors import InvalidValueError, RenderDeviceError
 from roboirg.evaluation.plan.stored_plans import read_plan
-from roboirg.evaluation.records.record import Job, Record
+from roboirg.evaluation.records.record import ErrorKind, Job, Record
 from roboirg.evaluation.records.store import RECORDS_FILE, RecordStore, StoreError, read_records
 from roboirg.evaluation.run.executor import InProcess, LocalProcesses, choose_executor
 from roboirg.evaluation.run.progress import SilentReporter
@@ -225,3 +225,48 @@ def test_workers_are_counted() -> None:
     assert isinstance(choose_executor(None), LocalProcesses)
     with pytest.raises(InvalidValueError, match="workers is -1"):
         choose_executor(-1)
+
+
+@pytest.mark.parametrize("field", ["language_version", "environment_version"])
+def test_a_record_of_another_version_is_not_stored(tmp_path: Path, field: str) -> None:
+    plan = small_plan(1)
+
+    def elsewhere(job: Job) -> Record:
+        record = FakePlay()(job)
+        return replace(record, **{field: type(getattr(record, field))(7)})
+
+    what = field.removesuffix("_version")
+    with pytest.raises(StoreError, match=f"with {what} version 7, .* was not stored"):
+        run_plan(plan, tmp_path, elsewhere, InProcess())
+    assert not (tmp_path / RECORDS_FILE).read_bytes()
+
+
+@pytest.mark.parametrize(("error", "place"), [("infrastructure", 1), ("environment", -1)])
+def test_what_was_lost_is_retried_at_once_and_errors_after_all_others(
+    tmp_path: Path, error: ErrorKind, place: int
+) -> None:
+    played: list[str] = []
+
+    def play(job: Job) -> Record:
+        played.append(job.slug)
+        record = FakePlay()(job)
+        if len(played) > 1:
+            return record
+        return replace(record, outcome="error", error=error, cause=f"{error}: x")
+
+    run_plan(small_plan(4), tmp_path, play, InProcess())
+    assert played[place] == played[0]
+    assert len(played) == len(small_plan(4).jobs()) + 1
+
+
+def test_machines_of_other_versions_are_named() -> None:
+    from roboirg.evaluation.run.ray_machines import MachineVersions
+
+    here = MachineVersions.here(("random",))
+    assert here.difference(MachineVersions.here(("random",))) is None
+    there = here._replace(language="2.0.1")
+    assert here.difference(there) == (
+        f"its language has version 2.0.1 there and {here.language} here"
+    )
+    other = here._replace(policies={"random": "old"})
+    assert str(here.difference(other)).startswith("random has version old there")

@@ -274,6 +274,7 @@ def test_a_policy_that_cannot_be_reached_is_left_and_the_others_go_on(tmp_path: 
     plan = small_plan(50, ("random", "oracle"))
     summary = run_plan(plan, tmp_path, Unreachable("random"), LocalProcesses(1))
     assert summary.unreachable == ("random",)
-    assert len(summary.errors) == UNREACHABLE_AFTER
-    assert summary.missing == 100 - UNREACHABLE_AFTER
+    played = len(summary.errors)
+    assert UNREACHABLE_AFTER <= played <= UNREACHABLE_AFTER + 1  # one was under way
+    assert summary.missing == 100 - played
     assert sum(record.policy == "oracle" for record in read_records(tmp_path)) == 100

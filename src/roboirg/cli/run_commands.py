@@ -249,7 +249,8 @@ def _executor(plan: Plan, name: str, workers: int | None) -> Executor:
     if name == "ray":
         from roboirg.evaluation.run.ray_cluster import RayCluster
 
-        return RayCluster(workers, os.environ.get("RAY_ADDRESS"), plan.episode_timeout_s)
+        address = os.environ.get("RAY_ADDRESS")
+        return RayCluster(workers, address, plan.episode_timeout_s, plan.cluster)
     from roboirg.evaluation.run.executor import choose_executor
 
     return choose_executor(workers, plan.episode_timeout_s)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import tempfile
 import time
+from collections import deque
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -67,7 +68,7 @@ def episodes_per_hour(policy: type, workers: int) -> float:
     times = []
     with tempfile.TemporaryDirectory() as folder:
         runner = EpisodeRunner(Path(folder), hosting=plan.hosting)
-        for record in LocalProcesses(workers).run(plan.jobs(), runner):
+        for record in LocalProcesses(workers).run(deque(plan.jobs()), runner):
             times.append(time.perf_counter())
             if record.outcome == "error":
                 raise RuntimeError(f"an episode ended in an error: {record.cause}")

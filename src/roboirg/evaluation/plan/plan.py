@@ -33,6 +33,7 @@ from roboirg.core.word_pools import POOLS
 from roboirg.evaluation.hosting.host_pool import DEFAULT_BATCH, HostSettings
 from roboirg.evaluation.hosting.policy_descriptions import describe_policy
 from roboirg.evaluation.plan.plan_parsing import check_names, name_and_spec
+from roboirg.evaluation.plan.worker_needs import WorkerNeeds
 from roboirg.evaluation.play.job_instruction import instruct_job
 from roboirg.evaluation.records.film import VideoMode
 from roboirg.evaluation.records.record import (
@@ -126,6 +127,8 @@ class Plan(BaseModel):
     """Time limit of one call of a policy, seconds."""
     episode_timeout_s: float = 7200.0
     """Time limit of an episode, seconds."""
+    cluster: WorkerNeeds = WorkerNeeds()
+    """What a worker reserves on a machine of a Ray cluster, and what it gets from this one."""
     tries: int = 2
     """How often an episode is played if it ends in an error of a kind in `retry_on`."""
     retry_on: tuple[ErrorKind, ...] = RETRYABLE

@@ -1,14 +1,15 @@
 """Executors: play jobs in this process or in worker processes.
 
-An executor gets jobs and a function that plays one, and yields one record for each job in the order
-in which they finish. Storing records and retrying errors is the caller's task. To write your own,
-implement `Executor`; `roboirg.evaluation.run.ray_cluster` is one for many machines.
+An executor takes jobs from a queue, plays them with a function, and yields one record for each in
+the order in which they finish. Storing records is the caller's task, and so is retrying errors: it
+puts jobs back into the queue. To write your own, implement `Executor`;
+`roboirg.evaluation.run.ray_cluster` is one for many machines.
 """
 
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from multiprocessing.connection import wait
 from typing import Protocol
@@ -23,11 +24,21 @@ from roboirg.util.processor import core_count, worker_count
 NO_TIMEOUT_S = float("inf")
 
 
+Warn = Callable[[str], None]
+"""Shows a sentence that the user should read now."""
+
+
 class Executor(Protocol):
     """Interface of an executor."""
 
-    def run(self, jobs: Sequence[Job], play: PlayJob) -> Iterator[Record]:
+    def run(self, jobs: deque[Job], play: PlayJob, warn: Warn, /) -> Iterator[Record]:
         """Yield one record for each job as they finish; closing the iterator stops the rest.
+
+        Args:
+            jobs: the jobs, from which the caller may remove some, and to which it may add some
+                whenever it has got a record.
+            play: plays one job.
+            warn: shows what the user should know of the machines.
 
         Raises:
             RoboIRGError: an error that would end every other job too (no Vulkan device, …).
@@ -41,10 +52,11 @@ class InProcess:
     There is no supervisor: a crash ends the run, and a hanging call is never ended.
     """
 
-    def run(self, jobs: Sequence[Job], play: PlayJob) -> Iterator[Record]:
+    def run(self, jobs: deque[Job], play: PlayJob, _warn: Warn = print, /) -> Iterator[Record]:
         """Yield one record for each job, in order."""
         with open_hosts(play) as connect, connected(play, connect) as hosted:
-            yield from map(hosted, jobs)
+            while jobs:
+                yield hosted(jobs.popleft())
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,7 +81,7 @@ class LocalProcesses:
         if self.workers < 1:
             raise InvalidValueError(f"workers is {self.workers}; it must be at least 1.")
 
-    def run(self, jobs: Sequence[Job], play: PlayJob) -> Iterator[Record]:
+    def run(self, jobs: deque[Job], play: PlayJob, _warn: Warn = print, /) -> Iterator[Record]:
         """Yield one record for each job as they finish.
 
         Raises:
@@ -78,16 +90,16 @@ class LocalProcesses:
         with open_hosts(play) as connect:
             yield from self._run(jobs, play, connect)
 
-    def _run(self, jobs: Sequence[Job], play: PlayJob, connect: Connect | None) -> Iterator[Record]:
-        waiting, failed_starts = deque(jobs), 0
+    def _run(self, jobs: deque[Job], play: PlayJob, connect: Connect | None) -> Iterator[Record]:
+        failed_starts = 0
         # With a process on every core, more threads in Mesa would not help.
         limit_threads = self.workers >= core_count()
         active: list[Worker] = []
         released: list[Worker] = []
         try:
-            while waiting or active:
-                while waiting and len(active) < self.workers:
-                    job = waiting.popleft()
+            while jobs or active:
+                while jobs and len(active) < self.workers:
+                    job = jobs.popleft()
                     active.append(Worker.start(play, job, connect, limit_threads=limit_threads))
                 for worker, record in self._finished(active):
                     failed_starts = failed_starts + 1 if worker.failed_to_start else 0
@@ -95,8 +107,8 @@ class LocalProcesses:
                         raise RoboIRGError(f"No worker process can start ({record.cause}).")
                     if worker.is_dead:
                         active.remove(worker)
-                    elif waiting:
-                        worker.assign(waiting.popleft())
+                    elif jobs:
+                        worker.assign(jobs.popleft())
                     else:
                         active.remove(worker)
                         released.append(worker)

@@ -6,7 +6,7 @@ import contextlib
 import os
 import signal
 import threading
-from collections import Counter
+from collections import Counter, deque
 from collections.abc import Generator, Iterable, Iterator, Sequence
 from pathlib import Path
 from types import FrameType
@@ -32,7 +32,7 @@ from roboirg.evaluation.records.store import (
     StoreError,
     read_index,
 )
-from roboirg.evaluation.run.executor import Executor
+from roboirg.evaluation.run.executor import Executor, Warn
 from roboirg.evaluation.run.progress import Reporter, SilentReporter
 from roboirg.language import LANGUAGE_VERSION
 from roboirg.tasks.splits.splits import get_episode
@@ -78,8 +78,9 @@ def run_plan(
 ) -> RunSummary:
     """Play the jobs of a plan that the folder lacks; store each record as soon as it arrives.
 
-    An episode that ends in an error of a kind in `Plan.retry_on` is retried after all others, at
-    most `Plan.tries` times in all; the newest record counts.
+    An episode that ends in an error of a kind in `Plan.retry_on` is retried after all others, or at
+    once if its machine or process was lost, at most `Plan.tries` times in all; the newest record
+    counts.
 
     Args:
         plan: what to play.
@@ -190,26 +191,23 @@ class _RunLoop:
 
     def play(self, todo: Sequence[Job], play: PlayJob, executor: Executor) -> None:
         """Play jobs, and retry those that ended in an error of a retryable kind."""
-        while todo:
-            todo = self._play_once(todo, play, executor)
-
-    def _play_once(self, todo: Sequence[Job], play: PlayJob, executor: Executor) -> list[Job]:
-        """Play jobs once. Returns the jobs to play next."""
-        open_jobs, again = {identity_key(job): job for job in todo}, []
-        with contextlib.closing(_iterate(executor, todo, play)) as records:
+        waiting, by_key = deque(todo), {identity_key(job): job for job in todo}
+        with contextlib.closing(_iterate(executor, waiting, play, self._reporter.warn)) as records:
             for record in records:
-                job = open_jobs.pop(identity_key(record))
+                job = by_key[identity_key(record)]
                 self._store_record(job, record)
-                if self._should_retry(job, record):
-                    again.append(job)
                 if self._count_connection_error(record):
-                    # Start again with the jobs of the other policies.
                     self._report_unreachable(record)
-                    again += open_jobs.values()
-                    break
-        return [job for job in again if job.policy not in self.unreachable]
+                    left = [one for one in waiting if one.policy != record.policy]
+                    waiting.clear()
+                    waiting.extend(left)
+                elif self._should_retry(job, record):
+                    # What was lost with a machine can be played at once; others had better wait.
+                    lost = record.error == "infrastructure"
+                    (waiting.appendleft if lost else waiting.append)(job)
 
     def _store_record(self, job: Job, record: Record) -> None:
+        _check_record_version(record)
         record = _refuse_contradiction(record)
         before = self._store.stored.get(identity_key(job))
         if before is not None:
@@ -222,15 +220,19 @@ class _RunLoop:
             self.video_errors.append(record.video_error)
 
     def _should_retry(self, job: Job, record: Record) -> bool:
-        return record.error in self._plan.retry_on and self.tries[job] < self._plan.tries
+        return (
+            record.error in self._plan.retry_on
+            and self.tries[job] < self._plan.tries
+            and job.policy not in self.unreachable
+        )
 
     def _count_connection_error(self, record: Record) -> bool:
-        """Count consecutive connection errors of a policy. Returns True at the limit."""
+        """Count consecutive connection errors of a policy. Returns True once, at the limit."""
         if record.error == "connection":
             self._connection_errors[record.policy] += 1
         else:
             self._connection_errors[record.policy] = 0
-        return self._connection_errors[record.policy] >= UNREACHABLE_AFTER
+        return self._connection_errors[record.policy] == UNREACHABLE_AFTER
 
     def _report_unreachable(self, record: Record) -> None:
         self.unreachable.append(record.policy)
@@ -238,6 +240,19 @@ class _RunLoop:
             f"{record.policy} could not be reached in {UNREACHABLE_AFTER} episodes in a row "
             f"({record.cause}); this run skips its remaining episodes."
         )
+
+
+def _check_record_version(record: Record) -> None:
+    """Refuse what a worker with another version of language or environment has played."""
+    for what, version, ours in (
+        ("language", record.language_version, LANGUAGE_VERSION),
+        ("environment", record.environment_version, ENVIRONMENT_VERSION),
+    ):
+        if version != ours:
+            raise StoreError(
+                f"A worker returned {record.slug} with {what} version {version}, but this roboirg "
+                f"has version {ours}; the record was not stored."
+            )
 
 
 def _refuse_contradiction(record: Record) -> Record:
@@ -314,9 +329,9 @@ def _seed(task: str, split: str, episode: int) -> str | int:
 
 
 def _iterate(
-    executor: Executor, jobs: Sequence[Job], play: PlayJob
+    executor: Executor, jobs: deque[Job], play: PlayJob, warn: Warn
 ) -> Generator[Record, None, None]:
-    yield from executor.run(jobs, play)
+    yield from executor.run(jobs, play, warn)
 
 
 @contextlib.contextmanager
@@ -326,11 +341,16 @@ def _sigterm_interrupts() -> Iterator[None]:
         yield  # only the main thread can handle signals
         return
 
+    received = threading.Event()
+
     def interrupt(_number: int, _frame: FrameType | None) -> None:
+        received.set()
         raise Terminated
 
     before = signal.signal(signal.SIGTERM, interrupt)
     try:
         yield
+    except KeyboardInterrupt as error:  # a library such as Ray may raise it in place of ours
+        raise (Terminated if received.is_set() else type(error)) from error
     finally:
         signal.signal(signal.SIGTERM, before)

@@ -170,6 +170,11 @@ class WorkerSlot:
             self._worker = None
         return record
 
+    @property
+    def queued_s(self) -> float:
+        """Seconds that the current job has waited for its turn."""
+        return 0.0 if self._worker is None else self._worker.watchdog.queued_s
+
     def close(self) -> None:
         """Terminate the process."""
         if self._worker is not None:

@@ -1,0 +1,270 @@
+"""What a run starts on each machine of a Ray cluster.
+
+| actor | how many | content |
+| --- | --- | --- |
+| `MachineAgent` | one a machine | checks the machine, holds its policy hosts, ends frozen workers |
+| `RemoteWorker` | one an episode under way | supervises a process of its own, as local workers do |
+
+Both answer `beat` in a thread of its own, so that the driver notices a frozen one.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import secrets
+import shutil
+import signal
+import socket
+import tempfile
+import threading
+import time
+from collections.abc import Mapping
+from pathlib import Path
+from typing import NamedTuple, Protocol, Self, cast, runtime_checkable
+
+from roboirg.core.episode import ENVIRONMENT_VERSION
+from roboirg.core.errors import RoboIRGError
+from roboirg.core.version import __version__
+from roboirg.evaluation.episode_errors import one_line
+from roboirg.evaluation.hosting.host_pool import HostPool, HostSettings
+from roboirg.evaluation.hosting.policy_descriptions import describe_policy
+from roboirg.evaluation.play.rollout import PlayJob
+from roboirg.evaluation.records.record import Job, Record
+from roboirg.evaluation.run.workers import WorkerSlot
+from roboirg.language import LANGUAGE_VERSION
+from roboirg.tasks.splits.private_splits import use_salt
+
+KEY_S = 1.0
+"""How long a client of a machine's hosts may take to send its key."""
+
+_PID_SUFFIX = ".pid"
+"""Of empty files named after the processes of a run on a machine."""
+
+
+@runtime_checkable
+class VideoRecorder(Protocol):
+    """A function that plays jobs and writes videos to a folder that can be changed."""
+
+    folder: Path
+
+    def in_folder(self, folder: Path) -> Self:
+        """Return a copy that writes its videos to another folder."""
+
+
+def video_recorder(play: object) -> VideoRecorder | None:
+    """Return what plays jobs, if it writes videos."""
+    return play if isinstance(play, VideoRecorder) else None
+
+
+class MachineVersions(NamedTuple):
+    """What must be the same on every machine, or records of one run would differ.
+
+    Attributes:
+        roboirg: version of the package.
+        language: version of the instructions.
+        environment: version of the environment.
+        policies: versions of the run's policies, by what names them.
+    """
+
+    roboirg: str
+    language: str
+    environment: int
+    policies: Mapping[str, str] = {}
+
+    @classmethod
+    def here(cls, specs: tuple[str, ...]) -> MachineVersions:
+        """Return those of this machine.
+
+        Raises:
+            RoboIRGError: a policy cannot be loaded.
+        """
+        policies = {spec: describe_policy(spec).version for spec in specs}
+        return cls(__version__, LANGUAGE_VERSION, ENVIRONMENT_VERSION, policies)
+
+    def difference(self, there: MachineVersions) -> str | None:
+        """Return how another machine differs, in words; None if it does not."""
+        pairs = [
+            ("roboirg", self.roboirg, there.roboirg),
+            ("its language", self.language, there.language),
+            ("its environment", self.environment, there.environment),
+            *((spec, mine, there.policies[spec]) for spec, mine in self.policies.items()),
+        ]
+        for what, mine, theirs in pairs:
+            if mine != theirs:
+                return f"{what} has version {theirs} there and {mine} here"
+        return None
+
+
+class HostAddress(NamedTuple):
+    """Where the policy hosts of a machine listen, for other actors there.
+
+    Attributes:
+        path: of the socket.
+        key: proves that a client belongs to the run; policies do not know it.
+    """
+
+    path: str
+    key: bytes
+
+    def connect(self) -> socket.socket:
+        """Return a new line to the hosts."""
+        line = socket.socket(socket.AF_UNIX)
+        line.connect(self.path)
+        line.sendall(self.key)
+        return line
+
+
+class CheckedMachine(NamedTuple):
+    """What an agent reports of its machine.
+
+    Attributes:
+        fault: why the machine cannot play, in words; None if it can.
+        folder: for temporary files of the run, removed at its end.
+        hosts: where the policy hosts listen; None if the run needs none.
+    """
+
+    fault: str | None
+    folder: Path
+    hosts: HostAddress | None = None
+
+
+class MachineAgent:
+    """Actor that checks a machine and holds its policy hosts; all workers there use them.
+
+    Args:
+        folder: for temporary files; an earlier agent there and its workers are killed, and their
+            files go.
+        settings: of the policy hosts; None if the run needs none.
+    """
+
+    def __init__(self, folder: Path, settings: HostSettings | None) -> None:
+        for noted in folder.glob(f"*{_PID_SUFFIX}"):
+            self.end(int(noted.stem))  # Ray does not kill what is frozen
+        shutil.rmtree(folder, ignore_errors=True)
+        folder.mkdir(mode=0o700)
+        _register(folder)
+        self._folder = folder
+        self._address: HostAddress | None = None
+        if settings is None:
+            return
+        self._pool = HostPool(settings)
+        path = str(folder / "hosts")
+        self._address = HostAddress(path, secrets.token_bytes(32))
+        self._door = socket.socket(socket.AF_UNIX)
+        self._door.bind(path)
+        self._door.listen()
+        threading.Thread(target=self._open_lines, daemon=True).start()
+
+    def check(self, versions: MachineVersions) -> CheckedMachine:
+        """Check that the machine has the same versions as the driver and can load the policies."""
+        try:
+            fault = versions.difference(MachineVersions.here(tuple(versions.policies)))
+        except RoboIRGError as error:
+            fault = one_line(error)
+        return CheckedMachine(fault, self._folder, self._address)
+
+    def beat(self) -> float:
+        """Return 0: this process is alive."""
+        return 0.0
+
+    def end(self, pid: int) -> None:
+        """Kill a process of this machine that does not answer."""
+        with contextlib.suppress(ProcessLookupError):
+            os.kill(pid, signal.SIGKILL)
+
+    def close(self) -> None:
+        """End the hosts and remove the files of the run."""
+        if self._address is not None:
+            self._door.close()
+            self._pool.close()
+        shutil.rmtree(self._folder, ignore_errors=True)
+
+    def _open_lines(self) -> None:
+        """Serve everyone who has the key; who does not send it at once is sent away."""
+        address = cast("HostAddress", self._address)
+        while True:
+            try:
+                line, _ = self._door.accept()
+            except OSError:
+                return
+            line.settimeout(KEY_S)
+            with contextlib.suppress(OSError):
+                if secrets.compare_digest(line.recv(len(address.key)), address.key):
+                    line.settimeout(None)
+                    self._pool.serve(line)
+                    continue
+            line.close()
+
+
+class RemoteResult(NamedTuple):
+    """Reply of a remote worker.
+
+    Attributes:
+        record: of the job; None if nothing can be played there.
+        fault: why not, in words.
+        files: contents of the videos and posters by path relative to the run's folder.
+    """
+
+    record: Record | None
+    fault: str = ""
+    files: Mapping[str, bytes] = {}
+
+
+class RemoteWorker:
+    """Actor that plays jobs on a machine of the cluster and returns videos as bytes.
+
+    Args:
+        play: plays one job.
+        episode_timeout_s: how long an episode may take.
+        salt: of the private split, if one is known.
+    """
+
+    def __init__(self, play: PlayJob, episode_timeout_s: float, salt: str | None) -> None:
+        if salt is not None:
+            use_salt(salt)
+        self._play, self._episode_timeout_s = play, episode_timeout_s
+        self._slot: WorkerSlot | None = None
+        self._started: float | None = None
+
+    def pid(self) -> int:
+        """Return the number of this process as soon as it runs."""
+        return os.getpid()
+
+    def beat(self) -> float:
+        """Return the seconds of the job under way, without those that it waited for its turn."""
+        started, slot = self._started, self._slot
+        if started is None or slot is None:
+            return 0.0
+        return time.monotonic() - started - slot.queued_s
+
+    def play(self, job: Job, machine: CheckedMachine) -> RemoteResult:
+        """Play a job on a machine that was found fit; it remains the same."""
+        if self._slot is None:
+            self._slot = self._new_slot(machine)
+        self._started = time.monotonic()
+        try:
+            record = self._slot.play(job)
+        except RoboIRGError as error:  # it would end every other job here, too
+            return RemoteResult(None, one_line(error))
+        finally:
+            self._started = None
+        files = {}
+        for path in sorted(self._folder.rglob("*")):
+            if path.is_file():
+                files[path.relative_to(self._folder).as_posix()] = path.read_bytes()
+                path.unlink()
+        return RemoteResult(record, files=files)
+
+    def _new_slot(self, machine: CheckedMachine) -> WorkerSlot:
+        _register(machine.folder)
+        self._folder = Path(tempfile.mkdtemp(dir=machine.folder))
+        recorder = video_recorder(self._play)
+        own = self._play if recorder is None else cast("PlayJob", recorder.in_folder(self._folder))
+        connect = None if machine.hosts is None else machine.hosts.connect
+        return WorkerSlot(own, self._episode_timeout_s, connect)
+
+
+def _register(folder: Path) -> None:
+    """Note this process, so that the machine's next agent ends it if it is frozen."""
+    (folder / f"{os.getpid()}{_PID_SUFFIX}").touch()

@@ -1,0 +1,21 @@
+"""A policy whose module cannot be imported on the bad machine of a cluster."""
+
+from __future__ import annotations
+
+import os
+
+from ray_fakes import BAD_MACHINE
+
+if os.environ.get(BAD_MACHINE):
+    raise ModuleNotFoundError("No module named 'their_model'")
+
+
+class Local:
+    """Is never asked."""
+
+    def reset(self, instruction: str, demonstration: object) -> None:
+        """Begin."""
+
+    def act(self, observation: object) -> list[list[float]]:
+        """Hold still."""
+        return [[0.0] * 8]

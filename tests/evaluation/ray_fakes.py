@@ -1,0 +1,61 @@
+"""Ways to play and policies that fail on one machine of a cluster: where `BAD_MACHINE` is set."""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+from evaluation_fakes import FakePlayer
+
+from roboirg.core.errors import RenderDeviceError
+from roboirg.evaluation.records.record import Job, Record
+
+BAD_MACHINE = "BAD_MACHINE"
+
+
+class WithoutVulkan(FakePlayer):
+    """Finds no Vulkan device on the bad machine."""
+
+    def __call__(self, job: Job) -> Record:
+        if os.environ.get(BAD_MACHINE):
+            raise RenderDeviceError("No Vulkan device can render; install one.")
+        return super().__call__(job)
+
+
+@dataclass(frozen=True)
+class UntilReleased(FakePlayer):
+    """Does not end the plan's last episodes before the file `gate` exists."""
+
+    gate: Path = Path()
+
+    def __call__(self, job: Job) -> Record:
+        while job.episode == 7 and not self.gate.exists():
+            time.sleep(0.1)
+        return super().__call__(job)
+
+
+class WithoutModule(FakePlayer):
+    """Cannot be loaded on the bad machine."""
+
+    def __reduce__(self) -> tuple[Callable[..., WithoutModule], tuple[Path, float]]:
+        return load, (self.folder, self.seconds)
+
+
+def load(folder: Path, seconds: float) -> WithoutModule:
+    """Load what plays."""
+    if os.environ.get(BAD_MACHINE):
+        raise ModuleNotFoundError("No module named 'needed_here'")
+    return WithoutModule(folder, seconds)
+
+
+class NotingPlace(FakePlayer):
+    """Writes in each video where it was played: a variable, a file of the working folder."""
+
+    def __call__(self, job: Job) -> Record:
+        record = super().__call__(job)
+        found = (os.environ.get("A_KEY", ""), Path("note.txt").read_text(), os.environ["RACK"])
+        (self.folder / str(record.video)).write_text(" ".join(found))
+        return record

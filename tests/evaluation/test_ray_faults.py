@@ -1,0 +1,224 @@
+"""One bad machine of a Ray cluster costs no record, and is named once."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+import ray_fakes
+from evaluation_fakes import FakePlayer, small_plan
+from ray_fakes import BAD_MACHINE, NotingPlace, UntilReleased, WithoutModule, WithoutVulkan
+
+from roboirg.core.errors import InvalidValueError, RoboIRGError
+from roboirg.evaluation.plan.worker_needs import WorkerNeeds
+from roboirg.evaluation.records.store import RECORDS_FILE, read_records
+from roboirg.evaluation.run import ray_pool
+from roboirg.evaluation.run.progress import SilentReporter
+from roboirg.evaluation.run.ray_cluster import RayCluster
+from roboirg.evaluation.run.runner import run_plan
+
+pytestmark = pytest.mark.slow
+
+ray = pytest.importorskip("ray")
+
+PLAN = small_plan(8).model_copy(update={"tries": 3})
+
+
+class Warnings(SilentReporter):
+    """Keeps what the user would read."""
+
+    def __init__(self) -> None:
+        self.texts: list[str] = []
+
+    def warn(self, text: str) -> None:
+        self.texts.append(text)
+
+
+@pytest.fixture
+def cluster(monkeypatch: pytest.MonkeyPatch) -> Iterator[Any]:
+    from ray.cluster_utils import Cluster
+
+    monkeypatch.syspath_prepend(Path(ray_fakes.__file__).parent)
+    nodes = Cluster(initialize_head=True, head_node_args={"num_cpus": 1})
+    yield nodes
+    ray.shutdown()
+    nodes.shutdown()
+
+
+def lines(folder: Path) -> int:
+    path = folder / RECORDS_FILE
+    return path.read_bytes().count(b"\n") if path.exists() else 0
+
+
+def actors(cluster: Any, name: str) -> list[int]:
+    """Return the processes of this cluster's actors, as other tests may have clusters, too."""
+    raylets = [node.all_processes["raylet"][0].process.pid for node in cluster.list_all_nodes()]
+    command = ["pgrep", "-P", ",".join(map(str, raylets)), "-f", f"ray::{name}"]
+    found = subprocess.run(command, capture_output=True, check=False)
+    return list(map(int, found.stdout.split()))
+
+
+def after(folder: Path, count: int, act: Callable[[], object]) -> threading.Thread:
+    """Act in a thread as soon as that many records are stored."""
+
+    def run() -> None:
+        while lines(folder) < count:
+            time.sleep(0.05)
+        act()
+
+    thread = threading.Thread(target=run, daemon=True)
+    thread.start()
+    return thread
+
+
+@pytest.mark.parametrize(
+    ("play", "policy", "fault"),
+    [
+        (WithoutVulkan, "random", "No Vulkan device can render; install one."),
+        (WithoutModule, "random", "No module named 'needed_here'"),
+        (FakePlayer, "local_policy:Local", "No module named 'their_model'"),
+    ],
+)
+def test_a_bad_machine_is_left_out_and_named_once(
+    cluster: Any, tmp_path: Path, play: type[FakePlayer], policy: str, fault: str
+) -> None:
+    cluster.add_node(num_cpus=1, env_vars={BAD_MACHINE: "1"})
+    warnings = Warnings()
+    plan = small_plan(8, (policy,)).model_copy(update={"tries": 3})
+    summary = run_plan(
+        plan, tmp_path, play(tmp_path, 0.3), RayCluster(address=cluster.address), reporter=warnings
+    )
+    assert (summary.errors, summary.missing) == ((), 0)
+    assert lines(tmp_path) == len(plan.jobs())  # nothing that it played was stored
+    (named,) = [text for text in warnings.texts if "left out" in text]
+    assert fault.rstrip(".") in named
+
+
+@pytest.mark.parametrize("actor", ["RemoteWorker", "MachineAgent"])
+def test_what_is_frozen_is_noticed_and_its_episode_played_elsewhere(
+    cluster: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, actor: str
+) -> None:
+    monkeypatch.setattr(ray_pool, "BEAT_S", 1.0)
+    monkeypatch.setattr(ray_pool, "SILENCE_S", 8.0)
+    cluster.add_node(num_cpus=1)
+    frozen: list[int] = []
+
+    def freeze() -> None:
+        frozen.append(actors(cluster, actor)[0])
+        os.kill(frozen[0], signal.SIGSTOP)
+
+    freezer = after(tmp_path, 4, freeze)
+    play = UntilReleased(tmp_path, 0.5, gate=tmp_path / "released")
+    run = threading.Thread(
+        target=run_plan, args=(PLAN, tmp_path, play, RayCluster(address=cluster.address))
+    )
+    run.start()
+    freezer.join()
+    while Path(f"/proc/{frozen[0]}").exists() and run.is_alive():
+        time.sleep(0.1)
+    play.gate.touch()
+    run.join()
+    assert not Path(f"/proc/{frozen[0]}").exists()
+    kept = list(read_records(tmp_path))
+    assert (len(kept), [one.error for one in kept if one.error]) == (len(PLAN.jobs()), [])
+    assert "has not answered" in (tmp_path / RECORDS_FILE).read_text()
+
+
+def test_a_machine_that_joins_is_used_and_a_head_without_cpus_is_not(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from ray.cluster_utils import Cluster
+
+    nodes = Cluster(initialize_head=True, head_node_args={"num_cpus": 0})
+    warnings = Warnings()
+    monkeypatch.setattr(ray_pool, "WAIT_S", 2.0)
+    play, executor = FakePlayer(tmp_path), RayCluster(address=nodes.address)
+    run = threading.Thread(
+        target=run_plan, args=(PLAN, tmp_path, play, executor), kwargs={"reporter": warnings}
+    )
+    try:
+        run.start()
+        while not warnings.texts:
+            time.sleep(0.1)
+        nodes.add_node(num_cpus=1)
+        run.join()
+    finally:
+        ray.shutdown()
+        nodes.shutdown()
+    assert "Waiting for a free CPU" in warnings.texts[0]
+    assert lines(tmp_path) == len(PLAN.jobs())
+
+
+def test_a_worker_gets_what_the_plan_asks_for(
+    cluster: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    folder, out = tmp_path / "policies", tmp_path / "run"
+    folder.mkdir()
+    (folder / "note.txt").write_text("copied")
+    here = Path(ray_fakes.__file__).parent
+    for module in ("ray_fakes.py", "evaluation_fakes.py"):
+        (folder / module).write_text((here / module).read_text())
+    for rack in ("a", "b"):
+        cluster.add_node(num_cpus=2, num_gpus=1, labels={"rack": rack}, env_vars={"RACK": rack})
+    monkeypatch.setenv("A_KEY", "secret")
+    needs = WorkerNeeds(
+        gpus=0.5, labels={"rack": "b"}, variables=("A_KEY",), working_dir=str(folder)
+    )
+    executor = RayCluster(address=cluster.address, needs=needs)
+    summary = run_plan(PLAN, out, NotingPlace(out), executor)
+    assert (summary.errors, summary.missing) == ((), 0)
+    assert {(out / str(one.video)).read_text() for one in read_records(out)} == {"secret copied b"}
+
+    needs = WorkerNeeds(variables=("NOT_SET_HERE",))
+    with pytest.raises(InvalidValueError, match="NOT_SET_HERE is not set here"):
+        run_plan(
+            small_plan(9), out, NotingPlace(out), RayCluster(address=cluster.address, needs=needs)
+        )
+
+
+def test_the_loss_of_the_head_is_one_sentence(
+    cluster: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(ray_pool, "HEAD_LOST_S", 5.0)
+    gcs = cluster.head_node.all_processes["gcs_server"][0].process.pid
+    after(tmp_path, 4, lambda: os.kill(gcs, signal.SIGKILL))
+    play = FakePlayer(tmp_path, 0.5)
+    with pytest.raises(RoboIRGError, match=r"head of the Ray cluster .* same command again"):
+        run_plan(PLAN, tmp_path, play, RayCluster(address=cluster.address))
+    assert 4 <= lines(tmp_path) == len(list(read_records(tmp_path)))
+
+
+COMMAND = """
+import sys
+from pathlib import Path
+from evaluation_fakes import FakePlayer, small_plan
+from roboirg.evaluation.run.ray_cluster import RayCluster
+from roboirg.evaluation.run.runner import Terminated, run_plan
+folder = Path(sys.argv[1])
+try:
+    run_plan(small_plan(8), folder, FakePlayer(folder, 0.5), RayCluster(address=sys.argv[2]))
+except Terminated:
+    sys.exit(143)
+"""
+
+
+def test_sigterm_ends_a_run_as_it_does_locally(cluster: Any, tmp_path: Path) -> None:
+    here = Path(ray_fakes.__file__).parent
+    command = subprocess.Popen(
+        [sys.executable, "-c", COMMAND, str(tmp_path), cluster.address],
+        env=os.environ | {"PYTHONPATH": str(here)},
+        stderr=subprocess.PIPE,
+    )
+    after(tmp_path, 3, command.terminate)
+    _, errors = command.communicate()
+    assert command.returncode == 143, errors.decode()
+    assert b"Traceback" not in errors
+    assert 3 <= lines(tmp_path) < len(PLAN.jobs())
