@@ -11,7 +11,13 @@ from typing import Literal, NamedTuple
 from roboirg.core.fact_traits import FactKind, FactTraits, fact_traits
 
 GroundingFailure = Literal[
-    "wrong_object", "mirrored_pick", "wrong_count", "wrong_order", "wrong_time", "wrong_place"
+    "wrong_object",
+    "mirrored_pick",
+    "wrong_count",
+    "wrong_order",
+    "wrong_time",
+    "wrong_place",
+    "other_goal",
 ]
 """The policy did something else than the instruction means."""
 

@@ -17,6 +17,7 @@ class EnvOptions(InstructionKeywords, total=False):
 
     split: str
     episode: int | None
+    arm: str
     actions: str
     cameras: Sequence[str]
     depth: bool

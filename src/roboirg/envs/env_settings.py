@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from roboirg.core.actions import JOINT_ANGLE
+from roboirg.core.arms import TOLD, check_arm
 from roboirg.core.episode import Episode
 from roboirg.core.errors import InvalidValueError, UnknownNameError
 from roboirg.core.instruction_options import (
@@ -25,7 +26,7 @@ MAX_STEPS = 1300
 """Control steps a policy has, as in RoboMME's published experiments."""
 EXPLICIT_WORDS = InstructionOptions()
 RENDER_MODES = ("rgb_array",)
-RESET_OPTIONS = ("split", "episode", *OPTION_NAMES)
+RESET_OPTIONS = ("split", "episode", "arm", *OPTION_NAMES)
 """Options that `reset` takes: which episode is played, and in which words."""
 
 
@@ -37,13 +38,14 @@ class EnvSettings:
         words: of the instruction; the file of its wordings has been opened.
 
     Raises:
-        UnknownNameError: there is no such render mode.
+        UnknownNameError: there is no such render mode or arm.
         InvalidValueError: `max_steps` is no positive integer.
     """
 
     words: InstructionOptions = EXPLICIT_WORDS
     split: str = "test"
     episode: int | None = 0
+    arm: str = TOLD
     actions: str = JOINT_ANGLE.name
     cameras: Sequence[str] = CAMERAS
     depth: bool = False
@@ -70,6 +72,7 @@ class EnvSettings:
             raise InvalidValueError(f"max_steps is {self.max_steps!r}; it must be an integer >= 1.")
         if self.render_mode is not None and self.render_mode not in RENDER_MODES:
             raise UnknownNameError("render mode", self.render_mode, RENDER_MODES)
+        check_arm(self.arm)
 
     @property
     def episodes(self) -> int:

@@ -22,7 +22,7 @@ from roboirg.envs.env_settings import RENDER_MODES, EnvSettings, choose_index
 from roboirg.envs.episode_state import EpisodeState
 from roboirg.envs.observation_spaces import make_observation_space
 from roboirg.judging import Event, Status, plain_subgoal
-from roboirg.language import Instruction, instruct_with
+from roboirg.language.arms import ArmWords, say_arm
 from roboirg.simulation.controllers import make_controller
 from roboirg.simulation.episode_session import EpisodeSession
 from roboirg.simulation.observation_builder import ObservationBuilder
@@ -67,13 +67,16 @@ class RoboIRGEnv(gymnasium.Env[dict[str, Any], NDArray[np.floating[Any]]]):
     `grounded`. At reset also `demonstration`, arrays as in the observation with a leading axis T
     (pictures are drawn when they are read), and `demonstration_subgoals`, T texts, and
     `demonstration_source`: ``recorded`` (RoboMME's actions), ``planned`` by the oracle, or
-    ``none``.
+    ``none``. In the arm ``other-goal`` also `verdict` and `original`: the status of the stated goal
+    and of the scene's own one.
 
     The arguments are those of `roboirg.make`, which documents them.
 
     Attributes:
         episode: the episode that is played, or will be.
         instruction: its instruction.
+        original: the scene's own episode in the arm ``other-goal``, whose `episode` has another
+            goal; else None.
         draws: whether observations hold pictures; `read_pictures` reads them at any time.
 
     Raises:
@@ -90,7 +93,7 @@ class RoboIRGEnv(gymnasium.Env[dict[str, Any], NDArray[np.floating[Any]]]):
     def __init__(self, task: str | Episode, **options: Unpack[EnvOptions]) -> None:
         self._task, self._settings = task, EnvSettings.of(options)
         self._last_index: int | None = None
-        self._instructed: tuple[tuple[Episode, InstructionOptions], Instruction] | None = None
+        self._instructed: tuple[tuple[Episode, InstructionOptions, str], ArmWords] | None = None
         self._select_episode(self._settings, choose_index(self._settings, None, None))
         self._space = find_action_space(self._settings.actions)
         self._spec = self._settings.observation_spec()
@@ -120,16 +123,17 @@ class RoboIRGEnv(gymnasium.Env[dict[str, Any], NDArray[np.floating[Any]]]):
     @property
     def status(self) -> str:
         """Episode status: ongoing, success, failure or timeout."""
-        status = self.session.status
-        if status is Status.ONGOING and self._current.steps >= self.max_steps:
-            return "timeout"
-        return str(status)
+        session, is_late = self.session, self._current.steps >= self.max_steps
+        if not session.is_decided and not is_late:
+            return "ongoing"  # in the arm other-goal even after the verdict
+        return "timeout" if session.status is Status.ONGOING else str(session.status)
 
     @property
     def cause(self) -> str | None:
         """Why the episode ended without success, in words; None if it did not."""
-        late = f"not done after {self.max_steps} steps" if self.status == "timeout" else None
-        return self.session.judge.cause or late
+        if self.status == "timeout":
+            return f"not done after {self.max_steps} steps"
+        return None if self.status == "ongoing" else self.session.judge.cause
 
     @property
     def subgoal(self) -> str:
@@ -301,10 +305,10 @@ class RoboIRGEnv(gymnasium.Env[dict[str, Any], NDArray[np.floating[Any]]]):
         self._last_index = self.episode.index
 
     def _select_episode(self, settings: EnvSettings, index: int) -> None:
-        chosen = settings.find_episode(self._task, index), settings.words
+        chosen = settings.find_episode(self._task, index), settings.words, settings.arm
         if self._instructed is None or self._instructed[0] != chosen:
-            self._instructed = chosen, instruct_with(*chosen)
-        (self.episode, _), self.instruction = self._instructed
+            self._instructed = chosen, say_arm(*chosen)
+        _, (self.episode, self.instruction, self.original) = self._instructed
         self.delivery = settings.words.delivery
 
     def _play_demonstration(self, recording: Recording | None) -> Recording:
@@ -320,7 +324,10 @@ class RoboIRGEnv(gymnasium.Env[dict[str, Any], NDArray[np.floating[Any]]]):
 
     def _start_episode(self) -> EpisodeState:
         session = EpisodeSession(
-            self.episode, visible=self._renders, rendering=self._spec.rendering
+            self.episode,
+            visible=self._renders,
+            rendering=self._spec.rendering,
+            original=self.original,
         )
         world = session.world
         return EpisodeState(
@@ -345,7 +352,7 @@ class RoboIRGEnv(gymnasium.Env[dict[str, Any], NDArray[np.floating[Any]]]):
                         return
         except MotionPlanningError as error:
             # The policy chose a pose that cannot be reached: a failure, not an error.
-            self.session.judge.fail(str(error))
+            self.session.fail(str(error))
 
     def _after_step(self, stage: Stage | None, *, demonstration: bool = False) -> None:
         """Update the state and call the frame hook after a control step.
@@ -395,6 +402,8 @@ class RoboIRGEnv(gymnasium.Env[dict[str, Any], NDArray[np.floating[Any]]]):
         }
         if state.pixel_grounding is not None:
             info["grounded_subgoal"] = state.pixel_grounding.text
+        if self.session.original is not None:
+            info |= {"verdict": str(judge.status), "original": str(self.session.original.status)}
         return info
 
 

@@ -30,6 +30,8 @@ def make(task: str | Episode, **options: Unpack[EnvOptions]) -> RoboIRGEnv:
         split: train, val, test or random.
         episode: index of the episode in the split, from 0; None if the seed of each reset
             chooses it.
+        arm: told, or a control arm: other words, or another goal, for the same scene
+            (docs/controls.md).
         actions: joint_angle, ee_pose or waypoint.
         cameras: cameras whose pictures observations hold; () renders nothing.
         depth: add depth for the same cameras.

@@ -11,7 +11,7 @@ from roboirg.core.episode import Episode, Stage
 from roboirg.core.fact_traits import FactRole
 from roboirg.judging.events import Event
 from roboirg.judging.fact_history import FactHistory
-from roboirg.judging.judge import Judge
+from roboirg.judging.judge import Judge, Status
 
 
 class FactInterval(NamedTuple):
@@ -26,6 +26,18 @@ class FactInterval(NamedTuple):
     fact: Fact
     start: int
     end: int | None
+
+
+class Decision(NamedTuple):
+    """How an episode ended for a goal.
+
+    Attributes:
+        judge: after the verdict, or the last step.
+        step: of the verdict, or the last one; since the world began.
+    """
+
+    judge: Judge
+    step: int
 
 
 @dataclass(frozen=True)
@@ -111,6 +123,15 @@ def rejudge(
     return EpisodeReplay(
         episode, policy_start_step, tuple(expected_stages), facts, _intervals(events), judge
     )
+
+
+def decide(episode: Episode, events: Sequence[Event], elapsed_steps: int) -> Decision:
+    """Judge an episode again up to its verdict; faster than `rejudge`."""
+    judge = Judge((*episode.demonstration, *episode.stages), episode.scene)
+    for step in _evaluations(judge, events, elapsed_steps):
+        if judge.status is not Status.ONGOING:
+            return Decision(judge, step)
+    return Decision(judge, elapsed_steps)
 
 
 def completed_stages(

@@ -86,10 +86,13 @@ def instruct(
     return instruct_with(episode, replace(chosen, **as_fields(options)))
 
 
-def instruct_with(episode: Episode, options: InstructionOptions) -> Instruction:
-    """Return the instruction of an episode; like `instruct`, with all options in one value."""
+def instruct_with(episode: Episode, options: InstructionOptions, variant: int = 0) -> Instruction:
+    """Return the instruction of an episode; like `instruct`, with all options in one value.
+
+    Each `variant` draws its words anew; 0 is the one that is told.
+    """
     setting = get_setting(options.setting, get_task(episode.task))
-    request = _request(episode, options)
+    request = _request(episode, options, variant)
     missing = _missing(request)
     if missing is not None:
         raise InvalidValueError(f"The {missing}.")
@@ -104,7 +107,7 @@ def instruct_with(episode: Episode, options: InstructionOptions) -> Instruction:
             # Both forms have a command from outside, or none of them.
             forms = {str(form): _say_outside(request, setting, form) for form in FORMS}
             return _instruction(*forms[options.form])
-    own = replace(request, wordings=None, sampler=_sampler(episode))
+    own = replace(request, wordings=None, sampler=TemplateSampler(request.sampler.key))
     return _instruction(own, setting.say(own))
 
 
@@ -116,7 +119,8 @@ def _say_outside(
     Which command the setting fills is known only then, so it is said again with its phrases.
     """
     options = replace(request.options, form=form)
-    request = replace(request, options=options, sampler=_sampler(request.episode), filled=[])
+    sampler = TemplateSampler(request.sampler.key)
+    request = replace(request, options=options, sampler=sampler, filled=[])
     spec = setting.say(request)
     if request.phrases_of is None and request.filled:
         return _say_outside(replace(request, phrases_of=request.filled[-1]), setting, form)
@@ -149,7 +153,7 @@ def expressible(
     return tuple(name for name in settings_of(get_task(episode.task)) if name not in refused)
 
 
-def _request(episode: Episode, options: InstructionOptions) -> InstructionRequest:
+def _request(episode: Episode, options: InstructionOptions, variant: int = 0) -> InstructionRequest:
     check_options(options)
     task = get_task(episode.task)
     wordings = None
@@ -157,11 +161,8 @@ def _request(episode: Episode, options: InstructionOptions) -> InstructionReques
         wordings = find_wordings(options.wordings).tasks.get(task.name, TaskWordings(()))
         if wordings.own & {options.setting, all_settings()[options.setting].plain}:
             wordings = None
-    return InstructionRequest(episode, task, options, _sampler(episode), wordings)
-
-
-def _sampler(episode: Episode) -> TemplateSampler:
-    return TemplateSampler(f"{LANGUAGE_VERSION}|{episode.task}|{episode.seed}")
+    key = f"{LANGUAGE_VERSION}|{episode.task}|{episode.seed}" + f"|{variant}" * bool(variant)
+    return InstructionRequest(episode, task, options, TemplateSampler(key), wordings)
 
 
 def _missing(request: InstructionRequest) -> str | None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import itertools
 from collections.abc import Callable, Iterator
 from typing import Any
 
@@ -32,15 +33,23 @@ class EpisodeSession:
     Attributes:
         world: the simulator.
         judge: follows all stages, those of the demonstration first.
+        original: follows the stages to the scene's own goal in the same way, if the episode has
+            another one; else None.
         events: all events since the start.
     """
 
     def __init__(
-        self, episode: Episode, *, visible: bool, rendering: RenderSettings = FAITHFUL
+        self,
+        episode: Episode,
+        *,
+        visible: bool,
+        rendering: RenderSettings = FAITHFUL,
+        original: Episode | None = None,
     ) -> None:
         self.episode = episode
         self.world = World(episode.scene, visible=visible, rendering=rendering)
-        self.judge = Judge((*episode.demonstration, *episode.stages), episode.scene)
+        self.judge = _judge_of(episode)
+        self.original = None if original is None else _judge_of(original)
         self.events: list[Event] = list(changes(0, frozenset(), self.world.facts))
         self._judge()
 
@@ -48,6 +57,16 @@ class EpisodeSession:
     def status(self) -> Status:
         """Status of the episode."""
         return self.judge.status
+
+    @property
+    def is_decided(self) -> bool:
+        """Whether the verdict has fallen, on the original goal as well if there is one."""
+        return all(judge.status is not Status.ONGOING for judge in self._judges)
+
+    def fail(self, cause: str) -> None:
+        """End the episode as a failure of every goal that is not decided yet."""
+        for judge in self._judges:
+            judge.fail(cause)
 
     def step(self, action: NDArray[np.floating[Any]]) -> None:
         """Execute one action (8) and judge the result."""
@@ -92,8 +111,8 @@ class EpisodeSession:
         digest = hashlib.sha256()
         for array in self._state():
             digest.update(np.ascontiguousarray(array).tobytes())
-        progress = (self.world.elapsed, self.judge.index, str(self.judge.status), self.events)
-        digest.update(repr(progress).encode())
+        progress = [(judge.index, str(judge.status)) for judge in self._judges]
+        digest.update(repr((self.world.elapsed, *itertools.chain(*progress), self.events)).encode())
         return digest.hexdigest()
 
     def state_numbers(self) -> NDArray[np.float64]:
@@ -124,9 +143,18 @@ class EpisodeSession:
                 for action in trajectory:
                     yield RecordedStep(index, action)
 
+    @property
+    def _judges(self) -> tuple[Judge, ...]:
+        return (self.judge,) if self.original is None else (self.judge, self.original)
+
     def _judge(self) -> None:
-        self.judge.update(self.world.elapsed, self.world.facts)
+        for judge in self._judges:
+            judge.update(self.world.elapsed, self.world.facts)
         self.world.note_stage(self.judge.index)
+
+
+def _judge_of(episode: Episode) -> Judge:
+    return Judge((*episode.demonstration, *episode.stages), episode.scene)
 
 
 def _body_state(body: Body) -> list[NDArray[Any]]:

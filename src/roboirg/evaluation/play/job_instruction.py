@@ -8,6 +8,7 @@ from functools import cached_property
 from roboirg import language
 from roboirg.core.episode import Episode
 from roboirg.evaluation.records.record import Job
+from roboirg.language.arms import arm_episode, say_arm
 from roboirg.language.instruction import Instruction
 from roboirg.language.settings import EXPLICIT
 from roboirg.language.wordings.wording_store import open_wordings
@@ -21,25 +22,30 @@ class PreparedJob:
     job: Job
 
     @cached_property
-    def episode(self) -> Episode:
-        """The episode; raises `InvalidValueError` if there is none of that number."""
+    def scene_episode(self) -> Episode:
+        """The scene's own episode; raises `InvalidValueError` if there is none of that number."""
         return splits.get_episode(self.job.task, self.job.split, self.job.episode)
+
+    @cached_property
+    def episode(self) -> Episode:
+        """The episode with the goal by which the verdict falls; raises like `arm_episode`."""
+        return arm_episode(self.scene_episode, self.job.arm)
 
     @cached_property
     def instruction(self) -> Instruction:
         """The instruction; raises like `instruct_job`."""
-        return self._say(self.job.setting)
+        self._open_wordings()
+        return say_arm(self.scene_episode, self.job.options, self.job.arm).instruction
 
     @cached_property
     def explicit(self) -> Instruction:
-        """The explicit instruction of the same episode; raises like `instruct_job`."""
-        return self._say(EXPLICIT)
+        """The explicit instruction of the goal of `episode`; raises like `instruct_job`."""
+        self._open_wordings()
+        return language.instruct_with(self.episode, replace(self.job.options, setting=EXPLICIT))
 
-    def _say(self, setting: str) -> Instruction:
-        job, episode = self.job, self.episode
-        if job.options.wordings is not None:
-            open_wordings(job.wordings_file, job.options.wordings)
-        return language.instruct_with(episode, replace(job.options, setting=setting))
+    def _open_wordings(self) -> None:
+        if self.job.options.wordings is not None:
+            open_wordings(self.job.wordings_file, self.job.options.wordings)
 
 
 def instruct_job(job: Job) -> Instruction:

@@ -41,7 +41,8 @@ def make_env(prepared: PreparedJob, needs: PolicyNeeds) -> RoboIRGEnv:
 
     job = prepared.job
     return make(
-        prepared.episode,
+        prepared.scene_episode,
+        arm=job.arm,
         **asdict(job.options),
         **needs.env_options,
         meshes=job.meshes,

@@ -20,14 +20,20 @@ from pydantic import JsonValue
 
 from roboirg import language
 from roboirg.core.actions import find_action_space
+from roboirg.core.arms import OTHER_GOAL
 from roboirg.core.conditions import Fact
 from roboirg.core.delivery import TURNS, PromptVerdict
-from roboirg.core.episode import ENVIRONMENT_VERSION, Episode
+from roboirg.core.episode import ENVIRONMENT_VERSION
 from roboirg.core.errors import InvalidValueError, MissingDependencyError
 from roboirg.core.field_types import MOST_CAUSE_LETTERS
 from roboirg.core.observations import DemonstrationSource
 from roboirg.core.plain_text import clip_text
 from roboirg.evaluation.hosting.policy_descriptions import PolicyDescription, describe_policy
+from roboirg.evaluation.play.goal_outcomes import (
+    Trajectory,
+    find_goal_outcomes,
+    name_other_goal,
+)
 from roboirg.evaluation.play.job_instruction import PreparedJob
 from roboirg.evaluation.play.prompt_shares import audit_job, audit_prompt
 from roboirg.evaluation.records.action_log import ActionLog
@@ -35,6 +41,7 @@ from roboirg.evaluation.records.record import (
     Attribution,
     ErrorKind,
     EventRecord,
+    GoalOutcomes,
     Job,
     MentionSpan,
     Outcome,
@@ -72,6 +79,7 @@ class RolloutResult:
         instruction: what the policy was told; None if the episode did not get that far.
         heard: what the policy has heard so far, in order: ``text`` and ``step``.
         events: facts that became true or ceased to be.
+        original: how it ended for the scene's own goal, if the words state another one.
         subgoals: what the policy's planner named.
         render_device: the driver's name; None if nothing was rendered.
         details: traceback of an error.
@@ -99,6 +107,7 @@ class RolloutResult:
     instruction: language.Instruction | None = None
     heard: list[Mapping[str, Any]] = field(default_factory=list)
     events: list[EventRecord] = field(default_factory=list)
+    original: str | None = None
     subgoals: list[SubgoalRecord] = field(default_factory=list)
     render_device: str | None = None
     details: str | None = None
@@ -148,6 +157,7 @@ class RolloutResult:
     def add_events(self, info: Mapping[str, Any]) -> None:
         """Add the events and the elapsed steps in an environment's info."""
         self.elapsed_steps = int(info.get("elapsed_steps", self.elapsed_steps))
+        self.original = info.get("original")
         for event in info.get("events", ()):
             place = event.get("place")
             self.events.append(
@@ -207,6 +217,8 @@ def make_record(
     policy = result.policy or _describe(job)
     utterances = _utterances(job, instruction, result)
     prompt, verdict = _audit(job, instruction, utterances, result)
+    trajectory = _trajectory(prepared, result)
+    goals = None if trajectory is None else find_goal_outcomes(trajectory)
     return Record(
         **msgspec.structs.asdict(job),
         **{name: getattr(result, name) for name in _COPIED},
@@ -214,7 +226,8 @@ def make_record(
         difficulty=episode.difficulty,
         cause=None if result.cause is None else clip_text(result.cause, MOST_CAUSE_LETTERS),
         error=result.error if result.outcome == "error" else None,
-        attribution=_attribution(episode, result, instruction),
+        attribution=_attribution(trajectory, goals, result, instruction),
+        goals=goals,
         instruction=utterances,
         prompt=prompt,
         prompt_verdict=verdict,
@@ -285,28 +298,43 @@ def _utterances(
     )
 
 
+def _trajectory(prepared: PreparedJob, result: RolloutResult) -> Trajectory | None:
+    """Return what happened, for its analysis; None if there is no verdict."""
+    if result.outcome == "error":
+        return None
+    start = result.policy_start_step
+    events = [
+        Event(one.step + start, Fact(one.kind, one.subject, one.place), one.holds)
+        for one in result.events
+    ]
+    original = prepared.scene_episode if prepared.job.arm == OTHER_GOAL else None
+    return Trajectory(
+        prepared.episode, events, start, result.elapsed_steps, original, result.original
+    )
+
+
 def _attribution(
-    episode: Episode, result: RolloutResult, instruction: language.Instruction
+    trajectory: Trajectory | None,
+    goals: GoalOutcomes | None,
+    result: RolloutResult,
+    instruction: language.Instruction,
 ) -> Attribution | None:
     """Return why the episode failed; None if it did not or the cause is unclear."""
-    if result.outcome != "failure":
+    if trajectory is None or goals is None or result.outcome != "failure":
         return None
+    episode = trajectory.episode
     found = attribute_failure(
         episode,
-        [
-            Event(
-                event.step + result.policy_start_step,
-                Fact(event.kind, event.subject, event.place),
-                event.holds,
-            )
-            for event in result.events
-        ],
+        trajectory.events_until_verdict,
         timed_out=result.timed_out,
         policy_start_step=result.policy_start_step,
-        elapsed_steps=result.elapsed_steps,
+        elapsed_steps=trajectory.decision.step,
         cause=result.cause,
-        mirrored=language.mirrored_objects(episode, instruction),
+        # What mentions nothing, such as a scrambled text, has no sides to exchange.
+        mirrored=language.mirrored_objects(episode, instruction) if instruction.mentions else None,
     )
+    if found is not None and trajectory.original is not None:
+        found = name_other_goal(found, trajectory.original, goals)
     return None if found is None else Attribution(**found._asdict())
 
 

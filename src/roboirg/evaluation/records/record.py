@@ -16,6 +16,7 @@ from typing import Annotated, Any, Literal, Self, get_args
 
 import msgspec
 
+from roboirg.core.arms import TOLD
 from roboirg.core.delivery import PromptVerdict
 from roboirg.core.field_types import Cause, Name, Subgoal, Whole
 from roboirg.core.instruction_options import InstructionOptions
@@ -39,6 +40,7 @@ instruction is longer than what the policy's model reads, and such episodes were
 ERROR_KINDS: tuple[ErrorKind, ...] = get_args(ErrorKind)
 
 FailureKind = Literal["grounding", "execution"]
+OriginalStatus = Literal["success", "failure", "undecided"]
 
 DEFAULT_MAX_STEPS = 1300
 DEFAULT_MESHES = "faithful"
@@ -79,6 +81,7 @@ class Job(msgspec.Struct, frozen=True, kw_only=True, gc=False):
         demonstration_frames: which frames of the video the policy gets; None for its own choice.
         observe_every: control steps between observations; None for the policy's own choice.
         meshes: faithful or light.
+        arm: which control arm it is, as in `roboirg.core.arms`; ``told`` for the episode's words.
         wordings_file: path of the wording file in `options`; not part of the identity, because a
             file may be moved.
         spec: spec of the policy if that is not its name; not part of the identity, because an
@@ -96,6 +99,7 @@ class Job(msgspec.Struct, frozen=True, kw_only=True, gc=False):
     demonstration_frames: DemonstrationFrames | None = None
     observe_every: Whole | None = None
     meshes: Name = DEFAULT_MESHES
+    arm: Name = TOLD
     wordings_file: str | None = None
     spec: str | None = None
 
@@ -129,11 +133,15 @@ class Job(msgspec.Struct, frozen=True, kw_only=True, gc=False):
     @property
     def slug(self) -> str:
         """Short unique name that is safe in file names."""
-        words = (self.policy, self.task, self.split, self.episode, self.setting, self.form)
+        words = [self.policy, self.task, self.split, self.episode, self.setting, self.form]
+        identity = {name: getattr(self, name) for name in IDENTITY}
+        if self.arm == TOLD:
+            del identity["arm"]  # files of runs without arms keep their names
+        else:
+            words.append(self.arm)
         readable = re.sub(r"[^A-Za-z0-9]+", "-", "-".join(map(str, words))).strip("-")[:100]
         # Only from the identity, so that a record (which is a job) has its job's slug.
-        identity = msgspec.json.encode({name: getattr(self, name) for name in IDENTITY})
-        return f"{readable}-{short_hash(identity)}"
+        return f"{readable}-{short_hash(msgspec.json.encode(identity))}"
 
 
 IDENTITY = tuple(name for name in Job.__struct_fields__ if name not in {"spec", "wordings_file"})
@@ -232,6 +240,24 @@ class Attribution(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
     sentence: str
 
 
+class GoalOutcomes(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """Which goals of the scene the trajectory reached; goals are in words.
+
+    Attributes:
+        stated: the goal that the verdict is about.
+        reached: all goals whose stages were completed, those on the way to another included.
+        agrees: those with which the act agrees by which the verdict became a failure: that neither
+            failed by then nor were reached before. Empty if no act did.
+        original: whether the scene's own goal was reached, where the words state another one; None
+            in the other arms.
+    """
+
+    stated: Name
+    reached: tuple[Name, ...] = ()
+    agrees: tuple[Name, ...] = ()
+    original: OriginalStatus | None = None
+
+
 class PromptAudit(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """What of the instruction reached the policy's language model, by the limit it declares.
 
@@ -282,6 +308,8 @@ class Summary(Job, frozen=True, kw_only=True, gc=False):
         error: kind of error; None if the outcome is not an error.
         cause: why it failed or ended in an error, in words.
         attribution: of a failure; None if the reason is unclear.
+        goals: which goals of the scene were reached; None for an error, and in records from before
+            this was kept.
         steps: control steps that the policy played.
         demonstration_steps: frames of the video before the policy's turn, one per control step;
             0 without a video.
@@ -314,6 +342,7 @@ class Summary(Job, frozen=True, kw_only=True, gc=False):
     error: ErrorKind | None = None
     cause: Cause | None = None
     attribution: Attribution | None = None
+    goals: GoalOutcomes | None = None
     steps: Whole = 0
     demonstration_steps: Whole = 0
     demonstration_source: DemonstrationSource = "none"

@@ -1,0 +1,54 @@
+"""Another goal of the same scene, for the control arm `other-goal`."""
+
+from __future__ import annotations
+
+import zlib
+from collections.abc import Sequence
+
+import numpy as np
+
+from roboirg.core.arms import OTHER_GOAL
+from roboirg.core.episode import Episode, Goal, Stage
+from roboirg.tasks import get_task
+
+_PICKS = ("pick_cube", "pick_container")
+
+
+def other_goals(episode: Episode) -> tuple[Goal, ...]:
+    """Return the goals of the scene that take as many picks as the episode's.
+
+    None of them is reached on the way to the episode's goal, or the episode's on the way to it.
+    """
+    task = get_task(episode.task)
+    found = []
+    for goal in task.goals(episode.scene):
+        stages = task.stages(episode.scene, goal)
+        overlaps = begins_with(stages, episode.stages) or begins_with(episode.stages, stages)
+        if not overlaps and _picks(stages) == _picks(episode.stages):
+            found.append(goal)
+    return tuple(found)
+
+
+def draw_other_goal(episode: Episode) -> Goal | None:
+    """Return one of `other_goals`, all equally likely; None if there is none.
+
+    The draw depends on the episode alone, not on any words.
+    """
+    goals = other_goals(episode)
+    if not goals:
+        return None
+    rng = np.random.default_rng([episode.seed, zlib.crc32(f"{OTHER_GOAL}|{episode.task}".encode())])
+    return goals[int(rng.integers(len(goals)))]
+
+
+def begins_with(stages: Sequence[Stage], first: Sequence[Stage]) -> bool:
+    """Return whether stages begin with others: to the judge, not to the oracle."""
+    return _judged(stages[: len(first)]) == _judged(first)
+
+
+def _judged(stages: Sequence[Stage]) -> list[tuple[object, ...]]:
+    return [(one.expects, one.forbids, one.lasting, one.timer) for one in stages]
+
+
+def _picks(stages: Sequence[Stage]) -> int:
+    return sum(stage.primitive.kind in _PICKS for stage in stages)
