@@ -46,6 +46,13 @@ PolicySeeds = Annotated[
     str | None,
     _episodes(help="Seeds, separated by commas; every seed plays every episode.  (0)"),
 ]
+Arms = Annotated[
+    str | None,
+    _episodes(
+        help="told and control arms of its scenes: other-goal, silent, scrambled, paraphrase:2, "
+        "again.  (told)"
+    ),
+]
 Stages = Annotated[
     str | None,
     _words(help="Stages of the contextual setting; several sets with semicolons: 1,5;1-5.  (1-5)"),
@@ -68,6 +75,7 @@ class PlanChoices(OptionGroup):
     split: Split
     episodes: Episodes
     policy_seeds: PolicySeeds
+    arms: Arms
     stages: Stages
     wordings: Wordings
     max_steps: MaxSteps

@@ -283,6 +283,8 @@ def _print_estimate(plan: Plan, folder: Path, workers: int | None) -> None:
     table.caption = f"episodes: {' + '.join(forms)}" if forms else "episodes"
     widen(console, table)
     console.print(table)
+    for arm, count in plan.left_out(jobs).items():
+        console.print(f"{arm}: {counted(count, 'episode')} left out.", highlight=False)
     _print_prompt_shares(jobs, settings, console)
     played = read_index(folder)
     todo = [job for job in jobs if identity_key(job) not in played]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import itertools
 import math
 import os
@@ -15,6 +16,7 @@ from pydantic import BaseModel, ConfigDict, field_serializer, field_validator, m
 
 from roboirg import language, policies, tasks
 from roboirg.core.actions import find_action_space
+from roboirg.core.arms import TOLD, check_arm
 from roboirg.core.errors import InvalidValueError
 from roboirg.core.field_types import CONTROLS, NAME
 from roboirg.core.instruction_options import (
@@ -42,6 +44,7 @@ from roboirg.evaluation.records.record import (
     ErrorKind,
     Job,
 )
+from roboirg.evaluation.records.record_codec import RecordKey, identity_key
 from roboirg.language.generator import check_options, find_refusal
 from roboirg.language.settings import EXPLICIT, all_settings, plain_settings
 from roboirg.language.wordings.wording_store import open_wordings
@@ -88,6 +91,9 @@ class Plan(BaseModel):
     """Positions in the split, from 0; a number alone, such as 4, is the first four."""
     policy_seeds: tuple[int, ...] = (0,)
     """Every seed plays every episode."""
+    arms: tuple[str, ...] = (TOLD,)
+    """told, and control arms of the same scenes: other-goal, silent, silent-empty, scrambled,
+    paraphrase:N (N other texts), again (another policy seed). What has no such arm is left out."""
     seed_secret: str | None = None
     """Text from which, with the policy seed and the scene, the seeds of policies are made; without
     one, the run draws it, or takes that of its folder."""
@@ -180,7 +186,7 @@ class Plan(BaseModel):
             raise InvalidValueError("The plan has no policy seeds; it needs at least one.")
         several = (self.policies, self.tasks, self.forms, self.episodes, self.policy_seeds)
         settings = plain_settings() if self.settings == "all" else self.settings
-        size = math.prod(map(len, (*several, settings, self.stages)))
+        size = math.prod(map(len, (*several, settings, self.stages, self.arms)))
         if size > MOST_JOBS:
             raise InvalidValueError(
                 f"The plan has up to {size:,} episodes; a plan has at most {MOST_JOBS:,}."
@@ -274,8 +280,20 @@ class Plan(BaseModel):
             job
             for policy in self.specs.items()
             for where, expressible in settings.items()
-            for job in self._jobs_of(policy, *where, expressible, seeds=self.policy_seeds)
+            for job in self._jobs_of(policy, *where, expressible, self.arms, self.policy_seeds)
         )
+
+    def left_out(self, jobs: Iterable[Job]) -> Mapping[str, int]:
+        """Return how many jobs each arm lacks, because it has no other goal or cannot be said.
+
+        Args:
+            jobs: of this plan.
+        """
+        trials = {name: set[RecordKey]() for name in self.arms}
+        for job in jobs:
+            trials[job.arm].add(identity_key(msgspec.structs.replace(job, arm=TOLD)))
+        every = set[RecordKey]().union(*trials.values())
+        return {name: len(every - found) for name, found in trials.items() if found != every}
 
     def drawable_jobs(self) -> tuple[Job, ...]:
         """Return the jobs that can be told here, for counting what a stored run lacks.
@@ -306,7 +324,7 @@ class Plan(BaseModel):
         task: str,
         episode: int,
         settings: Iterable[str],
-        *,
+        arms: tuple[str, ...],
         seeds: tuple[int, ...],
     ) -> Iterator[Job]:
         name, spec = policy
@@ -321,7 +339,6 @@ class Plan(BaseModel):
                 episode=episode,
                 options=replace(options, wordings=self.options.wordings),
                 wordings_file=self.wordings,
-                policy_seed=seeds[0],
                 max_steps=self.max_steps,
                 actions=self.actions,
                 demonstration_frames=self.demonstration_frames,
@@ -329,10 +346,11 @@ class Plan(BaseModel):
                 meshes=self.meshes,
                 spec=None if spec == name else spec,
             )
-            yield job
             # Copying is faster, and there may be very many.
-            for seed in seeds[1:]:
-                yield msgspec.structs.replace(job, policy_seed=seed)
+            for arm in arms:
+                if arm == TOLD or _has_arm(msgspec.structs.replace(job, policy="", spec=None), arm):
+                    for seed in seeds:
+                        yield msgspec.structs.replace(job, policy_seed=seed, arm=arm)
 
     def _options_of(self, setting: str) -> Iterator[InstructionOptions]:
         """Yield the instruction options to play in a setting.
@@ -367,12 +385,14 @@ class Plan(BaseModel):
         for task in self.tasks:
             for episode in self.episodes[:1] if usual else self.episodes:
                 settings = self.settings_of(task, episode)
-                yield from self._jobs_of(("", ""), task, episode, settings, seeds=(0,))
+                yield from self._jobs_of(("", ""), task, episode, settings, (TOLD,), (0,))
 
     def _check_options(self) -> None:
         for form, stages in itertools.product(self.forms, self.stages):
             check_options(replace(self.options, form=form, stages=stages))
         check_names("kind of meshes", (self.meshes,), MESHES)
+        for arm in self.arms:
+            check_arm(arm)
         for name, least in (("max_steps", 1), ("tries", 1), ("batch", 1)):
             if getattr(self, name) < least:
                 raise InvalidValueError(
@@ -401,6 +421,16 @@ class Plan(BaseModel):
 
 SINGLE_OPTIONS = tuple(name for name in OPTION_NAMES if name not in (*AXES, *Plan.model_fields))
 """Options of instructions of which a plan has one value, in `options`."""
+
+
+@functools.lru_cache(maxsize=65_536)
+def _has_arm(job: Job, arm: str) -> bool:
+    """Return whether an instruction, a job without a policy, has an arm."""
+    try:
+        instruct_job(msgspec.structs.replace(job, arm=arm))
+    except InvalidValueError:
+        return False
+    return True
 
 
 def _names_the_goal(options: InstructionOptions) -> bool:

@@ -29,6 +29,7 @@ _LISTS = frozenset(
         "forms",
         "episodes",
         "policy_seeds",
+        "arms",
         "stages",
         "retry_on",
         "devices",

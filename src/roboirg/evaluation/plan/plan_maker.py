@@ -8,6 +8,7 @@ from dataclasses import replace
 from pydantic import ValidationError
 
 from roboirg import tasks as task_registry
+from roboirg.core.arms import TOLD
 from roboirg.core.errors import InvalidValueError
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.evaluation.plan.plan import LONG_PROMPTS, REQUIRED, RETRYABLE, Plan, nest_options
@@ -15,6 +16,7 @@ from roboirg.evaluation.plan.plan_parsing import (
     ALL,
     check_names,
     means_all,
+    parse_arms,
     parse_episodes,
     parse_names,
     parse_numbers,
@@ -34,6 +36,7 @@ def make_plan(
     forms: str = "implicit",
     episodes: str = "4",
     policy_seeds: str = "0",
+    arms: str = TOLD,
     stages: str = "1-5",
     retry_on: str = ",".join(RETRYABLE),
     devices: str = "",
@@ -48,6 +51,7 @@ def make_plan(
         forms: names separated by commas.
         episodes: ``4`` for the first four, a list such as ``0,3,5-9``, or difficulties: ``hard``.
         policy_seeds: a list of numbers.
+        arms: names separated by commas, such as ``told,other-goal,paraphrase:3``.
         stages: a list of numbers, or several lists separated by semicolons.
         retry_on: kinds of errors separated by commas, or ``none``.
         devices: names separated by commas; none for one process on any device.
@@ -74,6 +78,7 @@ def make_plan(
             forms=parse_names("form", forms),
             episodes=parse_episodes(episodes, split, names),
             policy_seeds=parse_numbers("policy seed", policy_seeds),
+            arms=parse_arms(arms),
             stages=parse_stage_sets(stages),
             retry_on=_error_kinds(retry_on),
             devices=parse_names("device", devices) if devices else (),

@@ -6,6 +6,7 @@ import re
 from collections.abc import Collection, Iterable, Iterator, Sequence
 
 from roboirg import language
+from roboirg.core.arms import parse_arm
 from roboirg.core.episode import DIFFICULTIES, SPLITS, Split
 from roboirg.core.errors import InvalidValueError, UnknownNameError
 from roboirg.tasks.splits import splits
@@ -36,6 +37,17 @@ def parse_names(kind: str, text: str) -> tuple[str, ...]:
     if not names:
         raise InvalidValueError(f"No {kind} was given.")
     return names
+
+
+def parse_arms(text: str) -> tuple[str, ...]:
+    """Parse control arms separated by commas; repeated ones count once.
+
+    Raises:
+        UnknownNameError: there is no such arm.
+        InvalidValueError: there is none, or a number of paraphrases is out of range.
+    """
+    found = (arm for name in parse_names("arm", text) for arm in parse_arm(name))
+    return tuple(dict.fromkeys(found))
 
 
 def parse_policies(specs: Iterable[str]) -> tuple[str, ...]:

@@ -21,6 +21,7 @@ from pathlib import Path
 from socket import socket
 
 from roboirg import policies
+from roboirg.core.arms import AGAIN
 from roboirg.evaluation.episode_errors import (
     EpisodeError,
     EpisodeLostError,
@@ -268,7 +269,10 @@ def load_policy(prepared: PreparedJob, seed_secret: str = "") -> Policy:
 
 
 def _policy_seed(prepared: PreparedJob, secret: str) -> int:
-    return episode_policy_seed(prepared.job.policy_seed, prepared.episode.seed, secret)
+    job = prepared.job
+    if job.arm == AGAIN:
+        secret = f"{secret}|{AGAIN}"
+    return episode_policy_seed(job.policy_seed, prepared.scene_episode.seed, secret)
 
 
 def _close_policy(policy: Policy, result: RolloutResult, guard: CallGuard) -> None:
