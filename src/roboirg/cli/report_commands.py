@@ -15,6 +15,7 @@ from roboirg.core.errors import InvalidValueError, UnknownNameError
 if TYPE_CHECKING:
     from roboirg.evaluation.analysis.stats.breakdowns import Breakdown, Labels
     from roboirg.evaluation.analysis.stats.cells import Cells
+    from roboirg.evaluation.analysis.stats.run_data import RunData
     from roboirg.evaluation.analysis.tables.table import Table
     from roboirg.evaluation.records.record import Job, Summary
 
@@ -105,7 +106,7 @@ def figures(
     which: Annotated[
         str,
         typer.Option(
-            help="averages, forms, expressions, context, failures, real, strips (a filmed failure "
+            help="averages, forms, expressions, context, failures, arms, real, strips (a failure "
             "in pictures), several separated by commas, or all that apply."
         ),
     ] = _ALL,
@@ -138,7 +139,8 @@ def tables(
         str,
         typer.Option(
             help="main, planner, context, real, other, coverage, or all that apply; or of runs "
-            "alone: forms, failures, subgoals (of planners), heard (how many prompts were cut)."
+            "alone: forms, failures, subgoals (of planners), heard (how many prompts were cut), "
+            "arms (what control arms show)."
         ),
     ] = _ALL,
     format: Annotated[  # noqa: A002
@@ -202,13 +204,14 @@ def compare(
     from roboirg.evaluation.analysis.stats.comparison_text import sentences
     from roboirg.evaluation.analysis.stats.flips import read_flips
     from roboirg.evaluation.analysis.stats.intervals import SEED
+    from roboirg.evaluation.analysis.tables.arm_table import language_use_sentences
     from roboirg.util.console_width import widen
 
     ours, theirs = _one_policy(first), _one_policy(second)
     breakdowns = _breakdowns(by)
     labels = _labels(breakdowns, [_split(first)[0], _split(second)[0]])
     titled = {one.title: labels[one.name] for one in breakdowns}
-    found = compare_cells(ours, theirs, np.random.default_rng(SEED), titled)
+    found = compare_cells(ours.cells, theirs.cells, np.random.default_rng(SEED), titled)
     names = [found.first.marked_policy, found.second.marked_policy]
     if names[0] == names[1]:
         names = [f"{names[0]} ({first})", f"{names[1]} ({second})"]
@@ -216,6 +219,8 @@ def compare(
     widen(console)
     flips = read_flips(Path(_split(first)[0])), read_flips(Path(_split(second)[0]))
     for sentence in sentences(found, names[0], names[1], flips):
+        console.print(Text(sentence), highlight=False)
+    for sentence in language_use_sentences(ours, theirs, (names[0], names[1])):
         console.print(Text(sentence), highlight=False)
 
 
@@ -342,16 +347,21 @@ def _runs(runs: list[str]) -> tuple[list[tuple[str, Sequence[Summary]]], list[Jo
     return results, planned
 
 
-def _one_policy(text: str) -> Cells:
-    """Return the cells of a run's folder or of RUN:policy; policy names may contain colons."""
+def _one_policy(text: str) -> RunData:
+    """Return the data of a run's folder or of RUN:policy; policy names may contain colons."""
+    from roboirg.evaluation.analysis.stats.run_data import RunData
+
     folder, policy = _split(text)
-    cells = _cells([folder])
-    if policy is None:
-        return cells
-    names = list(dict.fromkeys(key.policy_run.policy for key in cells))
-    if policy not in names:
-        raise UnknownNameError(f"policy in {folder}", policy, names)
-    return {key: cell for key, cell in cells.items() if key.policy_run.policy == policy}
+    runs, planned = _runs([folder])
+    if policy is not None:
+        names = list(
+            dict.fromkeys(one.policy for _, results in runs for one in (*results, *planned))
+        )
+        if policy not in names:
+            raise UnknownNameError(f"policy in {folder}", policy, names)
+        runs = [(name, [one for one in results if one.policy == policy]) for name, results in runs]
+        planned = [job for job in planned if job.policy == policy]
+    return RunData.of(runs, planned)
 
 
 def _split(text: str) -> tuple[str, str | None]:

@@ -14,6 +14,7 @@ from typing import NamedTuple
 
 import msgspec
 
+from roboirg.core.arms import TOLD
 from roboirg.core.plain_text import counted
 from roboirg.evaluation.analysis.comparability import is_robomme
 from roboirg.evaluation.analysis.stats.cells import PolicyRun
@@ -50,7 +51,8 @@ def refusal(results: Sequence[Summary], known: Collection[str]) -> str:
         return f"{counted(stray, 'record')} of no plan in the pack"
     by_run: dict[PolicyRun, list[Summary]] = defaultdict(list)
     for one in results:
-        by_run[PolicyRun.of(one)].append(one)
+        if one.arm == TOLD:
+            by_run[PolicyRun.of(one)].append(one)
     return next(filter(None, map(_run_refusal, by_run.values())), "")
 
 

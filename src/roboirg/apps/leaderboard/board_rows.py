@@ -12,7 +12,13 @@ import numpy as np
 from roboirg.apps.leaderboard.admission import with_failures
 from roboirg.apps.leaderboard.pack_checks import PackCheck
 from roboirg.evaluation.analysis.published import MAX_STEPS, published_rows
-from roboirg.evaluation.analysis.stats.cells import Cells, PolicyRun, clustered_interval, gather
+from roboirg.evaluation.analysis.stats.cells import (
+    Cells,
+    PolicyRun,
+    clustered_interval,
+    gather,
+    only_told,
+)
 from roboirg.evaluation.analysis.stats.intervals import SEED
 from roboirg.evaluation.analysis.stats.option_labels import (
     has_default_options,
@@ -172,7 +178,7 @@ def _without_split(policy_run: PolicyRun | None) -> PolicyRun | None:
 
 def _rows_of(run: PackedRun) -> Iterable[BoardRow]:
     results = with_failures(run.results)
-    cells = gather([(run.name, results)], run.planned)
+    cells = only_told(gather([(run.name, results)], run.planned))
     rng = np.random.default_rng(SEED)
     by_policy_run = _by_policy_run(cells)
     for policy_run in sorted(by_policy_run, key=repr):

@@ -22,12 +22,14 @@ from roboirg.evaluation.plan.stored_plans import kept_fingerprints, read_plans
 from roboirg.evaluation.records.record import Summary
 from roboirg.evaluation.records.record_codec import identity_key
 from roboirg.evaluation.records.store import StoredRun, read_summaries
-from roboirg.language.generator import find_refusal
+from roboirg.language.arms import find_arm_refusal
 from roboirg.tasks.splits.private_splits import check_salt
 from roboirg.tasks.splits.splits import get_episode
 from roboirg.util.parallel_map import parallel_map
 
 Progress = Callable[[int, int], object]
+_CellName = tuple[str, str, str, InstructionOptions, str]
+"""Policy, task, split, options and arm."""
 
 
 @dataclass(frozen=True)
@@ -160,25 +162,27 @@ def _holes(entries: Iterable[Summary]) -> Iterator[str]:
 def _holes_of_plan(entries: Iterable[Summary]) -> Iterator[str]:
     episodes: dict[tuple[str, ...], set[int]] = defaultdict(set)
     seeds: dict[str, set[int]] = defaultdict(set)
-    cells: dict[tuple[str, str, str, InstructionOptions], set[tuple[int, int]]] = defaultdict(set)
+    cells: dict[_CellName, set[tuple[int, int]]] = defaultdict(set)
     for one in entries:
         episodes[one.policy, one.task, one.split].add(one.episode)
         seeds[one.policy].add(one.policy_seed)
-        played = cells[one.policy, one.task, one.split, one.column]
+        played = cells[one.policy, one.task, one.split, one.column, one.arm]
         played.add((one.episode, one.policy_seed))
-    for (policy, task, split, options), played in cells.items():
+    for (policy, task, split, options, arm), played in cells.items():
         for episode in sorted(episodes[policy, task, split]):
             lacking = {seed for seed in seeds[policy] if (episode, seed) not in played}
-            if not lacking or not _is_expressible(task, split, episode, options):
+            if not lacking or not _is_expressible(task, split, episode, options, arm):
                 continue
             for seed in sorted(lacking):
-                words = " ".join(map(str, asdict(options).values()))
+                words = " ".join(map(str, (*asdict(options).values(), arm)))
                 yield f"{policy} {task} {split}/{episode} ({words}), policy seed {seed}"
 
 
-def _is_expressible(task: str, split: str, episode: int, options: InstructionOptions) -> bool:
+def _is_expressible(
+    task: str, split: str, episode: int, options: InstructionOptions, arm: str
+) -> bool:
     """Return whether an episode exists and has words; what has none is told by its record."""
     try:
-        return find_refusal(get_episode(task, split, episode), options) is None
+        return find_arm_refusal(get_episode(task, split, episode), options, arm) is None
     except RoboIRGError:
         return False

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
 
+from roboirg.core.arms import TOLD
 from roboirg.core.episode import ENVIRONMENT_VERSION
 from roboirg.core.plain_text import counted
 from roboirg.evaluation.analysis.published import MAX_STEPS, TRIALS, published_tasks
@@ -115,6 +116,8 @@ def _explicit_differences(policy_run: PolicyRun, cell: CellResults) -> Iterator[
         yield words_label(conditions.wordings)
     episodes = range(TRIALS["main"][0])
     played = len(cell.by_episode().keys() & set(episodes))
+    if conditions.arm != TOLD:
+        yield f"arm {conditions.arm}"
     if conditions.split != _SPLIT:
         yield f"split {conditions.split}"
     elif played < len(episodes):

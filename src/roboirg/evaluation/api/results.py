@@ -14,7 +14,7 @@ import numpy as np
 from roboirg.core.errors import InvalidValueError, MissingDependencyError, UnknownNameError
 from roboirg.core.plain_text import counted
 from roboirg.evaluation.analysis.figures import FIGURES, draw_figure
-from roboirg.evaluation.analysis.stats.cells import Cells, gather
+from roboirg.evaluation.analysis.stats.cells import Cells, gather, only_told
 from roboirg.evaluation.analysis.stats.comparison import compare
 from roboirg.evaluation.analysis.stats.comparison_text import sentences
 from roboirg.evaluation.analysis.stats.intervals import SEED
@@ -32,9 +32,9 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 COLUMNS = (
-    "policy", "task", "split", "episode", "difficulty", "setting", "form", "policy_seed", "outcome",
-    "cause", "error", "steps", "max_steps", "privileged", "policy_version", "language_version",
-    "environment_version", "duration_s", "video",
+    "policy", "task", "split", "episode", "difficulty", "setting", "form", "policy_seed", "arm",
+    "outcome", "cause", "error", "steps", "max_steps", "privileged", "policy_version",
+    "language_version", "environment_version", "duration_s", "video",
 )  # fmt: skip
 """Columns of the data frame, beside ``success`` and ``failure``."""
 
@@ -105,7 +105,7 @@ class Results:
         """Return the mean success over tasks, 0 to 1, by policy and setting (with options)."""
         return {
             (one.key.policy_run.policy, options_label(one.key.options)): float(one.rate)
-            for one in summarize(self.cells, np.random.default_rng(SEED))
+            for one in summarize(only_told(self.cells), np.random.default_rng(SEED))
             if one.key.scope == ALL and one.rate is not None
         }
 

@@ -13,6 +13,7 @@ from rich.markup import escape
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.text import Text
 
+from roboirg.core.arms import TOLD
 from roboirg.core.plain_text import counted, printable
 from roboirg.evaluation.records.record import Record
 
@@ -154,5 +155,7 @@ def _summary(record: Record) -> str:
     where = f"{record.policy} {record.task} {record.split}/{record.episode} {record.setting}"
     if record.form != "implicit":
         where += f" ({record.form})"
+    if record.arm != TOLD:
+        where += f" ({record.arm})"
     verdict = record.outcome if record.cause is None else f"{record.outcome}: {record.cause}"
     return f"{where}: {verdict}"

@@ -30,6 +30,8 @@ BUILTIN: Mapping[str, str] = {
     "last-mention": "roboirg.policies.builtin.shortcut_listeners:LastMentionPolicy",
     "elimination": "roboirg.policies.builtin.shortcut_listeners:EliminationPolicy",
     "surface": "roboirg.policies.builtin.shortcut_listeners:SurfacePolicy",
+    "habit": "roboirg.policies.builtin.word_ignorers:HabitPolicy",
+    "previous-goal": "roboirg.policies.builtin.word_ignorers:PreviousGoalPolicy",
     "random": "roboirg.policies.builtin.random_policy:RandomPolicy",
 }
 

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 __all__ = ["FIGURES", "draw_figure", "write_figures"]
 
-FIGURES = ("averages", "forms", "expressions", "context", "failures", "real", "strips")
+FIGURES = ("averages", "forms", "expressions", "context", "failures", "arms", "real", "strips")
 
 
 def write_figures(
@@ -80,12 +80,16 @@ def draw_figure(name: str, content: RunData, *, published: bool = False) -> Figu
 
 
 def _drawn(name: str, content: RunData, *, published: bool) -> Figure | None:
+    from roboirg.evaluation.analysis.figures.arms import draw_arms
     from roboirg.evaluation.analysis.figures.averages import draw_averages
     from roboirg.evaluation.analysis.figures.context import draw_context
     from roboirg.evaluation.analysis.figures.failures import draw_failures
     from roboirg.evaluation.analysis.figures.forms import draw_forms
     from roboirg.evaluation.analysis.figures.real_robot import draw_real_robot
 
+    if name == "arms":
+        return draw_arms(content)
+    content = content.told()
     match name:
         case "averages":
             return draw_averages(content, published=published)

@@ -18,7 +18,7 @@ from roboirg import language
 from roboirg.core.conditions import Fact
 from roboirg.core.episode import ENVIRONMENT_VERSION
 from roboirg.core.errors import RoboIRGError
-from roboirg.evaluation.play.job_instruction import instruct_job
+from roboirg.evaluation.play.job_instruction import PreparedJob, instruct_job
 from roboirg.evaluation.records.record import Record
 from roboirg.judging import Event
 from roboirg.judging.episode_replay import completed_stages
@@ -65,7 +65,7 @@ def stages_of(record: Record) -> tuple[StageMark, ...]:
     ]
     last = max(record.steps, *(event.step for event in record.events))
     try:
-        episode = get_episode(record.task, record.split, record.episode)
+        episode = PreparedJob(record.identity).episode
         done = completed_stages(episode, events, turn + last)
     except (RoboIRGError, KeyError):
         return ()  # a task that is no longer installed, or incomplete events

@@ -17,6 +17,8 @@ from roboirg.evaluation.analysis.page.matrix import make_matrix
 from roboirg.evaluation.analysis.page.run_warnings import comparisons, facts_of, run_warnings
 from roboirg.evaluation.analysis.stats.breakdowns import BREAKDOWNS, label_instructions
 from roboirg.evaluation.analysis.stats.cells import Cells, PolicyRun
+from roboirg.evaluation.analysis.stats.run_data import RunData
+from roboirg.evaluation.analysis.tables.arm_table import has_arms, make_arm_table
 from roboirg.evaluation.analysis.tables.breakdown_table import make_breakdown_table
 from roboirg.evaluation.analysis.tables.table import Table
 from roboirg.evaluation.records.episode_log import logged_slugs
@@ -150,7 +152,7 @@ def _data(entries: EpisodeEntries, columns: Columns) -> dict[str, Any]:
 
 
 def _breakdown_tables(runs: Sequence[Run], entries: EpisodeEntries) -> list[Table]:
-    """Return the tables of gaps by kind of instruction that have rows."""
+    """Return the tables of control arms, and of gaps by kind of instruction, that have rows."""
     breakdowns = tuple(BREAKDOWNS.values())
     instructions = itertools.chain.from_iterable(run.whole(run.records) for run in runs)
     labels = label_instructions(breakdowns, instructions)
@@ -158,7 +160,9 @@ def _breakdown_tables(runs: Sequence[Run], entries: EpisodeEntries) -> list[Tabl
         make_breakdown_table(one, entries.cells, labels[one.name], entries.names)
         for one in breakdowns
     ]
-    return [table for table in tables if table.rows]
+    data = RunData.of([(run.name, run.records) for run in runs])
+    arms = [make_arm_table(data)] if has_arms(data) else []
+    return [*arms, *(table for table in tables if table.rows)]
 
 
 def _sides(entries: EpisodeEntries) -> tuple[list[int], str]:

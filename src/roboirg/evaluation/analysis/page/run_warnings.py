@@ -74,7 +74,9 @@ def facts_of(runs: Sequence[Run]) -> list[tuple[str, str]]:
 def comparisons(entries: EpisodeEntries) -> list[dict[str, Any]]:
     """Return the comparison of the first pairs of policies in words."""
     names = list(entries.names)
-    pairs = list(combinations(range(len(names)), 2))[:MAX_COMPARISONS]
+    arms = [one.conditions.arm for one in names]
+    alike = [pair for pair in combinations(range(len(names)), 2) if arms[pair[0]] == arms[pair[1]]]
+    pairs = alike[:MAX_COMPARISONS]
     return [
         {
             "left": first,

@@ -47,6 +47,7 @@ class InstructionKey(NamedTuple):
     split: str
     episode: int
     options: InstructionOptions
+    arm: str
     language_version: str
     environment_version: int
 
@@ -66,6 +67,7 @@ class InstructionKey(NamedTuple):
             conditions.split,
             trial.episode,
             replace(key.options, wordings=conditions.wordings),
+            conditions.arm,
             versions.language,
             versions.environment,
         )

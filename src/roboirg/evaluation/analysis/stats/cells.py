@@ -15,6 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from roboirg.core.arms import TOLD
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.core.observations import DemonstrationFrames
 from roboirg.evaluation.analysis.stats.intervals import (
@@ -49,6 +50,7 @@ class EvalConditions(NamedTuple):
     observe_every: int | None = None
     meshes: str = DEFAULT_MESHES
     wordings: str | None = None
+    arm: str = TOLD
 
     @classmethod
     def of(cls, job: Job) -> EvalConditions:
@@ -74,6 +76,7 @@ FAIRNESS = {
     "wordings": "words",
     "max_steps": "step limits",
     "meshes": "kinds of meshes",
+    "arm": "arms",
 }
 """Conditions that must be equal in a comparison, with their names in the plural."""
 
@@ -259,6 +262,12 @@ def gather(runs: Sequence[tuple[str, Sequence[Summary]]], planned: Iterable[Job]
         missing[CellKey(policy_run, job.task, job.column)] += 1
     keys = dict.fromkeys([*verdicts, *errors, *missing])
     return {key: CellResults(verdicts.get(key, {}), errors[key], missing[key]) for key in keys}
+
+
+def only_told(cells: Cells) -> Cells:
+    """Return the cells without those of control arms, if there are others."""
+    found = {key: cell for key, cell in cells.items() if key.policy_run.conditions.arm == TOLD}
+    return found or cells
 
 
 def policy_order(

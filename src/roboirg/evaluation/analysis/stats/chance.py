@@ -19,6 +19,8 @@ from roboirg.evaluation.play.job_instruction import instruct_job
 from roboirg.evaluation.records.record import Job
 from roboirg.shortcuts import SURFACE_RULES, goal_share, guess_goal
 from roboirg.shortcuts.command_chance import blind_goals, right_share
+from roboirg.tasks import get_task
+from roboirg.tasks.other_goals import begins_with
 from roboirg.tasks.splits.splits import get_episode
 
 CHANCE = "chance"
@@ -39,6 +41,17 @@ def floor_level(floor: str, jobs: Iterable[Job]) -> Fraction | None:
     instructions = dict.fromkeys((job.task, job.split, job.episode, job.column) for job in jobs)
     levels = [_level(floor, *each) for each in instructions]
     return sum(levels, Fraction(0)) / len(levels) if levels else None
+
+
+@functools.lru_cache(maxsize=65_536)
+def silent_chance(task: str, split: str, number: int) -> float:
+    """Return the expected success of who executes a random goal of the scene without any words.
+
+    Goals that begin with all stages of the right one succeed, too.
+    """
+    episode, known = get_episode(task, split, number), get_task(task)
+    plans = [known.stages(episode.scene, goal) for goal in known.goals(episode.scene)]
+    return sum(begins_with(plan, episode.stages) for plan in plans) / len(plans)
 
 
 @functools.lru_cache(maxsize=65_536)

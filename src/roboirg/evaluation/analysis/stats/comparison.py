@@ -11,7 +11,13 @@ import numpy as np
 from roboirg.core.errors import InvalidValueError
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.evaluation.analysis.stats.breakdowns import Labels, cells_by_label
-from roboirg.evaluation.analysis.stats.cells import FAIRNESS, CellResults, Cells, PolicyRun
+from roboirg.evaluation.analysis.stats.cells import (
+    FAIRNESS,
+    CellResults,
+    Cells,
+    PolicyRun,
+    only_told,
+)
 from roboirg.evaluation.analysis.stats.intervals import ALPHA
 from roboirg.evaluation.analysis.stats.option_labels import REFERENCE, options_sort_key
 from roboirg.evaluation.analysis.stats.paired_tests import Gap, Pairs, holm, measure_gap
@@ -103,7 +109,7 @@ def compare(
     rng: np.random.Generator,
     labels: Mapping[str, Labels] | None = None,
 ) -> Comparison:
-    """Compare two policies on the episodes that both played.
+    """Compare two policies on the episodes that both played, in the arm ``told`` if both have it.
 
     Args:
         first: the cells of one policy run.
@@ -115,6 +121,7 @@ def compare(
         InvalidValueError: one side has several policies or versions, the two have different
             language or environment versions, or they share no episode.
     """
+    first, second = only_told(first), only_told(second)
     ours, theirs = _only_policy_run(first), _only_policy_run(second)
     _check_fair(ours, theirs)
     here = {ComparisonKey(task, options): cell for (_, task, options), cell in first.items()}

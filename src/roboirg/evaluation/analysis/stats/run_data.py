@@ -12,6 +12,7 @@ from roboirg.evaluation.analysis.stats.cells import (
     PolicyRun,
     gather,
     labels,
+    only_told,
     policy_order,
     sort_cells,
 )
@@ -50,6 +51,14 @@ class RunData:
         names = labels(cells)
         results = [(_owner(name, one, names), one) for name, results in runs for one in results]
         return cls(tuple(results), cells, summaries_by_key(cells), names)
+
+    def told(self) -> RunData:
+        """Return the data without control arms, if there is any."""
+        cells = only_told(self.cells)
+        names = {one: name for one, name in self.names.items() if one in {key[0] for key in cells}}
+        results = tuple(one for one in self.results if one[0] in names)
+        summaries = {key: one for key, one in self.summaries.items() if key.policy_run in names}
+        return RunData(results, cells, summaries, names)
 
     def owner(self, run: str, result: Summary) -> PolicyRun:
         """Return the policy run of a result of a run."""

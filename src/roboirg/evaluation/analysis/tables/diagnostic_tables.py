@@ -13,6 +13,7 @@ from roboirg.evaluation.analysis.stats.paired_tests import Gap, holm
 from roboirg.evaluation.analysis.stats.rates import points
 from roboirg.evaluation.analysis.stats.run_data import RunData
 from roboirg.evaluation.analysis.stats.run_summary import ALL_TASKS
+from roboirg.evaluation.analysis.tables.arm_table import make_arm_table
 from roboirg.evaluation.analysis.tables.breakdown_table import (
     corrected_p_text,
     interval_text,
@@ -131,5 +132,6 @@ DIAGNOSTIC_TABLES: Mapping[str, Callable[[RunData], Table]] = {
     "forms": make_forms_table,
     "failures": make_failure_table,
     "heard": make_heard_table,
+    "arms": make_arm_table,
 }
 """By name, as in the command line."""

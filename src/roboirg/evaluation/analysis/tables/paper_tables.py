@@ -21,7 +21,14 @@ from roboirg.evaluation.analysis.published import (
     published_rows,
     published_tasks,
 )
-from roboirg.evaluation.analysis.stats.cells import CellKey, Cells, PolicyRun, cell_interval, labels
+from roboirg.evaluation.analysis.stats.cells import (
+    CellKey,
+    Cells,
+    PolicyRun,
+    cell_interval,
+    labels,
+    only_told,
+)
 from roboirg.evaluation.analysis.stats.chance import floor_level
 from roboirg.evaluation.analysis.stats.intervals import SEED
 from roboirg.evaluation.analysis.stats.option_labels import setting_sort_key, staged_options
@@ -88,6 +95,7 @@ def make_table(
         published: whether to add the paper's rows, and to say which rates can be compared.
         floors: those of `FLOORS` whose expected success is added below the policies.
     """
+    cells = only_told(cells)
     for known in WHICH:
         if which == known:
             if known == "coverage":
@@ -100,7 +108,7 @@ def is_informative(which: Which, cells: Cells) -> bool:
     """Return whether a run has rows for a table; context and planners need several."""
     if which == "coverage":
         return True
-    rows = list(_positions(which, cells))
+    rows = list(_positions(which, only_told(cells)))
     if which == "planner":
         return len({policy_run for policy_run, _ in rows}) > 1
     if which == "context":

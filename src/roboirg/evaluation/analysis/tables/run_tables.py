@@ -9,6 +9,7 @@ from rich.console import Console
 from rich.table import Table as Grid
 from rich.text import Text
 
+from roboirg.core.arms import TOLD
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.core.plain_text import counted, printable
 from roboirg.evaluation.analysis.comparability import (
@@ -138,7 +139,8 @@ def failure_text(record: Summary) -> str:
     mark = f" {ERROR_MARK}" if record.outcome == "error" else ""
     where = f"{record.task} {record.split}/{record.episode} {options_label(record.options)}"
     seed = f" (policy seed {record.policy_seed})" if record.policy_seed else ""
-    return f"{where}{seed}: {printable(record.cause or record.outcome)}{mark}"
+    arm = "" if record.arm == TOLD else f" ({record.arm})"
+    return f"{where}{seed}{arm}: {printable(record.cause or record.outcome)}{mark}"
 
 
 def gap_text(overlap: Overlap) -> str:

@@ -1,0 +1,120 @@
+"""Table of what control arms show, and its comparison of two policies in sentences."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from typing import cast
+
+import numpy as np
+
+from roboirg.core.errors import InvalidValueError
+from roboirg.evaluation.analysis.stats.arm_figures import (
+    WORDS_WORTH,
+    ArmFigure,
+    arm_figures,
+    as_told,
+    compare_language_use,
+)
+from roboirg.evaluation.analysis.stats.cells import PolicyRun
+from roboirg.evaluation.analysis.stats.chance import silent_chance
+from roboirg.evaluation.analysis.stats.intervals import SEED, Interval
+from roboirg.evaluation.analysis.stats.option_labels import options_label
+from roboirg.evaluation.analysis.stats.rates import p_text, points
+from roboirg.evaluation.analysis.stats.run_data import RunData
+from roboirg.evaluation.analysis.tables.breakdown_table import corrected_p_text, interval_text
+from roboirg.evaluation.analysis.tables.table import NOT_APPLICABLE, Column, Entry, Row, Table
+
+COLUMNS = tuple(
+    map(Column, ("episodes", "first, %", "second, %", "chance", "difference", "95 % interval", "p"))
+)
+_NOTE = (
+    "Each figure compares two rates on the same scenes, as means over tasks, in percent with 95 % "
+    "intervals. Language use: first the scenes in which the told goal and another one were both "
+    "reached when stated; second those in which the same goal was pursued whichever was stated. "
+    "Words' worth and order's worth: success when told, against silence and against scrambled "
+    "words. Paraphrases: all of them succeed, against their mean. Repeat: another policy seed. "
+    "Chance is the success in silence of a random goal of the scene. Differences are in points; "
+    "p-values are corrected over all rows of the policy. Scenes without an arm are in none of its "
+    "figures."
+)
+
+
+def make_arm_table(data: RunData) -> Table:
+    """Make the table, one row for each figure of a policy in a setting.
+
+    Raises:
+        InvalidValueError: the runs have no control arms.
+    """
+    found = figures_of(data)
+    if not found:
+        raise InvalidValueError(
+            "The runs have no control arms; play them with --arms told,other-goal,silent,scrambled."
+        )
+    names = {as_told(one): name for one, name in data.told().names.items()}
+    return Table(
+        key="arms",
+        title="Control arms",
+        heads=("policy and setting", "figure"),
+        columns=COLUMNS,
+        rows=tuple(
+            Row(
+                f"{policy_label(one, names)}, {options_label(one.key.options)}",
+                f"{one.contrast.name}: {one.contrast.first} − {one.contrast.second}",
+                "ours",
+                tuple(Entry(word=word) for word in _words(one)),
+            )
+            for one in found
+        ),
+        notes=(_NOTE,),
+    )
+
+
+def has_arms(data: RunData) -> bool:
+    """Return whether the runs have a control arm next to another."""
+    return bool(figures_of(data))
+
+
+def figures_of(data: RunData) -> tuple[ArmFigure, ...]:
+    """Return the figures of all policies of some runs."""
+    return arm_figures(data.results, np.random.default_rng(SEED))
+
+
+def language_use_sentences(
+    first: RunData, second: RunData, names: tuple[str, str]
+) -> Iterator[str]:
+    """Yield how the language use of two policies differs, a sentence for each setting."""
+    rng = np.random.default_rng(SEED)
+    for options, (gap, p_value) in compare_language_use(
+        figures_of(first), figures_of(second), rng
+    ).items():
+        ends = interval_text(gap)
+        interval = "" if ends == NOT_APPLICABLE else f" (95 % interval {ends})"
+        yield (
+            f"Language use, {options_label(options)}: {names[0]} less {names[1]} "
+            f"{points(gap.value, 1)} points{interval}, {p_text(p_value)}, {gap.episodes} scenes."
+        )
+
+
+def policy_label(one: ArmFigure, names: Mapping[PolicyRun, str]) -> str:
+    """Return the label of a policy run without that of its arm."""
+    name = names.get(one.key.policy_run, one.key.policy_run.marked_policy)
+    return name.replace(f", {one.key.policy_run.conditions.label('arm')}", "")
+
+
+def _words(one: ArmFigure) -> Sequence[str]:
+    rates = [_rate_text(*side) for side in zip(one.rates, one.intervals, strict=True)]
+    chance = NOT_APPLICABLE
+    if one.contrast.name == WORDS_WORTH:
+        split = one.key.policy_run.conditions.split
+        chances = [
+            np.mean([silent_chance(task, split, trial.episode) for trial in pair.second.verdicts])
+            for task, pair in one.cells.items()
+        ]
+        chance = f"{100 * float(cast('float', np.mean(chances))):.1f}"
+    figures = (points(one.gap.value, 1), interval_text(one.gap), corrected_p_text(one.p_holm))
+    return (str(one.gap.episodes), *rates, chance, *figures)
+
+
+def _rate_text(rate: float, interval: Interval | None) -> str:
+    ends = "" if interval is None else f" ({100 * interval.low:.1f} to {100 * interval.high:.1f})"
+    return f"{100 * rate:.1f}{ends}"
