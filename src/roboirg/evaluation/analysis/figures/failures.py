@@ -31,7 +31,7 @@ COLORS: Mapping[str, str] = {
     **dict(
         zip(
             GROUNDING,
-            ("#7f2704", "#a63603", "#c0510a", "#ee8130", "#fbb477", "#fddfbf"),
+            ("#7f2704", "#a63603", "#c0510a", "#ee8130", "#fbb477", "#fddfbf", "#fff1e3"),
             strict=True,
         )
     ),

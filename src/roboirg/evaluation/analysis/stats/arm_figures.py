@@ -115,11 +115,11 @@ def arm_figures(
 ) -> tuple[ArmFigure, ...]:
     """Return the figures for which the arms were played, by policy run and setting."""
     trials: dict[ArmKey, dict[str, dict[Trial, dict[str, Summary]]]] = {}
-    for policy_run, one in results:
-        if one.outcome != "error":
-            key = ArmKey(as_told(policy_run), one.column)
+    for policy_run, result in results:
+        if result.outcome != "error":
+            key = ArmKey(as_told(policy_run), result.column)
             tasks = trials.setdefault(key, defaultdict(lambda: defaultdict(dict)))
-            tasks[one.task][Trial(one.episode, one.policy_seed)][one.arm] = one
+            tasks[result.task][Trial(result.episode, result.policy_seed)][result.arm] = result
     runs = list(dict.fromkeys(key.policy_run for key in trials))
     found = []
     for key in sorted(trials, key=lambda key: (runs.index(key[0]), options_sort_key(key[1]))):

@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
+from roboirg.core.arms import TOLD
 from roboirg.core.errors import UnknownNameError
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.evaluation.analysis.stats.cells import CellKey, CellResults, Cells, Trial
@@ -47,9 +48,9 @@ class InstructionKey(NamedTuple):
     split: str
     episode: int
     options: InstructionOptions
-    arm: str
     language_version: str
     environment_version: int
+    arm: str = TOLD
 
     @classmethod
     def of(cls, record: Record) -> InstructionKey:
@@ -67,9 +68,9 @@ class InstructionKey(NamedTuple):
             conditions.split,
             trial.episode,
             replace(key.options, wordings=conditions.wordings),
-            conditions.arm,
             versions.language,
             versions.environment,
+            conditions.arm,
         )
 
 

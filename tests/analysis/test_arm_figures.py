@@ -1,0 +1,124 @@
+"""What the figures of control arms show of made-up policies."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from conftest import make_result
+from roboirg.core.errors import InvalidValueError
+from roboirg.evaluation.analysis.figures import draw_figure
+from roboirg.evaluation.analysis.stats.arm_figures import ArmFigure, compare_language_use
+from roboirg.evaluation.analysis.stats.chance import silent_chance
+from roboirg.evaluation.analysis.stats.run_data import RunData
+from roboirg.evaluation.analysis.tables.arm_table import (
+    figures_of,
+    language_use_sentences,
+    make_arm_table,
+)
+from roboirg.evaluation.records.record import GoalOutcomes, Summary
+
+TASKS = ("PickXtimes", "VideoUnmask")
+SCENES = range(12)
+
+
+def goals(arm: str, done: str) -> tuple[str, GoalOutcomes]:
+    """Return verdict and goals of a policy that does `own` or `other`."""
+    stated = "other" if arm == "other-goal" else "own"
+    won = done == stated
+    return ("success" if won else "failure"), GoalOutcomes(
+        stated=stated,
+        reached=(done,) if won or arm == "other-goal" else (),
+        agrees=() if won else (done,),
+        original=("success" if done == "own" else "failure") if arm == "other-goal" else None,
+    )
+
+
+def play(policy: str, acts: dict[str, str], scenes: range = SCENES) -> list[Summary]:
+    """Return results of a policy that does something in each arm."""
+    found = []
+    for arm, done in acts.items():
+        outcome, outcomes = goals(arm, done)
+        found += [
+            make_result(outcome, scene, policy=policy, task=task, arm=arm, goals=outcomes)
+            for task in TASKS
+            for scene in scenes
+        ]
+    return found
+
+
+LISTENER = {"told": "own", "other-goal": "other", "silent": "none", "scrambled": "none"}
+HABIT = {"told": "own", "other-goal": "own", "silent": "own", "scrambled": "own"}
+FIXED = {"told": "other", "other-goal": "other", "silent": "other", "scrambled": "other"}
+
+
+def data_of(*results: list[Summary]) -> RunData:
+    return RunData.of([("", [one for each in results for one in each])])
+
+
+def figure(data: RunData, name: str) -> ArmFigure:
+    return next(one for one in figures_of(data) if one.contrast.name == name)
+
+
+@pytest.mark.parametrize(
+    ("acts", "use", "habit", "worth"),
+    [(LISTENER, 1.0, 0.0, 1.0), (HABIT, 0.0, 1.0, 0.0), (FIXED, 0.0, 1.0, 0.0)],
+)
+def test_who_listens_and_who_has_a_habit(acts, use, habit, worth):
+    data = data_of(play("mine", acts))
+    found = figure(data, "language use")
+    assert found.rates == (use, habit)
+    assert found.gap.value == use - habit
+    assert found.gap.episodes == len(TASKS) * len(SCENES)
+    assert found.p_holm < 0.001
+    for interval, rate in zip(found.intervals, found.rates, strict=True):
+        assert interval is not None
+        assert interval.low <= rate <= interval.high
+    assert figure(data, "words' worth").gap.value == worth
+    assert figure(data, "order's worth").gap.value == worth
+
+
+def test_all_paraphrases_against_their_mean():
+    half = play("mine", {"told": "own", "paraphrase-1": "own"}, range(8))
+    half += play("mine", {"paraphrase-2": "own"}, range(4))
+    half += play("mine", {"paraphrase-2": "none"}, range(4, 8))
+    found = figure(data_of(half), "paraphrases")
+    assert found.rates == (0.5, 0.75)
+    assert found.gap.value == -0.25
+    assert found.gap.episodes == 16
+
+
+def test_a_trial_without_an_arm_and_an_error_count_in_no_figure():
+    results = play("mine", LISTENER, range(3))
+    results += [make_result("success", 7, policy="mine", task=TASKS[0])]
+    results += [make_result("error", 8, policy="mine", task=TASKS[0], arm=arm) for arm in LISTENER]
+    found = figure(data_of(results), "words' worth")
+    assert found.gap.episodes == 6
+
+
+def test_tables_figures_and_sentences_have_each_policy_once():
+    data = data_of(play("mine", LISTENER), play("knows", HABIT))
+    table = make_arm_table(data)
+    assert len(table.rows) == 6
+    assert {row.group for row in table.rows} == {"mine, explicit", "knows, explicit"}
+    uses = next(row for row in table.rows if row.name.startswith("language use"))
+    assert uses.entries[0].text == "24"
+    assert uses.entries[1].text.startswith("0.0 (")
+    assert draw_figure("arms", data) is not None
+    assert draw_figure("arms", data_of(play("mine", {"told": "own"}))) is None
+    averages = draw_figure("averages", data)
+    assert averages is not None
+    with pytest.raises(InvalidValueError, match="--arms told"):
+        make_arm_table(data_of(play("mine", {"told": "own"})))
+    sides = data_of(play("mine", LISTENER)), data_of(play("knows", HABIT))
+    (sentence,) = language_use_sentences(*sides, ("mine", "knows"))
+    assert sentence.startswith("Language use, explicit: mine less knows +100.0 points")
+    rng = np.random.default_rng(0)
+    assert not compare_language_use(figures_of(sides[0]), (), rng)
+
+
+def test_chance_in_silence_counts_goals_that_begin_alike():
+    # Nine goals: three picks, six pairs. One that is to be lifted is also how two pairs begin.
+    for number in range(12):
+        assert silent_chance("VideoUnmask", "test", number) in {pytest.approx(1 / 9), 1 / 3}
+    assert silent_chance("StopCube", "test", 0) == 0.25

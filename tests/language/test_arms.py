@@ -1,0 +1,125 @@
+"""What is said in the control arms of a scene, and for which goal."""
+
+from __future__ import annotations
+
+from collections import Counter
+
+import pytest
+
+from roboirg.core.arms import ARMS, PARAPHRASES, parse_arm
+from roboirg.core.episode import Episode, Goal
+from roboirg.core.errors import InvalidValueError, UnknownNameError
+from roboirg.core.instruction_options import InstructionOptions
+from roboirg.language import expressible, instruct_with
+from roboirg.language.arms import FUNCTION_WORDS, find_arm_refusal, say_arm
+from roboirg.reader import interpret
+from roboirg.tasks import all_tasks, get_task, with_goal
+from roboirg.tasks.other_goals import begins_with, draw_other_goal, other_goals
+from roboirg.tasks.splits.splits import get_episode, make_episode
+
+TASKS = tuple(all_tasks())
+
+
+def options_of(episode: Episode) -> list[InstructionOptions]:
+    return [InstructionOptions(name) for name in expressible(episode)]
+
+
+def reads_as(text: str, episode: Episode) -> tuple[Goal, ...]:
+    return interpret(text, episode.scene, episode.task).goals
+
+
+@pytest.mark.parametrize("task", TASKS)
+def test_other_goals_take_as_many_picks_and_none_begins_the_other(task):
+    picks = {"pick_cube", "pick_container"}
+    for index in range(50):
+        episode = get_episode(task, "test", index)
+        found = other_goals(episode)
+        assert episode.goal not in found
+        assert set(found) <= set(get_task(task).goals(episode.scene))
+        for goal in found:
+            stages = with_goal(episode, goal).stages
+            both = [sum(one.primitive.kind in picks for one in each) for each in (
+                stages, episode.stages)]  # fmt: skip
+            assert both[0] == both[1]
+            assert not begins_with(stages, episode.stages)
+            assert not begins_with(episode.stages, stages)
+
+
+def test_the_other_goal_is_drawn_evenly_and_not_by_the_words():
+    counts: Counter[tuple[int, int]] = Counter()
+    for seed in range(600):
+        episode = make_episode("StopCube", seed, "easy")
+        drawn = draw_other_goal(episode)
+        assert drawn == draw_other_goal(episode)
+        assert drawn is not None
+        counts[episode.goal.number("visit"), drawn.number("visit")] += 1
+    assert len(counts) == 12  # each of four visits, with each of the other three
+    assert min(counts.values()) > 25
+    assert max(counts.values()) < 80
+
+
+def test_a_scene_without_another_goal_says_so():
+    episode = get_episode("VideoRepick", "test", 0)
+    assert draw_other_goal(episode) is None
+    reason = find_arm_refusal(episode, InstructionOptions(), "other-goal")
+    assert reason is not None
+    assert "no other goal" in reason
+    assert find_arm_refusal(episode, InstructionOptions(), "silent") is None
+
+
+@pytest.mark.parametrize("task", TASKS)
+def test_the_reader_gets_the_goal_of_every_arm_that_states_one(task):
+    stated = 0
+    for index in (1, 2, 3):
+        episode = get_episode(task, "test", index)
+        for options in options_of(episode):
+            told = instruct_with(episode, options).text
+            texts = [told]
+            for arm in ("other-goal", "paraphrase-1", "paraphrase-2"):
+                if find_arm_refusal(episode, options, arm) is not None:
+                    continue
+                said = say_arm(episode, options, arm)
+                stated += 1
+                assert reads_as(said.instruction.text, episode) == (said.episode.goal,)
+                if arm == "other-goal":
+                    assert said.original == episode
+                    assert said.episode.goal != episode.goal
+                    assert said.episode.scene == episode.scene
+                else:
+                    assert (said.episode, said.original) == (episode, None)
+                    texts.append(said.instruction.text)
+                assert said.instruction.metadata["pool"] == "test"
+            assert len(set(texts)) == len(texts)
+    assert stated > 20
+
+
+@pytest.mark.parametrize("setting", ["explicit", "contextual", "reasoning"])
+def test_told_silent_and_scrambled_words(setting):
+    episode, options = get_episode("PickXtimes", "test", 3), InstructionOptions(setting)
+    told = instruct_with(episode, options)
+    for arm in ("told", "again"):
+        assert say_arm(episode, options, arm).instruction == told
+    assert say_arm(episode, options, "silent").instruction.turns == ("Please do your task.",)
+    assert say_arm(episode, options, "silent-empty").instruction.text == ""
+    scrambled = say_arm(episode, options, "scrambled").instruction
+    assert scrambled == say_arm(episode, options, "scrambled").instruction
+    assert len(scrambled.utterances) == len(told.utterances)
+    words = told.text.lower().replace(",", "").replace(".", "").split()
+    content = [word for word in words if word not in FUNCTION_WORDS.split()]
+    assert Counter(scrambled.text.split()) == Counter(content)
+    assert scrambled.text.split() != content
+    assert not scrambled.mentions
+
+
+def test_names_of_arms():
+    assert parse_arm("other-goal") == ("other-goal",)
+    assert parse_arm("paraphrase:3") == ("paraphrase-1", "paraphrase-2", "paraphrase-3")
+    assert len(parse_arm("paraphrase")) == PARAPHRASES
+    assert parse_arm("paraphrase-4") == ("paraphrase-4",)
+    assert all(parse_arm(name) for name in ARMS)
+    for wrong in ("othergoal", "paraphrase-0", "paraphrase-21", "silent:2", ""):
+        with pytest.raises(UnknownNameError, match="arm"):
+            parse_arm(wrong)
+    for wrong in ("paraphrase:0", "paraphrase:x", "paraphrase:21", "paraphrase:"):
+        with pytest.raises(InvalidValueError, match="paraphrase:2"):
+            parse_arm(wrong)
