@@ -74,8 +74,7 @@ def name_other_goal(
 
     That is, it reached that goal, or its first wrong act agrees with it.
     """
-    own = describe_goal(original.goal)
-    if goals.original != "success" and own not in goals.agrees:
+    if goals.original != "success" and describe_goal(original.goal) not in goals.agrees:
         return found
-    words = f"followed the other goal ({own}), which was not stated: {found.sentence[:-1]}"
+    words = f"followed the other goal, which was not stated: {found.sentence[:-1]}"
     return FailureAttribution.of("other_goal", found.subject, found.step, words)

@@ -246,8 +246,8 @@ class GoalOutcomes(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fie
     Attributes:
         stated: the goal that the verdict is about.
         reached: all goals whose stages were completed, those on the way to another included.
-        agrees: those with which the act agrees by which the verdict became a failure: that neither
-            failed by then nor were reached before. Empty if no act did.
+        agrees: those that are still possible after the first wrong act, or are reached by it; empty
+            unless something forbidden decided the verdict.
         original: whether the scene's own goal was reached, where the words state another one; None
             in the other arms.
     """

@@ -41,7 +41,7 @@ def draw_arms(content: RunData) -> Figure | None:
     for panel, (title, rows) in zip(axes, panels.items(), strict=True):
         _draw_panel(panel, rows)
         panel.set_title(folded(title, TITLE_LETTERS), fontsize=8.5, loc="left", fontweight="bold")
-    axes[-1].set_xlabel("scenes, %: first rate filled, second hollow; difference in points")
+    axes[-1].set_xlabel("%: first filled, second hollow", loc="left")
     return figure
 
 
