@@ -32,6 +32,7 @@ def plan_of(arms: str = ARMS, **changes: object) -> Plan:
 
 
 def play(plan: Plan, folder: Path) -> Path:
+    folder.mkdir(exist_ok=True)
     write_plan(plan, folder)
     run_plan(plan, folder, FakePlay(), InProcess())
     return folder
@@ -56,7 +57,7 @@ def test_arms_of_the_command_line_and_of_plan_files(tmp_path: Path) -> None:
     path = tmp_path / "arms.yaml"
     path.write_text("policies: oracle\ntasks: StopCube\narms: [told, paraphrase:2, again]\n")
     fields = read_plan_file(str(path))
-    made = make_plan([str(fields.pop("policies"))], **fields)
+    made = make_plan(fields.pop("policies"), **fields)
     assert made.arms == ("told", "paraphrase-1", "paraphrase-2", "again")
     write_plan(made, tmp_path)
     assert read_plan(tmp_path) == made

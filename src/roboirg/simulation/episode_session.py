@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import itertools
 from collections.abc import Callable, Iterator
 from typing import Any
 
@@ -111,8 +110,8 @@ class EpisodeSession:
         digest = hashlib.sha256()
         for array in self._state():
             digest.update(np.ascontiguousarray(array).tobytes())
-        progress = [(judge.index, str(judge.status)) for judge in self._judges]
-        digest.update(repr((self.world.elapsed, *itertools.chain(*progress), self.events)).encode())
+        progress = (self.world.elapsed, self.judge.index, str(self.judge.status), self.events)
+        digest.update(repr(progress).encode())
         return digest.hexdigest()
 
     def state_numbers(self) -> NDArray[np.float64]:
