@@ -17,7 +17,7 @@ from roboirg.evaluation.analysis.stats.arm_figures import ArmFigure
 from roboirg.evaluation.analysis.stats.option_labels import options_label
 from roboirg.evaluation.analysis.stats.rates import points
 from roboirg.evaluation.analysis.stats.run_data import RunData
-from roboirg.evaluation.analysis.tables.arm_table import figures_of, policy_label
+from roboirg.evaluation.analysis.tables.arm_table import figures_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -31,8 +31,9 @@ TEXT_AT, ROOM = 106, 150
 def draw_arms(content: RunData) -> Figure | None:
     """Draw a panel for each policy; return None without control arms."""
     panels: dict[str, list[ArmFigure]] = {}
+    names = content.told().names
     for one in figures_of(content):
-        panels.setdefault(policy_label(one, content.told().names), []).append(one)
+        panels.setdefault(names[one.policy_run], []).append(one)
     if not panels:
         return None
     heights = [len(rows) * ROW_INCHES + MARGIN_INCHES for rows in panels.values()]
@@ -47,7 +48,7 @@ def draw_arms(content: RunData) -> Figure | None:
 
 def _draw_panel(axes: Axes, rows: list[ArmFigure]) -> None:
     labels = [
-        f"{one.contrast.name}, {options_label(one.key.options)}\n"
+        f"{one.contrast.name}, {options_label(one.options)}\n"
         f"{one.contrast.first} / {one.contrast.second}"
         for one in rows
     ]

@@ -48,6 +48,7 @@ Arms = Mapping[str, Summary]
 """The verdicts of one trial by arm."""
 Sides = tuple[Mapping[Trial, bool], Mapping[Trial, bool]]
 """What a trial counts in the first and in the second rate."""
+SideCells = tuple[CellResults, CellResults]
 
 
 class ArmContrast(NamedTuple):
@@ -66,34 +67,22 @@ class ArmContrast(NamedTuple):
     sides: Callable[[Trial, Arms], Sides | None]
 
 
-class ArmKey(NamedTuple):
-    """Policy run, as of the arm ``told``, and instruction options."""
-
-    policy_run: PolicyRun
-    options: InstructionOptions
-
-
-class SideCells(NamedTuple):
-    """The two sides of a figure in one task."""
-
-    first: CellResults
-    second: CellResults
-
-
 @dataclass(frozen=True, slots=True)
 class ArmFigure:
     """A figure of one policy in one setting, the mean over tasks.
 
     Attributes:
-        key: policy run and options.
+        policy_run: as of the arm ``told``.
+        options: of the instruction.
         contrast: which figure.
-        cells: by task.
+        cells: by task, those of the first and of the second rate.
         intervals: of the first and the second rate.
         gap: first less second.
         p_holm: its p-value after Holm's correction over all figures of the policy run.
     """
 
-    key: ArmKey
+    policy_run: PolicyRun
+    options: InstructionOptions
     contrast: ArmContrast
     cells: Mapping[str, SideCells]
     intervals: tuple[Interval | None, Interval | None]
@@ -114,23 +103,20 @@ def arm_figures(
     results: Iterable[tuple[PolicyRun, Summary]], rng: np.random.Generator
 ) -> tuple[ArmFigure, ...]:
     """Return the figures for which the arms were played, by policy run and setting."""
-    trials: dict[ArmKey, dict[str, dict[Trial, dict[str, Summary]]]] = {}
-    for policy_run, result in results:
-        if result.outcome != "error":
-            key = ArmKey(as_told(policy_run), result.column)
-            tasks = trials.setdefault(key, defaultdict(lambda: defaultdict(dict)))
-            tasks[result.task][Trial(result.episode, result.policy_seed)][result.arm] = result
-    runs = list(dict.fromkeys(key.policy_run for key in trials))
-    found = []
-    for key in sorted(trials, key=lambda key: (runs.index(key[0]), options_sort_key(key[1]))):
-        tasks = {name: trials[key][name] for name in task_order(trials[key])}
-        found += [one for each in CONTRASTS if (one := _figure(key, each, tasks, rng))]
-    return tuple(one for run in runs for one in _corrected(run, found))
-
-
-def as_told(policy_run: PolicyRun) -> PolicyRun:
-    """Return the policy run as of the arm ``told``."""
-    return policy_run._replace(conditions=policy_run.conditions._replace(arm=TOLD))
+    trials: dict[tuple[PolicyRun, InstructionOptions], dict[str, dict[Trial, dict[str, Summary]]]]
+    trials = defaultdict(lambda: defaultdict(lambda: defaultdict(dict)))
+    for run, one in results:
+        if one.outcome != "error":
+            told = run._replace(conditions=run.conditions._replace(arm=TOLD))
+            trial = Trial(one.episode, one.policy_seed)
+            trials[told, one.column][one.task][trial][one.arm] = one
+    found: dict[PolicyRun, list[ArmFigure]] = defaultdict(list)
+    for run, options in sorted(trials, key=lambda key: options_sort_key(key[1])):
+        tasks = {name: trials[run, options][name] for name in task_order(trials[run, options])}
+        made = (_figure(run, options, each, tasks, rng) for each in CONTRASTS)
+        found[run] += filter(None, made)
+    runs = dict.fromkeys(run for run, _ in trials)
+    return tuple(one for run in runs for one in _corrected(found[run]))
 
 
 def compare_language_use(
@@ -141,13 +127,13 @@ def compare_language_use(
     Each gap comes with its p-value after Holm's correction over the options.
     """
     ours, theirs = (
-        {one.key.options: one.cells for one in side if one.contrast.name == LANGUAGE_USE}
+        {one.options: one.cells for one in side if one.contrast.name == LANGUAGE_USE}
         for side in (first, second)
     )
     found: dict[InstructionOptions, Gap] = {}
     for options in (options for options in ours if options in theirs):
         here, there = ours[options], theirs[options]
-        pairs = [Pairs.of(here[one].first, there[one].first) for one in here if one in there]
+        pairs = [Pairs.of(here[one][0], there[one][0]) for one in here if one in there]
         if (gap := measure_gap(pairs, rng)) is not None:
             found[options] = gap
     adjusted = holm([gap.p_value for gap in found.values()])
@@ -155,37 +141,34 @@ def compare_language_use(
 
 
 def _figure(
-    key: ArmKey,
+    policy_run: PolicyRun,
+    options: InstructionOptions,
     contrast: ArmContrast,
     tasks: Mapping[str, Mapping[Trial, Arms]],
     rng: np.random.Generator,
 ) -> ArmFigure | None:
-    cells = {task: _cells(contrast, trials) for task, trials in tasks.items()}
-    cells = {task: pair for task, pair in cells.items() if pair.first.trials}
+    cells: dict[str, SideCells] = {}
+    for task, trials in tasks.items():
+        sides = [one for trial in sorted(trials) if (one := contrast.sides(trial, trials[trial]))]
+        if sides:
+            firsts, seconds = zip(*sides, strict=True)
+            cells[task] = (
+                CellResults(dict(ChainMap(*firsts))),
+                CellResults(dict(ChainMap(*seconds))),
+            )
     gap = measure_gap([Pairs.of(*pair) for pair in cells.values()], rng)
     if gap is None:
         return None
     intervals = (
-        clustered_interval([pair.first for pair in cells.values()], rng),
-        clustered_interval([pair.second for pair in cells.values()], rng),
+        clustered_interval([first for first, _ in cells.values()], rng),
+        clustered_interval([second for _, second in cells.values()], rng),
     )
-    return ArmFigure(key, contrast, cells, intervals, gap, gap.p_value)
+    return ArmFigure(policy_run, options, contrast, cells, intervals, gap, gap.p_value)
 
 
-def _cells(contrast: ArmContrast, trials: Mapping[Trial, Arms]) -> SideCells:
-    first: dict[Trial, bool] = {}
-    second: dict[Trial, bool] = {}
-    for trial, arms in sorted(trials.items()):
-        if (sides := contrast.sides(trial, arms)) is not None:
-            first |= sides[0]
-            second |= sides[1]
-    return SideCells(CellResults(first), CellResults(second))
-
-
-def _corrected(policy_run: PolicyRun, found: Sequence[ArmFigure]) -> Iterable[ArmFigure]:
-    own = [one for one in found if one.key.policy_run == policy_run]
-    adjusted = holm([one.gap.p_value for one in own])
-    return [replace(one, p_holm=p_value) for one, p_value in zip(own, adjusted, strict=True)]
+def _corrected(found: Sequence[ArmFigure]) -> Iterable[ArmFigure]:
+    adjusted = holm([one.gap.p_value for one in found])
+    return [replace(one, p_holm=p_value) for one, p_value in zip(found, adjusted, strict=True)]
 
 
 def _won(one: Summary) -> bool:

@@ -55,7 +55,7 @@ class RunData:
     def told(self) -> RunData:
         """Return the data without control arms, if there is any."""
         cells = only_told(self.cells)
-        names = {one: name for one, name in self.names.items() if one in {key[0] for key in cells}}
+        names = labels(cells)
         results = tuple(one for one in self.results if one[0] in names)
         summaries = {key: one for key, one in self.summaries.items() if key.policy_run in names}
         return RunData(results, cells, summaries, names)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from typing import cast
 
 import numpy as np
@@ -12,10 +12,8 @@ from roboirg.evaluation.analysis.stats.arm_figures import (
     WORDS_WORTH,
     ArmFigure,
     arm_figures,
-    as_told,
     compare_language_use,
 )
-from roboirg.evaluation.analysis.stats.cells import PolicyRun
 from roboirg.evaluation.analysis.stats.chance import silent_chance
 from roboirg.evaluation.analysis.stats.intervals import SEED, Interval
 from roboirg.evaluation.analysis.stats.option_labels import options_label
@@ -50,7 +48,7 @@ def make_arm_table(data: RunData) -> Table:
         raise InvalidValueError(
             "The runs have no control arms; play them with --arms told,other-goal,silent,scrambled."
         )
-    names = {as_told(one): name for one, name in data.told().names.items()}
+    names = data.told().names
     return Table(
         key="arms",
         title="Control arms",
@@ -58,7 +56,7 @@ def make_arm_table(data: RunData) -> Table:
         columns=COLUMNS,
         rows=tuple(
             Row(
-                f"{policy_label(one, names)}, {options_label(one.key.options)}",
+                f"{names[one.policy_run]}, {options_label(one.options)}",
                 f"{one.contrast.name}: {one.contrast.first} − {one.contrast.second}",
                 "ours",
                 tuple(Entry(word=word) for word in _words(one)),
@@ -95,20 +93,14 @@ def language_use_sentences(
         )
 
 
-def policy_label(one: ArmFigure, names: Mapping[PolicyRun, str]) -> str:
-    """Return the label of a policy run without that of its arm."""
-    name = names.get(one.key.policy_run, one.key.policy_run.marked_policy)
-    return name.replace(f", {one.key.policy_run.conditions.label('arm')}", "")
-
-
 def _words(one: ArmFigure) -> Sequence[str]:
     rates = [_rate_text(*side) for side in zip(one.rates, one.intervals, strict=True)]
     chance = NOT_APPLICABLE
     if one.contrast.name == WORDS_WORTH:
-        split = one.key.policy_run.conditions.split
+        split = one.policy_run.conditions.split
         chances = [
-            np.mean([silent_chance(task, split, trial.episode) for trial in pair.second.verdicts])
-            for task, pair in one.cells.items()
+            np.mean([silent_chance(task, split, trial.episode) for trial in silent.verdicts])
+            for task, (_, silent) in one.cells.items()
         ]
         chance = f"{100 * float(cast('float', np.mean(chances))):.1f}"
     figures = (points(one.gap.value, 1), interval_text(one.gap), corrected_p_text(one.p_holm))
