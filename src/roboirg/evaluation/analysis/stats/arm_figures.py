@@ -151,11 +151,11 @@ def _figure(
     for task, trials in tasks.items():
         sides = [one for trial in sorted(trials) if (one := contrast.sides(trial, trials[trial]))]
         if sides:
-            firsts, seconds = zip(*sides, strict=True)
-            cells[task] = (
-                CellResults(dict(ChainMap(*firsts))),
-                CellResults(dict(ChainMap(*seconds))),
+            first, second = (
+                CellResults({trial: won for one in side for trial, won in one.items()})
+                for side in zip(*sides, strict=True)
             )
+            cells[task] = first, second
     gap = measure_gap([Pairs.of(*pair) for pair in cells.values()], rng)
     if gap is None:
         return None
