@@ -16,7 +16,7 @@ from roboirg.tasks import get_task, with_goal
 
 
 @dataclass(frozen=True)
-class Trajectory:
+class PlayedCourse:
     """What happened in an episode; steps count since the world began.
 
     Attributes:
@@ -46,7 +46,7 @@ class Trajectory:
         return [event for event in self.events if event.step <= self.decision.step]
 
 
-def find_goal_outcomes(trajectory: Trajectory) -> GoalOutcomes:
+def find_goal_outcomes(trajectory: PlayedCourse) -> GoalOutcomes:
     """Return which goals of the scene were reached, and with which the wrong act agrees."""
     episode, (verdict, wrong_step) = trajectory.episode, trajectory.decision
     reached, agrees = [], []

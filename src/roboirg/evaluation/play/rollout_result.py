@@ -30,7 +30,7 @@ from roboirg.core.observations import DemonstrationSource
 from roboirg.core.plain_text import clip_text
 from roboirg.evaluation.hosting.policy_descriptions import PolicyDescription, describe_policy
 from roboirg.evaluation.play.goal_outcomes import (
-    Trajectory,
+    PlayedCourse,
     find_goal_outcomes,
     name_other_goal,
 )
@@ -298,7 +298,7 @@ def _utterances(
     )
 
 
-def _trajectory(prepared: PreparedJob, result: RolloutResult) -> Trajectory | None:
+def _trajectory(prepared: PreparedJob, result: RolloutResult) -> PlayedCourse | None:
     """Return what happened, for its analysis; None if there is no verdict."""
     if result.outcome == "error":
         return None
@@ -308,13 +308,13 @@ def _trajectory(prepared: PreparedJob, result: RolloutResult) -> Trajectory | No
         for one in result.events
     ]
     original = prepared.scene_episode if prepared.job.arm == OTHER_GOAL else None
-    return Trajectory(
+    return PlayedCourse(
         prepared.episode, events, start, result.elapsed_steps, original, result.original
     )
 
 
 def _attribution(
-    trajectory: Trajectory | None,
+    trajectory: PlayedCourse | None,
     goals: GoalOutcomes | None,
     result: RolloutResult,
     instruction: language.Instruction,
