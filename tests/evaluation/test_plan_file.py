@@ -28,7 +28,7 @@ def test_robommes_plan_needs_its_words() -> None:
 
 @pytest.mark.parametrize("name", sorted({*named_plans()} - {"robomme"}))
 def test_every_named_plan_can_be_played(name: str) -> None:
-    plan = make_plan(["random"], **read_plan_file(name))
+    plan = make_plan(**{"policies": ["random"], **read_plan_file(name)})
     assert plan.jobs()
     assert make_plan(["random"], **read_plan_file(name)).fingerprint == plan.fingerprint
 

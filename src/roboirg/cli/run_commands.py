@@ -34,8 +34,8 @@ PlanName = Annotated[
     str | None,
     typer.Option(
         "--plan",
-        help="YAML file or a run's plan.json; or challenge, paper, paper-context, paper-planners, "
-        "robomme or quick.",
+        help="YAML file or a run's plan.json; or challenge, demo, paper, paper-context, "
+        "paper-planners, robomme or quick.",
         rich_help_panel=options.EPISODES,
     ),
 ]

@@ -9,7 +9,6 @@ import typer
 
 from roboirg.cli.export_commands import export_app
 from roboirg.cli.options import (
-    NO_PLAN,
     PlanWords,
     Settings,
     Split,
@@ -24,6 +23,18 @@ if TYPE_CHECKING:
     from roboirg.apps.demonstrations.export_plan import ExportPlan
 
 
+class ExportWords(PlanWords):
+    """A plan with words, and what is rare in an export."""
+
+    section = "demonstrations"
+    own = (
+        "video", "names", "extra_actions", "variations", "policy", "outcomes", "language_columns",
+    )  # fmt: skip
+
+
+NO_WORDS = ExportWords()
+
+
 @spread
 def export_demonstrations(
     out: Annotated[Path, typer.Option(help="Folder of the data set.")],
@@ -36,37 +47,10 @@ def export_demonstrations(
         str, typer.Option(help="all, 4 for the first four, or a list: 0,3,5-9.")
     ] = "all",
     settings: Settings = "all",
-    words: PlanWords = NO_PLAN,
+    words: ExportWords = NO_WORDS,
     pictures: Annotated[
         str, typer.Option(help="png, lossless-video, lossy-video or none.")
     ] = "png",
-    video: Annotated[
-        str | None,
-        typer.Option(
-            help="Frames of the video: none, prefix, or sidecar.  (none; of robomme-hdf5 prefix)"
-        ),
-    ] = None,
-    names: Annotated[
-        str | None,
-        typer.Option(help="Names of the features: lerobot or openpi.  (by format)"),
-    ] = None,
-    actions: Annotated[
-        str, typer.Option(help="Further descriptions of actions: delta, pose or both.")
-    ] = "none",
-    variations: Annotated[
-        int, typer.Option(help="Trajectories per episode; further ones vary.")
-    ] = 1,
-    policy: Annotated[
-        str, typer.Option(help="Who moves the robot; words change nothing for oracle.")
-    ] = "oracle",
-    outcomes: Annotated[str, typer.Option(help="successes or all.")] = "successes",
-    language_columns: Annotated[
-        bool,
-        typer.Option(
-            "--language-columns",
-            help="Add language columns, for LeRobot 0.6 or later.",
-        ),
-    ] = False,
     trajectories: Annotated[
         Path | None,
         typer.Option(help="Folder that keeps trajectories for further exports."),
@@ -77,6 +61,9 @@ def export_demonstrations(
     ] = False,
 ) -> None:
     """Export demonstrations for training, recorded once per episode, told in every setting.
+
+    A plan may have, under `demonstrations`: video, names, extra_actions, variations, policy,
+    outcomes, language_columns.
 
     Example: roboirg export demonstrations --tasks PickXtimes --out data
     """
@@ -90,7 +77,10 @@ def export_demonstrations(
     from roboirg.tasks import find_tasks
     from roboirg.util.processor import worker_count
 
-    load_policy_class(policy)
+    chosen = words.choices(ExportPlan)
+    load_policy_class(chosen.get("policy", ExportPlan.policy))
+    chosen.setdefault("video", _default_video(format))
+    chosen.setdefault("names", _default_names(format, pictures))
     # `validated` checks the names that are cast.
     names_of_tasks = find_tasks(parse_names("task", tasks))
     plan = ExportPlan(
@@ -102,13 +92,7 @@ def export_demonstrations(
         options=words.options(),
         format=cast("Any", format),
         pictures=cast("Any", pictures),
-        video=cast("Any", video or _default_video(format)),
-        names=cast("Any", names or _default_names(format, pictures)),
-        extra_actions=cast("Any", () if actions == "none" else parse_names("action", actions)),
-        variations=variations,
-        policy=policy,
-        outcomes=cast("Any", outcomes),
-        language_columns=language_columns,
+        **chosen,
     ).validated()
     _print_estimate(plan)
     if dry_run:

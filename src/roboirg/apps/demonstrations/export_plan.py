@@ -119,7 +119,7 @@ class ExportPlan:
         if self.video == "sidecar":
             raise InvalidValueError(
                 "The format 'robomme-hdf5' has the video's frames before the policy's: ask for "
-                "--video prefix, or none."
+                "`video: prefix`, or none."
             )
         if self.variations > 1:
             raise InvalidValueError(

@@ -145,7 +145,7 @@ def run_export(
         ]
         if not kept:
             raise InvalidValueError(
-                f"None of the {len(jobs)} trajectories is a success; ask for --outcomes all."
+                f"None of the {len(jobs)} trajectories is a success; ask for `outcomes: all`."
             )
         datasets = _datasets(plan, out, kept)
         _write_parts(datasets, parts_folder, workers, report, keep=trajectories is not None)

@@ -9,6 +9,7 @@ from typing import Any, Generic, NamedTuple, TypeVar
 
 import numpy as np
 import torch
+from pydantic import NonNegativeInt, PositiveInt
 from torch import nn
 from torch.nn import functional
 
@@ -73,10 +74,10 @@ class TrainingPlan(NamedTuple):
     tasks: tuple[str, ...]
     settings: tuple[str, ...]
     words: PoolName = "train"
-    scenes: int = 300
-    goals: int = 4
-    detector_epochs: int = 6
-    reader_epochs: int = 12
+    scenes: NonNegativeInt = 300
+    goals: PositiveInt = 4
+    detector_epochs: PositiveInt = 6
+    reader_epochs: PositiveInt = 12
     without: Without = "none"
     seed: int = 0
 

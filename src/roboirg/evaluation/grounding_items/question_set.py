@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import msgspec
+from pydantic import PositiveInt
 
 from roboirg.core.episode import ENVIRONMENT_VERSION, Split
 from roboirg.core.errors import InvalidValueError
@@ -61,8 +62,8 @@ class ExportRequest(NamedTuple):
     forms: tuple[str, ...]
     options: InstructionOptions = InstructionOptions()
     every_variant: bool = False
-    frames: int = FRAMES
-    frames_every: int = FRAMES_EVERY
+    frames: PositiveInt = FRAMES
+    frames_every: PositiveInt = FRAMES_EVERY
     wordings: str | None = None
 
     def pictures(self) -> dict[str, Any]:

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import replace
+from typing import Any
 
-from pydantic import ValidationError
+from pydantic import TypeAdapter, ValidationError
 
 from roboirg import tasks as task_registry
 from roboirg.core.errors import InvalidValueError
@@ -110,6 +111,18 @@ def form_names(text: str) -> tuple[str, ...]:
     names = FORMS if means_all(text) else parse_names("form", text)
     check_names("form", names, FORMS)
     return names
+
+
+def as_typed_field(name: str, kind: Any, value: object) -> Any:  # noqa: ANN401 - of that type
+    """Return a value from a file as a field of a type.
+
+    Raises:
+        InvalidValueError: it cannot be one.
+    """
+    try:
+        return TypeAdapter(kind).validate_python(value)
+    except ValidationError as error:
+        raise InvalidValueError(f"{name} is {value!r}: {error.errors()[0]['msg']}.") from error
 
 
 def _explain(error: ValidationError) -> InvalidValueError:
