@@ -227,7 +227,7 @@ class Stage:
         points_at: the object whose pixel the grounded form names; None if it has no slot.
         lasting: control steps for which `expects` has to hold before the stage is complete.
         timer: name of the timer that the stage's first evaluation starts, unless it runs already.
-        recorded: whether the stage is in the video, if it is part of the demonstration.
+        in_video: whether the video shows the stage, if it is part of the demonstration.
     """
 
     expects: Condition
@@ -237,7 +237,7 @@ class Stage:
     points_at: str | None = None
     lasting: int = 0
     timer: str | None = None
-    recorded: bool = True
+    in_video: bool = True
 
 
 def episode_key(task: str, split: Split, index: int) -> str:
