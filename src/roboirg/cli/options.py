@@ -144,7 +144,7 @@ class PlanWords(OptionGroup):
         return {name: self.fields[name] for name in names if name in self.fields}
 
     @property
-    def file(self) -> str | None:
+    def wordings_file(self) -> str | None:
         """The wording file or the name of a pool."""
         return self.fields.get("wordings")
 

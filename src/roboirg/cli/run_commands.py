@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from roboirg.cli import plan_options as options
+from roboirg.cli import run_options as options
 from roboirg.cli.options import Workers, add_working_directory, spread
 from roboirg.core.errors import InvalidValueError, UnknownNameError
 from roboirg.core.plain_text import counted, printable, verb_for

@@ -72,7 +72,7 @@ def export_demonstrations(
     from roboirg.apps.demonstrations.size_estimate import size_text
     from roboirg.cli.names import known_settings
     from roboirg.cli.progress_bar import progress_bars
-    from roboirg.evaluation.plan.plan_parsing import parse_episodes, parse_names
+    from roboirg.evaluation.plan.option_parsing import parse_episodes, parse_names
     from roboirg.policies import load_policy_class
     from roboirg.tasks import find_tasks
     from roboirg.util.processor import worker_count
@@ -100,8 +100,8 @@ def export_demonstrations(
     count = worker_count(workers)
     with progress_bars() as show:
 
-        def report(stage: str, done: int, total: int, size: int) -> None:
-            show(stage, done, total, size_text(size) if size else "")
+        def report(work: str, done: int, total: int, size: int) -> None:
+            show(work, done, total, size_text(size) if size else "")
 
         summary = run_export(plan, out, count, report, trajectories)
     ends = ", ".join(f"{number} {status}" for status, number in summary.statuses.items())
@@ -152,7 +152,7 @@ def export_recordings(
     with progress_bars() as show:
         summary = export_recording(
             recorded, checked.takes, out, format, worker_count(None),
-            lambda stage, done, total, _: show(stage, done, total, ""),
+            lambda work, done, total, _: show(work, done, total, ""),
         )  # fmt: skip
     typer.echo(f"{counted(summary.episodes, 'episode')}, {size_text(summary.size)}: {out}")
 

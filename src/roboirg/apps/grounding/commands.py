@@ -64,7 +64,7 @@ def export_grounding(
         EpisodeName,
         ExportRequest,
     )
-    from roboirg.evaluation.plan.plan_parsing import parse_episodes, parse_splits
+    from roboirg.evaluation.plan.option_parsing import parse_episodes, parse_splits
     from roboirg.language.generator import check_options
     from roboirg.util.parquet_support import check_parquet_support
     from roboirg.util.processor import worker_count
@@ -82,7 +82,7 @@ def export_grounding(
         settings=known_settings(settings),
         forms=words.forms(),
         options=options,
-        wordings=words.file,
+        wordings_file=words.wordings_file,
         **words.choices(ExportRequest),
     )
     count = worker_count()

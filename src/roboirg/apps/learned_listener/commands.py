@@ -124,7 +124,7 @@ def _plan(words: TrainingWords, without: str) -> TrainingPlan:
     return TrainingPlan(
         known_tasks(words.fields.get("tasks", "all")),
         known_settings(words.fields.get("settings", "all")),
-        words=known_name("pool of words", words.file or "train", POOLS),
+        words=known_name("pool of words", words.wordings_file or "train", POOLS),
         without=known_name("variant", without, WITHOUTS),
         **words.choices(TrainingPlan),
     )
@@ -134,11 +134,11 @@ def _print_tenths() -> Callable[[str, int, int], None]:
     """Return a function that prints progress whenever another tenth is done."""
     shown: dict[str, int] = {}
 
-    def progress(stage: str, done: int, total: int) -> None:
+    def progress(work: str, done: int, total: int) -> None:
         tenth = 10 * done // total
-        if shown.get(stage) != tenth:
-            shown[stage] = tenth
-            typer.echo(f"{stage}: {done} of {total}", err=True)
+        if shown.get(work) != tenth:
+            shown[work] = tenth
+            typer.echo(f"{work}: {done} of {total}", err=True)
 
     return progress
 

@@ -113,7 +113,7 @@ def train_listener(plan: TrainingPlan, workers: int, progress: Progress) -> Lear
     Args:
         plan: how.
         workers: processes that draw pictures; 0 uses this one.
-        progress: called with a stage, what is done of it, and all of it.
+        progress: called with a kind of work, what is done of it, and all of it.
 
     Raises:
         InvalidValueError: no task has one of the settings.
@@ -140,7 +140,7 @@ def see_episodes(plan: TrainingPlan, workers: int, progress: Progress) -> SeenEp
     Args:
         plan: which tasks, how many scenes and passes.
         workers: processes that draw pictures; 0 uses this one.
-        progress: called with a stage, what is done of it, and all of it.
+        progress: called with a kind of work, what is done of it, and all of it.
     """
     torch.manual_seed(plan.seed)
     episodes = tuple(_episodes(plan))
@@ -167,7 +167,7 @@ def teach(scenes: SeenEpisodes, plan: TrainingPlan, progress: Progress) -> Learn
     Args:
         scenes: seen before.
         plan: which settings and words, how many passes, and what it does not get.
-        progress: called with a stage, what is done of it, and all of it.
+        progress: called with a kind of work, what is done of it, and all of it.
     """
     torch.manual_seed(plan.seed)
     told = [(episode, instruction.text) for episode, instruction in _instructions(scenes, plan)]

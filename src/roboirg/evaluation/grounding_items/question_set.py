@@ -54,7 +54,7 @@ class ExportRequest(NamedTuple):
         every_variant: whether to add every combination of options.
         frames: maximum of frames of a video that are stored as pictures.
         frames_every: control steps between two frames of the video.
-        wordings: path of a wording file or name of a pool, for worker processes.
+        wordings_file: path of a wording file or name of a pool, for worker processes.
     """
 
     episodes: tuple[EpisodeName, ...]
@@ -64,7 +64,7 @@ class ExportRequest(NamedTuple):
     every_variant: bool = False
     frames: PositiveInt = FRAMES
     frames_every: PositiveInt = FRAMES_EVERY
-    wordings: str | None = None
+    wordings_file: str | None = None
 
     def pictures(self) -> dict[str, Any]:
         """Return everything that the pictures depend on, as JSON values."""
@@ -133,7 +133,7 @@ def _claim(folder: Path, request: ExportRequest) -> None:
 
 def _make_episode(folder: Path, request: ExportRequest, name: EpisodeName) -> list[GroundingItem]:
     """Return the items of an episode, and store its pictures; runs in worker processes."""
-    open_wordings(request.wordings)
+    open_wordings(request.wordings_file)
     episode = get_episode(*name)
     wanted = list(
         wanted_options(

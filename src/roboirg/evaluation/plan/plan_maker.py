@@ -11,8 +11,7 @@ from pydantic import TypeAdapter, ValidationError
 from roboirg import tasks as task_registry
 from roboirg.core.errors import InvalidValueError
 from roboirg.core.instruction_options import InstructionOptions
-from roboirg.evaluation.plan.plan import LONG_PROMPTS, REQUIRED, RETRYABLE, Plan, nest_options
-from roboirg.evaluation.plan.plan_parsing import (
+from roboirg.evaluation.plan.option_parsing import (
     ALL,
     check_names,
     means_all,
@@ -22,6 +21,7 @@ from roboirg.evaluation.plan.plan_parsing import (
     parse_policies,
     parse_stage_sets,
 )
+from roboirg.evaluation.plan.plan import LONG_PROMPTS, REQUIRED, RETRYABLE, Plan, nest_options
 from roboirg.evaluation.records.film import VIDEO_MODES
 from roboirg.evaluation.records.record import ERROR_KINDS, ErrorKind
 from roboirg.language import FORMS

@@ -19,7 +19,7 @@ from roboirg.apps.real.study.counterbalancing import counterbalanced_episodes, t
 from roboirg.core.episode import Episode
 from roboirg.core.errors import InvalidValueError, RoboIRGError, UnknownNameError
 from roboirg.core.instruction_options import InstructionOptions
-from roboirg.evaluation.plan.plan_parsing import name_and_spec
+from roboirg.evaluation.plan.option_parsing import name_and_spec
 from roboirg.evaluation.records.record import DEFAULT_MAX_STEPS, Job
 from roboirg.language.settings import plain_settings, settings_of
 from roboirg.tasks import get_task
