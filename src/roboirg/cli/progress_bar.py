@@ -28,7 +28,7 @@ def progress_bars(*, has_lines: bool = True) -> Iterator[Callable[[str, int, int
     """Show a bar for each kind of work while the block runs.
 
     Args:
-        has_lines: whether to print lines with the progress and the time left if stderr is no terminal.
+        has_lines: whether to print the progress and the time left where stderr is no terminal.
 
     Yields:
         A function that takes a kind of work, how much of it is done, how much there is, and a

@@ -255,8 +255,9 @@ def _is_usable(
     facts = load_facts(path)
     if facts.environment_version != ENVIRONMENT_VERSION:
         return False
-    may_lack_pictures |= plan.pictures == "none"
-    return may_lack_pictures or has_pictures(path) or not _is_wanted(plan, facts)
+    if plan.pictures == "none" or not _is_wanted(plan, facts):
+        return True
+    return may_lack_pictures or has_pictures(path)
 
 
 def _is_wanted(plan: ExportPlan, facts: TrajectoryFacts) -> bool:

@@ -38,7 +38,7 @@ from roboirg.language.instruction import Instruction
 from roboirg.language.settings import all_settings, settings_of
 from roboirg.language.variants import instructions
 from roboirg.policies.vlm.goal_schema import goal_schema
-from roboirg.tasks import get_task, with_goal
+from roboirg.tasks import get_task, goals_of, with_goal
 from roboirg.tasks.splits.splits import SIZES, get_episode
 from roboirg.util.parallel_map import parallel_map
 
@@ -201,7 +201,7 @@ def _with_goals(episodes: Iterable[Episode], plan: TrainingPlan) -> Iterator[Epi
     rng = random.Random(plan.seed)
     for episode in episodes:
         yield episode
-        goals = get_task(episode.task).goals(episode.scene)
+        goals = goals_of(episode)
         others = [goal for goal in goals if goal != episode.goal]
         for goal in rng.sample(others, min(plan.goals - 1, len(others))):
             yield with_goal(episode, goal)

@@ -15,7 +15,7 @@ from roboirg.apps.people.listener_answers import (
 from roboirg.core.episode import Goal
 from roboirg.core.errors import InvalidValueError
 from roboirg.policies.builtin.scripted import ScriptedPolicy
-from roboirg.policies.by_name.policy_specs import Build, PolicyKind
+from roboirg.policies.by_name.policy_specs import PolicyKind, PolicyMaker
 from roboirg.policies.vlm.goal_schema import goal_schema
 from roboirg.util.short_hash import short_hash
 
@@ -107,7 +107,7 @@ def study_version(folder: Path) -> str:
         ) from error
 
 
-def _people(spec: str, name: str, options: Mapping[str, str]) -> Build:
+def _people(spec: str, name: str, options: Mapping[str, str]) -> PolicyMaker:
     if not name or options:
         raise InvalidValueError(f"Policy {spec!r} is not people:FOLDER, the folder of a study.")
     return lambda seed: PeopleListener(Path(name), seed)

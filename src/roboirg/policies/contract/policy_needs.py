@@ -145,7 +145,8 @@ class PolicyNeeds:
     def __post_init__(self) -> None:
         for one in fields(self):
             value = getattr(self, one.name)
-            if value is not None or one.default is not None:
+            is_undeclared = value is None and one.default is None
+            if not is_undeclared:
                 object.__setattr__(self, one.name, one.metadata["check"](value))
         if self.history_cameras is None:
             object.__setattr__(self, "history_cameras", self.cameras)

@@ -23,7 +23,7 @@ from roboirg.policies.vlm.model_content import ChatTurn, summary_clip
 from roboirg.policies.vlm.models import Model, ModelOptions, ModelQuery, make_model
 from roboirg.policies.vlm.prompt_files import load_prompts
 from roboirg.policies.vlm.vlm_query import VLMQuery
-from roboirg.tasks import get_task
+from roboirg.tasks import goals_of
 from roboirg.util.media import Clip, Picture
 
 if TYPE_CHECKING:
@@ -147,7 +147,7 @@ class VLMListener(ScriptedPolicy):
         self.understood = goal
         if goal is None:
             raise NotUnderstoodError
-        if goal not in get_task(env.episode.task).goals(env.episode.scene):
+        if goal not in goals_of(env.episode):
             self._impossible += 1
             raise NotUnderstoodError
         return goal

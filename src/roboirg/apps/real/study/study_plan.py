@@ -271,7 +271,7 @@ def _check(
             raise InvalidValueError(f"{name} is {value}; it must be at least {minimum}.")
     for task in tasks:
         target_kind(task)
+        available = settings_of(get_task(task))
         for setting in settings:
-            available = settings_of(get_task(task))
             if setting not in available:
                 raise UnknownNameError(f"setting of {task}", setting, available)

@@ -127,8 +127,9 @@ class MmeVlaPolicy(RemotePolicy):
     def _send_beginning(self, demonstration: Demonstration, observation: Observation) -> None:
         """Send the T frames of the video and the first frame of the policy's turn, number T."""
         length = len(demonstration["joint_positions"])
-        # Pictures are rendered when they are read: without a video there are none to read.
-        video = demonstration["front_rgb"] if length else observation["front_rgb"][None][:0]
+        # The demonstration draws pictures when they are read, so it is not asked for none.
+        no_pictures = np.empty((0, *observation["front_rgb"].shape), np.uint8)
+        video = demonstration["front_rgb"] if length else no_pictures
         states = proprioception(demonstration["joint_positions"], demonstration["gripper"])
         start = length
         for part in _parts(
