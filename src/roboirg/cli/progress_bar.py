@@ -17,7 +17,7 @@ def progress_bar(words: str) -> Iterator[Callable[[int, int], None]]:
     """Show a bar while the block runs, if stderr is a terminal.
 
     Yields:
-        A function to tell how many are done, and how many there are.
+        A function that takes how many are done, and how many there are.
     """
     with progress_bars(has_lines=False) as report:
         yield lambda done, total: report(words, done, total, "")

@@ -58,7 +58,7 @@ class SceneObject:
             table, a ``tape`` a roll of adhesive tape that lies flat.
         position: of the object's origin, world frame, meters.
         yaw: rotation about the vertical, radians.
-        color: of a cube, box or tape; None for objects whose color tells nothing.
+        color: of a cube, box or tape; None for objects whose color means nothing.
         inside: name of the container that stands over this (hidden) cube, else None.
         radius: of a target, site or marker, meters; None for the other kinds.
         thickness: of a target, meters; None for the usual 0.005.

@@ -404,6 +404,6 @@ class RoboIRGEnv(gymnasium.Env[dict[str, Any], NDArray[np.floating[Any]]]):
 def _shipped_recording(episode: Episode) -> Recording | None:
     """Return RoboMME's recording of the demonstration; None if there is none."""
     slot = (episode.task, episode.split, episode.index)
-    if not episode.recorded or not is_recorded(*slot):  # anybody can make an episode that says so
+    if not episode.recorded or not is_recorded(*slot):  # episodes can be made by hand
         return None
     return Recording(*recorded_actions(*slot), end="")

@@ -69,7 +69,7 @@ def attribute_failure(
         cause: the recorded cause. If the events violate no rule and the policy did not time out,
             the environment ended the episode: the arm could not reach a pose.
         mirrored: for each object that the instruction means, those that it would mean with left
-            and right exchanged (`roboirg.language.mirrored_objects`); None tells no mirrored picks.
+            and right exchanged (`roboirg.language.mirrored_objects`); None finds no mirrored picks.
     """
     replay = rejudge(episode, events, policy_start_step, elapsed_steps)
     ended = timed_out or cause is not None

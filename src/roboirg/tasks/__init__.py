@@ -2,7 +2,7 @@
 
 Three suites are the benchmark. The suite ``real`` holds the simulated twins of the real-robot
 tasks. Installed packages add tasks, in suites of their own, through entry points of the group
-``roboirg.tasks``. Tasks outside the benchmark are played, told and judged like all others, but
+``roboirg.tasks``. Tasks outside the benchmark are played, worded and judged like all others, but
 only on request: by name or by suite.
 """
 

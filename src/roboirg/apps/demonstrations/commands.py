@@ -60,7 +60,7 @@ def export_demonstrations(
         bool, typer.Option("--dry-run", help="Estimate the size and record nothing.")
     ] = False,
 ) -> None:
-    """Export demonstrations for training, recorded once per episode, told in every setting.
+    """Export demonstrations for training, recorded once per episode, in the words of every setting.
 
     A plan may have, under `demonstrations`: video, names, extra_actions, variations, policy,
     outcomes, language_columns.
@@ -158,7 +158,7 @@ def export_recordings(
 
 
 def _default_video(format_name: str) -> str:
-    """Return how the video is treated unless the user says so."""
+    """Return how the video is treated by default."""
     return "prefix" if format_name == "robomme-hdf5" else "none"
 
 

@@ -114,7 +114,7 @@ def run_export(
         plan: what to export.
         out: folder of the data set, new or of the same plan.
         workers: processes; 0 uses this one.
-        report: told the progress.
+        report: called with the progress.
         trajectories: folder that keeps the recorded trajectories, for other formats and settings;
             None for one in `out` that is deleted at the end.
         source: of the trajectories; None to play the plan's episodes.

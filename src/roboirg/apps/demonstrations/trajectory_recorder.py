@@ -146,7 +146,7 @@ def record_trajectory(
         policy: moves the robot, by joint angles.
         path: file to write.
         spec: what it holds.
-        options: what the policy is told; None for the explicit instruction.
+        options: of the instruction; None for the explicit instruction.
         policy_name: name of the policy.
         variation: number of the variation.
         only_successes: leave out the pictures of an episode that is no success.

@@ -171,7 +171,7 @@ def score_shortcuts(
         bool, typer.Option(help="Add floors learned from the words of the train split (a minute).")
     ] = False,
 ) -> None:
-    """Score rules that see the words only, beside chance: how much needs no understanding.
+    """Score rules that see the words only, next to chance: how much needs no understanding.
 
     Example: roboirg language shortcuts --settings reasoning --by pattern
     """

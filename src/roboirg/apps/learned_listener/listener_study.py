@@ -146,7 +146,7 @@ def _answers(
 
 
 def told_options() -> Iterator[InstructionOptions]:
-    """Yield how the test split is told: in words of both pools, and with rivals."""
+    """Yield the words of the test split: in words of both pools, and with rivals."""
     for setting in plain_settings():
         for pool in POOLS:
             yield InstructionOptions(setting, wordings=pool)
@@ -157,7 +157,7 @@ def told_options() -> Iterator[InstructionOptions]:
 def _reader_of(
     model: LearnedModel, shown: Sequence[tuple[Episode, Sequence[Pixels]]]
 ) -> Callable[[Episode, str], bool]:
-    # Every scene is told many times, and looked at once.
+    # Every scene has many instructions, and is looked at once.
     seen = {episode.key: model.see(pictures) for episode, pictures in shown}
 
     def understand(episode: Episode, text: str) -> bool:

@@ -1,6 +1,6 @@
 """What people answer in a study of listeners, one JSON line each, on the disk before it counts.
 
-Nothing in the file tells who a person is: people have numbers, and a code with which they go on.
+Nothing in the file shows who a person is: people have numbers, and a code with which they go on.
 """
 
 from __future__ import annotations

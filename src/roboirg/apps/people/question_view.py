@@ -50,7 +50,7 @@ def view_question(
         for name, target in media.objects.items()
         if episode.scene[name].kind in form.kinds
     ]
-    # By place alone: the order of the scene could tell what is meant.
+    # By place alone: the order of the scene could give away what is meant.
     seen.sort(key=lambda one: (one[1].x, one[1].y))
     shown = {
         "turns": item.turns if job.options.delivery == TURNS else [item.text],

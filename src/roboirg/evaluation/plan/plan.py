@@ -278,7 +278,7 @@ class Plan(BaseModel):
         )
 
     def drawable_jobs(self) -> tuple[Job, ...]:
-        """Return the jobs that can be told here, for counting what a stored run lacks.
+        """Return the jobs whose words can be made here, for counting what a stored run lacks.
 
         None if the episodes are private and their salt is not known; none of tasks and settings
         whose package is not installed.

@@ -277,7 +277,7 @@ def _close_policy(policy: Policy, result: RolloutResult, guard: CallGuard) -> No
     """Read the policy's costs and close it; errors there do not change the outcome.
 
     Raises:
-        EpisodeLostError: the policy's process was lost before it told the costs.
+        EpisodeLostError: the policy's process was lost before it reported the costs.
     """
     try:
         with guard.policy("policy's close()", "policy_close"):

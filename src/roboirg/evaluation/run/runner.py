@@ -88,7 +88,7 @@ def run_plan(
         play: plays one job.
         executor: where jobs are played.
         retry_errors: play jobs again whose newest record is an error.
-        reporter: is told of every record, and first of any damage in the file.
+        reporter: gets every record, and first any damage in the file.
 
     Raises:
         StoreError: another run writes to the folder, the records cannot be read or written, or

@@ -173,11 +173,11 @@ def _refuse_undeclared(spec: str, policy: object) -> None:
 
 
 def server_version(metadata: Mapping[str, Any]) -> str | None:
-    """Return the version that a policy's server told; None if there is none, or it told none.
+    """Return the version that a policy's server reported; None without a server or a version.
 
     Args:
         metadata: of the policy, or of a planner and a policy, after `reset`. Those of clients hold
-            the address of the ``server`` and what it told, such as its ``version``.
+            the address of the ``server`` and what it reported, such as its ``version``.
     """
     for told in (metadata, metadata.get("policy")):
         if isinstance(told, Mapping) and "server" in told:

@@ -26,7 +26,7 @@ def read_tokenizer(path: str) -> Tokenize:
         InvalidValueError: there is no such file, or it holds no tokenizer.
         MissingDependencyError: the library that reads it is not installed.
     """
-    return _read(os.path.abspath(path))  # noqa: PTH100 - links stay: the suffix tells the kind
+    return _read(os.path.abspath(path))  # noqa: PTH100 - links stay: the suffix names the kind
 
 
 @functools.cache

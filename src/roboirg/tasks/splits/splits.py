@@ -1,4 +1,4 @@
-"""The splits: RoboMME's published episodes, and the sampled ones beside them.
+"""The splits: RoboMME's published episodes, and the sampled ones next to them.
 
 The episodes of the benchmark's train, val and test splits are RoboMME's (`published_episodes`).
 Sampled are the six that RoboMME's data lacks, the tasks of the suite ``real`` or of another
