@@ -102,10 +102,6 @@ class LeRobotPolicy:
     Args:
         url: path or hub id, and options.
         seed: unused; each episode has its own.
-
-    Raises:
-        UnknownNameError: the URL has an unknown option.
-        InvalidValueError: an option has a wrong value.
     """
 
     cameras: ClassVar[tuple[str, ...]] = CAMERAS

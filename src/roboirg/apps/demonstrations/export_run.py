@@ -90,11 +90,7 @@ class ExportSummary(NamedTuple):
 
 
 def check_support(plan: ExportPlan) -> None:
-    """Check early that the plan's format can be written.
-
-    Raises:
-        MissingDependencyError: a package is not installed.
-    """
+    """Check early that the plan's format can be written."""
     check_parquet_support()
     if plan.format == "robomme-hdf5":
         check_hdf5_support()

@@ -92,11 +92,7 @@ def flips_by_cell(episodes: Sequence[RepeatedEpisode]) -> Flips:
 
 
 def write_flips(found: Flips, folder: Path) -> None:
-    """Keep in the folder of a run how often its policies' verdicts change.
-
-    Raises:
-        InvalidValueError: the file cannot be written.
-    """
+    """Keep in the folder of a run how often its policies' verdicts change."""
     rows = [
         {"policy": policy, "options": asdict(options), "counts": asdict(counts)}
         for (policy, options), counts in found.items()

@@ -24,10 +24,6 @@ class LearnedListener(ScriptedPolicy):
 
     It gets the words, the video and the first picture; only the hands are privileged. If the scene
     does not have the goal, it holds still.
-
-    Raises:
-        InvalidValueError: the file is no trained listener.
-        MissingDependencyError: PyTorch is not installed.
     """
 
     cameras = (FRONT,)
@@ -67,10 +63,6 @@ class LearnedListener(ScriptedPolicy):
 
 
 def check_learn_support() -> None:
-    """Check early that PyTorch is there.
-
-    Raises:
-        MissingDependencyError: it is not installed.
-    """
+    """Check early that PyTorch is there."""
     with extra_needed("A listener that learns needs PyTorch", "learn"):
         import torch  # noqa: F401 - an extra, and slow to import

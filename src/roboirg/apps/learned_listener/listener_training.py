@@ -114,9 +114,6 @@ def train_listener(plan: TrainingPlan, workers: int, progress: Progress) -> Lear
         plan: how.
         workers: processes that draw pictures; 0 uses this one.
         progress: called with a kind of work, what is done of it, and all of it.
-
-    Raises:
-        InvalidValueError: no task has one of the settings.
     """
     check_settings(plan)
     return teach(see_episodes(plan, workers, progress), plan, progress)

@@ -68,11 +68,7 @@ class PeopleListener(ScriptedPolicy):
         }
 
     def decide(self, env: RoboIRGEnv, instruction: str) -> Goal | None:  # noqa: ARG002
-        """Return the goal that was answered; None if the scene does not have it.
-
-        Raises:
-            InvalidValueError: no person of this seed has answered this question.
-        """
+        """Return the goal that was answered; None if the scene does not have it."""
         one = self._answer = self._find(env)
         return None if one.goal is None else goal_schema(one.task).goals[one.goal]
 

@@ -80,21 +80,12 @@ def make_policy(spec: str, seed: int) -> Policy:
 
 
 def policy_needs(spec: str) -> PolicyNeeds:
-    """Return what the policy of a spec needs; it is not connected to anything.
-
-    Raises:
-        InvalidValueError: there is no such policy, or it declares something invalid.
-        MissingDependencyError: a library that it needs is not installed.
-    """
+    """Return what the policy of a spec needs; it is not connected to anything."""
     return PolicyNeeds.of(_declaring(spec))
 
 
 def is_foreign(spec: str) -> bool:
-    """Return whether a spec names code that does not come with this package or a protocol.
-
-    Raises:
-        InvalidValueError: it is a system that cannot be read.
-    """
+    """Return whether a spec names code that does not come with this package or a protocol."""
     spec = undeclared(spec)
     kind, colon, rest = spec.partition(":")
     if spec in BUILTIN or is_url(spec) or not colon:
@@ -110,9 +101,6 @@ def needs_host(spec: str) -> bool:
 
     Built-in policies and the clients of remote ones are our own code and run next to the world, as
     do policies that the user declares privileged.
-
-    Raises:
-        InvalidValueError: it is a system that cannot be read.
     """
     if declares_privilege(spec):
         return False

@@ -81,10 +81,6 @@ def find_policy_factory(spec: str) -> PolicyFactory | None:
     """Return the factory of a spec; None if the spec is of another kind.
 
     Needs neither a network nor a provider's client library.
-
-    Raises:
-        UnknownNameError: there is no such system, provider or option.
-        InvalidValueError: an option is missing or has an invalid value.
     """
     kind, colon, rest = spec.partition(":")
     found = find_kind(kind) if colon else None
@@ -126,11 +122,7 @@ OURS = (PolicyKind(SYSTEM, _system), PolicyKind(LISTENER, _listener))
 
 @functools.cache
 def find_kind(name: str) -> PolicyKind | None:
-    """Return the kind of a name; None if there is none. Other kinds are not imported.
-
-    Raises:
-        InvalidValueError: the installed package that adds it cannot be loaded.
-    """
+    """Return the kind of a name; None if there is none. Other kinds are not imported."""
     ours = {kind.name: kind for kind in OURS}
     return ours.get(name) or find_entry(name, "KIND", PolicyKind, KINDS_GROUP)
 

@@ -170,11 +170,7 @@ class PolicyNeeds:
 
     @classmethod
     def of_planner(cls, planner: object) -> Self:
-        """Return what a planner declares; by default, it needs no pictures.
-
-        Raises:
-            InvalidValueError: an attribute has an invalid value.
-        """
+        """Return what a planner declares; by default, it needs no pictures."""
         unseen = {"cameras": (), "demonstration_frames": "none"}
         return cls(**{**unseen, **_declared(planner, _names(cls, "merge"))})
 

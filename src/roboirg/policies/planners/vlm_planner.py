@@ -40,9 +40,6 @@ class VLMPlanner(ABC):
     """Queries a model for subgoals, with pictures of the front camera only.
 
     If the model gives no usable subgoal even at the second try, the last one stays.
-
-    Raises:
-        InvalidValueError: the prompts cannot be read.
     """
 
     kind: ClassVar[str]

@@ -85,9 +85,6 @@ def import_robomme(root: Path, name: str = ROBOMME_NAME) -> ImportedWordings:
     Args:
         root: folder of the clone.
         name: of the wordings.
-
-    Raises:
-        InvalidValueError: the folder lacks the sentences, or the name is no word.
     """
     where = "imported wording file"
     check_name(name, where)

@@ -137,10 +137,6 @@ def make_study(
         demonstrations: per task.
         seed: of the orders.
         max_steps: largest number of control periods of a trial.
-
-    Raises:
-        UnknownNameError: a task or setting does not exist.
-        InvalidValueError: a number is out of range, or a name is given twice.
     """
     named = [name_and_spec(policy) for policy in policies]
     names = [name for name, _ in named]

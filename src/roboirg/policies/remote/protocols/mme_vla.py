@@ -103,11 +103,7 @@ class MmeVlaPolicy(RemotePolicy):
         self._subgoal = subgoal.lower()
 
     def request_actions(self, observation: Observation) -> NDArray[np.floating[Any]]:
-        """Send the frames since the last call, then request actions.
-
-        Raises:
-            InvalidValueError: the episode is longer than the model's memory.
-        """
+        """Send the frames since the last call, then request actions."""
         if self.options.history:
             if self._demonstration is not None:
                 demonstration, self._demonstration = self._demonstration, None

@@ -66,11 +66,7 @@ class VlaEvalPolicy(RemotePolicy):
         self._in_episode = False
 
     def begin_episode(self, demonstration: Demonstration) -> None:
-        """Begin an episode; the demonstration goes with the first observation.
-
-        Raises:
-            InvalidValueError: the server wants what this client's options leave out.
-        """
+        """Begin an episode; the demonstration goes with the first observation."""
         self._check_params()
         self._subgoal = None
         shows = self.options.video and self._wants("send_video_history")
