@@ -8,8 +8,8 @@ from typing import Any, ClassVar, Literal
 from pydantic import BaseModel, ConfigDict, Field
 
 from roboirg.core.observations import Demonstration, DemonstrationFrames, Observation
-from roboirg.policies.vlm.config_fingerprint import config_version
 from roboirg.policies.vlm.models import ModelOptions
+from roboirg.policies.vlm.models.model import config_version
 from roboirg.policies.vlm.prompt_files import SHARED, load_prompts
 from roboirg.policies.vlm.vlm_query import VLMQuery
 from roboirg.util.media import Pixels

@@ -16,11 +16,11 @@ from pydantic import Field as Option
 from roboirg.core.episode import Goal
 from roboirg.core.observations import Demonstration
 from roboirg.policies.builtin.scripted import ScriptedPolicy
-from roboirg.policies.vlm.config_fingerprint import config_version
 from roboirg.policies.vlm.goal_schema import GoalSchema, goal_schema
 from roboirg.policies.vlm.listener_query import PROMPTS, question_texts
 from roboirg.policies.vlm.model_content import ChatTurn, summary_clip
 from roboirg.policies.vlm.models import Model, ModelOptions, ModelQuery, make_model
+from roboirg.policies.vlm.models.model import config_version
 from roboirg.policies.vlm.prompt_files import load_prompts
 from roboirg.policies.vlm.vlm_query import VLMQuery
 from roboirg.tasks import goals_of
