@@ -152,7 +152,6 @@ def _wasted_occurrences(replay: EpisodeReplay, rule: Rule) -> Iterator[_Deviatio
 
 
 def _completes_stage(replay: EpisodeReplay, interval: FactInterval) -> bool:
-    """Return whether an interval completes a stage."""
     end = replay.last_step + 1 if interval.end is None else interval.end
     return any(
         interval.start <= step < end and replay.stages[stage].expects == interval.fact

@@ -182,7 +182,6 @@ class RecordingJob(NamedTuple):
 
     @property
     def episode(self) -> Episode:
-        """The episode."""
         return get_episode(self.task, self.split, self.number)
 
     @property

@@ -212,7 +212,6 @@ def _record(
     workers: int,
     report: Report,
 ) -> None:
-    """Record the trajectories that are missing."""
     done, size = total - len(missing), folder_size(folder)
     report("record", done, total, size)
     for job, _ in parallel_map(record, missing, workers):

@@ -125,7 +125,6 @@ class AnswerLog:
         self.events.append(event)
 
     def close(self) -> None:
-        """Close the file."""
         self._file.close()
 
     def __enter__(self) -> Self:

@@ -43,7 +43,6 @@ class PersonView(NamedTuple):
 def view_question(
     job: Job, episode: Episode, item: GroundingItem, media: EpisodeMedia
 ) -> PersonView:
-    """Return what a person sees of a question."""
     form = answer_form(job.task)
     seen = [
         (name, target)

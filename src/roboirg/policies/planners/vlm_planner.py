@@ -118,7 +118,6 @@ class VLMPlanner(ABC):
         return self._vlm.usage()
 
     def close(self) -> None:
-        """Close the connection."""
         self._vlm.close()
 
     def forms(self) -> str:

@@ -157,7 +157,6 @@ class VLMListener(ScriptedPolicy):
         return {**self._vlm.usage(), "impossible": self._impossible}
 
     def close(self) -> None:
-        """Close the connection."""
         self._vlm.close()
 
     def _build_query(self, env: RoboIRGEnv, schema: GoalSchema, instruction: str) -> ModelQuery:

@@ -60,7 +60,6 @@ class FrameSequence:
         return np.empty((count, *self.format.shape), self.format.dtype)
 
     def key(self) -> str:
-        """Return the cache key."""
         parts = (
             recording_key(self.episode),
             self.recording.end,

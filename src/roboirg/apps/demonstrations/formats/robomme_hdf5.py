@@ -45,7 +45,6 @@ def check_hdf5_support() -> None:
 
 
 def file_name(task: str) -> str:
-    """Return the name of a task's file."""
     return f"record_dataset_{task}.h5"
 
 

@@ -168,12 +168,10 @@ class RoboIRGBenchmark(StepBenchmark):  # type: ignore[misc] # vla-eval has no t
         return {"max_steps": self.max_steps, "max_episodes_per_task": episodes}
 
     def get_action_spec(self) -> dict[str, DimSpec]:
-        """Declare the action."""
         space = self.action_space
         return {"action": DimSpec("action", space.size, _ACTION_FORMATS[space.name])}
 
     def get_observation_spec(self) -> dict[str, DimSpec]:
-        """Declare the observation."""
         fields = {"agentview": IMAGE_RGB, "language": LANGUAGE}
         if self._has_wrist:
             fields["wrist"] = IMAGE_RGB
