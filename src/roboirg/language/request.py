@@ -1,7 +1,7 @@
 """The request to put an episode into words, and what a setting returns for it.
 
-The command's words are ours, or "from outside": those of a wording file, such as RoboMME's. In words
-from outside the phrase of a field has a core that names the value, and words around it: *the
+The command's words are ours, or "from outside": those of a wording file, such as RoboMME's. In
+words from outside the phrase of a field has a core that names the value, and words around it: *the
 container hiding* **the red cube**. A referring expression replaces the core; the rest stays.
 """
 
@@ -222,7 +222,7 @@ class InstructionRequest:
     def command(self, fields: Mapping[str, Phrase]) -> Phrase:
         """Fill the task's command, which has the same wording in all settings.
 
-        `fields` are words for fields. Of words from outside, the fields without any state the value.
+        `fields` are words for fields. In words from outside, the other fields state their values.
 
         Raises:
             NoCommandError: the words from outside have no command for these fields.
