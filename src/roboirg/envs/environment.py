@@ -22,7 +22,8 @@ from roboirg.envs.env_settings import RENDER_MODES, EnvSettings, choose_index
 from roboirg.envs.episode_state import EpisodeState
 from roboirg.envs.observation_spaces import make_observation_space
 from roboirg.judging import Event, Status, plain_subgoal
-from roboirg.language.arms import ArmWords, say_arm
+from roboirg.language import Instruction
+from roboirg.language.arms import say_arm
 from roboirg.simulation.controllers import make_controller
 from roboirg.simulation.episode_session import EpisodeSession
 from roboirg.simulation.observation_builder import ObservationBuilder
@@ -37,6 +38,7 @@ COMPLETED = "All tasks completed"
 """The subgoal after the last stage."""
 
 FrameHook = Callable[["RoboIRGEnv", bool], None]
+"""Called with the environment, and with whether the step belongs to the demonstration."""
 
 
 class RoboIRGEnv(gymnasium.Env[dict[str, Any], NDArray[np.floating[Any]]]):
@@ -93,7 +95,10 @@ class RoboIRGEnv(gymnasium.Env[dict[str, Any], NDArray[np.floating[Any]]]):
     def __init__(self, task: str | Episode, **options: Unpack[EnvOptions]) -> None:
         self._task, self._settings = task, EnvSettings.of(options)
         self._last_index: int | None = None
-        self._instructed: tuple[tuple[Episode, InstructionOptions, str], ArmWords] | None = None
+        self._instructed: tuple[Episode, InstructionOptions, str] | None = None
+        self.episode: Episode
+        self.instruction: Instruction
+        self.original: Episode | None
         self._select_episode(self._settings, choose_index(self._settings, None, None))
         self._space = find_action_space(self._settings.actions)
         self._spec = self._settings.observation_spec()
@@ -306,9 +311,9 @@ class RoboIRGEnv(gymnasium.Env[dict[str, Any], NDArray[np.floating[Any]]]):
 
     def _select_episode(self, settings: EnvSettings, index: int) -> None:
         chosen = settings.find_episode(self._task, index), settings.words, settings.arm
-        if self._instructed is None or self._instructed[0] != chosen:
-            self._instructed = chosen, say_arm(*chosen)
-        _, (self.episode, self.instruction, self.original) = self._instructed
+        if self._instructed != chosen:
+            self.episode, self.instruction, self.original = say_arm(*chosen)
+            self._instructed = chosen
         self.delivery = settings.words.delivery
 
     def _play_demonstration(self, recording: Recording | None) -> Recording:
@@ -410,6 +415,6 @@ class RoboIRGEnv(gymnasium.Env[dict[str, Any], NDArray[np.floating[Any]]]):
 def _shipped_recording(episode: Episode) -> Recording | None:
     """Return RoboMME's recording of the demonstration; None if there is none."""
     slot = (episode.task, episode.split, episode.index)
-    if not episode.recorded or not is_recorded(*slot):
+    if not episode.recorded or not is_recorded(*slot):  # episodes can be made by hand
         return None
     return Recording(*recorded_actions(*slot), end="")

@@ -22,7 +22,7 @@ from roboirg.shortcuts import SURFACE_RULES, draw_goal, guess_goal
 from roboirg.shortcuts.command_chance import fitting_goals
 from roboirg.shortcuts.learned_floor import LearnedFloor, places_of
 from roboirg.shortcuts.shortcut_tables import TRAINING_SPLIT
-from roboirg.tasks import get_task
+from roboirg.tasks import goals_of
 from roboirg.tasks.splits.splits import get_episode, split_episodes
 
 ORACLE, CHANCE, COMMAND = "oracle", "chance", "command"
@@ -86,7 +86,7 @@ def _random_points(item: GroundingItem, rng: np.random.Generator) -> str:
 
 
 def _random_goal(_item: GroundingItem, episode: Episode, rng: np.random.Generator) -> Goal:
-    goals = get_task(episode.task).goals(episode.scene)
+    goals = goals_of(episode)
     return goals[int(rng.integers(len(goals)))]
 
 

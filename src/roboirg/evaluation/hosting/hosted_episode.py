@@ -8,6 +8,7 @@ from typing import Any
 
 from numpy.typing import NDArray
 
+from roboirg.core.inference_facts import inference_facts
 from roboirg.evaluation.hosting.messages import (
     Acted,
     Ask,
@@ -108,7 +109,7 @@ class HostedEpisode:
         value = self.read(call)
         demonstration = HostedDemonstration(value["fields"], value["arrays"], self._fetch)
         self.policy.reset(value["instruction"], demonstration)
-        return Told(dump_metadata(self.policy))
+        return Told(dump_metadata(self.policy), inference=inference_facts(self.policy))
 
     def act(self, call: Call) -> Acted:
         """Return the next actions."""
@@ -122,7 +123,7 @@ class HostedEpisode:
         return Acted(chunk.tobytes(), chunk.shape[1], latency_s, subgoal)
 
     def hear(self, call: Call) -> Told:
-        """Tell the policy what was said; returns its metadata."""
+        """Let the policy hear what was said; returns its metadata."""
         tell_policy(self.policy, call.utterances)
         return Told(dump_metadata(self.policy))
 

@@ -12,7 +12,14 @@ from dataclasses import asdict, replace
 from typing import Any, Literal, get_args
 
 import msgspec
-from pydantic import BaseModel, ConfigDict, field_serializer, field_validator, model_validator
+from pydantic import (
+    BaseModel,
+    ConfigDict,
+    Field,
+    field_serializer,
+    field_validator,
+    model_validator,
+)
 
 from roboirg import language, policies, tasks
 from roboirg.core.actions import find_action_space
@@ -34,7 +41,7 @@ from roboirg.core.plain_text import is_encodable
 from roboirg.core.word_pools import POOLS
 from roboirg.evaluation.hosting.host_pool import DEFAULT_BATCH, HostSettings
 from roboirg.evaluation.hosting.policy_descriptions import describe_policy
-from roboirg.evaluation.plan.plan_parsing import check_names, name_and_spec
+from roboirg.evaluation.plan.option_parsing import check_names, name_and_spec
 from roboirg.evaluation.plan.worker_needs import WorkerNeeds
 from roboirg.evaluation.play.job_instruction import instruct_job
 from roboirg.evaluation.records.film import VideoMode
@@ -133,6 +140,10 @@ class Plan(BaseModel):
     """Time limit of one call of a policy, seconds."""
     episode_timeout_s: float = 7200.0
     """Time limit of an episode, seconds."""
+    max_cost: float | None = Field(default=None, gt=0)
+    """US dollars that the models of the run may cost; then it stops, to be resumed with more."""
+    model_replies: Literal["stored", "anew"] = "stored"
+    """stored: a model is not asked again what its reply in the folder answers; anew: it is."""
     cluster: WorkerNeeds = WorkerNeeds()
     """What a worker reserves on a machine of a Ray cluster, and what it gets from this one."""
     tries: int = 2
@@ -296,7 +307,7 @@ class Plan(BaseModel):
         return {name: len(every - found) for name, found in trials.items() if found != every}
 
     def drawable_jobs(self) -> tuple[Job, ...]:
-        """Return the jobs that can be told here, for counting what a stored run lacks.
+        """Return the jobs whose words can be made here, for counting what a stored run lacks.
 
         None if the episodes are private and their salt is not known; none of tasks and settings
         whose package is not installed.

@@ -145,7 +145,8 @@ class PolicyNeeds:
     def __post_init__(self) -> None:
         for one in fields(self):
             value = getattr(self, one.name)
-            if value is not None or one.default is not None:
+            is_undeclared = value is None and one.default is None
+            if not is_undeclared:
                 object.__setattr__(self, one.name, one.metadata["check"](value))
         if self.history_cameras is None:
             object.__setattr__(self, "history_cameras", self.cameras)
@@ -169,11 +170,7 @@ class PolicyNeeds:
 
     @classmethod
     def of_planner(cls, planner: object) -> Self:
-        """Return what a planner declares; by default, it needs no pictures.
-
-        Raises:
-            InvalidValueError: an attribute has an invalid value.
-        """
+        """Return what a planner declares; by default, it needs no pictures."""
         unseen = {"cameras": (), "demonstration_frames": "none"}
         return cls(**{**unseen, **_declared(planner, _names(cls, "merge"))})
 
@@ -186,6 +183,16 @@ class PolicyNeeds:
     def env_options(self) -> dict[str, Any]:
         """The options of an environment that meets the needs, as `roboirg.make` takes them."""
         return {one: getattr(self, one) for one in _names(type(self), "env")}
+
+    @property
+    def declared(self) -> dict[str, Any]:
+        """The needs without those that are None, as JSON values."""
+        values = {one.name: getattr(self, one.name) for one in fields(self)}
+        return {
+            name: list(value) if isinstance(value, tuple) else value
+            for name, value in values.items()
+            if value is not None
+        }
 
     def merge(self, planner: PolicyNeeds) -> Self:
         """Return the needs of this policy together with those of its planner."""
