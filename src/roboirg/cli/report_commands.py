@@ -160,7 +160,8 @@ def tables(
         typer.Option(
             help="main, planner, context, real, other, coverage, or all that apply; or of runs "
             "alone: forms, failures, subgoals (of planners), heard (how many prompts were cut), "
-            "arms (what control arms show), sensitivity (whether gaps depend on how they are analyzed)."
+            "arms (what control arms show), sensitivity (whether gaps depend on how they are "
+            "analyzed)."
         ),
     ] = _ALL,
     format: Annotated[  # noqa: A002
@@ -235,7 +236,7 @@ def compare(
     breakdowns = _breakdowns(by)
     labels = _labels(breakdowns, [_split(first)[0], _split(second)[0]])
     titled = {one.title: labels[one.name] for one in breakdowns}
-    found = compare_cells(ours.cells, theirs.cells, np.random.default_rng(SEED), titled)
+    found = compare_cells(ours, theirs, np.random.default_rng(SEED), titled)
     names = [found.first.marked_policy, found.second.marked_policy]
     if names[0] == names[1]:
         names = [f"{names[0]} ({first})", f"{names[1]} ({second})"]

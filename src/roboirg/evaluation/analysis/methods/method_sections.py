@@ -242,6 +242,7 @@ def _controls(data: RunData, jobs: Sequence[Job]) -> Iterator[Fact]:
     controls = [one for one in data.names if one.is_privileged]
     listed = [f"{data.names[one]}: {_rates(data, one)}" for one in controls]
     yield Fact("privileged policies as controls", "; ".join(listed) or "none")
+    yield Fact("arms", ", ".join(sorted({one.arm for _, one in data.results})))
     forms = sorted({one.form for one in jobs if one.setting != EXPLICIT})
     yield Fact("forms of the implicit settings", ", ".join(forms) or "none")
 
