@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import functools
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import cast
 
 from roboirg.core.episode import Episode
@@ -15,55 +13,36 @@ from roboirg.language.worded_command import describe_goal
 from roboirg.tasks import get_task, with_goal
 
 
-@dataclass(frozen=True)
-class PlayedCourse:
-    """What happened in an episode; steps count since the world began.
+def find_goal_outcomes(
+    episode: Episode,
+    events: Sequence[Event],
+    elapsed_steps: int,
+    decision: Decision,
+    original: str | None = None,
+) -> GoalOutcomes:
+    """Return which goals of the scene were reached, and with which the wrong act agrees.
 
-    Attributes:
+    Args:
         episode: with the goal by which the verdict fell.
-        events: all facts that changed, in order.
-        policy_start_step: steps of the world before the policy's turn.
+        events: all facts that changed, in order; steps count since the world began.
         elapsed_steps: steps of the world in all.
-        original: the scene's own episode, if that of the verdict has another goal.
-        original_status: how it ended for the original goal, as the environment says.
+        decision: the verdict, which may have fallen before the end.
+        original: how it ended for the scene's own goal, if the episode has another one.
     """
-
-    episode: Episode
-    events: Sequence[Event]
-    policy_start_step: int
-    elapsed_steps: int
-    original: Episode | None = None
-    original_status: str | None = None
-
-    @functools.cached_property
-    def decision(self) -> Decision:
-        """The verdict, which may have fallen before the end."""
-        return decide(self.episode, self.events, self.elapsed_steps)
-
-    @property
-    def events_until_verdict(self) -> Sequence[Event]:
-        """The events that the verdict is about."""
-        return [event for event in self.events if event.step <= self.decision.step]
-
-
-def find_goal_outcomes(trajectory: PlayedCourse) -> GoalOutcomes:
-    """Return which goals of the scene were reached, and with which the wrong act agrees."""
-    episode, (verdict, wrong_step) = trajectory.episode, trajectory.decision
     reached, agrees = [], []
     for goal in get_task(episode.task).goals(episode.scene):
-        judge, step = decide(with_goal(episode, goal), trajectory.events, trajectory.elapsed_steps)
-        if judge.status is Status.SUCCESS:
+        judge, step = decide(with_goal(episode, goal), events, elapsed_steps)
+        is_reached = judge.status is Status.SUCCESS
+        if is_reached:
             reached.append(describe_goal(goal))
-        lives_on = judge.status is Status.ONGOING or step > wrong_step
-        ended_with_it = judge.status is Status.SUCCESS and step == wrong_step
-        if verdict.violation is not None and (lives_on or ended_with_it):
+        lives_on = judge.status is Status.ONGOING or step > decision.step
+        if decision.judge.violation and (lives_on or (is_reached and step == decision.step)):
             agrees.append(describe_goal(goal))
-    status = "undecided" if trajectory.original_status == "ongoing" else trajectory.original_status
     return GoalOutcomes(
         stated=describe_goal(episode.goal),
         reached=tuple(reached),
         agrees=tuple(agrees),
-        original=cast("OriginalStatus | None", status),
+        original=cast("OriginalStatus", "undecided" if original == "ongoing" else original),
     )
 
 

@@ -20,7 +20,7 @@ from pydantic import JsonValue
 
 from roboirg import language
 from roboirg.core.actions import find_action_space
-from roboirg.core.arms import OTHER_GOAL
+from roboirg.core.arms import TOLD
 from roboirg.core.conditions import Fact
 from roboirg.core.delivery import TURNS, PromptVerdict
 from roboirg.core.episode import ENVIRONMENT_VERSION
@@ -30,11 +30,7 @@ from roboirg.core.inference_facts import InferenceFacts
 from roboirg.core.observations import DemonstrationSource
 from roboirg.core.plain_text import clip_text
 from roboirg.evaluation.hosting.policy_descriptions import PolicyDescription, describe_policy
-from roboirg.evaluation.play.goal_outcomes import (
-    PlayedCourse,
-    find_goal_outcomes,
-    name_other_goal,
-)
+from roboirg.evaluation.play.goal_outcomes import find_goal_outcomes, name_other_goal
 from roboirg.evaluation.play.job_instruction import PreparedJob
 from roboirg.evaluation.play.prompt_shares import audit_job, audit_prompt
 from roboirg.evaluation.records.action_log import ActionLog
@@ -52,6 +48,7 @@ from roboirg.evaluation.records.record import (
     UtteranceRecord,
 )
 from roboirg.judging import Event, attribute_failure
+from roboirg.judging.episode_replay import decide
 from roboirg.language.settings import EXPLICIT
 from roboirg.policies.by_name.loading import server_version
 from roboirg.policies.prompt_length.prompt_audit import PromptLimit
@@ -220,12 +217,12 @@ def make_record(
     episode = prepared.episode
     # An episode that failed before its reset has a record with the words it would have had.
     instruction = result.instruction or prepared.instruction
-    explicit = instruction if job.setting == EXPLICIT else prepared.explicit
+    is_explicit = job.setting == EXPLICIT and job.arm == TOLD
+    explicit = instruction if is_explicit else prepared.explicit
     policy = result.policy or _describe(job)
     utterances = _utterances(job, instruction, result)
     prompt, verdict = _audit(job, instruction, utterances, result)
-    trajectory = _trajectory(prepared, result)
-    goals = None if trajectory is None else find_goal_outcomes(trajectory)
+    goals, attribution = _analyze(prepared, result, instruction)
     return Record(
         **msgspec.structs.asdict(job),
         **{name: getattr(result, name) for name in _COPIED},
@@ -233,7 +230,7 @@ def make_record(
         difficulty=episode.difficulty,
         cause=None if result.cause is None else clip_text(result.cause, MOST_CAUSE_LETTERS),
         error=result.error if result.outcome == "error" else None,
-        attribution=_attribution(trajectory, goals, result, instruction),
+        attribution=attribution,
         goals=goals,
         instruction=utterances,
         prompt=prompt,
@@ -306,44 +303,37 @@ def _utterances(
     )
 
 
-def _trajectory(prepared: PreparedJob, result: RolloutResult) -> PlayedCourse | None:
-    """Return what happened, for its analysis; None if there is no verdict."""
-    if result.outcome == "error":
-        return None
-    start = result.policy_start_step
+def _analyze(
+    prepared: PreparedJob, result: RolloutResult, instruction: language.Instruction
+) -> tuple[GoalOutcomes | None, Attribution | None]:
+    """Return which goals were reached, and why the episode failed.
+
+    Without a verdict or events there is neither, and no attribution if the cause is unclear.
+    """
+    if result.outcome == "error" or not result.events:
+        return None, None
+    episode, start, elapsed = prepared.episode, result.policy_start_step, result.elapsed_steps
     events = [
         Event(one.step + start, Fact(one.kind, one.subject, one.place), one.holds)
         for one in result.events
     ]
-    original = prepared.scene_episode if prepared.job.arm == OTHER_GOAL else None
-    return PlayedCourse(
-        prepared.episode, events, start, result.elapsed_steps, original, result.original
-    )
-
-
-def _attribution(
-    trajectory: PlayedCourse | None,
-    goals: GoalOutcomes | None,
-    result: RolloutResult,
-    instruction: language.Instruction,
-) -> Attribution | None:
-    """Return why the episode failed; None if it did not or the cause is unclear."""
-    if trajectory is None or goals is None or result.outcome != "failure":
-        return None
-    episode = trajectory.episode
+    decision = decide(episode, events, elapsed)
+    goals = find_goal_outcomes(episode, events, elapsed, decision, result.original)
+    if result.outcome != "failure":
+        return goals, None
     found = attribute_failure(
         episode,
-        trajectory.events_until_verdict,
+        [event for event in events if event.step <= decision.step],
         timed_out=result.timed_out,
-        policy_start_step=result.policy_start_step,
-        elapsed_steps=trajectory.decision.step,
+        policy_start_step=start,
+        elapsed_steps=decision.step,
         cause=result.cause,
         # What mentions nothing, such as a scrambled text, has no sides to exchange.
         mirrored=language.mirrored_objects(episode, instruction) if instruction.mentions else None,
     )
-    if found is not None and trajectory.original is not None:
-        found = name_other_goal(found, trajectory.original, goals)
-    return None if found is None else Attribution(**found._asdict())
+    if found is not None and goals.original is not None:
+        found = name_other_goal(found, prepared.scene_episode, goals)
+    return goals, None if found is None else Attribution(**found._asdict())
 
 
 def utc_now() -> str:
