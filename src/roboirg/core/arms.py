@@ -30,11 +30,6 @@ def paraphrase_number(arm: str) -> int | None:
     return None if found is None else int(found[1])
 
 
-def arm_kind(arm: str) -> str:
-    """Return the kind of an arm, one of `ARMS`."""
-    return arm if paraphrase_number(arm) is None else PARAPHRASE
-
-
 def check_arm(arm: str) -> None:
     """Check that there is such an arm; a paraphrase needs its number.
 

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
 import re
 import zlib
-from collections.abc import Iterator
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -107,26 +107,17 @@ def _paraphrase(
 ) -> Instruction:
     """Return the paraphrase of a number: another text than the told one and those before it."""
     seen = {told.text}
-    for other in _redrawn(episode, options, number * _MOST_DRAWS):
-        if other.text not in seen and _kept_notes(other) == _kept_notes(told):
-            seen.add(other.text)
+    kept = [told.metadata.get(name) for name in _KEPT_NOTES]
+    for variant in range(1, number * _MOST_DRAWS + 1):
+        with contextlib.suppress(InvalidValueError):  # a setting may refuse what was drawn
+            other = instruct_with(episode, options, variant)
+            if [other.metadata.get(name) for name in _KEPT_NOTES] == kept:
+                seen.add(other.text)
             if len(seen) > number:
                 return other
     raise InvalidValueError(
         f"The {options.setting} setting has no paraphrase {number} of episode {episode.key}."
     )
-
-
-def _redrawn(episode: Episode, options: InstructionOptions, draws: int) -> Iterator[Instruction]:
-    for variant in range(1, draws + 1):
-        try:
-            yield instruct_with(episode, options, variant)
-        except InvalidValueError:  # a setting may refuse what was drawn
-            continue
-
-
-def _kept_notes(instruction: Instruction) -> list[object]:
-    return [instruction.metadata.get(name) for name in _KEPT_NOTES]
 
 
 def _scramble(episode: Episode, told: Instruction) -> Instruction:

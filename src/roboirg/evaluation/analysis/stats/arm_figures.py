@@ -22,12 +22,11 @@ from roboirg.core.arms import (
     AGAIN,
     MOST_PARAPHRASES,
     OTHER_GOAL,
-    PARAPHRASE,
     SCRAMBLED,
     SILENT,
     SILENT_EMPTY,
     TOLD,
-    arm_kind,
+    paraphrase_number,
 )
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.evaluation.analysis.stats.cells import (
@@ -196,7 +195,7 @@ def _language_use(trial: Trial, arms: Arms) -> Sides | None:
 
 
 def _paraphrases(trial: Trial, arms: Arms) -> Sides | None:
-    wins = [_won(one) for arm, one in sorted(arms.items()) if arm_kind(arm) == PARAPHRASE]
+    wins = [_won(one) for arm, one in sorted(arms.items()) if paraphrase_number(arm)]
     if len(wins) < 2:  # noqa: PLR2004
         return None
     # Paraphrases stand as seeds of their own, none of which the two sides share.
