@@ -48,7 +48,7 @@ from roboirg.policies.contract.base import Policy, close_policy
 from roboirg.policies.contract.policy_needs import PolicyNeeds
 from roboirg.policies.contract.random_state import episode_policy_seed
 from roboirg.policies.prompt_length.declared_limit import prompt_limit
-from roboirg.policies.vlm.models.ledger import LedgerSettings, use_ledger
+from roboirg.policies.vlm.models.reply_store import ReplySettings, use_replies
 
 PlayJob = Callable[[Job], Record]
 """Function that plays one job. Executors send it to other processes, so it must be picklable."""
@@ -74,7 +74,7 @@ class EpisodeRunner:
         refuse_long: whether an episode is not played if its prompt is longer than what the policy's
             model reads.
         seed_secret: of the run, for the policies' seeds.
-        ledger: of the models that policies ask; None for a run that keeps none.
+        replies: where those of models are kept; None for a run that keeps none.
     """
 
     folder: Path
@@ -86,12 +86,12 @@ class EpisodeRunner:
     hosts: socket | None = None
     refuse_long: bool = False
     seed_secret: str = ""
-    ledger: LedgerSettings | None = None
+    replies: ReplySettings | None = None
 
     def in_folder(self, folder: Path) -> EpisodeRunner:
-        """Return a copy that writes its videos and its ledger to another folder."""
-        ledger = None if self.ledger is None else self.ledger._replace(folder=folder)
-        return replace(self, folder=folder, ledger=ledger)
+        """Return a copy that writes its videos and the replies of models to another folder."""
+        replies = None if self.replies is None else self.replies._replace(folder=folder)
+        return replace(self, folder=folder, replies=replies)
 
     def with_hosts(self, hosts: socket) -> EpisodeRunner:
         """Return a copy that asks for hosts on a line, as `HostPool.connect` returns it."""
@@ -104,7 +104,7 @@ class EpisodeRunner:
             EndOfRunError: no Vulkan device can render, a package has to be installed first, ….
         """
         started_at, start = utc_now(), time.monotonic()
-        with use_ledger(self.ledger, job.slug):
+        with use_replies(self.replies, job.slug):
             writer, result = self._play(job)
         video = self._finish_video(writer, result)
         error = None if writer is None else writer.error

@@ -35,7 +35,7 @@ from roboirg.evaluation.records.store import (
 from roboirg.evaluation.run.executor import Executor, Warn
 from roboirg.evaluation.run.progress import Reporter, SilentReporter
 from roboirg.language import LANGUAGE_VERSION
-from roboirg.policies.vlm.models.ledger import LedgerSettings
+from roboirg.policies.vlm.models.reply_store import ReplySettings
 from roboirg.tasks.splits.splits import get_episode
 
 UNREACHABLE_AFTER = 20
@@ -142,7 +142,7 @@ def episode_runner(plan: Plan, folder: Path) -> EpisodeRunner:
         hosting=plan.hosting,
         refuse_long=plan.long_prompts == "refuse",
         seed_secret=plan.seed_secret or "",
-        ledger=LedgerSettings(folder, plan.max_cost, plan.model_replies == "anew"),
+        replies=ReplySettings(folder, plan.max_cost, plan.model_replies == "anew"),
     )
 
 

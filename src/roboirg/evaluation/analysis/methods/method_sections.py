@@ -37,18 +37,21 @@ from roboirg.tasks import all_tasks, every_task
 from roboirg.util.media import CONTROL_RATE
 
 
-class Fact(NamedTuple):
+class MethodItem(NamedTuple):
     """One item of a section: what it is about, and what is known."""
 
     label: str
     text: str
 
 
+Items = Iterator[MethodItem]
+
+
 class Section(NamedTuple):
     """A heading with its facts."""
 
     title: str
-    facts: tuple[Fact, ...]
+    facts: tuple[MethodItem, ...]
 
 
 def make_sections(folder: Path, planned: Sequence[Job]) -> tuple[Section, ...]:
@@ -90,12 +93,12 @@ def _distinct(values: Iterable[object]) -> str:
     return ", ".join(found) or NOT_REPORTED
 
 
-def _horizon(results: Sequence[Summary], played: Mapping[str, PlayedFacts]) -> Iterator[Fact]:
-    yield Fact("step limit", f"{_distinct(one.max_steps for one in results)} control steps")
-    yield Fact("control rate", f"{CONTROL_RATE} steps a second")
+def _horizon(results: Sequence[Summary], played: Mapping[str, PlayedFacts]) -> Items:
+    yield MethodItem("step limit", f"{_distinct(one.max_steps for one in results)} control steps")
+    yield MethodItem("control rate", f"{CONTROL_RATE} steps a second")
     for name, facts in played.items():
         each = f"{facts.steps / facts.calls:.1f}" if facts.calls else NOT_REPORTED
-        yield Fact(
+        yield MethodItem(
             name,
             f"action space {facts.need('actions')}; steps executed per call, mean: {each}; "
             f"further observations during a call's steps, every n-th: "
@@ -103,7 +106,7 @@ def _horizon(results: Sequence[Summary], played: Mapping[str, PlayedFacts]) -> I
         )
 
 
-def _precision(results: Sequence[Summary], played: Mapping[str, PlayedFacts]) -> Iterator[Fact]:
+def _precision(results: Sequence[Summary], played: Mapping[str, PlayedFacts]) -> Items:
     for name, facts in played.items():
         known = {
             DECLARABLE["dtype"]: _either(facts, "dtype", "dtypes"),
@@ -112,9 +115,9 @@ def _precision(results: Sequence[Summary], played: Mapping[str, PlayedFacts]) ->
             "Python": facts.measured("python"),
         }
         where = "computed by a server; " if facts.is_remote else ""
-        yield Fact(name, where + "; ".join(f"{key}: {value}" for key, value in known.items()))
-    yield Fact("roboirg", _distinct(one.package_version for one in results))
-    yield Fact("physics computed on", _distinct(one.processor for one in results))
+        yield MethodItem(name, where + "; ".join(f"{key}: {value}" for key, value in known.items()))
+    yield MethodItem("roboirg", _distinct(one.package_version for one in results))
+    yield MethodItem("physics computed on", _distinct(one.processor for one in results))
 
 
 def _either(facts: PlayedFacts, key: str, name: str) -> str:
@@ -123,15 +126,15 @@ def _either(facts: PlayedFacts, key: str, name: str) -> str:
     return facts.measured(name) if said == NOT_REPORTED else said
 
 
-def _observations(results: Sequence[Summary], played: Mapping[str, PlayedFacts]) -> Iterator[Fact]:
-    yield Fact(
+def _observations(results: Sequence[Summary], played: Mapping[str, PlayedFacts]) -> Items:
+    yield MethodItem(
         "source",
         f"simulated, environment version {_distinct(one.environment_version for one in results)}, "
         f"{_distinct(one.meshes for one in results)} meshes, rendered on "
         f"{_distinct(one.render_device for one in results)}",
     )
     for name, facts in played.items():
-        yield Fact(
+        yield MethodItem(
             name,
             f"cameras: {facts.need('cameras')}, 256 × 256 pixels, depth: {facts.need('depth')}; "
             f"frames of the video: {facts.need('demonstration_frames')}; "
@@ -139,26 +142,26 @@ def _observations(results: Sequence[Summary], played: Mapping[str, PlayedFacts])
         )
 
 
-def _instructions(results: Sequence[Summary], played: Mapping[str, PlayedFacts]) -> Iterator[Fact]:
-    yield Fact("language version", _distinct(one.language_version for one in results))
+def _instructions(results: Sequence[Summary], played: Mapping[str, PlayedFacts]) -> Items:
+    yield MethodItem("language version", _distinct(one.language_version for one in results))
     for wordings in sorted({one.options.wordings for one in results}, key=str):
         splits = sorted({one.split for one in results if one.options.wordings == wordings})
         listed = ", ".join(_pool_words(split, wordings) for split in splits)
-        yield Fact("words", f"{words_label(wordings)}, {listed}")
-    yield Fact(
+        yield MethodItem("words", f"{words_label(wordings)}, {listed}")
+    yield MethodItem(
         "overlap of pools",
         "templates of the two pools are disjoint: no instruction of the test split occurs in train "
         "or val",
     )
     for setting in dict.fromkeys(one.setting for one in results):
         texts = set().union(*(facts.texts.get(setting, set()) for facts in played.values()))
-        yield Fact(setting, counted(len(texts), "distinct instruction"))
-    yield Fact("delivery", _distinct(one.options.delivery for one in results))
+        yield MethodItem(setting, counted(len(texts), "distinct instruction"))
+    yield MethodItem("delivery", _distinct(one.options.delivery for one in results))
     lowered = {"yes": "sent in lower case", "no": "sent as written"}
     for name, facts in played.items():
         own = Counter(one.prompt_verdict for one in results if one.policy == name)
         unknown = own.total() - own["heard"] - own["cut"]
-        yield Fact(
+        yield MethodItem(
             name,
             f"{lowered.get(facts.need('lowers_prompt'), NOT_REPORTED)}; "
             f"{DECLARABLE['text_normalization']}: {facts.said('text_normalization')}; "
@@ -173,28 +176,28 @@ def _pool_words(split: str, wordings: str | None) -> str:
     return f"{split} split"
 
 
-def _training(played: Mapping[str, PlayedFacts]) -> Iterator[Fact]:
+def _training(played: Mapping[str, PlayedFacts]) -> Items:
     for name, facts in played.items():
-        yield Fact(name, f"{DECLARABLE['trained_on']}: {facts.said('trained_on')}")
+        yield MethodItem(name, f"{DECLARABLE['trained_on']}: {facts.said('trained_on')}")
 
 
-def _screening(jobs: Sequence[Job]) -> Iterator[Fact]:
+def _screening(jobs: Sequence[Job]) -> Items:
     scenes = {(one.task, one.split, one.episode) for one in jobs}
-    yield Fact(
+    yield MethodItem(
         "scenes",
         f"{len(scenes)}, of {counted(len({one[0] for one in scenes}), 'task')}, split "
         f"{_distinct(one[1] for one in scenes)}: the first ones of the split; none was left out "
         "after it was played",
     )
     absent = [name for name in all_tasks() if name not in {one[0] for one in scenes}]
-    yield Fact("tasks that were not played", ", ".join(absent) or "none")
+    yield MethodItem("tasks that were not played", ", ".join(absent) or "none")
     by_setting: dict[str, set[tuple[str, str, int]]] = defaultdict(set)
     for one in jobs:
         by_setting[one.setting].add((one.task, one.split, one.episode))
     for setting, own in by_setting.items():
         has = [task for task in {one[0] for one in scenes} if _has_setting(task, setting)]
         possible = sum(one[0] in has for one in scenes)
-        yield Fact(
+        yield MethodItem(
             setting,
             f"{len(own)} of {possible} scenes of {counted(len(has), 'task')}; "
             f"{possible - len(own)} refused, because the setting cannot express them",
@@ -206,21 +209,21 @@ def _has_setting(task: str, setting: str) -> bool:
     return found is None or setting in settings_of(found)
 
 
-def _statistics(data: RunData) -> Iterator[Fact]:
+def _statistics(data: RunData) -> Items:
     seeds = len({one.policy_seed for _, one in data.results})
-    yield Fact("unit", "the episode; all policy seeds of an episode are one unit")
+    yield MethodItem("unit", "the episode; all policy seeds of an episode are one unit")
     single = "Wilson's score for single cells, for averages" if seeds == 1 else "for all rates"
-    yield Fact("intervals", f"95 %; {single} the bootstrap over episodes ({DRAWS} resamples)")
-    yield Fact(
+    yield MethodItem("intervals", f"95 %; {single} the bootstrap over episodes ({DRAWS} resamples)")
+    yield MethodItem(
         "gaps",
         "paired by episode, two-sided, signed; exact sign-flip test"
         + (" (McNemar's exact test)" if seeds == 1 else ""),
     )
-    yield Fact("multiplicity", "Holm's correction over what is read together")
-    yield Fact("averages", "unweighted means over tasks")
+    yield MethodItem("multiplicity", "Holm's correction over what is read together")
+    yield MethodItem("averages", "unweighted means over tasks")
 
 
-def _sensitivity(data: RunData) -> Iterator[Fact]:
+def _sensitivity(data: RunData) -> Items:
     for policy_run, name in data.names.items():
         own = [one for owner, one in data.results if owner == policy_run]
         for found in try_choices(gap_contrasts(own)):
@@ -228,23 +231,25 @@ def _sensitivity(data: RunData) -> Iterator[Fact]:
                 found.verdict, f"{found.verdict} than explicit"
             )
             how = found.sentence if found.others else "no other choice applies"
-            yield Fact(f"{name}, {found.label}", f"{verdict}; {how}")
+            yield MethodItem(f"{name}, {found.label}", f"{verdict}; {how}")
 
 
-def _controls(data: RunData, jobs: Sequence[Job]) -> Iterator[Fact]:
+def _controls(data: RunData, jobs: Sequence[Job]) -> Items:
     by_options = defaultdict(list)
     for job in jobs:
         by_options[job.column].append(job)
     for options in sorted(by_options, key=options_sort_key):
         level = chance_level(by_options[options])
         text = NOT_REPORTED if level is None else f"{100 * float(level):.1f} %"
-        yield Fact(f"chance in {options_label(options)}", f"{text}, given the final command alone")
+        yield MethodItem(
+            f"chance in {options_label(options)}", f"{text}, given the final command alone"
+        )
     controls = [one for one in data.names if one.is_privileged]
     listed = [f"{data.names[one]}: {_rates(data, one)}" for one in controls]
-    yield Fact("privileged policies as controls", "; ".join(listed) or "none")
-    yield Fact("arms", ", ".join(sorted({one.arm for _, one in data.results})))
+    yield MethodItem("privileged policies as controls", "; ".join(listed) or "none")
+    yield MethodItem("arms", ", ".join(sorted({one.arm for _, one in data.results})))
     forms = sorted({one.form for one in jobs if one.setting != EXPLICIT})
-    yield Fact("forms of the implicit settings", ", ".join(forms) or "none")
+    yield MethodItem("forms of the implicit settings", ", ".join(forms) or "none")
 
 
 def _rates(data: RunData, policy_run: PolicyRun) -> str:
@@ -256,17 +261,15 @@ def _rates(data: RunData, policy_run: PolicyRun) -> str:
     return ", ".join(found)
 
 
-def _errors(
-    results: Sequence[Summary], data: RunData, played: Mapping[str, PlayedFacts]
-) -> Iterator[Fact]:
+def _errors(results: Sequence[Summary], data: RunData, played: Mapping[str, PlayedFacts]) -> Items:
     seeds = _distinct(one.policy_seed for one in results)
-    yield Fact("policy seeds", f"{seeds}; a policy's seed is derived from it and the episode")
+    yield MethodItem("policy seeds", f"{seeds}; a policy's seed is derived from it and the episode")
     again = sum(
         count for one in played.values() for number, count in one.attempts.items() if number > 1
     )
-    yield Fact("episodes that were begun more than once", f"{again} of {len(results)}")
+    yield MethodItem("episodes that were begun more than once", f"{again} of {len(results)}")
     kinds = Counter(one.error for one in results if one.outcome == "error")
     listed = ", ".join(f"{kind}: {count}" for kind, count in kinds.items())
-    yield Fact("errors, in no rate", f"{listed or 'none'} (of {len(results)} results)")
+    yield MethodItem("errors, in no rate", f"{listed or 'none'} (of {len(results)} results)")
     missing = sum(cell.missing for cell in data.cells.values())
-    yield Fact("planned and not played", str(missing))
+    yield MethodItem("planned and not played", str(missing))

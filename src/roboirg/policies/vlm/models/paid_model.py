@@ -9,8 +9,8 @@ from typing import Any
 
 from roboirg.core.errors import BudgetError, ModelBusyError, PolicyConnectionError
 from roboirg.core.waiting import waiting
-from roboirg.policies.vlm.models.ledger import Ledger, current_ledger
 from roboirg.policies.vlm.models.model import Model, ModelOptions, ModelQuery, ModelReply
+from roboirg.policies.vlm.models.reply_store import ReplyStore, current_store
 from roboirg.util.media import Clip, Picture
 
 MILLION = 1_000_000
@@ -19,15 +19,15 @@ LONGEST_PAUSE_S = 60.0
 
 
 class PaidModel:
-    """Asks a model, unless the run's ledger has its reply; waits where the service says so.
+    """Asks a model, unless the run has stored its reply; waits where the service says so.
 
     Args:
         model: the connection.
         options: of the model.
 
     Attributes:
-        stored: replies that came from the ledger.
-        anew: calls that the ledger had with something else sent, as by another machine.
+        stored: replies that came from the store.
+        anew: calls that were stored with something else sent, as by another machine.
         waited_s: seconds spent waiting for the service or for a turn.
     """
 
@@ -52,42 +52,42 @@ class PaidModel:
         Raises:
             BudgetError: the run has spent what it may.
         """
-        ledger = current_ledger()
-        if ledger is None:
+        store = current_store()
+        if store is None:
             return self._ask(query, None)
         sent = digest(query, self._options)
-        found = ledger.find(sent)
+        found = store.find(sent)
         if found.reply is None:
-            self._check_prices(ledger)
-            ledger.check_budget()
+            self._check_prices(store)
+            store.check_budget()
             self.anew += found.differs
-            reply = self._ask(query, ledger)
-            ledger.keep(sent, reply, cost_of(self._options, reply) or 0.0)
+            reply = self._ask(query, store)
+            store.keep(sent, reply, cost_of(self._options, reply) or 0.0)
         else:
             self.stored += 1
             reply = found.reply
-        ledger.calls += 1
+        store.calls += 1
         return reply
 
     def close(self) -> None:
         """Close the connection."""
         self._model.close()
 
-    def _check_prices(self, ledger: Ledger) -> None:
-        if ledger.settings.max_cost_usd is not None and cost_of(self._options) is None:
+    def _check_prices(self, store: ReplyStore) -> None:
+        if store.settings.max_cost_usd is not None and cost_of(self._options) is None:
             raise BudgetError(
                 f"--max-cost needs the prices of model {self._options.model!r}; give input_price "
                 "and output_price, in US dollars per million tokens."
             )
 
-    def _ask(self, query: ModelQuery, ledger: Ledger | None) -> ModelReply:
+    def _ask(self, query: ModelQuery, store: ReplyStore | None) -> ModelReply:
         """Send a query, again while the service is busy or, a few times, cannot be reached."""
         pause, unreachable = FIRST_PAUSE_S, 0
         start = time.monotonic()
         while True:
             before = time.monotonic()
-            if ledger is not None:
-                ledger.wait_for_turn(self._service, self._options.requests_per_minute)
+            if store is not None:
+                store.wait_for_turn(self._service, self._options.requests_per_minute)
             self.waited_s += time.monotonic() - before
             try:
                 return self._model.answer(query)
@@ -99,13 +99,13 @@ class PaidModel:
                 left = self._options.patience_s - (time.monotonic() - start)
                 if unreachable > self._options.retries or seconds > left:
                     raise
-            self._pause(seconds, ledger if is_busy else None)
+            self._pause(seconds, store if is_busy else None)
             pause = min(2 * pause, LONGEST_PAUSE_S)
 
-    def _pause(self, seconds: float, ledger: Ledger | None) -> None:
+    def _pause(self, seconds: float, store: ReplyStore | None) -> None:
         """Wait, and make the other processes of the run wait for a busy service, too."""
-        if ledger is not None:
-            ledger.pause(self._service, seconds)
+        if store is not None:
+            store.pause(self._service, seconds)
         with waiting(f"{self._service}, which is busy", is_queue=True):
             time.sleep(seconds)
         self.waited_s += seconds

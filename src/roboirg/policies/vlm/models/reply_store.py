@@ -1,4 +1,4 @@
-"""The ledger of a run: replies of models that are paid for, what they cost, whose turn it is.
+"""The store of a run's replies: what models said and what it cost, and whose turn it is.
 
 A file of SQLite in the run's folder, shared by all its processes on a machine. A reply is stored
 before the policy sees it, so that a run that is stopped and resumed asks nothing twice. On a
@@ -19,7 +19,7 @@ from roboirg.core.errors import BudgetError
 from roboirg.core.waiting import waiting
 from roboirg.policies.vlm.models.model import ModelReply
 
-LEDGER_FILE = "models.sqlite"
+REPLIES_FILE = "models.sqlite"
 _LOCK_S = 60.0
 """How long a process waits for another one to finish a transaction."""
 _TABLES = """
@@ -32,8 +32,8 @@ CREATE TABLE IF NOT EXISTS services (name TEXT PRIMARY KEY, next_at REAL) WITHOU
 """
 
 
-class LedgerSettings(NamedTuple):
-    """Where a run keeps its ledger, and what it may spend.
+class ReplySettings(NamedTuple):
+    """Where a run keeps its replies, and what it may spend.
 
     Attributes:
         folder: of the run.
@@ -47,7 +47,7 @@ class LedgerSettings(NamedTuple):
 
 
 class Found(NamedTuple):
-    """What the ledger knows of a call.
+    """What the store knows of a call.
 
     Attributes:
         reply: that was stored; None if there is none for what is sent now.
@@ -59,8 +59,8 @@ class Found(NamedTuple):
 
 
 @dataclass
-class Ledger:
-    """The ledger during one episode.
+class ReplyStore:
+    """The store during one episode.
 
     Args:
         settings: of the run.
@@ -70,14 +70,14 @@ class Ledger:
         calls: number of the episode's next call.
     """
 
-    settings: LedgerSettings
+    settings: ReplySettings
     episode: str
     calls: int = field(default=0, init=False)
 
     def __post_init__(self) -> None:
         self.settings.folder.mkdir(parents=True, exist_ok=True)
         self._database = sqlite3.connect(
-            self.settings.folder / LEDGER_FILE, timeout=_LOCK_S, isolation_level=None
+            self.settings.folder / REPLIES_FILE, timeout=_LOCK_S, isolation_level=None
         )
         # What is committed is on disk, and survives a kill at any moment.
         self._database.execute("PRAGMA synchronous = FULL")
@@ -167,20 +167,20 @@ class Ledger:
 
 
 class _Use:
-    """The use of the ledger by one episode, which opens the file when it asks a model."""
+    """The use of the store by one episode, which opens the file when it asks a model."""
 
-    def __init__(self, settings: LedgerSettings, episode: str) -> None:
+    def __init__(self, settings: ReplySettings, episode: str) -> None:
         self._settings, self._episode = settings, episode
-        self._ledger: Ledger | None = None
+        self._store: ReplyStore | None = None
 
     @property
-    def ledger(self) -> Ledger:
-        self._ledger = self._ledger or Ledger(self._settings, self._episode)
-        return self._ledger
+    def store(self) -> ReplyStore:
+        self._store = self._store or ReplyStore(self._settings, self._episode)
+        return self._store
 
     def close(self) -> None:
-        if self._ledger is not None:
-            self._ledger.close()
+        if self._store is not None:
+            self._store.close()
 
 
 _uses: list[_Use] = []
@@ -188,8 +188,8 @@ _uses: list[_Use] = []
 
 
 @contextlib.contextmanager
-def use_ledger(settings: LedgerSettings | None, episode: str) -> Iterator[None]:
-    """Let the models of an episode use the run's ledger while the block runs.
+def use_replies(settings: ReplySettings | None, episode: str) -> Iterator[None]:
+    """Let the models of an episode use the run's store while the block runs.
 
     The file is not made before a model is asked.
     """
@@ -203,6 +203,6 @@ def use_ledger(settings: LedgerSettings | None, episode: str) -> Iterator[None]:
         _uses.pop().close()
 
 
-def current_ledger() -> Ledger | None:
-    """Return the ledger of the episode that is played; None if the run keeps none."""
-    return _uses[-1].ledger if _uses else None
+def current_store() -> ReplyStore | None:
+    """Return the store of the episode that is played; None if the run keeps none."""
+    return _uses[-1].store if _uses else None

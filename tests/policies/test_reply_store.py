@@ -18,8 +18,8 @@ from planning_fakes import TOKENS, Garbage, Status, fake_vlm, model_options, wor
 from roboirg.core.errors import BudgetError, ModelBusyError, PolicyReplyError
 from roboirg.policies.vlm.model_content import ChatTurn
 from roboirg.policies.vlm.models import ModelQuery, make_model
-from roboirg.policies.vlm.models.ledger import LEDGER_FILE, LedgerSettings, use_ledger
 from roboirg.policies.vlm.models.paid_model import PaidModel
+from roboirg.policies.vlm.models.reply_store import REPLIES_FILE, ReplySettings, use_replies
 from roboirg.policies.vlm.models.response_limits import retry_after_s
 from roboirg.util.media import Picture
 
@@ -33,12 +33,12 @@ def query(words: str, shade: int | None = None) -> ModelQuery:
     return ModelQuery("system", (ChatTurn("user", (words, *picture)),))
 
 
-def play(server, settings: LedgerSettings, episode: str, *queries: ModelQuery, **options):
+def play(server, settings: ReplySettings, episode: str, *queries: ModelQuery, **options):
     """Ask the queries of an episode, as a policy does; returns replies and counts."""
     chosen = model_options(server, **options)
     model = PaidModel(make_model(chosen), chosen)
     try:
-        with use_ledger(settings, episode):
+        with use_replies(settings, episode):
             replies = [model.answer(one).text for one in queries]
     finally:
         model.close()
@@ -46,7 +46,7 @@ def play(server, settings: LedgerSettings, episode: str, *queries: ModelQuery, *
 
 
 def test_an_episode_that_is_played_again_asks_nothing_again(tmp_path: Path) -> None:
-    settings = LedgerSettings(tmp_path)
+    settings = ReplySettings(tmp_path)
     with fake_vlm(["one", "two", "never"]) as server:
         first, counts = play(server, settings, "a", query("first"), query("second"))
         assert (first, counts["stored"]) == (["one", "two"], 0)
@@ -61,7 +61,7 @@ def test_an_episode_that_is_played_again_asks_nothing_again(tmp_path: Path) -> N
 
 def test_what_is_sent_decides_and_differences_are_counted(tmp_path: Path) -> None:
     """Pictures may differ in a bit on another machine; another temperature is another question."""
-    settings = LedgerSettings(tmp_path)
+    settings = ReplySettings(tmp_path)
     with fake_vlm(["one", "two", "three"]) as server:
         play(server, settings, "a", query("words", shade=1))
         replies, counts = play(server, settings, "a", query("words", shade=2))
@@ -75,8 +75,8 @@ def test_what_is_sent_decides_and_differences_are_counted(tmp_path: Path) -> Non
 
 def test_a_repeat_asks_anew_if_it_is_to(tmp_path: Path) -> None:
     with fake_vlm(["one", "two"]) as server:
-        play(server, LedgerSettings(tmp_path), "a", query("words"))
-        replies, counts = play(server, LedgerSettings(tmp_path, anew=True), "a", query("words"))
+        play(server, ReplySettings(tmp_path), "a", query("words"))
+        replies, counts = play(server, ReplySettings(tmp_path, anew=True), "a", query("words"))
         assert (replies, counts["stored"], counts["anew"]) == (["two"], 0, 0)
 
 
@@ -92,9 +92,9 @@ def test_a_run_ends_when_it_has_spent_what_it_may_and_can_go_on_with_more(tmp_pa
     queries = [query(str(number)) for number in range(4)]
     with fake_vlm(lambda body: words_of(body)[-1]) as server:
         with pytest.raises(BudgetError, match=r"have cost 20\.00 of at most 15\.00 US dollars"):
-            play(server, LedgerSettings(tmp_path, 1.5 * COST), "a", *queries, **PRICES)
+            play(server, ReplySettings(tmp_path, 1.5 * COST), "a", *queries, **PRICES)
         assert len(server.requests) == 2
-        replies, counts = play(server, LedgerSettings(tmp_path, 9 * COST), "a", *queries, **PRICES)
+        replies, counts = play(server, ReplySettings(tmp_path, 9 * COST), "a", *queries, **PRICES)
         assert (replies, counts["stored"]) == (list("0123"), 2)
         assert len(server.requests) == 4
 
@@ -104,7 +104,7 @@ def test_a_limit_of_costs_needs_prices(tmp_path: Path) -> None:
         fake_vlm(["one"]) as server,
         pytest.raises(BudgetError, match="needs the prices of model 'fake'"),
     ):
-        play(server, LedgerSettings(tmp_path, 1.0), "a", query("words"))
+        play(server, ReplySettings(tmp_path, 1.0), "a", query("words"))
     assert not server.requests
 
 
@@ -115,13 +115,13 @@ def test_a_busy_service_is_waited_for(tmp_path: Path, provider: str, code: int) 
     busy = Status(code, headers={"Retry-After": "0.05"})
     started = time.time()
     with fake_vlm([busy, busy, busy, "at last"]) as server:
-        settings = LedgerSettings(tmp_path)
+        settings = ReplySettings(tmp_path)
         replies, counts = play(
             server, settings, "a", query("words"), provider=provider, patience_s=60
         )
         assert (replies, len(server.requests)) == (["at last"], 4)
         assert counts["waited_s"] >= 0.15
-    with sqlite3.connect(tmp_path / LEDGER_FILE) as database:
+    with sqlite3.connect(tmp_path / REPLIES_FILE) as database:
         ((next_at,),) = database.execute("SELECT next_at FROM services")
     assert next_at >= started + 0.15
 
@@ -130,15 +130,15 @@ def test_patience_ends(tmp_path: Path) -> None:
     busy = Status(429, headers={"retry-after": "3600"})
     with fake_vlm([busy]) as server:
         with pytest.raises(ModelBusyError, match="is not available"):
-            play(server, LedgerSettings(tmp_path), "a", query("words"), patience_s=60)
+            play(server, ReplySettings(tmp_path), "a", query("words"), patience_s=60)
         assert len(server.requests) == 1
 
 
 def test_what_is_no_chat_completion_is_not_asked_again_nor_stored(tmp_path: Path) -> None:
     with fake_vlm([Garbage(b"{}"), "one"]) as server:
         with pytest.raises(PolicyReplyError):
-            play(server, LedgerSettings(tmp_path), "a", query("words"))
-        replies, counts = play(server, LedgerSettings(tmp_path), "a", query("words"))
+            play(server, ReplySettings(tmp_path), "a", query("words"))
+        replies, counts = play(server, ReplySettings(tmp_path), "a", query("words"))
         assert (replies, counts["stored"]) == (["one"], 0)
 
 
@@ -163,7 +163,7 @@ CHILD = textwrap.dedent(
     from pathlib import Path
     from roboirg.policies.vlm.model_content import ChatTurn
     from roboirg.policies.vlm.models import ModelOptions, ModelQuery, make_model
-    from roboirg.policies.vlm.models.ledger import LedgerSettings, use_ledger
+    from roboirg.policies.vlm.models.reply_store import ReplySettings, use_replies
     from roboirg.policies.vlm.models.paid_model import PaidModel
 
     url, folder, episode, calls, per_minute = sys.argv[1:]
@@ -171,7 +171,7 @@ CHILD = textwrap.dedent(
         model="fake", base_url=url, requests_per_minute=float(per_minute) or None
     )
     model = PaidModel(make_model(options), options)
-    with use_ledger(LedgerSettings(Path(folder)), episode):
+    with use_replies(ReplySettings(Path(folder)), episode):
         for number in range(int(calls)):
             words = f"<{episode} {number}"
             reply = model.answer(ModelQuery("system", (ChatTurn("user", (words,)),)))
@@ -237,6 +237,6 @@ def test_processes_keep_one_limit_together(tmp_path: Path) -> None:
             one.communicate()
             assert one.returncode == 0
         assert len(server.requests) == 2 * CALLS
-    with sqlite3.connect(tmp_path / LEDGER_FILE) as database:
+    with sqlite3.connect(tmp_path / REPLIES_FILE) as database:
         ((next_at,),) = database.execute("SELECT next_at FROM services")
     assert next_at >= started + 2 * CALLS * 60 / per_minute
