@@ -202,32 +202,42 @@ def host_of(frame: Any) -> Any:
     return frame.f_locals["self"]
 
 
+class ForgesReply(Forger):
+    """Says what only the supervisor may say: play this episode again."""
+
+    message: ClassVar = {"type": "reply", "kind": "infrastructure", "message": "x", "again": True}
+
+
 class ForgesLost(Forger):
-    message = ({"type": "lost", "kind": "infrastructure", "message": "x", "again": True},)
+    message = ({"type": "outcome", "again": True},)
+
+
+class ForgesKind(Forger):
+    message = ({"type": "outcome", "error": "infrastructure", "message": "x"},)
 
 
 class ForgesSeconds(Forger):
-    message = ({"type": "told", "seconds": float("nan")},)
+    message = ({"type": "outcome", "seconds": float("nan")},)
 
 
 class ForgesLatency(Forger):
-    message = ({"type": "acted", "rows": bytes(64), "size": 8, "latency_s": float("nan")},)
+    message = ({"type": "outcome", "rows": bytes(64), "size": 8, "latency_s": float("nan")},)
 
 
 class ForgesWant(Forger):
-    message = ({"type": "told", "want": ["front_rgb"]},)
+    message = ({"type": "outcome", "want": ["front_rgb"]},)
 
 
 class ForgesPrivilege(Forger):
-    message = ({"type": "opened", "needs": {}, "version": "1", "is_privileged": True},)
+    message = ({"type": "outcome", "needs": {}, "version": "1", "is_privileged": True},)
 
 
 class ForgesVersion(Forger):
-    message = ({"type": "opened", "needs": {}, "version": "\x1b[2J"},)
+    message = ({"type": "outcome", "needs": {}, "version": "\x1b[2J"},)
 
 
 class ForgesOtherEpisode(Forger):
-    message: ClassVar = {"type": "ask", "session": 10**6}
+    message: ClassVar = {"type": "question", "session": 10**6}
 
 
 class Deep210(Hostile):
@@ -273,7 +283,9 @@ class Asker(Hostile):
     def ask(self) -> None:
         host = host_of(sys._getframe())
         (session,) = host._asking
-        host._connection.send_bytes(msgspec.msgpack.encode({"type": "ask", "session": session}))
+        host._connection.send_bytes(
+            msgspec.msgpack.encode({"type": "question", "session": session})
+        )
         host._connection.recv_bytes()
 
 
@@ -344,7 +356,9 @@ class ChangingVersion(Hostile):
 
 
 FORGED = {
-    "ForgesLost": "policy: the process sent what is no reply (Invalid value 'lost' - ",
+    "ForgesReply": "policy: the process sent what is no reply (Invalid value 'reply' - ",
+    "ForgesLost": "policy: the process sent what is no reply (Object contains unknown field ",
+    "ForgesKind": "policy: the process sent what is no reply (Invalid enum value 'infrastructure",
     "ForgesSeconds": "policy: the process sent what is no reply (Object contains unknown field ",
     "ForgesLatency": "policy: the process sent what is no reply (Expected `float` >= 0.0 - at ",
     "ForgesWant": "policy: the process sent what is no reply (Object contains unknown field `want",

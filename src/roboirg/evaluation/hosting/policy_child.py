@@ -12,14 +12,14 @@ from collections.abc import Mapping, Sequence
 from typing import Any, Self
 
 from roboirg.core.errors import RoboIRGError
+from roboirg.evaluation.episode_errors import EpisodeLostError
 from roboirg.evaluation.hosting.messages import (
     MAX_MESSAGE,
-    Ask,
     Call,
     Outcome,
+    Question,
     encode,
     read_child,
-    send_descriptor,
 )
 from roboirg.evaluation.records.record import ErrorKind
 from roboirg.tasks.splits.private_splits import SALT_VARIABLE
@@ -32,18 +32,6 @@ MAX_OUTPUT = 256 * 2**10
 MAX_WORDS = 300
 DRAIN_S = 1.0
 """How long to wait for the end of what was printed; a thread of the policy may print for ever."""
-
-
-class ChildLostError(Exception):
-    """A policy process is gone.
-
-    Attributes:
-        kind: of the error, if the process did not end because of a time limit.
-    """
-
-    def __init__(self, kind: ErrorKind, message: str) -> None:
-        super().__init__(message)
-        self.kind = kind
 
 
 class PolicyChild(ChildProcess):
@@ -60,32 +48,25 @@ class PolicyChild(ChildProcess):
         """Start a process with environment variables besides those of this one, without a salt."""
         return cls.run_module(_MODULE, {**(variables or {}), SALT_VARIABLE: None})
 
-    def exchange(
-        self, message: Call | Sequence[Call], block: int | None = None
-    ) -> Ask | list[Outcome]:
+    def exchange(self, calls: Sequence[Call]) -> Question | list[Outcome]:
         """Send calls, or an answer, and return the reply; waits for as long as it takes.
 
-        Args:
-            message: to send.
-            block: descriptor of an episode's shared memory, sent after the message.
-
         Raises:
-            ChildLostError: the process has died, or sent something other than a message.
+            EpisodeLostError: the process has died, or sent something other than a message; whose
+                fault that is, its host decides.
         """
         try:
-            self.connection.send_bytes(encode(message))
-            if block is not None:
-                send_descriptor(self.connection, block)
-            reply: Ask | list[Outcome] = read_child(self.connection.recv_bytes(MAX_MESSAGE))
+            self.connection.send_bytes(encode(calls))
+            reply: Question | list[Outcome] = read_child(self.connection.recv_bytes(MAX_MESSAGE))
             return reply
         except (EOFError, OSError):
             raise _explain(self.close()) from None
         except (RoboIRGError, RecursionError, ValueError) as error:
             self.end()
             words = f"the process sent what is no reply ({error})"
-            raise ChildLostError("policy", words[:MAX_WORDS]) from None
+            raise EpisodeLostError("policy", words[:MAX_WORDS], alone=False) from None
 
-    def loss(self) -> ChildLostError | None:
+    def loss(self) -> EpisodeLostError | None:
         """Return how the process died; None while it is alive."""
         return None if self.exit is None else _explain(self.exit)
 
@@ -122,6 +103,7 @@ class PolicyChild(ChildProcess):
                 return
 
 
-def _explain(ended: ChildExit) -> ChildLostError:
+def _explain(ended: ChildExit) -> EpisodeLostError:
     """Return the loss of a process that ended so."""
-    return ChildLostError("infrastructure" if ended.was_killed else "policy", str(ended))
+    kind: ErrorKind = "infrastructure" if ended.was_killed else "policy"
+    return EpisodeLostError(kind, str(ended), alone=False)
