@@ -13,8 +13,9 @@ import time
 from pathlib import Path
 from typing import Any, ClassVar, NoReturn
 
-import msgspec
 import numpy as np
+
+from roboirg.evaluation.hosting.messages import receive_calls, send
 
 NEEDLE = "9035768"
 """Stands in the world's secret, read backward; this file does not hold it."""
@@ -191,13 +192,13 @@ class Forger(Hostile):
     message: Any = None
 
     def act(self, observation: Any) -> Any:
-        host_of(sys._getframe())._connection.send_bytes(msgspec.msgpack.encode(self.message))
+        send(host_of(sys._getframe())._line, self.message)
         time.sleep(3600)
 
 
 def host_of(frame: Any) -> Any:
     """Return the object that carries out the calls of this process."""
-    while not hasattr(frame.f_locals.get("self"), "_connection"):
+    while not hasattr(frame.f_locals.get("self"), "_asking"):
         frame = frame.f_back
     return frame.f_locals["self"]
 
@@ -283,10 +284,8 @@ class Asker(Hostile):
     def ask(self) -> None:
         host = host_of(sys._getframe())
         (session,) = host._asking
-        host._connection.send_bytes(
-            msgspec.msgpack.encode({"type": "question", "session": session})
-        )
-        host._connection.recv_bytes()
+        send(host._line, {"type": "question", "session": session})
+        receive_calls(host._line)
 
 
 class Forker(Hostile):

@@ -5,8 +5,10 @@ from __future__ import annotations
 import os
 import random
 import signal
+import socket
 import subprocess
 import sys
+import threading
 import time
 from collections import deque
 from collections.abc import Iterator
@@ -25,7 +27,7 @@ from roboirg.evaluation.episode_errors import EpisodeError, EpisodeLostError
 from roboirg.evaluation.hosting import policy_descriptions
 from roboirg.evaluation.hosting.host_pool import HostPool, HostSettings
 from roboirg.evaluation.hosting.hosted_policy import HostedPolicy
-from roboirg.evaluation.hosting.messages import Call, encode, read_call, read_calls
+from roboirg.evaluation.hosting.messages import Call, receive_calls, send
 from roboirg.evaluation.hosting.policy_descriptions import describe_policy
 from roboirg.evaluation.plan.plan import Plan
 from roboirg.evaluation.records.record import Job, Record
@@ -64,19 +66,29 @@ def play(plan: Plan, folder: Path, executor: Executor) -> dict[Job, dict[str, An
 # Arrays
 
 
+def relayed(call: Call) -> Call:
+    """Return a call as it arrives at the other end of a line."""
+    ours, theirs = socket.socketpair()
+    with ours, theirs:
+        threading.Thread(target=send, args=(ours, [call])).start()
+        (found,) = receive_calls(theirs)
+        return found
+
+
 def test_arrays_of_every_kind_travel_through_the_supervisor() -> None:
     value = {
         "history": [{"a": np.arange(6, dtype=np.int16).reshape(2, 3)}, {"a": np.float32(2.5)}],
         "none": np.zeros((0, 256, 256, 3), np.uint8),
         "turned": np.arange(12.0).reshape(3, 4).T,
+        "large": np.arange(10**6),
         "text": "pick",
     }
-    relayed = read_call(encode(Call("act", value=value)))
-    (found,) = (call.value for call in read_calls(encode([relayed])))
+    found = relayed(relayed(Call("act", value=value))).value
     assert found["text"] == "pick"
     assert np.array_equal(found["history"][0]["a"], value["history"][0]["a"])  # type: ignore[index]
     assert found["history"][1]["a"] == np.float32(2.5)
     assert found["none"].shape == (0, 256, 256, 3)
+    assert np.array_equal(found["large"], np.arange(10**6))
     assert np.array_equal(found["turned"], value["turned"])  # type: ignore[arg-type]
     found["turned"][0, 0] = 7.0  # a policy may write into what it gets
 
@@ -84,7 +96,7 @@ def test_arrays_of_every_kind_travel_through_the_supervisor() -> None:
 @pytest.mark.parametrize("value", [object(), np.array([object()]), {"world": PaperRunner}])
 def test_nothing_but_plain_data_and_arrays_is_sent(value: object) -> None:
     with pytest.raises(TypeError):
-        encode(Call("act", value=value))
+        send(socket.socket(), [Call("act", value=value)])
 
 
 def test_a_hosted_policy_gets_what_a_policy_gets(
@@ -395,7 +407,7 @@ def test_a_world_that_dies_in_a_call_does_not_stop_the_host(pool: HostPool) -> N
     spec = f"{Path(hosting_fakes.__file__).stem}:Dice"
     line = pool.connect()
     HostedPolicy(line, spec, 0)
-    line.sendall((1000).to_bytes(4, "big") + encode(Call("reset")))  # half a message
+    line.sendall((1000).to_bytes(8, "big") + b"half a message")
     line.close()
     after = HostedPolicy(pool.connect(), spec, 1)
     after.close()

@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 import contextlib
-import os
 import socket
 import threading
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from multiprocessing.connection import Connection
 from typing import Any, Self
 
 from roboirg.core.errors import InvalidValueError
 from roboirg.evaluation.episode_errors import EpisodeLostError
-from roboirg.evaluation.hosting.messages import encode, read_call
+from roboirg.evaluation.hosting.messages import receive_calls, send
 from roboirg.evaluation.hosting.policy_child import PolicyChild
 from roboirg.evaluation.hosting.policy_host import HostSession, PolicyHost
 
@@ -123,20 +121,20 @@ class HostPool:
     def _serve(self, line: socket.socket) -> None:
         """Carry out the calls of a world until it hangs up."""
         host: PolicyHost | None = None
-        with line, Connection(os.dup(line.fileno())) as connection:
-            session = HostSession(connection)
+        with line:
+            session = HostSession(line)
             try:
                 with contextlib.suppress(EOFError, OSError):
                     while True:
-                        call = read_call(connection.recv_bytes())
+                        (call,) = receive_calls(line)
                         if call.method == "open":
                             if host is not None:  # the world gave up the episode before
                                 host.leave(session)
-                            session = HostSession(connection, call.alone)
+                            session = HostSession(line, call.alone)
                             host = self._host_for(call.spec, session)
                         if host is None:
                             return
-                        connection.send_bytes(encode(host.call(session, call)))
+                        send(line, host.call(session, call))
                         if not session.started:
                             host.leave(session)
             finally:
@@ -167,6 +165,6 @@ class HostPool:
         variables = {} if device is None else {"CUDA_VISIBLE_DEVICES": device}
 
         def start() -> PolicyChild:
-            return self._starter.submit(PolicyChild.start, variables).result()
+            return self._starter.submit(PolicyChild, variables).result()
 
         return PolicyHost(start, self._settings.batch, self._settings.policy_timeout_s)

@@ -10,11 +10,11 @@ import contextlib
 import functools
 import io
 import os
+import socket
 import sys
 import threading
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Any
 
@@ -29,8 +29,8 @@ from roboirg.evaluation.hosting.messages import (
     Call,
     Outcome,
     Question,
-    encode,
-    read_calls,
+    receive_calls,
+    send,
 )
 from roboirg.evaluation.policy_calls import check_rows, dump_metadata, policy_subgoal, policy_usage
 from roboirg.policies.by_name.loading import make_policy, policy_needs, policy_version
@@ -40,14 +40,14 @@ from roboirg.policies.contract.random_state import RandomState
 
 
 class HostProcess:
-    """Carries out calls until the connection closes.
+    """Carries out calls until the line closes.
 
     Args:
-        connection: to the supervisor.
+        line: to the supervisor.
     """
 
-    def __init__(self, connection: Connection) -> None:
-        self._connection = connection
+    def __init__(self, line: socket.socket) -> None:
+        self._line = line
         self._episodes: dict[int, tuple[Any, RandomState, ActionSpace]] = {}
         self._read_fields: dict[str, None] = {}
         self._asking: set[int] = set()
@@ -57,8 +57,8 @@ class HostProcess:
         """Answer every message."""
         with contextlib.suppress(EOFError, OSError):
             while True:
-                calls = read_calls(self._connection.recv_bytes())
-                self._connection.send_bytes(encode(self._answer(calls)))
+                calls = receive_calls(self._line)
+                send(self._line, self._answer(calls))
 
     def _answer(self, calls: Sequence[Call]) -> list[Outcome]:
         with contextlib.suppress(OSError):
@@ -146,8 +146,8 @@ class HostProcess:
                 "under way, by the thread that was called"
             )
         self._read_fields.update(dict.fromkeys(fields))
-        self._connection.send_bytes(encode(Question(session, tuple(fields))))
-        (answer,) = read_calls(self._connection.recv_bytes())
+        send(self._line, Question(session, tuple(fields)))
+        (answer,) = receive_calls(self._line)
         if answer.method == "gone":
             raise RuntimeError("the episode has ended")
         found: Mapping[str, NDArray[Any]] = answer.value
@@ -184,13 +184,13 @@ def _failure(error: BaseException) -> Outcome:
     return Outcome(kind, str(found)[:MAX_TEXT], found.details)
 
 
-def main(connection: Connection) -> None:
+def main(line: socket.socket) -> None:
     """Serve a supervisor; runs in a process of its own."""
     if isinstance(sys.stdout, io.TextIOWrapper):
         sys.stdout.reconfigure(line_buffering=True)
     if sys.path[-1] == str(Path.cwd()):  # where a command puts it: its policy's files come first
         sys.path.insert(0, sys.path.pop())
-    HostProcess(connection).serve()
+    HostProcess(line).serve()
     with contextlib.suppress(Exception):
         sys.stdout.flush()
     os._exit(0)  # threads that a policy left behind must not keep this process

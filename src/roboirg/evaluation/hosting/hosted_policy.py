@@ -12,7 +12,6 @@ import socket
 import sys
 import time
 from collections.abc import Sequence
-from multiprocessing.connection import Connection
 from typing import Any
 
 import numpy as np
@@ -27,8 +26,9 @@ from roboirg.evaluation.hosting.messages import (
     Outcome,
     Question,
     Reply,
-    encode,
     read_supervisor,
+    receive,
+    send,
 )
 from roboirg.evaluation.policy_calls import read_metadata
 from roboirg.policies.contract.policy_urls import is_url
@@ -135,17 +135,16 @@ class HostedPolicy:
     def _exchange(self, call: Call) -> tuple[Reply, Exception | None]:
         """Return the reply to a call, and what was raised while pictures were drawn for it."""
         failure: Exception | None = None
-        with Connection(os.dup(self._hosts.fileno())) as line:
-            line.send_bytes(encode(call))
-            while isinstance(reply := read_supervisor(line.recv_bytes()), Question):
-                answer = encode(Call("gone"))
-                try:
-                    with attribute_errors("environment"):
-                        answer = encode(Call("answer", value=self._draw(reply.fields)))
-                except Exception as error:  # noqa: BLE001 - raised once the policy has returned
-                    failure = error
-                line.send_bytes(answer)
-            return reply, failure
+        send(self._hosts, [call])
+        while isinstance(reply := read_supervisor(receive(self._hosts)), Question):
+            answer = Call("gone")
+            try:
+                with attribute_errors("environment"):
+                    answer = Call("answer", value=self._draw(reply.fields))
+            except Exception as error:  # noqa: BLE001 - raised once the policy has returned
+                failure = error
+            send(self._hosts, [answer])
+        return reply, failure
 
     def _error(self, reply: Reply) -> Exception:
         """Return what a loss, or a policy's exception, raises here."""

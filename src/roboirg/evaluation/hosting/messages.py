@@ -2,17 +2,19 @@
 
 Messages are msgpack with a fixed schema, so that a policy cannot run code in the process that reads
 them, nor send what only the supervisor may say: `Reply` is no part of what its process can send.
-Arrays travel to the policy inside of the messages; what comes from it has none.
+The bytes of arrays follow a call; what comes from a policy's process has none.
 """
 
 from __future__ import annotations
 
+import socket
 from typing import Annotated, Any, Literal
 
 import msgspec
 import numpy as np
 from msgspec import Meta, Struct
 from msgspec.msgpack import Ext
+from numpy.typing import NDArray
 
 from roboirg.core.field_types import Name
 from roboirg.core.subgoal_text import MOST_SUBGOAL_LETTERS
@@ -25,8 +27,11 @@ MAX_MESSAGE = 16 * 2**20
 """Largest message that is read from a policy; 10,000 actions have 640,000 bytes."""
 MAX_TEXT = 2000
 
+_SIZE_BYTES = 8
 _ARRAY = 1
-"""Code of the extension type of msgpack that holds an array: its type, shape and bytes."""
+"""Code of the extension type of msgpack that stands for an array: its type and shape."""
+_MOST_JOINED = 8 * 2**20
+"""Bytes that are copied to be sent at once, which wakes the receiver once."""
 
 Text = Annotated[str, Meta(max_length=MAX_TEXT)]
 Names = Annotated[tuple[Text, ...], Meta(max_length=64)]
@@ -114,25 +119,72 @@ class Reply(Struct, tag="reply", forbid_unknown_fields=True, omit_defaults=True)
     alone: bool = False
 
 
-def _pack_array(value: object) -> Ext:
-    if not isinstance(value, np.ndarray | np.generic):
-        raise TypeError(f"{type(value).__name__} is not sent to policies")
-    array = np.asarray(value)
-    content = np.ascontiguousarray(array).reshape(-1).view(np.uint8).data
-    return Ext(_ARRAY, msgspec.msgpack.encode((array.dtype.str, array.shape, content)))
-
-
-def _unpack_array(_code: int, data: memoryview) -> np.ndarray[Any, Any]:
-    dtype, shape, content = _read_array(data)
-    return np.ndarray(shape, np.dtype(dtype), content)  # of its own: a policy may write into it
-
-
-_read_array = msgspec.msgpack.Decoder(tuple[str, tuple[int, ...], bytearray]).decode
-encode = msgspec.msgpack.Encoder(enc_hook=_pack_array).encode
-read_call = msgspec.msgpack.Decoder(Call).decode
-"""Reads what a world sends; arrays remain packed."""
-read_calls = msgspec.msgpack.Decoder(list[Call], ext_hook=_unpack_array).decode
-"""Reads what a policy's process gets."""
 read_child = msgspec.msgpack.Decoder(Question | list[Outcome]).decode
 """Reads what a policy's process sends."""
 read_supervisor = msgspec.msgpack.Decoder(Question | Reply).decode
+_read_array = msgspec.msgpack.Decoder(tuple[str, tuple[int, ...]]).decode
+
+
+def send(line: socket.socket, message: object) -> None:
+    """Send a message, led by its size and followed by the bytes of its arrays.
+
+    Raises:
+        TypeError: it holds something other than plain data and arrays.
+    """
+    arrays: list[memoryview] = []
+
+    def pack(value: object) -> Ext:
+        if not isinstance(value, np.ndarray | np.generic):
+            raise TypeError(f"{type(value).__name__} is not sent to policies")
+        array = np.asarray(value)
+        arrays.append(np.ascontiguousarray(array).reshape(-1).view(np.uint8).data)
+        return Ext(_ARRAY, msgspec.msgpack.encode((array.dtype.str, array.shape)))
+
+    data = msgspec.msgpack.encode(message, enc_hook=pack)
+    parts = (len(data).to_bytes(_SIZE_BYTES, "big"), data, *arrays)
+    if sum(map(len, parts)) <= _MOST_JOINED:
+        parts = (b"".join(parts),)
+    for part in parts:
+        line.sendall(part)
+
+
+def receive(line: socket.socket, limit: int | None = None) -> bytearray:
+    """Return the next message of a line, which has no arrays.
+
+    Raises:
+        EOFError: the line was closed.
+        ValueError: the message is larger than the limit.
+    """
+    head = bytearray(_SIZE_BYTES)
+    _fill(line, head)
+    size = int.from_bytes(head, "big")
+    if limit is not None and size > limit:
+        raise ValueError(f"a message of {size:,} bytes; at most {limit:,} are read")
+    data = bytearray(size)
+    _fill(line, data)
+    return data
+
+
+def receive_calls(line: socket.socket) -> list[Call]:
+    """Return the next calls of a line, with arrays of their own; the sender is ours.
+
+    Raises:
+        EOFError: the line was closed.
+    """
+
+    def unpack(_code: int, packed: memoryview) -> np.ndarray[Any, Any]:
+        dtype, shape = _read_array(packed)
+        array = np.empty(shape, np.dtype(dtype))
+        _fill(line, array.reshape(-1).view(np.uint8))
+        return array
+
+    return msgspec.msgpack.decode(receive(line), type=list[Call], ext_hook=unpack)
+
+
+def _fill(line: socket.socket, buffer: bytearray | NDArray[np.uint8]) -> None:
+    left = memoryview(buffer)
+    while left:
+        count = line.recv_into(left, 0, socket.MSG_WAITALL)
+        if count == 0:
+            raise EOFError
+        left = left[count:]

@@ -77,7 +77,7 @@ def _describe_ours(spec: str) -> PolicyDescription:
 
 
 def _describe_apart(spec: str) -> PolicyDescription:
-    child = PolicyChild.start()
+    child = PolicyChild()
     try:
         with DeadlineWatch(child.kill) as watch:
             watch.begin(LIMIT_S)

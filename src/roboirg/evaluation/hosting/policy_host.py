@@ -10,12 +10,12 @@ others that can be carried out together.
 from __future__ import annotations
 
 import itertools
+import socket
 import threading
 import time
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from multiprocessing.connection import Connection
 
 from roboirg.evaluation.episode_errors import EpisodeLostError
 from roboirg.evaluation.hosting.messages import (
@@ -23,8 +23,8 @@ from roboirg.evaluation.hosting.messages import (
     Outcome,
     Question,
     Reply,
-    encode,
-    read_call,
+    receive_calls,
+    send,
 )
 from roboirg.evaluation.hosting.policy_child import PolicyChild
 from roboirg.util.deadline_watch import DeadlineWatch
@@ -58,7 +58,7 @@ class HostSession:
         reply: to it; None while it waits or is under way.
     """
 
-    line: Connection
+    line: socket.socket
     alone: bool = False
     number: int = field(default_factory=lambda: next(_numbers))
     started: int = 0
@@ -235,10 +235,11 @@ class PolicyHost:
 def _ask(session: HostSession, question: Question) -> Call:
     """Return the answer of a world."""
     try:
-        session.line.send_bytes(encode(question))
-        return read_call(session.line.recv_bytes())
+        send(session.line, question)
+        (answer,) = receive_calls(session.line)
     except (EOFError, OSError):
         return Call("gone")
+    return answer
 
 
 def _lost(message: str) -> EpisodeLostError:
