@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any, ClassVar, NoReturn
 
 import numpy as np
+from msgspec.msgpack import Ext, encode
 
 from roboirg.evaluation.hosting.messages import receive_calls, send
 
@@ -241,6 +242,28 @@ class ForgesOtherEpisode(Forger):
     message: ClassVar = {"type": "question", "session": 10**6}
 
 
+class LyingArray(Forger):
+    """An array of objects that exists nowhere."""
+
+    message = ({"type": "outcome", "rows": Ext(1, encode(("|O8", (2**40, 2**20))))},)
+
+
+class Announcer(Hostile):
+    """Announces more than there is memory, and sends nothing of it."""
+
+    data: ClassVar = (2**62).to_bytes(8, "big")
+
+    def act(self, observation: Any) -> Any:
+        host_of(sys._getframe())._line.sendall(self.data)
+        time.sleep(3600)
+
+
+class GiantList(Announcer):
+    """Five bytes that stand for four billion outcomes."""
+
+    data = (5).to_bytes(8, "big") + b"\xdd\xff\xff\xff\xff"
+
+
 class Deep210(Hostile):
     levels = 210
 
@@ -286,6 +309,14 @@ class Asker(Hostile):
         (session,) = host._asking
         send(host._line, {"type": "question", "session": session})
         receive_calls(host._line)
+
+
+class Pesterer(Asker):
+    """Keeps its world busy, which is nobody's time."""
+
+    def act(self, observation: Any) -> Any:
+        while True:
+            self.ask()
 
 
 class Forker(Hostile):
@@ -364,6 +395,10 @@ FORGED = {
     "ForgesPrivilege": "policy: the process sent what is no reply (Object contains unknown field ",
     "ForgesVersion": "policy: the process sent what is no reply (Expected `str` matching regex ",
     "ForgesOtherEpisode": "policy: the process asked for the video of another episode",
+    "Announcer": "policy: the process sent what is no reply (a message of 4,611,686,018,",
+    "LyingArray": "policy: the process sent what is no reply (Expected `bytes`, got `ext` - at ",
+    "GiantList": "policy: the process sent what is no reply (Input data was truncated)",
+    "Pesterer": "policy: the process asked for the video again and again in the policy's act()",
     "Deep210": "policy: the policy's metadata are nested more than 16 deep; make them flat.",
     "Deep300": "policy: the policy's metadata are nested more than 16 deep; make them flat.",
     "NamesServer": "policy: the policy's metadata have the key 'server', which is reserved; ",

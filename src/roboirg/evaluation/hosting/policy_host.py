@@ -32,6 +32,9 @@ from roboirg.util.deadline_watch import DeadlineWatch
 GATHER_S = 0.003
 """How long a call waits for others that could be carried out together with it."""
 
+MOST_QUESTIONS = 64
+"""How often a call may ask for the video of an episode; a field is kept once it is read."""
+
 PHASES: Mapping[str, str] = {
     "open": "policy's constructor",
     "reset": "policy's reset()",
@@ -184,7 +187,7 @@ class PolicyHost:
         by_number = {session.number: session for session in sessions}
         calls = [session.call for session in sessions]
         spent_s = 0.0
-        while True:
+        for _ in range(MOST_QUESTIONS * len(sessions)):
             start = time.monotonic()
             self._limit.begin(None if self._timeout_s is None else self._timeout_s - spent_s)
             try:
@@ -200,6 +203,7 @@ class PolicyHost:
                 raise _lost("the process asked for the video of another episode")
             # What the world takes to draw is not the policy's time.
             calls = [_ask(by_number[reply.session], reply)]
+        raise _lost("the process asked for the video again and again")
 
     def _started_child(self) -> PolicyChild:
         if self.child is None:
