@@ -14,7 +14,6 @@ import msgspec
 import numpy as np
 from msgspec import Meta, Struct
 from msgspec.msgpack import Ext
-from numpy.typing import NDArray
 
 from roboirg.core.field_types import Name
 from roboirg.core.subgoal_text import MOST_SUBGOAL_LETTERS
@@ -141,9 +140,9 @@ def send(line: socket.socket, message: object) -> None:
         return Ext(_ARRAY, msgspec.msgpack.encode((array.dtype.str, array.shape)))
 
     data = msgspec.msgpack.encode(message, enc_hook=pack)
-    parts = (len(data).to_bytes(_SIZE_BYTES, "big"), data, *arrays)
+    parts: list[bytes | memoryview] = [len(data).to_bytes(_SIZE_BYTES, "big"), data, *arrays]
     if sum(map(len, parts)) <= _MOST_JOINED:
-        parts = (b"".join(parts),)
+        parts = [b"".join(parts)]
     for part in parts:
         line.sendall(part)
 
@@ -175,13 +174,13 @@ def receive_calls(line: socket.socket) -> list[Call]:
     def unpack(_code: int, packed: memoryview) -> np.ndarray[Any, Any]:
         dtype, shape = _read_array(packed)
         array = np.empty(shape, np.dtype(dtype))
-        _fill(line, array.reshape(-1).view(np.uint8))
+        _fill(line, array.reshape(-1).view(np.uint8).data)
         return array
 
     return msgspec.msgpack.decode(receive(line), type=list[Call], ext_hook=unpack)
 
 
-def _fill(line: socket.socket, buffer: bytearray | NDArray[np.uint8]) -> None:
+def _fill(line: socket.socket, buffer: bytearray | memoryview) -> None:
     left = memoryview(buffer)
     while left:
         count = line.recv_into(left, 0, socket.MSG_WAITALL)
