@@ -17,8 +17,6 @@ from roboirg.evaluation.hosting.policy_child import PolicyChild
 from roboirg.evaluation.hosting.policy_host import HostSession, PolicyHost
 
 DEFAULT_BATCH = 16
-_PER_EPISODE = 2
-"""File descriptors with which an episode begins: a connection, and a block of shared memory."""
 
 Connect = Callable[[], socket.socket]
 """Returns a new line to a pool, for a process with worlds."""
