@@ -122,7 +122,7 @@ def describe(words: Sentence) -> Description:
     if _THAN.search(text):
         return Description("not", colors)
     if colors:
-        return Description("color", colors[:1])
+        return Description("color", tuple(dict.fromkeys(colors)))
     return _choice(text) or _pointer(words) or Description("any")
 
 

@@ -32,3 +32,31 @@ class Phrases:
 
     def finditer(self, text: str) -> Iterator[re.Match[str]]:
         return self._any.finditer(text)
+
+
+class Rewrites:
+    """Ways to say something in other words, which are replaced one after another.
+
+    Args:
+        ways: for each way, by an example, the words of which a sentence must have one, a pattern of
+            words joined by spaces, and what replaces it.
+
+    Attributes:
+        by_example: the words, pattern and replacement of each way.
+    """
+
+    def __init__(self, ways: Mapping[str, tuple[str, str, str]]) -> None:
+        self.by_example = {
+            example: (frozenset(triggers.split()), re.compile(pattern), replacement)
+            for example, (triggers, pattern, replacement) in ways.items()
+        }
+        self._triggers = frozenset().union(*(one[0] for one in self.by_example.values()))
+
+    def apply(self, words: tuple[str, ...]) -> tuple[str, ...]:
+        """Return words with all replacements."""
+        if self._triggers.isdisjoint(words):
+            return words
+        for triggers, pattern, replacement in self.by_example.values():
+            if not triggers.isdisjoint(words):
+                words = tuple(pattern.sub(replacement, " ".join(words)).split())
+        return words

@@ -186,12 +186,17 @@ def read_value(text: str) -> CountExpression | None:
     return next((one.expression for one in quantities(text) if one.expression.derived), None)
 
 
-def read_times(text: str) -> CountExpression | None:
-    """Return the number of repetitions; None if the text gives none."""
+def times_mentions(text: str) -> list[Quantity]:
+    """Return the numbers of repetitions of a text, those that point or derive one first."""
     found = quantities(text)
     plain = [one for one in found if one.plain]
     times = [one for one in found if not one.plain]
-    times += [
+    return times + [
         one for one in plain if text[one.start : one.end] in ADVERBS or _TIMES.match(text, one.end)
     ]
+
+
+def read_times(text: str) -> CountExpression | None:
+    """Return the number of repetitions; None if the text gives none."""
+    times = times_mentions(text)
     return times[0].expression if times else None
