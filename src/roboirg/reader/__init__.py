@@ -18,6 +18,7 @@ from roboirg.reader.comprehension import ComprehensionGap, find_gaps, is_unknown
 from roboirg.reader.constraints import goal_constraints
 from roboirg.reader.corrections import corrected
 from roboirg.reader.discourse_context import names_camera, read_discourse, read_remark
+from roboirg.reader.incomplete_sentences import completed
 from roboirg.reader.negations import is_negated_command, unread_negations
 from roboirg.reader.paraphrases import paraphrased
 from roboirg.reader.pick_order import in_order
@@ -63,7 +64,7 @@ def interpret(text: str, scene: Scene, task: str) -> Interpretation:
         UnknownNameError: there is no such task.
     """
     candidates = _possible_goals(scene, task)
-    sentences = tuple(map(_prepared, split_sentences(text)))
+    sentences = completed(tuple(map(_prepared, split_sentences(text))))
     first, last = _command_span(sentences)
     gaps = _command_gaps(sentences, first, last)
     if gaps:
@@ -102,10 +103,10 @@ def _settled(
     words: Sentence, scene: Scene, slots: Mapping[str, SlotValue]
 ) -> tuple[Sentence, tuple[str, ...]]:
     """Return a command with its picks in order and its repetitions added up, and what is unread."""
+    order = ""
+    if "colors" in slots and "counts" not in slots:
+        words, order = in_order(words)
     words, again = added_up(words, repeats="repeats" in slots, seen=bool(scene.past))
-    if "colors" not in slots or "counts" in slots:
-        return words, (again,) if again else ()
-    words, order = in_order(words)
     return words, tuple(filter(None, (again, order)))
 
 

@@ -14,6 +14,7 @@ from roboirg.reader.negations import OBJECT, VERB, unread_negations
 from roboirg.reader.phrases import Phrases
 from roboirg.reader.places import place_mentions
 from roboirg.reader.quantities import quantities
+from roboirg.reader.repetitions import more_mentions
 from roboirg.reader.several_amounts import several_amounts
 from roboirg.reader.tokens import Sentence, color_of, number_of, word_set
 from roboirg.reader.vocabulary import (
@@ -173,7 +174,7 @@ def _unread_comparisons(words: Sentence) -> Iterator[ComprehensionGap]:
     """Yield the comparisons that are no part of a number, such as *fewer than three*."""
     text = " ".join(words)
     spans = [(quantity.start, quantity.end) for quantity in quantities(text)]
-    spans += [found.span() for found in several_amounts(text)]
+    spans += [found.span() for found in (*several_amounts(text), *more_mentions(text))]
     for found in _COMPARISON.finditer(text):
         if not any(start <= found.start() < end for start, end in spans):
             yield ComprehensionGap(

@@ -8,13 +8,15 @@ from roboirg.reader.command import is_command
 from roboirg.reader.phrases import Phrases
 from roboirg.reader.tokens import COLOR, NUMBER, ORDINAL, Sentence, word_set
 
-_TRIGGERS = word_set("no mean sorry wait actually")
+_TRIGGERS = word_set("but no mean sorry wait actually")
 _REPAIR = r"(?:[,;] )?(?:no wait|wait no|oh no|no sorry|no|i mean|sorry|actually|wait)(?: [,;])?"
 _TIMES = rf"(?:{NUMBER} times?|once|twice|thrice|{NUMBER})"
 _THE = r"(?:(?:do it|the|a|an|at|on|to|over|in) )*"
 
 
 _CORRECTIONS = Phrases({
+    "not the first time but the second time":
+        rf"\bnot (?:on |at )?(?:the )?{ORDINAL}(?: \w+)? ,? ?but (?:on |at )?(?:the )?(?P<instead>{ORDINAL})\b",
     "the red no the blue cube": rf"\b{COLOR}(?: cubes?| ones?| container)* {_REPAIR} {_THE}"
                                 rf"(?P<color>{COLOR})\b",
     "twice no three times": rf"\b{_TIMES} {_REPAIR} {_THE}(?P<times>{_TIMES})\b",

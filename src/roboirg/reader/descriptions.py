@@ -20,7 +20,7 @@ from roboirg.reader.tokens import (
 )
 
 _PRONOUNS = word_set("it them")
-_POINTED = word_set("cube box tape one color")
+_POINTED = word_set("cube box tape one color container")
 _PLACE_NOUNS = word_set("place spot position location")
 _SERIES_NOUNS = word_set("visit placement time pass placing stay occasion")
 _FORMER = {"former": 0, "latter": -1}
@@ -155,7 +155,7 @@ def _pointer(words: Sentence) -> Description | None:
         if position is not None and after not in _SERIES_NOUNS:
             kind: DescriptionKind = "introduced place" if after in _PLACE_NOUNS else "introduced"
             return Description(kind, times=times, position=position)
-        if word in _PRONOUNS or (before == "that" and word in _POINTED):
+        if word in _PRONOUNS or (before in ("that", "this") and word in _POINTED):
             return Description("introduced")
     return None
 

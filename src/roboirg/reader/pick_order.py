@@ -6,7 +6,7 @@ import functools
 import re
 from typing import NamedTuple
 
-from roboirg.reader.phrases import Phrases
+from roboirg.reader.phrases import Phrases, Rewrites
 from roboirg.reader.tokens import COLOR, Sentence
 
 _ACT = (
@@ -24,6 +24,15 @@ _LATE = Phrases({
 })  # fmt: skip
 _NAME = Phrases({"the red cube": rf"\b{COLOR}s?\b(?:'s)?(?: cube| one| container)*(?: is| goes)?"})
 _WORDS = frozenset({"before", "after", "first", "second", "last"})
+_ONE_EACH = Rewrites({
+    "Do the same with the red cube.": (
+        "same", rf"\bdo (?:exactly )?the same (?:with|for|to|on) (?:the (?:container|one) over )?(?:the )?({COLOR})\b"
+        r"(?: cube| one)?(?!s)", r"lift the container over the \1 cube"),
+    "Lift it, put it down, and then the one over the red cube.": (
+        "then finally also", r"\b(it (?:(?:back|down|aside) )*(?:[,;] )?(?:and )?(?:then|also|finally) )"
+        r"(?=the (?:one|container)\b)", r"\1lift "),
+})  # fmt: skip
+"""Picks without a verb of their own."""
 
 
 class PickOrder(NamedTuple):
@@ -39,6 +48,7 @@ def in_order(words: Sentence) -> PickOrder:
 
     Words for an order that it cannot place are the unread ones.
     """
+    words = _ONE_EACH.apply(words)
     if _WORDS.isdisjoint(words):
         return PickOrder(words)
     text = " ".join(words)

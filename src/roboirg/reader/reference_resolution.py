@@ -137,6 +137,13 @@ class ReferenceResolver:
             return set(MOMENTS) - moments if len(moments) == 1 else set(MOMENTS)
         return moments
 
+    def moments_at(self, position: OrdinalExpression | None) -> set[PressRelation] | None:
+        """Return the moments of the elements of the series that fit a description."""
+        if position is None or position.points or self._series_length() != len(MOMENTS):
+            return None
+        numbers = position.results((), (), len(MOMENTS))
+        return None if numbers is None else {MOMENTS[number - 1] for number in numbers}
+
     def _introduced_moments(self, when: TemporalRelation) -> set[PressRelation]:
         """Return the moments to start from: the preferred one, if a choice has to be made."""
         preferred = self._context.preferred_moment

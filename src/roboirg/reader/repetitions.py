@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import functools
 import re
+from collections.abc import Iterator
 from typing import NamedTuple
 
 from roboirg.reader.phrases import Phrases
 from roboirg.reader.quantities import ADVERBS, times_mentions
 from roboirg.reader.tokens import NUMBER, Sentence, number_of, ordinal_of, word_set
 
-_TRIGGERS = word_set("again more another same repeat second third")
+_TRIGGERS = word_set("again more another same repeat second third each every")
 _JOINT = r"(?:(?:[,;:]|and|then|also) )*"
 _DO = (
     rf"{_JOINT}(?:do|repeat|perform) "
@@ -28,19 +29,26 @@ _MORE = Phrases({
         r"(?<!\w)(?:(?:[,;:]|and|then) )+(?:again|another time)(?= [,;]| and\b|$)",
     "do the same": rf"(?<!\w){_JOINT}(?:do|repeat) the same(?: thing)?(?= ?[,;]| and\b|$)",
     "Pick it up and then pick it up again":
-        rf"(?<=\w) (?:(?:[,;:]|and|then) )+{_PICK} (?:up )?(?:it|the cube|that one)(?: up)? again\b",
+        rf"(?<=\w) (?:(?:[,;:]|and|then) )+(?P<pick>{_PICK}) (?:up )?(?:it|the cube|that one)(?: up)? again\b",
 })  # fmt: skip
 """What adds to the repetitions before it: a number, up to a rank, else one."""
+_PICKS = Phrases({"pick it up": rf"(?<!you )\b{_PICK}\b"})
 _UNREAD = Phrases({
     "Take it there again.": r"(?:\w+ )?\bagain\b",
+    "Pick it up once for each of them.": r"\b(?:once|twice|time|times) (?:for|per) (?:each|every)\b",
     "Do the same with the red cube.": r"\b(?:do|repeat) (?:exactly )?the same\b(?: \w+)?",
 })  # fmt: skip
 _LIKE_BEFORE = Phrases({
     "put it down again":
         r"\b(?:put|set|lay|lower|place)(?: \w+){0,3} (?:down|back|table)(?P<down> again)\b",
 })  # fmt: skip
+_BARE_MORE = Phrases({
+    "Pick it up one more time.": rf"\b{NUMBER}(?P<before> more) times?\b(?! than)",
+    "Pick it up two times more.": rf"\b{NUMBER} times?(?P<after> more)\b(?! than)",
+})  # fmt: skip
+"""Numbers that count from what the video shows."""
 _LIKE_SEEN = Phrases({
-    "Pick it up again.": rf"\b{_PICK}(?: \w+){{0,3}}?(?P<seen> again)\b",
+    "Pick it up again.": rf"\b{_PICK}(?: [\w']+){{0,9}}?(?P<seen> again)\b",
 })  # fmt: skip
 
 
@@ -65,12 +73,16 @@ def added_up(words: Sentence, *, repeats: bool, seen: bool) -> Repetitions:
     if _TRIGGERS.isdisjoint(words):
         return Repetitions(words)
     text = " ".join(words)
-    marks = list(_MORE.finditer(text)) if repeats else []
+    marks = list(added(text))
+    if marks and not repeats:
+        return Repetitions(words, marks[0][0].strip(" ,"))
     rest = _without(text, [mark.span() for mark in marks])
     rest = _without(rest, [found.span("down") for found in _LIKE_BEFORE.finditer(rest)])
     if seen:
-        rest = _without(rest, [found.span("seen") for found in _LIKE_SEEN.finditer(rest)])
-    unread = _UNREAD.search(rest)
+        for seen_before in (_LIKE_SEEN, _BARE_MORE):
+            spans = [found.span(found.lastgroup or 0) for found in seen_before.finditer(rest)]
+            rest = _without(rest, spans)
+    unread = _UNREAD.search(rest) or _BARE_MORE.search(rest)
     if unread is not None:
         return Repetitions(words, unread[0])
     if not marks:
@@ -83,6 +95,20 @@ def added_up(words: Sentence, *, repeats: bool, seen: bool) -> Repetitions:
     rest = _without(rest, [(one.start, one.end) for one in named])
     total = functools.reduce(_added, marks, base)
     return Repetitions(tuple(f"{rest} , {total} times".split()))
+
+
+def added(text: str) -> Iterator[re.Match[str]]:
+    """Yield the words of a command that add repetitions."""
+    for found in _MORE.finditer(text):
+        # Without a pick before it, "pick it up again" is about the video.
+        if found["pick"] is None or _PICKS.search(text[: found.start()]):
+            yield found
+
+
+def more_mentions(text: str) -> Iterator[re.Match[str]]:
+    """Yield the words for more repetitions, of which `added_up` names those that it cannot add."""
+    yield from added(text)
+    yield from _BARE_MORE.finditer(text)
 
 
 def _without(text: str, spans: list[tuple[int, int]]) -> str:

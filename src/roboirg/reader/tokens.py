@@ -28,6 +28,7 @@ _SPELLINGS = (
     ("what's ", "what is "),
     ("where's ", "where is "),
     ("->", " to "),
+    (" + ", " and "),
     ("(s)", "s"),
     ("colour", "color"),
     ("neighbour", "neighbor"),
@@ -57,7 +58,7 @@ def word_set(words: str) -> frozenset[str]:
 SYNONYMS = {
     "block": "cube", "blocks": "cubes", "circle": "target", "circles": "targets",
     "trash": "bin", "cup": "container", "cups": "containers", "lid": "container",
-    "movie": "video", "demo": "video", "clip": "video",
+    "movie": "video", "demo": "video", "clip": "video", "repick": "pick", "till": "until",
 }  # fmt: skip
 """Words that are read as others; `vocabulary.register_words` adds those of other packages."""
 
