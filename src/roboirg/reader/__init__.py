@@ -18,7 +18,6 @@ from roboirg.reader.comprehension import ComprehensionGap, find_gaps, is_unknown
 from roboirg.reader.constraints import goal_constraints
 from roboirg.reader.corrections import corrected
 from roboirg.reader.discourse_context import names_camera, read_discourse, read_remark
-from roboirg.reader.incomplete_sentences import completed
 from roboirg.reader.negations import is_negated_command, unread_negations
 from roboirg.reader.paraphrases import paraphrased
 from roboirg.reader.pick_order import in_order
@@ -64,7 +63,7 @@ def interpret(text: str, scene: Scene, task: str) -> Interpretation:
         UnknownNameError: there is no such task.
     """
     candidates = _possible_goals(scene, task)
-    sentences = completed(tuple(map(_prepared, split_sentences(text))))
+    sentences = tuple(map(_prepared, paraphrased(split_sentences(text))))
     first, last = _command_span(sentences)
     gaps = _command_gaps(sentences, first, last)
     if gaps:
@@ -96,7 +95,7 @@ def interpret(text: str, scene: Scene, task: str) -> Interpretation:
 
 def _prepared(words: Sentence) -> Sentence:
     """Return a sentence in the words that the other modules read."""
-    return take_remaining(corrected(paraphrased(words)))
+    return take_remaining(corrected(words))
 
 
 def _settled(

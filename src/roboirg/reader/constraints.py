@@ -39,9 +39,9 @@ def goal_constraints(
         constraints.append(_text("color", common_options(map(resolver.colors_of, things))))
     constraints += _numbers(slots, candidates, command, resolver)
     if "relation" in slots:
-        moments = resolver.moments(_moment(command.text)) or resolver.moments_at(
-            read_position(command.text)
-        )
+        when = _moment(command.text)
+        moments = resolver.moments_at(read_position(command.text)) if when is None else None
+        moments = moments or resolver.moments(when)
         constraints.append(_text("relation", moments))
     return constraints
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 
 
 class Phrases:
@@ -35,28 +35,31 @@ class Phrases:
 
 
 class Rewrites:
-    """Ways to say something in other words, which are replaced one after another.
+    """Rules that put other words for some words of a text, one after another.
 
     Args:
-        ways: for each way, by an example, the words of which a sentence must have one, a pattern of
-            words joined by spaces, and what replaces it.
-
-    Attributes:
-        by_example: the words, pattern and replacement of each way.
+        rules: for each the words of which a text must have one, ``::``, a pattern of words joined
+            by spaces, ``=>``, and what replaces it.
+        parts: patterns for names in capital letters that the rules use.
     """
 
-    def __init__(self, ways: Mapping[str, tuple[str, str, str]]) -> None:
-        self.by_example = {
-            example: (frozenset(triggers.split()), re.compile(pattern), replacement)
-            for example, (triggers, pattern, replacement) in ways.items()
-        }
-        self._triggers = frozenset().union(*(one[0] for one in self.by_example.values()))
+    def __init__(self, *rules: str, parts: Mapping[str, str]) -> None:
+        named = re.compile("|".join(parts))
+        self._rules: list[tuple[frozenset[str], re.Pattern[str], str]] = []
+        for rule in rules:
+            words, _, rest = rule.partition(":: ")
+            pattern, _, replacement = rest.partition("=>")
+            full = named.sub(lambda name: parts[name[0]], pattern.removesuffix(" "))
+            self._rules.append((frozenset(words.split()), re.compile(full), replacement))
+        self._triggers = frozenset().union(*(words for words, _, _ in self._rules))
 
-    def apply(self, words: tuple[str, ...]) -> tuple[str, ...]:
-        """Return words with all replacements."""
-        if self._triggers.isdisjoint(words):
-            return words
-        for triggers, pattern, replacement in self.by_example.values():
-            if not triggers.isdisjoint(words):
-                words = tuple(pattern.sub(replacement, " ".join(words)).split())
-        return words
+    def apply(self, text: str, present: Collection[str]) -> str:
+        """Return a text with all replacements; `present` are its words."""
+        if self._triggers.isdisjoint(present):
+            return text
+        for triggers, pattern, replacement in self._rules:
+            if not triggers.isdisjoint(present):
+                changed = " ".join(pattern.sub(f"{replacement} ", text).split())
+                if changed != text:
+                    text, present = changed, frozenset(changed.split())
+        return text

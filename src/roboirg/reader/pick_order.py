@@ -20,18 +20,17 @@ _CLAUSE = Phrases({
 """What comes before, or after, another pick."""
 _EARLY = Phrases({"the red one first": r"(?<!^)(?<!\bthe )(?<!\bat )\bfirst\b(?! of\b)"})
 _LATE = Phrases({
-    "the red one second": r"(?<!\bthe )\b(?:second|last)\b(?! (?:of|from|to|closest|farthest)\b)",
+    "the red one second": r"(?<!\bthe )\b(?:second|last)\b(?! (?:of|from|to|closest|nearest|farthest|furthest)\b)",
 })  # fmt: skip
 _NAME = Phrases({"the red cube": rf"\b{COLOR}s?\b(?:'s)?(?: cube| one| container)*(?: is| goes)?"})
 _WORDS = frozenset({"before", "after", "first", "second", "last"})
-_ONE_EACH = Rewrites({
-    "Do the same with the red cube.": (
-        "same", rf"\bdo (?:exactly )?the same (?:with|for|to|on) (?:the (?:container|one) over )?(?:the )?({COLOR})\b"
-        r"(?: cube| one)?(?!s)", r"lift the container over the \1 cube"),
-    "Lift it, put it down, and then the one over the red cube.": (
-        "then finally also", r"\b(it (?:(?:back|down|aside) )*(?:[,;] )?(?:and )?(?:then|also|finally) )"
-        r"(?=the (?:one|container)\b)", r"\1lift "),
-})  # fmt: skip
+_ONE_EACH = Rewrites(
+    r"same:: \bdo (?:exactly )?the same (?:with|for|to|on) (?:the (?:container|one) over )?(?:the )?"
+    r"(COLOR)\b(?: cube| one)?(?!s)=>lift the container over the \1 cube",
+    r"then finally also:: \b(it (?:(?:back|down|aside) )*(?:[,;] )?(?:and )?(?:then|also|finally) )"
+    r"(?=the (?:one|container)\b)=>\1lift",
+    parts={"COLOR": COLOR},
+)
 """Picks without a verb of their own."""
 
 
@@ -48,7 +47,7 @@ def in_order(words: Sentence) -> PickOrder:
 
     Words for an order that it cannot place are the unread ones.
     """
-    words = _ONE_EACH.apply(words)
+    words = tuple(_ONE_EACH.apply(" ".join(words), words).split())
     if _WORDS.isdisjoint(words):
         return PickOrder(words)
     text = " ".join(words)
