@@ -18,6 +18,7 @@ from roboirg.reader.comprehension import ComprehensionGap, find_gaps, is_unknown
 from roboirg.reader.constraints import goal_constraints
 from roboirg.reader.corrections import corrected
 from roboirg.reader.discourse_context import names_camera, read_discourse, read_remark
+from roboirg.reader.leftovers import left_over
 from roboirg.reader.negations import is_negated_command, unread_negations
 from roboirg.reader.paraphrases import paraphrased
 from roboirg.reader.pick_order import in_order
@@ -79,6 +80,9 @@ def interpret(text: str, scene: Scene, task: str) -> Interpretation:
     if unread:
         return Interpretation((), tuple(f'does not understand "{one}"' for one in unread))
     command = read_command(words)
+    unused = tuple(left_over(command, slots))
+    if unused:
+        return Interpretation((), unused)
     times = context.times | mentioned_times(command.text)
     resolver = ReferenceResolver(scene, context, times, mirrored=names_camera(words))
     constraints = goal_constraints(candidates, command, resolver)

@@ -56,8 +56,7 @@ _RULES = Rewrites(
     r"until:: \bdo not (stop it|press (?:it|the button)) until=>\1",
     r"not:: \bdo not VERB (?:the one over )?HUE(?: [,;])?(?: but)? (?=(?:lift|put|take|swing|pick) "
     r"(?:the|up)\b)(?!.*\b\1\b)=>",
-    r"first:: \b((?:press|push|hit) (?:the |both |two )*buttons?) first\b=>\1",
-    r"button:: STARTbutton press (?=when|on|at)=>press the button",
+    r"when:: STARTbutton press (?=when)=>press the button",
     r";:: ; (?=VERB|container)=>.",
     # Sights
     r"show:: \bshow (?:me|us) where (?:is )?(CUBE)(?: is\b(?: hiding| hidden)?)?=>uncover \1",
@@ -72,7 +71,6 @@ _RULES = Rewrites(
     r"top:: \bHOLDER on top of\b=>container over",
     r"its:: \bits HOLDER\b=>the container over it",
     r"find:: \bfind (CUBE) [,;] (?:and )?(\w+) the container over it\b=>\2 the container over \1",
-    r"of:: \bcontainer of (CUBE)\b=>container over \1",
     r"red's green's blue's one's cube's:: \b(?:the )?(COLOR)(?:'s| (?:cube|one)'s)(?: container)?"
     r"(?! \w+ing)\b=>the container over the \1 cube",
     # Numbers and series
@@ -83,7 +81,7 @@ _RULES = Rewrites(
     r"reps rep repetitions swings:: \b(NUMBER) (?:reps?|repetitions|swings)\b=>\1 times",
     r"do:: \bdo (?:it|this|that|so|the same(?: thing)?) (?=NUMBER times?|once|twice)=>repeat it",
     r"wait:: \bno ,? ?wait ,? ?(?=VERB)=>,",
-    r"twice half double:: \b(NUMBER) (\w+ (?:cube|one)s?\b.*?)\b(twice|half|double) as many (COLOR)"
+    r"many:: \b(NUMBER) (\w+ (?:cube|one)s?\b.*?)\b(twice|half|double) as many (COLOR)"
     r" (ones|cubes)(?! as)\b=>\1 \2\3 as many \4 \5 as \1",
     r"let allow:: \b(NUMBER times) over the target\b=>over the target \1",
     r"passing crossing:: \b(RANK) (?:passing|crossing)\b=>\1 pass",
@@ -100,9 +98,9 @@ _RULES = Rewrites(
     r"containers them:: START((?:first )?CUBEMAYAND(?:first )?CUBEMAY)AND"
     r"(?:you )?(?:lift|pick up) (?:the )?containers?(?: over them)?(?: in that order)?STOP"
     r"=>lift the container over \1",
-    r"not no:: STARTHUE (?:and|or) HUE (?:are|is) (?:not|of no) \w+ [.] (.*)\bthe other (?:cube|one)\b"
+    r"wanted needed interest:: STARTHUE (?:and|or) HUE (?:are|is) (?:not|of no) \w+ [.] (.*)\bthe other (?:cube|one)\b"
     r"=>\3the cube that is neither \1 nor \2",
-    r"not neither:: START(?:not|neither) HUE(?: ,)?(?: and)? (?:not|nor) HUE(?: [.:,])?(.*) the "
+    r"neither:: START(?:not|neither) HUE(?: ,)?(?: and)? (?:not|nor) HUE(?: [.:,])?(.*) the "
     r"(?:other|last|one with the last) (?:cube|one|color)\b=>\3 the cube that is neither \1 nor \2",
     parts=_PARTS,
 )  # fmt: skip
@@ -126,23 +124,25 @@ _RUN_ON = Phrases({
 _MOVING = TAKING | PUTTING
 _PRESSES = word_set("press push hit tap stop")
 _CLAUSES = _PRESSES | word_set("lift put pick take swing set uncover place drop")
-_BEFORE_RUN_ON = word_set("when use")
+_BEFORE_RUN_ON = word_set("when use after")
 
 
 def paraphrased(sentences: tuple[Sentence, ...]) -> tuple[Sentence, ...]:
     """Return a text in the words that the other modules read, with all its verbs."""
     present = frozenset().union(*sentences)
-    before = text = " . ".join(map(" ".join, sentences))
-    text = _RULES.apply(text, present)
+    verbs = _CLAUSES & present
+    run_on = "," not in present and len(verbs) > 1 or not _BEFORE_RUN_ON.isdisjoint(present)
+    without_press = _PRESSES.isdisjoint(verbs)
+    if (
+        _RULES.leaves(present) and not run_on and verbs - _PRESSES
+        and not (without_press and _WITHOUT_PRESS.leaves(present))
+    ):
+        return sentences
+    text = _RULES.apply(" . ".join(map(" ".join, sentences)), present)
     if _MOVING.isdisjoint(text.split()):
         text = _WITHOUT_VERB.apply(text, present)
-    if _PRESSES.isdisjoint(present):
+    if without_press:
         text = _WITHOUT_PRESS.apply(text, present)
-    if len(_CLAUSES & present) > 1 or not _BEFORE_RUN_ON.isdisjoint(present):
-        found = _RUN_ON.search(text)
-        while found is not None:
-            text = f"{text[: found.start('verb')]}, {text[found.start('verb') :]}"
-            found = _RUN_ON.search(text)
-    if text == before:
-        return sentences
+    while run_on and (found := _RUN_ON.search(text)) is not None:
+        text = f"{text[: found.start('verb')]}, {text[found.start('verb') :]}"
     return tuple(tuple(part.split()) for part in f" {text} ".split(" . ") if part.strip(" ,"))

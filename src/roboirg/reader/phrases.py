@@ -53,10 +53,12 @@ class Rewrites:
             self._rules.append((frozenset(words.split()), re.compile(full), replacement))
         self._triggers = frozenset().union(*(words for words, _, _ in self._rules))
 
+    def leaves(self, present: Collection[str]) -> bool:
+        """Return whether a text with these words stays as it is."""
+        return self._triggers.isdisjoint(present)
+
     def apply(self, text: str, present: Collection[str]) -> str:
         """Return a text with all replacements; `present` are its words."""
-        if self._triggers.isdisjoint(present):
-            return text
         for triggers, pattern, replacement in self._rules:
             if not triggers.isdisjoint(present):
                 changed = " ".join(pattern.sub(f"{replacement} ", text).split())

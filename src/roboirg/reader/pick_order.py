@@ -27,6 +27,7 @@ _WORDS = frozenset({"before", "after", "first", "second", "last"})
 _ONE_EACH = Rewrites(
     r"same:: \bdo (?:exactly )?the same (?:with|for|to|on) (?:the (?:container|one) over )?(?:the )?"
     r"(COLOR)\b(?: cube| one)?(?!s)=>lift the container over the \1 cube",
+    r"first:: \b((?:press|push|hit) (?:the |both |two )*buttons?) first\b=>\1",
     r"then finally also:: \b(it (?:(?:back|down|aside) )*(?:[,;] )?(?:and )?(?:then|also|finally) )"
     r"(?=the (?:one|container)\b)=>\1lift",
     parts={"COLOR": COLOR},
