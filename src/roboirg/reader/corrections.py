@@ -26,7 +26,7 @@ _CORRECTIONS = Phrases({
 })  # fmt: skip
 
 
-@functools.lru_cache(maxsize=1024)
+@functools.lru_cache(maxsize=4096)
 def corrected(words: Sentence) -> Sentence:
     """Return a commanding sentence with the values to which it corrects itself."""
     if _TRIGGERS.isdisjoint(words) or not is_command(words):

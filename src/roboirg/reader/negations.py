@@ -11,7 +11,7 @@ import re
 
 from roboirg.reader.phrases import Phrases
 from roboirg.reader.temporal_relations import NOT_NAMED, NOT_THAT
-from roboirg.reader.tokens import COLOR, NUMBER, THING, Sentence
+from roboirg.reader.tokens import COLOR, NUMBER, THING, Sentence, word_set
 from roboirg.reader.vocabulary import GERUNDS, VERBS, may_be_verb
 
 VERB = rf"(?:{'|'.join(sorted(VERBS))})\b"
@@ -79,9 +79,13 @@ _READ_ELSEWHERE = Phrases({
 """Ways that other modules read; they may overlap."""
 
 
+_FORBIDDING = word_set("not dont never avoid refrain")
+"""Every phrase of `_PROHIBITION` has one of these words."""
+
+
 def is_negated_command(words: Sentence) -> bool:
     """Return whether a sentence forbids something: ``do not put the cube there``."""
-    return bool(_prohibitions(" ".join(words)))
+    return not _FORBIDDING.isdisjoint(words) and bool(_prohibitions(" ".join(words)))
 
 
 def unread_negations(words: Sentence) -> tuple[str, ...]:

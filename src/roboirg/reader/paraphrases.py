@@ -43,20 +43,21 @@ _RULES = Rewrites(
     r": you:: START((?:(?:the|my) )?(?!\w+ing\b)(?:(?!is\b|was\b|are\b|VERB)[\w']+ |(?:that|which) is )+?)"
     r"[,:] (?:you )?(MOVE)(?: (?:it|this one|them)\b)?(?! the\b)=>\2 \1",
     r"you:: \bi (?:would like|want|need|wish) (?:that )?you (?:to )?(?=VERB)=>and",
-    r"glad happy:: \bi would be (?:glad to (?:see|have)|happy if) (?:you )?=>and",
-    r"want:: \bi want that (?=the\b|an?\b|NUMBER)=>",
+    r"glad if:: \bi would be (?:glad to (?:see|have)|happy if) (?:you )?=>and",
+    r"comes goes:: \bi want that (?=the\b|an?\b|NUMBER)=>",
     r"will got:: \byou (?:will|have got to) (?=VERB)=>and",
     r"you:: (?:, |\b(?:and|then|so|that|finally|afterwards) )you (?=VERB)=>,",
     r"you:: \b(time|target) you (?=press|push|hit|stop)=>\1 ,",
     r"done finished:: (?:, )?(?:\band )?\b(?:when|once|after|then) (?:you are |it is )?"
     r"(?:done|finished)\b(?: so)? ?,?=>,",
     r"end:: (?:\band )?\b(?:at|in) the end ,? ?(?=VERB)=>,",
-    r"after:: \band after (?=show|lift|uncover|take|put|press)=>and then",
+    r"show:: \band after (?=show|lift|uncover|take|put|press)=>and then",
     r"just so:: \b(?:just|so) (?=VERB)=>and",
     r"until:: \bdo not (stop it|press (?:it|the button)) until=>\1",
-    r"not:: \bdo not VERB (?:the one over )?HUE(?: [,;])?(?: but)? (?=(?:lift|put|take|swing|pick) "
+    r"do:: \bdo not VERB (?:the one over )?HUE(?: [,;])?(?: but)? (?=(?:lift|put|take|swing|pick) "
     r"(?:the|up)\b)(?!.*\b\1\b)=>",
     r"when:: STARTbutton press (?=when)=>press the button",
+    r"buttons:: \b(both(?: the)?|the(?: two)?) buttons (?=MOVE)=>\1 buttons ,",
     r";:: ; (?=VERB|container)=>.",
     # Sights
     r"show:: \bshow (?:me|us) where (?:is )?(CUBE)(?: is\b(?: hiding| hidden)?)?=>uncover \1",
@@ -88,7 +89,7 @@ _RULES = Rewrites(
     r"last:: \b(?:last but one|second last)\b=>second to last",
     r"last:: \blast (visit|placement|time|pass|one|target) but one\b=>second to last \1",
     r"initial:: \binitial\b(?= (?:target|disc|placement|visit))=>first",
-    r"liked like:: \bi liked? the RANK \w+ ,? ?but (?:use|take|choose) the (RANK)(?: one)?"
+    r"use choose:: \bi liked? the RANK \w+ ,? ?but (?:use|take|choose) the (RANK)(?: one)?"
     r"=>use the \1 placement",
     # Things
     r"away:: \b(furthest|farthest) away\b(?! from)=>\1 from you",
@@ -124,7 +125,7 @@ _RUN_ON = Phrases({
 _MOVING = TAKING | PUTTING
 _PRESSES = word_set("press push hit tap stop")
 _CLAUSES = _PRESSES | word_set("lift put pick take swing set uncover place drop")
-_BEFORE_RUN_ON = word_set("when use after")
+_BEFORE_RUN_ON = word_set("when use")
 
 
 def paraphrased(sentences: tuple[Sentence, ...]) -> tuple[Sentence, ...]:

@@ -42,7 +42,7 @@ class PickOrder(NamedTuple):
     unread: str = ""
 
 
-@functools.lru_cache(maxsize=1024)
+@functools.lru_cache(maxsize=4096)
 def in_order(words: Sentence) -> PickOrder:
     """Return a command for one or two picks with the one first that comes first.
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import re
 from collections.abc import Callable, Iterable
 from typing import Literal, NamedTuple
@@ -159,6 +160,7 @@ _READINGS: tuple[Reading, ...] = (
 """Phrases, reader, and whether it is a plain number; of two that overlap, the first one counts."""
 
 
+@functools.lru_cache(maxsize=8192)
 def quantities(text: str) -> tuple[Quantity, ...]:
     """Return all quantities of a sentence, in order."""
     found: list[Quantity] = []

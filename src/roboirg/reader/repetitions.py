@@ -59,7 +59,7 @@ class Repetitions(NamedTuple):
     unread: str = ""
 
 
-@functools.lru_cache(maxsize=1024)
+@functools.lru_cache(maxsize=4096)
 def added_up(words: Sentence, *, repeats: bool, seen: bool) -> Repetitions:
     """Return a command whose repetitions are one number.
 
