@@ -12,11 +12,9 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import NamedTuple
 
 from roboirg.core.episode import Goal, Scene, SlotValue
-from roboirg.reader.alternatives import take_remaining
 from roboirg.reader.command import is_command, read_command
 from roboirg.reader.comprehension import ComprehensionGap, find_gaps, is_unknown_command
 from roboirg.reader.constraints import goal_constraints
-from roboirg.reader.corrections import corrected
 from roboirg.reader.discourse_context import names_camera, read_discourse, read_remark
 from roboirg.reader.leftovers import left_over
 from roboirg.reader.negations import is_negated_command, unread_negations
@@ -64,7 +62,7 @@ def interpret(text: str, scene: Scene, task: str) -> Interpretation:
         UnknownNameError: there is no such task.
     """
     candidates = _possible_goals(scene, task)
-    sentences = tuple(map(_prepared, paraphrased(split_sentences(text))))
+    sentences = paraphrased(split_sentences(text))
     first, last = _command_span(sentences)
     gaps = _command_gaps(sentences, first, last)
     if gaps:
@@ -95,11 +93,6 @@ def interpret(text: str, scene: Scene, task: str) -> Interpretation:
     if len(goals) > 1 and not complaints:
         complaints = [_left_open(goals)]
     return Interpretation(goals, _distinct(complaints))
-
-
-def _prepared(words: Sentence) -> Sentence:
-    """Return a sentence in the words that the other modules read."""
-    return take_remaining(corrected(words))
 
 
 def _settled(

@@ -23,6 +23,10 @@ _PARTS = {
     "NOUN": rf"(?:a|the|one|same|leftmost|rightmost|closest|furthest|farthest|cubes?|ones?|of|over|and|,"
     rf"|containers?|from|you|{NUMBER}|{COLOR}s?)",
     "START": r"(?:^|(?<= \. ))(?:okay |so |now |then |and )*",
+    "VALUE": rf"(?:{COLOR}|{NUMBER}|{ORDINAL})",
+    "TIMES": rf"(?:{NUMBER} times?|once|twice|thrice|{NUMBER})",
+    "REPAIR": r"(?: [,;])? (?:no wait|wait no|oh no|no sorry|no|i mean|sorry|actually|wait)"
+    r"(?: [,;])? (?:(?:do it|the|a|an|at|on|to|over|in) )*",
     "STOP": r"(?= [.]|$)",
     "AND": r"(?: ?[.,:;]| and| then)* ",
     "MAY": r"(?: first| second| is| goes)*",
@@ -59,6 +63,14 @@ _RULES = Rewrites(
     r"when:: STARTbutton press (?=when)=>press the button",
     r"buttons:: \b(both(?: the)?|the(?: two)?) buttons (?=MOVE)=>\1 buttons ,",
     r";:: ; (?=VERB|container)=>.",
+    # Values taken back
+    r"or:: \b(VALUE) or (VALUE)((?: \w+){0,3}?)(?: ,)?(?: but)? not (?:the )?\1\b=>\2\3",
+    r"or:: \b(VALUE) or (VALUE)((?: \w+){0,3}?)(?: ,)?(?: but)? not (?:the )?\2\b=>\1\3",
+    r"no mean sorry actually wait:: \bCOLOR(?: cubes?| ones?| container)*REPAIR(COLOR)\b=>\1",
+    r"no mean sorry actually wait:: \bTIMESREPAIR(TIMES)\b=>\1",
+    r"no mean sorry actually wait:: \bRANK(?: \w+)??REPAIR(RANK)\b=>\1",
+    r"no mean sorry actually wait:: \b(?:before|after)REPAIR(before|after)\b=>\1",
+    r"but:: \bnot (?:on |at )?(?:the )?RANK(?: \w+)? ,? ?but (?:on |at )?(?:the )?(RANK)\b=>\1",
     # Sights
     r"show:: \bshow (?:me|us) where (?:is )?(CUBE)(?: is\b(?: hiding| hidden)?)?=>uncover \1",
     r"show:: \bshow (?:me|us) (?=the\b|an?\b|COLOR|what\b)=>uncover",

@@ -4,122 +4,105 @@ from __future__ import annotations
 
 import functools
 import re
-from collections.abc import Iterator
-from typing import NamedTuple
+from collections.abc import Iterable, Iterator
 
 from roboirg.reader.phrases import Phrases
 from roboirg.reader.quantities import ADVERBS, times_mentions
-from roboirg.reader.tokens import NUMBER, Sentence, number_of, ordinal_of, word_set
+from roboirg.reader.tokens import NUMBER, Sentence, number_of, word_set
 
 _TRIGGERS = word_set("again more another same repeat second third each every")
-_JOINT = r"(?:(?:[,;:]|and|then|also) )*"
+_AND = r"(?<!\w)(?:(?:[,;:]|and|then|also) )*"
 _DO = (
-    rf"{_JOINT}(?:do|repeat|perform) "
+    rf"{_AND}(?:do|repeat|perform) "
     r"(?:(?:it|this|that|so|the same(?: thing)?|the (?:action|motion)) )?"
 )
-_PICK = r"(?:pick|lift|take|grab)"
 _MORE = Phrases({
     "and then repeat it two more times":
-        rf"(?<!\w)(?:{_DO}|(?:(?:[,;:]|and|then) )+)(?P<more>{NUMBER}) (?:more|further) times?\b(?! than)",
-    "and then do it twice more": rf"(?<!\w)(?:{_DO}|{_JOINT})(?P<adverb>once|twice|thrice) more\b(?! than)",
-    "and repeat it once": rf"(?<!\w){_JOINT}repeat (?:it |this |that )?(?P<once>once)\b",
-    "do this a third time": rf"(?<!\w){_DO}a (?P<rank>second|third) time\b",
-    "and then do the same again": rf"(?<!\w){_DO}(?:again|another time)\b",
+        rf"(?:{_DO}|{_AND}(?<=[,;:dn] ))(?P<more>{NUMBER}) (?:more|further) times?\b(?! than)",
+    "and then do it twice more": rf"(?:{_DO}|{_AND})(?P<adverb>once|twice|thrice) more\b(?! than)",
+    "and repeat it once": rf"{_AND}repeat (?:it |this |that )?(?P<once>once)\b",
+    "do this a second time": rf"{_DO}a (?:second|third) time\b",
+    "and then do the same again": rf"{_DO}(?:again|another time)\b",
     "on the target, and again":
         r"(?<!\w)(?:(?:[,;:]|and|then) )+(?:again|another time)(?= [,;]| and\b|$)",
-    "do the same": rf"(?<!\w){_JOINT}(?:do|repeat) the same(?: thing)?(?= ?[,;]| and\b|$)",
+    "do the same": rf"{_AND}(?:do|repeat) the same(?: thing)?(?= ?[,;]| and\b|$)",
     "Pick it up and then pick it up again":
-        rf"(?<=\w) (?:(?:[,;:]|and|then) )+(?P<pick>{_PICK}) (?:up )?(?:it|the cube|that one)(?: up)? again\b",
+        r"(?<=\w) (?:(?:[,;:]|and|then) )+(?P<pick>pick|lift|take|grab) (?:up )?"
+        r"(?:it|the cube|that one)(?: up)? again\b",
 })  # fmt: skip
-"""What adds to the repetitions before it: a number, up to a rank, else one."""
-_PICKS = Phrases({"pick it up": rf"(?<!you )\b{_PICK}\b"})
-_UNREAD = Phrases({
-    "Take it there again.": r"(?:\w+ )?\bagain\b",
-    "Pick it up once for each of them.": r"\b(?:once|twice|time|times) (?:for|per) (?:each|every)\b",
-    "Do the same with the red cube.": r"\b(?:do|repeat) (?:exactly )?the same\b(?: \w+)?",
-})  # fmt: skip
-_LIKE_BEFORE = Phrases({
-    "put it down again":
-        r"\b(?:put|set|lay|lower|place)(?: \w+){0,3} (?:down|back|table)(?P<down> again)\b",
-})  # fmt: skip
-_BARE_MORE = Phrases({
+"""What adds one to the repetitions before it, or a number."""
+_SEEN = Phrases({
+    "Pick it up again.": r"\b(?:pick|lift|take|grab)(?: [\w']+){0,9}?(?P<seen> again)\b",
     "Pick it up one more time.": rf"\b{NUMBER}(?P<before> more) times?\b(?! than)",
     "Pick it up two times more.": rf"\b{NUMBER} times?(?P<after> more)\b(?! than)",
 })  # fmt: skip
-"""Numbers that count from what the video shows."""
-_LIKE_SEEN = Phrases({
-    "Pick it up again.": rf"\b{_PICK}(?: [\w']+){{0,9}}?(?P<seen> again)\b",
+"""Words that count from what the video shows."""
+_DOWN = Phrases({
+    "put it down again":
+        r"\b(?:put|set|lay|lower|place)(?: \w+){0,3} (?:down|back|table)(?P<down> again)\b",
+})  # fmt: skip
+_UNREAD = Phrases({
+    "Take it there again.": r"(?:\w+ )?\bagain\b",
+    "Pick it up once for each of them.":
+        r"\b(?:once|twice|times?) (?:for|per) (?:each|every)\b",
+    "Do the same with the red cube.": r"\b(?:do|repeat) (?:exactly )?the same\b(?: \w+)?",
+    "Put it there one more time.": rf"\b{NUMBER} (?:more times?|times? more)\b(?! than)",
 })  # fmt: skip
 
 
-class Repetitions(NamedTuple):
-    """The words of a command with one number of repetitions, and the words that stay unread."""
-
-    words: Sentence
-    unread: str = ""
-
-
 @functools.lru_cache(maxsize=4096)
-def added_up(words: Sentence, *, repeats: bool, seen: bool) -> Repetitions:
-    """Return a command whose repetitions are one number.
+def added_up(words: Sentence, *, repeats: bool, seen: bool) -> tuple[Sentence, str]:
+    """Return a command whose repetitions are one number, and words for more of them that are unread.
 
     Args:
         words: of the command.
-        repeats: whether goals of the task have a number of repetitions; otherwise all words for
-            one more are unread.
-        seen: whether the video shows acts, so that to pick something up *again* may be to do it
-            after that.
+        repeats: whether goals of the task have a number of repetitions; otherwise all are unread.
+        seen: whether the video shows acts, so that to do something *again* may be to do it once.
     """
     if _TRIGGERS.isdisjoint(words):
-        return Repetitions(words)
+        return words, ""
     text = " ".join(words)
-    marks = list(added(text))
-    if marks and not repeats:
-        return Repetitions(words, marks[0][0].strip(" ,"))
-    rest = _without(text, [mark.span() for mark in marks])
-    rest = _without(rest, [found.span("down") for found in _LIKE_BEFORE.finditer(rest)])
-    if seen:
-        for seen_before in (_LIKE_SEEN, _BARE_MORE):
-            spans = [found.span(found.lastgroup or 0) for found in seen_before.finditer(rest)]
-            rest = _without(rest, spans)
-    unread = _UNREAD.search(rest) or _BARE_MORE.search(rest)
-    if unread is not None:
-        return Repetitions(words, unread[0])
-    if not marks:
-        return Repetitions(tuple(rest.split()))
+    marks = list(_added(text))
+    rest = _without(_without(text, marks), _DOWN.finditer(_without(text, marks)))
+    rest = _without(rest, _SEEN.finditer(rest)) if seen else rest
     named = times_mentions(rest)
     numbers = {one.expression.quantity for one in named} or {1}
-    base = numbers.pop()
-    if base is None or numbers:
-        return Repetitions(words, marks[0][0].strip(" ,"))
-    rest = _without(rest, [(one.start, one.end) for one in named])
-    total = functools.reduce(_added, marks, base)
-    return Repetitions(tuple(f"{rest} , {total} times".split()))
-
-
-def added(text: str) -> Iterator[re.Match[str]]:
-    """Yield the words of a command that add repetitions."""
-    for found in _MORE.finditer(text):
-        # Without a pick before it, "pick it up again" is about the video.
-        if found["pick"] is None or _PICKS.search(text[: found.start()]):
-            yield found
+    unread = _UNREAD.search(rest) or (
+        marks and (not repeats or len(numbers) > 1 or None in numbers) and marks[0]
+    )
+    if unread:
+        return words, unread[0].strip(" ,")
+    if not marks:
+        return tuple(rest.split()), ""
+    for one in reversed(named):
+        rest = f"{rest[: one.start]}{rest[one.end :]}"
+    total = sum(map(_more, marks), numbers.pop() or 0)
+    return tuple(f"{rest} , {total} times".split()), ""
 
 
 def more_mentions(text: str) -> Iterator[re.Match[str]]:
     """Yield the words for more repetitions, of which `added_up` names those that it cannot add."""
-    yield from added(text)
-    yield from _BARE_MORE.finditer(text)
+    yield from _added(text)
+    yield from _SEEN.finditer(text)
 
 
-def _without(text: str, spans: list[tuple[int, int]]) -> str:
-    for start, end in reversed(spans):
+def _added(text: str) -> Iterator[re.Match[str]]:
+    for found in _MORE.finditer(text):
+        # Without a pick before it, "pick it up again" is about the video.
+        if not found["pick"] or re.search(rf"(?<!you )\b{found['pick']}\b", text[: found.start()]):
+            yield found
+
+
+def _more(mark: re.Match[str]) -> int:
+    return number_of(mark["more"] or "") or ADVERBS[mark["adverb"] or mark["once"] or "once"]
+
+
+def _without(text: str, found: Iterable[re.Match[str]]) -> str:
+    """Return a text without what was found, or without its group."""
+    for one in reversed(list(found)):
+        start, end = one.span(one.lastgroup if one.lastgroup in _CUT else 0)
         text = f"{text[:start]} {text[end:]}"
     return " ".join(text.split())
 
 
-def _added(total: int, mark: re.Match[str]) -> int:
-    """Return the number of repetitions after one more phrase."""
-    if mark["rank"]:
-        return max(total, ordinal_of(mark["rank"]) or 0)
-    more = mark["adverb"] or mark["once"] or "once"
-    return total + (number_of(mark["more"] or "") or ADVERBS[more])
+_CUT = ("seen", "before", "after", "down")
