@@ -23,7 +23,7 @@ from roboirg.reader.pick_order import in_order
 from roboirg.reader.preferences import with_preference
 from roboirg.reader.reference_resolution import ReferenceResolver
 from roboirg.reader.repetitions import added_up
-from roboirg.reader.selections import read_selection, with_selection
+from roboirg.reader.selections import read_selection, unsettled_choice, with_selection
 from roboirg.reader.temporal_relations import mentioned_times
 from roboirg.reader.tokens import Sentence, split_sentences
 from roboirg.reader.vocabulary import VERBS
@@ -72,13 +72,15 @@ def interpret(text: str, scene: Scene, task: str) -> Interpretation:
             _distinct(word for gap in gaps for word in gap.words),
         )
     before = sentences[:first]
-    context = with_selection(with_preference(read_discourse(before), before), before)
+    introduced = with_preference(read_discourse(before), before)
+    context = with_selection(introduced, before)
     slots = candidates[0].as_mapping() if candidates else {}
     words, unread = _settled(_joined(sentences[first:last]), scene, slots)
     if unread:
         return Interpretation((), tuple(f'does not understand "{one}"' for one in unread))
     command = read_command(words)
-    unused = tuple(left_over(command, slots))
+    open_choice = unsettled_choice(introduced, context, command.text)
+    unused = (*left_over(command, slots), *([open_choice] if open_choice else []))
     if unused:
         return Interpretation((), unused)
     times = context.times | mentioned_times(command.text)

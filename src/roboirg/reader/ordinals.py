@@ -47,19 +47,21 @@ _PENULTIMATE = Phrases({
 })  # fmt: skip
 _WAITED = Phrases({
     "after it has passed three times, stop it":
-        r"\b(?:let|allow|wait|after|once|until|till|when)\b (?:(?!stop|press|push|hit|halt)[\w']+ ){1,8}?"
+        r"\b(?:let|allow|wait|after|once|until|when)\b "
+        r"(?:(?!stop|press|push|hit|halt)[\w']+ ){1,8}?"
         rf"(?:(?P<times>{NUMBER}) (?:times?|passes|visits)|(?P<adverb>once|twice|thrice))\b",
 })  # fmt: skip
 """So many visits pass before the one that is meant."""
 _BARE = Phrases({
     "on the first of the two targets":
-        rf"\b(?P<of>{ORDINAL}|last) of (?:the|these|those|all|its)? ?(?:{NUMBER} )?(?:targets|discs|placements|visits)\b",
+        rf"\b(?P<of>{ORDINAL}|last) of (?:the|these|those|all|its)? ?(?:{NUMBER} )?"
+        r"(?:targets|discs|placements|visits)\b",
     "where the robot first put the cube": rf"\b(?P<when>{ORDINAL}|last) (?:put|placed|set|laid)\b",
-    "the target used last": rf"\b(?:used|put|placed|visited) (?P<used>{ORDINAL}|last)\b(?! of)",
+    "the target used last": rf"\b(?:used|put|visited) (?P<used>{ORDINAL}|last)\b(?! of)",
     "to last target": rf"\b(?P<at>{ORDINAL}|last) (?:target|disc)\b",
     "the target of the later one": r"\bthe (?P<later>later|earlier) (?:one|of the two)\b",
     "the target on which it was placed third":
-        rf"\b(?:its|the|placed) (?P<ordinal>{ORDINAL}|last)\b",
+        rf"\b(?:its|the|placed) (?P<ordinal>{ORDINAL}|last)\b(?! of (?:them|those|these)\b)",
 })  # fmt: skip
 _POINTER = Phrases({
     "during that very visit": rf"\b(?:that|this|the same) (?:very )?(?:one|number|{_NOUN})\b",
@@ -138,7 +140,9 @@ def read_position(text: str) -> OrdinalExpression | None:
 def _read_relative(text: str) -> OrdinalExpression | None:
     waited = _WAITED.search(text)
     if waited and _ELEMENT.search(text) is None:
-        return OrdinalExpression(number_of(waited["times"] or "") or ADVERBS[waited["adverb"]], (1,))
+        return OrdinalExpression(
+            number_of(waited["times"] or "") or ADVERBS[waited["adverb"]], (1,)
+        )
     # First of all: the "one" of "the preceding one" is no number.
     following = _NEXT.search(text)
     if following:

@@ -20,8 +20,8 @@ _PARTS = {
     "CUBE": rf"(?:the )?{COLOR}s?(?: cubes?| ones?)?",
     "HUE": rf"(?:the )?({COLOR})s?(?: cubes?| ones?)?",
     "HOLDER": r"(?:containers?|ones?)",
-    "NOUN": rf"(?:a|the|one|same|leftmost|rightmost|closest|furthest|farthest|cubes?|ones?|of|over|and|,"
-    rf"|containers?|from|you|{NUMBER}|{COLOR}s?)",
+    "NOUN": r"(?:a|the|one|same|leftmost|rightmost|closest|furthest|farthest|cubes?|ones?|of|over"
+    rf"|and|,|containers?|from|you|{NUMBER}|{COLOR}s?)",
     "START": r"(?:^|(?<= \. ))(?:okay |so |now |then |and )*",
     "VALUE": rf"(?:{COLOR}|{NUMBER}|{ORDINAL})",
     "TIMES": rf"(?:{NUMBER} times?|once|twice|thrice|{NUMBER})",
@@ -44,8 +44,8 @@ _RULES = Rewrites(
     r"without:: (?:, )?\bwithout doing anything\b=>",
     r"show:: (?: ,)?(?: and| then)* show meSTOP=>",
     # Who asks, and when
-    r": you:: START((?:(?:the|my) )?(?!\w+ing\b)(?:(?!is\b|was\b|are\b|VERB)[\w']+ |(?:that|which) is )+?)"
-    r"[,:] (?:you )?(MOVE)(?: (?:it|this one|them)\b)?(?! the\b)=>\2 \1",
+    r": you:: START((?:(?:the|my) )?(?!\w+ing\b)(?:(?!is\b|was\b|are\b|VERB)[\w']+ "
+    r"|(?:that|which) is )+?)[,:] (?:you )?(MOVE)(?: (?:it|this one|them)\b)?(?! the\b)=>\2 \1",
     r"you:: \bi (?:would like|want|need|wish) (?:that )?you (?:to )?(?=VERB)=>and",
     r"glad if:: \bi would be (?:glad to (?:see|have)|happy if) (?:you )?=>and",
     r"comes goes:: \bi want that (?=the\b|an?\b|NUMBER)=>",
@@ -111,8 +111,8 @@ _RULES = Rewrites(
     r"containers them:: START((?:first )?CUBEMAYAND(?:first )?CUBEMAY)AND"
     r"(?:you )?(?:lift|pick up) (?:the )?containers?(?: over them)?(?: in that order)?STOP"
     r"=>lift the container over \1",
-    r"wanted needed interest:: STARTHUE (?:and|or) HUE (?:are|is) (?:not|of no) \w+ [.] (.*)\bthe other (?:cube|one)\b"
-    r"=>\3the cube that is neither \1 nor \2",
+    r"wanted needed interest:: STARTHUE (?:and|or) HUE (?:are|is) (?:not|of no) \w+ [.] (.*)"
+    r"\bthe other (?:cube|one)\b=>\3the cube that is neither \1 nor \2",
     r"neither:: START(?:not|neither) HUE(?: ,)?(?: and)? (?:not|nor) HUE(?: [.:,])?(.*) the "
     r"(?:other|last|one with the last) (?:cube|one|color)\b=>\3 the cube that is neither \1 nor \2",
     parts=_PARTS,
@@ -131,7 +131,8 @@ _WITHOUT_PRESS = Rewrites(
 _RUN_ON = Phrases({
     "press the button lift the container":
         rf"\b(?:cubes?|ones?|buttons?|target|bin|it|down|twice|once|times?|placement|{COLOR}) "
-        r"(?P<verb>(?:lift|put|pick|take|swing|set|uncover|place|drop)(?= (?:the|it|a|up|both|what)\b)"
+        r"(?P<verb>(?:lift|put|pick|take|swing|set|uncover|place|drop)"
+        r"(?= (?:the|it|a|up|both|what)\b)"
         r"|(?<!button )(?:press|push|hit|stop) (?:the|it|both)\b)",
 })  # fmt: skip
 _MOVING = TAKING | PUTTING
@@ -144,10 +145,12 @@ def paraphrased(sentences: tuple[Sentence, ...]) -> tuple[Sentence, ...]:
     """Return a text in the words that the other modules read, with all its verbs."""
     present = frozenset().union(*sentences)
     verbs = _CLAUSES & present
-    run_on = "," not in present and len(verbs) > 1 or not _BEFORE_RUN_ON.isdisjoint(present)
+    run_on = ("," not in present and len(verbs) > 1) or not _BEFORE_RUN_ON.isdisjoint(present)
     without_press = _PRESSES.isdisjoint(verbs)
     if (
-        _RULES.leaves(present) and not run_on and verbs - _PRESSES
+        _RULES.leaves(present)
+        and not run_on
+        and verbs - _PRESSES
         and not (without_press and _WITHOUT_PRESS.leaves(present))
     ):
         return sentences

@@ -61,7 +61,7 @@ _NOUNS = rf"(?: (?:times?|{THING}|{THINGS}|ones?|visits?|{COLOR}|such|of|the|the
 _TO = (
     r"(?:(?:the|their|that|this) (?:combined )?(?P<combined>total|sum|difference|gap)\b"
     rf"(?: between them| (?:of|between) (?P<left>{NUMBER}) and (?P<right>{NUMBER}))?"
-    rf"|(?P<quantity>that|it|this|the|{NUMBER})\b)"
+    rf"|(?P<quantity>that|it|this|the(?! (?:target|disc|video|button|left|right)\b)|{NUMBER})\b)"
 )
 _MORE = "more|larger|greater|higher|bigger|above|over"
 _LESS = "fewer|less|smaller|lower|below|under"

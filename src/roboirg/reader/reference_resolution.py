@@ -90,6 +90,9 @@ class ReferenceResolver:
         """Return the amount of each color that words for all of them mean."""
         if not (words.amounts or self._context.amounts):
             self._complain("amounts")
+        elif not words.amounts and len(self._context.colors) > len(self._context.amounts):
+            self._complain("an amount of each color")
+            return [dict.fromkeys(self._colors())]
         return [{color: numbers} for color, numbers in words.results(self._context.amounts)]
 
     def repeats(self, count: CountExpression | None) -> set[int] | None:

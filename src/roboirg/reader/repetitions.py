@@ -52,7 +52,7 @@ _UNREAD = Phrases({
 
 @functools.lru_cache(maxsize=4096)
 def added_up(words: Sentence, *, repeats: bool, seen: bool) -> tuple[Sentence, str]:
-    """Return a command whose repetitions are one number, and words for more of them that are unread.
+    """Return a command whose repetitions are one number, and words for more of them.
 
     Args:
         words: of the command.
