@@ -114,7 +114,7 @@ def _left_open(goals: Sequence[Goal]) -> str:
     left = {slot: found for slot, found in values.items() if len(found) > 1}
     slot, found = next(iter(left.items()))
     named = (" and ".join(map(str, one)) if isinstance(one, tuple) else str(one) for one in found)
-    return f"leaves {' and '.join(left)} open: {slot} can be {' or '.join(named)}"
+    return f"leaves {' and '.join(left)} open: it can be {' or '.join(named)}"
 
 
 @functools.lru_cache(maxsize=64)

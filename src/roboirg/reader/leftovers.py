@@ -33,6 +33,8 @@ _CLASH = Phrases({
         r"\bother (?:cube|box|tape|one|moment|container) (?:i\b|of (?:her|his) choice)",
     "the second cube I want": rf"\b{_RANK} (?:cube|one) i (?!just|mentioned|named|said|listed)\w+",
     "right the second": rf"\b(?:right|just) the {_RANK}\b|\blast the\b",
+    "then another one": rf"\banother (?:one|cube|{COLOR})\b(?! color)",
+    "but use the other one": r"\bbut (?:use|take|choose|want|prefer) (?:the other|another)\b",
     "on the target times": r"\b(?:target|disc|table|it|down|back|other|button|left|right) times\b",
 })  # fmt: skip
 """Words that are each clear, but not together."""

@@ -41,6 +41,7 @@ _RULES = Rewrites(
     r"if:: (?:, )?if you do not mindSTOP=>",
     r"else:: (?:\bthat is (?:everything|all) ?,? )?(?:and |but )?\bnothing else\b=>",
     r"having:: STARThaving (?:watched|seen) the video ,? ?=>",
+    r"starting:: (?:, )?\bstarting (?:at|from|with|on|over) (?:the|your) right(?: target| one)?=>",
     r"without:: (?:, )?\bwithout doing anything\b=>",
     r"show:: (?: ,)?(?: and| then)* show meSTOP=>",
     # Who asks, and when
