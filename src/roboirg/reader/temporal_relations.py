@@ -31,7 +31,7 @@ _NEIGHBOR = Phrases({
     "at the placement next to that": r"\b(?:neighbor\w*|adjacent|next to|beside)\b",
     "at the placement right before or after that": _EITHER_SIDE,
 })  # fmt: skip
-NOT_THAT = r"\bnot (?:at |in )?(?:that|this|it|the one|the moment|when)\b(?! pair)"
+NOT_THAT = r"\bnot (?:at |in )?(?:that|this|it|the one|the moment|when)\b(?! pair| on)"
 """A regular expression for ``not at that moment``."""
 NOT_NAMED = r"\bnot (?:the |one |right |just |moment |at |directly )*(before|after)\b"
 """A regular expression for ``not the one right before the press``; a group has the moment."""

@@ -73,7 +73,8 @@ _VERB_FORMS = word_set(
     "painted being held work preceded followed ready colored watch watched repeated reaches "
     "reach reached arrives "
     "arrived passed shown demonstrated contains contained visited finished finish done completed "
-    "complete remembering recalling returns returned according based initial original correct"
+    "comes came gets got cross crosses crossed visiting pushed made shows complete remembering"
+    "  recalling returns returned according based initial original correct"
 )
 _COMPARISONS = word_set(
     "nearer closer farther further away "
