@@ -21,6 +21,7 @@ from roboirg.shortcuts.shortcut_scores import (
     CHANCE,
     ShortcutScore,
     counted_slots,
+    hidden_slots,
     rule_scorers,
     score_guess,
 )
@@ -229,7 +230,7 @@ def _learned(
     told: Sequence[Told], options: InstructionOptions, scenes: int
 ) -> list[dict[str, ShortcutScore]]:
     """Return the scores of the learned floors on instructions of one task and setting."""
-    slots = frozenset(slot for one in told for slot in counted_slots(one))
+    slots = frozenset(slot for one in told for slot in hidden_slots(one))
     if not told:
         return []
     episode, instruction = told[0]
