@@ -141,9 +141,7 @@ def _claims(floors: Floors) -> str:
         f"{points} points above chance in {names or 'no setting'}: these count for the "
         "[headline number](statistics.md#the-headline-number)."
     ]
-    tested = {
-        key: one for key, one in floors.items() if key.slot and key.setting in counting
-    }
+    tested = {key: one for key, one in floors.items() if key.slot and key.setting in counting}
     above = [
         f"{key.task} {key.slot} in `{key.setting}` ({key.split}, {excess_text(excess, len(tested))})"
         for key, one in tested.items()

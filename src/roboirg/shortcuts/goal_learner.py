@@ -95,7 +95,9 @@ class GoalLearner:
         if not told or not judged:
             raise InvalidValueError("The learned floors have no instruction to learn from.")
         self._vocabulary = goal_vocabulary(told[0][0].task)
-        sets = [[(Heard.of(one), one[0].goal.as_mapping()) for one in each] for each in (told, judged)]
+        sets = [
+            [(Heard.of(one), one[0].goal.as_mapping()) for one in each] for each in (told, judged)
+        ]
         self._places: dict[Place, _PlaceLearner] = {}
         for slot, vocabulary in self._vocabulary.items():
             for index in range(vocabulary.longest):
@@ -202,7 +204,9 @@ class _PlaceLearner:
     def _input(self, view: View, heard: Heard) -> str | SceneFacts:
         if view == "scene":
             return heard.facts
-        return heard.text if view == "words" else marked_text(heard.text, self._slot, self._vocabulary)
+        return (
+            heard.text if view == "words" else marked_text(heard.text, self._slot, self._vocabulary)
+        )
 
     def _label(self, view: View, heard: Heard, value: Value | None) -> str:
         if view != "order" or value is None:

@@ -110,8 +110,12 @@ class _Tally:
     def row(self, group: Group) -> ShortcutRow:
         size = sum(self.sizes)
         shares = {
-            name: ShortcutShares(sum(right) / size if size else None, float(np.mean(goals)))
-            for (name, right), goals in zip(self.slots.items(), self.goals.values(), strict=True)
+            name: ShortcutShares(
+                # Shares are fractions; what floats add to their sum could change a rounding.
+                round(sum(right) / size, 12) if size else None,
+                round(sum(self.goals[name]) / len(self.sizes), 12),
+            )
+            for name, right in self.slots.items()
         }
         return ShortcutRow(group, len(self.sizes), shares, self._excess() if size else None)
 

@@ -379,7 +379,8 @@ class Plan(BaseModel):
         # All settings with the default frame are only those that can express the episode.
         usual = (
             isinstance(self.settings, str)
-            and self.options.frame == DEFAULT_FRAME and self.wordings is None
+            and self.options.frame == DEFAULT_FRAME
+            and self.wordings is None
         )
         for task in self.tasks:
             for episode in self.episodes[:1] if usual else self.episodes:

@@ -48,13 +48,15 @@ class Headline:
     @property
     def text(self) -> str:
         """The number, its interval, and what it is over."""
-        ends = "" if self.interval is None else (
-            f" (95 % interval {' to '.join(points(end, 1) for end in self.interval)})"
+        ends = (
+            ""
+            if self.interval is None
+            else (f" (95 % interval {' to '.join(points(end, 1) for end in self.interval)})")
         )
         partial = "" if self.is_complete else ", incomplete"
         return (
-            f"{points(self.gap, 1)} points to explicit{ends}, the mean over the settings that words "
-            f"alone do not solve: {', '.join(self.settings)}; "
+            f"{points(self.gap, 1)} points to explicit{ends}, the mean over the settings that "
+            f"words alone do not solve: {', '.join(self.settings)}; "
             f"{counted(self.episodes, 'episode')}{partial}"
         )
 
@@ -71,7 +73,10 @@ def headline_notes(cells: Cells, names: Mapping[PolicyRun, str]) -> Iterator[str
         if found is None or policy_run.versions is None:
             continue
         if policy_run.conditions.wordings is not None:
-            yield f"{name} has no headline number: its commands are not in our words."
+            yield (
+                f"{name} has no headline number: the floors are those of our own words of each "
+                f"split, and it was played in {policy_run.conditions.text('wordings')}."
+            )
         elif not floors:
             yield (
                 f"{name} has no headline number: no floors were measured for its language version "

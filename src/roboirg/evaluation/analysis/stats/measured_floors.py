@@ -17,6 +17,7 @@ from roboirg.shortcuts.shortcut_tables import MARGIN
 RANDOM, TEST = "random", "test"
 NAMES = ("chance", "majority", "rules", "text-only", "scene-only", "union")
 """The floors; of the rules the best."""
+LEARNED = NAMES[3:]
 
 
 class FloorKey(NamedTuple):
