@@ -22,13 +22,13 @@ from roboirg.evaluation.analysis.stats.measured_floors import FloorKey, Floors
 from roboirg.language.settings import all_settings
 from roboirg.language.templates import LANGUAGE_VERSION
 from roboirg.shortcuts import SURFACE_RULES
+from roboirg.shortcuts.goal_learner import Told
 from roboirg.shortcuts.shortcut_scores import counted_slots
 from roboirg.shortcuts.shortcut_tables import (
     LEARNING_SCENES,
     MARGIN,
     Excess,
     Group,
-    GroupsOf,
     ShortcutRow,
     excess_text,
     score_texts,
@@ -45,7 +45,7 @@ SCENES = 1000
 def measure(tasks: Sequence[str], scenes: int, learning: int) -> list[ShortcutRow]:
     """Return the rows of all settings of some tasks, on random scenes and on the test split."""
 
-    def groups_of(told: tuple) -> Iterator[tuple[Group, Sequence[str]]]:
+    def groups_of(told: Told) -> Iterator[tuple[Group, Sequence[str]]]:
         episode, instruction = told
         slots, split, setting = counted_slots(told), episode.split, instruction.setting
         if slots:
@@ -54,11 +54,10 @@ def measure(tasks: Sequence[str], scenes: int, learning: int) -> list[ShortcutRo
         for slot in slots:
             yield FloorKey(split, setting, episode.task, slot), (slot,)
 
-    typed: GroupsOf = groups_of
     names = tuple(name for name, one in all_settings().items() if one.implicit)
     options = InstructionOptions()
     scored = score_texts(tasks, ("test",), names, options, seeds=scenes, learning=learning)
-    rows = tabulate(scored, typed)
+    rows = tabulate(scored, groups_of)
     places = {name: place for place, name in enumerate(names)}
     return sorted(rows, key=lambda row: (row.group[0], places[row.group[1]], bool(row.group[2])))
 
@@ -73,11 +72,10 @@ def file_text(rows: Sequence[ShortcutRow]) -> str:
         shares = dict(row.shares)
         best = max(SURFACE_RULES, key=lambda name: shares[name].slots or 0)
         shares["rules"] = shares[best]
-        assert row.excess is not None
         numbers = [
             *(shares[name].slots for name in stored.NAMES),
             *(shares[name].goals for name in stored.NAMES),
-            *row.excess,
+            *(row.excess or ()),
         ]
         writer.writerow((*row.group, row.count, *(f"{number:.4f}" for number in numbers)))
     return file.getvalue()
@@ -91,9 +89,12 @@ def tables(floors: Floors) -> str:
 def _by_setting(floors: Floors) -> str:
     heads = ("chance", "majority", "rules", "text-only", "scene-only", "union")
     keys = [key for key in floors if key == FloorKey(stored.RANDOM, key.setting)]
-    lines = [
+    head = (
         f"Language version {LANGUAGE_VERSION}, percent of the slots that count, on random scenes "
-        "(in brackets: on the test split), all tasks together:",
+        "(in brackets: on the test split), all tasks together:"
+    )
+    lines = [
+        head,
         "",
         f"| setting | texts | {' | '.join(heads)} | text-only over chance |",
         f"| --- | ---: |{' ---: |' * (len(heads) + 1)}",
@@ -135,31 +136,25 @@ def _claims(floors: Floors) -> str:
     """Return which settings count for the headline, and in how many slots they exceed chance."""
     counting = stored.settings_at_chance(floors)
     names = ", ".join(f"`{name}`" for name in counting)
-    points = f"{100 * MARGIN:.0f}"
-    lines = [
-        "Words alone are at most "
-        f"{points} points above chance in {names or 'no setting'}: these count for the "
-        "[headline number](statistics.md#the-headline-number)."
-    ]
     tested = {key: one for key, one in floors.items() if key.slot and key.setting in counting}
-    above = [
-        f"{key.task} {key.slot} in `{key.setting}` ({key.split}, {excess_text(excess, len(tested))})"
-        for key, one in tested.items()
-        if (excess := Excess(one.excess, one.error)).interval(len(tested))[0] > MARGIN
-    ]
-    listed = "; ".join(above)
-    lines.append(
-        f"Of the {len(tested)} pairs of a task's slot and a set of episodes in them, {len(above)} "
-        f"are above that by an interval that is corrected for their number{': ' if above else '.'}"
-        f"{listed}{'.' if above else ''}"
+    above = []
+    for key, one in tested.items():
+        excess = Excess(one.excess, one.error)
+        if excess.interval(len(tested))[0] > MARGIN:
+            where = f"{key.task} {key.slot} in `{key.setting}`, {key.split}"
+            above.append(f"{where}: {excess_text(excess, len(tested))}")
+    listed = f": {'; '.join(above)}" if above else ""
+    return (
+        f"Words alone are at most {100 * MARGIN:.0f} points above chance in "
+        f"{names or 'no setting'}, over all tasks. With an interval corrected for the "
+        f"{len(tested)} slots of their tasks, on random scenes and on the test split, "
+        f"{len(above)} are above that{listed}."
     )
-    return "\n".join(lines)
 
 
 def page_text() -> str:
     """Return the page with the tables of the stored floors."""
-    floors = stored.measured_floors(LANGUAGE_VERSION)
-    assert floors is not None
+    floors = stored.measured_floors(LANGUAGE_VERSION) or {}
     return TABLES.sub(lambda _: tables(floors), PAGE.read_text(encoding="utf-8"), count=1)
 
 

@@ -12,6 +12,7 @@ from __future__ import annotations
 import warnings
 from collections import Counter
 from collections.abc import Mapping, Sequence
+from types import MappingProxyType
 from typing import Any, Literal, NamedTuple, cast, get_args
 
 from roboirg.core.episode import Episode
@@ -55,8 +56,8 @@ class Heard(NamedTuple):
     """
 
     text: str
-    candidates: Mapping[str, tuple[Value, ...]] = {}
-    facts: SceneFacts = {}
+    candidates: Mapping[str, tuple[Value, ...]] = MappingProxyType({})
+    facts: SceneFacts = MappingProxyType({})
 
     @classmethod
     def of(cls, told: Told) -> Heard:
