@@ -291,6 +291,7 @@ def test_only_slots_that_a_text_touches_count():
     assert counted_slots((episode, said)) == ("color", "relation")
     assert counted_slots((episode, touched)) == ("relation",)
     assert set(score_chance((episode, touched)).slots) == {"relation"}
+    assert counted_slots((episode, instruct(episode))) == ()
 
 
 def test_the_table_of_the_documentation():

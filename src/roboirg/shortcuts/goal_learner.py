@@ -11,14 +11,14 @@ from __future__ import annotations
 
 import warnings
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from types import MappingProxyType
 from typing import Any, Literal, NamedTuple, cast, get_args
 
 from roboirg.core.episode import Episode
 from roboirg.core.errors import InvalidValueError
 from roboirg.core.extras import extra_needed
-from roboirg.language.instruction import Instruction
+from roboirg.language.instruction import Instruction, hidden_slots
 from roboirg.shortcuts.goal_vocabulary import SlotVocabulary, Value, goal_vocabulary, values_in
 from roboirg.shortcuts.named_values import marked_text, named_values
 from roboirg.shortcuts.scene_facts import SceneFacts, scene_facts
@@ -50,12 +50,14 @@ class Heard(NamedTuple):
 
     Attributes:
         text: all of its words.
+        open: the slots that the command does not state.
         candidates: by slot, the values that the text introduces on equal terms, in the order of
             mention; whoever looks knows them, even where the words give places only.
         facts: of the scene; none for learners of the words.
     """
 
     text: str
+    open: Collection[str] = ()
     candidates: Mapping[str, tuple[Value, ...]] = MappingProxyType({})
     facts: SceneFacts = MappingProxyType({})
 
@@ -70,7 +72,14 @@ class Heard(NamedTuple):
             for slot, values in found.items()
         }
         candidates = {slot: one for slot, one in ordered.items() if len(one) == len(found[slot])}
-        return cls(instruction.text, candidates, scene_facts(episode.scene))
+        return cls(instruction.text, open_slots(told), candidates, scene_facts(episode.scene))
+
+
+def open_slots(told: Told) -> frozenset[str]:
+    """Return the slots that the command leaves to its context, or that it says are to be seen."""
+    episode, instruction = told
+    touched = cast("list[str]", instruction.metadata.get("touched", []))
+    return hidden_slots(instruction, episode.goal).union(touched)
 
 
 def check_learning_support() -> None:
@@ -136,7 +145,7 @@ def _value_at(values: Sequence[Value], index: int) -> Value | None:
 def _stated(
     floor: LearnedFloor, heard: Heard, slot: str, vocabulary: SlotVocabulary
 ) -> tuple[tuple[Value, ...], ...]:
-    if "words" not in _VIEWS[floor]:
+    if slot in heard.open or "words" not in _VIEWS[floor]:
         return ()
     named = named_values(heard.text, slot, vocabulary)
     return tuple((one.value,) for one in named if one.stated)
@@ -167,8 +176,7 @@ class _PlaceLearner:
             return
         # What a command states needs no guess.
         answers, judged = (
-            [one for one in each if not _stated("union", one[0], slot, vocabulary)] or each
-            for each in (answers, judged)
+            [one for one in each if slot in one[0].open] or each for each in (answers, judged)
         )
         right = {}
         for view in _VIEWS["union"]:

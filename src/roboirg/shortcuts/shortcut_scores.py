@@ -40,9 +40,10 @@ def hidden_slots(told: Told) -> tuple[str, ...]:
 
 
 def counted_slots(told: Told) -> tuple[str, ...]:
-    """Return the hidden slots that count: all, or those that the instruction says it touches."""
-    touched = cast("list[str] | None", told[1].metadata.get("touched"))
-    return tuple(slot for slot in hidden_slots(told) if touched is None or slot in touched)
+    """Return the slots that count: those that the instruction names as touched, or all hidden."""
+    touched = cast("list[str]", told[1].metadata.get("touched", []))
+    slots = tuple(slot for slot, _ in told[0].goal.slots if slot in touched)
+    return slots or hidden_slots(told)
 
 
 def score_chance(told: Told) -> ShortcutScore:

@@ -16,12 +16,11 @@ from roboirg.core.errors import InvalidValueError
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.language.settings import settings_of
 from roboirg.language.variants import instructions
-from roboirg.shortcuts.goal_learner import LEARNED_FLOORS, GoalLearner, Heard, Told
+from roboirg.shortcuts.goal_learner import LEARNED_FLOORS, GoalLearner, Heard, Told, open_slots
 from roboirg.shortcuts.shortcut_scores import (
     CHANCE,
     ShortcutScore,
     counted_slots,
-    hidden_slots,
     rule_scorers,
     score_guess,
 )
@@ -234,7 +233,7 @@ def _learned(
     told: Sequence[Told], options: InstructionOptions, scenes: int
 ) -> list[dict[str, ShortcutScore]]:
     """Return the scores of the learned floors on instructions of one task and setting."""
-    slots = frozenset(slot for one in told for slot in hidden_slots(one))
+    slots = frozenset(slot for one in told for slot in open_slots(one))
     if not told:
         return []
     episode, instruction = told[0]

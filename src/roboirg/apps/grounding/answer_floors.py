@@ -120,7 +120,9 @@ def _learn(items: Sequence[GroundingItem], name: str) -> dict[str, TextGuess]:
     found: dict[str, TextGuess] = {}
     for (task, options), members in groups.items():
         wanted = InstructionOptions(EXPLICIT) if name == LEARNED_EXPLICIT else options
-        guesses = _trained(task, wanted).guesses("text-only", [Heard(one.text) for one in members])
+        guesses = _trained(task, wanted).guesses(
+            "text-only", [Heard(one.text, one.hidden_slots) for one in members]
+        )
         found |= {item.id: guess for item, guess in zip(members, guesses, strict=True)}
     return found
 
