@@ -46,4 +46,4 @@ def test_lines_are_read_as_they_were_written():
         for name in ("chance", "majority", "text-only", "scene-only", "union"):
             assert one.slots[name] == pytest.approx(row.shares[name].slots, abs=1e-4)
             assert one.goals[name] == pytest.approx(row.shares[name].goals, abs=1e-4)
-    assert list(found)[0] == FloorKey("random", "direct")
+    assert next(iter(found)) == FloorKey("random", "direct")

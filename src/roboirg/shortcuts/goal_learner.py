@@ -9,13 +9,14 @@ instructions that were not learned from.
 
 from __future__ import annotations
 
+import itertools
 import warnings
 from collections import Counter
 from collections.abc import Collection, Mapping, Sequence
 from types import MappingProxyType
 from typing import Any, Literal, NamedTuple, cast, get_args
 
-from roboirg.core.episode import Episode
+from roboirg.core.episode import Episode, Goal
 from roboirg.core.errors import InvalidValueError
 from roboirg.core.extras import extra_needed
 from roboirg.language.instruction import Instruction, hidden_slots
@@ -26,10 +27,11 @@ from roboirg.shortcuts.text_guess import TextGuess
 
 LearnedFloor = Literal["majority", "text-only", "scene-only", "union"]
 LEARNED_FLOORS: tuple[LearnedFloor, ...] = get_args(LearnedFloor)
-View = Literal["nothing", "words", "order", "scene"]
-Model = Literal["most frequent", "linear", "network"]
+View = Literal["words", "order", "scene"]
+Model = Literal["linear", "network"]
+MODELS: tuple[Model, ...] = get_args(Model)
 _VIEWS: Mapping[LearnedFloor, tuple[View, ...]] = {
-    "majority": ("nothing",),
+    "majority": (),
     "text-only": ("words", "order"),
     "scene-only": ("scene",),
     "union": ("words", "order", "scene"),
@@ -41,8 +43,6 @@ _NONE, _UNNAMED = "none", "unnamed"
 
 Told = tuple[Episode, Instruction]
 """An episode and one of its instructions."""
-Place = tuple[str, int]
-"""A slot, and the position of a value in it."""
 
 
 class Heard(NamedTuple):
@@ -94,29 +94,19 @@ class GoalLearner:
     Args:
         told: instructions of the task to learn from, with their episodes.
         judged: others, on which the best view and model of each place are chosen.
-        slots: those to learn; the others are left at the most frequent value unless the command
-            states them. None for all.
     """
 
-    def __init__(
-        self, told: Sequence[Told], judged: Sequence[Told], slots: frozenset[str] | None = None
-    ) -> None:
+    def __init__(self, told: Sequence[Told], judged: Sequence[Told]) -> None:
         check_learning_support()
         if not told or not judged:
             raise InvalidValueError("The learned floors have no instruction to learn from.")
         self._vocabulary = goal_vocabulary(told[0][0].task)
-        sets = [
-            [(Heard.of(one), one[0].goal.as_mapping()) for one in each] for each in (told, judged)
-        ]
-        self._places: dict[Place, _PlaceLearner] = {}
-        for slot, vocabulary in self._vocabulary.items():
-            for index in range(vocabulary.longest):
-                found = [
-                    [(heard, _value_at(values_in(goal[slot]), index)) for heard, goal in each]
-                    for each in sets
-                ]
-                learns = slots is None or slot in slots
-                self._places[slot, index] = _PlaceLearner(slot, vocabulary, *found, learns=learns)
+        sets = [[(Heard.of(one), one[0].goal) for one in each] for each in (told, judged)]
+        self._places = {
+            (slot, index): _PlaceLearner(slot, index, vocabulary, *sets)
+            for slot, vocabulary in self._vocabulary.items()
+            for index in range(vocabulary.longest)
+        }
 
     def guesses(self, floor: LearnedFloor, heard: Sequence[Heard]) -> list[TextGuess]:
         """Return what a floor makes of some instructions of the task.
@@ -138,10 +128,6 @@ class GoalLearner:
         ]
 
 
-def _value_at(values: Sequence[Value], index: int) -> Value | None:
-    return values[index] if index < len(values) else None
-
-
 def _stated(
     floor: LearnedFloor, heard: Heard, slot: str, vocabulary: SlotVocabulary
 ) -> tuple[tuple[Value, ...], ...]:
@@ -151,46 +137,46 @@ def _stated(
     return tuple((one.value,) for one in named if one.stated)
 
 
-Answer = tuple[Heard, Value | None]
-"""What is heard, and the right value at the place; None if the goal has none there."""
-
-
 class _PlaceLearner:
-    """All that predict one place, and which of them each floor takes."""
+    """All that predict one place of a slot, and which of them each floor takes.
+
+    Learns from instructions whose command leaves the slot open; without any it is the majority.
+    """
 
     def __init__(
         self,
         slot: str,
+        index: int,
         vocabulary: SlotVocabulary,
-        answers: Sequence[Answer],
-        judged: Sequence[Answer],
-        *,
-        learns: bool,
+        told: Sequence[tuple[Heard, Goal]],
+        judged: Sequence[tuple[Heard, Goal]],
     ) -> None:
         self._slot, self._vocabulary = slot, vocabulary
-        frequent = Counter(value for _, value in answers)
-        self._frequent = [value for value, _ in frequent.most_common()]
+        values = [dict(enumerate(values_in(goal[slot]))).get(index) for _, goal in told]
+        self._frequent = [value for value, _ in Counter(values).most_common()]
+        answers = [
+            (heard, value)
+            for (heard, _), value in zip(told, values, strict=True)
+            if slot in heard.open
+        ]
         self._readers: dict[tuple[View, Model], Any] = {}
         self._best: dict[LearnedFloor, tuple[View, Model]] = {}
-        if not learns or len(frequent) == 1:
+        if not answers or len(self._frequent) == 1:
             return
-        # What a command states needs no guess.
-        answers, judged = (
-            [one for one in each if slot in one[0].open] or each for each in (answers, judged)
-        )
-        right = {}
-        for view in _VIEWS["union"]:
-            for model in ("linear", "network"):
-                way = (view, cast("Model", model))
-                self._readers[way] = self._fit(way, answers)
-                found = self._predict(way, [heard for heard, _ in judged])
-                right[way] = sum(
-                    value == wanted for value, (_, wanted) in zip(found, judged, strict=True)
-                )
+        right: dict[tuple[View, Model], int] = {}
+        tested = [one for one in judged if slot in one[0].open]
+        for view, model in itertools.product(_VIEWS["union"], MODELS):
+            way = (view, model)
+            self._readers[way] = self._fit(view, model, answers)
+            found = self._predict(way, [heard for heard, _ in tested]) if tested else []
+            right[way] = sum(
+                value == dict(enumerate(values_in(goal[slot]))).get(index)
+                for value, (_, goal) in zip(found, tested, strict=True)
+            )
         for floor, views in _VIEWS.items():
             ways = [way for way in right if way[0] in views]
             if ways:
-                self._best[floor] = max(ways, key=lambda way: right[way])
+                self._best[floor] = max(ways, key=right.__getitem__)
 
     def predict(self, floor: LearnedFloor, heard: Sequence[Heard]) -> list[Value | None]:
         """Return the value of the place for each instruction; None for none."""
@@ -198,10 +184,10 @@ class _PlaceLearner:
             return [self._frequent[0]] * len(heard)
         return self._predict(self._best[floor], heard)
 
-    def _fit(self, way: tuple[View, Model], answers: Sequence[Answer]) -> Any:  # noqa: ANN401 - scikit-learn has no types
-        labels = [self._label(way[0], *answer) for answer in answers]
-        inputs = [self._input(way[0], heard) for heard, _ in answers]
-        reader = _reader(*way) if len(set(labels)) > 1 else _reader("scene", "most frequent")
+    def _fit(self, view: View, model: Model, answers: Sequence[tuple[Heard, Value | None]]) -> Any:  # noqa: ANN401 - scikit-learn has no types
+        labels = [self._label(view, *answer) for answer in answers]
+        inputs = [self._input(view, heard) for heard, _ in answers]
+        reader = _reader(view, model, is_constant=len(set(labels)) == 1)
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # that an iteration more would be better
             return reader.fit(inputs, labels)
@@ -241,7 +227,7 @@ class _PlaceLearner:
         return tuple(dict.fromkeys(one.value for one in named))
 
 
-def _reader(view: View, model: Model) -> Any:  # noqa: ANN401 - scikit-learn has no types
+def _reader(view: View, model: Model, *, is_constant: bool) -> Any:  # noqa: ANN401 - scikit-learn has no types
     """Return an unfitted model behind what makes numbers of a view."""
     from sklearn.dummy import DummyClassifier
     from sklearn.feature_extraction import DictVectorizer
@@ -251,7 +237,7 @@ def _reader(view: View, model: Model) -> Any:  # noqa: ANN401 - scikit-learn has
     from sklearn.pipeline import make_pipeline
     from sklearn.preprocessing import MaxAbsScaler
 
-    if model == "most frequent":
+    if is_constant:
         return DummyClassifier()
     predictor = (
         LogisticRegression(C=10.0, max_iter=200)

@@ -16,7 +16,7 @@ from roboirg.core.errors import InvalidValueError
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.language.settings import settings_of
 from roboirg.language.variants import instructions
-from roboirg.shortcuts.goal_learner import LEARNED_FLOORS, GoalLearner, Heard, Told, open_slots
+from roboirg.shortcuts.goal_learner import LEARNED_FLOORS, GoalLearner, Heard, Told
 from roboirg.shortcuts.shortcut_scores import (
     CHANCE,
     ShortcutScore,
@@ -208,9 +208,7 @@ def _told(episodes: Iterable[Episode], setting: str, options: InstructionOptions
     return list(instructions(episodes, (setting,), (options.form,), options))
 
 
-def learn_goals(
-    task: str, options: InstructionOptions, scenes: int, slots: frozenset[str] | None = None
-) -> GoalLearner:
+def learn_goals(task: str, options: InstructionOptions, scenes: int) -> GoalLearner:
     """Return the floors that learn from the words of train, in the setting of `options`.
 
     What they learn from are the train split and random scenes; what is best is chosen on the val
@@ -225,7 +223,6 @@ def learn_goals(
     return GoalLearner(
         said(TRAINING_SPLIT, FIRST_LEARNED, scenes, "train"),
         said(JUDGING_SPLIT, FIRST_JUDGED, scenes // 4, "test"),
-        slots,
     )
 
 
@@ -233,13 +230,10 @@ def _learned(
     told: Sequence[Told], options: InstructionOptions, scenes: int
 ) -> list[dict[str, ShortcutScore]]:
     """Return the scores of the learned floors on instructions of one task and setting."""
-    slots = frozenset(slot for one in told for slot in open_slots(one))
     if not told:
         return []
     episode, instruction = told[0]
-    learner = learn_goals(
-        episode.task, replace(options, setting=instruction.setting), scenes, slots
-    )
+    learner = learn_goals(episode.task, replace(options, setting=instruction.setting), scenes)
     heard = [Heard.of(one) for one in told]
     scores: list[dict[str, ShortcutScore]] = [{} for _ in told]
     for floor in LEARNED_FLOORS:
