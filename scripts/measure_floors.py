@@ -27,7 +27,6 @@ from roboirg.shortcuts.shortcut_scores import counted_slots
 from roboirg.shortcuts.shortcut_tables import (
     LEARNING_SCENES,
     MARGIN,
-    Excess,
     Group,
     ShortcutRow,
     excess_text,
@@ -87,7 +86,6 @@ def tables(floors: Floors) -> str:
 
 
 def _by_setting(floors: Floors) -> str:
-    heads = ("chance", "majority", "rules", "text-only", "scene-only", "union")
     keys = [key for key in floors if key == FloorKey(stored.RANDOM, key.setting)]
     head = (
         f"Language version {LANGUAGE_VERSION}, percent of the slots that count, on random scenes "
@@ -96,14 +94,14 @@ def _by_setting(floors: Floors) -> str:
     lines = [
         head,
         "",
-        f"| setting | texts | {' | '.join(heads)} | text-only over chance |",
-        f"| --- | ---: |{' ---: |' * (len(heads) + 1)}",
+        f"| setting | texts | {' | '.join(stored.NAMES)} | text-only over chance |",
+        f"| --- | ---: |{' ---: |' * (len(stored.NAMES) + 1)}",
     ]
     for key in keys:
         one, test = floors[key], floors[key._replace(split=stored.TEST)]
-        cells = (f"{100 * one.slots[name]:.0f} ({100 * test.slots[name]:.0f})" for name in heads)
-        excess = excess_text(Excess(one.excess, one.error), len(keys))
-        lines.append(f"| `{key.setting}` | {one.texts:,} | {' | '.join(cells)} | {excess} |")
+        cells = (f"{_percent(one, name)} ({_percent(test, name)})" for name in stored.NAMES)
+        excess = excess_text(one.excess, len(keys))
+        lines.append(f"| `{key.setting}` | {one.count:,} | {' | '.join(cells)} | {excess} |")
     return "\n".join(lines)
 
 
@@ -119,17 +117,17 @@ def _by_task(floors: Floors) -> str:
         cells = []
         for setting in settings:
             one = floors.get(FloorKey(stored.RANDOM, setting, task))
-            cells.append("–" if one is None else f"{_words(one):.0f} ({_least(one):.0f})")
+            if one is None:
+                cells.append("–")
+                continue
+            least = max(("chance", "majority"), key=lambda name: one.shares[name].slots or 0)
+            cells.append(f"{_percent(one, 'text-only')} ({_percent(one, least)})")
         lines.append(f"| {task} | {' | '.join(cells)} |")
     return "\n".join(lines)
 
 
-def _words(one: stored.MeasuredFloor) -> float:
-    return 100 * one.slots["text-only"]
-
-
-def _least(one: stored.MeasuredFloor) -> float:
-    return 100 * (one.slots["text-only"] - one.excess)
+def _percent(row: ShortcutRow, name: str) -> str:
+    return f"{100 * (row.shares[name].slots or 0):.0f}"
 
 
 def _claims(floors: Floors) -> str:
@@ -139,10 +137,9 @@ def _claims(floors: Floors) -> str:
     tested = {key: one for key, one in floors.items() if key.slot and key.setting in counting}
     above = []
     for key, one in tested.items():
-        excess = Excess(one.excess, one.error)
-        if excess.interval(len(tested))[0] > MARGIN:
+        if one.excess and one.excess.interval(len(tested))[0] > MARGIN:
             where = f"{key.task} {key.slot} in `{key.setting}`, {key.split}"
-            above.append(f"{where}: {excess_text(excess, len(tested))}")
+            above.append(f"{where}: {excess_text(one.excess, len(tested))}")
     listed = f": {'; '.join(above)}" if above else ""
     return (
         f"Words alone are at most {100 * MARGIN:.0f} points above chance in "

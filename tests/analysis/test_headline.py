@@ -12,7 +12,6 @@ from roboirg.evaluation.analysis.stats.headline import headline_notes, measure_h
 from roboirg.evaluation.analysis.stats.measured_floors import (
     RANDOM,
     FloorKey,
-    MeasuredFloor,
     measured_floors,
     settings_at_chance,
 )
@@ -21,6 +20,7 @@ from roboirg.evaluation.analysis.tables.paper_tables import make_table
 from roboirg.evaluation.analysis.tables.run_tables import make_run_tables
 from roboirg.language.settings import all_settings, settings_of
 from roboirg.language.templates import LANGUAGE_VERSION
+from roboirg.shortcuts.shortcut_tables import Excess, ShortcutRow
 from roboirg.tasks import all_tasks
 
 SETTINGS = ("reasoning", "spatial")
@@ -28,10 +28,9 @@ OUTCOMES = {True: "success", False: "failure"}
 
 
 def floors(excess):
-    shares = dict.fromkeys(("text-only", "scene-only", "union"), 0.5)
     return {
-        FloorKey(RANDOM, setting): MeasuredFloor(9, shares, shares, value, 0.01)
-        for setting, value in excess.items()
+        key: ShortcutRow(key, 9, {}, Excess(value, 0.01))
+        for key, value in ((FloorKey(RANDOM, name), value) for name, value in excess.items())
     }
 
 

@@ -28,12 +28,12 @@ def test_the_file_holds_what_is_measured():
     own = {key: one for key, one in found.items() if key.task and key.split == stored.TEST}
     assert len(own) > 8
     for key, one in own.items():
-        assert one.texts == kept[key].texts, AGAIN
+        assert one.count == kept[key].count, AGAIN
         for name in ("chance", "rules"):
-            assert one.slots[name] == kept[key].slots[name], AGAIN
-            assert one.goals[name] == kept[key].goals[name], AGAIN
+            assert one.shares[name] == kept[key].shares[name], AGAIN
         for name in ("text-only", "scene-only"):
-            assert one.slots[name] == pytest.approx(kept[key].slots[name], abs=0.25), AGAIN
+            again = pytest.approx(kept[key].shares[name].slots, abs=0.25)
+            assert one.shares[name].slots == again, AGAIN
 
 
 def test_lines_are_read_as_they_were_written():
@@ -41,9 +41,8 @@ def test_lines_are_read_as_they_were_written():
     found = read_floors(measure_floors.file_text(rows))
     for row in rows:
         one = found[FloorKey(*row.group)]
-        assert one.texts == row.count
-        assert one.excess == pytest.approx(row.excess.value, abs=1e-4)
+        assert one.count == row.count
+        assert one.excess == pytest.approx(row.excess, abs=1e-4)
         for name in ("chance", "majority", "text-only", "scene-only", "union"):
-            assert one.slots[name] == pytest.approx(row.shares[name].slots, abs=1e-4)
-            assert one.goals[name] == pytest.approx(row.shares[name].goals, abs=1e-4)
+            assert one.shares[name] == pytest.approx(row.shares[name], abs=1e-4)
     assert next(iter(found)) == FloorKey("random", "direct")

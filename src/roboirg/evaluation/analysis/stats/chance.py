@@ -59,7 +59,7 @@ def _level(
         key = FloorKey(TEST if split == TEST else RANDOM, options.setting, task)
         measured = (measured_floors(LANGUAGE_VERSION) or {}).get(key)
         is_usual = options == InstructionOptions(options.setting)
-        return Fraction(str(measured.goals[floor])) if measured and is_usual else None
+        return Fraction(str(measured.shares[floor].goals)) if measured and is_usual else None
     job = Job(policy="", task=task, split=split, episode=number, options=options)
     episode, instruction = get_episode(task, split, number), instruct_job(job)
     if floor == CHANCE:

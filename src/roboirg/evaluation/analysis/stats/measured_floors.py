@@ -12,7 +12,7 @@ from collections.abc import Mapping
 from importlib import resources
 from typing import NamedTuple
 
-from roboirg.shortcuts.shortcut_tables import MARGIN
+from roboirg.shortcuts.shortcut_tables import MARGIN, Excess, ShortcutRow, ShortcutShares
 
 RANDOM, TEST = "random", "test"
 NAMES = ("chance", "majority", "rules", "text-only", "scene-only", "union")
@@ -29,25 +29,7 @@ class FloorKey(NamedTuple):
     slot: str = ""
 
 
-class MeasuredFloor(NamedTuple):
-    """One line; shares are 0 to 1.
-
-    Attributes:
-        texts: number of instructions.
-        slots: by name of the floor, the share of the slots that count.
-        goals: the share of whole goals.
-        excess: how far the text-only learner is above the larger of chance and majority.
-        error: standard error of the excess.
-    """
-
-    texts: int
-    slots: Mapping[str, float]
-    goals: Mapping[str, float]
-    excess: float
-    error: float
-
-
-Floors = Mapping[FloorKey, MeasuredFloor]
+Floors = Mapping[FloorKey, ShortcutRow]
 
 
 def floors_name(version: str) -> str:
@@ -64,16 +46,15 @@ def measured_floors(version: str) -> Floors | None:
 
 def read_floors(text: str) -> Floors:
     """Return the floors of a file's text."""
-    return {
-        FloorKey(*(line[name] for name in FloorKey._fields)): MeasuredFloor(
-            int(line["texts"]),
-            {name: float(line[name]) for name in NAMES},
-            {name: float(line[f"{name} goals"]) for name in NAMES},
-            float(line["excess"]),
-            float(line["error"]),
-        )
-        for line in csv.DictReader(text.splitlines())
-    }
+    found = {}
+    for line in csv.DictReader(text.splitlines()):
+        key = FloorKey(*(line[name] for name in FloorKey._fields))
+        shares = {
+            name: ShortcutShares(float(line[name]), float(line[f"{name} goals"])) for name in NAMES
+        }
+        excess = Excess(float(line["excess"]), float(line["error"]))
+        found[key] = ShortcutRow(key, int(line["texts"]), shares, excess)
+    return found
 
 
 def settings_at_chance(floors: Floors) -> tuple[str, ...]:
@@ -81,5 +62,5 @@ def settings_at_chance(floors: Floors) -> tuple[str, ...]:
     return tuple(
         key.setting
         for key, one in floors.items()
-        if key == FloorKey(RANDOM, key.setting) and one.excess <= MARGIN
+        if key == FloorKey(RANDOM, key.setting) and one.excess and one.excess.value <= MARGIN
     )
