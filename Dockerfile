@@ -3,7 +3,7 @@
 #   docker build -t roboirg .                                    the processor renders
 #   docker build -t roboirg:gpu --build-arg VARIANT=gpu .        an NVIDIA GPU renders
 #   mkdir -p runs
-#   docker run --rm --user "$(id -u)" -v "$PWD/runs:/runs" roboirg demo --out /runs/demo
+#   docker run --rm --user "$(id -u)" -v "$PWD/runs:/runs" roboirg run --plan demo --out /runs/demo
 #   docker run --rm --gpus all -v "$PWD/runs:/runs" roboirg:gpu doctor
 ARG VARIANT=cpu
 

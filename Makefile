@@ -36,7 +36,8 @@ docs: setup ## the documentation site, in build/site; a warning or dead link is 
 	NO_MKDOCS_2_WARNING=1 $(PYTHON) -m mkdocs build --strict
 
 demo: setup ## the main job: three policies, every task and setting; ends with a table and a page
-	.venv/bin/roboirg demo --out runs/demo
+	.venv/bin/roboirg run --plan demo --out runs/demo
+	.venv/bin/roboirg report runs/demo
 
 card: setup ## write docs/language-card.md anew, after a change of words or episodes
 	$(PYTHON) scripts/write_language_card.py

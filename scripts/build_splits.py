@@ -15,7 +15,7 @@ from seed_summary import follow_progress, print_summary
 
 from roboirg.cli.options import Tasks, Workers
 from roboirg.core.errors import InvalidValueError, RoboIRGError
-from roboirg.evaluation.plan.plan_parsing import parse_names, parse_splits
+from roboirg.evaluation.plan.option_parsing import parse_names, parse_splits
 from roboirg.tasks import find_tasks
 from roboirg.tasks.splits import splits
 from roboirg.util.atomic_write import write_atomically

@@ -30,7 +30,7 @@ from roboirg.core.motions import Shuttle, Swap
 from roboirg.core.observations import Demonstration
 from roboirg.envs.environment import RoboIRGEnv
 from roboirg.envs.factory import make
-from roboirg.evaluation.plan.plan_parsing import parse_names, parse_splits
+from roboirg.evaluation.plan.option_parsing import parse_names, parse_splits
 from roboirg.policies import play
 from roboirg.policies.builtin.oracle_policy import OraclePolicy
 from roboirg.simulation.motion_player import shuttle_position

@@ -18,7 +18,6 @@ from msgspec.structs import replace
 from plan_files import plan_file
 
 from roboirg import main as cli
-from roboirg.cli import demo_commands
 from roboirg.cli.progress_bar import progress_bars
 from roboirg.cli.run_commands import report_problems
 from roboirg.core.instruction_options import InstructionOptions
@@ -142,7 +141,8 @@ def is_refused(roboirg, tmp_path: Path, words: tuple[str, ...], sentence: str) -
     "words",
     [
         ("run",), ("play",), ("report",), ("report", "nowhere"), ("report", ""),
-        ("show", "PickXtimes"), ("show", "PickXtimes", "-1"), ("demo", "--out", " "),
+        ("show", "PickXtimes"), ("show", "PickXtimes", "-1"),
+        ("run", "--plan", "demo", "--out", " "),
     ],
 )  # fmt: skip
 def test_wrong_usage_is_one_sentence_and_exit_code_2(roboirg, words: tuple[str, ...]) -> None:
@@ -162,29 +162,20 @@ def test_help_and_version_are_answered(roboirg) -> None:
     assert roboirg().code in {0, 2}  # Click before 8.2 sees no fault in it
 
 
-@pytest.mark.parametrize("command", ["demo", "report"])
-def test_a_missing_jinja_is_told_before_anything_is_played(
-    roboirg, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, command: str
-) -> None:
+def test_a_missing_jinja_is_told(roboirg, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "jinja2", None)
-    words = ("demo", "--out", tmp_path / "out") if command == "demo" else ("report", tmp_path)
-    said = roboirg(*words)
+    said = roboirg("report", tmp_path)
     assert (said.code, said.out, said.err.count("\n")) == (2, "", 1)
     assert "[report]'" in said.err
-    assert not (tmp_path / "out").exists()
 
 
-@pytest.mark.usefixtures("canned", "in_this_process")
-def test_a_missing_pyav_can_be_done_without(
+def test_a_missing_pyav_is_told_before_anything_is_played(
     roboirg, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setitem(sys.modules, "av", None)
-    words = ("demo", "--out", tmp_path / "out", "--episodes", "1")
-    said = roboirg(*words)
-    assert said.code == 0
-    assert said.err.startswith("Without videos: ")
-    lines = (tmp_path / "out" / "records.jsonl").read_text().splitlines()
-    assert {json.loads(line)["video"] for line in lines} == {None}
+    said = roboirg("run", "--plan", "demo", "--out", tmp_path / "out")
+    assert (said.code, said.out, said.err.count("\n")) == (2, "", 1)
+    assert not (tmp_path / "out").exists()
 
 
 def test_lost_videos_are_reported_once(
@@ -262,11 +253,10 @@ def test_missing_graphics_are_one_sentence(
 
 
 @pytest.mark.usefixtures("canned", "in_this_process")
-def test_demo_ends_with_the_path_of_the_page(roboirg, tmp_path: Path) -> None:
-    said = roboirg("demo", "--out", tmp_path, "--episodes", "1")
+def test_the_demo_plays_three_policies(roboirg, tmp_path: Path) -> None:
+    said = roboirg("run", "--plan", "demo", "--video", "off", "--out", tmp_path)
     assert said.code == 0, said.err
-    assert said.out.splitlines()[-1] == str(tmp_path / "report.html")
-    for policy in demo_commands.DEMO_POLICIES:
+    for policy in ("oracle", "listener", "forgetful"):
         assert policy in said.out
 
 

@@ -16,11 +16,10 @@ NAMES = {
     "--tasks": "PickXtime", "--settings": "spatail", "--setting": "spatail", "--forms": "implict",
     "--split": "tset", "--episodes": "four", "--policy-seeds": "one",
     "--stages": "9-1", "--distractor": "nutral", "--frame": "robt",
-    "--wordings": "nowhere.toml", "--actions": "joints", "--floors": "chanse",
+    "--wordings": "nowhere.toml", "--floors": "chanse",
     "--video": "som", "--protocol": "opnpi",
     "--executor": "slurm", "--plan": "papr", "--api-key-env": "NO_SUCH_VARIABLE", "--which": "mian",
     "--format": "pdf", "--by": "colour", "--robot": "twn", "--score": "me",
-    "--consent": "nowhere.txt",
 }  # fmt: skip
 """A value that no command takes, for every option that takes names."""
 

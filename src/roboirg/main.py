@@ -15,7 +15,6 @@ import typer
 
 from roboirg import apps
 from roboirg.cli import (
-    demo_commands,
     export_commands,
     look_commands,
     policy_commands,
@@ -73,7 +72,6 @@ def _add_commands() -> None:
     """Add the commands of the core, then those of the applications that are installed."""
     for command in (
         run_commands.run,
-        demo_commands.demo,
         look_commands.doctor,
         report_commands.report,
         report_commands.tables,

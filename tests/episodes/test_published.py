@@ -130,7 +130,7 @@ def test_recordings_are_as_long_as_robomme_s(converter):
             continue
         found = recorded_actions(*key)
         stages = get_task(row["task"]).demonstration(published_episode(*key).scene)
-        seen = np.array([stage.recorded for stage in stages])[found.stages]
+        seen = np.array([stage.in_video for stage in stages])[found.stages]
         assert found.actions.shape == (row["elapsed"] - 1, 8)
         assert int(seen.sum()) + 1 == row["frames"]
         assert set(np.diff(found.stages.astype(int))) <= {0, 1}

@@ -5,14 +5,14 @@ from pathlib import Path
 import pytest
 
 from roboirg.core.errors import InvalidValueError, UnknownNameError
-from roboirg.evaluation.plan.plan import Plan
-from roboirg.evaluation.plan.plan_maker import make_plan
-from roboirg.evaluation.plan.plan_parsing import (
+from roboirg.evaluation.plan.option_parsing import (
     parse_episodes,
     parse_numbers,
     parse_policies,
     parse_stages,
 )
+from roboirg.evaluation.plan.plan import Plan
+from roboirg.evaluation.plan.plan_maker import make_plan
 from roboirg.evaluation.plan.stored_plans import read_plan, write_plan
 from roboirg.evaluation.records.record import Job
 from roboirg.evaluation.records.record_codec import identity_key

@@ -148,7 +148,7 @@ def test_every_setting_begins_in_many_ways(setting):
 @pytest.mark.parametrize("episodes", slow_but([3], [3, 12]))
 def test_every_split_is_valid_in_the_words_of_either_pool(task, pool, episodes):
     for split in ("train", "test"):
-        found = validate_batch(Batch(task, split, 0, episodes, wordings=pool))
+        found = validate_batch(Batch(task, split, 0, episodes, wordings_file=pool))
         assert not found.failures
         # With a rival, too, where there is one.
         assert 2 * episodes <= found.texts[task, "direct"] <= 4 * episodes

@@ -103,7 +103,7 @@ def test_videos_forbid_nothing_and_show_what_the_past_says(task, difficulty):
     for scene in scenes(task, difficulty):
         stages = task.demonstration(scene)
         assert not any(stage.forbids for stage in stages)
-        assert [stage.recorded for stage in stages] == [True] * (len(stages) - 1) + [False]
+        assert [stage.in_video for stage in stages] == [True] * (len(stages) - 1) + [False]
         assert stages[-1].expects == Fact("home", "robot")
         expected = iter(stage.expects for stage in stages)
         assert all(fact in expected for fact in scene.past)

@@ -17,7 +17,7 @@ def known_tasks(text: str, wordings: str | None = None) -> tuple[str, ...]:
         UnknownNameError: one of them does not exist.
     """
     from roboirg.core.word_pools import POOLS
-    from roboirg.evaluation.plan.plan_parsing import means_all, parse_names
+    from roboirg.evaluation.plan.option_parsing import means_all, parse_names
     from roboirg.language.wordings.wording_store import find_wordings
     from roboirg.tasks import find_tasks
 
@@ -33,7 +33,7 @@ def known_settings(text: str) -> tuple[str, ...]:
     Raises:
         UnknownNameError: one of them does not exist.
     """
-    from roboirg.evaluation.plan.plan_parsing import means_all
+    from roboirg.evaluation.plan.option_parsing import means_all
     from roboirg.language import plain_settings, setting_names
 
     return plain_settings() if means_all(text) else known_names("setting", text, setting_names())
@@ -57,7 +57,7 @@ def known_names(kind: str, text: str, known: Sequence[Name]) -> tuple[Name, ...]
     Raises:
         UnknownNameError: one of them is not known.
     """
-    from roboirg.evaluation.plan.plan_parsing import means_all, parse_names
+    from roboirg.evaluation.plan.option_parsing import means_all, parse_names
 
     if means_all(text):
         return tuple(known)

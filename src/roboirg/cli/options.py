@@ -7,11 +7,11 @@ import inspect
 import sys
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, get_type_hints
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, get_origin, get_type_hints
 
 import typer
 
-from roboirg.core.errors import InvalidValueError
+from roboirg.core.errors import InvalidValueError, UnknownNameError
 
 if TYPE_CHECKING:
     from roboirg.core.instruction_options import InstructionOptions
@@ -48,7 +48,8 @@ class OptionGroup:
     @classmethod
     def types(cls) -> dict[str, Any]:
         """Return the annotation of each option."""
-        return get_type_hints(cls, include_extras=True)
+        found = get_type_hints(cls, include_extras=True)
+        return {name: kind for name, kind in found.items() if get_origin(kind) is not ClassVar}
 
     def typed(self) -> dict[str, Any]:
         """Return those that were typed, by name."""
@@ -92,9 +93,15 @@ SELECTION = ("tasks", "split", "episodes", "settings")
 
 
 class PlanWords(OptionGroup):
-    """The options of instructions, as a plan gives them."""
+    """The options of instructions, as a plan gives them.
+
+    The class of a command may name a section of the plan's file, and what this may have: choices
+    of its own for which the command has no options.
+    """
 
     plan: PlanName
+    section: ClassVar[str] = ""
+    own: ClassVar[Sequence[str]] = ()
 
     @functools.cached_property
     def fields(self) -> dict[str, Any]:
@@ -102,7 +109,31 @@ class PlanWords(OptionGroup):
         from roboirg.evaluation.plan.plan_file import read_plan_file
 
         name = self._given.get("plan")
-        return {} if name is None else read_plan_file(name)
+        return {} if name is None else read_plan_file(name, self.section)
+
+    def choices(self, kind: type) -> dict[str, Any]:
+        """Return what the plan's section gives, each a field of this class.
+
+        Raises:
+            UnknownNameError: a key is none of its own.
+            InvalidValueError: a value is not of the field's type.
+        """
+        from roboirg.evaluation.plan.plan_maker import as_typed_field
+
+        given = self.fields.get(self.section) or {}
+        if not isinstance(given, Mapping):
+            raise InvalidValueError(
+                f"{self.section} of the plan is {given!r}; it must be a mapping such as "
+                f"'{self.own[0]}: …'."
+            )
+        for name in given:
+            if name not in self.own:
+                raise UnknownNameError(f"key of {self.section} in the plan", str(name), self.own)
+        types = get_type_hints(kind, include_extras=True)
+        return {
+            name: as_typed_field(f"{self.section}.{name}", types[name], value)
+            for name, value in given.items()
+        }
 
     @property
     def words(self) -> dict[str, Any]:
@@ -113,7 +144,7 @@ class PlanWords(OptionGroup):
         return {name: self.fields[name] for name in names if name in self.fields}
 
     @property
-    def file(self) -> str | None:
+    def wordings_file(self) -> str | None:
         """The wording file or the name of a pool."""
         return self.fields.get("wordings")
 

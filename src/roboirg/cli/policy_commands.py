@@ -31,7 +31,6 @@ class ProtocolHelpCommand(TyperCommand):
     """A command whose help lists the protocols; they are imported only for that."""
 
     def get_help(self, ctx: Any) -> str:  # noqa: ANN401 - typer does not export its base class
-        """Return the help text."""
         from roboirg.policies.by_name.policy_classes import url_schemes
         from roboirg.policies.remote.protocols import protocols_by_scheme
 

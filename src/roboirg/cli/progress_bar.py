@@ -17,7 +17,7 @@ def progress_bar(words: str) -> Iterator[Callable[[int, int], None]]:
     """Show a bar while the block runs, if stderr is a terminal.
 
     Yields:
-        A function to tell how many are done, and how many there are.
+        A function that takes how many are done, and how many there are.
     """
     with progress_bars(has_lines=False) as report:
         yield lambda done, total: report(words, done, total, "")
@@ -25,13 +25,14 @@ def progress_bar(words: str) -> Iterator[Callable[[int, int], None]]:
 
 @contextmanager
 def progress_bars(*, has_lines: bool = True) -> Iterator[Callable[[str, int, int, str], None]]:
-    """Show a bar for each stage of the work while the block runs.
+    """Show a bar for each kind of work while the block runs.
 
     Args:
-        has_lines: whether lines tell the progress and the time left if stderr is no terminal.
+        has_lines: whether to print the progress and the time left where stderr is no terminal.
 
     Yields:
-        A function to tell a stage, how many of it are done, how many there are, and a remark.
+        A function that takes a kind of work, how much of it is done, how much there is, and a
+        remark.
     """
     from rich.progress import (
         BarColumn,
@@ -58,19 +59,19 @@ def progress_bars(*, has_lines: bool = True) -> Iterator[Callable[[str, int, int
     ) as bar:
         bars = {}
 
-        def report(stage: str, done: int, total: int, remark: str) -> None:
+        def report(work: str, done: int, total: int, remark: str) -> None:
             nonlocal last_line
-            if stage not in bars:
-                bars[stage] = bar.add_task(stage, total=total, remark="")
-                started[stage] = time.monotonic(), done
-            bar.update(bars[stage], completed=done, total=total, remark=remark)
+            if work not in bars:
+                bars[work] = bar.add_task(work, total=total, remark="")
+                started[work] = time.monotonic(), done
+            bar.update(bars[work], completed=done, total=total, remark=remark)
             now = time.monotonic()
             if console.is_terminal or not has_lines:
                 return
             if now - last_line > LINE_EVERY_S or done == total:
                 last_line = now
-                left = _time_left(now, *started[stage], done, total)
-                console.print(f"{stage} {done}/{total} {left} {remark}".rstrip(), highlight=False)
+                left = _time_left(now, *started[work], done, total)
+                console.print(f"{work} {done}/{total} {left} {remark}".rstrip(), highlight=False)
 
         yield report
 

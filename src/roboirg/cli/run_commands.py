@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from roboirg.cli import plan_options as options
+from roboirg.cli import run_options as options
 from roboirg.cli.options import Workers, add_working_directory, spread
 from roboirg.core.errors import InvalidValueError, UnknownNameError
 from roboirg.core.plain_text import counted, printable, verb_for
@@ -34,8 +34,8 @@ PlanName = Annotated[
     str | None,
     typer.Option(
         "--plan",
-        help="YAML file or a run's plan.json; or challenge, paper, paper-context, paper-planners, "
-        "robomme or quick.",
+        help="YAML file or a run's plan.json; or challenge, demo, paper, paper-context, "
+        "paper-planners, robomme or quick.",
         rich_help_panel=options.EPISODES,
     ),
 ]

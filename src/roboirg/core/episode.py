@@ -58,7 +58,7 @@ class SceneObject:
             table, a ``tape`` a roll of adhesive tape that lies flat.
         position: of the object's origin, world frame, meters.
         yaw: rotation about the vertical, radians.
-        color: of a cube, box or tape; None for objects whose color tells nothing.
+        color: of a cube, box or tape; None for objects whose color means nothing.
         inside: name of the container that stands over this (hidden) cube, else None.
         radius: of a target, site or marker, meters; None for the other kinds.
         thickness: of a target, meters; None for the usual 0.005.
@@ -227,7 +227,7 @@ class Stage:
         points_at: the object whose pixel the grounded form names; None if it has no slot.
         lasting: control steps for which `expects` has to hold before the stage is complete.
         timer: name of the timer that the stage's first evaluation starts, unless it runs already.
-        recorded: whether the stage is in the video, if it is part of the demonstration.
+        in_video: whether the video shows the stage, if it is part of the demonstration.
     """
 
     expects: Condition
@@ -237,7 +237,7 @@ class Stage:
     points_at: str | None = None
     lasting: int = 0
     timer: str | None = None
-    recorded: bool = True
+    in_video: bool = True
 
 
 def episode_key(task: str, split: Split, index: int) -> str:

@@ -36,7 +36,7 @@ _queued = [0.0]
 
 @contextlib.contextmanager
 def waiting(what: str, *, is_queue: bool = False) -> Iterator[None]:
-    """Tell what this process waits for while the block runs, in words to follow "waiting for".
+    """Report what this process waits for while the block runs, in words to follow "waiting for".
 
     `is_queue`: it waits for its turn, which is not the policy's own time.
     """
@@ -53,7 +53,7 @@ def waiting(what: str, *, is_queue: bool = False) -> Iterator[None]:
 
 
 def listen(listener: WaitListener) -> None:
-    """Tell a listener, from now on, of all waits that begin and end in this process."""
+    """Report to a listener, from now on, all waits that begin and end in this process."""
     _listeners.append(listener)
 
 

@@ -81,12 +81,7 @@ class EnvSettings:
         return split_size(self.split)
 
     def observation_spec(self) -> ObservationSpec:
-        """Return the fields of observations and of the video.
-
-        Raises:
-            UnknownNameError: a camera or kind of meshes does not exist.
-            InvalidValueError: a value is invalid.
-        """
+        """Return the fields of observations and of the video."""
         return ObservationSpec(
             self.cameras,
             self.depth,
@@ -109,12 +104,7 @@ class EnvSettings:
         return replace(self, **_nested(self.words, options))
 
     def find_episode(self, task: str | Episode, index: int) -> Episode:
-        """Return the episode to play: number `index`, or `task` itself if it is an episode.
-
-        Raises:
-            UnknownNameError: there is no such task or split.
-            InvalidValueError: the split has no episode of that number.
-        """
+        """Return the episode to play: number `index`, or `task` itself if it is an episode."""
         return task if isinstance(task, Episode) else get_episode(task, self.split, index)
 
 
@@ -134,9 +124,6 @@ def choose_index(settings: EnvSettings, seed: int | None, last: int | None) -> i
         settings: of the reset. If they name an episode, it is that one.
         seed: of the reset. Without a named episode, ``seed % episodes`` is played.
         last: the episode played before; without a seed, the next one is played, from 0 on.
-
-    Raises:
-        UnknownNameError: there is no such split.
     """
     if settings.episode is not None:
         return settings.episode

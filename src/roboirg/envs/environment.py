@@ -37,6 +37,7 @@ COMPLETED = "All tasks completed"
 """The subgoal after the last stage."""
 
 FrameHook = Callable[["RoboIRGEnv", bool], None]
+"""Called with the environment, and with whether the step belongs to the demonstration."""
 
 
 class RoboIRGEnv(gymnasium.Env[dict[str, Any], NDArray[np.floating[Any]]]):
@@ -90,7 +91,9 @@ class RoboIRGEnv(gymnasium.Env[dict[str, Any], NDArray[np.floating[Any]]]):
     def __init__(self, task: str | Episode, **options: Unpack[EnvOptions]) -> None:
         self._task, self._settings = task, EnvSettings.of(options)
         self._last_index: int | None = None
-        self._instructed: tuple[tuple[Episode, InstructionOptions], Instruction] | None = None
+        self._instructed: tuple[Episode, InstructionOptions] | None = None
+        self.episode: Episode
+        self.instruction: Instruction
         self._select_episode(self._settings, choose_index(self._settings, None, None))
         self._space = find_action_space(self._settings.actions)
         self._spec = self._settings.observation_spec()
@@ -301,11 +304,11 @@ class RoboIRGEnv(gymnasium.Env[dict[str, Any], NDArray[np.floating[Any]]]):
         self._last_index = self.episode.index
 
     def _select_episode(self, settings: EnvSettings, index: int) -> None:
-        chosen = settings.find_episode(self._task, index), settings.words
-        if self._instructed is None or self._instructed[0] != chosen:
-            self._instructed = chosen, instruct_with(*chosen)
-        (self.episode, _), self.instruction = self._instructed
-        self.delivery = settings.words.delivery
+        episode, words = settings.find_episode(self._task, index), settings.words
+        if self._instructed != (episode, words):
+            self.instruction = instruct_with(episode, words)
+            self._instructed = episode, words
+        self.episode, self.delivery = episode, words.delivery
 
     def _play_demonstration(self, recording: Recording | None) -> Recording:
         """Start the episode and play its demonstration."""
@@ -401,6 +404,6 @@ class RoboIRGEnv(gymnasium.Env[dict[str, Any], NDArray[np.floating[Any]]]):
 def _shipped_recording(episode: Episode) -> Recording | None:
     """Return RoboMME's recording of the demonstration; None if there is none."""
     slot = (episode.task, episode.split, episode.index)
-    if not episode.recorded or not is_recorded(*slot):
+    if not episode.recorded or not is_recorded(*slot):  # episodes can be made by hand
         return None
     return Recording(*recorded_actions(*slot), end="")

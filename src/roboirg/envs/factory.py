@@ -87,10 +87,6 @@ def make_vec(
 
 
 def check_simulator() -> None:
-    """Check that what playing episodes needs is installed.
-
-    Raises:
-        MissingDependencyError: it is not.
-    """
+    """Check that what playing episodes needs is installed."""
     with extra_needed("Playing episodes needs the simulator", "sim"):
         importlib.import_module("roboirg.envs.environment")

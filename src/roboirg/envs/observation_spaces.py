@@ -72,7 +72,6 @@ def _read(space: InstructionSpace, block: Any, n: int = 1) -> _TextView:  # noqa
 
 
 def make_observation_space(spec: ObservationSpec) -> spaces.Dict:
-    """Return the space of the observations of an environment."""
     instruction = InstructionSpace()
     fields: dict[str, spaces.Space[Any]] = {**_spaces(spec), "instruction": instruction}
     if spec.observe_every is not None:

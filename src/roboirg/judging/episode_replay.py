@@ -51,7 +51,6 @@ class EpisodeReplay:
 
     @property
     def last_step(self) -> int:
-        """The last step."""
         return len(self.facts) - 1
 
     @property

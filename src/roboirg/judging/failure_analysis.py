@@ -69,7 +69,7 @@ def attribute_failure(
         cause: the recorded cause. If the events violate no rule and the policy did not time out,
             the environment ended the episode: the arm could not reach a pose.
         mirrored: for each object that the instruction means, those that it would mean with left
-            and right exchanged (`roboirg.language.mirrored_objects`); None tells no mirrored picks.
+            and right exchanged (`roboirg.language.mirrored_objects`); None finds no mirrored picks.
     """
     replay = rejudge(episode, events, policy_start_step, elapsed_steps)
     ended = timed_out or cause is not None
@@ -152,7 +152,6 @@ def _wasted_occurrences(replay: EpisodeReplay, rule: Rule) -> Iterator[_Deviatio
 
 
 def _completes_stage(replay: EpisodeReplay, interval: FactInterval) -> bool:
-    """Return whether an interval completes a stage."""
     end = replay.last_step + 1 if interval.end is None else interval.end
     return any(
         interval.start <= step < end and replay.stages[stage].expects == interval.fact

@@ -1,4 +1,9 @@
-"""The request to put an episode into words, and what a setting returns for it."""
+"""The request to put an episode into words, and what a setting returns for it.
+
+The command's words are ours, or "from outside": those of a wording file, such as RoboMME's. In
+words from outside the phrase of a field has a core that names the value, and words around it: *the
+container hiding* **the red cube**. A referring expression replaces the core; the rest stays.
+"""
 
 from __future__ import annotations
 
@@ -155,18 +160,27 @@ class InstructionRequest:
         return self.wordings.phrase(self.episode.goal, field, self.phrases_of)
 
     def around(self, field: str, words: Phrase) -> Phrase:
-        """Return words for a field between those from outside that stay, if there are any."""
+        """Return words for a field between the words from outside that stay around it.
+
+        *That one* becomes *the container hiding that one*.
+        """
         outside = self.outside_phrase(field)
         if outside is None:
             return words
         return (*plain(outside.before), *words, *plain(outside.after))
 
     def _names_thing(self, outside: StatedPhrase | None) -> bool:
-        """Return whether the replaced words name the object to handle, not just its cube."""
+        """Return whether the core that is replaced names the object to handle.
+
+        It may name the cube in it instead: *the red cube* in *the container hiding the red cube*.
+        """
         return outside is None or self.task.commands.thing in outside.core
 
     def by_color(self, color: GoalValue, cube: Phrase) -> Phrase:
-        """Return words for the object to handle, given words for its cube."""
+        """Return words for the object to handle, given words for its cube: *that one*.
+
+        Where a container is handled, they become *the container over that one*.
+        """
         if self._names_thing(self.outside_phrase(color.field)):
             cube = fill(self.task.commands.by_color, {"cube": cube})
         return self.around(color.field, cube)
@@ -208,6 +222,8 @@ class InstructionRequest:
     def command(self, fields: Mapping[str, Phrase]) -> Phrase:
         """Fill the task's command, which has the same wording in all settings.
 
+        `fields` are words for fields. In words from outside, the other fields state their values.
+
         Raises:
             NoCommandError: the words from outside have no command for these fields.
         """
@@ -219,6 +235,10 @@ class InstructionRequest:
         return fill(self.sampler.pick(f"command-{handled}", possible).text, fields)
 
     def _outside_command(self, wordings: TaskWordings, fields: Mapping[str, Phrase]) -> Phrase:
+        """Fill the first command from outside that leaves room for the words that replace its own.
+
+        Words for a field that equal those that state its value replace nothing.
+        """
         goal = self.episode.goal
         names = goal_fields(goal)
         stated = {name: self.outside_stated(name) for name in names}
@@ -234,7 +254,10 @@ class InstructionRequest:
         return swap_particles(fill(command.text, words))
 
     def outside_stated(self, field: str) -> Phrase:
-        """Return the words from outside for a field, with the value that they name."""
+        """Return the words from outside that state a field's value, as a mention of it.
+
+        In `AMOUNT_FIELD` the words before the core are the count, and the core is the color.
+        """
         phrase = self.outside_phrase(field)
         if phrase is None:
             return ()

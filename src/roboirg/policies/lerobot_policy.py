@@ -102,10 +102,6 @@ class LeRobotPolicy:
     Args:
         url: path or hub id, and options.
         seed: unused; each episode has its own.
-
-    Raises:
-        UnknownNameError: the URL has an unknown option.
-        InvalidValueError: an option has a wrong value.
     """
 
     cameras: ClassVar[tuple[str, ...]] = CAMERAS
@@ -139,6 +135,7 @@ class LeRobotPolicy:
         model = load(self.place, self.options.device).model
         before = dict(vars(model))
         model.reset()
+        # What the reset replaced, such as a queue of actions, belongs to the episode.
         own = {name: one for name, one in vars(model).items() if before.get(name) is not one}
         return CheckpointEpisode(seed, own)
 
@@ -169,19 +166,21 @@ class LeRobotPolicy:
         import torch
 
         loaded, count = load(self.place, self.options.device), len(states)
+        missing = size - count
         seeds = [state.next_seed() for state in states]
-        padded = [*observations, *[observations[-1]] * (size - count)]
-        batch = loaded.before(self._batch(padded))
+        batch = loaded.before(self._batch([*observations, *[observations[-1]] * missing]))
         options = {}
         if loaded.noise is None or size == 1:
             torch.manual_seed(seeds[0])
         else:
             noise = [
                 torch.randn(loaded.noise, generator=torch.Generator().manual_seed(seed))
-                for seed in [*seeds, *[seeds[-1]] * (size - count)]
+                for seed in [*seeds, *[seeds[-1]] * missing]
             ]
             options["noise"] = torch.stack(noise).to(self.options.device)
-        model, memory = loaded.model, states[0].memory if size == 1 else {}
+        model = loaded.model
+        # Asked about several episodes at once, the model remembers none of them.
+        memory = states[0].memory if size == 1 else {}
         vars(model).update(memory)
         try:
             rows = model.predict_action_chunk(batch, **options)

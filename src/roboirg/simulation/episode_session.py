@@ -77,7 +77,7 @@ class EpisodeSession:
             stage = self.episode.demonstration[step.stage]
             self.step(step.action)
             executed.append(step)
-            if stage.recorded:
+            if stage.in_video:
                 after_step(stage)
         if self.judge.index < len(self.episode.demonstration):
             raise MotionPlanningError(

@@ -56,8 +56,8 @@ class Recording:
 
     def video_actions(self, episode: Episode) -> NDArray[np.float64]:
         """Return the actions (T, 8) of the steps in the episode's video."""
-        recorded = np.array([stage.recorded for stage in episode.demonstration], dtype=bool)
-        return self.actions[recorded[self.stages]] if len(recorded) else self.actions[:0]
+        in_video = np.array([stage.in_video for stage in episode.demonstration], dtype=bool)
+        return self.actions[in_video[self.stages]] if len(in_video) else self.actions[:0]
 
     def video_length(self, episode: Episode) -> int:
         """Return the number of steps in the episode's video."""

@@ -2,7 +2,7 @@
 
 Three suites are the benchmark. The suite ``real`` holds the simulated twins of the real-robot
 tasks. Installed packages add tasks, in suites of their own, through entry points of the group
-``roboirg.tasks``. Tasks outside the benchmark are played, told and judged like all others, but
+``roboirg.tasks``. Tasks outside the benchmark are played, worded and judged like all others, but
 only on request: by name or by suite.
 """
 
@@ -18,7 +18,16 @@ from roboirg.core.errors import InvalidValueError, UnknownNameError
 from roboirg.tasks.task import Task
 from roboirg.util.discovery import discover, discover_in_modules
 
-__all__ = ["Task", "all_suites", "all_tasks", "every_task", "find_tasks", "get_task", "with_goal"]
+__all__ = [
+    "Task",
+    "all_suites",
+    "all_tasks",
+    "every_task",
+    "find_tasks",
+    "get_task",
+    "goals_of",
+    "with_goal",
+]
 
 ALL = "all"
 """Stands for all tasks of the benchmark wherever tasks are named."""
@@ -61,6 +70,11 @@ def find_tasks(words: Iterable[str]) -> tuple[str, ...]:
     """
     in_turn = sorted(words, key=lambda word: word.lower() != ALL)
     return tuple(dict.fromkeys(name for word in in_turn for name in _expand(word)))
+
+
+def goals_of(episode: Episode) -> tuple[Goal, ...]:
+    """Return all goals that the episode's scene allows."""
+    return get_task(episode.task).goals(episode.scene)
 
 
 def with_goal(episode: Episode, goal: Goal) -> Episode:

@@ -13,7 +13,7 @@ from roboirg.core.errors import InvalidValueError
 
 @contextlib.contextmanager
 def replacing(path: Path) -> Iterator[Path]:
-    """Yield a path beside `path` to write to; the file replaces `path` when the block ends.
+    """Yield a path next to `path` to write to; the file replaces `path` when the block ends.
 
     If the block raises, the partial file is removed and `path` stays as it was. Readers see the
     old or the new content, never a part, and the content is on the disk before the name is.

@@ -161,7 +161,7 @@ class ChildProcess:
         return None if code is None else ChildExit(code)
 
     def send(self, message: Any) -> None:  # noqa: ANN401
-        """Send a message; if the child is dead, the next `receive` tells."""
+        """Send a message; if the child is dead, the next `receive` raises."""
         with contextlib.suppress(OSError):
             self.connection.send(message)
 

@@ -47,7 +47,7 @@ def save_figure(
         name: of the files, without extension.
         formats: extensions, of ``png``, ``svg`` and ``pdf``.
         dots_per_inch: of pixel formats.
-        style: matplotlib's settings, beside fonts and reproducible ids.
+        style: matplotlib's settings, besides fonts and reproducible ids.
 
     Returns:
         The files.

@@ -12,7 +12,7 @@ from roboirg.apps.demonstrations.parquet_tables import (
     write_rows,
 )
 from roboirg.apps.demonstrations.picture_coding import VideoEncoder, encode_png
-from roboirg.apps.real.study.plan_csv import demonstrations_csv
+from roboirg.apps.real.study.study_csv import demonstrations_csv
 from roboirg.apps.real.study.study_plan import make_study
 from roboirg.util.atomic_write import write_atomically
 

@@ -9,6 +9,12 @@ from roboirg import main as cli
 from roboirg.apps.demonstrations import dataset_replay
 from roboirg.apps.demonstrations.dataset_replay import ReplayResult
 
+
+def within(**choices):
+    """Return words with a plan that has these choices of an export."""
+    return "--plan", plan_file(demonstrations=choices)
+
+
 FEW = ("--tasks", "PickXtimes", "--episodes", "2", "--settings", "explicit,direct")
 
 
@@ -34,6 +40,14 @@ def test_a_dry_run_says_how_big_it_gets_and_writes_nothing(roboirg, tmp_path):
     assert not (tmp_path / "data").exists()
 
 
+def test_a_plan_has_what_is_rare(roboirg, tmp_path):
+    more = within(video="prefix", variations=3, outcomes="all", extra_actions=["delta"])
+    words = ("export", "demonstrations", *FEW, *more, "--dry-run", "--out", tmp_path / "data")
+    code, _, err = roboirg(*words)
+    assert code == 0
+    assert "6 trajectories, 12 episodes" in err
+
+
 def test_an_export_tells_its_progress_and_its_end(roboirg, tmp_path, synthetic):
     root = tmp_path / "data"
     words = ("export", "demonstrations", *FEW, "--workers", "0", "--out", root)
@@ -54,13 +68,23 @@ def test_an_export_tells_its_progress_and_its_end(roboirg, tmp_path, synthetic):
     [
         (("--format", "lerobot-v2"), "There is no format 'lerobot-v2'; known: lerobot-v3,"),
         (("--pictures", "jpeg"), "There is no way to store pictures 'jpeg'"),
-        (("--video", "first"), "There is no way to treat the video 'first'"),
+        (within(video="first"), "demonstrations.video is 'first': Input should be 'none', 'pref"),
         (("--settings", "indirect"), "There is no setting 'indirect'"),
         (("--split", "training"), "There is no split 'training'"),
         (("--split", "random", "--episodes", "all"), "say how many with --episodes"),
         (("--episodes", "101"), "There is no episode 100"),
-        (("--actions", "tool"), "There is no description of actions 'tool'"),
-        (("--policy", "oracel"), "Did you mean 'oracle'?"),
+        (within(extra_actions=["tool"]), "demonstrations.extra_actions is ['tool']: Input should"),
+        (within(policy="oracel"), "Did you mean 'oracle'?"),
+        (
+            within(variations="two"),
+            "variations is 'two': Input should be a valid int",
+        ),
+        (within(variation=2), "Did you mean 'variations'?"),
+        (
+            ("--plan", plan_file(demonstrations=3)),
+            "demonstrations of the plan is 3; it must",
+        ),
+        (("--plan", plan_file(listening={})), "There is no plan key"),
         (("--plan", plan_file(forms="literal")), "There is no form 'literal'"),
     ],
 )

@@ -216,10 +216,10 @@ def test_what_a_variant_does_not_get_changes_nothing(torch):
 
 @pytest.mark.sim
 def test_the_study_writes_every_listener_a_table_and_a_figure(torch, tmp_path):
-    words = "learn listener --study --scenes 0 --epochs 2"
-    done = CliRunner().invoke(
-        app, [*words.split(), "--plan", plan_file(tasks="StopCube"), "--out", str(tmp_path)]
-    )
+    short = {"scenes": 0, "detector_epochs": 1, "reader_epochs": 2}
+    plan = plan_file(tasks="StopCube", training=short)
+    words = ["learn", "listener", "--study", "--plan", plan, "--out", str(tmp_path)]
+    done = CliRunner().invoke(app, words)
     assert done.exit_code == 0, done.output
     names = {one.name for one in tmp_path.glob("*.pt")}
     assert names == {f"{variant.name}.pt" for variant in VARIANTS}

@@ -22,7 +22,7 @@ from roboirg.apps.real.study.counterbalancing import (
     read_arrangement,
 )
 from roboirg.apps.real.study.failure_choices import failure_choices
-from roboirg.apps.real.study.plan_csv import demonstrations_csv, trials_csv
+from roboirg.apps.real.study.study_csv import demonstrations_csv, trials_csv
 from roboirg.apps.real.study.study_plan import StudyPlan, make_study, read_study, write_study
 from roboirg.apps.real.study.study_run import Study
 from roboirg.core.errors import InvalidValueError, UnknownNameError

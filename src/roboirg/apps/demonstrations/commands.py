@@ -9,7 +9,6 @@ import typer
 
 from roboirg.cli.export_commands import export_app
 from roboirg.cli.options import (
-    NO_PLAN,
     PlanWords,
     Settings,
     Split,
@@ -24,6 +23,18 @@ if TYPE_CHECKING:
     from roboirg.apps.demonstrations.export_plan import ExportPlan
 
 
+class ExportWords(PlanWords):
+    """A plan with words, and what is rare in an export."""
+
+    section = "demonstrations"
+    own = (
+        "video", "names", "extra_actions", "variations", "policy", "outcomes", "language_columns",
+    )  # fmt: skip
+
+
+NO_WORDS = ExportWords()
+
+
 @spread
 def export_demonstrations(
     out: Annotated[Path, typer.Option(help="Folder of the data set.")],
@@ -36,37 +47,10 @@ def export_demonstrations(
         str, typer.Option(help="all, 4 for the first four, or a list: 0,3,5-9.")
     ] = "all",
     settings: Settings = "all",
-    words: PlanWords = NO_PLAN,
+    words: ExportWords = NO_WORDS,
     pictures: Annotated[
         str, typer.Option(help="png, lossless-video, lossy-video or none.")
     ] = "png",
-    video: Annotated[
-        str | None,
-        typer.Option(
-            help="Frames of the video: none, prefix, or sidecar.  (none; of robomme-hdf5 prefix)"
-        ),
-    ] = None,
-    names: Annotated[
-        str | None,
-        typer.Option(help="Names of the features: lerobot or openpi.  (by format)"),
-    ] = None,
-    actions: Annotated[
-        str, typer.Option(help="Further descriptions of actions: delta, pose or both.")
-    ] = "none",
-    variations: Annotated[
-        int, typer.Option(help="Trajectories per episode; further ones vary.")
-    ] = 1,
-    policy: Annotated[
-        str, typer.Option(help="Who moves the robot; words change nothing for oracle.")
-    ] = "oracle",
-    outcomes: Annotated[str, typer.Option(help="successes or all.")] = "successes",
-    language_columns: Annotated[
-        bool,
-        typer.Option(
-            "--language-columns",
-            help="Add language columns, for LeRobot 0.6 or later.",
-        ),
-    ] = False,
     trajectories: Annotated[
         Path | None,
         typer.Option(help="Folder that keeps trajectories for further exports."),
@@ -76,7 +60,10 @@ def export_demonstrations(
         bool, typer.Option("--dry-run", help="Estimate the size and record nothing.")
     ] = False,
 ) -> None:
-    """Export demonstrations for training, recorded once per episode, told in every setting.
+    """Export demonstrations for training, recorded once per episode, in the words of every setting.
+
+    A plan may have, under `demonstrations`: video, names, extra_actions, variations, policy,
+    outcomes, language_columns.
 
     Example: roboirg export demonstrations --tasks PickXtimes --out data
     """
@@ -85,12 +72,15 @@ def export_demonstrations(
     from roboirg.apps.demonstrations.size_estimate import size_text
     from roboirg.cli.names import known_settings
     from roboirg.cli.progress_bar import progress_bars
-    from roboirg.evaluation.plan.plan_parsing import parse_episodes, parse_names
+    from roboirg.evaluation.plan.option_parsing import parse_episodes, parse_names
     from roboirg.policies import load_policy_class
     from roboirg.tasks import find_tasks
     from roboirg.util.processor import worker_count
 
-    load_policy_class(policy)
+    chosen = words.choices(ExportPlan)
+    load_policy_class(chosen.get("policy", ExportPlan.policy))
+    chosen.setdefault("video", _default_video(format))
+    chosen.setdefault("names", _default_names(format, pictures))
     # `validated` checks the names that are cast.
     names_of_tasks = find_tasks(parse_names("task", tasks))
     plan = ExportPlan(
@@ -102,13 +92,7 @@ def export_demonstrations(
         options=words.options(),
         format=cast("Any", format),
         pictures=cast("Any", pictures),
-        video=cast("Any", video or _default_video(format)),
-        names=cast("Any", names or _default_names(format, pictures)),
-        extra_actions=cast("Any", () if actions == "none" else parse_names("action", actions)),
-        variations=variations,
-        policy=policy,
-        outcomes=cast("Any", outcomes),
-        language_columns=language_columns,
+        **chosen,
     ).validated()
     _print_estimate(plan)
     if dry_run:
@@ -116,8 +100,8 @@ def export_demonstrations(
     count = worker_count(workers)
     with progress_bars() as show:
 
-        def report(stage: str, done: int, total: int, size: int) -> None:
-            show(stage, done, total, size_text(size) if size else "")
+        def report(work: str, done: int, total: int, size: int) -> None:
+            show(work, done, total, size_text(size) if size else "")
 
         summary = run_export(plan, out, count, report, trajectories)
     ends = ", ".join(f"{number} {status}" for status, number in summary.statuses.items())
@@ -168,13 +152,13 @@ def export_recordings(
     with progress_bars() as show:
         summary = export_recording(
             recorded, checked.takes, out, format, worker_count(None),
-            lambda stage, done, total, _: show(stage, done, total, ""),
+            lambda work, done, total, _: show(work, done, total, ""),
         )  # fmt: skip
     typer.echo(f"{counted(summary.episodes, 'episode')}, {size_text(summary.size)}: {out}")
 
 
 def _default_video(format_name: str) -> str:
-    """Return how the video is treated unless the user says so."""
+    """Return how the video is treated by default."""
     return "prefix" if format_name == "robomme-hdf5" else "none"
 
 

@@ -99,8 +99,9 @@ def _count_lines(
     yield ""
     words = ", ".join(plan.settings)
     yield (
-        f"Settings: {words}; forms: {', '.join(plan.forms)}. Each trajectory is told once in each "
-        "of them that can express it; `meta/demonstrations.parquet` says which episode is which."
+        f"Settings: {words}; forms: {', '.join(plan.forms)}. Each trajectory comes once with the "
+        "words of each of them that can express it; `meta/demonstrations.parquet` says which "
+        "episode is which."
     )
     ends = Counter(one.status for one in facts)
     yield f"Trajectories by outcome: {', '.join(f'{n} {status}' for status, n in ends.items())}."
@@ -122,7 +123,7 @@ def _content_lines(plan: ExportPlan, facts: Sequence[TrajectoryFacts]) -> Iterat
     if plan.video == "prefix":
         yield "Frames of the video come before the policy's, with `is_video_demo`."
     elif plan.video == "sidecar":
-        yield "Frames of the videos are in the data set `demonstration_videos` beside this one."
+        yield "Frames of the videos are in the data set `demonstration_videos` next to this one."
     else:
         yield "Frames of the videos are left out."
     if plan.pictures == "none":

@@ -21,7 +21,7 @@ CHUNK_SIZE = 1000
 
 
 class RecordedEpisode(NamedTuple):
-    """A trajectory and the instructions that are told with it.
+    """A trajectory and its instructions.
 
     Attributes:
         path: of the trajectory's file.
@@ -120,7 +120,7 @@ def read_episodes(
 
 
 def episode_row(trajectory: Trajectory, placed: PlacedText, length: int) -> dict[str, Any]:
-    """Return the row of an episode in the table of facts beside the data set."""
+    """Return the row of an episode in the table of facts next to the data set."""
     facts = trajectory.facts
     words = placed.words
     options = asdict(words.options) | {"stages": list(words.options.stages)}

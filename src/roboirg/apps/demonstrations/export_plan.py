@@ -53,7 +53,7 @@ class ExportPlan:
         options: all other options of the words.
         format: of the data set.
         pictures: how they are stored.
-        video: frames of the video: left out, before the policy's frames, or in a data set beside.
+        video: frames of the video: left out, before the policy's frames, or a data set apart.
         names: of the features: LeRobot's or openpi's.
         extra_actions: further descriptions of each action.
         variations: trajectories per episode; all but the first vary.
@@ -119,7 +119,7 @@ class ExportPlan:
         if self.video == "sidecar":
             raise InvalidValueError(
                 "The format 'robomme-hdf5' has the video's frames before the policy's: ask for "
-                "--video prefix, or none."
+                "`video: prefix`, or none."
             )
         if self.variations > 1:
             raise InvalidValueError(
@@ -168,7 +168,7 @@ class RecordingJob(NamedTuple):
         number: of the episode.
         variation: number of the variation.
         policy: who moves the robot.
-        options: what it is told; None for the oracle, whose way the words do not change.
+        options: of its instruction; None for the oracle, whose way the words do not change.
         spec: what the trajectory holds.
     """
 
@@ -182,12 +182,11 @@ class RecordingJob(NamedTuple):
 
     @property
     def episode(self) -> Episode:
-        """The episode."""
         return get_episode(self.task, self.split, self.number)
 
     @property
     def file_name(self) -> str:
-        """Name of the trajectory's file, which tells all that it depends on."""
+        """Name of the trajectory's file, with all that it depends on."""
         said = ""
         if self.options is not None:
             said = f"-{short_hash(self.policy)}-{self.options.setting}-{self.options.form}"

@@ -90,11 +90,7 @@ class ExportSummary(NamedTuple):
 
 
 def check_support(plan: ExportPlan) -> None:
-    """Check early that the plan's format can be written.
-
-    Raises:
-        MissingDependencyError: a package is not installed.
-    """
+    """Check early that the plan's format can be written."""
     check_parquet_support()
     if plan.format == "robomme-hdf5":
         check_hdf5_support()
@@ -114,7 +110,7 @@ def run_export(
         plan: what to export.
         out: folder of the data set, new or of the same plan.
         workers: processes; 0 uses this one.
-        report: told the progress.
+        report: called with the progress.
         trajectories: folder that keeps the recorded trajectories, for other formats and settings;
             None for one in `out` that is deleted at the end.
         source: of the trajectories; None to play the plan's episodes.
@@ -145,7 +141,7 @@ def run_export(
         ]
         if not kept:
             raise InvalidValueError(
-                f"None of the {len(jobs)} trajectories is a success; ask for --outcomes all."
+                f"None of the {len(jobs)} trajectories is a success; ask for `outcomes: all`."
             )
         datasets = _datasets(plan, out, kept)
         _write_parts(datasets, parts_folder, workers, report, keep=trajectories is not None)
@@ -216,7 +212,6 @@ def _record(
     workers: int,
     report: Report,
 ) -> None:
-    """Record the trajectories that are missing."""
     done, size = total - len(missing), folder_size(folder)
     report("record", done, total, size)
     for job, _ in parallel_map(record, missing, workers):
@@ -255,8 +250,9 @@ def _is_usable(
     facts = load_facts(path)
     if facts.environment_version != ENVIRONMENT_VERSION:
         return False
-    may_lack_pictures |= plan.pictures == "none"
-    return may_lack_pictures or has_pictures(path) or not _is_wanted(plan, facts)
+    if plan.pictures == "none" or not _is_wanted(plan, facts):
+        return True
+    return may_lack_pictures or has_pictures(path)
 
 
 def _is_wanted(plan: ExportPlan, facts: TrajectoryFacts) -> bool:

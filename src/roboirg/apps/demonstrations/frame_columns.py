@@ -60,7 +60,7 @@ class FrameColumns:
 
     Args:
         plan: what is exported.
-        is_video_part: whether this is the data set of the videos' frames, beside the main one.
+        is_video_part: whether this is the data set of the videos' frames, and not the main one.
     """
 
     plan: ExportPlan

@@ -35,7 +35,6 @@ def picture_column(pictures: Sequence[bytes]) -> Any:  # noqa: ANN401
 
 
 def text_column(texts: Sequence[str]) -> Any:  # noqa: ANN401
-    """Return texts as a column."""
     import pyarrow as pa
 
     return pa.array(texts, pa.string())
@@ -109,7 +108,6 @@ def write_rows(path: Path, rows: Sequence[Mapping[str, Any]]) -> None:
 
 
 def read_rows(path: Path) -> list[dict[str, Any]]:
-    """Return the rows of a table."""
     from pyarrow import parquet
 
     rows: list[dict[str, Any]] = parquet.read_table(path).to_pylist()

@@ -15,7 +15,7 @@ from roboirg.core.observations import Demonstration, Observation
 from roboirg.evaluation.records.action_log import read_actions
 from roboirg.evaluation.records.record import Record
 from roboirg.evaluation.records.store import read_records
-from roboirg.policies.by_name.policy_specs import Build, PolicyKind
+from roboirg.policies.by_name.policy_specs import PolicyKind, PolicyMaker
 
 if TYPE_CHECKING:
     from roboirg.envs.environment import RoboIRGEnv
@@ -101,7 +101,7 @@ def _joint_rows(env: RoboIRGEnv, folder: Path, digest: str) -> Iterator[NDArray[
         yield from controller.trajectories(row)
 
 
-def _recorded(spec: str, name: str, options: Mapping[str, str]) -> Build:
+def _recorded(spec: str, name: str, options: Mapping[str, str]) -> PolicyMaker:
     for option in options.keys() - {"policy"}:
         raise UnknownNameError("option of recorded:", option, ["policy"])
     if not name:

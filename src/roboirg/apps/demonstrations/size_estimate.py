@@ -49,11 +49,7 @@ class SizeEstimate(NamedTuple):
 
 
 def estimate_size(plan: ExportPlan) -> SizeEstimate:
-    """Estimate the size of an export from mean lengths and sizes of frames.
-
-    Raises:
-        InvalidValueError: no setting can express any of the episodes.
-    """
+    """Estimate the size of an export from mean lengths and sizes of frames."""
     jobs = recording_jobs(plan)
     frames = pictures = 0
     for job, said in jobs:

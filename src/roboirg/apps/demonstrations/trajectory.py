@@ -233,7 +233,6 @@ class PictureFile:
         return np.asarray(found).astype(np.int16)[..., None]
 
     def video(self, name: str) -> bytes:
-        """Return an encoded video."""
         return self._archive.read(name)
 
 

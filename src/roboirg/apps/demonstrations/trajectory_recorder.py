@@ -39,8 +39,6 @@ from roboirg.util.atomic_write import replacing
 if TYPE_CHECKING:
     from roboirg.envs.environment import RoboIRGEnv
 
-_VIDEO_PARTS = ("demonstration", "policy")
-
 
 class RecordingSpec(NamedTuple):
     """What a trajectory holds.
@@ -84,7 +82,9 @@ class PictureTracks:
             return
         self._count_last()
         self._uncounted = pictures, int(not is_video)
-        part = _VIDEO_PARTS[not is_video] if self._spec.is_video_apart else ""
+        part = ""
+        if self._spec.is_video_apart:
+            part = "demonstration" if is_video else "policy"
         for camera in CAMERAS:
             picture = pictures[f"{camera}_rgb"]
             if self._spec.coding == "png":
@@ -100,7 +100,10 @@ class PictureTracks:
         self._rows += 1
 
     def _count_last(self) -> None:
-        """Count the values of the row before; the last row of all is never counted."""
+        """Count the values of the row before.
+
+        The last row of all is never counted: no action follows it, so data sets leave it out.
+        """
         if self._uncounted is not None:
             pictures, part = self._uncounted
             for camera in CAMERAS:
@@ -143,7 +146,7 @@ def record_trajectory(
         policy: moves the robot, by joint angles.
         path: file to write.
         spec: what it holds.
-        options: what the policy is told; None for the explicit instruction.
+        options: of the instruction; None for the explicit instruction.
         policy_name: name of the policy.
         variation: number of the variation.
         only_successes: leave out the pictures of an episode that is no success.
@@ -344,6 +347,11 @@ def without_pixel(subgoal: str) -> str:
     return split_point(subgoal)[0]
 
 
+def _without_place(template: str) -> str:
+    """Return the simple form of a subgoal, such as ``pick up {at} the cube``."""
+    return template.replace("{at} ", "").replace(" {at}", "")
+
+
 def _with_pixels(templates: list[str], online: list[str]) -> list[str]:
     """Fill the pixels into subgoals, as the judge's view of the same subgoal found them.
 
@@ -355,6 +363,6 @@ def _with_pixels(templates: list[str], online: list[str]) -> list[str]:
     filled = []
     for template, due in zip(templates, online, strict=True):
         latest[without_pixel(due)] = due
-        simple = without_pixel(template.replace("{at} ", "").replace(" {at}", ""))
+        simple = without_pixel(_without_place(template))
         filled.append(latest.get(simple, simple))
     return filled

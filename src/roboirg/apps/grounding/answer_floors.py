@@ -21,7 +21,7 @@ from roboirg.shortcuts.command_chance import fitting_goals
 from roboirg.shortcuts.goal_learner import Heard
 from roboirg.shortcuts.shortcut_tables import learn_goals
 from roboirg.shortcuts.text_guess import TextGuess
-from roboirg.tasks import get_task
+from roboirg.tasks import goals_of
 from roboirg.tasks.splits.splits import get_episode
 
 ORACLE, CHANCE, COMMAND = "oracle", "chance", "command"
@@ -85,7 +85,7 @@ def _random_points(item: GroundingItem, rng: np.random.Generator) -> str:
 
 
 def _random_goal(_item: GroundingItem, episode: Episode, rng: np.random.Generator) -> Goal:
-    goals = get_task(episode.task).goals(episode.scene)
+    goals = goals_of(episode)
     return goals[int(rng.integers(len(goals)))]
 
 

@@ -10,7 +10,6 @@ import typer
 
 from roboirg.cli.export_commands import export_app
 from roboirg.cli.options import (
-    NO_PLAN,
     AnySplit,
     PlanWords,
     Settings,
@@ -34,22 +33,27 @@ def _score() -> None:
     pass
 
 
+class GroundingWords(PlanWords):
+    """A plan with words, and what is rare in an export."""
+
+    section = "grounding"
+    own = ("every_variant", "frames", "frames_every")
+
+
+NO_WORDS = GroundingWords()
+
+
 @spread
 def export_grounding(
     out: Annotated[Path, typer.Option(help="Folder for the dataset; continued if interrupted.")],
     split: AnySplit = "test",
     tasks: Tasks = "all",
     settings: Settings = "all",
-    words: PlanWords = NO_PLAN,
-    variants: Annotated[
-        bool, typer.Option(help="Add every combination of options that changes the words.")
-    ] = False,
-    frames: Annotated[int, typer.Option(min=1, help="Most frames of a video as pictures.")] = 16,
-    frames_every: Annotated[
-        int, typer.Option(min=1, help="Control steps between two frames of a video.")
-    ] = 8,
+    words: GroundingWords = NO_WORDS,
 ) -> None:
     """Export questions of grounding with pictures: Parquet, JSON lines, VLMEvalKit's TSV.
+
+    A plan may have, under `grounding`: every_variant, frames, frames_every.
 
     Example: roboirg export grounding --split val --out grounding
     """
@@ -60,7 +64,7 @@ def export_grounding(
         EpisodeName,
         ExportRequest,
     )
-    from roboirg.evaluation.plan.plan_parsing import parse_episodes, parse_splits
+    from roboirg.evaluation.plan.option_parsing import parse_episodes, parse_splits
     from roboirg.language.generator import check_options
     from roboirg.util.parquet_support import check_parquet_support
     from roboirg.util.processor import worker_count
@@ -78,10 +82,8 @@ def export_grounding(
         settings=known_settings(settings),
         forms=words.forms(),
         options=options,
-        every_variant=variants,
-        frames=frames,
-        frames_every=frames_every,
-        wordings=words.file,
+        wordings_file=words.wordings_file,
+        **words.choices(ExportRequest),
     )
     count = worker_count()
     with progress_bar("episodes") as progress:

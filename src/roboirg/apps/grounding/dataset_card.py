@@ -82,9 +82,6 @@ def write_card(folder: Path, facts: DatasetFacts, frames: int, every: int) -> No
         facts: what it holds.
         frames: maximum of the frames of a video.
         every: control steps between two frames.
-
-    Raises:
-        InvalidValueError: the file cannot be written.
     """
     write_atomically(folder / CARD, "\n".join(_lines(facts, frames, every)) + "\n")
 

@@ -34,10 +34,6 @@ def write_parquet(items: Sequence[GroundingItem], folder: Path, split: str) -> P
     """Write the items of a split with their pictures inside, for pandas and `datasets`.
 
     Pictures are columns of the type Image of `datasets`, which loads the file without options.
-
-    Raises:
-        MissingDependencyError: pyarrow is not installed.
-        InvalidValueError: the file cannot be written.
     """
     check_parquet_support()
     import pyarrow as pa
@@ -68,9 +64,6 @@ def write_tsv(items: Sequence[GroundingItem], folder: Path, split: str) -> Path:
     """Write the choice questions of a split as VLMEvalKit reads them.
 
     An item with the pictures of an earlier one names that one in their place, as the format allows.
-
-    Raises:
-        InvalidValueError: the file cannot be written.
     """
     questions = load_prompts("grounding_questions")
     path = folder / TSV_FOLDER / f"roboirg_grounding_{split}.tsv"

@@ -7,7 +7,7 @@
 | inspect | a log as JSON (``inspect log convert --to json``) | nothing; errors: events |
 | jsonl | lines ``{"task": ..., "episode": ..., "success": ...}`` | causes, events, errors, times |
 
-What a harness does not tell is named in ``policy_metadata["imported"]``, with the harness and the
+What a harness does not report is named in ``policy_metadata["imported"]``, with the harness and the
 file. Versions of words and environment are those of this package: import with the version that was
 played. Failures have no attribution, because without events it would be a guess.
 """
@@ -50,7 +50,7 @@ _ERRORS: Mapping[str, ErrorKind] = {
 }
 """vla-eval's reasons that are not due to the environment."""
 _FIELDS = (*Job.__struct_fields__, *OPTION_NAMES)
-"""What may be told of an episode, its instruction options included."""
+"""What may be reported of an episode, its instruction options included."""
 _NAMES = {"action_space": "actions"}
 """Parameters of our vla-eval class that have another name in jobs."""
 

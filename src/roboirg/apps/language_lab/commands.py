@@ -58,7 +58,7 @@ def export_instructions(
         check_export_support,
         write_rows,
     )
-    from roboirg.evaluation.plan.plan_parsing import parse_splits
+    from roboirg.evaluation.plan.option_parsing import parse_splits
     from roboirg.language import FORMS
     from roboirg.language.instruction_row import row
     from roboirg.language.variants import instructions
@@ -93,7 +93,7 @@ def stats(
     """
     from roboirg.apps.language_lab.statistics_tables import overview_tables
     from roboirg.evaluation.analysis.figures.expressions import write_figure
-    from roboirg.evaluation.plan.plan_parsing import parse_splits
+    from roboirg.evaluation.plan.option_parsing import parse_splits
     from roboirg.language import plain_settings
     from roboirg.language.variants import instructions
     from roboirg.tasks.splits.splits import split_episodes
@@ -133,7 +133,7 @@ def validate_instructions(
     """
     from roboirg.apps.language_lab.validation import ValidationResults, batches, validate
     from roboirg.apps.language_lab.validation.validation_tables import validation_tables
-    from roboirg.evaluation.plan.plan_parsing import parse_splits
+    from roboirg.evaluation.plan.option_parsing import parse_splits
     from roboirg.language.wordings.wording_store import open_wordings
     from roboirg.util.processor import worker_count
 
@@ -175,7 +175,7 @@ def score_shortcuts(
 
     Example: roboirg language shortcuts --settings reasoning --by pattern
     """
-    from roboirg.evaluation.plan.plan_parsing import parse_splits
+    from roboirg.evaluation.plan.option_parsing import parse_splits
     from roboirg.shortcuts.goal_learner import check_learning_support
     from roboirg.shortcuts.shortcut_tables import (
         GROUPINGS,

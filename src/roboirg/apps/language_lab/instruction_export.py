@@ -24,19 +24,12 @@ def encode(rows: Iterable[ExportRow], kind: ExportFormat) -> bytes:
     """Return the content of a file with the rows; the same rows give the same bytes.
 
     In Parquet, the bytes also depend on the version of pyarrow.
-
-    Raises:
-        MissingDependencyError: the format is Parquet, and pyarrow is not installed.
     """
     return _ENCODERS[kind](rows)
 
 
 def check_export_support(kind: ExportFormat) -> None:
-    """Check early that a format can be written.
-
-    Raises:
-        MissingDependencyError: the format is Parquet, and pyarrow is not installed.
-    """
+    """Check early that a format can be written."""
     if kind == "parquet":
         check_parquet_support()
 
@@ -86,10 +79,5 @@ _ENCODERS: Mapping[ExportFormat, Callable[[Iterable[ExportRow]], bytes]] = {
 
 
 def write_rows(rows: Iterable[ExportRow], path: Path, kind: ExportFormat) -> None:
-    """Write the rows to a file, atomically.
-
-    Raises:
-        MissingDependencyError: the format is Parquet, and pyarrow is not installed.
-        InvalidValueError: the file is not writable.
-    """
+    """Write the rows to a file, atomically."""
     write_atomically(path, encode(rows, kind))

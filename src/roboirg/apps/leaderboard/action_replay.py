@@ -54,12 +54,7 @@ class ReplayPolicy:
 
 
 def unplayed(record: Record) -> Record:
-    """Return the record of the same job before anything is played.
-
-    Raises:
-        InvalidValueError: there is no such episode, or the job's wording file is missing or has
-            changed.
-    """
+    """Return the record of the same job before anything is played."""
     return make_record(_job(record), _unknown_policy(), started_at=record.started_at)
 
 

@@ -32,7 +32,7 @@ class NamedEpisodes(NamedTuple):
 
     Attributes:
         keys: what identifies them, the policy's own choices left out.
-        in_robommes_words: whether they are told in RoboMME's words.
+        in_robommes_words: whether their instructions are RoboMME's.
     """
 
     keys: frozenset[object]

@@ -80,21 +80,12 @@ def read_packs(
 
 
 def write_board(runs: Sequence[PackedRun], out: Path) -> None:
-    """Write the page of packed runs.
-
-    Raises:
-        MissingDependencyError: Jinja is not installed.
-        InvalidValueError: the file cannot be written.
-    """
+    """Write the page of packed runs."""
     write_atomically(out, render_board(runs))
 
 
 def render_board(runs: Sequence[PackedRun]) -> str:
-    """Return the page of packed runs.
-
-    Raises:
-        MissingDependencyError: Jinja is not installed.
-    """
+    """Return the page of packed runs."""
     check_report_support()
     environment = template_environment("roboirg.apps.leaderboard")
     rows = board_rows(runs)

@@ -216,7 +216,9 @@ def _print_flips(episodes: tuple[RepeatedEpisode, ...]) -> None:
         typer.echo(f"{changed.slug}: {' then '.join(changed.outcomes)}{where}")
     for policy, (before, now) in dict.fromkeys((one.policy, one.arithmetic) for one in episodes):
         if before != now:
-            typer.echo(printable(f"{policy}: first {before or 'untold'}; then {now or 'untold'}."))
+            typer.echo(
+                printable(f"{policy}: first {before or 'unknown'}; then {now or 'unknown'}.")
+            )
         elif now:
             typer.echo(printable(f"{policy}: {now}, both times."))
     found = count_flips(episodes)

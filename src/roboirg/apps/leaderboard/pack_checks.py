@@ -1,4 +1,4 @@
-"""Verify packed runs, and remember the result beside them."""
+"""Verify packed runs, and remember the result next to them."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ def check_pack(path: Path, *, sample: float, workers: int) -> PackCheck | None:
     None if it has private episodes whose salt is not known.
 
     Args:
-        path: of the file; the result is kept in `CHECKS_FILE` beside it.
+        path: of the file; the result is kept in `CHECKS_FILE` next to it.
         sample: share of the episodes whose actions are played, 0 to 1.
         workers: number of processes; 0 uses this one only.
     """

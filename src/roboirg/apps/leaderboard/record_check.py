@@ -47,7 +47,7 @@ class ReplayVerdict(StrEnum):
     Attributes:
         EXACT: equal, bit for bit.
         TOLERANT: equal but for `TOLERANCE`, and the record is from a processor of another family,
-            or does not tell.
+            or does not report it.
         DIFFERENT: not equal.
         NOT_REPLAYED: not in the sample, or an error that kept no actions.
     """

@@ -32,8 +32,8 @@ class RepeatedEpisode(NamedTuple):
         slug: of the job.
         outcomes: success, failure or error, first and second.
         differs_at: index of the first action that differs; None if all are equal, or were not kept.
-        arithmetic: device, driver and flags that the policy's server told, first and second; empty
-            texts if it told none.
+        arithmetic: device, driver and flags that the policy's server reported, first and second;
+            empty texts if it reported none.
     """
 
     policy: str
@@ -92,11 +92,7 @@ def flips_by_cell(episodes: Sequence[RepeatedEpisode]) -> Flips:
 
 
 def write_flips(found: Flips, folder: Path) -> None:
-    """Keep in the folder of a run how often its policies' verdicts change.
-
-    Raises:
-        InvalidValueError: the file cannot be written.
-    """
+    """Keep in the folder of a run how often its policies' verdicts change."""
     rows = [
         {"policy": policy, "options": asdict(options), "counts": asdict(counts)}
         for (policy, options), counts in found.items()

@@ -177,7 +177,7 @@ def _holes_of_plan(entries: Iterable[Summary]) -> Iterator[str]:
 
 
 def _is_expressible(task: str, split: str, episode: int, options: InstructionOptions) -> bool:
-    """Return whether an episode exists and has words; what has none is told by its record."""
+    """Return whether an episode exists and has words; what has none is named by its record."""
     try:
         return find_refusal(get_episode(task, split, episode), options) is None
     except RoboIRGError:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from roboirg.cli.options import NO_PLAN, PlanWords, check_output_file, spread
+from roboirg.cli.options import PlanWords, check_output_file, spread
 from roboirg.core.errors import InvalidValueError
 from roboirg.core.plain_text import counted
 
@@ -19,6 +19,16 @@ if TYPE_CHECKING:
 
 learn_app = typer.Typer(no_args_is_help=True, help="Train a listener, and let it answer.")
 
+
+class TrainingWords(PlanWords):
+    """A plan with words, and what is rare in a training."""
+
+    section = "training"
+    own = ("scenes", "goals", "detector_epochs", "reader_epochs", "seed")
+
+
+NO_WORDS = TrainingWords()
+
 _Without = Annotated[
     str, typer.Option(help="What it does not get: none, pictures, video or words.")
 ]
@@ -28,14 +38,7 @@ _Without = Annotated[
 @spread
 def learn_listener(
     out: Annotated[Path, typer.Option(help="File for what it has learned; with --study a folder.")],
-    words: PlanWords = NO_PLAN,
-    scenes: Annotated[
-        int, typer.Option(min=0, help="Random scenes of each task beyond the train split.")
-    ] = 300,
-    epochs: Annotated[
-        int, typer.Option(min=2, help="Passes over the instructions; half as many over pictures.")
-    ] = 12,
-    seed: Annotated[int, typer.Option(help="Of initial weights and order.")] = 0,
+    words: TrainingWords = NO_WORDS,
     without: _Without = "none",
     study: Annotated[
         bool,
@@ -48,15 +51,15 @@ def learn_listener(
 ) -> None:
     """Train a listener on the train split: pictures with free labels, then instructions.
 
+    A plan may have, under `training`: scenes, goals, detector_epochs, reader_epochs, seed.
+
     Example: roboirg learn listener --out listener.pt
     """
     from roboirg.apps.learned_listener.learned_listener import check_learn_support
     from roboirg.util.processor import worker_count
 
     check_learn_support()
-    plan = _plan(words, without)._replace(
-        scenes=scenes, detector_epochs=epochs // 2, reader_epochs=epochs, seed=seed
-    )
+    plan = _plan(words, without)
     count = worker_count()
     if study:
         _run_study(plan, out, count)
@@ -112,7 +115,7 @@ def learned_answers(
     typer.echo(f"{counted(len(items), 'answer')}: {out}")
 
 
-def _plan(words: PlanWords, without: str) -> TrainingPlan:
+def _plan(words: TrainingWords, without: str) -> TrainingPlan:
     from roboirg.apps.learned_listener.learned_model import WITHOUTS
     from roboirg.apps.learned_listener.listener_training import TrainingPlan
     from roboirg.cli.names import known_name, known_settings, known_tasks
@@ -121,8 +124,9 @@ def _plan(words: PlanWords, without: str) -> TrainingPlan:
     return TrainingPlan(
         known_tasks(words.fields.get("tasks", "all")),
         known_settings(words.fields.get("settings", "all")),
-        words=known_name("pool of words", words.file or "train", POOLS),
+        words=known_name("pool of words", words.wordings_file or "train", POOLS),
         without=known_name("variant", without, WITHOUTS),
+        **words.choices(TrainingPlan),
     )
 
 
@@ -130,11 +134,11 @@ def _print_tenths() -> Callable[[str, int, int], None]:
     """Return a function that prints progress whenever another tenth is done."""
     shown: dict[str, int] = {}
 
-    def progress(stage: str, done: int, total: int) -> None:
+    def progress(work: str, done: int, total: int) -> None:
         tenth = 10 * done // total
-        if shown.get(stage) != tenth:
-            shown[stage] = tenth
-            typer.echo(f"{stage}: {done} of {total}", err=True)
+        if shown.get(work) != tenth:
+            shown[work] = tenth
+            typer.echo(f"{work}: {done} of {total}", err=True)
 
     return progress
 

@@ -28,9 +28,6 @@ def learned_answers(
         model: the listener.
         items: of the dataset.
         folder: of the dataset.
-
-    Raises:
-        InvalidValueError: the listener was not trained on a task, or a picture is missing.
     """
     from roboirg.apps.learned_listener.learned_model import pictures_to_see
 

@@ -6,10 +6,10 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from roboirg.core.errors import InvalidValueError, UnknownNameError
-from roboirg.policies.by_name.policy_specs import Build, PolicyKind
+from roboirg.policies.by_name.policy_specs import PolicyKind, PolicyMaker
 
 
-def _learned(spec: str, name: str, options: Mapping[str, str]) -> Build:
+def _learned(spec: str, name: str, options: Mapping[str, str]) -> PolicyMaker:
     from roboirg.apps.learned_listener.learned_listener import LearnedListener
 
     for option in options:

@@ -9,7 +9,7 @@ from roboirg.core.episode import Goal
 from roboirg.core.extras import extra_needed
 from roboirg.core.observations import FRONT, Demonstration
 from roboirg.policies.builtin.scripted import ScriptedPolicy
-from roboirg.tasks import get_task
+from roboirg.tasks import goals_of
 
 if TYPE_CHECKING:
     from roboirg.apps.learned_listener.learned_model import LearnedModel
@@ -24,10 +24,6 @@ class LearnedListener(ScriptedPolicy):
 
     It gets the words, the video and the first picture; only the hands are privileged. If the scene
     does not have the goal, it holds still.
-
-    Raises:
-        InvalidValueError: the file is no trained listener.
-        MissingDependencyError: PyTorch is not installed.
     """
 
     cameras = (FRONT,)
@@ -59,19 +55,14 @@ class LearnedListener(ScriptedPolicy):
         """Return the goal that is understood; None if the scene does not have it."""
         from roboirg.apps.learned_listener.learned_model import pictures_to_see
 
-        task, scene = env.episode.task, env.episode.scene
         frames = self._demonstration.get(f"{FRONT}_rgb", ())
         pictures = pictures_to_see(env.picture(FRONT), frames, FRAMES_EVERY)
         self._demonstration = {}
-        self.understood = self._model.understand(task, instruction, pictures)
-        return self.understood if self.understood in get_task(task).goals(scene) else None
+        self.understood = self._model.understand(env.episode.task, instruction, pictures)
+        return self.understood if self.understood in goals_of(env.episode) else None
 
 
 def check_learn_support() -> None:
-    """Check early that PyTorch is there.
-
-    Raises:
-        MissingDependencyError: it is not installed.
-    """
+    """Check early that PyTorch is there."""
     with extra_needed("A listener that learns needs PyTorch", "learn"):
         import torch  # noqa: F401 - an extra, and slow to import

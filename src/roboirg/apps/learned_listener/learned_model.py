@@ -61,9 +61,6 @@ class LearnedModel(NamedTuple):
             task: name of the task.
             text: everything that was said.
             pictures: those of `pictures_to_see`.
-
-        Raises:
-            InvalidValueError: it was not trained on the task.
         """
         return self.understand_seen(task, text, self.see(pictures))
 

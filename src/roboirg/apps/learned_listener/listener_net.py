@@ -1,4 +1,4 @@
-"""A small transformer that reads words beside the objects of the pictures, and scores goals."""
+"""A small transformer that reads words and the objects of the pictures, and scores goals."""
 
 from __future__ import annotations
 

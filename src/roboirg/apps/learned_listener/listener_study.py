@@ -89,7 +89,7 @@ def run_study(
         plan: of the first listener; the others differ as `VARIANTS` says.
         folder: for the files, ``NAME.pt``.
         workers: processes that draw pictures; 0 uses this one.
-        progress: called with a stage, what is done of it, and all of it.
+        progress: called with a kind of work, what is done of it, and all of it.
     """
     from roboirg.apps.learned_listener.learned_model import save_model
     from roboirg.apps.learned_listener.listener_training import see_episodes, teach
@@ -98,8 +98,8 @@ def run_study(
     shown = list(_show_all(plan.tasks, workers, progress))
     for variant in VARIANTS:
 
-        def follow(stage: str, done: int, total: int, name: str = variant.name) -> None:
-            progress(f"{name}: {stage}", done, total)
+        def follow(work: str, done: int, total: int, name: str = variant.name) -> None:
+            progress(f"{name}: {work}", done, total)
 
         model = teach(scenes, variant.plan(plan), follow)
         save_model(model, folder / f"{variant.name}.pt")
@@ -146,7 +146,7 @@ def _answers(
 
 
 def told_options() -> Iterator[InstructionOptions]:
-    """Yield how the test split is told: in words of both pools, and with rivals."""
+    """Yield the words of the test split: in words of both pools, and with rivals."""
     for setting in plain_settings():
         for pool in POOLS:
             yield InstructionOptions(setting, wordings=pool)
@@ -157,7 +157,7 @@ def told_options() -> Iterator[InstructionOptions]:
 def _reader_of(
     model: LearnedModel, shown: Sequence[tuple[Episode, Sequence[Pixels]]]
 ) -> Callable[[Episode, str], bool]:
-    # Every scene is told many times, and looked at once.
+    # Every scene has many instructions, and is looked at once.
     seen = {episode.key: model.see(pictures) for episode, pictures in shown}
 
     def understand(episode: Episode, text: str) -> bool:

@@ -9,6 +9,7 @@ from typing import Any, Generic, NamedTuple, TypeVar
 
 import numpy as np
 import torch
+from pydantic import NonNegativeInt, PositiveInt
 from torch import nn
 from torch.nn import functional
 
@@ -37,7 +38,7 @@ from roboirg.language.instruction import Instruction
 from roboirg.language.settings import all_settings, settings_of
 from roboirg.language.variants import instructions
 from roboirg.policies.vlm.goal_schema import goal_schema
-from roboirg.tasks import get_task, with_goal
+from roboirg.tasks import get_task, goals_of, with_goal
 from roboirg.tasks.splits.splits import SIZES, get_episode
 from roboirg.util.parallel_map import parallel_map
 
@@ -62,8 +63,8 @@ class TrainingPlan(NamedTuple):
             express the episode.
         words: the pool of words.
         scenes: random scenes of each task beyond the train split.
-        goals: goals of each scene that are told by place, where there is the most to learn. In
-            other settings only the episode's own is.
+        goals: goals of each scene with an instruction by place, where there is the most to learn.
+            In other settings only the episode's own is.
         detector_epochs: passes over all pictures of the train split.
         reader_epochs: passes over all instructions.
         without: what it does not get.
@@ -73,10 +74,10 @@ class TrainingPlan(NamedTuple):
     tasks: tuple[str, ...]
     settings: tuple[str, ...]
     words: PoolName = "train"
-    scenes: int = 300
-    goals: int = 4
-    detector_epochs: int = 6
-    reader_epochs: int = 12
+    scenes: NonNegativeInt = 300
+    goals: PositiveInt = 4
+    detector_epochs: PositiveInt = 6
+    reader_epochs: PositiveInt = 12
     without: Without = "none"
     seed: int = 0
 
@@ -112,10 +113,7 @@ def train_listener(plan: TrainingPlan, workers: int, progress: Progress) -> Lear
     Args:
         plan: how.
         workers: processes that draw pictures; 0 uses this one.
-        progress: called with a stage, what is done of it, and all of it.
-
-    Raises:
-        InvalidValueError: no task has one of the settings.
+        progress: called with a kind of work, what is done of it, and all of it.
     """
     check_settings(plan)
     return teach(see_episodes(plan, workers, progress), plan, progress)
@@ -139,7 +137,7 @@ def see_episodes(plan: TrainingPlan, workers: int, progress: Progress) -> SeenEp
     Args:
         plan: which tasks, how many scenes and passes.
         workers: processes that draw pictures; 0 uses this one.
-        progress: called with a stage, what is done of it, and all of it.
+        progress: called with a kind of work, what is done of it, and all of it.
     """
     torch.manual_seed(plan.seed)
     episodes = tuple(_episodes(plan))
@@ -166,7 +164,7 @@ def teach(scenes: SeenEpisodes, plan: TrainingPlan, progress: Progress) -> Learn
     Args:
         scenes: seen before.
         plan: which settings and words, how many passes, and what it does not get.
-        progress: called with a stage, what is done of it, and all of it.
+        progress: called with a kind of work, what is done of it, and all of it.
     """
     torch.manual_seed(plan.seed)
     told = [(episode, instruction.text) for episode, instruction in _instructions(scenes, plan)]
@@ -200,7 +198,7 @@ def _with_goals(episodes: Iterable[Episode], plan: TrainingPlan) -> Iterator[Epi
     rng = random.Random(plan.seed)
     for episode in episodes:
         yield episode
-        goals = get_task(episode.task).goals(episode.scene)
+        goals = goals_of(episode)
         others = [goal for goal in goals if goal != episode.goal]
         for goal in rng.sample(others, min(plan.goals - 1, len(others))):
             yield with_goal(episode, goal)

@@ -1,6 +1,6 @@
 """Where the objects of pictures stand on the table, and how they rank among their kind.
 
-Words such as *the cube second closest to the button* name a rank. Each object tells its ranks
+Words such as *the cube second closest to the button* name a rank. Each object has its ranks
 itself, so that a small network need not count and compare places.
 """
 
@@ -17,7 +17,7 @@ from roboirg.core.episode import ROBOT_BASE
 VIEWS = 2
 """At the start of the video, or else of the policy's turn; and later in the video."""
 _RANKS = 3
-"""How many of the first and of the last are told."""
+"""How many of the first and of the last have a rank."""
 _CODES = 2 * _RANKS
 _FIXED = 7
 """To the robot's left, forward, distance from the robot, and distance from each corner."""
@@ -91,7 +91,7 @@ def fit_plane(places: NDArray[np.floating], positions: NDArray[np.floating]) -> 
 
 
 def relation_count(classes: int) -> int:
-    """Return the number of ranks that are told of `classes` classes of objects."""
+    """Return the number of ranks for `classes` classes of objects."""
     return (_FIXED + VIEWS * classes) * _CODES
 
 

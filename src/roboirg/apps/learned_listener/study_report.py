@@ -69,7 +69,7 @@ def study_text(cells: Cells, about: Mapping[str, Any]) -> str:
 
 
 def study_tables(cells: Cells) -> Iterator[Table]:
-    """Yield a table for each way in which the test split is told."""
+    """Yield a table for each kind of words of the test split."""
     for title, pool, has_rival in _SECTIONS:
         own = _cells_of(cells, pool, has_rival=has_rival)
         found = {
@@ -90,7 +90,7 @@ def study_tables(cells: Cells) -> Iterator[Table]:
 
 
 def save_study_figure(cells: Cells, folder: Path) -> tuple[Path, ...]:
-    """Draw the means over tasks by setting, told in held-out words, and write the files."""
+    """Draw the means over tasks by setting, in held-out words, and write the files."""
     own = {
         key._replace(options=InstructionOptions(key.options.setting)): results
         for key, results in _cells_of(cells, HELD_OUT, has_rival=False).items()

@@ -18,7 +18,7 @@ from roboirg.core.episode import Episode, Goal, ObjectKind
 from roboirg.core.errors import InvalidValueError
 from roboirg.evaluation.grounding_items.referents import find_referents, is_ordered
 from roboirg.policies.vlm.goal_schema import SOURCE, Field, goal_schema
-from roboirg.tasks import get_task
+from roboirg.tasks import goals_of, with_goal
 from roboirg.tasks.splits.splits import split_episodes
 
 Value = str | int
@@ -67,7 +67,7 @@ def answer_form(task: str) -> AnswerForm:
     most: Counter[ObjectKind] = Counter()
     shapes: set[tuple[ObjectKind, ...]] = set()
     for episode in split_episodes([task], [SOURCE]):
-        goals = get_task(task).goals(episode.scene)
+        goals = goals_of(episode)
         if not is_ordered(goals[0]):
             return AnswerForm((), 0, fields)
         by_objects: dict[tuple[str, ...], list[Goal]] = defaultdict(list)
@@ -99,7 +99,7 @@ def answer_of(episode: Episode, goal: Goal) -> FormAnswer:
 
 def goal_of(episode: Episode, answer: FormAnswer) -> Goal | None:
     """Return the goal that an answer means; None if the scene has no such goal."""
-    goals = get_task(episode.task).goals(episode.scene)
+    goals = goals_of(episode)
     return next((goal for goal in goals if answer_of(episode, goal) == answer), None)
 
 
@@ -168,7 +168,6 @@ def _pointed(episode: Episode, goal: Goal) -> tuple[str, ...]:
 
 def _open_slots(episode: Episode, goals: Sequence[Goal]) -> set[str]:
     """Return the slots in which goals differ that are not the same to the judge."""
-    task = get_task(episode.task)
-    distinct = {task.stages(episode.scene, goal): goal for goal in goals}
+    distinct = {with_goal(episode, goal).stages: goal for goal in goals}
     slots = [goal.as_mapping() for goal in distinct.values()]
     return {name for name in slots[0] for one in slots if one[name] != slots[0][name]}

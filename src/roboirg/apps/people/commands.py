@@ -14,7 +14,6 @@ from roboirg.cli.options import (
     NO_PLAN,
     PlanWords,
     Settings,
-    Split,
     Tasks,
     spread,
 )
@@ -30,6 +29,16 @@ listen_app = typer.Typer(
     no_args_is_help=True, help="Ask people what is meant; the oracle's hands play their answers."
 )
 
+
+class StudyWords(PlanWords):
+    """A plan with words, and what is rare in a study."""
+
+    section = "listening"
+    own = ("practice", "checks", "seed", "frames_every", "consent")
+
+
+NO_WORDS = StudyWords()
+
 Study = Annotated[Path, typer.Argument(help="Folder of the study.")]
 Host = Annotated[str, typer.Option(help="Address to listen at; 0.0.0.0 for other machines, too.")]
 Port = Annotated[int, typer.Option(help="Port to listen at; 0 for any free port.")]
@@ -44,24 +53,20 @@ def plan(
     ],
     tasks: Tasks = "all",
     settings: Settings = "all",
-    split: Split = "test",
     episodes: Annotated[
         str, typer.Option(help="all, 4 for the first four, or a list such as 0,3,5-9.")
     ] = "4",
-    words: PlanWords = NO_PLAN,
-    practice: Annotated[int, typer.Option(help="Practice questions for each task.")] = 1,
-    checks: Annotated[int, typer.Option(help="Attention checks for each person.")] = 2,
-    consent: Annotated[
-        Path | None, typer.Option(help="Text file that people agree to, instead of ours.")
-    ] = None,
+    words: StudyWords = NO_WORDS,
 ) -> None:
     """Plan a study of listeners and draw its pictures; continues one that was interrupted.
+
+    A plan may have, under `listening`: practice, checks, seed, frames_every, and consent, the text
+    that people agree to.
 
     Example: roboirg listen plan study --people 10
     """
     from roboirg.apps.people.listening_session import QUESTIONS
     from roboirg.apps.people.listening_study import (
-        CONSENT,
         PEOPLE,
         ListeningStudy,
         write_listening_study,
@@ -78,16 +83,14 @@ def plan(
         tasks=tasks,
         settings=settings,
         forms=words.form(),
-        split=split,
+        split=words.fields.get("split", "test"),
         episodes=episodes,
         **words.words,
     )
     study = ListeningStudy(
         plan=made.model_copy(update={"policies": (PEOPLE,)}),
         people=people,
-        practice=practice,
-        checks=checks,
-        consent=CONSENT if consent is None else _read_text(consent),
+        **words.choices(ListeningStudy),
     ).checked()
     write_listening_study(study, folder)
     count = worker_count()
@@ -183,19 +186,11 @@ def _serve(server: KeyedPageServer, words: str) -> None:
         server.server_close()
 
 
-def _read_text(path: Path) -> str:
-    try:
-        return path.read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as error:
-        raise InvalidValueError(f"The text {str(path)!r} cannot be read ({error}).") from error
-
-
 @spread
 def drive(
     task: Annotated[str, typer.Argument(help="Name of the task.")],
     episode: Annotated[int, typer.Argument(help="Position in the split, from 0.")],
     setting: Annotated[str, typer.Option(help="Setting of the words.")] = "explicit",
-    split: Split = "test",
     words: PlanWords = NO_PLAN,
     out: run_commands.Out = "runs/driven",
     name: Annotated[str, typer.Option(help="Name of the policy in the records.")] = "person",
@@ -218,7 +213,7 @@ def drive(
         tasks=task,
         settings=setting,
         forms=words.form(),
-        split=split,
+        split=words.fields.get("split", "test"),
         episodes=f"{episode},",
         **words.words,
         max_steps=words.fields.get("max_steps", DEFAULT_MAX_STEPS),

@@ -34,7 +34,7 @@ class DrivingSession:
         phase: at first; then idle, loading, driving (it waits for a command), moving, over or
             failed.
         options: of the live pictures.
-        caption: what was said so far; unused, as `say` is told.
+        caption: what was said so far; unused, as `say` gets it.
         longest_caption: unused.
         env: the environment, once it is there.
     """

@@ -1,6 +1,6 @@
 """What people answer in a study of listeners, one JSON line each, on the disk before it counts.
 
-Nothing in the file tells who a person is: people have numbers, and a code with which they go on.
+Nothing in the file shows who a person is: people have numbers, and a code with which they go on.
 """
 
 from __future__ import annotations
@@ -125,7 +125,6 @@ class AnswerLog:
         self.events.append(event)
 
     def close(self) -> None:
-        """Close the file."""
         self._file.close()
 
     def __enter__(self) -> Self:

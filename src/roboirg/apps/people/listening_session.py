@@ -129,7 +129,7 @@ class ListeningSession:
             }
 
     def answer(self, code: str, number: int, body: Mapping[str, Any]) -> dict[str, Any]:
-        """Store an answer; return what the person is told, which after practice is what was meant.
+        """Store an answer; return what the person sees next: after practice, what was meant.
 
         An answer that was stored already, and whose reply got lost, is not stored again.
 
@@ -166,7 +166,7 @@ class ListeningSession:
             return _explain(episode, view, answer)
 
     def undo(self, code: str, number: int) -> dict[str, Any]:
-        """Take back the newest answer; return what the person is told, which is nothing.
+        """Take back the newest answer; return what the person sees next, which is nothing.
 
         Args:
             code: of the person.

@@ -148,7 +148,7 @@ class ListeningStudy(BaseModel):
             forms=plan.forms,
             options=replace(plan.options, stages=plan.stages[0], delivery=DEFAULT_DELIVERY),
             frames_every=self.frames_every,
-            wordings=plan.wordings,
+            wordings_file=plan.wordings,
         )
 
     @functools.cached_property

@@ -15,7 +15,7 @@ from roboirg.apps.people.listener_answers import (
 from roboirg.core.episode import Goal
 from roboirg.core.errors import InvalidValueError
 from roboirg.policies.builtin.scripted import ScriptedPolicy
-from roboirg.policies.by_name.policy_specs import Build, PolicyKind
+from roboirg.policies.by_name.policy_specs import PolicyKind, PolicyMaker
 from roboirg.policies.vlm.goal_schema import goal_schema
 from roboirg.util.short_hash import short_hash
 
@@ -68,11 +68,7 @@ class PeopleListener(ScriptedPolicy):
         }
 
     def decide(self, env: RoboIRGEnv, instruction: str) -> Goal | None:  # noqa: ARG002
-        """Return the goal that was answered; None if the scene does not have it.
-
-        Raises:
-            InvalidValueError: no person of this seed has answered this question.
-        """
+        """Return the goal that was answered; None if the scene does not have it."""
         one = self._answer = self._find(env)
         return None if one.goal is None else goal_schema(one.task).goals[one.goal]
 
@@ -107,7 +103,7 @@ def study_version(folder: Path) -> str:
         ) from error
 
 
-def _people(spec: str, name: str, options: Mapping[str, str]) -> Build:
+def _people(spec: str, name: str, options: Mapping[str, str]) -> PolicyMaker:
     if not name or options:
         raise InvalidValueError(f"Policy {spec!r} is not people:FOLDER, the folder of a study.")
     return lambda seed: PeopleListener(Path(name), seed)

@@ -43,14 +43,13 @@ class PersonView(NamedTuple):
 def view_question(
     job: Job, episode: Episode, item: GroundingItem, media: EpisodeMedia
 ) -> PersonView:
-    """Return what a person sees of a question."""
     form = answer_form(job.task)
     seen = [
         (name, target)
         for name, target in media.objects.items()
         if episode.scene[name].kind in form.kinds
     ]
-    # By place alone: the order of the scene could tell what is meant.
+    # By place alone: the order of the scene could give away what is meant.
     seen.sort(key=lambda one: (one[1].x, one[1].y))
     shown = {
         "turns": item.turns if job.options.delivery == TURNS else [item.text],

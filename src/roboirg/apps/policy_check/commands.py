@@ -18,7 +18,7 @@ def check_policy(
         typer.Option(help="Compare with an expert's episode, if the simulator is installed."),
     ] = True,
 ) -> None:
-    """Check a policy on synthetic episodes, and beside the scripted expert.
+    """Check a policy on synthetic episodes, and next to the scripted expert.
 
     Example: roboirg check-policy my_policy:MyPolicy
     """

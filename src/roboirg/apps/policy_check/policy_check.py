@@ -71,7 +71,7 @@ LAST_CHECKS: tuple[Check, ...] = (check_joint_targets, check_broken_sensors)
 def check_policy(
     policy: str | Policy, *, seed: int = 0, record_expert: RecordExpert | None = None
 ) -> list[CheckResult]:
-    """Check a policy on synthetic episodes, and beside the scripted expert.
+    """Check a policy on synthetic episodes, and next to the scripted expert.
 
     Args:
         policy: a spec as for `roboirg.policies.make_policy`, or an object, which is reset wherever

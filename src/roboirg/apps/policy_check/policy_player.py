@@ -79,12 +79,10 @@ class PolicyPlayer:
 
     @cached_property
     def without_video(self) -> SyntheticEpisode:
-        """An episode without a video."""
         return self.make_episodes().episode(FIRST, 0)
 
     @cached_property
     def with_video(self) -> SyntheticEpisode:
-        """An episode with a video."""
         return self.make_episodes().episode(SECOND, VIDEO_STEPS)
 
     @cached_property
@@ -185,7 +183,6 @@ class PolicyPlayer:
         return self._policy
 
     def close(self) -> None:
-        """Close the policy."""
         policy, self._policy = self._policy, None
         close_policy(policy)
 

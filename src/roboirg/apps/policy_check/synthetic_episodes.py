@@ -104,7 +104,6 @@ class SyntheticEpisodes:
         return observation
 
     def _plain_picture(self) -> NDArray[np.uint8]:
-        """Return a picture of one color."""
         return np.broadcast_to(
             self._other_rng.integers(0, 256, PICTURE[-1], dtype=np.uint8), PICTURE
         ).copy()

@@ -48,7 +48,7 @@ def plan(
     Example: roboirg real plan --policy my_policy:MyPolicy --out study
     """
     from roboirg.apps.real.study.study_plan import make_study
-    from roboirg.evaluation.plan.plan_parsing import means_all, parse_names
+    from roboirg.evaluation.plan.option_parsing import means_all, parse_names
     from roboirg.tasks import find_tasks
 
     made = make_study(
@@ -65,15 +65,15 @@ def plan(
 def _write(made: StudyPlan, folder: Path) -> None:
     """Write the files of a plan and print their names."""
     from roboirg.apps.real.pages.trial_sheet import SHEET_FILE, write_sheet
-    from roboirg.apps.real.study import plan_csv
+    from roboirg.apps.real.study import study_csv
     from roboirg.apps.real.study.study_plan import write_study
     from roboirg.core.errors import MissingDependencyError
     from roboirg.util.atomic_write import write_atomically
 
     typer.echo(write_study(made, folder))
     for name, text in (
-        (plan_csv.TRIALS_FILE, plan_csv.trials_csv(made)),
-        (plan_csv.DEMONSTRATIONS_FILE, plan_csv.demonstrations_csv(made)),
+        (study_csv.TRIALS_FILE, study_csv.trials_csv(made)),
+        (study_csv.DEMONSTRATIONS_FILE, study_csv.demonstrations_csv(made)),
     ):
         if text:
             write_atomically(folder / name, text)

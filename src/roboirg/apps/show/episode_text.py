@@ -67,7 +67,7 @@ def describe_motions(scene: Scene) -> list[str]:
 
 def describe_video(episode: Episode) -> list[str]:
     """Describe the stages of the demonstration and the facts that instructions refer to."""
-    shown = [plain_subgoal(stage) for stage in episode.demonstration if stage.recorded]
+    shown = [plain_subgoal(stage) for stage in episode.demonstration if stage.in_video]
     lines = [f"{number}. {words}" for number, words in enumerate(shown, start=1)]
     if episode.scene.past:
         lines.append("that is: " + ", ".join(fact_words(fact) for fact in episode.scene.past))

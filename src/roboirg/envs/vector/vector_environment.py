@@ -87,6 +87,7 @@ class RoboIRGVectorEnv(gymnasium.vector.VectorEnv[Batch, Any, NDArray[Any]]):
         self._kept: dict[str, Any] = {}
         self._over = np.zeros(num_envs, dtype=np.bool_)
         self._texts: list[dict[str, Any]] = [{} for _ in range(num_envs)]
+        # Pictures that are drawn on demand are those of one moment and of one episode's start.
         self._moment, self._starts = 0, [0] * num_envs
         # Spawned, because the threads of the renderer do not survive a fork.
         context = multiprocessing.get_context("spawn")
@@ -164,7 +165,7 @@ class RoboIRGVectorEnv(gymnasium.vector.VectorEnv[Batch, Any, NDArray[Any]]):
         chunks = [check_chunk(rows, self._space) for rows in cast("Sequence[Any]", actions)]
         if len(chunks) != self.num_envs:
             raise InvalidActionError(f"{len(chunks)} actions for {self.num_envs} sub-environments.")
-        if not all(self._texts):
+        if not self._was_reset:
             raise gymnasium.error.ResetNeeded("Call reset() first.")
         if self._over.any() and self._mode is AutoresetMode.DISABLED:
             raise gymnasium.error.ResetNeeded(
@@ -172,6 +173,7 @@ class RoboIRGVectorEnv(gymnasium.vector.VectorEnv[Batch, Any, NDArray[Any]]):
                 "call reset(options={'reset_mask': ...})."
             )
         requests: dict[int, Request] = {}
+        # Resets for the case that a sub-environment's episode ends in this step.
         following: dict[int, dict[str, Any]] = {}
         before = list(self._last)
         for index, chunk in enumerate(chunks):
@@ -206,6 +208,11 @@ class RoboIRGVectorEnv(gymnasium.vector.VectorEnv[Batch, Any, NDArray[Any]]):
         """End the worker processes."""
         self._processes.close()
 
+    @property
+    def _was_reset(self) -> bool:
+        """Whether every sub-environment has an episode, so that there are texts of each."""
+        return all(self._texts)
+
     def _choose(
         self, index: int, seed: int | None = None, episode: int | None = None
     ) -> dict[str, Any]:
@@ -214,8 +221,8 @@ class RoboIRGVectorEnv(gymnasium.vector.VectorEnv[Batch, Any, NDArray[Any]]):
             return self._kept
         if episode is None:
             last = self._last[index]
-            before = index - 1 if last is None else last + self.num_envs - 1
-            episode = choose_index(self._chosen, seed, before)
+            following = index if last is None else last + self.num_envs
+            episode = choose_index(self._chosen, seed, last=following - 1)
         self._last[index] = episode
         return {**self._kept, "episode": episode}
 
@@ -227,15 +234,16 @@ class RoboIRGVectorEnv(gymnasium.vector.VectorEnv[Batch, Any, NDArray[Any]]):
         """Return what `step` does, given the answers of those who were asked."""
         count, mode = self.num_envs, self._mode
         rewards = np.zeros(count)
-        ends = np.zeros((2, count), dtype=np.bool_)
+        terminated, truncated = np.zeros(count, np.bool_), np.zeros(count, np.bool_)
         infos: list[dict[str, Any] | None] = [None] * count
         for index, answer in answers.items():
             self._texts[index] = answer.texts
             rewards[index] = answer.reward
-            ends[:, index] = answer.terminated, answer.truncated
+            terminated[index], truncated[index] = answer.terminated, answer.truncated
             infos[index] = self._complete(index, answer)
-            self._over[index] = ends[:, index].any() and mode is not AutoresetMode.SAME_STEP
-        return self._batch(), rewards, ends[0], ends[1], stack_infos(infos)
+            is_over = answer.terminated or answer.truncated
+            self._over[index] = is_over and mode is not AutoresetMode.SAME_STEP
+        return self._batch(), rewards, terminated, truncated, stack_infos(infos)
 
     def _complete(self, index: int, answer: Transition) -> dict[str, Any]:
         """Return an info with the video, and the end of the episode before if there was one."""
@@ -304,7 +312,7 @@ class RoboIRGVectorEnv(gymnasium.vector.VectorEnv[Batch, Any, NDArray[Any]]):
                 f"reset_mask is {mask!r}; it must be bool of shape ({self.num_envs},), not all "
                 "False."
             )
-        if not found.all() and not all(self._texts):
+        if not found.all() and not self._was_reset:
             raise gymnasium.error.ResetNeeded("The first reset is one of all sub-environments.")
         return found
 

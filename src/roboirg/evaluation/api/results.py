@@ -36,7 +36,7 @@ COLUMNS = (
     "cause", "error", "steps", "max_steps", "privileged", "policy_version", "language_version",
     "environment_version", "duration_s", "video",
 )  # fmt: skip
-"""Columns of the data frame, beside ``success`` and ``failure``."""
+"""Columns of the data frame, besides ``success`` and ``failure``."""
 
 
 @dataclass(frozen=True)

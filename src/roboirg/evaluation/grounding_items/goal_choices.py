@@ -12,7 +12,7 @@ from roboirg.core.episode import Episode, Goal
 from roboirg.language import instruct
 from roboirg.language.instruction import Instruction
 from roboirg.shortcuts.command_chance import blind_goals, is_right
-from roboirg.tasks import get_task, with_goal
+from roboirg.tasks import goals_of, with_goal
 
 MOST = 4
 _BLOCK = 12
@@ -58,9 +58,7 @@ def explicit_command(episode: Episode, goal: Goal, pool: str) -> str:
 
 
 def _wrong_goals(episode: Episode, instruction: Instruction) -> Sequence[Goal]:
-    every = [
-        goal for goal in get_task(episode.task).goals(episode.scene) if not is_right(goal, episode)
-    ]
+    every = [goal for goal in goals_of(episode) if not is_right(goal, episode)]
     blind = set(blind_goals(instruction, episode))
     alike = [goal for goal in every if _shape(goal) == _shape(episode.goal)]
     return [goal for goal in every if goal in blind] or alike or every

@@ -111,7 +111,6 @@ class GroundingItem(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fi
         return InstructionOptions(**{**given, "stages": tuple(self.stages), "wordings": None})
 
     def system_prompt(self, kind: QuestionKind) -> str:
-        """Return the system prompt of a kind of question."""
         return self.slots_system if kind == "slots" else self.system
 
     def question(self, kind: QuestionKind) -> str:

@@ -100,7 +100,7 @@ def make_items(
 
 
 def item_id(episode: Episode, options: InstructionOptions) -> str:
-    """Return the name of an item. It is a hash, which tells nothing about the answer."""
+    """Return the name of an item. It is a hash, which gives nothing away about the answer."""
     content = (episode.key, *astuple(options), LANGUAGE_VERSION, ENVIRONMENT_VERSION)
     return "g" + hashlib.sha256(repr(content).encode()).hexdigest()[:ID_DIGITS]
 

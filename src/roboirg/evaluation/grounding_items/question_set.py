@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import msgspec
+from pydantic import PositiveInt
 
 from roboirg.core.episode import ENVIRONMENT_VERSION, Split
 from roboirg.core.errors import InvalidValueError
@@ -53,7 +54,7 @@ class ExportRequest(NamedTuple):
         every_variant: whether to add every combination of options.
         frames: maximum of frames of a video that are stored as pictures.
         frames_every: control steps between two frames of the video.
-        wordings: path of a wording file or name of a pool, for worker processes.
+        wordings_file: path of a wording file or name of a pool, for worker processes.
     """
 
     episodes: tuple[EpisodeName, ...]
@@ -61,9 +62,9 @@ class ExportRequest(NamedTuple):
     forms: tuple[str, ...]
     options: InstructionOptions = InstructionOptions()
     every_variant: bool = False
-    frames: int = FRAMES
-    frames_every: int = FRAMES_EVERY
-    wordings: str | None = None
+    frames: PositiveInt = FRAMES
+    frames_every: PositiveInt = FRAMES_EVERY
+    wordings_file: str | None = None
 
     def pictures(self) -> dict[str, Any]:
         """Return everything that the pictures depend on, as JSON values."""
@@ -132,7 +133,7 @@ def _claim(folder: Path, request: ExportRequest) -> None:
 
 def _make_episode(folder: Path, request: ExportRequest, name: EpisodeName) -> list[GroundingItem]:
     """Return the items of an episode, and store its pictures; runs in worker processes."""
-    open_wordings(request.wordings)
+    open_wordings(request.wordings_file)
     episode = get_episode(*name)
     wanted = list(
         wanted_options(

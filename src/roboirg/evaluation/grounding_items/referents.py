@@ -8,7 +8,7 @@ from dataclasses import replace
 from typing import NamedTuple
 
 from roboirg.core.episode import Episode, Goal, ObjectKind, Scene, SceneObject, Split
-from roboirg.tasks import Task, get_task
+from roboirg.tasks import Task, get_task, goals_of
 from roboirg.tasks.splits.splits import split_episodes
 
 SOURCE: Split = "train"
@@ -78,7 +78,7 @@ def find_referents(episode: Episode) -> tuple[Referent, ...]:
 
 def find_candidates(episode: Episode) -> tuple[SceneObject, ...]:
     """Return all objects of the kinds that goals of the scene mean, in scene order."""
-    goals = get_task(episode.task).goals(episode.scene)
+    goals = goals_of(episode)
     meant = itertools.chain.from_iterable(
         find_referents(replace(episode, goal=goal)) for goal in goals
     )

@@ -73,7 +73,6 @@ def guess_chance(item: GroundingItem, kind: QuestionKind) -> float:
 
 
 def right_reply(item: GroundingItem, kind: QuestionKind) -> str:
-    """Return a right reply."""
     if kind == "slots":
         return item.answer
     if kind == "choice":

@@ -18,6 +18,8 @@ from roboirg.evaluation.hosting.policy_child import ChildLostError, PolicyChild
 from roboirg.evaluation.hosting.policy_host import HostSession, PolicyHost
 
 DEFAULT_BATCH = 16
+_PER_EPISODE = 2
+"""File descriptors with which an episode begins: a connection, and a block of shared memory."""
 
 Connect = Callable[[], socket.socket]
 """Returns a new line to a pool, for a process with worlds."""
@@ -126,7 +128,7 @@ class HostPool:
         with line, contextlib.suppress(OSError):
             while True:
                 _, descriptors, *_ = socket.recv_fds(line, 1, 2)
-                if len(descriptors) != len(("connection", "block")):
+                if len(descriptors) != _PER_EPISODE:  # the line was closed
                     return
                 threading.Thread(
                     target=self._serve, args=descriptors, name="hosted world", daemon=True

@@ -122,7 +122,7 @@ class HostedEpisode:
         return Acted(chunk.tobytes(), chunk.shape[1], latency_s, subgoal)
 
     def hear(self, call: Call) -> Told:
-        """Tell the policy what was said; returns its metadata."""
+        """Let the policy hear what was said; returns its metadata."""
         tell_policy(self.policy, call.utterances)
         return Told(dump_metadata(self.policy))
 

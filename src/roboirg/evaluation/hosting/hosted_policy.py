@@ -61,7 +61,7 @@ class HostedPolicy:
         version: of the policy.
         metadata: as the policy reports them, from `reset` on.
         waited_s: seconds that its calls waited for others.
-        latency_s: seconds that its last actions took on the robot it is meant for, if it tells.
+        latency_s: seconds that its last actions took on its own robot, if it reports that.
         subgoal: what it named after its last actions, if anything.
 
     Raises:
@@ -109,7 +109,7 @@ class HostedPolicy:
         return np.frombuffer(found.rows, np.float64).reshape(-1, found.size).copy()
 
     def hear(self, text: str, step: int) -> None:
-        """Tell the policy what was said."""
+        """Let the policy hear what was said."""
         utterance = {"text": text, "step": step}
         self._take_metadata(self._call(Told, Call("hear", utterances=(utterance,))))
 

@@ -1,4 +1,4 @@
-"""What a run must know of a policy before it plays, without running its code beside a world."""
+"""What a run must know of a policy before it plays, without running its code next to a world."""
 
 from __future__ import annotations
 

@@ -33,7 +33,7 @@ from roboirg.core.plain_text import is_encodable
 from roboirg.core.word_pools import POOLS
 from roboirg.evaluation.hosting.host_pool import DEFAULT_BATCH, HostSettings
 from roboirg.evaluation.hosting.policy_descriptions import describe_policy
-from roboirg.evaluation.plan.plan_parsing import check_names, name_and_spec
+from roboirg.evaluation.plan.option_parsing import check_names, name_and_spec
 from roboirg.evaluation.plan.worker_needs import WorkerNeeds
 from roboirg.evaluation.play.job_instruction import instruct_job
 from roboirg.evaluation.records.film import VideoMode
@@ -291,7 +291,7 @@ class Plan(BaseModel):
         )
 
     def drawable_jobs(self) -> tuple[Job, ...]:
-        """Return the jobs that can be told here, for counting what a stored run lacks.
+        """Return the jobs whose words can be made here, for counting what a stored run lacks.
 
         None if the episodes are private and their salt is not known; none of tasks and settings
         whose package is not installed.

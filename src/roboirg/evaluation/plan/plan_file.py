@@ -44,7 +44,7 @@ def named_plans() -> tuple[str, ...]:
     return tuple(sorted(name.stem for name in names if name.suffix in _SUFFIXES))
 
 
-def read_plan_file(name: str) -> dict[str, Any]:
+def read_plan_file(name: str, section: str = "") -> dict[str, Any]:
     """Read a plan file as options of `make_plan`.
 
     Lists become text as typed on the command line: ``[1, 5]`` becomes ``"1,5"``, and
@@ -53,6 +53,7 @@ def read_plan_file(name: str) -> dict[str, Any]:
     Args:
         name: name of a plan that comes with the package, or path of a YAML file, or of the
             plan.json that a run wrote.
+        section: key of what a command other than `run` reads, if it has one.
 
     Raises:
         UnknownNameError: there is no such plan, or it has an unknown key.
@@ -64,7 +65,7 @@ def read_plan_file(name: str) -> dict[str, Any]:
             f"The plan {name!r} is of type {type(data).__name__}; it must be a mapping such as "
             "'tasks: all'."
         )
-    known = (*Plan.model_fields, *SINGLE_OPTIONS)
+    known = (*Plan.model_fields, *SINGLE_OPTIONS, *([section] if section else []))
     for key in data:
         if key not in known:
             raise UnknownNameError(f"plan key (in {name!r})", key, known)

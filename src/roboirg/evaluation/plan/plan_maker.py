@@ -4,22 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import replace
+from typing import Any
 
-from pydantic import ValidationError
+from pydantic import TypeAdapter, ValidationError
 
 from roboirg import tasks as task_registry
 from roboirg.core.errors import InvalidValueError
 from roboirg.core.instruction_options import InstructionOptions
-from roboirg.evaluation.plan.plan import (
-    LONG_PROMPTS,
-    REQUIRED,
-    RETRYABLE,
-    SETTINGS_NAMES,
-    Plan,
-    SettingsName,
-    nest_options,
-)
-from roboirg.evaluation.plan.plan_parsing import (
+from roboirg.evaluation.plan.option_parsing import (
     ALL,
     check_names,
     means_all,
@@ -28,6 +20,15 @@ from roboirg.evaluation.plan.plan_parsing import (
     parse_numbers,
     parse_policies,
     parse_stage_sets,
+)
+from roboirg.evaluation.plan.plan import (
+    LONG_PROMPTS,
+    REQUIRED,
+    RETRYABLE,
+    SETTINGS_NAMES,
+    Plan,
+    SettingsName,
+    nest_options,
 )
 from roboirg.evaluation.records.film import VIDEO_MODES
 from roboirg.evaluation.records.record import ERROR_KINDS, ErrorKind
@@ -122,6 +123,18 @@ def form_names(text: str) -> tuple[str, ...]:
     names = FORMS if means_all(text) else parse_names("form", text)
     check_names("form", names, FORMS)
     return names
+
+
+def as_typed_field(name: str, kind: Any, value: object) -> Any:  # noqa: ANN401 - of that type
+    """Return a value from a file as a field of a type.
+
+    Raises:
+        InvalidValueError: it cannot be one.
+    """
+    try:
+        return TypeAdapter(kind).validate_python(value)
+    except ValidationError as error:
+        raise InvalidValueError(f"{name} is {value!r}: {error.errors()[0]['msg']}.") from error
 
 
 def _explain(error: ValidationError) -> InvalidValueError:

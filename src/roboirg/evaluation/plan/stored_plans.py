@@ -1,4 +1,4 @@
-"""The plans that a run's folder keeps beside its records: the newest one, and earlier ones."""
+"""The plans that a run's folder keeps next to its records: the newest one, and earlier ones."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def with_secret(plan: Plan, folder: Path) -> Plan:
 
 
 def write_plan(plan: Plan, folder: Path) -> None:
-    """Write the newest plan of a folder beside its records; earlier ones stay in ``plans/``."""
+    """Write the newest plan of a folder next to its records; earlier ones stay in ``plans/``."""
     store_plan((plan.model_dump_json(indent=2) + "\n").encode(), folder)
 
 

@@ -117,8 +117,9 @@ class EpisodeRunner:
 
     def _play(self, job: Job) -> tuple[VideoWriter | None, RolloutResult]:
         """Play a job, again from its beginning if the policy's process is lost meanwhile."""
-        alone = False
-        for attempt in range(1, MAX_LOSSES + 1):
+        alone, attempt = False, 0
+        while True:
+            attempt += 1
             writer = None
             if self.video != "off":
                 writer = VideoWriter(self.folder / VIDEO_FOLDER / f"{job.slug}.mp4", self.options)
@@ -133,15 +134,15 @@ class EpisodeRunner:
                     seed_secret=self.seed_secret,
                 )
             except EpisodeLostError as error:
-                alone = alone or error.alone
+                if attempt < MAX_LOSSES:
+                    alone = alone or error.alone
+                    if writer is not None:
+                        writer.discard()
+                    continue
                 result, message = RolloutResult(), f"{error}, {attempt} times in a row"
                 result.record_error(error.kind, format_cause(error.kind, message))
-                if writer is not None and attempt < MAX_LOSSES:
-                    writer.discard()
-            else:
-                break
-        result.attempt = attempt
-        return writer, result
+            result.attempt = attempt
+            return writer, result
 
     def _finish_video(self, writer: VideoWriter | None, result: RolloutResult) -> str | None:
         """Keep or discard the video; return its path relative to the folder, or None."""
@@ -185,20 +186,21 @@ def play_episode(
         open_wordings(job.wordings_file, job.options.wordings)
     prepared = PreparedJob(job)
     result = RolloutResult(prepared=prepared)
-    is_hosted = hosts is not None and needs_host(job.policy_spec)
-    guard = CallGuard(result, policy_timeout_s, is_hosted=is_hosted)
+    if not needs_host(job.policy_spec):
+        hosts = None
+    guard = CallGuard(result, policy_timeout_s, is_hosted=hosts is not None)
     policy: Policy | None = None
     try:
-        if hosts is None or not is_hosted:
+        if hosts is None:
             result.policy = describe_here(job.policy_spec)
         with guard.policy("policy's constructor", "policy_load"):
-            if hosts is None or not is_hosted:
+            if hosts is None:
                 policy = load_policy(prepared, seed_secret)
             else:
                 seed = _policy_seed(prepared, seed_secret)
-                policy = hosted = HostedPolicy(hosts, job.policy_spec, seed, alone=alone)
+                hosted = HostedPolicy(hosts, job.policy_spec, seed, alone=alone)
                 result.policy = PolicyDescription(hosted.version, is_privileged=False)
-        with guard.policy("policy's constructor", "policy_load"):
+                policy = hosted
             needs = job_needs(policy, job)
             result.prompt_limit = prompt_limit(needs)
         if refuse_long:
@@ -275,7 +277,7 @@ def _close_policy(policy: Policy, result: RolloutResult, guard: CallGuard) -> No
     """Read the policy's costs and close it; errors there do not change the outcome.
 
     Raises:
-        EpisodeLostError: the policy's process was lost before it told the costs.
+        EpisodeLostError: the policy's process was lost before it reported the costs.
     """
     try:
         with guard.policy("policy's close()", "policy_close"):

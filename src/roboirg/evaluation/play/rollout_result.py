@@ -69,7 +69,7 @@ class RolloutResult:
         policy_start_step: control steps of the episode before the policy's turn.
         elapsed_steps: control steps of the episode in all.
         prepared: the job's episode and words, as far as they are made; None if none are.
-        instruction: what the policy was told; None if the episode did not get that far.
+        instruction: what was said; None if the episode did not get that far.
         heard: what the policy has heard so far, in order: ``text`` and ``step``.
         events: facts that became true or ceased to be.
         subgoals: what the policy's planner named.

@@ -50,7 +50,7 @@ class FrameSink(Protocol):
     """Takes the frames of an episode while it is played.
 
     Attributes:
-        options: tell how often there is a frame.
+        options: how often there is a frame, and its format.
         caption: what was said so far.
         longest_caption: everything that will have been said.
     """

@@ -99,7 +99,7 @@ class Watchdog:
 
     @property
     def awaited(self) -> str:
-        """What the process waits for; empty if it has not told."""
+        """What the process waits for; empty if it has not reported."""
         return bytes(self._shared.awaited).decode("utf-8", "replace")
 
     @property

@@ -1,4 +1,4 @@
-"""The actions of an episode, in a file beside the records, so that anyone can play them again.
+"""The actions of an episode, in a file next to the records, so that anyone can play them again.
 
 A file is named after the SHA-256 of its content, and the record holds that name. `numpy.load` reads
 it: ``space`` (name of the action space), ``rows`` (n, 8 or 7), ``requests`` (k,) and ``end_state``.

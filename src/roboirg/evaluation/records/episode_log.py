@@ -1,4 +1,4 @@
-"""What a policy prints in an episode, in a file of bounded size beside the records.
+"""What a policy prints in an episode, in a file of bounded size next to the records.
 
 The file is found by the slug of the episode's job, so records do not mention it. Output goes
 straight into the file, not through a pipe: it is there after a crash, and a policy that prints

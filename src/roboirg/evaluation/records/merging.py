@@ -90,7 +90,7 @@ def merge_runs(folders: Sequence[Path], out: Path) -> MergeSummary:
 
 
 def _keep_plans(folders: Sequence[Path], out: Path) -> None:
-    """Keep the plans of all runs, so that it can be told which episodes are missing."""
+    """Keep the plans of all runs, so that what is missing can be counted."""
     for folder in folders:
         for name in plan_names(folder):
             try:

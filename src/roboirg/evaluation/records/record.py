@@ -289,8 +289,8 @@ class Summary(Job, frozen=True, kw_only=True, gc=False):
             (``planned``), or ``none``.
         privileged: whether the policy has access to the simulator's state.
         policy_version: distinguishes versions of a policy of the same name.
-        server_version: the version that the policy's server told; None if there is no server, or
-            it told none, or the episode ended before.
+        server_version: that the policy's server reported; None if there is no server, if it
+            reported none, or if the episode ended before.
         language_version: version of the instruction generator.
         environment_version: version of scenes, rules and physics.
         package_version: version of roboirg.

@@ -1,7 +1,7 @@
-"""The versions that policies' servers tell: verdicts of two of them are not mixed in one folder.
+"""The versions that policies' servers report: verdicts of two of them are not mixed in one folder.
 
 Episodes that ended in an error are in no rate, so they do not count; and one that ended before its
-server told a version belongs to the version of the folder's verdicts.
+server reported a version belongs to the version of the folder's verdicts.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ Stored = TypeVar("Stored", bound=Summary)
 
 
 def told_versions(records: Iterable[Summary]) -> dict[str, str | None]:
-    """Return what the server of each policy with a verdict told; None if it told nothing."""
+    """Return the version of each policy's server, of those with a verdict; None if unreported."""
     return {one.policy: one.server_version for one in records if one.outcome != "error"}
 
 
@@ -37,8 +37,8 @@ def check_told_version(folder: Path, told: Mapping[str, str | None], record: Sum
     before, now = told.get(record.policy, record.server_version), record.server_version
     if record.outcome != "error" and before != now:
         raise StoreError(
-            f"{folder} holds episodes of {record.policy} whose server told {_name(before)}, but "
-            f"now it tells {_name(now)}; choose another --out."
+            f"{folder} holds episodes of {record.policy} whose server reported {_name(before)}, "
+            f"but now it reports {_name(now)}; choose another --out."
         )
 
 

@@ -1,6 +1,6 @@
 """Storage of records as JSON lines, one record each, in a file that is only appended to.
 
-Guaranteed on a local POSIX file system, beside what `line_file` guarantees:
+Guaranteed on a local POSIX file system, besides what `line_file` guarantees:
 
 - A damaged line in the middle is skipped and reported; all other lines are read.
 - Verdicts of two versions of a policy's server do not get into one file.
@@ -151,7 +151,7 @@ def read_contents(path: Path) -> StoreContents:
 def read_records(folder: Path) -> tuple[Record, ...]:
     """Read the records of a run's folder: the newest of each identity, in the order of the file.
 
-    An episode that ended in an error before the server told its version has that of the others.
+    An episode that ended in an error before the server reported its version has that of the others.
 
     Raises:
         StoreError: there are none, or a line is not a record of this schema version.

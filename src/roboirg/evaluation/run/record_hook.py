@@ -1,4 +1,4 @@
-"""Tell others of records as they are stored: a function, or a command's standard input."""
+"""Pass records on as they are stored: a function, or a command's standard input."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ def split_command(text: str) -> list[str]:
 class CommandHook:
     """Writes each record as a line of JSON to a command, which is started once.
 
-    The command runs beside the run: a thread writes, so that a slow command delays nothing.
+    The command runs during the run: a thread writes, so that a slow command delays nothing.
     """
 
     def __init__(self, command: str) -> None:
@@ -107,7 +107,7 @@ class CommandHook:
 
 
 class HookedReporter:
-    """Passes a run's progress on, and its records to a hook, whose failures are told once.
+    """Passes a run's progress on, and its records to a hook, whose failures are reported once.
 
     Args:
         reporter: shows the progress.

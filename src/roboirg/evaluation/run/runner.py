@@ -88,7 +88,7 @@ def run_plan(
         play: plays one job.
         executor: where jobs are played.
         retry_errors: play jobs again whose newest record is an error.
-        reporter: is told of every record, and first of any damage in the file.
+        reporter: gets every record, and first any damage in the file.
 
     Raises:
         StoreError: another run writes to the folder, the records cannot be read or written, or
@@ -198,13 +198,16 @@ class _RunLoop:
                 self._store_record(job, record)
                 if self._count_connection_error(record):
                     self._report_unreachable(record)
+                    # In place: the executor takes its next job from here.
                     left = [one for one in waiting if one.policy != record.policy]
                     waiting.clear()
                     waiting.extend(left)
-                elif self._should_retry(job, record):
-                    # What was lost with a machine can be played at once; others had better wait.
-                    lost = record.error == "infrastructure"
-                    (waiting.appendleft if lost else waiting.append)(job)
+                elif not self._should_retry(job, record):
+                    continue
+                elif record.error == "infrastructure":
+                    waiting.appendleft(job)  # what was lost with a machine can be played at once
+                else:
+                    waiting.append(job)
 
     def _store_record(self, job: Job, record: Record) -> None:
         _check_record_version(record)
@@ -331,6 +334,7 @@ def _seed(task: str, split: str, episode: int) -> str | int:
 def _iterate(
     executor: Executor, jobs: deque[Job], play: PlayJob, warn: Warn
 ) -> Generator[Record, None, None]:
+    """Yield an executor's records. Unlike an iterator, a generator can be closed."""
     yield from executor.run(jobs, play, warn)
 
 

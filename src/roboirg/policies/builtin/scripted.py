@@ -13,7 +13,7 @@ from roboirg.core.conditions import Fact
 from roboirg.core.episode import Goal, Stage
 from roboirg.core.observations import Demonstration, Observation
 from roboirg.judging import Judge
-from roboirg.tasks import get_task
+from roboirg.tasks import get_task, with_goal
 
 if TYPE_CHECKING:
     from roboirg.envs.environment import RoboIRGEnv
@@ -90,7 +90,7 @@ class ScriptedPolicy(ABC):
         if goal is None:
             self._chunks = iter(())
             return
-        stages = get_task(env.episode.task).stages(env.episode.scene, goal)
+        stages = with_goal(env.episode, goal).stages
         self._chunks = _execute(env, stages, self.make_primitives(env))
 
     def act(self, observation: Observation) -> NDArray[np.floating[Any]]:  # noqa: ARG002

@@ -80,21 +80,12 @@ def make_policy(spec: str, seed: int) -> Policy:
 
 
 def policy_needs(spec: str) -> PolicyNeeds:
-    """Return what the policy of a spec needs; it is not connected to anything.
-
-    Raises:
-        InvalidValueError: there is no such policy, or it declares something invalid.
-        MissingDependencyError: a library that it needs is not installed.
-    """
+    """Return what the policy of a spec needs; it is not connected to anything."""
     return PolicyNeeds.of(_declaring(spec))
 
 
 def is_foreign(spec: str) -> bool:
-    """Return whether a spec names code that does not come with this package or a protocol.
-
-    Raises:
-        InvalidValueError: it is a system that cannot be read.
-    """
+    """Return whether a spec names code that does not come with this package or a protocol."""
     spec = undeclared(spec)
     kind, colon, rest = spec.partition(":")
     if spec in BUILTIN or is_url(spec) or not colon:
@@ -110,9 +101,6 @@ def needs_host(spec: str) -> bool:
 
     Built-in policies and the clients of remote ones are our own code and run next to the world, as
     do policies that the user declares privileged.
-
-    Raises:
-        InvalidValueError: it is a system that cannot be read.
     """
     if declares_privilege(spec):
         return False
@@ -173,11 +161,11 @@ def _refuse_undeclared(spec: str, policy: object) -> None:
 
 
 def server_version(metadata: Mapping[str, Any]) -> str | None:
-    """Return the version that a policy's server told; None if there is none, or it told none.
+    """Return the version that a policy's server reported; None without a server or a version.
 
     Args:
         metadata: of the policy, or of a planner and a policy, after `reset`. Those of clients hold
-            the address of the ``server`` and what it told, such as its ``version``.
+            the address of the ``server`` and what it reported, such as its ``version``.
     """
     for told in (metadata, metadata.get("policy")):
         if isinstance(told, Mapping) and "server" in told:

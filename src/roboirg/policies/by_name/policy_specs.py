@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 
 SYSTEM = "system"
 LISTENER = "vlm-listener"
-Build = Callable[[int], Policy]
+PolicyMaker = Callable[[int], Policy]
 """Makes a policy from a seed, without network or the libraries of providers."""
 
 
@@ -41,12 +41,12 @@ class PolicyKind(NamedTuple):
 
     Attributes:
         name: what stands before the colon.
-        build: returns what makes the policies of a spec. It is called with the whole spec, with
-            what stands between the colon and the question mark, and with the options behind that.
+        read: returns what makes the policies of a spec. It is called with the whole spec, with what
+            stands between the colon and the question mark, and with the options behind that.
     """
 
     name: str
-    build: Callable[[str, str, Mapping[str, str]], Build]
+    read: Callable[[str, str, Mapping[str, str]], PolicyMaker]
 
 
 class PolicyFactory:
@@ -54,19 +54,19 @@ class PolicyFactory:
 
     Args:
         spec: names the policies.
-        build: makes a policy from a seed, without network or the libraries of providers.
-        sample: a policy that `build` made.
+        make: makes a policy from a seed.
+        sample: a policy that `make` made.
     """
 
-    def __init__(self, spec: str, build: Build, sample: Policy) -> None:
-        self.spec, self._build = spec, build
+    def __init__(self, spec: str, make: PolicyMaker, sample: Policy) -> None:
+        self.spec, self._make = spec, make
         self.__name__ = spec
         PolicyNeeds.of(sample).declare_on(self)
         self.version = str(getattr(sample, "version", "unknown"))
 
     def __call__(self, seed: int = 0) -> Policy:
         """Make a fresh policy."""
-        return self._build(seed)
+        return self._make(seed)
 
 
 class PrivilegedPolicyFactory(PolicyFactory):
@@ -81,23 +81,19 @@ def find_policy_factory(spec: str) -> PolicyFactory | None:
     """Return the factory of a spec; None if the spec is of another kind.
 
     Needs neither a network nor a provider's client library.
-
-    Raises:
-        UnknownNameError: there is no such system, provider or option.
-        InvalidValueError: an option is missing or has an invalid value.
     """
     kind, colon, rest = spec.partition(":")
     found = find_kind(kind) if colon else None
     if found is None:
         return None
     name, _, query = rest.partition("?")
-    build = found.build(spec, name, parse_query(spec, query))
-    sample = build(0)
-    made = PrivilegedPolicyFactory if hasattr(sample, "attach") else PolicyFactory
-    return made(spec, build, sample)
+    make = found.read(spec, name, parse_query(spec, query))
+    sample = make(0)
+    factory = PrivilegedPolicyFactory if hasattr(sample, "attach") else PolicyFactory
+    return factory(spec, make, sample)
 
 
-def _system(spec: str, name: str, options: Mapping[str, str]) -> Build:
+def _system(spec: str, name: str, options: Mapping[str, str]) -> PolicyMaker:
     from roboirg.policies.by_name.systems import build_system, find_system
 
     if not name:
@@ -106,8 +102,8 @@ def _system(spec: str, name: str, options: Mapping[str, str]) -> Build:
     return lambda seed: build_system(system, seed)
 
 
-def _listener(_spec: str, name: str, options: Mapping[str, str]) -> Build:
-    """Return the builder of a VLM listener; its options and its model's stand side by side."""
+def _listener(_spec: str, name: str, options: Mapping[str, str]) -> PolicyMaker:
+    """Return what makes VLM listeners; its options and its model's stand side by side."""
     own = [option for option in ListenerOptions.model_fields if option != "model"]
     of_model = [option for option in ModelOptions.model_fields if option != "provider"]
     for option in options:
@@ -126,11 +122,7 @@ OURS = (PolicyKind(SYSTEM, _system), PolicyKind(LISTENER, _listener))
 
 @functools.cache
 def find_kind(name: str) -> PolicyKind | None:
-    """Return the kind of a name; None if there is none. Other kinds are not imported.
-
-    Raises:
-        InvalidValueError: the installed package that adds it cannot be loaded.
-    """
+    """Return the kind of a name; None if there is none. Other kinds are not imported."""
     ours = {kind.name: kind for kind in OURS}
     return ours.get(name) or find_entry(name, "KIND", PolicyKind, KINDS_GROUP)
 

@@ -114,12 +114,7 @@ def find_system(name_or_file: str, overrides: Mapping[str, str]) -> System:
 
 
 def build_system(system: System, seed: int) -> Policy:
-    """Make the policy of a system; nothing is connected.
-
-    Raises:
-        UnknownNameError: there is no such planner, policy or option.
-        InvalidValueError: an option has an invalid value.
-    """
+    """Make the policy of a system; nothing is connected."""
     policy = make_from_class(system.policy, find_class(system.policy), seed)
     if system.planner is None:
         return policy

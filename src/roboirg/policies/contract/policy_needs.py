@@ -145,7 +145,8 @@ class PolicyNeeds:
     def __post_init__(self) -> None:
         for one in fields(self):
             value = getattr(self, one.name)
-            if value is not None or one.default is not None:
+            is_undeclared = value is None and one.default is None
+            if not is_undeclared:
                 object.__setattr__(self, one.name, one.metadata["check"](value))
         if self.history_cameras is None:
             object.__setattr__(self, "history_cameras", self.cameras)
@@ -169,11 +170,7 @@ class PolicyNeeds:
 
     @classmethod
     def of_planner(cls, planner: object) -> Self:
-        """Return what a planner declares; by default, it needs no pictures.
-
-        Raises:
-            InvalidValueError: an attribute has an invalid value.
-        """
+        """Return what a planner declares; by default, it needs no pictures."""
         unseen = {"cameras": (), "demonstration_frames": "none"}
         return cls(**{**unseen, **_declared(planner, _names(cls, "merge"))})
 

@@ -53,7 +53,7 @@ class HierarchicalPolicy:
         self._parts = of_planner, own
         self.needs = own.merge(of_planner)
         if self.needs.actions == WAYPOINT.name and self.needs.observe_every is None:
-            # Only the history tells how many control steps a waypoint took.
+            # Only the history shows how many control steps a waypoint took.
             self.needs = replace(self.needs, observe_every=1)
         self.needs.declare_on(self)
         self._observed = self._step = self._rows = 0

@@ -40,7 +40,6 @@ class OraclePlanner:
 
     @property
     def metadata(self) -> dict[str, Any]:
-        """The options."""
         return {"kind": "oracle", **self.options.model_dump(mode="json")}
 
     def attach(self, env: RoboIRGEnv) -> None:

@@ -8,8 +8,8 @@ from typing import Any, ClassVar, Literal
 from pydantic import BaseModel, ConfigDict, Field
 
 from roboirg.core.observations import Demonstration, DemonstrationFrames, Observation
-from roboirg.policies.vlm.config_fingerprint import config_version
 from roboirg.policies.vlm.models import ModelOptions
+from roboirg.policies.vlm.models.model import config_version
 from roboirg.policies.vlm.prompt_files import SHARED, load_prompts
 from roboirg.policies.vlm.vlm_query import VLMQuery
 from roboirg.util.media import Pixels
@@ -40,9 +40,6 @@ class VLMPlanner(ABC):
     """Queries a model for subgoals, with pictures of the front camera only.
 
     If the model gives no usable subgoal even at the second try, the last one stays.
-
-    Raises:
-        InvalidValueError: the prompts cannot be read.
     """
 
     kind: ClassVar[str]
@@ -121,7 +118,6 @@ class VLMPlanner(ABC):
         return self._vlm.usage()
 
     def close(self) -> None:
-        """Close the connection."""
         self._vlm.close()
 
     def forms(self) -> str:

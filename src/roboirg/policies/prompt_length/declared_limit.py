@@ -10,12 +10,7 @@ from roboirg.policies.prompt_length.tokenizer_file import read_tokenizer
 
 
 def prompt_limit(needs: PolicyNeeds) -> PromptLimit | None:
-    """Return the limit that a policy declares; None if it declares none.
-
-    Raises:
-        InvalidValueError: the tokenizer's file holds none.
-        MissingDependencyError: the library that reads that file is not installed.
-    """
+    """Return the limit that a policy declares; None if it declares none."""
     if needs.prompt_tokens is None:
         return None
     path = needs.tokenizer

@@ -21,12 +21,8 @@ def read_tokenizer(path: str) -> Tokenize:
 
     Args:
         path: ``.json`` for the library `tokenizers`, anything else for SentencePiece.
-
-    Raises:
-        InvalidValueError: there is no such file, or it holds no tokenizer.
-        MissingDependencyError: the library that reads it is not installed.
     """
-    return _read(os.path.abspath(path))  # noqa: PTH100 - links stay: the suffix tells the kind
+    return _read(os.path.abspath(path))  # noqa: PTH100 - links stay: the suffix names the kind
 
 
 @functools.cache

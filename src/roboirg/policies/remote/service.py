@@ -89,7 +89,7 @@ def act(policy: Policy, observation: Observation) -> tuple[NDArray[np.float64], 
 
 
 def tell_change(policy: Policy, before: str, observation: Observation, step: int) -> str:
-    """Tell a policy what an observation says, if it differs from what was said before it.
+    """Let a policy hear what an observation says, if it differs from what was said before it.
 
     Args:
         policy: that remembers from one request to the next.

@@ -43,19 +43,11 @@ class Transport(NamedTuple):
     server: str
 
     def load_client(self) -> Connect:
-        """Import what opens a connection.
-
-        Raises:
-            MissingDependencyError: a library it needs is not installed.
-        """
+        """Import what opens a connection."""
         return cast("Connect", pkgutil.resolve_name(self.client))
 
     def load_server(self) -> Listen:
-        """Import what opens a server.
-
-        Raises:
-            MissingDependencyError: a library it needs is not installed.
-        """
+        """Import what opens a server."""
         return cast("Listen", pkgutil.resolve_name(self.server))
 
 

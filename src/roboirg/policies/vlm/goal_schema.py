@@ -113,11 +113,7 @@ class GoalSchema:
 
 @functools.cache
 def goal_schema(task: str) -> GoalSchema:
-    """Return the goal schema of a task.
-
-    Raises:
-        UnknownNameError: there is no such task.
-    """
+    """Return the goal schema of a task."""
     known_task = get_task(task)
     goals: dict[str, Goal] = {}
     for index in range(SIZES[SOURCE]):

@@ -54,9 +54,6 @@ def question_texts(
         instruction: everything that was said.
         steps: control steps of the video; 0 without one.
         reasoning: meaning of the field in which the model may think; None without it.
-
-    Raises:
-        InvalidValueError: the prompts lack a text or have an unknown field.
     """
     fields = "\n".join(_describe_fields(prompts, schema, reasoning))
     return QuestionTexts(

@@ -16,14 +16,14 @@ from pydantic import Field as Option
 from roboirg.core.episode import Goal
 from roboirg.core.observations import Demonstration
 from roboirg.policies.builtin.scripted import ScriptedPolicy
-from roboirg.policies.vlm.config_fingerprint import config_version
 from roboirg.policies.vlm.goal_schema import GoalSchema, goal_schema
 from roboirg.policies.vlm.listener_query import PROMPTS, question_texts
 from roboirg.policies.vlm.model_content import ChatTurn, summary_clip
 from roboirg.policies.vlm.models import Model, ModelOptions, ModelQuery, make_model
+from roboirg.policies.vlm.models.model import config_version
 from roboirg.policies.vlm.prompt_files import load_prompts
 from roboirg.policies.vlm.vlm_query import VLMQuery
-from roboirg.tasks import get_task
+from roboirg.tasks import goals_of
 from roboirg.util.media import Clip, Picture
 
 if TYPE_CHECKING:
@@ -147,7 +147,7 @@ class VLMListener(ScriptedPolicy):
         self.understood = goal
         if goal is None:
             raise NotUnderstoodError
-        if goal not in get_task(env.episode.task).goals(env.episode.scene):
+        if goal not in goals_of(env.episode):
             self._impossible += 1
             raise NotUnderstoodError
         return goal
@@ -157,7 +157,6 @@ class VLMListener(ScriptedPolicy):
         return {**self._vlm.usage(), "impossible": self._impossible}
 
     def close(self) -> None:
-        """Close the connection."""
         self._vlm.close()
 
     def _build_query(self, env: RoboIRGEnv, schema: GoalSchema, instruction: str) -> ModelQuery:

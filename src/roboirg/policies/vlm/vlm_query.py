@@ -81,7 +81,6 @@ class VLMQuery:
         return usage
 
     def close(self) -> None:
-        """Close the connection."""
         model, self._model = self._model, None
         if model is not None:
             model.close()

@@ -80,7 +80,6 @@ def _make_table_arrays() -> Arrays:
 
 
 def _load_shape(content: bytes) -> sapien.render.RenderShapeTriangleMesh:
-    """Load a shape from the content of a file."""
     with tempfile.TemporaryDirectory(prefix="roboirg-") as folder:
         path = Path(folder) / "table.glb"
         path.write_bytes(content)

@@ -60,7 +60,6 @@ class FrameSequence:
         return np.empty((count, *self.format.shape), self.format.dtype)
 
     def key(self) -> str:
-        """Return the cache key."""
         parts = (
             recording_key(self.episode),
             self.recording.end,
@@ -95,27 +94,29 @@ def read_frames(sequences: Sequence[FrameSequence]) -> list[NDArray[Any]]:
 def _draw(missing: Sequence[tuple[FrameSequence, NDArray[Any]]]) -> None:
     """Replay the demonstration and draw the pictures into the arrays.
 
-    The world advances while pictures are drawn; they are fetched before the next ones start.
+    The renderer draws a picture while the world goes on, so a picture is fetched only when the
+    next one is due, and the last one at the end.
     """
     (first, _), *_ = missing
     session = EpisodeSession(first.episode, visible=True, rendering=first.rendering)
     world, cameras = session.world, session.world.cameras
     drawing = tuple(dict.fromkeys(sequence.field.rpartition("_")[0] for sequence, _ in missing))
-    steps = started = 0
+    steps = pictures = 0  # seen, and begun
 
     def fetch() -> None:
+        """Read the pictures begun last."""
         with cameras.frozen():
             for sequence, array in missing:
-                array[started - 1] = read_picture(world, sequence.field)
+                array[pictures - 1] = read_picture(world, sequence.field)
 
     def draw_if_due(stage: Stage) -> None:
         del stage
-        nonlocal steps, started
+        nonlocal steps, pictures
         if steps % first.every == 0:
-            if started:
+            if pictures:
                 fetch()
             cameras.draw(drawing)
-            started += 1
+            pictures += 1
         steps += 1
 
     end = session.play_demonstration(draw_if_due, first.recording).end

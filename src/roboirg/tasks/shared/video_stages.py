@@ -47,5 +47,5 @@ def go_home() -> Stage:
         forbids=(),
         primitive=Primitive("go_home", "robot"),
         subgoal="go home",
-        recorded=False,
+        in_video=False,
     )

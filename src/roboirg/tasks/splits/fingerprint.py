@@ -18,6 +18,9 @@ NOT_COUNTED = frozenset({("Rule", "cause"), ("Rule", "failure")})
 """Type and name of fields that describe a failure and change no score: two episodes that differ
 in nothing else are the same."""
 
+HASHED_AS = {("Stage", "in_video"): "recorded"}
+"""Names of fields when the hashes of the shipped episodes were made, where they were others."""
+
 
 def fingerprint(episodes: Iterable[Episode]) -> str:
     """Return the SHA-256 hash, in hexadecimal, of the canonical JSON of episodes, in their order.
@@ -46,5 +49,9 @@ def plain(value: object) -> Plain:
     else:
         raise TypeError(f"{value!r} of {type(value).__name__} is not plain data")
     kind = type(value).__name__
-    counted = (name for name in names if (kind, name) not in NOT_COUNTED)
-    return {"type": kind, **{name: plain(getattr(value, name)) for name in counted}}
+    fields = {
+        HASHED_AS.get((kind, name), name): plain(getattr(value, name))
+        for name in names
+        if (kind, name) not in NOT_COUNTED
+    }
+    return {"type": kind, **fields}

@@ -1,4 +1,4 @@
-"""The splits: RoboMME's published episodes, and the sampled ones beside them.
+"""The splits: RoboMME's published episodes, and the sampled ones next to them.
 
 The episodes of the benchmark's train, val and test splits are RoboMME's (`published_episodes`).
 Sampled are the six that RoboMME's data lacks, the tasks of the suite ``real`` or of another
@@ -168,9 +168,10 @@ def split_episodes(tasks: Iterable[str], splits: Iterable[Split]) -> Iterator[Ep
 
 def fingerprint_of(task_name: str, passed_over: Mapping[str, int]) -> str:
     """Return the fingerprint of all episodes of a task, given the numbers of seeds passed over."""
+    task = get_task(task_name)
     return fingerprint(
-        _published(task_name, split, index)
-        or _sampled(task_name, split, index, passed_over.get(slot_key(split, index), 0))
+        _published(task, split, index)
+        or _sampled(task, split, index, passed_over.get(slot_key(split, index), 0))
         for split in SPLITS
         for index in range(SIZES[split])
     )
@@ -197,11 +198,12 @@ def _check_index(split: Split, index: SupportsIndex) -> int:
 
 
 @functools.lru_cache(maxsize=4096)
-def _episode(task: str, split: Split, index: int) -> Episode:
+def _episode(task_name: str, split: Split, index: int) -> Episode:
+    task = get_task(task_name)
     published = _published(task, split, index)
     if published is not None:
         return published
-    entry = shipped_splits().get(task)
+    entry = shipped_splits().get(task_name)
     if entry is not None and split in SPLITS:
         return _sampled(task, split, index, entry.passed_over.get(slot_key(split, index), 0))
     for passed_over in range(MAX_REJECTED):
@@ -210,17 +212,17 @@ def _episode(task: str, split: Split, index: int) -> Episode:
     return _sampled(task, split, index, MAX_REJECTED)
 
 
-def _published(task: str, split: Split, index: int) -> Episode | None:
-    found = published_episode(task, split, index)
+def _published(task: Task, split: Split, index: int) -> Episode | None:
+    found = published_episode(task.name, split, index)
     if found is None:
         return None
-    recorded = is_recorded(task, split, index)
-    return assemble_episode(get_task(task), *found, split=split, index=index, recorded=recorded)
+    recorded = is_recorded(task.name, split, index)
+    return assemble_episode(task, *found, split=split, index=index, recorded=recorded)
 
 
-def _sampled(task: str, split: Split, index: int, passed_over: int) -> Episode:
+def _sampled(task: Task, split: Split, index: int, passed_over: int) -> Episode:
     if is_private(split):
-        seed = private_seed(task, split, index, passed_over)
+        seed = private_seed(task.name, split, index, passed_over)
     else:
-        seed = slot_seed(get_task(task), split, index) + passed_over
-    return make_episode(task, seed, slot_difficulty(index), split, index)
+        seed = slot_seed(task, split, index) + passed_over
+    return make_episode(task.name, seed, slot_difficulty(index), split, index)

@@ -132,6 +132,7 @@ class _StatsCollector:
         self._columns = columns
         self._numbers: defaultdict[str, list[NDArray[Any]]] = defaultdict(list)
         self._counts: dict[str, NDArray[np.int64]] = {}
+        # Instructions of a trajectory follow one another and share what is slow to compute.
         self._last: tuple[Path, dict[str, FeatureStats]] | None = None
 
     def add(self, trajectory: Trajectory, placed: PlacedText) -> dict[str, FeatureStats]:

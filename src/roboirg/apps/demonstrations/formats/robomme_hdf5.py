@@ -39,17 +39,12 @@ _NO_CHOICE = json.dumps({"choice": "", "point": []})
 
 
 def check_hdf5_support() -> None:
-    """Check early that HDF5 files can be written and read.
-
-    Raises:
-        MissingDependencyError: h5py is not installed.
-    """
+    """Check early that HDF5 files can be written and read."""
     with extra_needed("RoboMME's format needs h5py", "demonstrations"):
         import h5py  # noqa: F401
 
 
 def file_name(task: str) -> str:
-    """Return the name of a task's file."""
     return f"record_dataset_{task}.h5"
 
 

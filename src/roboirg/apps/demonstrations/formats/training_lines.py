@@ -56,7 +56,7 @@ lines have not been run here: the weights and a GPU were not at hand.
 
 _OPENPI = """\
 openpi reads this data set with the LeRobot that it pins. Save the following as
-`roboirg_config.py` beside openpi's `scripts/`, and start training through it:
+`roboirg_config.py` next to openpi's `scripts/`, and start training through it:
 
 ```python
 import dataclasses

@@ -19,14 +19,14 @@ from roboirg.core.observations import CAMERAS
 
 PLAN_FILE = "demonstrations.csv"
 FACTORS = ("target_color", "repeats")
-"""What the words of a demonstration tell; sides can be planned, but not be checked."""
+"""What the words of a demonstration say; sides can be planned, but not be checked."""
 _SHOWN = 3
 _SLACK = 0.25
 """Share of the gripper's range by which its values may leave it."""
 
 
 class PlannedTake(NamedTuple):
-    """A demonstration of the plan: its episode, its instruction, and what that tells."""
+    """A demonstration of the plan: its episode, its instruction, and what that says."""
 
     name: str
     task: str

@@ -55,7 +55,7 @@ def export_recording(
         out: folder of the new data set.
         data_format: one of `FORMATS`.
         workers: processes; 0 uses this one.
-        report: told the progress.
+        report: called with the progress.
     """
     plan = ExportPlan(
         tasks=tuple(dict.fromkeys(one.task for one in takes)),

@@ -37,7 +37,7 @@ from roboirg.evaluation.grounding_items.grounding_item import (
     read_items,
 )
 from roboirg.evaluation.grounding_items.verdicts import judge_reply, right_reply
-from roboirg.evaluation.plan.plan_parsing import means_all, parse_names
+from roboirg.evaluation.plan.option_parsing import means_all, parse_names
 from roboirg.policies.vlm.goal_schema import goal_schema
 from roboirg.policies.vlm.listener_query import PROMPTS, QuestionTexts
 from roboirg.policies.vlm.prompt_files import load_prompts

@@ -34,7 +34,7 @@ class LeRobotSubEnvironment(gymnasium.Env[dict[str, Any], NDArray[np.floating[An
 
     Observation: `pixels`, uint8 (256, 256, 3) for each camera; `agent_pos` float32 (8,), seven
     joints (rad) and the first finger (m). The instruction is `task_description`, which is what was
-    said last. Info: `is_success`, and `is_video_demo` while the video is played. Nothing tells
+    said last. Info: `is_success`, and `is_video_demo` while the video is played. Nothing shows
     setting, episode or goal.
 
     After the end of an episode it repeats the last transition until a reset with a seed or with
@@ -98,7 +98,7 @@ class LeRobotSubEnvironment(gymnasium.Env[dict[str, Any], NDArray[np.floating[An
 
     @property
     def task(self) -> str:
-        """What LeRobot tells a policy where it does not know `task_description`: the same."""
+        """What LeRobot gives a policy where it does not know `task_description`: the same."""
         return self.task_description
 
     def reset(

@@ -1,4 +1,8 @@
-"""Batches of sub-environments for LeRobot, without importing it."""
+"""Batches of sub-environments for LeRobot, without importing it.
+
+They are Gymnasium's own vector classes, and not `roboirg.make_vec`, because LeRobot asks for them:
+it reads `envs`, and calls what sub-environments have under its own names.
+"""
 
 from __future__ import annotations
 

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 MAX_STEPS = 1300
 """As in RoboMME's protocol; vla-eval's own default is 300."""
 TOLD_TASK = {"name": "RoboIRGBench"}
-"""All that a policy is told of the task besides the observations."""
+"""All that a policy learns of the task besides the observations."""
 ICD_VARIABLE = "ROBOIRG_LAVAPIPE_ICD"
 """Environment variable with the path of lavapipe's Vulkan manifest, for ``render: cpu``."""
 _STATE = DimSpec("state", 8, "joint_positions7_finger1")
@@ -91,7 +91,7 @@ class RoboIRGBenchmark(StepBenchmark):  # type: ignore[misc] # vla-eval has no t
         return chosen
 
     def get_tasks(self) -> list[dict[str, Any]]:
-        """Return the tasks, for the harness's results; a policy is not told."""
+        """Return the tasks, for the harness's results; a policy does not get them."""
         return [{"name": task, "suite": f"{self.setting}-{self.split}"} for task in self.tasks]
 
     def reset(self, task: dict[str, Any]) -> dict[str, Any]:
@@ -168,12 +168,10 @@ class RoboIRGBenchmark(StepBenchmark):  # type: ignore[misc] # vla-eval has no t
         return {"max_steps": self.max_steps, "max_episodes_per_task": episodes}
 
     def get_action_spec(self) -> dict[str, DimSpec]:
-        """Declare the action."""
         space = self.action_space
         return {"action": DimSpec("action", space.size, _ACTION_FORMATS[space.name])}
 
     def get_observation_spec(self) -> dict[str, DimSpec]:
-        """Declare the observation."""
         fields = {"agentview": IMAGE_RGB, "language": LANGUAGE}
         if self._has_wrist:
             fields["wrist"] = IMAGE_RGB

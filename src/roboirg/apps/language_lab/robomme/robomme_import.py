@@ -85,9 +85,6 @@ def import_robomme(root: Path, name: str = ROBOMME_NAME) -> ImportedWordings:
     Args:
         root: folder of the clone.
         name: of the wordings.
-
-    Raises:
-        InvalidValueError: the folder lacks the sentences, or the name is no word.
     """
     where = "imported wording file"
     check_name(name, where)
@@ -278,7 +275,7 @@ def _merged(first: WordedCommand, second: WordedCommand) -> WordedCommand | None
         if any(known.get(value, phrase) != phrase for value, phrase in table.items()):
             return None
         known.update(table)
-    # A condition on a slot that the fields tell anyway is not needed.
+    # A condition on a slot that the fields hold anyway is not needed.
     told = {one.partition(".")[0] for one in first.fields}
     told |= {"colors", "counts"} if "cubes" in told else set()
     when = {slot: value for slot, value in first.when.items() if slot not in told}

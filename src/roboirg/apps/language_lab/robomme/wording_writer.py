@@ -13,7 +13,6 @@ _BARE = frozenset("abcdefghijklmnopqrstuvwxyz0123456789")
 
 
 def wording_text(name: str, source: str, tasks: Mapping[str, TaskWordings]) -> str:
-    """Return the text of a wording file."""
     lines = [f"name = {_quoted(name)}", f"source = {_quoted(source)}"]
     for task, wordings in tasks.items():
         lines += ["", *_task_lines(task, wordings)]

@@ -25,7 +25,7 @@ from roboirg.language.settings import ACCEPTANCE_SETTINGS, all_settings, setting
 from roboirg.language.settings.setting import Setting
 from roboirg.language.variants import expressible_options
 from roboirg.reader import Interpretation, interpret
-from roboirg.tasks import get_task
+from roboirg.tasks import get_task, goals_of
 
 Read = Callable[[str], Interpretation]
 """Interprets a text in the scene at hand."""
@@ -156,7 +156,7 @@ def only_candidate(episode: Episode, instruction: Instruction) -> bool:
     if only one choice of colors has enough cubes, or if the goal wants all colors in equal numbers.
     """
     stated = frozenset(episode.goal.as_mapping()) - hidden_slots(instruction, episode.goal)
-    candidates = get_task(episode.task).goals(episode.scene)
+    candidates = goals_of(episode)
     wanted = _contents(episode.goal, stated)
     return sum(_contents(goal, stated) == wanted for goal in candidates) == 1
 

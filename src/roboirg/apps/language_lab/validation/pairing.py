@@ -37,7 +37,7 @@ def unpaired(
 
 
 def _differences(options: InstructionOptions, say: Instruct) -> Iterator[str]:
-    """Yield how the forms of an instruction differ, beside their references."""
+    """Yield how the forms of an instruction differ, apart from their references."""
     implicit, resolved = say(options), say(replace(options, form="resolved"))
     if implicit.turns[:-1] != resolved.turns[:-1]:
         yield "resolved, its context differs"

@@ -93,7 +93,6 @@ class ValidationResults:
     failures: list[RuleViolation] = field(default_factory=list)
 
     def add(self, other: ValidationResults) -> None:
-        """Add the results of other episodes."""
         self.texts.update(other.texts)
         self.commands.update(other.commands)
         self.exceptions.update(other.exceptions)

@@ -25,18 +25,18 @@ class Batch(NamedTuple):
         split: name of the split.
         first: index of the first episode.
         size: number of episodes.
-        wordings: path of a wording file; None for our own words.
+        wordings_file: its path, or the name of a pool; None for the words of the split.
     """
 
     task: str
     split: Split
     first: int
     size: int
-    wordings: str | None = None
+    wordings_file: str | None = None
 
 
 def batches(
-    tasks: Sequence[str], splits: Sequence[Split], seeds: int, wordings: str | None = None
+    tasks: Sequence[str], splits: Sequence[Split], seeds: int, wordings_file: str | None = None
 ) -> tuple[Batch, ...]:
     """Return batches of all episodes of the splits and of random ones.
 
@@ -44,7 +44,7 @@ def batches(
         tasks: names.
         splits: names.
         seeds: number of random episodes for each task.
-        wordings: path of a wording file; None for our own words.
+        wordings_file: its path, or the name of a pool; None for the words of the split.
 
     Raises:
         InvalidValueError: the number is negative, or there is nothing to validate.
@@ -54,7 +54,7 @@ def batches(
     amounts = [(split, SIZES[split]) for split in splits]
     amounts.append(("random", seeds))
     found = tuple(
-        Batch(task, split, first, min(BATCH, amount - first), wordings)
+        Batch(task, split, first, min(BATCH, amount - first), wordings_file)
         for task in tasks
         for split, amount in amounts
         for first in range(0, amount, BATCH)
@@ -67,7 +67,7 @@ def batches(
 def validate_batch(batch: Batch) -> ValidationResults:
     """Check the episodes of a batch."""
     results = ValidationResults()
-    identity = open_wordings(batch.wordings)
+    identity = open_wordings(batch.wordings_file)
     for index in range(batch.first, batch.first + batch.size):
         episode = get_episode(batch.task, batch.split, index)
         expected = batch.split in SPLITS

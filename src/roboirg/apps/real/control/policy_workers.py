@@ -145,7 +145,6 @@ class PolicyThread:
         threading.Thread(target=self._run, name="policy", daemon=True).start()
 
     def send(self, method: str, *args: Any) -> None:  # noqa: ANN401
-        """Send a request."""
         self._requests.put((method, *args))
 
     def receive(self, timeout_s: float) -> PolicyReply | None:

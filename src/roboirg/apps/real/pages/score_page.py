@@ -49,9 +49,6 @@ def render_trial(trial_log: TrialLog, trial: PlannedTrial, *, nonce: str, messag
         trial: to show.
         nonce: allows the page's own style and script.
         message: result of the last click.
-
-    Raises:
-        MissingDependencyError: Jinja is not installed.
     """
     names = [one.name for one in trial_log.plan.trials]
     index = names.index(trial.name)

@@ -45,12 +45,7 @@ DEMONSTRATIONS_PER_PAGE = 6
 
 
 def write_sheet(plan: StudyPlan, path: Path) -> int:
-    """Draw the sheet as PDF; returns its number of pages.
-
-    Raises:
-        MissingDependencyError: matplotlib is not installed.
-        InvalidValueError: the file cannot be written.
-    """
+    """Draw the sheet as PDF; returns its number of pages."""
     with extra_needed("The sheet needs matplotlib", "report"):
         from matplotlib.backends.backend_pdf import PdfPages
 

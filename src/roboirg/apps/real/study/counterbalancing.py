@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 from roboirg.core.episode import Color, Episode, ObjectKind
 from roboirg.core.errors import InvalidValueError
-from roboirg.tasks import get_task
+from roboirg.tasks import get_task, goals_of
 from roboirg.tasks.shared.real_table import left_to_right
 from roboirg.tasks.splits.splits import SIZES, check_fixed_split, get_episode
 
@@ -74,7 +74,7 @@ def counterbalanced_order(task: str) -> tuple[Arrangement, ...]:
     episode = get_episode(task, "train", 0)
     colors = left_to_right(episode.scene, target_kind(task))
     first, second = sorted(colors)
-    goals = get_task(task).goals(episode.scene)
+    goals = goals_of(episode)
     numbers = sorted({goal.as_mapping().get("repeats") for goal in goals}, key=str)
     ordered: list[Arrangement] = []
     # A number has an opposite only where there are two.

@@ -15,9 +15,6 @@ def at_horizon(spec: str) -> str:
 
     Policies and systems behind ``mme-vla://`` execute fewer actions in simulation, as RoboMME's
     client does. What already names a number keeps it, as TTT-Expert's stride.
-
-    Raises:
-        UnknownNameError: there is no such system.
     """
     head, _, query = spec.partition("?")
     option = _OPTION

@@ -19,7 +19,7 @@ from roboirg.apps.real.study.counterbalancing import counterbalanced_episodes, t
 from roboirg.core.episode import Episode
 from roboirg.core.errors import InvalidValueError, RoboIRGError, UnknownNameError
 from roboirg.core.instruction_options import InstructionOptions
-from roboirg.evaluation.plan.plan_parsing import name_and_spec
+from roboirg.evaluation.plan.option_parsing import name_and_spec
 from roboirg.evaluation.records.record import DEFAULT_MAX_STEPS, Job
 from roboirg.language.settings import plain_settings, settings_of
 from roboirg.tasks import get_task
@@ -137,10 +137,6 @@ def make_study(
         demonstrations: per task.
         seed: of the orders.
         max_steps: largest number of control periods of a trial.
-
-    Raises:
-        UnknownNameError: a task or setting does not exist.
-        InvalidValueError: a number is out of range, or a name is given twice.
     """
     named = [name_and_spec(policy) for policy in policies]
     names = [name for name, _ in named]
@@ -271,7 +267,7 @@ def _check(
             raise InvalidValueError(f"{name} is {value}; it must be at least {minimum}.")
     for task in tasks:
         target_kind(task)
+        available = settings_of(get_task(task))
         for setting in settings:
-            available = settings_of(get_task(task))
             if setting not in available:
                 raise UnknownNameError(f"setting of {task}", setting, available)

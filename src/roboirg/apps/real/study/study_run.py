@@ -25,7 +25,7 @@ from roboirg.core.episode import ENVIRONMENT_VERSION
 from roboirg.core.errors import InvalidValueError, UnknownNameError
 from roboirg.core.instruction_options import DEFAULT_DELIVERY
 from roboirg.evaluation.hosting.policy_descriptions import describe_policy
-from roboirg.evaluation.plan.plan_parsing import name_and_spec
+from roboirg.evaluation.plan.option_parsing import name_and_spec
 from roboirg.evaluation.play.job_instruction import instruct_job
 from roboirg.evaluation.play.rollout_result import make_record, utc_now
 from roboirg.evaluation.records.record import Job, Record

@@ -132,6 +132,6 @@ def legend_below(figure: Figure, axes: Axes) -> None:
 
 
 def _legend_columns(labels: Sequence[str]) -> int:
-    """Return in how many columns the labels fit beside each other."""
+    """Return in how many columns the labels fit next to each other."""
     longest = max(map(len, labels), default=0) + SIGN_LETTERS
     return max(1, min(MOST_COLUMNS, LEGEND_LETTERS // longest))

@@ -35,7 +35,6 @@ class Strings:
         return place
 
     def optional_index(self, text: str | None) -> int | None:
-        """Return the index of a text, or None."""
         return None if text is None else self.index(text)
 
 

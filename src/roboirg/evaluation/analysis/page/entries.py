@@ -73,7 +73,6 @@ class EpisodeEntry:
 
     @property
     def options(self) -> InstructionOptions:
-        """The instruction options."""
         return self.record.column
 
     @property

@@ -50,7 +50,6 @@ class PageServer(AppServer):
 
     @property
     def address(self) -> str:
-        """Address of the page."""
         return f"http://{LOOPBACK}:{self.port}/"
 
     def page(self) -> str:

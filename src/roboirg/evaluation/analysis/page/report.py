@@ -66,7 +66,7 @@ def write_report(
         videos: whether to embed the videos.
         against: folder of another run, to compare with episode by episode.
         planned_against: planned jobs of the other run.
-        progress: told after each episode.
+        progress: called after each episode.
     """
     check_report_support()
     path = folder / REPORT_FILE

@@ -166,7 +166,7 @@ def _mixed_policy(policy: str, policy_runs: Sequence[PolicyRun]) -> Iterable[str
 def _without_reference(entries: EpisodeEntries) -> Iterable[str]:
     if len(entries.names) == 1:
         yield (
-            "Only one policy: without the forgetful listener’s results beside it, a rate does not "
+            "Only one policy: without the forgetful listener’s results next to it, a rate does not "
             "show how much of it is chance (roboirg tables RUN --floors chance adds the level)."
         )
     if all(key.options.setting != EXPLICIT for key in entries.cells):

@@ -40,7 +40,6 @@ class BreakdownRow:
 
     @property
     def policy_run(self) -> PolicyRun:
-        """The policy run."""
         return self.results.policy_run
 
 

@@ -73,7 +73,6 @@ class ScopeResults:
 
     @property
     def policy_run(self) -> PolicyRun:
-        """The policy run."""
         return self.key.policy_run
 
     @property
@@ -83,7 +82,6 @@ class ScopeResults:
 
     @property
     def options(self) -> InstructionOptions:
-        """The instruction options."""
         return self.key.options
 
     @property

@@ -57,7 +57,7 @@ class Entry:
         best: whether it is the best, or among the best, of its group.
         marks: of incomplete entries, as in the constants above.
         counts: behind the rate; None if they are unknown.
-        differences: from the published rate's conditions; None without a published rate beside it.
+        differences: from the published rate's conditions; None without a published rate.
     """
 
     percent: Decimal | None = None

@@ -156,7 +156,6 @@ class WebsocketConnection:
             raise PolicyConnectionError(f"{spec} refused: {_describe(error)}.") from error
 
     def send(self, data: bytes) -> None:
-        """Send a message."""
         connection = self._open()
         try:
             with contextlib.suppress(TimeoutError):

@@ -19,11 +19,7 @@ __all__ = ["all_protocols", "protocols_by_scheme"]
 
 @functools.cache
 def all_protocols() -> tuple[Protocol, ...]:
-    """Return every protocol: ours by file name, then those of installed packages.
-
-    Raises:
-        InvalidValueError: a package adds something that is no protocol, or a name in use.
-    """
+    """Return every protocol: ours by file name, then those of installed packages."""
     return tuple(discover(sys.modules[__name__], "PROTOCOL", Protocol, "roboirg.protocols"))
 
 

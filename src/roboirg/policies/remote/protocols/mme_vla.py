@@ -103,11 +103,7 @@ class MmeVlaPolicy(RemotePolicy):
         self._subgoal = subgoal.lower()
 
     def request_actions(self, observation: Observation) -> NDArray[np.floating[Any]]:
-        """Send the frames since the last call, then request actions.
-
-        Raises:
-            InvalidValueError: the episode is longer than the model's memory.
-        """
+        """Send the frames since the last call, then request actions."""
         if self.options.history:
             if self._demonstration is not None:
                 demonstration, self._demonstration = self._demonstration, None
@@ -127,8 +123,9 @@ class MmeVlaPolicy(RemotePolicy):
     def _send_beginning(self, demonstration: Demonstration, observation: Observation) -> None:
         """Send the T frames of the video and the first frame of the policy's turn, number T."""
         length = len(demonstration["joint_positions"])
-        # Pictures are rendered when they are read: without a video there are none to read.
-        video = demonstration["front_rgb"] if length else observation["front_rgb"][None][:0]
+        # The demonstration draws pictures when they are read, so it is not asked for none.
+        no_pictures = np.empty((0, *observation["front_rgb"].shape), np.uint8)
+        video = demonstration["front_rgb"] if length else no_pictures
         states = proprioception(demonstration["joint_positions"], demonstration["gripper"])
         start = length
         for part in _parts(

@@ -3,7 +3,7 @@
 Such a server remembers nothing: there is no reset, and every request holds all that a reply
 needs. Several episodes may use it at once, and a request whose connection breaks is sent once
 more. Our service has one policy per connection; an episode begins with the connection and when
-the prompt changes. So a policy behind our service cannot be told an instruction in turns: every
+the prompt changes. So a policy behind our service cannot hear an instruction in turns: every
 utterance begins an episode that knows nothing of the one before.
 """
 

@@ -23,8 +23,8 @@ from roboirg.policies.remote.protocol import Protocol
 from roboirg.policies.remote.transport import Transport
 
 TASK = {"name": "RoboIRGBench"}
-"""Told at the beginning of an episode; the harness tells the task here, which would tell more than
-the instruction."""
+"""Sent at the beginning of an episode. The harness sends the task here, which would give away more
+than the instruction."""
 _ENVELOPE = Transport(
     "websocket",
     "roboirg.policies.remote.client.envelope_connection:EnvelopeConnection",
@@ -37,7 +37,7 @@ class VlaEvalOptions(RemoteOptions):
 
     Attributes:
         actions: action space of the checkpoint.
-        wrist: whether to send wrist pictures, unless the server says so itself.
+        wrist: whether to send wrist pictures, unless the server asks for them.
         state: likewise proprioception.
         video: likewise the demonstration.
     """
@@ -66,11 +66,7 @@ class VlaEvalPolicy(RemotePolicy):
         self._in_episode = False
 
     def begin_episode(self, demonstration: Demonstration) -> None:
-        """Begin an episode; the demonstration goes with the first observation.
-
-        Raises:
-            InvalidValueError: the server wants what this client's options leave out.
-        """
+        """Begin an episode; the demonstration goes with the first observation."""
         self._check_params()
         self._subgoal = None
         shows = self.options.video and self._wants("send_video_history")
@@ -79,7 +75,7 @@ class VlaEvalPolicy(RemotePolicy):
         self._in_episode = True
 
     def close(self) -> None:
-        """End the episode, which the server is told, and disconnect."""
+        """Report the end of the episode to the server, and disconnect."""
         if self._in_episode:
             self._in_episode = False
             with contextlib.suppress(RoboIRGError):  # it is over for the server too

@@ -39,9 +39,6 @@ class WebsocketServer:
 
     Attributes:
         socket: that listens.
-
-    Raises:
-        InvalidValueError: the address is in use or not this computer's.
     """
 
     def __init__(
@@ -125,8 +122,5 @@ def open_websocket(
         service: answers messages.
         metadata: sent first on every connection.
         options: address, key and time limit.
-
-    Raises:
-        InvalidValueError: the address is in use or not this computer's.
     """
     return WebsocketServer(service, metadata, options)

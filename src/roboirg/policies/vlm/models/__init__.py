@@ -8,12 +8,7 @@ __all__ = ["Model", "ModelOptions", "ModelQuery", "ModelReply", "make_model"]
 
 
 def make_model(options: ModelOptions) -> Model:
-    """Return a connection to a model; nothing is sent before the first query.
-
-    Raises:
-        MissingDependencyError: the provider's client library is not installed, or the environment
-            variable with the key is not set.
-    """
+    """Return a connection to a model; nothing is sent before the first query."""
     if options.provider == "google":
         from roboirg.policies.vlm.models.google import GoogleModel
 

@@ -72,7 +72,6 @@ class GoogleModel:
             raise self._convert_error(error) from None
 
     def close(self) -> None:
-        """Close the connection."""
         self._client.close()
 
     def _contents(self, query: ModelQuery) -> list[Any]:

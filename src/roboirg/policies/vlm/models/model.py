@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 from collections.abc import Mapping
 from typing import Any, Literal, NamedTuple, Protocol
@@ -11,6 +12,7 @@ from pydantic import BaseModel, ConfigDict, Field, field_validator
 
 from roboirg.core.errors import MissingDependencyError
 from roboirg.policies.vlm.model_content import ChatTurn
+from roboirg.util.short_hash import short_hash
 
 Provider = Literal["openai", "google"]
 
@@ -137,3 +139,16 @@ class Model(Protocol):
 
     def close(self) -> None:
         """Close the connection."""
+
+
+def config_version(model: ModelOptions, about: Mapping[str, Any]) -> str:
+    """Return the model's name and a fingerprint of all else that may change its answers."""
+    canonical = json.dumps(_without_address(about), sort_keys=True)
+    return f"{model.model} {short_hash(canonical)}"
+
+
+def _without_address(about: object) -> object:
+    """Leave out addresses: a model at another port is the same model."""
+    if isinstance(about, Mapping):
+        return {name: _without_address(value) for name, value in about.items() if name != "address"}
+    return about

@@ -65,7 +65,6 @@ class OpenAIModel:
             raise self._convert_error(error) from None
 
     def close(self) -> None:
-        """Close the connection."""
         self._client.close()
 
     def _request(self, query: ModelQuery) -> dict[str, Any]:
