@@ -1,6 +1,6 @@
 """Measure the floors of every setting and task, and write them where they are read.
 
-python scripts/measure_floors.py [--scenes 1000]
+python scripts/measure_floors.py [--scenes 400]
 
 Writes the file of the installed version of the language, with the settings that count for the
 headline number, and the tables of docs/language.md. With --tables only the tables, from that file.
@@ -37,7 +37,7 @@ from roboirg.tasks import all_tasks
 
 PAGE = Path(__file__).parent.parent / "docs" / "language.md"
 TABLES = re.compile(r"(?<=<!-- floors -->\n\n).*?(?=\n\n<!-- end of floors -->)", re.DOTALL)
-SCENES = 1000
+SCENES = 400
 """Random scenes of each task that are tested."""
 
 

@@ -29,7 +29,7 @@ from roboirg.tasks.splits.splits import get_episode, split_episodes
 
 TRAINING_SPLIT: Split = "train"
 JUDGING_SPLIT: Split = "val"
-LEARNING_SCENES = 1500
+LEARNING_SCENES = 500
 """Random scenes of a task to learn from, beyond the train split."""
 FIRST_LEARNED, FIRST_JUDGED = 500_000, 700_000
 """Numbers of the first random scene to learn from, and to choose on: none of them is tested."""
