@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from roboirg.language.instruction import REFERENCE
-from roboirg.language.number_words import cardinal, ordinal
+from roboirg.language.number_words import cardinal, ordinal, plural
 from roboirg.language.patterns.pattern import Derived, Pattern
 from roboirg.language.phrases import Phrase, anaphor, antecedent, fill, plain, sentences
 from roboirg.language.request import GoalValue, InstructionRequest
@@ -72,7 +72,8 @@ def _pointing(request: InstructionRequest, pair: ValuePair) -> Phrase:
     """Return ``the other visit``."""
     kind = "count" if pair.slot == "counts" else pair.word_kind
     template = request.pick(f"other {kind}", derivations.OTHERS[kind])
-    words = template.format(noun=pair_noun(request, pair))
+    noun = pair_noun(request, pair)
+    words = template.format(noun=noun, nouns=plural(noun))
     return anaphor(words, "other", pair.meant.slot, pair.meant.value)
 
 

@@ -5,6 +5,7 @@ Counts stay explicit.
 
 from __future__ import annotations
 
+import itertools
 import re
 from collections.abc import Mapping, Sequence
 
@@ -24,6 +25,7 @@ POINTING: Mapping[int, tuple[Pointer, ...]] = {
 }
 _STANDS_ALONE = re.compile(r"the (?P<noun>\w+) \{place\}")
 """Words for a thing at a place, with nothing in between or after it."""
+_NOUN = re.compile(r"^the \w+")
 NO_LANDMARK = "no landmark singles out a target"
 LONGEST = {1: 12, 2: 6, 3: 5}
 """The length that a landmark should have beside others, in `_length`; see `templates`."""
@@ -104,43 +106,58 @@ def _pointed(
 ) -> Phrase:
     """Return the command's words for a thing, which name its place or point at it."""
     words, expression = pointer
-    several = expression != "there"
-    ranked = several and request.task.commands.by_rank is not None
+    if expression != "there":
+        return at_place(request, color, landmark, anaphor(words, expression, *_of(color)))
     if request.resolved:
-        named = f"the one {landmark.phrase}" if ranked else landmark.phrase
-        place = antecedent(named, color.slot, color.value)
+        place = antecedent(landmark.phrase, *_of(color))
     else:
-        words = f"at {words} place" if several and not ranked else words
-        place = anaphor(words, expression, color.slot, color.value)
-    template = request.task.commands.by_rank if ranked else None
+        place = anaphor(words, expression, *_of(color))
+    template = None
     stands_alone = _STANDS_ALONE.fullmatch(request.task.commands.by_place)
-    if not several and request.wordings is None and stands_alone:
+    if request.wordings is None and stands_alone:
         # "The one there": the noun is that of the introduction.
         noun = request.sampler.pick("noun there", (stands_alone["noun"], "one"))
-        named = f"the {stands_alone['noun']} {landmark.phrase}"
         place = (
-            antecedent(named, color.slot, color.value)
+            antecedent(f"the {stands_alone['noun']} {landmark.phrase}", *_of(color))
             if request.resolved
-            else anaphor(f"the {noun} there", expression, color.slot, color.value)
+            else anaphor(f"the {noun} there", expression, *_of(color))
         )
         template = "{place}"
     return request.by_place(color, place, plural=request.count_of(color) > 1, template=template)
+
+
+def _of(color: GoalValue) -> tuple[str, str | int]:
+    return color.slot, color.value
+
+
+def at_place(
+    request: InstructionRequest, value: GoalValue, landmark: Landmark, words: Phrase
+) -> Phrase:
+    """Return the command's words for one of several things; resolved, they name its place."""
+    commands = request.task.commands
+    if commands.by_rank is not None:
+        named, template = f"the one {landmark.phrase}", commands.by_rank
+    else:
+        named = commands.things_at.format(place=landmark.phrase)
+        handled = commands.pointed == commands.thing
+        template = "{place}" if handled else commands.by_color.replace("{cube}", "{place}")
+    place = antecedent(named, *_of(value)) if request.resolved else words
+    return request.by_place(value, place, plural=request.count_of(value) > 1, template=template)
 
 
 def introduction(
     request: InstructionRequest, colors: Sequence[GoalValue], marks: Sequence[Landmark]
 ) -> UtteranceSpec:
     """Name the places."""
-    several = len(marks) > 1
-    places = listed(
-        [
-            antecedent(landmark.phrase, color.slot, color.value)
-            for color, landmark in zip(colors, marks, strict=True)
-        ]
-    )
-    things = fill(request.task.commands.things_at, {"place": places}, plural=several)
-    template = request.pick("place introduction", introductions.PLACE_INTRODUCTIONS)
-    return UtteranceSpec("introduction", fill(template, {"things": things}, plural=several))
+    first = request.task.commands.things_at
+    templates = itertools.chain((first,), itertools.repeat(_NOUN.sub("the one", first)))
+    things = [
+        fill(template, {"place": antecedent(landmark.phrase, color.slot, color.value)})
+        for template, color, landmark in zip(templates, colors, marks, strict=False)
+    ]
+    sentence = request.pick("place introduction", introductions.PLACE_INTRODUCTIONS)
+    words = fill(sentence, {"things": listed(things)}, plural=len(marks) > 1)
+    return UtteranceSpec("introduction", words)
 
 
 SETTING = Setting(

@@ -13,27 +13,27 @@ COLOR_REINFORCEMENTS = Pools(
     train=(
         "{ref} [was a present|were presents].",
         "I know {ref} well.",
-        "I painted {ref}.",
+        "I painted {ref} myself.",
         "I would miss {ref}.",
     ),
     test=(
         "I made {ref}.",
         "I treasure {ref}.",
-        "I keep {ref} safe.",
-        "I drew {ref}.",
+        "I take good care of {ref}.",
+        "I picked out {ref} myself.",
     ),
 )
 NUMBER_REINFORCEMENTS = Pools(
-    train=("{ref} brings luck.", "I trust {ref}.", "I dreamed of {ref}."),
-    test=("{ref} follows me.", "{ref} suits me.", "{ref} feels right."),
+    train=("{ref} brings me luck.", "I remember {ref}.", "I dreamed of {ref}."),
+    test=("I keep seeing {ref}.", "{ref} stuck with me.", "{ref} feels right."),
 )
 VISIT_REINFORCEMENTS = Pools(
     train=("I must see {ref}.", "{ref} will be fun.", "I am ready for {ref}."),
-    test=("{ref} will be great.", "I cannot miss {ref}.", "I expect a lot from {ref}."),
+    test=("{ref} will be great.", "I cannot miss {ref}.", "I am excited about {ref}."),
 )
 VIDEO_REINFORCEMENTS = Pools(
-    train=("I often recall {ref}.", "{ref} made me laugh.", "I talk a lot about {ref}."),
-    test=("{ref} surprised me.", "I admire {ref}.", "I could watch {ref} forever."),
+    train=("I often think of {ref}.", "{ref} made me laugh.", "I talk a lot about {ref}."),
+    test=("{ref} surprised me.", "I loved {ref}.", "I could watch {ref} forever."),
 )
 """For placements and moments."""
 
@@ -86,7 +86,7 @@ NEUTRAL_DISTRACTORS = Pools(
         NeutralRemark("The dishes are still dirty."),
         NeutralRemark("The kids are at school."),
         NeutralRemark("Breakfast was too short."),
-        NeutralRemark("I owe him a letter."),
+        NeutralRemark("I owe Mom a letter."),
         NeutralRemark("The train was crowded.", "the train"),
         NeutralRemark("A cat is asleep outside.", "a cat"),
         NeutralRemark("My hands are cold."),
@@ -178,7 +178,7 @@ CUES = Pools(
         "Here is my request.",
         "Please do this.",
         "Okay, here goes.",
-        "Your job is this.",
+        "This is your job.",
         "Now listen.",
     ),
 )
