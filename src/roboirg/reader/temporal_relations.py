@@ -39,8 +39,10 @@ NOT_NAMED = r"\bnot (?:the |one |right |just |moment |at |directly )*(before|aft
 _OTHER = Phrases({
     "at the other of the two moments":
         r"(?<!\bcolor )(?<!\bthem )(?<!\btwo )\bother (?:one |moment )?"
-        r"(?:of|moment|time|point|than)\b",
-    "I named one moment; put it where it was at the other one.": r"\bthe other one\b",
+        r"(?:of|moment|time|point|than)\b"
+        r"(?! (?:the two|those|these|them|of)? ?(?:cube|box|tape|color)(?:e?s)?\b)",
+    "I named one moment; put it where it was at the other one.":
+        r"\b(?:at|in|during) the other one\b",
     "not at that moment": NOT_THAT,
     "at whichever he would not choose": r"\bwhichever\b.*\bnot\b",
     "at the moment she would skip":

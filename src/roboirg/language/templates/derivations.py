@@ -87,8 +87,8 @@ TAKEN_REMARKS = Pools(
 """Said of the one of two values that is not meant."""
 OTHERS = {
     "color": Pools(
-        train=("the other {noun}", "the other one of the two"),
-        test=("the other of the two {nouns}", "the other one"),
+        train=("the other {noun}", "the other one of those {nouns}"),
+        test=("the other of the two {nouns}", "the other one of the two {nouns}"),
     ),
     "amount": Pools(train=("of the other {noun}",), test=("of the others",)),
     "number": Pools(
