@@ -194,8 +194,7 @@ def _locates(words: Sentence, at: int) -> bool:
     if words[at] in _BELOW and following in _AFTER_BELOW:
         # The container that the red cube is hidden under.
         return _HIDDEN.search(" ".join(words[:at])) is None
-    if words[at + 1 : at + 4] == ("in", "time", "to"):
-        return False  # the placement closest in time to that one
     if words[at] == "next":
         return following == ("to",)
-    return words[at] in PLACE_WORDS
+    # "The placement closest in time to that one" is no place.
+    return words[at] in PLACE_WORDS and words[at + 1 : at + 4] != ("in", "time", "to")

@@ -97,7 +97,7 @@ _COMPLEMENT = Phrases({
     "the cube in the other color": r"\bin the other color\b(?! (?:of|in|from)\b)",
     "the other color of those two":
         rf"\bthe other (?:one |color |(?:{THING}|{THINGS}) )?(?:of|in|from)\b"
-        r"(?! (?:the |those |these )?(?:two )?moments)",
+        r"(?! (?:the |those |these )?(?:two )?(?:moments|visits|placements))",
     "the one of these two that is not red":
         r"\bthe (?:one|color) (?:of|in|from)\b.*\b(?:not|other than|except)\b",
 })  # fmt: skip
