@@ -13,6 +13,7 @@ from typing import NamedTuple
 
 from roboirg.core.episode import Goal, Scene
 from roboirg.reader.alternatives import take_remaining
+from roboirg.reader.calculations import read_calculation, with_calculation
 from roboirg.reader.command import is_command, read_command
 from roboirg.reader.comprehension import ComprehensionGap, find_gaps, is_unknown_command
 from roboirg.reader.constraints import goal_constraints
@@ -69,7 +70,9 @@ def interpret(text: str, scene: Scene, task: str) -> Interpretation:
             _distinct(word for gap in gaps for word in gap.words),
         )
     before = sentences[:first]
-    context = with_selection(with_preference(read_discourse(before), before), before)
+    said = tuple(words for words in before if read_calculation(words) is None)
+    context = with_selection(with_preference(read_discourse(said), said), said)
+    context = with_calculation(context, before)
     words = _joined(sentences[first:last])
     command = read_command(words)
     times = context.times | mentioned_times(command.text)
@@ -92,6 +95,8 @@ def _possible_goals(scene: Scene, task: str) -> tuple[Goal, ...]:
 
 def _commands(words: Sentence) -> bool:
     """Return whether a sentence gives a command, understood or not."""
+    if read_calculation(words) is not None:
+        return False
     if is_command(words) or is_negated_command(words):
         return True
     # "Leave out the former" chooses; it is no command with an unknown verb.

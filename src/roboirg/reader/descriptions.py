@@ -112,7 +112,7 @@ def describe(words: Sentence) -> Description:
     text = " ".join(words)
     colors = colors_in(words)
     comparison = read_comparison(text)
-    if comparison is not None and _THAN.search(text):
+    if comparison is not None and (not colors or _THAN.search(text)):
         return Description("compared", colors, comparison=comparison)
     places = read_places(words)
     if places:

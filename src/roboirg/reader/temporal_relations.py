@@ -36,6 +36,7 @@ NOT_THAT = r"\bnot (?:at |in )?(?:that|this|it|the one|the moment|when)\b(?! pai
 """A regular expression for ``not at that moment``."""
 NOT_NAMED = r"\bnot (?:the |one |right |just |moment |at |directly )*(before|after)\b"
 """A regular expression for ``not the one right before the press``; a group has the moment."""
+_LEAVE = r"(?:skip|give up|gave up|leave out|left out|drop|trade|trade away)\b"
 _OTHER = Phrases({
     "at the other of the two moments":
         r"(?<!\bcolor )(?<!\bthem )(?<!\btwo )\bother (?:one |moment )?"
@@ -47,7 +48,7 @@ _OTHER = Phrases({
     "at whichever he would not choose": r"\bwhichever\b.*\bnot\b",
     "at the moment she would skip":
         r"\bthe moment s?he (?:(?:would|did|does) not"
-        r"|(?:would )?(?:skip|give up|gave up|left out))\b",
+        rf"(?! {_LEAVE})|(?:would )?(?:{_LEAVE}|miss out))\b",
 })  # fmt: skip
 _NOT = Phrases({"when it was not before but after the press": NOT_NAMED})
 _POINTER = Phrases({

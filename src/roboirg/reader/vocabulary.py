@@ -62,7 +62,7 @@ _PRONOUNS = word_set(
     "then everything anything something"
 )
 _VERB_FORMS = word_set(
-    "asked decided settled selected opted favor favorite own special prefers skip give gave choice "
+    "trade asked decided settled selected opted favor favorite own special prefers skip give gave choice "
     "left pick "
     "combined named mentioned spoke others new distinct alternative separate "
     "is are was were be been am do does did done has had have stops stopped hides hid hidden "

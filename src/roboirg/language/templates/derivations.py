@@ -97,11 +97,11 @@ OTHERS = {
     "count": Pools(train=("the other number",), test=("the other number",)),
     "visit": Pools(
         train=("the other {noun}",),
-        test=("the other of those {nouns}", "the other one of those {nouns}"),
+        test=("the other of those {nouns}",),
     ),
     "placement": Pools(
         train=("the other {noun}",),
-        test=("the other of those {nouns}", "the other one of those {nouns}"),
+        test=("the other of those {nouns}",),
     ),
 }
 """The value that is left, by kind of words."""
