@@ -97,9 +97,7 @@ def _factor(found: re.Match[str]) -> float:
     return 1.0 if word is None else 0.5 if word.startswith("hal") else 2.0
 
 
-def with_calculation(
-    context: DiscourseContext, sentences: Iterable[Sentence]
-) -> DiscourseContext:
+def with_calculation(context: DiscourseContext, sentences: Iterable[Sentence]) -> DiscourseContext:
     """Return a context in which the result of the last calculation stands for all numbers."""
     found = [one for words in sentences if (one := read_calculation(words)) is not None]
     if not found:

@@ -62,8 +62,8 @@ _PRONOUNS = word_set(
     "then everything anything something"
 )
 _VERB_FORMS = word_set(
-    "trade asked decided settled selected opted favor favorite own special prefers skip give gave choice "
-    "left pick "
+    "trade asked decided settled selected opted favor favorite own special prefers skip give gave "
+    "choice left pick "
     "combined named mentioned spoke others new distinct alternative separate "
     "is are was were be been am do does did done has had have stops stopped hides hid hidden "
     "covers covered picked lifted raised placed moved moves pressed presses swapped changed "

@@ -11,7 +11,7 @@ import functools
 import itertools
 import math
 from collections import defaultdict
-from collections.abc import Mapping
+from collections.abc import Callable, Collection, Mapping
 from typing import NamedTuple
 
 from roboirg.language.instruction import REFERENCE
@@ -30,10 +30,14 @@ COMBINED = {
     "larger": max,
     "smaller": min,
 }
-ROUNDS = 40
-"""After which the shares of the calculations change no more."""
-TICKETS = 48
-"""Into which the share of a calculation is rounded."""
+ROUNDS = 30
+"""After which the shares hardly change."""
+TICKETS = 400
+TICKETS_OF_RESULT = 60
+"""Into which the shares of numbers, and of the ways to a result, are rounded."""
+
+PARTIAL = 0.7
+"""The factor by which the share of what leads to some choices alone shrinks each time."""
 
 Numbers = tuple[int, int]
 
@@ -54,38 +58,83 @@ def calculations(numbers: Numbers, result: int) -> list[Calculation]:
     ]
 
 
-@functools.cache
-def balanced_calculations(
-    choices: tuple[int, ...],
-) -> Mapping[tuple[Numbers, int], tuple[Calculation, ...]]:
-    """Return calculations for numbers and results, as often as each is to be drawn.
+Way = tuple[Numbers, int, Calculation]
+"""Numbers, what follows from them, and how."""
+Tickets = Mapping[Numbers, Mapping[int, tuple[Calculation, ...]]]
+"""By numbers and result, each calculation as often as its share."""
 
-    Only numbers, the smaller one first, that lead to all choices. The shares are fitted so that a
-    calculation leads to each of the choices equally often, as far as the numbers allow.
+
+@functools.cache
+def balanced_ways(choices: tuple[int, ...]) -> tuple[tuple[Numbers, ...], Tickets]:
+    """Return numbers as often as they are to be drawn, and then calculations for each result.
+
+    Numbers lead to all choices, the smaller one comes first. The shares are fitted so that numbers
+    go with all choices equally often, and a calculation too, as nearly as the numbers allow.
     """
-    ways: dict[tuple[Numbers, int], list[Calculation]] = {}
+    shares: dict[Way, float] = {}
     for numbers in itertools.combinations(range(1, len(CARDINALS)), 2):
-        found = {(numbers, result): calculations(numbers, result) for result in choices}
-        if all(found.values()):
-            ways |= found
-    shares = {key: dict.fromkeys(found, 1 / len(found)) for key, found in ways.items()}
+        ways = [(numbers, one, way) for one in choices for way in calculations(numbers, one)]
+        if {result for _, result, _ in ways} == set(choices):
+            shares |= dict.fromkeys(ways, 1.0)
     for _ in range(ROUNDS):
-        sums: dict[Calculation, dict[int, float]] = defaultdict(lambda: dict.fromkeys(choices, 0.0))
-        for (_, result), share in shares.items():
-            for one, part in share.items():
-                sums[one][result] += part
-        for (_, result), share in shares.items():
-            for one in share:
-                mean = sum(sums[one].values()) / len(choices)
-                share[one] *= math.sqrt(mean / sums[one][result]) if sums[one][result] else 0.0
-            total = sum(share.values())
-            share.update({one: part / total for one, part in share.items()})
-    return {
-        key: tuple(
-            one for one, part in share.items() for _ in range(math.ceil(part * TICKETS - 0.5))
-        )
-        for key, share in shares.items()
-    }
+        for part, mean in ((_calculation, _arithmetic), (_numbers, _geometric)):
+            _level(shares, choices, part, mean)
+    total = sum(shares.values())
+    drawn: list[Numbers] = []
+    found: dict[Numbers, dict[int, tuple[Calculation, ...]]] = {}
+    for numbers, group in itertools.groupby(shares, _numbers):
+        ways = list(group)
+        count = round(sum(shares[way] for way in ways) / total * TICKETS)
+        drawn += [numbers] * count
+        if count:
+            found[numbers] = {
+                choice: _tickets({way[2]: shares[way] for way in ways if way[1] == choice})
+                for choice in choices
+            }
+    return tuple(drawn), found
+
+
+def _tickets(shares: Mapping[Calculation, float]) -> tuple[Calculation, ...]:
+    total = sum(shares.values())
+    return tuple(
+        one
+        for one, share in shares.items()
+        for _ in range(round(share / total * TICKETS_OF_RESULT))
+    )
+
+
+def _level(
+    shares: dict[Way, float],
+    choices: tuple[int, ...],
+    part: Callable[[Way], object],
+    mean: Callable[[Collection[float]], float],
+) -> None:
+    """Scale the shares so that each part of them leads to all choices equally often."""
+    sums: dict[object, dict[int, float]] = defaultdict(lambda: dict.fromkeys(choices, 0.0))
+    for way, share in shares.items():
+        sums[part(way)][way[1]] += share
+    for way in shares:
+        found = sums[part(way)]
+        if found[way[1]]:
+            shares[way] *= mean(found.values()) / found[way[1]]
+        if not all(found.values()):
+            shares[way] *= PARTIAL  # it cannot lead to all of them
+
+
+def _calculation(way: Way) -> object:
+    return way[2]
+
+
+def _numbers(way: Way) -> Numbers:
+    return way[0]
+
+
+def _arithmetic(values: Collection[float]) -> float:
+    return sum(values) / len(values)
+
+
+def _geometric(values: Collection[float]) -> float:
+    return math.prod(values) ** (1 / len(values))
 
 
 def _goal_value(request: InstructionRequest) -> GoalValue | None:
@@ -94,24 +143,22 @@ def _goal_value(request: InstructionRequest) -> GoalValue | None:
     return found[0] if len(found) == 1 else None
 
 
-def _balanced(
-    request: InstructionRequest, goal_value: GoalValue
-) -> Mapping[tuple[Numbers, int], tuple[Calculation, ...]]:
-    numbers = {number for one in request.alternative_numbers(goal_value.slot) for number in one[:1]}
-    return balanced_calculations(tuple(sorted(numbers))) if len(numbers) > 1 else {}
+def _choices(request: InstructionRequest, goal_value: GoalValue) -> tuple[int, ...]:
+    found = {number for one in request.alternative_numbers(goal_value.slot) for number in one[:1]}
+    return tuple(sorted(found))
 
 
 def _allows(request: InstructionRequest) -> bool:
     goal_value = _goal_value(request)
-    return goal_value is not None and bool(_balanced(request, goal_value))
+    return goal_value is not None and len(_choices(request, goal_value)) > 1
 
 
 def _derive(request: InstructionRequest) -> Derived:
     goal_value = _goal_value(request)
     assert goal_value is not None  # noqa: S101 - `_allows`
-    ways = _balanced(request, goal_value)
-    numbers = request.sampler.pick("two numbers", sorted({numbers for numbers, _ in ways}))
-    calculation = request.sampler.pick("calculation", ways[numbers, goal_value.number])
+    drawn, tickets = balanced_ways(_choices(request, goal_value))
+    numbers = request.sampler.pick("two numbers", drawn)
+    calculation = request.sampler.pick("calculation", tickets[numbers][goal_value.number])
     first, second = request.sampler.pick("order of numbers", (numbers, numbers[::-1]))
     context = fill(
         request.pick("two quantities", templates.TWO_QUANTITIES),

@@ -166,6 +166,8 @@ SECOND_STEPS = (
     _step("two less", "{first} and subtract two", "two less than {first}", -2),
     _step("two more", "{first} and add two", "two more than {first}", 2),
     _step("three less", "{first} and subtract three", "three less than {first}", -3),
+    _step("four less", "{first} and subtract four", "four less than {first}", -4),
+    _step("five less", "{first} and subtract five", "five less than {first}", -5),
     _step("half", "{first} and halve it", "half of {first}", factor=0.5),
     _step("double", "{first} and double it", "double {first}", factor=2.0),
 )

@@ -91,9 +91,7 @@ OTHERS = {
         test=("the other of the two {nouns}", "the other one of the two {nouns}"),
     ),
     "amount": Pools(train=("of the other {noun}",), test=("of the others",)),
-    "number": Pools(
-        train=("the other number of times",), test=("the other number of times",)
-    ),
+    "number": Pools(train=("the other number of times",), test=("the other number of times",)),
     "count": Pools(train=("the other number",), test=("the other number",)),
     "visit": Pools(
         train=("the other {noun}",),
