@@ -32,7 +32,7 @@ _MENTIONED = Phrases({
 _CHOSEN = Phrases({
     "the cube I want":
         r"\b(?:the|my) (?P<noun>cubes?|box|container|tapes?|ones?|color|place|spot) i "
-        r"(?:mean|meant|want|wanted|asked for|favor|chose|choose|prefer|preferred|decided on"
+        r"(?:mean|meant|want|wanted|need|asked for|favor|chose|choose|prefer|preferred|decided on"
         r"|settled on|picked|selected|opted for)\b",
 })  # fmt: skip
 _OTHERS = Phrases({

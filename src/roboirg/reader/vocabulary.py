@@ -55,7 +55,8 @@ _NOUNS = word_set(
     "table robot video camera picture beginning start outset end pair couple color colors amount "
     "place places spot position location press presses swaps swap order way hand mind "
     "neighbor neighbors action actions motion motions movement task process steps sequence "
-    "demonstration side total whole object objects cycle cycles sum difference gap exact"
+    "demonstration side total whole object objects cycle cycles sum difference gap exact "
+    "desired agreed"
 )
 _PRONOUNS = word_set(
     "he she it them they you yourself i me us we what when where which who whichever there here "

@@ -18,8 +18,9 @@ from roboirg.language.instruction import REFERENCE
 from roboirg.language.number_words import CARDINALS, cardinal
 from roboirg.language.open_reasoning import open_templates as templates
 from roboirg.language.patterns.pattern import Derived, Pattern
-from roboirg.language.phrases import Phrase, anaphor, antecedent, fill, plain
+from roboirg.language.phrases import Phrase, anaphor, antecedent, fill, listed, plain
 from roboirg.language.request import GoalValue, InstructionRequest
+from roboirg.language.rivals.rival_templates import NUMBER_PAIRS
 from roboirg.language.slot_types import Fields, amount
 from roboirg.language.slot_types.ordinal import wrapped
 
@@ -160,13 +161,8 @@ def _derive(request: InstructionRequest) -> Derived:
     numbers = request.sampler.pick("two numbers", drawn)
     calculation = request.sampler.pick("calculation", tickets[numbers][goal_value.number])
     first, second = request.sampler.pick("order of numbers", (numbers, numbers[::-1]))
-    context = fill(
-        request.pick("two quantities", templates.TWO_QUANTITIES),
-        {
-            "first": antecedent(cardinal(first), REFERENCE, first),
-            "second": antecedent(cardinal(second), REFERENCE, second),
-        },
-    )
+    named = [antecedent(cardinal(one), REFERENCE, one) for one in (first, second)]
+    context = fill(request.pick("two numbers said", NUMBER_PAIRS), {"things": listed(named)})
     notes: dict[str, object] = {
         "patterns": ["number deduction"],
         "relation": f"{calculation.second.name}, {calculation.combination}",

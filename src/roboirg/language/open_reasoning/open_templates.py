@@ -83,32 +83,6 @@ COMPARATIVES = Pools(
     ),
 )
 
-TWO_QUANTITIES = Pools(
-    train=(
-        "I rolled {first} and {second}.",
-        "Ann said {first}, Bob said {second}.",
-        "The dice show {first} and {second}.",
-        "My scores were {first} and {second}.",
-        "{first} and {second} are my lucky numbers.",
-        "{first} and {second} came up.",
-        "My kids picked {first} and {second}.",
-        "The score was {first} to {second}.",
-        "Pages {first} and {second} are missing.",
-        "Buses {first} and {second} are late.",
-    ),
-    test=(
-        "The cards say {first} and {second}.",
-        "Tom wrote {first}, Ella wrote {second}.",
-        "I drew {first} and {second}.",
-        "My results were {first} and {second}.",
-        "{first} and {second} won the raffle.",
-        "{first} and {second} are on my tickets.",
-        "Grandpa guessed {first} and {second}.",
-        "Rooms {first} and {second} are free.",
-        "Chapters {first} and {second} are long.",
-        "The twins chose {first} and {second}.",
-    ),
-)
 COMBINATIONS: Mapping[str, Pools[str]] = {
     "total": Pools(train=("add {numbers} up",), test=("the sum of {numbers}",)),
     "difference": Pools(

@@ -40,7 +40,7 @@ def _complement(request: InstructionRequest) -> Derived:
     remark = request.pick("taken", derivations.TAKEN_REMARKS)
     context = sentences(
         [
-            fill(template, {"pair": (*named[0], *plain(" and "), *named[1])}),
+            fill(template, {"things": (*named[0], *plain(" and "), *named[1])}),
             fill(remark, {"single": single}),
         ]
     )

@@ -9,6 +9,7 @@ import itertools
 import re
 from collections.abc import Mapping, Sequence
 
+from roboirg.core.word_pools import Pools
 from roboirg.language.instruction import Expression
 from roboirg.language.landmarks import FRAMES, SIMPLE, Landmark, landmarks
 from roboirg.language.phrases import Phrase, anaphor, antecedent, fill, listed
@@ -146,7 +147,10 @@ def at_place(
 
 
 def introduction(
-    request: InstructionRequest, colors: Sequence[GoalValue], marks: Sequence[Landmark]
+    request: InstructionRequest,
+    colors: Sequence[GoalValue],
+    marks: Sequence[Landmark],
+    sentences: Pools[str] = introductions.PLACE_INTRODUCTIONS,
 ) -> UtteranceSpec:
     """Name the places."""
     first = request.task.commands.things_at
@@ -155,7 +159,7 @@ def introduction(
         fill(template, {"place": antecedent(landmark.phrase, color.slot, color.value)})
         for template, color, landmark in zip(templates, colors, marks, strict=False)
     ]
-    sentence = request.pick("place introduction", introductions.PLACE_INTRODUCTIONS)
+    sentence = request.pick("place introduction", sentences)
     words = fill(sentence, {"things": listed(things)}, plural=len(marks) > 1)
     return UtteranceSpec("introduction", words)
 
