@@ -50,7 +50,6 @@ _REJECTED = Phrases(
         "I gave up": r"\b(?:gave|give|passed) up",
     "I am done with": r"\bdone with",
     "I meant the former when I said": r"\bi said",
-    "I have switched from": r"\bswitched\b.* from|\bswitched from",
         "I want the latter instead of": r"\b(?:instead of|rather than)",
         "I swapped": r"\b(?:swapped|swap|exchanged)",
         "I prefer the latter to":

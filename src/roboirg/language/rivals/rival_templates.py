@@ -214,11 +214,17 @@ CHOICES: dict[ReferenceKind, tuple[Pools[str], Pools[str]]] = {
     "correction": (
         Pools(
             train=("I mean {yes}, no longer {no}.", "I want {yes}, no longer {no}."),
-            test=("I meant {yes} when I said {no}.", "I have switched to {yes} from {no}."),
+            test=(
+                "I meant {yes} when I said {no}.",
+                "I want {yes}, I said {no} by mistake.",
+            ),
         ),
         Pools(
             train=("I mean {no} - no, {yes}.", "Let's take {no} - no, {yes}."),
-            test=("I said {no} when I meant {yes}.", "I have switched from {no} to {yes}."),
+            test=(
+                "I said {no} when I meant {yes}.",
+                "I said {no} by mistake, I want {yes}.",
+            ),
         ),
     ),
 }
@@ -229,7 +235,7 @@ CHOICES: dict[ReferenceKind, tuple[Pools[str], Pools[str]]] = {
 
 CLAUSES = Pools(
     train=("I mean", "I want", "I asked for", "I need"),
-    test=("I chose", "I prefer", "I picked", "I decided on"),
+    test=("I chose", "I prefer", "I picked", "I selected"),
 )
 """Follow the noun in the command: *the cube I mean*."""
 NUMBERS_OF = Pools(
