@@ -98,8 +98,8 @@ MOMENT_PAIRS = Pools(
     ),
 )
 PAIR_REINFORCEMENTS = Pools(
-    train=("I like {ref}.", "{ref} are great.", "I enjoy {ref}.", "{ref} make me smile."),
-    test=("{ref} are fine.", "I love {ref}.", "{ref} please me.", "I am happy with {ref}."),
+    train=("I like {ref}.", "{ref} are great.", "I enjoy {ref}.", "{ref} are useful."),
+    test=("{ref} are fine.", "I love {ref}.", "{ref} look good.", "I remember {ref}."),
 )
 """One more remark about both values; short, as two remarks and a command come with it."""
 

@@ -5,13 +5,13 @@ Counts stay explicit.
 
 from __future__ import annotations
 
-import itertools
 import re
 from collections.abc import Mapping, Sequence
 
 from roboirg.core.word_pools import Pools
 from roboirg.language.instruction import Expression
 from roboirg.language.landmarks import FRAMES, SIMPLE, Landmark, landmarks
+from roboirg.language.number_words import plural
 from roboirg.language.phrases import Phrase, anaphor, antecedent, fill, listed
 from roboirg.language.request import GoalValue, InstructionRequest, InstructionSpec, UtteranceSpec
 from roboirg.language.settings.setting import Setting
@@ -26,7 +26,10 @@ POINTING: Mapping[int, tuple[Pointer, ...]] = {
 }
 _STANDS_ALONE = re.compile(r"the (?P<noun>\w+) \{place\}")
 """Words for a thing at a place, with nothing in between or after it."""
+PAIR = 2
 _NOUN = re.compile(r"^the \w+")
+_TIME = re.compile(r" (?:now|at first)\b")
+"""Said of the first of two things, it goes for both."""
 NO_LANDMARK = "no landmark singles out a target"
 LONGEST = {1: 12, 2: 6, 3: 5}
 """The length that a landmark should have beside others, in `_length`; see `templates`."""
@@ -154,10 +157,12 @@ def introduction(
 ) -> UtteranceSpec:
     """Name the places."""
     first = request.task.commands.things_at
-    templates = itertools.chain((first,), itertools.repeat(_NOUN.sub("the one", first)))
+    rest = _TIME.sub("", _NOUN.sub("the one", first))
+    if len(marks) > PAIR:  # short: "the cubes closest to you, farthest to your left and ..."
+        first, rest = _NOUN.sub(lambda noun: plural(noun[0]), first), "{place}"
     things = [
         fill(template, {"place": antecedent(landmark.phrase, color.slot, color.value)})
-        for template, color, landmark in zip(templates, colors, marks, strict=False)
+        for template, color, landmark in zip((first, rest, rest), colors, marks, strict=False)
     ]
     sentence = request.pick("place introduction", sentences)
     words = fill(sentence, {"things": listed(things)}, plural=len(marks) > 1)

@@ -13,14 +13,14 @@ COLOR_REINFORCEMENTS = Pools(
     train=(
         "{ref} [was a present|were presents].",
         "I know {ref} well.",
-        "I painted {ref} myself.",
+        "I painted {ref}.",
         "I would miss {ref}.",
     ),
     test=(
         "I made {ref}.",
         "I treasure {ref}.",
-        "I take good care of {ref}.",
-        "I picked out {ref} myself.",
+        "I cleaned {ref}.",
+        "I bought {ref}.",
     ),
 )
 NUMBER_REINFORCEMENTS = Pools(
