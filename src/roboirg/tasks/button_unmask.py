@@ -52,9 +52,9 @@ COMMANDS = unmask.seen_commands(
             Wording("Push the button, then raise {colors.0}."),
             Wording("Push the button and pick up {colors.0}."),
             Wording("Start by pushing the button, then raise {colors.0}."),
-            Wording("Push the button, raise {colors.0}, put it back, then raise {colors.1}.", 2),
-            Wording("Push the button, pick up {colors.0}, lower it, then pick up {colors.1}.", 2),
-            Wording("Push the button, raise {colors.0}, lay it down, then raise {colors.1}.", 2),
+            Wording("Push the button, raise {colors.0}, put it back, raise {colors.1}.", 2),
+            Wording("Push the button, pick up {colors.0}, lower it, pick up {colors.1}.", 2),
+            Wording("Push the button, raise {colors.0}, lay it down, raise {colors.1}.", 2),
         ),
     )
 )

@@ -82,16 +82,12 @@ COMMANDS = replace(
                 Wording("Push both buttons, then raise {colors.0}."),
                 Wording("Push both buttons and pick up {colors.0}."),
                 Wording("Start by pushing both buttons, then raise {colors.0}."),
+                Wording("Push both buttons, raise {colors.0}, put it back, raise {colors.1}.", 2),
                 Wording(
-                    "Push both buttons, raise {colors.0}, put it back, then raise {colors.1}.", 2
-                ),
-                Wording(
-                    "Push both buttons, pick up {colors.0}, lower it, then pick up {colors.1}.",
+                    "Push both buttons, pick up {colors.0}, lower it, pick up {colors.1}.",
                     2,
                 ),
-                Wording(
-                    "Push both buttons, raise {colors.0}, lay it down, then raise {colors.1}.", 2
-                ),
+                Wording("Push both buttons, raise {colors.0}, lay it down, raise {colors.1}.", 2),
             ),
         )
     ),

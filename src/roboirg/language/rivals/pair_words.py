@@ -84,7 +84,7 @@ def choosing_remark(
             field: antecedent(name(value), value.slot, value.value)
             for field, value in (("yes", meant), ("no", rival))
         }
-    return fill(draw.text, words, plural=thing == "cubes")
+    return fill(draw.text, words)
 
 
 def chosen(request: InstructionRequest, draw: PairDraw, words: str) -> Phrase:
@@ -143,7 +143,9 @@ def _pointer(draw: PairDraw, value: GoalValue, thing: str, *, points: bool) -> P
 
 
 def _introduced(request: InstructionRequest, draw: PairDraw, value: GoalValue) -> str:
-    """Return the words of the introduction, where the second moment has the words of both."""
+    """Return the words of the introduction, where the second value has the noun for both."""
+    if draw.pair.word_kind in ("color", "amount") and value is draw.introduced[0]:
+        return f"the {value.color}"
     if draw.pair.word_kind != "relation":
         return value_name(request, draw.pair, value)
     return MOMENTS[str(value.value)] if value is draw.introduced[1] else f"right {value.value}"

@@ -16,7 +16,7 @@ from roboirg.language.settings import contextual
 from roboirg.language.settings.setting import Setting
 
 LONGEST = 4
-"""Words of a distractor or a cue, because the command follows another remark."""
+"""Words of a distractor, and one more than those of a cue; the command has a remark before it."""
 
 
 def say(request: InstructionRequest) -> InstructionSpec:

@@ -142,7 +142,9 @@ def at_place(
     if commands.by_rank is not None:
         named, template = f"the one {landmark.phrase}", commands.by_rank
     else:
-        named = commands.things_at.format(place=landmark.phrase)
+        first = value == request.color_values[0]
+        named = commands.things_at if first else _TIME.sub("", commands.things_at)
+        named = named.format(place=landmark.phrase)
         handled = commands.pointed == commands.thing
         template = "{place}" if handled else commands.by_color.replace("{cube}", "{place}")
     place = antecedent(named, *_of(value)) if request.resolved else words

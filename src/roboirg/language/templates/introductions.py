@@ -31,11 +31,11 @@ NUMBER_INTRODUCTIONS = Pools(
         "My dog barked {times}.",
     ),
     test=(
-        "The owl hooted {times}.",
-        "My alarm beeped {times}.",
-        "The train whistled {times}.",
+        "The owl called {times}.",
+        "My alarm rang {times}.",
+        "The train stopped {times}.",
         "I clapped {times}.",
-        "The floor creaked {times}.",
+        "The door opened {times}.",
     ),
 )
 AMOUNT_INTRODUCTIONS = Pools(
@@ -139,7 +139,7 @@ PLACE_INTRODUCTIONS = Pools(
     test=(
         "I spotted {things}.",
         "I noticed {things}.",
-        "I am pointing at {things}.",
+        "I pointed at {things}.",
         "I mean {things}.",
         "My aunt likes {things}.",
         "Mom is watching {things}.",

@@ -20,12 +20,12 @@ COLOR_REINFORCEMENTS = Pools(
         "I made {ref}.",
         "I treasure {ref}.",
         "I cleaned {ref}.",
-        "I bought {ref}.",
+        "I found {ref}.",
     ),
 )
 NUMBER_REINFORCEMENTS = Pools(
     train=("{ref} brings me luck.", "I remember {ref}.", "I dreamed of {ref}."),
-    test=("I keep seeing {ref}.", "{ref} stuck with me.", "{ref} feels right."),
+    test=("I like {ref}.", "{ref} feels lucky.", "{ref} feels right."),
 )
 VISIT_REINFORCEMENTS = Pools(
     train=("I must see {ref}.", "{ref} will be fun.", "I am ready for {ref}."),
@@ -168,17 +168,17 @@ COMPETING_MOMENT_DISTRACTORS = Pools(
 
 CUES = Pools(
     train=(
-        "Here is your task.",
+        "Pay attention.",
         "Now do this.",
         "Time to work.",
-        "This is what I need.",
+        "Listen closely.",
         "Please listen.",
     ),
     test=(
         "Here is my request.",
         "Please do this.",
         "Okay, here goes.",
-        "This is your job.",
+        "Get ready.",
         "Now listen.",
     ),
 )
