@@ -30,7 +30,7 @@ from roboirg.language.request import (
 )
 from roboirg.language.settings import all_settings, get_setting, settings_of
 from roboirg.language.settings.setting import Setting
-from roboirg.language.template_sampler import TemplateSampler
+from roboirg.language.template_sampler import sampler_of
 from roboirg.language.templates import LANGUAGE_VERSION
 from roboirg.language.worded_command import TaskWordings, describe_goal
 from roboirg.language.wordings.wording_store import find_wordings
@@ -104,7 +104,7 @@ def instruct_with(episode: Episode, options: InstructionOptions) -> Instruction:
             # Both forms have a command from outside, or none of them.
             forms = {str(form): _say_outside(request, setting, form) for form in FORMS}
             return _instruction(*forms[options.form])
-    own = replace(request, wordings=None, sampler=_sampler(episode))
+    own = replace(request, wordings=None, sampler=sampler_of(episode))
     return _instruction(own, setting.say(own))
 
 
@@ -116,7 +116,7 @@ def _say_outside(
     Which command the setting fills is known only then, so it is said again with its phrases.
     """
     options = replace(request.options, form=form)
-    request = replace(request, options=options, sampler=_sampler(request.episode), filled=[])
+    request = replace(request, options=options, sampler=sampler_of(request.episode), filled=[])
     spec = setting.say(request)
     if request.phrases_of is None and request.filled:
         return _say_outside(replace(request, phrases_of=request.filled[-1]), setting, form)
@@ -157,11 +157,7 @@ def _request(episode: Episode, options: InstructionOptions) -> InstructionReques
         wordings = find_wordings(options.wordings).tasks.get(task.name, TaskWordings(()))
         if wordings.own & {options.setting, all_settings()[options.setting].plain}:
             wordings = None
-    return InstructionRequest(episode, task, options, _sampler(episode), wordings)
-
-
-def _sampler(episode: Episode) -> TemplateSampler:
-    return TemplateSampler(f"{LANGUAGE_VERSION}|{episode.task}|{episode.seed}")
+    return InstructionRequest(episode, task, options, sampler_of(episode), wordings)
 
 
 def _missing(request: InstructionRequest) -> str | None:

@@ -11,6 +11,9 @@ from typing import TypeVar
 
 import numpy as np
 
+from roboirg.core.episode import Episode
+from roboirg.language.templates import DRAWS
+
 Option = TypeVar("Option")
 
 
@@ -23,7 +26,7 @@ class TemplateSampler:
     spelling draws other words.
 
     Attributes:
-        key: language version, task and seed.
+        key: `DRAWS`, task and seed.
         log: ``purpose/index`` of every choice, in order.
     """
 
@@ -42,6 +45,11 @@ class TemplateSampler:
     def _take(self, purpose: str, options: Sequence[Option], index: int) -> Option:
         self.log.append(f"{purpose}/{index}")
         return options[index]
+
+
+def sampler_of(episode: Episode) -> TemplateSampler:
+    """Return the sampler of an episode."""
+    return TemplateSampler(f"{DRAWS}|{episode.task}|{episode.seed}")
 
 
 def _generator(key: str, purpose: str) -> np.random.Generator:

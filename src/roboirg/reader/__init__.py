@@ -12,6 +12,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import NamedTuple
 
 from roboirg.core.episode import Goal, Scene, SlotValue
+from roboirg.reader.calculations import read_calculation, with_calculation
 from roboirg.reader.command import is_command, read_command
 from roboirg.reader.comprehension import ComprehensionGap, find_gaps, is_unknown_command
 from roboirg.reader.constraints import goal_constraints
@@ -72,8 +73,9 @@ def interpret(text: str, scene: Scene, task: str) -> Interpretation:
             _distinct(word for gap in gaps for word in gap.words),
         )
     before = sentences[:first]
-    introduced = with_preference(read_discourse(before), before)
-    context = with_selection(introduced, before)
+    said = tuple(words for words in before if read_calculation(words) is None)
+    introduced = with_preference(read_discourse(said), said)
+    context = with_calculation(with_selection(introduced, said), before)
     slots = candidates[0].as_mapping() if candidates else {}
     words, unread = _settled(_joined(sentences[first:last]), scene, slots)
     if unread:
@@ -125,6 +127,8 @@ def _possible_goals(scene: Scene, task: str) -> tuple[Goal, ...]:
 
 def _commands(words: Sentence) -> bool:
     """Return whether a sentence gives a command, understood or not."""
+    if read_calculation(words) is not None:
+        return False
     if is_command(words) or is_negated_command(words):
         return True
     # "Leave out the former" chooses; it is no command with an unknown verb.

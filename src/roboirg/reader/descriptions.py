@@ -32,7 +32,7 @@ _MENTIONED = Phrases({
 CHOSEN = Phrases({
     "the cube I want":
         r"\b(?:the|my) (?P<noun>cubes?|box|container|tapes?|ones?|color|place|spot) i "
-        r"(?:mean|meant|want|wanted|asked for|favor|chose|choose|prefer|preferred|decided on"
+        r"(?:mean|meant|want|wanted|need|asked for|favor|chose|choose|prefer|preferred|decided on"
         r"|settled on|picked|selected|opted for)\b",
 })  # fmt: skip
 _OTHERS = Phrases({
@@ -99,7 +99,7 @@ _COMPLEMENT = Phrases({
     "the cube in the other color": r"\bin the other color\b(?! (?:of|in|from)\b)",
     "the other color of those two":
         rf"\bthe other (?:one |color |(?:{THING}|{THINGS}) )?(?:of|in|from)\b"
-        r"(?! (?:the |those |these )?(?:two )?moments)",
+        r"(?! (?:the |those |these )?(?:two )?(?:moments|visits|placements))",
     "the one of these two that is not red":
         r"\bthe (?:one|color) (?:of|in|from)\b.*\b(?:not|other than|except)\b",
 })  # fmt: skip
@@ -114,7 +114,7 @@ def describe(words: Sentence) -> Description:
     text = " ".join(words)
     colors = colors_in(words)
     comparison = read_comparison(text)
-    if comparison is not None and _THAN.search(text):
+    if comparison is not None and (not colors or _THAN.search(text)):
         return Description("compared", colors, comparison=comparison)
     places = read_places(words)
     if places:

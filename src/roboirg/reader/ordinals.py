@@ -39,7 +39,8 @@ _NEXT = Phrases({
 })  # fmt: skip
 _NEIGHBOR = Phrases({
     "the placement that is a neighbor of that":
-        r"\b(?:neighbor\w* (?:of|to)|adjacent to|next to|(?:just |right )?before or after)\b",
+        r"\b(?:neighbor\w* (?:of|to)|adjacent to|next to|(?:just |right )?before or after"
+        r"|(?:closest|nearest) in time to)\b",
 })  # fmt: skip
 _PENULTIMATE = Phrases({
     "its second to last visit": rf"\b(?P<rank>{ORDINAL}|next) (?:to|from) (?:the )?last\b",
@@ -69,6 +70,8 @@ _POINTER = Phrases({
 })  # fmt: skip
 _OTHER = Phrases({
     "during the other visit": rf"\bthe other {_NOUN}\b",
+    "during the other of the two visits":
+        rf"\bthe other (?:one )?of (?:the two|those|these|them) {_NOUN}s?\b",
     "during the visit that is left": rf"\bthe {_NOUN} that is left\b",
     "during the visit other than that":
         rf"\bthe {_NOUN} (?:of (?:the two|them|those) )?other than that\b",

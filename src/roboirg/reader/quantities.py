@@ -81,8 +81,11 @@ _SCALED = Phrases({
 })  # fmt: skip
 _SAME = Phrases({
     "that many of them": r"\b(?:that|as|this|so|equally) (?:many|often)\b",
-    "the same number of blue cubes": r"\b(?:that|this|the same) (?:number|amount) of\b",
-    "my lucky number of blue cubes": r"\bmy (?:\w+ )?number of\b",
+    "the same number of blue cubes":
+        r"\b(?:that same|that|this|the (?:exact |very )?same) (?:number|amount) of\b",
+    "my lucky number of blue cubes":
+        r"\b(?:my (?:\w+ )?|the (?:right|correct|chosen|selected|preferred|desired|agreed|final) )"
+        r"number of\b",
     "the number of times I mentioned": r"\bthe number of times(?= i\b)",
 })  # fmt: skip
 _REMAINING = Phrases({

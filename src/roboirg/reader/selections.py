@@ -34,7 +34,7 @@ _ACCEPTED = Phrases(
     {
         "Why not": "why not",
         "I could not live without": r"not (?:do |be |live )?without",
-        "I would not give up": "not (?:give up|trade|miss|swap|exchange)",
+        "I would not give up": "not (?:give up|part with|trade|miss|swap|exchange)",
         "Not the latter, but": "but",
         "I would go for": "for",
     },
@@ -48,7 +48,9 @@ _REJECTED = Phrases(
         "You may leave out": r"\b(?:leave|left|rule|ruled) out",
         "Set": r"\bset",
         "Forget about": r"\b(?:forget|never mind|skip|ignore)(?: about)?",
-        "I gave up": r"\b(?:gave|give) up",
+        "I gave up": r"\b(?:gave|give|passed) up",
+    "I am done with": r"\bdone with",
+    "I meant the former when I said": r"\bi said",
         "I want the latter instead of": r"\b(?:instead of|rather than)",
         "I swapped": r"\b(?:swapped|swap|exchanged)",
         "I prefer the latter to":
@@ -62,7 +64,8 @@ _REJECTED = Phrases(
 """Ways to set a pointer aside by the words before it, unless they accept it."""
 _REJECTED_AFTER = Phrases({
     ", no, the latter": "^(?:[,;] )?no [,;]",
-    "is out of the question": r"^(?:is|are|was) (?:out|not|off)\b",
+    "is out of the question": r"^(?:is|are|was) (?:definitely )?(?:out|not|off)\b",
+    "less than the latter": "^less than",
 })  # fmt: skip
 """Ways to set a pointer aside by the words after it."""
 

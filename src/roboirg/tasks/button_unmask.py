@@ -44,7 +44,7 @@ COMMANDS = unmask.seen_commands(
         test=(
             Wording("Push the button, then raise {colors.0}."),
             Wording("Push the button and pick up {colors.0}."),
-            Wording("Start with a push of the button, then raise {colors.0}."),
+            Wording("Start by pushing the button, then raise {colors.0}."),
             Wording("Push the button, raise {colors.0}, put it back, raise {colors.1}.", 2),
             Wording("Push the button, pick up {colors.0}, lower it, pick up {colors.1}.", 2),
             Wording("Push the button, raise {colors.0}, lay it down, raise {colors.1}.", 2),

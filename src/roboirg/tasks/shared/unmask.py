@@ -166,7 +166,7 @@ def hidden_commands(wordings: Pools[Wording]) -> Commands:
         by_color="the container over {cube}",
         by_place="the container {place}",
         pointed="container",
-        things_at="the container[|s] {place}",
+        things_at="the container {place}",
         wordings=wordings,
     )
 
