@@ -80,7 +80,7 @@ def interpret(text: str, scene: Scene, task: str) -> Interpretation:
         return Interpretation((), tuple(f'does not understand "{one}"' for one in unread))
     command = read_command(words)
     open_choice = unsettled_choice(introduced, context, command.text)
-    unused = (*left_over(command, slots), *([open_choice] if open_choice else []))
+    unused = (*left_over(command, tuple(slots)), *([open_choice] if open_choice else []))
     if unused:
         return Interpretation((), unused)
     times = context.times | mentioned_times(command.text)
