@@ -109,6 +109,10 @@ COMMANDS = [
 ]
 
 
+INSERTED = ["not", "again", "but", "no", "first", "last", "other", "same", "twice", "red", "more"]
+RIVALS = ["again", "not", "no", "second", "fifth", "except", "nine", "other"]
+
+
 @settings(deadline=None)
 @given(st.sampled_from(COMMANDS), st.data())
 def test_one_goal_or_a_complaint(case, data):
@@ -117,9 +121,7 @@ def test_one_goal_or_a_complaint(case, data):
     *context, command = instruction.turns
     words = command.split()
     at = data.draw(st.integers(0, len(words) - 2))
-    inserted = st.sampled_from(
-        ["not", "again", "but", "no", "first", "last", "other", "same", "twice", "red", "more"]
-    )
+    inserted = st.sampled_from(INSERTED)
     words[at : at + 2] = data.draw(
         st.sampled_from([words[at : at + 1], words[at : at + 2][::-1]])
         | inserted.map(lambda word: [words[at], word, words[at + 1]])
@@ -134,9 +136,7 @@ def test_a_second_value_is_never_read_in_silence(case, data):
     """Behind an explicit command, *again*, *not* and a rival value change no goal in silence."""
     task, episode, instruction = case
     words = instruction.text.removesuffix(".").split()
-    word = data.draw(
-        st.sampled_from(["again", "not", "no", "second", "fifth", "except", "nine", "other"])
-    )
+    word = data.draw(st.sampled_from(RIVALS))
     at = data.draw(st.integers(1, len(words)))
     found = interpret(" ".join([*words[:at], word, *words[at:]]), episode.scene, task)
     assert found.goals in ((), (episode.goal,)) or found.not_understood

@@ -14,7 +14,7 @@ UNDERSTOOD = {"sentences": 255, "held_out": 55}
 
 
 def sections(name):
-    """Yield task, episode, expected goal and sentence; the goal "?" is for what has to be refused."""
+    """Yield task, episode, expected goal (``?``: to be refused) and sentence."""
     task = index = ""
     for line in (PEOPLE / f"{name}.txt").read_text().splitlines():
         if line.startswith("["):
@@ -49,7 +49,7 @@ def test_no_sentence_of_people_is_misread_and_most_are_understood(name):
 
 
 def test_the_sentences_cover_all_tasks_and_several_hands():
-    named = [line.strip("[]").split() for line in (PEOPLE / "sentences.txt").read_text().splitlines()
-             if line.startswith("[")]  # fmt: skip
+    lines = (PEOPLE / "sentences.txt").read_text().splitlines()
+    named = [line.strip("[]").split() for line in lines if line.startswith("[")]
     assert len({task for task, _, _ in named}) == 11
     assert len({hand for _, _, hand in named}) == 5

@@ -82,7 +82,7 @@ def interpret(text: str, scene: Scene, task: str) -> Interpretation:
         return Interpretation((), tuple(f'does not understand "{one}"' for one in unread))
     command = read_command(words)
     open_choice = unsettled_choice(introduced, context, command.text)
-    unused = (*left_over(command, slots), *([open_choice] if open_choice else []))
+    unused = (*left_over(command, tuple(slots)), *([open_choice] if open_choice else []))
     if unused:
         return Interpretation((), unused)
     times = context.times | mentioned_times(command.text)
@@ -114,7 +114,7 @@ def _left_open(goals: Sequence[Goal]) -> str:
     """Return the complaint that the words leave more than one goal."""
     values = {slot: list(dict.fromkeys(goal[slot] for goal in goals)) for slot, _ in goals[0].slots}
     left = {slot: found for slot, found in values.items() if len(found) > 1}
-    slot, found = next(iter(left.items()))
+    found = next(iter(left.values()))
     named = (" and ".join(map(str, one)) if isinstance(one, tuple) else str(one) for one in found)
     return f"leaves {' and '.join(left)} open: it can be {' or '.join(named)}"
 

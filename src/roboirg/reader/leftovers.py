@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Collection, Iterator
 
 from roboirg.reader.command import Command
@@ -40,8 +41,14 @@ _CLASH = Phrases({
 """Words that are each clear, but not together."""
 
 
-def left_over(command: Command, slots: Collection[str]) -> Iterator[str]:
-    """Yield a complaint for each kind of value that a command names and that no slot takes."""
+@functools.lru_cache(maxsize=4096)
+def left_over(command: Command, slots: tuple[str, ...]) -> tuple[str, ...]:
+    """Return a complaint for each kind of value that a command names and that no slot takes."""
+    return tuple(_complaints(command, slots))
+
+
+def _complaints(command: Command, slots: Collection[str]) -> Iterator[str]:
+    """Yield a complaint for each of them."""
     text = command.text
     clash = _CLASH.search(text)
     if clash is not None:

@@ -67,7 +67,8 @@ _MORE = "more|larger|greater|higher|bigger|above|over"
 _LESS = "fewer|less|smaller|lower|below|under"
 _STEP = Phrases({
     "two more red cubes than that":
-        rf"(?<!\bthe )(?<!red )(?<!green )(?<!blue )\b(?P<step>{NUMBER}){_NOUNS}{{0,3}} (?P<way>{_MORE}|{_LESS}){_NOUNS}{{0,5}}(?: than)? "
+        rf"(?<!\bthe )(?<!red )(?<!green )(?<!blue )"
+        rf"\b(?P<step>{NUMBER}){_NOUNS}{{0,3}} (?P<way>{_MORE}|{_LESS}){_NOUNS}{{0,5}}(?: than)? "
         f"{_TO}",
 })  # fmt: skip
 _PLUS = Phrases({
