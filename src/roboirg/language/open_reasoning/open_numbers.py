@@ -168,15 +168,16 @@ def _derive(request: InstructionRequest) -> Derived:
         "relation": f"{calculation.second.name}, {calculation.combination}",
         "reference": [first, second],
     }
-    remark = _steps(request, calculation, f"{cardinal(first)} and {cardinal(second)}")
+    remark = _steps(request, calculation, (first, second))
     return Derived(context, _fields(request, goal_value), notes, remark)
 
 
-def _steps(request: InstructionRequest, calculation: Calculation, both: str) -> Phrase:
+def _steps(request: InstructionRequest, calculation: Calculation, numbers: Numbers) -> Phrase:
     """Return the sentence that calculates; resolved, it names both numbers."""
+    both = " and ".join(map(str, numbers))
     words = request.pick("the numbers", templates.NUMBERS)
-    numbers = (
-        antecedent(both, REFERENCE, both)
+    named = (
+        antecedent(" and ".join(map(cardinal, numbers)), REFERENCE, both)
         if request.resolved
         else anaphor(words, "them", REFERENCE, both)
     )
@@ -187,7 +188,7 @@ def _steps(request: InstructionRequest, calculation: Calculation, both: str) -> 
     ):
         (inner,) = pools.of(request.pool)
         template = template.replace(f"{{{field}}}", inner)
-    return fill(template, {"numbers": numbers})
+    return fill(template, {"numbers": named})
 
 
 def _fields(request: InstructionRequest, goal_value: GoalValue) -> Fields:
