@@ -86,7 +86,13 @@ def test_its_export_is_equal(run: Path, tmp_path: Path) -> None:
     now = pd.read_parquet(tmp_path / "records.parquet")
     then = pd.read_parquet(STORED / "records.parquet")
     changed = ["schema_version", "setting", "metadata"]
-    assert set(now.columns) - set(then.columns) == {"robot", "subgoals"}
+    assert set(now.columns) - set(then.columns) == {
+        "calls",
+        "inference",
+        "needs",
+        "robot",
+        "subgoals",
+    }
     for stored, read in zip(then.to_dict("records"), now.to_dict("records"), strict=True):
         options = {"rival": stored["rival"], "reasoning": stored["reasoning"]}
         assert harder_setting(stored["setting"], **options) == read["setting"]

@@ -35,8 +35,8 @@ class Late:
 class Status:
     """Reply with an HTTP error."""
 
-    def __init__(self, code, words="something went wrong"):
-        self.code, self.words = code, words
+    def __init__(self, code, words="something went wrong", headers=()):
+        self.code, self.words, self.headers = code, words, dict(headers)
 
 
 class Garbage:
@@ -88,7 +88,8 @@ class _Handler(BaseHTTPRequestHandler):
         google = "generateContent" in self.path
         if isinstance(said, Status):
             error = {"error": {"message": said.words, "code": said.code, "status": "BAD"}}
-            return self._reply(said.code, json.dumps(error).encode(), "application/json")
+            body = json.dumps(error).encode()
+            return self._reply(said.code, body, "application/json", said.headers)
         if isinstance(said, Garbage):
             return self._reply(200, said.body, said.kind)
         if isinstance(said, Late) and said.drip:
@@ -109,8 +110,10 @@ class _Handler(BaseHTTPRequestHandler):
         reply = google_reply(said) if google else openai_reply(said)
         return self._reply(200, json.dumps(reply).encode(), "application/json")
 
-    def _reply(self, code, body, kind):
+    def _reply(self, code, body, kind, headers=()):
         self.send_response(code)
+        for name, value in dict(headers).items():
+            self.send_header(name, value)
         self.send_header("Content-Type", kind)
         self.send_header("Content-Length", str(len(body)))
         self.end_headers()
@@ -173,7 +176,8 @@ def fake_vlm(answer: Callable):
 
 def model_options(server, provider="openai", **more):
     url = f"{server.url}/v1" if provider == "openai" else server.url
-    settings = {"model": "fake", "base_url": url, "retries": 0, "timeout_s": 10.0, **more}
+    never = {"retries": 0, "patience_s": 0}
+    settings = {"model": "fake", "base_url": url, "timeout_s": 10.0, **never, **more}
     return ModelOptions(provider=provider, **settings)
 
 

@@ -216,7 +216,12 @@ def check(attack, scheme, clients, good):
 def test_a_bad_model_endpoint_is_a_named_error(provider, answer, words):
     with answering(answer) as place:
         options = ModelOptions(
-            provider=provider, model="m", base_url=f"http://{place}", retries=0, timeout_s=200
+            provider=provider,
+            model="m",
+            base_url=f"http://{place}",
+            retries=0,
+            patience_s=0,
+            timeout_s=200,
         )
         model = make_model(options)
         with pytest.raises(PolicyServerError) as caught:

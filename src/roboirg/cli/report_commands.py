@@ -44,6 +44,14 @@ def report(
     port: Annotated[
         int, typer.Option(help="Port on loopback for --serve; 0 chooses a free one.")
     ] = 0,
+    methods: Annotated[
+        str | None,
+        typer.Option(
+            help="Write no file: print the methods section of the run in this format, markdown, "
+            "latex or json.",
+            metavar="FORMAT",
+        ),
+    ] = None,
 ) -> None:
     """Print the table of a run and write RUN/report.html, one self-contained page.
 
@@ -54,6 +62,9 @@ def report(
     from roboirg.evaluation.analysis.page.report import check_report_support, write_report
 
     path, other = run_commands.folder_of(folder), None if against is None else Path(against)
+    if methods is not None:
+        _print_methods(path, methods)
+        return
     if serve:
         _serve(path, port, against)
         return
@@ -70,6 +81,16 @@ def report(
         )
     run_commands.print_tables_of(path, planned)
     typer.echo(page)
+
+
+def _print_methods(folder: Path, name: str) -> None:
+    from roboirg.cli import run_commands
+    from roboirg.evaluation.analysis.methods.method_sections import make_sections
+    from roboirg.evaluation.analysis.methods.method_text import FORMATS, write_methods
+
+    known_names("format of a methods section", name, tuple(FORMATS))
+    sections = make_sections(folder, run_commands.planned_jobs(folder))
+    typer.echo(write_methods(sections, name), nl=False)
 
 
 def _serve(folder: Path, port: int, against: str | None) -> None:
@@ -138,7 +159,8 @@ def tables(
         str,
         typer.Option(
             help="main, planner, context, real, other, coverage, or all that apply; or of runs "
-            "alone: forms, failures, subgoals (of planners), heard (how many prompts were cut)."
+            "alone: forms, failures, subgoals (of planners), heard (how many prompts were cut), "
+            "sensitivity (whether gaps depend on how they are analyzed)."
         ),
     ] = _ALL,
     format: Annotated[  # noqa: A002
@@ -198,13 +220,16 @@ def compare(
     from rich.console import Console
     from rich.text import Text
 
+    from roboirg.evaluation.analysis.stats.cells import gather
     from roboirg.evaluation.analysis.stats.comparison import compare as compare_cells
     from roboirg.evaluation.analysis.stats.comparison_text import sentences
     from roboirg.evaluation.analysis.stats.flips import read_flips
     from roboirg.evaluation.analysis.stats.intervals import SEED
+    from roboirg.evaluation.analysis.stats.sensitivity import policy_contrasts, try_choices
     from roboirg.util.console_width import widen
 
-    ours, theirs = _one_policy(first), _one_policy(second)
+    sides = _one_policy(first), _one_policy(second)
+    ours, theirs = (gather(*each) for each in sides)
     breakdowns = _breakdowns(by)
     labels = _labels(breakdowns, [_split(first)[0], _split(second)[0]])
     titled = {one.title: labels[one.name] for one in breakdowns}
@@ -217,6 +242,12 @@ def compare(
     flips = read_flips(Path(_split(first)[0])), read_flips(Path(_split(second)[0]))
     for sentence in sentences(found, names[0], names[1], flips):
         console.print(Text(sentence), highlight=False)
+    results = [[one for _, results in runs for one in results] for runs, _ in sides]
+    tried = [one for one in try_choices(policy_contrasts(*results)) if one.others]
+    if tried:
+        console.print("\nUnder other choices of the analysis, the verdict on")
+    for one in tried:
+        console.print(Text(f"  {one.label} ({one.verdict}) {one.sentence}."), highlight=False)
 
 
 def _tables(which: str, cells: Cells, *, published: bool, floors: str | None) -> list[Table]:
@@ -342,16 +373,22 @@ def _runs(runs: list[str]) -> tuple[list[tuple[str, Sequence[Summary]]], list[Jo
     return results, planned
 
 
-def _one_policy(text: str) -> Cells:
-    """Return the cells of a run's folder or of RUN:policy; policy names may contain colons."""
+def _one_policy(text: str) -> tuple[list[tuple[str, Sequence[Summary]]], list[Job]]:
+    """Return the results and planned jobs of a run's folder or of RUN:policy.
+
+    Names of policies may contain colons.
+    """
     folder, policy = _split(text)
-    cells = _cells([folder])
+    runs, planned = _runs([folder])
     if policy is None:
-        return cells
-    names = list(dict.fromkeys(key.policy_run.policy for key in cells))
+        return runs, planned
+    names = list(dict.fromkeys(one.policy for one in (*planned, *runs[0][1])))
     if policy not in names:
         raise UnknownNameError(f"policy in {folder}", policy, names)
-    return {key: cell for key, cell in cells.items() if key.policy_run.policy == policy}
+    own: list[tuple[str, Sequence[Summary]]] = [
+        (name, [one for one in results if one.policy == policy]) for name, results in runs
+    ]
+    return own, [job for job in planned if job.policy == policy]
 
 
 def _split(text: str) -> tuple[str, str | None]:

@@ -55,6 +55,10 @@ Wordings = Annotated[
     _words(help="Our words for train or test, or a file with commands.  (ours of the split)"),
 ]
 MaxSteps = Annotated[int | None, _play(help="Limit in control steps, 20 per second.  (1300)")]
+MaxCost = Annotated[
+    float | None,
+    _play(help="US dollars that models may cost in all; then the run stops, to be resumed."),
+]
 Video = Annotated[str | None, _play(help="Record videos of episodes: off, failures or all.  (off)")]
 
 
@@ -71,6 +75,7 @@ class PlanChoices(OptionGroup):
     stages: Stages
     wordings: Wordings
     max_steps: MaxSteps
+    max_cost: MaxCost
     video: Video
 
 

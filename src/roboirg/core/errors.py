@@ -7,6 +7,7 @@
 | `InvalidActionError` | an action has a wrong shape or is not finite | exit code 2; or recorded |
 | `MissingDependencyError` | an extra or a model file is not installed | exit code 2 |
 | `RenderDeviceError` | no Vulkan device can render | exit code 2 |
+| `BudgetError` | a run has spent what it may on models | exit code 2 |
 | `SceneRejectedError` | a seed yields no valid scene (callers try the next seed) | never seen |
 | `PolicyConnectionError` | a policy's server or model cannot be reached | recorded as an error |
 | `PolicyTimeoutError` | a policy does not answer in time | recorded as an error |
@@ -54,12 +55,20 @@ class InvalidActionError(RoboIRGError, ValueError):
     """An action has a wrong shape or type, or is not finite."""
 
 
-class MissingDependencyError(RoboIRGError, ImportError):
+class EndOfRunError(RoboIRGError):
+    """Base class of errors that would end every other episode the same way, so the run stops."""
+
+
+class MissingDependencyError(EndOfRunError, ImportError):
     """A required package or file is not installed; the sentence says how to install it."""
 
 
-class RenderDeviceError(RoboIRGError, RuntimeError):
+class RenderDeviceError(EndOfRunError, RuntimeError):
     """No Vulkan device can render; the sentence says what to install."""
+
+
+class BudgetError(EndOfRunError):
+    """A run has spent what it may on models, or their prices are not known."""
 
 
 class SceneRejectedError(RoboIRGError):
@@ -79,6 +88,19 @@ class PolicyServerError(RoboIRGError):
 
 class PolicyConnectionError(PolicyServerError, ConnectionError):
     """The server or model of a policy cannot be reached, or the connection was lost."""
+
+
+class ModelBusyError(PolicyConnectionError):
+    """A model's service is up but cannot answer now.
+
+    Args:
+        message: what it said.
+        retry_after_s: seconds after which it wants to be asked again; None if it named none.
+    """
+
+    def __init__(self, message: str = "", retry_after_s: float | None = None) -> None:
+        super().__init__(message)
+        self.retry_after_s = retry_after_s
 
 
 class PolicyTimeoutError(PolicyServerError, TimeoutError):

@@ -10,9 +10,8 @@ from contextlib import contextmanager
 from typing import Literal
 
 from roboirg.core.errors import (
+    EndOfRunError,
     InvalidActionError,
-    MissingDependencyError,
-    RenderDeviceError,
     RoboIRGError,
 )
 from roboirg.core.plain_text import clip_text, printable
@@ -67,13 +66,12 @@ def attribute_errors(source: ErrorSource) -> Iterator[None]:
     Raises:
         EpisodeError: an exception was raised.
         EpisodeLostError: unchanged, because the episode is played again.
-        RenderDeviceError: unchanged, because every other episode would end the same way.
-        MissingDependencyError: likewise.
+        EndOfRunError: unchanged, because every other episode would end the same way.
         KeyboardInterrupt: unchanged, if it may be the user's.
     """
     try:
         yield
-    except (RenderDeviceError, MissingDependencyError, EpisodeError, EpisodeLostError):
+    except (EndOfRunError, EpisodeError, EpisodeLostError):
         raise
     except (Exception, SystemExit, GeneratorExit, KeyboardInterrupt) as error:
         # Policies may raise anything. Where Ctrl-C is ignored, as in workers, it is not the user's.

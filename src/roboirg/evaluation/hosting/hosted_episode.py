@@ -8,6 +8,7 @@ from typing import Any
 
 from numpy.typing import NDArray
 
+from roboirg.core.inference_facts import inference_facts
 from roboirg.evaluation.hosting.messages import (
     Acted,
     Ask,
@@ -108,7 +109,7 @@ class HostedEpisode:
         value = self.read(call)
         demonstration = HostedDemonstration(value["fields"], value["arrays"], self._fetch)
         self.policy.reset(value["instruction"], demonstration)
-        return Told(dump_metadata(self.policy))
+        return Told(dump_metadata(self.policy), inference=inference_facts(self.policy))
 
     def act(self, call: Call) -> Acted:
         """Return the next actions."""

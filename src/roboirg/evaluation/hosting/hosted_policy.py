@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 from pydantic import JsonValue
 
 from roboirg.core.errors import InvalidValueError, MissingDependencyError
+from roboirg.core.inference_facts import InferenceFacts
 from roboirg.core.observations import Demonstration, Observation
 from roboirg.evaluation.episode_errors import EpisodeError, EpisodeLostError, attribute_errors
 from roboirg.evaluation.hosting.messages import (
@@ -60,6 +61,7 @@ class HostedPolicy:
     Attributes:
         version: of the policy.
         metadata: as the policy reports them, from `reset` on.
+        inference: what its process computes with, from `reset` on.
         waited_s: seconds that its calls waited for others.
         latency_s: seconds that its last actions took on its own robot, if it reports that.
         subgoal: what it named after its last actions, if anything.
@@ -73,6 +75,7 @@ class HostedPolicy:
     def __init__(self, hosts: socket.socket, spec: str, seed: int, *, alone: bool = False) -> None:
         self._spec = spec
         self.metadata: dict[str, JsonValue] = {}
+        self.inference: InferenceFacts | None = None
         self.waited_s = self.latency_s = 0.0
         self.subgoal: str | None = None
         self._demonstration: Demonstration = {}
@@ -98,7 +101,9 @@ class HostedPolicy:
             "fields": list(demonstration),
             "arrays": self._drawn(now),
         }
-        self._take_metadata(self._call(Told, self._pack("reset", value)))
+        found = self._call(Told, self._pack("reset", value))
+        self._take_metadata(found)
+        self.inference = found.inference
 
     def act(self, observation: Observation) -> NDArray[np.float64]:
         """Return the next actions (n, 8) or (n, 7)."""

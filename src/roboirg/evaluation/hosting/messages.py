@@ -20,6 +20,7 @@ import numpy as np
 from msgspec import Meta, Struct
 
 from roboirg.core.field_types import Name
+from roboirg.core.inference_facts import InferenceFacts
 from roboirg.core.subgoal_text import MOST_SUBGOAL_LETTERS
 from roboirg.evaluation.episode_errors import MAX_DETAILS_LENGTH
 from roboirg.evaluation.policy_calls import MAX_COSTS, MAX_METADATA_LENGTH
@@ -79,10 +80,11 @@ class Opened(Struct, tag="opened", forbid_unknown_fields=True):
 
 
 class Told(Struct, tag="told", forbid_unknown_fields=True):
-    """What a policy says of itself: its metadata as JSON, and its costs."""
+    """What a policy says of itself: metadata as JSON, costs, what its process computes with."""
 
     metadata: Annotated[str, Meta(max_length=MAX_METADATA_LENGTH)] = "{}"
     usage: Annotated[dict[Text, float], Meta(max_length=MAX_COSTS)] = {}
+    inference: InferenceFacts | None = None
 
 
 class Acted(Struct, tag="acted", forbid_unknown_fields=True):

@@ -11,7 +11,14 @@ from dataclasses import asdict, replace
 from typing import Any, Literal, get_args
 
 import msgspec
-from pydantic import BaseModel, ConfigDict, field_serializer, field_validator, model_validator
+from pydantic import (
+    BaseModel,
+    ConfigDict,
+    Field,
+    field_serializer,
+    field_validator,
+    model_validator,
+)
 
 from roboirg import language, policies, tasks
 from roboirg.core.actions import find_action_space
@@ -127,6 +134,10 @@ class Plan(BaseModel):
     """Time limit of one call of a policy, seconds."""
     episode_timeout_s: float = 7200.0
     """Time limit of an episode, seconds."""
+    max_cost: float | None = Field(default=None, gt=0)
+    """US dollars that the models of the run may cost; then it stops, to be resumed with more."""
+    model_replies: Literal["stored", "anew"] = "stored"
+    """stored: a model is not asked again what its reply in the folder answers; anew: it is."""
     cluster: WorkerNeeds = WorkerNeeds()
     """What a worker reserves on a machine of a Ray cluster, and what it gets from this one."""
     tries: int = 2

@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from roboirg.core.actions import ActionSpace
 from roboirg.core.delivery import SpokenInstruction
+from roboirg.core.inference_facts import inference_facts
 from roboirg.core.observations import Demonstration
 from roboirg.core.subgoal_text import split_point
 from roboirg.evaluation.play.call_guard import CallGuard
@@ -21,6 +22,7 @@ from roboirg.judging import judge_subgoal, plain_subgoal
 from roboirg.policies.by_name.loading import is_foreign, is_privileged
 from roboirg.policies.contract.base import Policy
 from roboirg.policies.contract.play import EpisodeLoop
+from roboirg.policies.contract.policy_needs import PolicyNeeds
 
 if TYPE_CHECKING:
     from roboirg.envs.environment import RoboIRGEnv
@@ -86,6 +88,8 @@ class GuardedLoop(EpisodeLoop):
         with self._guard.policy("policy's reset()", "policy_reset"):
             self.start_policy(first, info["demonstration"])
             result.policy_metadata = policy_metadata(self.policy, is_ours=self._is_ours)
+            result.needs = PolicyNeeds.of(self.policy).declared
+            result.inference = inference_facts(self.policy)
         result.action_space = self._space.name
         return observation, info
 

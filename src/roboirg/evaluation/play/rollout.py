@@ -47,6 +47,7 @@ from roboirg.policies.contract.base import Policy, close_policy
 from roboirg.policies.contract.policy_needs import PolicyNeeds
 from roboirg.policies.contract.random_state import episode_policy_seed
 from roboirg.policies.prompt_length.declared_limit import prompt_limit
+from roboirg.policies.vlm.models.reply_store import ReplySettings, use_replies
 
 PlayJob = Callable[[Job], Record]
 """Function that plays one job. Executors send it to other processes, so it must be picklable."""
@@ -72,6 +73,7 @@ class EpisodeRunner:
         refuse_long: whether an episode is not played if its prompt is longer than what the policy's
             model reads.
         seed_secret: of the run, for the policies' seeds.
+        replies: where those of models are kept; None for a run that keeps none.
     """
 
     folder: Path
@@ -83,10 +85,12 @@ class EpisodeRunner:
     hosts: socket | None = None
     refuse_long: bool = False
     seed_secret: str = ""
+    replies: ReplySettings | None = None
 
     def in_folder(self, folder: Path) -> EpisodeRunner:
-        """Return a copy that writes its videos to another folder."""
-        return replace(self, folder=folder)
+        """Return a copy that writes its videos and the replies of models to another folder."""
+        replies = None if self.replies is None else self.replies._replace(folder=folder)
+        return replace(self, folder=folder, replies=replies)
 
     def with_hosts(self, hosts: socket) -> EpisodeRunner:
         """Return a copy that asks for hosts on a line, as `HostPool.connect` returns it."""
@@ -96,11 +100,11 @@ class EpisodeRunner:
         """Play one job.
 
         Raises:
-            RenderDeviceError: no Vulkan device can render.
-            MissingDependencyError: a package has to be installed first.
+            EndOfRunError: no Vulkan device can render, a package has to be installed first, ….
         """
         started_at, start = utc_now(), time.monotonic()
-        writer, result = self._play(job)
+        with use_replies(self.replies, job.slug):
+            writer, result = self._play(job)
         video = self._finish_video(writer, result)
         error = None if writer is None else writer.error
         log = result.action_log

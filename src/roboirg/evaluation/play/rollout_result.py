@@ -25,6 +25,7 @@ from roboirg.core.delivery import TURNS, PromptVerdict
 from roboirg.core.episode import ENVIRONMENT_VERSION, Episode
 from roboirg.core.errors import InvalidValueError, MissingDependencyError
 from roboirg.core.field_types import MOST_CAUSE_LETTERS
+from roboirg.core.inference_facts import InferenceFacts
 from roboirg.core.observations import DemonstrationSource
 from roboirg.core.plain_text import clip_text
 from roboirg.evaluation.hosting.policy_descriptions import PolicyDescription, describe_policy
@@ -78,6 +79,8 @@ class RolloutResult:
         policy: its version and whether it is privileged; None if it was never loaded.
         prompt_limit: what the policy declares about its prompt; None if it declares nothing.
         policy_metadata: what the policy reports about itself.
+        needs: what it declares that it needs.
+        inference: what its process computes with; None if it was not asked.
         action_space: name of the action space; None if the episode did not get that far.
         answers: what was executed of each answer of the policy.
         end_state: the state after the last of them, in numbers and as a hash; None before.
@@ -105,6 +108,8 @@ class RolloutResult:
     policy: PolicyDescription | None = None
     prompt_limit: PromptLimit | None = None
     policy_metadata: dict[str, JsonValue] = field(default_factory=dict)
+    needs: dict[str, Any] = field(default_factory=dict)
+    inference: InferenceFacts | None = None
     action_space: str | None = None
     answers: list[NDArray[np.float64]] = field(default_factory=list)
     end_state: tuple[NDArray[np.float64], str] | None = None
@@ -167,6 +172,8 @@ _COPIED = (
     "demonstration_steps",
     "demonstration_source",
     "policy_metadata",
+    "needs",
+    "inference",
     "details",
     "render_device",
     "usage",
@@ -228,6 +235,7 @@ def make_record(
         server_version=server_version(result.policy_metadata),
         action_log=action_log,
         end_state=None if result.end_state is None else result.end_state[1],
+        calls=len(result.answers),
         events=tuple(result.events),
         subgoals=tuple(result.subgoals),
         video=video,

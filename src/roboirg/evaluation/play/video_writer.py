@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from roboirg.core.errors import MissingDependencyError, RenderDeviceError
+from roboirg.core.errors import EndOfRunError
 from roboirg.core.extras import extra_needed
 from roboirg.evaluation.records.film import LAST_FRAME_REPEATS, VideoOptions
 from roboirg.util.text_overlay import draw_text, wrap_text
@@ -163,7 +163,7 @@ class VideoWriter:
                 longest_caption=self.longest_caption,
             )
             self._encode(frame)
-        except (RenderDeviceError, MissingDependencyError):
+        except EndOfRunError:
             raise
         except Exception as error:  # noqa: BLE001 - see the class
             self._abandon(error)

@@ -18,6 +18,7 @@ import msgspec
 
 from roboirg.core.delivery import PromptVerdict
 from roboirg.core.field_types import Cause, Name, Subgoal, Whole
+from roboirg.core.inference_facts import InferenceFacts
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.core.observations import DemonstrationFrames, DemonstrationSource
 from roboirg.evaluation.records.run_files import RELATIVE_PATH
@@ -49,6 +50,7 @@ NON_DETERMINISTIC_FIELDS = frozenset(
         "code",
         "details",
         "duration_s",
+        "inference",
         "plan",
         "processor",
         "spec",
@@ -303,6 +305,8 @@ class Summary(Job, frozen=True, kw_only=True, gc=False):
             None if they were not kept.
         video: path of the video relative to the records file, or None.
         render_device: the driver's name of the render device; None if nothing was rendered.
+        processor: architecture, maker and family of the processor that simulated it, which decide
+            the last bits of the record's `end_state`; None in records from before this was kept.
         started_at: ISO 8601, UTC.
         duration_s: wall-clock seconds.
     """
@@ -331,6 +335,7 @@ class Summary(Job, frozen=True, kw_only=True, gc=False):
     action_log: str | None = None
     video: RunPath | None = None
     render_device: Name | None = None
+    processor: str | None = None
     started_at: Name
     duration_s: float
 
@@ -351,6 +356,9 @@ class Record(Summary, frozen=True, kw_only=True, forbid_unknown_fields=True):
         goal: what the instruction conveys, a value for each slot.
         metadata: of the instruction: reasoning pattern, relation, stages, landmarks, ….
         policy_metadata: what the policy reports about itself: checkpoint, server, model, ….
+        needs: what it declares that it needs, as in `PolicyNeeds`; what is not declared is absent.
+        calls: how often it was asked for actions.
+        inference: what its process computes with; None if it was not asked.
         end_state: hash of the state in which the episode left the world and the judge; None if it
             did not come to an end.
         events: facts that became true or false, in order.
@@ -360,8 +368,6 @@ class Record(Summary, frozen=True, kw_only=True, forbid_unknown_fields=True):
         timings: wall-clock seconds by phase: ``policy_load``, ``policy_act``, ``env_step``, ….
         video_error: why the requested video could not be written, or None.
         details: traceback of an error, or None.
-        processor: architecture, maker and family of the processor that simulated it, which decide
-            the last bits of `end_state`; None in records from before this was kept.
     """
 
     instruction: tuple[UtteranceRecord, ...]
@@ -371,6 +377,9 @@ class Record(Summary, frozen=True, kw_only=True, forbid_unknown_fields=True):
     goal: dict[str, str | int | tuple[str | int, ...]]
     metadata: dict[str, Any]
     policy_metadata: dict[str, Any] = {}
+    needs: dict[str, Any] = {}
+    calls: Whole = 0
+    inference: InferenceFacts | None = None
     end_state: str | None = None
     events: tuple[EventRecord, ...] = ()
     subgoals: tuple[SubgoalRecord, ...] = ()
@@ -378,4 +387,3 @@ class Record(Summary, frozen=True, kw_only=True, forbid_unknown_fields=True):
     timings: dict[str, float] = {}
     video_error: str | None = None
     details: str | None = None
-    processor: str | None = None

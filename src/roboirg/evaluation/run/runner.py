@@ -35,6 +35,7 @@ from roboirg.evaluation.records.store import (
 from roboirg.evaluation.run.executor import Executor, Warn
 from roboirg.evaluation.run.progress import Reporter, SilentReporter
 from roboirg.language import LANGUAGE_VERSION
+from roboirg.policies.vlm.models.reply_store import ReplySettings
 from roboirg.tasks.splits.splits import get_episode
 
 UNREACHABLE_AFTER = 20
@@ -137,6 +138,7 @@ def episode_runner(plan: Plan, folder: Path) -> EpisodeRunner:
         hosting=plan.hosting,
         refuse_long=plan.long_prompts == "refuse",
         seed_secret=plan.seed_secret or "",
+        replies=ReplySettings(folder, plan.max_cost, plan.model_replies == "anew"),
     )
 
 

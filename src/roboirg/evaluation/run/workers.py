@@ -16,7 +16,7 @@ from dataclasses import dataclass
 from multiprocessing.connection import Connection, wait
 from typing import NamedTuple, cast
 
-from roboirg.core.errors import MissingDependencyError, RenderDeviceError, RoboIRGError
+from roboirg.core.errors import EndOfRunError, RoboIRGError
 from roboirg.evaluation.episode_errors import format_cause
 from roboirg.evaluation.hosting.host_pool import Connect
 from roboirg.evaluation.play.rollout import EpisodeRunner, PlayJob
@@ -32,7 +32,7 @@ MAX_FAILED_STARTS = 3
 POLL_S = 0.25
 """How often a supervisor checks deadlines."""
 
-_FATAL_ERRORS = {error.__name__: error for error in (RenderDeviceError, MissingDependencyError)}
+_FATAL_ERRORS = {error.__name__: error for error in EndOfRunError.__subclasses__()}
 
 
 class _FatalError(NamedTuple):

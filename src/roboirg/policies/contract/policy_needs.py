@@ -184,6 +184,16 @@ class PolicyNeeds:
         """The options of an environment that meets the needs, as `roboirg.make` takes them."""
         return {one: getattr(self, one) for one in _names(type(self), "env")}
 
+    @property
+    def declared(self) -> dict[str, Any]:
+        """The needs without those that are None, as JSON values."""
+        values = {one.name: getattr(self, one.name) for one in fields(self)}
+        return {
+            name: list(value) if isinstance(value, tuple) else value
+            for name, value in values.items()
+            if value is not None
+        }
+
     def merge(self, planner: PolicyNeeds) -> Self:
         """Return the needs of this policy together with those of its planner."""
         return replace(

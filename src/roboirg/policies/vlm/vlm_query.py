@@ -9,11 +9,11 @@ from typing import TypeVar
 
 from roboirg.policies.vlm.model_content import ChatTurn
 from roboirg.policies.vlm.models import Model, ModelOptions, ModelQuery, ModelReply, make_model
+from roboirg.policies.vlm.models.paid_model import PaidModel, cost_of
 from roboirg.util.json_reply import UnparsableReplyError
 
 Value = TypeVar("Value")
 
-MILLION = 1_000_000
 SILENCE = "(no answer)"
 """Stands for an empty reply when it is quoted back; services refuse empty turns."""
 
@@ -29,6 +29,7 @@ class VLMQuery:
         calls: requests, second tries included.
         input_tokens, output_tokens: of all calls.
         unparsed: queries without a usable reply even at the second try.
+        cost_usd: of all calls; None if the prices are not known.
     """
 
     options: ModelOptions
@@ -38,7 +39,8 @@ class VLMQuery:
     input_tokens: int = field(default=0, init=False)
     output_tokens: int = field(default=0, init=False)
     unparsed: int = field(default=0, init=False)
-    _model: Model | None = field(default=None, init=False, repr=False)
+    cost_usd: float | None = field(default=None, init=False)
+    _model: PaidModel | None = field(default=None, init=False, repr=False)
 
     def ask(self, query: ModelQuery, parse: Callable[[str], Value]) -> Value | None:
         """Return the parsed reply; None if `parse` rejects two replies.
@@ -64,20 +66,26 @@ class VLMQuery:
     def start(self) -> None:
         """Reset the counts for a new episode."""
         self.calls = self.input_tokens = self.output_tokens = self.unparsed = 0
+        self.cost_usd = cost_of(self.options)
+        if self._model is not None:
+            self._model.start()
 
     def usage(self) -> dict[str, float]:
-        """Return calls, tokens and queries without a usable reply; the cost if prices are known."""
+        """Return calls, tokens and queries without a usable reply; the cost if prices are known.
+
+        What was ``stored`` by an earlier try cost nothing again; ``anew`` is what was stored with
+        something else sent, and ``waited_s`` the time that the service made wait.
+        """
         usage: dict[str, float] = {
             "calls": self.calls,
             "input_tokens": self.input_tokens,
             "output_tokens": self.output_tokens,
             "unparsed": self.unparsed,
         }
-        prices = self.options.input_price, self.options.output_price
-        if prices != (None, None):
-            input_price, output_price = (price or 0.0 for price in prices)
-            total = self.input_tokens * input_price + self.output_tokens * output_price
-            usage["cost_usd"] = total / MILLION
+        if self.cost_usd is not None:
+            usage["cost_usd"] = self.cost_usd
+        if self._model is not None:
+            usage |= {name: count for name, count in self._model.counts().items() if count}
         return usage
 
     def close(self) -> None:
@@ -87,9 +95,11 @@ class VLMQuery:
 
     def _request(self, query: ModelQuery) -> ModelReply:
         if self._model is None:
-            self._model = self.connect(self.options)
+            self._model = PaidModel(self.connect(self.options), self.options)
         self.calls += 1
         reply = self._model.answer(query)
         self.input_tokens += reply.input_tokens
         self.output_tokens += reply.output_tokens
+        if self.cost_usd is not None:
+            self.cost_usd += cost_of(self.options, reply) or 0.0
         return reply

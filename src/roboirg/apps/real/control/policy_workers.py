@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from roboirg.apps.real.control.robot import HORIZON
-from roboirg.core.errors import MissingDependencyError, RenderDeviceError
+from roboirg.core.errors import EndOfRunError
 from roboirg.core.observations import Demonstration, Observation
 from roboirg.evaluation.episode_errors import (
     EpisodeError,
@@ -90,7 +90,7 @@ class PolicyDispatcher:
             return PolicyReply(error=(error.kind, str(error), error.details))
         except EpisodeLostError as error:
             return PolicyReply(error=(error.kind, str(error), ""))
-        except (MissingDependencyError, RenderDeviceError) as error:
+        except EndOfRunError as error:
             return PolicyReply(error=("policy", one_line(error), ""))
         return PolicyReply(value, float(getattr(self._policy, "latency_s", 0.0)))
 

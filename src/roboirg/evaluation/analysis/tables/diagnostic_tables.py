@@ -18,6 +18,7 @@ from roboirg.evaluation.analysis.tables.breakdown_table import (
     interval_text,
 )
 from roboirg.evaluation.analysis.tables.heard_table import make_heard_table
+from roboirg.evaluation.analysis.tables.sensitivity_table import make_sensitivity_table
 from roboirg.evaluation.analysis.tables.table import POLICY, Column, Entry, Row, Table
 from roboirg.judging.failure_attribution import EXECUTION, GROUNDING
 
@@ -131,5 +132,6 @@ DIAGNOSTIC_TABLES: Mapping[str, Callable[[RunData], Table]] = {
     "forms": make_forms_table,
     "failures": make_failure_table,
     "heard": make_heard_table,
+    "sensitivity": make_sensitivity_table,
 }
 """By name, as in the command line."""

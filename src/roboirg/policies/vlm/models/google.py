@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from roboirg.core.errors import (
+    ModelBusyError,
     PolicyConnectionError,
     PolicyReplyError,
     RoboIRGError,
@@ -16,6 +17,7 @@ from roboirg.policies.vlm.models.response_limits import (
     PLAIN_HEADERS,
     call_with_timeout,
     limit_response,
+    retry_after_s,
     timeout_error,
 )
 from roboirg.util.media import Picture, encode_png
@@ -47,9 +49,7 @@ class GoogleModel:
             client_args={"event_hooks": {"response": [limit_response]}},
             base_url=options.base_url,
             timeout=int(1000 * options.timeout_s),
-            retry_options=types.HttpRetryOptions(
-                attempts=options.retries + 1, http_status_codes=list(BUSY)
-            ),
+            retry_options=types.HttpRetryOptions(attempts=1),
         )
         self._client = genai.Client(vertexai=False, api_key=self._key, http_options=http)
 
@@ -115,7 +115,9 @@ class GoogleModel:
             return timeout_error(self._name, self._options.timeout_s)
         if isinstance(error, self._errors.APIError):
             if error.code in BUSY:
-                return PolicyConnectionError(f"{self._name} is not available: {words}")
+                headers = getattr(error.response, "headers", {})
+                wanted = retry_after_s(headers)
+                return ModelBusyError(f"{self._name} is not available: {words}", wanted)
             return PolicyReplyError(f"{self._name} refused or failed: {words}")
         if type(error).__module__.startswith(("httpx", "httpcore", "requests", "builtins")) and (
             isinstance(error, OSError) or "Connect" in kind or "Protocol" in kind or "Read" in kind

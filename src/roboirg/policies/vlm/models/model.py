@@ -32,8 +32,10 @@ class ModelOptions(BaseModel):
         api_key_env: environment variable with the key. By default it is the provider's usual one
             for the provider's own service, and none for any other address, so that a key is sent
             only where it belongs.
-        timeout_s: seconds for one reply, retries of the connection included.
-        retries: retries of the client library when the service is busy or unreachable.
+        timeout_s: seconds for one reply.
+        retries: how often a service that cannot be reached is tried again.
+        patience_s: how long to wait in all for a service that is busy, as it asks for.
+        requests_per_minute: that the service takes from all processes of a run; None for any.
         temperature: None leaves it to the provider.
         max_output_tokens: None leaves it to the provider.
         input_price, output_price: US dollars per million tokens; without them no cost is reported.
@@ -51,6 +53,8 @@ class ModelOptions(BaseModel):
     api_key_env: str | None = None
     timeout_s: float = Field(default=120.0, gt=0)
     retries: int = Field(default=2, ge=0, le=10)
+    patience_s: float = Field(default=300.0, ge=0)
+    requests_per_minute: float | None = Field(default=None, gt=0)
     temperature: float | None = Field(default=0.0, ge=0)
     max_output_tokens: int | None = Field(default=None, ge=1)
     input_price: float | None = Field(default=None, ge=0)
@@ -100,6 +104,7 @@ class ModelOptions(BaseModel):
     def about(self) -> dict[str, str | float | int | bool | None]:
         """Return, for records, the address and all that may change a reply; never a key."""
         omitted = {"base_url", "api_key_env", "timeout_s", "retries", "input_price", "output_price"}
+        omitted |= {"patience_s", "requests_per_minute"}
         return {**self.model_dump(mode="json", exclude=omitted), "address": self.address()}
 
 

@@ -8,6 +8,7 @@ from collections.abc import Iterator
 from typing import Any
 
 from roboirg.core.errors import (
+    ModelBusyError,
     PolicyConnectionError,
     PolicyReplyError,
     RoboIRGError,
@@ -19,6 +20,7 @@ from roboirg.policies.vlm.models.response_limits import (
     PLAIN_HEADERS,
     call_with_timeout,
     limit_response,
+    retry_after_s,
     timeout_error,
 )
 from roboirg.util.media import Clip, Picture, encode_png, sample_evenly
@@ -43,7 +45,7 @@ class OpenAIModel:
             api_key=self._key,
             base_url=options.base_url or OPENAI,
             timeout=options.timeout_s,
-            max_retries=options.retries,
+            max_retries=0,
             default_headers=PLAIN_HEADERS,
             http_client=openai.DefaultHttpxClient(event_hooks={"response": [limit_response]}),
         )
@@ -108,7 +110,8 @@ class OpenAIModel:
                 f"{self._name} cannot be reached ({type(reason).__name__}: {words})."
             )
         if isinstance(error, openai.APIStatusError) and error.status_code in BUSY:
-            return PolicyConnectionError(f"{self._name} is not available: {words}")
+            wanted = retry_after_s(error.response.headers)
+            return ModelBusyError(f"{self._name} is not available: {words}", wanted)
         if isinstance(error, openai.APIStatusError):
             return PolicyReplyError(f"{self._name} refused or failed: {words}")
         return PolicyReplyError(f"{self._name} replied with something else ({words}).")

@@ -6,6 +6,8 @@ they use, httpx and httpx2, call a hook with each response before its body is re
 
 from __future__ import annotations
 
+import contextlib
+import math
 import threading
 from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import Future
@@ -43,6 +45,17 @@ def limit_response(response: Any) -> None:  # noqa: ANN401 - of either library
     # The libraries check the class, and each has its own.
     limited = {"__iter__": pieces, "close": lambda _self: stream.close()}
     response.stream = type("LimitedStream", (base,), limited)()
+
+
+def retry_after_s(headers: Mapping[str, str]) -> float | None:
+    """Return the seconds after which a service wants to be asked again; None if it names none."""
+    for name, unit in (("retry-after-ms", 0.001), ("retry-after", 1.0)):
+        value = headers.get(name)
+        with contextlib.suppress(TypeError, ValueError):
+            seconds = float(value) * unit  # type: ignore[arg-type]
+            if math.isfinite(seconds) and seconds >= 0:
+                return seconds
+    return None
 
 
 Value = TypeVar("Value")

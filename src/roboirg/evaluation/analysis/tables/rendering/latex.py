@@ -76,7 +76,7 @@ def latex(table: Table, layout: Layout = PAGE) -> str:
 def _float(table: Table, part: Part, layout: Layout, number: int, count: int) -> Iterator[str]:
     columns = [table.columns[index] for index in part.indices]
     heads = table.heads[1:]
-    caption, label = _escaped(table.title), f"tab:{table.key}"
+    caption, label = escaped(table.title), f"tab:{table.key}"
     if count > 1:
         caption += f" ({number} of {count})"
         label += f"-{number}" if number > 1 else ""
@@ -89,12 +89,12 @@ def _float(table: Table, part: Part, layout: Layout, number: int, count: int) ->
     yield rf"\begin{{tabular}}{{{first}{'r' * len(columns)}}}"
     yield r"\toprule"
     yield from _column_groups(columns, len(heads))
-    yield _line([*map(_escaped, heads), *(_head(column.name) for column in columns)])
+    yield _line([*map(escaped, heads), *(_head(column.name) for column in columns)])
     block = dataclasses.replace(table, rows=tuple(part.rows))
     for group, rows in block.groups().items():
         yield r"\midrule"
         width = len(heads) + len(columns)
-        yield rf"\multicolumn{{{width}}}{{l}}{{\emph{{{_escaped(group)}}}}} \\"
+        yield rf"\multicolumn{{{width}}}{{l}}{{\emph{{{escaped(group)}}}}} \\"
         for row in rows:
             cells = [_cell(row.entries[index]) for index in part.indices]
             yield _line([*_names(table.names(row)), *cells])
@@ -107,7 +107,7 @@ def _float(table: Table, part: Part, layout: Layout, number: int, count: int) ->
 
 def _names(labels: Sequence[str]) -> list[str]:
     if len(labels) > 1:
-        return [_escaped(label) for label in labels]
+        return [escaped(label) for label in labels]
     return [rf"\raggedright {_foldable(labels[0])}"]
 
 
@@ -118,7 +118,7 @@ def _column_groups(columns: Sequence[Column], names: int) -> list[str]:
     for name, members in itertools.groupby(column.group for column in columns):
         width = len(list(members))
         cells.append(
-            rf"\multicolumn{{{width}}}{{c}}{{{_escaped(name)}}}" if name else " & " * (width - 1)
+            rf"\multicolumn{{{width}}}{{c}}{{{escaped(name)}}}" if name else " & " * (width - 1)
         )
         if name:
             rules.append(rf"\cmidrule(lr){{{place}-{place + width - 1}}}")
@@ -128,7 +128,7 @@ def _column_groups(columns: Sequence[Column], names: int) -> list[str]:
 
 def _head(name: str) -> str:
     """Return a heading with a line for each of its words."""
-    words = [_escaped(word) for word in HUMPS.split(name)]
+    words = [escaped(word) for word in HUMPS.split(name)]
     stacked = r"\\".join(rf"{word}\vphantom{{Ag}}" for word in words)
     return words[0] if len(words) == 1 else rf"\shortstack[r]{{{stacked}}}"
 
@@ -138,13 +138,13 @@ def _line(cells: list[str]) -> str:
 
 
 def _cell(entry: Entry) -> str:
-    text = "--" if entry.text == NOT_APPLICABLE else _escaped(entry.text)
+    text = "--" if entry.text == NOT_APPLICABLE else escaped(entry.text)
     if entry.best:
         text = rf"\textbf{{{text}}}"
     if change := entry.change_text:
         text += rf"{_CHANGES[change[0]]}{{{change[1:]}}}"
     if entry.signs:
-        text += rf"\textsuperscript{{{_escaped(entry.signs)}}}"
+        text += rf"\textsuperscript{{{escaped(entry.signs)}}}"
     return text
 
 
@@ -154,10 +154,11 @@ def _foldable(text: str) -> str:
     for sign in text:
         run = 0 if sign in _BREAKS or sign == " " else run + 1
         may_break = sign in _BREAKS or run == _MOST_LETTERS
-        found.append(_escaped(sign) + (r"\allowbreak{}" if may_break else ""))
+        found.append(escaped(sign) + (r"\allowbreak{}" if may_break else ""))
         run = 0 if may_break else run
     return "".join(found)
 
 
-def _escaped(text: str) -> str:
+def escaped(text: str) -> str:
+    """Return a text as the format prints it."""
     return "".join(_SPECIAL.get(sign, sign) for sign in text)

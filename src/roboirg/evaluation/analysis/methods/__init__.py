@@ -1,0 +1,1 @@
+"""A methods section that writes itself from the records of a run."""

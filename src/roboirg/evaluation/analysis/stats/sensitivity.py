@@ -1,0 +1,317 @@
+"""Whether a verdict depends on how results are analyzed.
+
+Each difference between two sides (a setting less explicit, one policy less another) is tested as
+everywhere, and again under each other choice that an analyst could have made: what an error counts
+as, which seeds and machines, what a unit is, how tasks weigh. A verdict that changes rests on the
+choice.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections import Counter, defaultdict
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from fractions import Fraction
+from typing import Literal, NamedTuple
+
+import msgspec
+import numpy as np
+from numpy.typing import NDArray
+
+from roboirg.core.instruction_options import InstructionOptions
+from roboirg.evaluation.analysis.stats.intervals import ALPHA, SEED
+from roboirg.evaluation.analysis.stats.option_labels import (
+    REFERENCE,
+    options_label,
+    options_sort_key,
+)
+from roboirg.evaluation.analysis.stats.paired_tests import holm, sign_flip_test
+from roboirg.evaluation.records.record import Summary
+from roboirg.tasks import every_task
+
+Direction = Literal["higher", "lower", "open"]
+"""Of the first side against the second; open if the corrected test does not decide."""
+
+Unit = Literal["trial", "episode", "task"]
+Weighting = Literal["task", "suite", "difficulty"]
+"""What weighs the same in a mean."""
+
+SIGNS = 10_000
+"""Random swaps of the test where there are too many units to try all."""
+_MOST_ENUMERATED = 14
+_NOTHING = 1e-12
+"""Differences below this are rounding."""
+
+Results = Sequence[Summary]
+
+
+class Contrast(NamedTuple):
+    """Two sides that are compared on the same episodes, with a label."""
+
+    label: str
+    first: Results
+    second: Results
+
+
+@dataclass(frozen=True)
+class Choice:
+    """One way to analyze.
+
+    Attributes:
+        group: what is chosen.
+        name: the choice; empty if the group has one only.
+        keep: returns what counts of a side's results.
+        unit: what the test swaps.
+        weights: what weighs the same.
+    """
+
+    group: str
+    name: str = ""
+    keep: Callable[[Results], Results] = field(default=lambda results: results)
+    unit: Unit = "episode"
+    weights: Weighting = "task"
+
+
+@dataclass(frozen=True)
+class Robustness:
+    """A verdict and what becomes of it under the other choices.
+
+    Attributes:
+        label: of the contrast.
+        verdict: as everywhere.
+        others: the verdict under each other choice, by choice.
+    """
+
+    label: str
+    verdict: Direction
+    others: Mapping[Choice, Direction]
+
+    @property
+    def exceptions(self) -> tuple[Choice, ...]:
+        """The choices under which the verdict is another one."""
+        return tuple(one for one, verdict in self.others.items() if verdict != self.verdict)
+
+    @property
+    def sentence(self) -> str:
+        """Whether the verdict holds in all analyses, in words."""
+        if not self.exceptions:
+            return f"holds in all {len(self.others)} other analyses"
+        listed = ", ".join(" ".join(filter(None, (one.group, one.name))) for one in self.exceptions)
+        return f"does not hold in {len(self.exceptions)} of {len(self.others)}: {listed}"
+
+
+USUAL = Choice("usual")
+
+
+def try_choices(contrasts: Sequence[Contrast]) -> tuple[Robustness, ...]:
+    """Test the contrasts, which are read together, under all choices that apply to them."""
+    choices = choices_for(contrasts)
+    usual = _directions(contrasts, USUAL)
+    others = [_directions(contrasts, choice) for choice in choices]
+    return tuple(
+        Robustness(
+            contrast.label,
+            usual[index],
+            {choice: found[index] for choice, found in zip(choices, others, strict=True)},
+        )
+        for index, contrast in enumerate(contrasts)
+    )
+
+
+def choices_for(contrasts: Sequence[Contrast]) -> tuple[Choice, ...]:
+    """Return the choices other than the usual one that can change anything."""
+    results = [one for each in contrasts for side in (each.first, each.second) for one in side]
+    tasks = list(dict.fromkeys(one.task for one in results))
+    seeds = sorted({one.policy_seed for one in results})
+    processors = Counter(one.processor for one in results)
+    found: list[Choice] = []
+    if any(one.outcome == "error" for one in results):
+        found.append(Choice("errors as failures", keep=_errors_as_failures))
+    if len(seeds) > 1:
+        found += [Choice("seed", str(seed), keep=_only_seed(seed)) for seed in seeds]
+        found.append(Choice("unit", "trial", unit="trial"))
+    if len(tasks) > 1:
+        found.append(Choice("unit", "task", unit="task"))
+        if len({_suite(task) for task in tasks}) > 1:
+            found.append(Choice("equal weights of", "suites", weights="suite"))
+    if len({one.difficulty for one in results}) > 1:
+        found.append(Choice("equal weights of", "difficulties", weights="difficulty"))
+    if len(tasks) > 1:
+        found += [Choice("without", task, keep=_without_task(task)) for task in tasks]
+    if len(processors) > 1:
+        usual = processors.most_common(1)[0][0]
+        found.append(Choice("one processor", keep=_only_processor(usual)))
+    return tuple(found)
+
+
+def _errors_as_failures(results: Results) -> Results:
+    return [
+        msgspec.structs.replace(one, outcome="failure") if one.outcome == "error" else one
+        for one in results
+    ]
+
+
+def _only_seed(seed: int) -> Callable[[Results], Results]:
+    return lambda results: [one for one in results if one.policy_seed == seed]
+
+
+def _without_task(task: str) -> Callable[[Results], Results]:
+    return lambda results: [one for one in results if one.task != task]
+
+
+def _only_processor(name: str | None) -> Callable[[Results], Results]:
+    return lambda results: [one for one in results if one.processor == name]
+
+
+def _suite(task: str) -> str:
+    found = every_task().get(task)
+    return "" if found is None else found.suite
+
+
+def _directions(contrasts: Iterable[Contrast], choice: Choice) -> list[Direction]:
+    """Return the verdicts under a choice, corrected over all contrasts that have any episode."""
+    tested = [_tested(contrast, choice) for contrast in contrasts]
+    corrected = iter(holm([p_value for _, p_value in filter(None, tested)]))
+    return [_direction(one[0], next(corrected)) if one else "open" for one in tested]
+
+
+def _direction(value: float, p_value: float) -> Direction:
+    if p_value > ALPHA or value == 0:
+        return "open"
+    return "higher" if value > 0 else "lower"
+
+
+class _Unit(NamedTuple):
+    """What two sides differ by in one unit, as a difference of rates, and where it belongs."""
+
+    task: str
+    difficulty: str
+    difference: Fraction
+
+
+def _tested(contrast: Contrast, choice: Choice) -> tuple[float, float] | None:
+    """Return the mean difference and its p-value; None without a pair."""
+    units = list(_units(choice.keep(contrast.first), choice.keep(contrast.second), choice.unit))
+    if not units:
+        return None
+    if choice.weights == "task" and choice.unit != "task":
+        # As everywhere: the mean weighs tasks equally, the test sums over units.
+        scale = int(np.lcm.reduce([one.difference.denominator for one in units]))
+        whole = np.array([int(one.difference * scale) for one in units])
+        return _mean(units, _weights(units, "task")), sign_flip_test(whole)
+    weights = _weights(units, choice.weights)
+    if choice.unit == "task":
+        values = [
+            sum(float(one.difference) * weight for one, weight in group)
+            for group in _by_task(units, weights).values()
+        ]
+    else:
+        values = [
+            float(one.difference) * weight for one, weight in zip(units, weights, strict=True)
+        ]
+    return _mean(units, weights), swap_test(np.array(values))
+
+
+def _units(first: Results, second: Results, unit: Unit) -> Iterator[_Unit]:
+    """Yield what the sides differ by in each trial, or else in each episode, that both have."""
+    ours, theirs = _verdicts(first), _verdicts(second)
+    difficulties = {(one.task, one.episode): one.difficulty for one in (*first, *second)}
+    for where in sorted(ours.keys() & theirs.keys()):
+        here, there = ours[where], theirs[where]
+        shared = here.keys() & there.keys()
+        if unit == "trial" and shared:
+            pairs = [([here[seed]], [there[seed]]) for seed in sorted(shared)]
+        else:
+            pairs = [
+                (
+                    [won for seed, won in here.items() if seed in shared or not shared],
+                    [won for seed, won in there.items() if seed in shared or not shared],
+                )
+            ]
+        for mine, other in pairs:
+            difference = Fraction(sum(mine), len(mine)) - Fraction(sum(other), len(other))
+            yield _Unit(where[0], difficulties[where], difference)
+
+
+def _verdicts(results: Results) -> dict[tuple[str, int], dict[int, bool]]:
+    found: dict[tuple[str, int], dict[int, bool]] = defaultdict(dict)
+    for one in results:
+        if one.outcome != "error":
+            found[one.task, one.episode][one.policy_seed] = one.outcome == "success"
+    return found
+
+
+def _weights(units: Sequence[_Unit], weighting: Weighting) -> list[float]:
+    """Return weights that sum to 1: equal for all groups, and within suites for all tasks."""
+    if weighting == "difficulty":
+        sizes = Counter(one.difficulty for one in units)
+        return [1 / (len(sizes) * sizes[one.difficulty]) for one in units]
+    sizes = Counter(one.task for one in units)
+    groups = {task: _suite(task) if weighting == "suite" else "" for task in sizes}
+    members = Counter(groups.values())
+    return [1 / (len(members) * members[groups[one.task]] * sizes[one.task]) for one in units]
+
+
+def _mean(units: Sequence[_Unit], weights: Sequence[float]) -> float:
+    pairs = zip(units, weights, strict=True)
+    value = sum(float(one.difference) * weight for one, weight in pairs)
+    return 0.0 if abs(value) < _NOTHING else value
+
+
+def _by_task(
+    units: Sequence[_Unit], weights: Sequence[float]
+) -> dict[str, list[tuple[_Unit, float]]]:
+    groups: dict[str, list[tuple[_Unit, float]]] = defaultdict(list)
+    for one, weight in zip(units, weights, strict=True):
+        groups[one.task].append((one, weight))
+    return groups
+
+
+def swap_test(values: NDArray[np.float64]) -> float:
+    """Return the two-sided p-value of swapping the sides in units of any size.
+
+    Tries all swaps of few units, and `SIGNS` random ones of many.
+
+    Args:
+        values: weighted difference of each unit.
+    """
+    values = values[np.abs(values) > _NOTHING]
+    if not len(values):
+        return 1.0
+    if len(values) <= _MOST_ENUMERATED:
+        signs = np.array(list(itertools.product((-1.0, 1.0), repeat=len(values))))
+        added = 0
+    else:
+        rng = np.random.default_rng(SEED)
+        signs = rng.integers(0, 2, (SIGNS, len(values))).astype(np.float64) * 2 - 1
+        added = 1  # the swap that was seen
+    as_far = np.abs(signs @ values) >= abs(values.sum()) - 1e-9
+    return float((as_far.sum() + added) / (len(signs) + added))
+
+
+def gap_contrasts(results: Results) -> tuple[Contrast, ...]:
+    """Return the gaps to explicit of one policy run, one for each set of other options."""
+    by_options = _by_options(results)
+    explicit = by_options.pop(REFERENCE, [])
+    return tuple(
+        Contrast(options_label(options), by_options[options], explicit)
+        for options in sorted(by_options, key=options_sort_key)
+        if explicit
+    )
+
+
+def policy_contrasts(first: Results, second: Results) -> tuple[Contrast, ...]:
+    """Return the comparisons of two policy runs, one for each set of options that both played."""
+    ours, theirs = _by_options(first), _by_options(second)
+    return tuple(
+        Contrast(options_label(options), ours[options], theirs[options])
+        for options in sorted(ours.keys() & theirs.keys(), key=options_sort_key)
+    )
+
+
+def _by_options(results: Results) -> dict[InstructionOptions, list[Summary]]:
+    found: dict[InstructionOptions, list[Summary]] = defaultdict(list)
+    for one in results:
+        found[one.column].append(one)
+    return found

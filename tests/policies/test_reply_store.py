@@ -1,0 +1,242 @@
+"""No call of a model is paid twice, whatever stops a run; limits are kept by all its processes."""
+
+from __future__ import annotations
+
+import random
+import sqlite3
+import subprocess
+import sys
+import textwrap
+import time
+from collections import Counter
+from pathlib import Path
+
+import numpy as np
+import pytest
+from planning_fakes import TOKENS, Garbage, Status, fake_vlm, model_options, words_of
+
+from roboirg.core.errors import BudgetError, ModelBusyError, PolicyReplyError
+from roboirg.policies.vlm.model_content import ChatTurn
+from roboirg.policies.vlm.models import ModelQuery, make_model
+from roboirg.policies.vlm.models.paid_model import PaidModel
+from roboirg.policies.vlm.models.reply_store import REPLIES_FILE, ReplySettings, use_replies
+from roboirg.policies.vlm.models.response_limits import retry_after_s
+from roboirg.util.media import Picture
+
+PRICES = {"input_price": 100_000.0, "output_price": 0.0}
+COST = TOKENS[0] * PRICES["input_price"] / 1_000_000
+"""US dollars of each reply."""
+
+
+def query(words: str, shade: int | None = None) -> ModelQuery:
+    picture = () if shade is None else (Picture(np.full((2, 2, 3), shade, np.uint8)),)
+    return ModelQuery("system", (ChatTurn("user", (words, *picture)),))
+
+
+def play(server, settings: ReplySettings, episode: str, *queries: ModelQuery, **options):
+    """Ask the queries of an episode, as a policy does; returns replies and counts."""
+    chosen = model_options(server, **options)
+    model = PaidModel(make_model(chosen), chosen)
+    try:
+        with use_replies(settings, episode):
+            replies = [model.answer(one).text for one in queries]
+    finally:
+        model.close()
+    return replies, model.counts()
+
+
+def test_an_episode_that_is_played_again_asks_nothing_again(tmp_path: Path) -> None:
+    settings = ReplySettings(tmp_path)
+    with fake_vlm(["one", "two", "never"]) as server:
+        first, counts = play(server, settings, "a", query("first"), query("second"))
+        assert (first, counts["stored"]) == (["one", "two"], 0)
+        again, counts = play(server, settings, "a", query("first"), query("second"))
+        assert (again, counts["stored"]) == (["one", "two"], 2)
+        assert len(server.requests) == 2
+        # Another episode, and the same words asked a second time, are calls of their own.
+        play(server, settings, "b", query("first"))
+        play(server, settings, "a", query("first"), query("first"))
+        assert len(server.requests) == 4
+
+
+def test_what_is_sent_decides_and_differences_are_counted(tmp_path: Path) -> None:
+    """Pictures may differ in a bit on another machine; another temperature is another question."""
+    settings = ReplySettings(tmp_path)
+    with fake_vlm(["one", "two", "three"]) as server:
+        play(server, settings, "a", query("words", shade=1))
+        replies, counts = play(server, settings, "a", query("words", shade=2))
+        assert (replies, counts["anew"]) == (["two"], 1)
+        replies, _ = play(server, settings, "a", query("words", shade=1), temperature=0.5)
+        assert replies == ["three"]
+        # Patience, prices and time limits change no reply.
+        replies, _ = play(server, settings, "a", query("words", shade=1), patience_s=7, **PRICES)
+        assert (replies, len(server.requests)) == (["one"], 3)
+
+
+def test_a_repeat_asks_anew_if_it_is_to(tmp_path: Path) -> None:
+    with fake_vlm(["one", "two"]) as server:
+        play(server, ReplySettings(tmp_path), "a", query("words"))
+        replies, counts = play(server, ReplySettings(tmp_path, anew=True), "a", query("words"))
+        assert (replies, counts["stored"], counts["anew"]) == (["two"], 0, 0)
+
+
+def test_a_run_without_a_ledger_asks_every_time() -> None:
+    with fake_vlm(["one", "two"]) as server:
+        options = model_options(server)
+        model = PaidModel(make_model(options), options)
+        assert [model.answer(query("words")).text for _ in range(2)] == ["one", "two"]
+        model.close()
+
+
+def test_a_run_ends_when_it_has_spent_what_it_may_and_can_go_on_with_more(tmp_path: Path) -> None:
+    queries = [query(str(number)) for number in range(4)]
+    with fake_vlm(lambda body: words_of(body)[-1]) as server:
+        with pytest.raises(BudgetError, match=r"have cost 20\.00 of at most 15\.00 US dollars"):
+            play(server, ReplySettings(tmp_path, 1.5 * COST), "a", *queries, **PRICES)
+        assert len(server.requests) == 2
+        replies, counts = play(server, ReplySettings(tmp_path, 9 * COST), "a", *queries, **PRICES)
+        assert (replies, counts["stored"]) == (list("0123"), 2)
+        assert len(server.requests) == 4
+
+
+def test_a_limit_of_costs_needs_prices(tmp_path: Path) -> None:
+    with (
+        fake_vlm(["one"]) as server,
+        pytest.raises(BudgetError, match="needs the prices of model 'fake'"),
+    ):
+        play(server, ReplySettings(tmp_path, 1.0), "a", query("words"))
+    assert not server.requests
+
+
+@pytest.mark.parametrize("provider", ["openai", "google"])
+@pytest.mark.parametrize("code", [429, 503])
+def test_a_busy_service_is_waited_for(tmp_path: Path, provider: str, code: int) -> None:
+    """As long as it asks for, and other processes of the run wait, too."""
+    busy = Status(code, headers={"Retry-After": "0.05"})
+    started = time.time()
+    with fake_vlm([busy, busy, busy, "at last"]) as server:
+        settings = ReplySettings(tmp_path)
+        replies, counts = play(
+            server, settings, "a", query("words"), provider=provider, patience_s=60
+        )
+        assert (replies, len(server.requests)) == (["at last"], 4)
+        assert counts["waited_s"] >= 0.15
+    with sqlite3.connect(tmp_path / REPLIES_FILE) as database:
+        ((next_at,),) = database.execute("SELECT next_at FROM services")
+    assert next_at >= started + 0.15
+
+
+def test_patience_ends(tmp_path: Path) -> None:
+    busy = Status(429, headers={"retry-after": "3600"})
+    with fake_vlm([busy]) as server:
+        with pytest.raises(ModelBusyError, match="is not available"):
+            play(server, ReplySettings(tmp_path), "a", query("words"), patience_s=60)
+        assert len(server.requests) == 1
+
+
+def test_what_is_no_chat_completion_is_not_asked_again_nor_stored(tmp_path: Path) -> None:
+    with fake_vlm([Garbage(b"{}"), "one"]) as server:
+        with pytest.raises(PolicyReplyError):
+            play(server, ReplySettings(tmp_path), "a", query("words"))
+        replies, counts = play(server, ReplySettings(tmp_path), "a", query("words"))
+        assert (replies, counts["stored"]) == (["one"], 0)
+
+
+@pytest.mark.parametrize(
+    ("headers", "seconds"),
+    [
+        ({"retry-after": "7"}, 7.0),
+        ({"retry-after-ms": "250", "retry-after": "1"}, 0.25),
+        ({"retry-after": "Wed, 21 Oct 2015 07:28:00 GMT"}, None),
+        ({"retry-after": "nan"}, None),
+        ({"retry-after": "-5"}, None),
+        ({}, None),
+    ],
+)
+def test_waiting_times_of_services(headers: dict[str, str], seconds: float | None) -> None:
+    assert retry_after_s(headers) == seconds
+
+
+CHILD = textwrap.dedent(
+    """
+    import sys
+    from pathlib import Path
+    from roboirg.policies.vlm.model_content import ChatTurn
+    from roboirg.policies.vlm.models import ModelOptions, ModelQuery, make_model
+    from roboirg.policies.vlm.models.reply_store import ReplySettings, use_replies
+    from roboirg.policies.vlm.models.paid_model import PaidModel
+
+    url, folder, episode, calls, per_minute = sys.argv[1:]
+    options = ModelOptions(
+        model="fake", base_url=url, requests_per_minute=float(per_minute) or None
+    )
+    model = PaidModel(make_model(options), options)
+    with use_replies(ReplySettings(Path(folder)), episode):
+        for number in range(int(calls)):
+            words = f"<{episode} {number}"
+            reply = model.answer(ModelQuery("system", (ChatTurn("user", (words,)),)))
+            print(reply.text, flush=True)
+    """
+)
+CALLS = 8
+
+
+def name_of(body: dict) -> str:
+    """The question of a request of `CHILD`, with which the stub answers it."""
+    return words_of(body).rpartition("<")[2]
+
+
+def start_child(server, folder: Path, episode: str, per_minute: float = 0.0):
+    return subprocess.Popen(
+        [
+            sys.executable,
+            "-c",
+            CHILD,
+            f"{server.url}/v1",
+            str(folder),
+            episode,
+            str(CALLS),
+            str(per_minute),
+        ],
+        stdout=subprocess.PIPE,
+        text=True,
+    )
+
+
+@pytest.mark.parametrize("kills", [4, pytest.param(50, marks=pytest.mark.slow)])
+def test_no_answered_call_is_made_again_after_a_kill(tmp_path: Path, kills: int) -> None:
+    """Each episode is killed twice after a random number of replies, and then finished."""
+    rng = random.Random(0)
+    with fake_vlm(name_of) as server:
+        requests = lambda: Counter(map(name_of, server.requests))  # noqa: E731
+        answered: dict[str, int] = {}
+        for episode in range(kills // 2):
+            for _ in range(2):
+                process = start_child(server, tmp_path, f"e{episode}")
+                assert process.stdout is not None
+                for _ in range(rng.randrange(1, CALLS)):
+                    name = process.stdout.readline().strip()
+                    answered.setdefault(name, requests()[name])
+                process.kill()
+                process.wait()
+                process.stdout.close()
+            said, _ = start_child(server, tmp_path, f"e{episode}").communicate()
+            assert said.split("\n")[:-1] == [f"e{episode} {number}" for number in range(CALLS)]
+        found = requests()
+        assert {name: found[name] for name in answered} == answered
+        # What was under way when a process was killed may have been asked again, once for a kill.
+        assert sum(found.values()) <= CALLS * (kills // 2) + kills
+
+
+def test_processes_keep_one_limit_together(tmp_path: Path) -> None:
+    """No turn is given twice: the next one is as many gaps away as there were requests."""
+    per_minute, started = 1200.0, time.time()
+    with fake_vlm(name_of) as server:
+        both = [start_child(server, tmp_path, name, per_minute) for name in ("a", "b")]
+        for one in both:
+            one.communicate()
+            assert one.returncode == 0
+        assert len(server.requests) == 2 * CALLS
+    with sqlite3.connect(tmp_path / REPLIES_FILE) as database:
+        ((next_at,),) = database.execute("SELECT next_at FROM services")
+    assert next_at >= started + 2 * CALLS * 60 / per_minute
