@@ -16,7 +16,8 @@ _RANK = rf"(?:{ORDINAL}|last)"
 _CLASH = Phrases({
     "the green blue cube": rf"\b{COLOR} (?:the )?{COLOR}\b",
     "the second third visit": rf"\b(?:{_RANK}|former|latter) (?:{ORDINAL}|former|latter)\b",
-    "that second visit": rf"\b(?:that|this) {_RANK}\b|\b{_RANK} that\b",
+    "that second visit":
+        rf"\b(?:that|this) {_RANK}\b|\b{_RANK} that\b(?! (?:hides|covers|is|has)\b)",
     "the other green cube": rf"\bother {COLOR}\b",
     "the second blue of them": rf"\b{_RANK} {COLOR} of\b",
     "green the former": rf"\b{COLOR} (?:\w+ )?the (?:former|latter|other)\b(?! color)",
