@@ -206,7 +206,7 @@ def check_agreement(lower):
             things = rf"({THING}|visit|placement)"
             several = re.search(
                 rf"\b{things}\b.* and the (\w+ )?{things}|\bthe \w+ and the \w+ {things}\b"
-                rf"|\bthe {things}(e?s)\b",
+                rf"|\bthe {things}(e?s)\b|\b{things}\b.* and the one\b",
                 subject,
             )
             plural = ("are", "were", "have", "look", "make", "stand")

@@ -25,7 +25,7 @@ from roboirg.language.slot_types import Fields, amount
 from roboirg.language.slot_types.ordinal import wrapped
 
 NUMBER_SLOTS = ("repeats", "counts", "visit", "placement")
-COMBINED = {
+COMBINED: Mapping[str, Callable[[int, int], int]] = {
     "total": lambda first, second: first + second,
     "difference": lambda first, second: abs(first - second),
     "larger": max,

@@ -26,7 +26,7 @@ THING_PAIRS = Pools(
         "Grandma likes {things}.",
         "My sister has {things}.",
         "Mom bought {things}.",
-        "Do you see {things}?",
+        "Everyone can see {things}.",
         "{things} look good.",
         "{things} were presents.",
     ),
