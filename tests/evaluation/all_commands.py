@@ -77,7 +77,7 @@ def words_of(folder, run):
         "show": ["PickXtimes", "0", "--out", f"{folder}/sheet.png"],
         "language stats": ["--tasks", "PickXtimes", "--split", "val"],
         "language validate": ["--tasks", "PickXtimes", "--split", "val"],
-        "language shortcuts": ["--tasks", "PickXtimes", "--split", "val", "--learned"],
+        "language shortcuts": ["--tasks", "StopCube", "--settings", "direct", "--learned"],
         "export instructions": [
             "--tasks",
             "PickXtimes",

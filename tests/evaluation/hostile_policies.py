@@ -13,8 +13,10 @@ import time
 from pathlib import Path
 from typing import Any, ClassVar, NoReturn
 
-import msgspec
 import numpy as np
+from msgspec.msgpack import Ext, encode
+
+from roboirg.evaluation.hosting.messages import receive_calls, send
 
 NEEDLE = "9035768"
 """Stands in the world's secret, read backward; this file does not hold it."""
@@ -191,43 +193,75 @@ class Forger(Hostile):
     message: Any = None
 
     def act(self, observation: Any) -> Any:
-        host_of(sys._getframe())._connection.send_bytes(msgspec.msgpack.encode(self.message))
+        send(host_of(sys._getframe())._line, self.message)
         time.sleep(3600)
 
 
 def host_of(frame: Any) -> Any:
     """Return the object that carries out the calls of this process."""
-    while not hasattr(frame.f_locals.get("self"), "_connection"):
+    while not hasattr(frame.f_locals.get("self"), "_asking"):
         frame = frame.f_back
     return frame.f_locals["self"]
 
 
+class ForgesReply(Forger):
+    """Says what only the supervisor may say: play this episode again."""
+
+    message: ClassVar = {"type": "reply", "kind": "infrastructure", "message": "x", "again": True}
+
+
 class ForgesLost(Forger):
-    message = ({"type": "lost", "kind": "infrastructure", "message": "x", "again": True},)
+    message = ({"type": "outcome", "again": True},)
+
+
+class ForgesKind(Forger):
+    message = ({"type": "outcome", "error": "infrastructure", "message": "x"},)
 
 
 class ForgesSeconds(Forger):
-    message = ({"type": "told", "seconds": float("nan")},)
+    message = ({"type": "outcome", "seconds": float("nan")},)
 
 
 class ForgesLatency(Forger):
-    message = ({"type": "acted", "rows": bytes(64), "size": 8, "latency_s": float("nan")},)
+    message = ({"type": "outcome", "rows": bytes(64), "size": 8, "latency_s": float("nan")},)
 
 
 class ForgesWant(Forger):
-    message = ({"type": "told", "want": ["front_rgb"]},)
+    message = ({"type": "outcome", "want": ["front_rgb"]},)
 
 
 class ForgesPrivilege(Forger):
-    message = ({"type": "opened", "needs": {}, "version": "1", "is_privileged": True},)
+    message = ({"type": "outcome", "needs": {}, "version": "1", "is_privileged": True},)
 
 
 class ForgesVersion(Forger):
-    message = ({"type": "opened", "needs": {}, "version": "\x1b[2J"},)
+    message = ({"type": "outcome", "needs": {}, "version": "\x1b[2J"},)
 
 
 class ForgesOtherEpisode(Forger):
-    message: ClassVar = {"type": "ask", "session": 10**6}
+    message: ClassVar = {"type": "question", "session": 10**6}
+
+
+class LyingArray(Forger):
+    """An array of objects that exists nowhere."""
+
+    message = ({"type": "outcome", "rows": Ext(1, encode(("|O8", (2**40, 2**20))))},)
+
+
+class Announcer(Hostile):
+    """Announces more than there is memory, and sends nothing of it."""
+
+    data: ClassVar = (2**62).to_bytes(8, "big")
+
+    def act(self, observation: Any) -> Any:
+        host_of(sys._getframe())._line.sendall(self.data)
+        time.sleep(3600)
+
+
+class GiantList(Announcer):
+    """Five bytes that stand for four billion outcomes."""
+
+    data = (5).to_bytes(8, "big") + b"\xdd\xff\xff\xff\xff"
 
 
 class Deep210(Hostile):
@@ -273,8 +307,16 @@ class Asker(Hostile):
     def ask(self) -> None:
         host = host_of(sys._getframe())
         (session,) = host._asking
-        host._connection.send_bytes(msgspec.msgpack.encode({"type": "ask", "session": session}))
-        host._connection.recv_bytes()
+        send(host._line, {"type": "question", "session": session})
+        receive_calls(host._line)
+
+
+class Pesterer(Asker):
+    """Keeps its world busy, which is nobody's time."""
+
+    def act(self, observation: Any) -> Any:
+        while True:
+            self.ask()
 
 
 class Forker(Hostile):
@@ -344,13 +386,19 @@ class ChangingVersion(Hostile):
 
 
 FORGED = {
-    "ForgesLost": "policy: the process sent what is no reply (Invalid value 'lost' - ",
+    "ForgesReply": "policy: the process sent what is no reply (Invalid value 'reply' - ",
+    "ForgesLost": "policy: the process sent what is no reply (Object contains unknown field ",
+    "ForgesKind": "policy: the process sent what is no reply (Invalid enum value 'infrastructure",
     "ForgesSeconds": "policy: the process sent what is no reply (Object contains unknown field ",
     "ForgesLatency": "policy: the process sent what is no reply (Expected `float` >= 0.0 - at ",
     "ForgesWant": "policy: the process sent what is no reply (Object contains unknown field `want",
     "ForgesPrivilege": "policy: the process sent what is no reply (Object contains unknown field ",
     "ForgesVersion": "policy: the process sent what is no reply (Expected `str` matching regex ",
     "ForgesOtherEpisode": "policy: the process asked for the video of another episode",
+    "Announcer": "policy: the process sent what is no reply (a message of 4,611,686,018,",
+    "LyingArray": "policy: the process sent what is no reply (Expected `bytes`, got `ext` - at ",
+    "GiantList": "policy: the process sent what is no reply (Input data was truncated)",
+    "Pesterer": "policy: the process asked for the video again and again in the policy's act()",
     "Deep210": "policy: the policy's metadata are nested more than 16 deep; make them flat.",
     "Deep300": "policy: the policy's metadata are nested more than 16 deep; make them flat.",
     "NamesServer": "policy: the policy's metadata have the key 'server', which is reserved; ",

@@ -133,6 +133,30 @@ def test_harder_settings_are_played_only_where_they_are_named() -> None:
     assert {job.setting for job in jobs} == set(named)
 
 
+def test_every_setting_is_the_harder_ones_too() -> None:
+    for text in ("every", "direct, Every", "all,every"):
+        plan = make_plan(["random"], tasks="StopCube,BinFill", settings=text, episodes="0-3")
+        assert plan.settings == "every"
+    for job in plan.jobs():
+        assert job.setting in expressible(get_episode(job.task, "test", job.episode))
+    told = {job.setting for job in plan.jobs()}
+    assert told > set(plain_settings()) - {"spatial"}
+    assert {"direct-rival", "reasoning-open"} <= told
+
+
+def test_settings_in_turns_are_played_in_both_ways() -> None:
+    options = {"tasks": "StopCube", "episodes": "2", "settings": "explicit,direct,reasoning"}
+    usual = make_plan(["random"], **options).jobs()
+    both = make_plan(["random"], in_turns="direct", **options).jobs()
+    added = [job for job in both if job not in usual]
+    assert [(job.setting, job.options.delivery) for job in added] == [("direct", "turns")] * 2
+    assert len(both) == len(usual) + 2
+    turns = make_plan(["random"], in_turns="direct", delivery="turns", **options).jobs()
+    assert len(turns) == len(set(turns)) == len(usual)
+    with pytest.raises(UnknownNameError, match="no setting in turns 'explicit'"):
+        make_plan(["random"], in_turns="explicit", **options)
+
+
 def test_episodes_without_a_rival_are_left_out() -> None:
     options = {"tasks": "BinFill", "settings": "explicit,direct-rival", "episodes": "0-7"}
     jobs = make_plan(["random"], **options).checked().jobs()

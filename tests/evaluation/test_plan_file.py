@@ -3,15 +3,19 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+import msgspec
 import pytest
 import yaml
 
 from roboirg.core.errors import InvalidValueError, UnknownNameError
+from roboirg.core.instruction_options import InstructionOptions
 from roboirg.evaluation.plan.plan_file import named_plans, read_plan_file
 from roboirg.evaluation.plan.plan_maker import make_plan
 from roboirg.evaluation.plan.stored_plans import write_plan
-from roboirg.language import STAGE_SETS
+from roboirg.language import STAGE_SETS, expressible
+from roboirg.language.settings import all_settings
 from roboirg.tasks import all_tasks
+from roboirg.tasks.splits.splits import get_episode
 
 
 def write(folder: Path, text: str) -> str:
@@ -53,6 +57,25 @@ def test_the_papers_protocol_is_the_papers() -> None:
     context = make_plan(["random"], **read_plan_file("paper-context"))
     assert {job.options.stages for job in context.jobs()} == set(STAGE_SETS)
     assert len(context.jobs()) == 3 * 4 * 50 * 3
+
+
+def test_the_standard_protocol_has_every_setting_and_direct_in_turns() -> None:
+    options = read_plan_file("standard")
+    plan = make_plan(["random"], **options)
+    assert plan.tasks == tuple(all_tasks())
+    assert (plan.episodes, plan.policy_seeds) == (tuple(range(50)), (0,))
+    assert (plan.split, plan.forms, plan.max_steps) == ("test", ("implicit",), 1300)
+    few = make_plan(["random"], **options | {"episodes": "4"}).jobs()
+    found = {(job.task, job.setting, job.options.delivery) for job in few}
+    assert {setting for _, setting, _ in found} == set(all_settings())
+    assert {(task, setting) for task, setting, way in found if way == "turns"} == {
+        (task, "direct") for task in all_tasks()
+    }
+    for job in few:
+        reference = msgspec.structs.replace(job, options=InstructionOptions())
+        assert reference in few, "without explicit there is no gap"
+        episode = get_episode(job.task, job.split, job.episode)
+        assert job.setting in expressible(episode)
 
 
 @pytest.mark.parametrize(

@@ -19,21 +19,20 @@ from roboirg.core.errors import InvalidValueError, MissingDependencyError, Unkno
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.language import instruct, instruct_with
 from roboirg.language.settings import all_settings, get_setting
-from roboirg.language.variants import expressible_options, instructions
+from roboirg.language.variants import expressible_options
 from roboirg.main import app
 from roboirg.shortcuts import SURFACE_RULES, draw_goal, goal_share, guess_goal
+from roboirg.shortcuts.goal_learner import LEARNED_FLOORS
 from roboirg.shortcuts.goal_vocabulary import goal_vocabulary, values_in
-from roboirg.shortcuts.learned_floor import LearnedFloor
 from roboirg.shortcuts.shortcut_scores import (
     CHANCE,
-    group_told,
+    counted_slots,
     hidden_slots,
-    mean_shares,
     rule_scorers,
     score_chance,
     score_rule,
 )
-from roboirg.shortcuts.shortcut_tables import LEARNED_SETTING, shortcut_rows
+from roboirg.shortcuts.shortcut_tables import shortcut_rows
 from roboirg.tasks import all_tasks, get_task
 from roboirg.tasks.splits.splits import get_episode
 
@@ -240,8 +239,8 @@ def test_shares_of_every_setting(task, setting, episodes):
                 continue
             told = episode, instruct_with(episode, options)
             for score in (one(told) for one in rule_scorers().values()):
-                assert len(score.slots) == len(hidden_slots(told))
-                assert all(0 <= share <= 1 for share in (*score.slots, score.goal))
+                assert tuple(score.slots) == counted_slots(told)
+                assert all(0 <= share <= 1 for share in (*score.slots.values(), score.goal))
             if not get_setting(setting, get_task(task)).implicit:
                 assert all(score_rule(rule, told).goal == 1 for rule in SURFACE_RULES)
             elif setting in ("direct", "contextual"):
@@ -275,15 +274,24 @@ def test_shares_by_hand():
     )  # fmt: skip
     told = episode, instruct(episode, "direct")
     assert hidden_slots(told) == ("color", "relation")
-    assert score_rule("first-mention", told).slots == (1, 1)
-    assert score_rule("elimination", told).slots == (0, 0)
-    assert score_chance(told).slots[1] == Fraction(1, 2)
+    assert score_rule("first-mention", told).slots == {"color": 1, "relation": 1}
+    assert score_rule("elimination", told).slots == {"color": 0, "relation": 0}
+    assert score_chance(told).slots["relation"] == Fraction(1, 2)
     told = episode, instruct(episode, "reasoning")
     assert hidden_slots(told) == ("relation",)
-    shares = mean_shares([score_rule("surface", told), score_rule("first-mention", told)])
-    assert (shares.slots, shares.goals) == (0.5, 0.5)
-    explicit = episode, instruct(episode)
-    assert mean_shares([score_chance(explicit)]) == (None, 1.0)
+    assert score_rule("surface", told) == ({"relation": 1}, 1)
+    assert score_rule("first-mention", told) == ({"relation": 0}, 0)
+    assert score_chance((episode, instruct(episode))) == ({}, 1)
+
+
+def test_only_slots_that_a_text_touches_count():
+    episode = get_episode("VideoPlaceButton", "test", 0)
+    said = instruct(episode, "direct")
+    touched = replace(said, metadata={**said.metadata, "touched": ["relation"]})
+    assert counted_slots((episode, said)) == ("color", "relation")
+    assert counted_slots((episode, touched)) == ("relation",)
+    assert set(score_chance((episode, touched)).slots) == {"relation"}
+    assert counted_slots((episode, instruct(episode))) == ()
 
 
 def test_the_table_of_the_documentation():
@@ -312,7 +320,8 @@ def test_a_place_tells_no_color_but_that_of_another_cube():
         named += other
         for rule in SURFACE_RULES:
             share = Fraction(1, 2) if rule == "elimination" else 0
-            assert score_rule(rule, told).slots == ((share if other else Fraction(1, 3)),)
+            expected = {"color": share if other else Fraction(1, 3)}
+            assert score_rule(rule, told).slots == expected
     assert 0 < named < 25
 
 
@@ -332,46 +341,22 @@ def test_the_documentation_says_what_is_measured():
         assert f"| {numbers} |" in table.split(f"{name}`" if name in SURFACE_RULES else name)[1]
 
 
-def test_rows_by_pattern_have_all_instructions():
-    told = list(instructions(first_episodes("BinFill", "test", 20), ["reasoning"], ["implicit"]))
-    groups = group_told(told, "pattern")
-    assert set(groups) == {
+def test_rows_have_all_instructions():
+    rows = {
+        by: shortcut_rows(("BinFill",), ("test",), ("reasoning",), InstructionOptions(), by=by)
+        for by in (None, "pattern", "task", "slot")
+    }
+    assert {row.group for row in rows["pattern"]} == {
         ("reasoning", pattern)
         for pattern in ("color exclusion", "number deduction", "contextual logic")
     }
-    assert sum(map(len, groups.values())) == len(told) == 20
-    assert set(group_told(told, "task")) == {("reasoning", "BinFill")}
-
-
-def learned(task, setting, count=100):
-    said = instructions(first_episodes(task, "train", count), [setting], ["implicit"])
-    return LearnedFloor(list(said))
-
-
-def test_the_learned_floor_is_deterministic_and_learns():
-    pytest.importorskip("sklearn")
-    tested = list(instructions(first_episodes("VideoUnmask", "test", 50), ["direct"], ["implicit"]))
-    texts = [instruction.text for _, instruction in tested]
-    first, second = learned("VideoUnmask", "direct"), learned("VideoUnmask", "direct")
-    assert first.predict(texts) == second.predict(texts)
-    assert mean_shares(first.scores(tested)).goals > 0.6
-    assert mean_shares(learned("VideoUnmask", "explicit").scores(tested)).goals < 0.6
-    assert first.scores([]) == []
-    with pytest.raises(InvalidValueError, match="no instruction to learn from"):
-        LearnedFloor([])
-
-
-def test_the_learned_floor_predicts_from_the_text_alone():
-    pytest.importorskip("sklearn")
-    floor = learned("VideoUnmask", "direct", 40)
-    ((episode, instruction),) = instructions(
-        [get_episode("VideoUnmask", "test", 1)], ["direct"], ["implicit"]
-    )
-    (score,) = floor.scores([(episode, instruction)])
-    others = [goal for goal in get_task("VideoUnmask").goals(episode.scene) if goal != episode.goal]
-    wrong = floor.scores([(replace(episode, goal=goal), instruction) for goal in others])
-    # One prediction, so it is right for one goal at most.
-    assert score.goal + sum(one.goal for one in wrong) <= 1
+    assert sum(row.count for row in rows["pattern"]) == 50
+    assert [(row.group, row.count) for row in rows["task"]] == [(("reasoning", "BinFill"), 50)]
+    assert {row.group[1] for row in rows["slot"]} == {"BinFill colors", "BinFill counts"}
+    (whole,) = rows[None]
+    by_slot = {one.group: one.count * one.shares[CHANCE].slots for one in rows["slot"]}
+    hidden = sum(one.count for one in rows["slot"])
+    assert sum(by_slot.values()) / hidden == pytest.approx(whole.shares[CHANCE].slots)
 
 
 def call(*words):
@@ -402,7 +387,7 @@ def test_the_command_prints_a_row_for_each_setting_or_pattern():
         (("--tasks", "StopCube", "--settings", "spatial"), "nothing to score"),
         (("--split", "none"), "nothing to score"),
         (("--seeds", "-1"), "number of random seeds is -1"),
-        (("--learned", "--split", "all"), "ask for val or test"),
+        (("--learned", "--split", "val"), "ask for test"),
         (("--plan", plan_file(distractors=0)), "distractors"),
     ],
 )
@@ -414,7 +399,7 @@ def test_bad_input_is_one_sentence(words, sentence):
 
 
 def test_without_scikit_learn_one_sentence_says_so(monkeypatch):
-    monkeypatch.setitem(sys.modules, "sklearn.linear_model", None)
+    monkeypatch.setitem(sys.modules, "sklearn.neural_network", None)
     outcome = call("--tasks", "StopCube", "--learned")
     assert isinstance(outcome.exception, MissingDependencyError)
     assert "[report]'" in str(outcome.exception)
@@ -422,9 +407,13 @@ def test_without_scikit_learn_one_sentence_says_so(monkeypatch):
 
 def test_the_learned_floors_are_columns():
     pytest.importorskip("sklearn")
-    (row,) = shortcut_rows(("StopCube",), ("val",), ("direct",), InstructionOptions(), learned=True)
-    assert list(row.shares) == [*rule_scorers(), "learned from explicit", LEARNED_SETTING]
-    assert row.shares[LEARNED_SETTING].goals > 0.9
+    (row,) = shortcut_rows(("StopCube",), ("test",), ("direct",), InstructionOptions(), learning=0)
+    assert list(row.shares) == [*rule_scorers(), *LEARNED_FLOORS]
+    assert row.shares["text-only"].goals > 0.9
+    low, high = row.excess.interval(1)
+    assert 0.5 < low < row.excess.value < high < 1
+    wide = row.excess.interval(100)
+    assert wide[0] < low < high < wide[1]
 
 
 def test_every_setting_has_a_row():

@@ -11,11 +11,7 @@ Name = TypeVar("Name", bound=str)
 
 
 def known_tasks(text: str, wordings: str | None = None) -> tuple[str, ...]:
-    """Return the tasks that were typed; of all, those that open wordings have commands of.
-
-    Raises:
-        UnknownNameError: one of them does not exist.
-    """
+    """Return the tasks that were typed; of all, those that open wordings have commands of."""
     from roboirg.core.word_pools import POOLS
     from roboirg.evaluation.plan.option_parsing import means_all, parse_names
     from roboirg.language.wordings.wording_store import find_wordings
@@ -28,11 +24,7 @@ def known_tasks(text: str, wordings: str | None = None) -> tuple[str, ...]:
 
 
 def known_settings(text: str) -> tuple[str, ...]:
-    """Return the settings that were typed.
-
-    Raises:
-        UnknownNameError: one of them does not exist.
-    """
+    """Return the settings that were typed."""
     from roboirg.evaluation.plan.option_parsing import means_all
     from roboirg.language import plain_settings, setting_names
 
@@ -52,11 +44,7 @@ def known_name(kind: str, name: str, known: Sequence[Name]) -> Name:
 
 
 def known_names(kind: str, text: str, known: Sequence[Name]) -> tuple[Name, ...]:
-    """Return the names that were typed, separated by commas; all are all that are known.
-
-    Raises:
-        UnknownNameError: one of them is not known.
-    """
+    """Return the names that were typed, separated by commas; all are all that are known."""
     from roboirg.evaluation.plan.option_parsing import means_all, parse_names
 
     if means_all(text):

@@ -172,7 +172,8 @@ def tables(
         str | None,
         typer.Option(
             help="Add the expected success of listeners that do not understand: chance, the "
-            "forgetful listener's; shortcuts by name, several separated by commas; or all."
+            "forgetful listener's; shortcuts and learners by name, several separated by commas; or "
+            "all."
         ),
     ] = None,
     by: By = None,
@@ -225,6 +226,7 @@ def compare(
     from roboirg.evaluation.analysis.stats.comparison import compare as compare_cells
     from roboirg.evaluation.analysis.stats.comparison_text import sentences
     from roboirg.evaluation.analysis.stats.flips import read_flips
+    from roboirg.evaluation.analysis.stats.headline import headline_notes
     from roboirg.evaluation.analysis.stats.intervals import SEED
     from roboirg.evaluation.analysis.stats.run_data import RunData
     from roboirg.evaluation.analysis.stats.sensitivity import policy_contrasts, try_choices
@@ -243,7 +245,11 @@ def compare(
     console = Console()
     widen(console)
     flips = read_flips(Path(_split(first)[0])), read_flips(Path(_split(second)[0]))
-    for sentence in sentences(found, names[0], names[1], flips):
+    headlines = (
+        *headline_notes(ours, {found.first: names[0]}),
+        *headline_notes(theirs, {found.second: names[1]}),
+    )
+    for sentence in (*sentences(found, names[0], names[1], flips), *headlines):
         console.print(Text(sentence), highlight=False)
     data = [RunData.of(*each) for each in sides]
     for sentence in language_use_sentences(data[0], data[1], (names[0], names[1])):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any, Literal, NotRequired, TypedDict
 
 import numpy as np
@@ -110,6 +110,55 @@ Demonstration = Mapping[str, NDArray[Any]]
 T is 0 in tasks without a video. The first observation follows the last frame. Images are rendered
 when they are first read, and then kept; images that are not read cost no time.
 """
+
+
+class FetchedDemonstration(Mapping[str, NDArray[Any]]):
+    """A demonstration in another process than the simulator; what is read is fetched and then kept.
+
+    Args:
+        fields: names of all fields.
+        arrays: those that are already here.
+        fetch: returns other fields; raises if it is too late.
+    """
+
+    def __init__(
+        self,
+        fields: Sequence[str],
+        arrays: Mapping[str, NDArray[Any]],
+        fetch: Callable[[Sequence[str]], Mapping[str, NDArray[Any]]],
+    ) -> None:
+        self._fields, self._arrays, self._fetch = tuple(fields), dict(arrays), fetch
+
+    def __getitem__(self, field: str) -> NDArray[Any]:
+        """Return a field for all steps; raises KeyError if it does not exist."""
+        if field not in self._arrays and field in self._fields:
+            self._arrays.update(self._fetch([field]))
+        return self._arrays[field]
+
+    def draw(self) -> None:
+        """Fetch all fields that are not here, drawn together."""
+        missing = [field for field in self._fields if field not in self._arrays]
+        if missing:
+            self._arrays.update(self._fetch(missing))
+
+    @property
+    def length(self) -> int:
+        """Control steps in the video, T."""
+        return len(self["joint_positions"])
+
+    def __contains__(self, field: object) -> bool:
+        return field in self._fields
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._fields)
+
+    def __len__(self) -> int:
+        """Return the number of fields; `length` is the number of control steps."""
+        return len(self._fields)
+
+    def __reduce__(self) -> tuple[type[dict[str, Any]], tuple[dict[str, Any]]]:
+        self.draw()
+        return dict, (dict(self),)
 
 
 def proprioception(joints: NDArray[Any], gripper: NDArray[Any]) -> NDArray[np.float32]:

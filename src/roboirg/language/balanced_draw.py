@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 from roboirg.language.request import InstructionRequest
 from roboirg.language.template_sampler import TemplateSampler
-from roboirg.language.templates import LANGUAGE_VERSION
+from roboirg.language.templates import DRAWS
 
 
 class TwoBits(NamedTuple):
@@ -28,7 +28,7 @@ def draw_balanced(request: InstructionRequest, purpose: str) -> TwoBits:
     """
     episode = request.episode
     block, place = divmod(episode.index, BLOCK)
-    key = f"{LANGUAGE_VERSION}|{episode.task}|{episode.split}|{block}"
+    key = f"{DRAWS}|{episode.task}|{episode.split}|{block}"
     cycle = TemplateSampler(key).cycle(purpose, _COMBINATIONS)
     found = next(itertools.islice(cycle, place, None))
     request.sampler.log.append(f"{purpose}/{_COMBINATIONS.index(found)}")

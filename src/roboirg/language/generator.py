@@ -30,7 +30,7 @@ from roboirg.language.request import (
 )
 from roboirg.language.settings import all_settings, get_setting, settings_of
 from roboirg.language.settings.setting import Setting
-from roboirg.language.template_sampler import TemplateSampler
+from roboirg.language.template_sampler import TemplateSampler, sampler_of
 from roboirg.language.templates import LANGUAGE_VERSION
 from roboirg.language.worded_command import TaskWordings, describe_goal
 from roboirg.language.wordings.wording_store import find_wordings
@@ -107,7 +107,7 @@ def instruct_with(episode: Episode, options: InstructionOptions, variant: int = 
             # Both forms have a command from outside, or none of them.
             forms = {str(form): _say_outside(request, setting, form) for form in FORMS}
             return _instruction(*forms[options.form])
-    own = replace(request, wordings=None, sampler=TemplateSampler(request.sampler.key))
+    own = replace(request, wordings=None, sampler=sampler_of(episode, variant))
     return _instruction(own, setting.say(own))
 
 
@@ -161,8 +161,7 @@ def _request(episode: Episode, options: InstructionOptions, variant: int = 0) ->
         wordings = find_wordings(options.wordings).tasks.get(task.name, TaskWordings(()))
         if wordings.own & {options.setting, all_settings()[options.setting].plain}:
             wordings = None
-    key = f"{LANGUAGE_VERSION}|{episode.task}|{episode.seed}" + f"|{variant}" * bool(variant)
-    return InstructionRequest(episode, task, options, TemplateSampler(key), wordings)
+    return InstructionRequest(episode, task, options, sampler_of(episode, variant), wordings)
 
 
 def _missing(request: InstructionRequest) -> str | None:

@@ -140,6 +140,15 @@ class InstructionRequest:
         return tuple(tuple(map(int, content)) for content in self.alternatives(slot))
 
     @property
+    def shows_color(self) -> bool:
+        """Whether the video shows the robot handle a thing of the goal's color, and no other."""
+        scene = self.episode.scene
+        kinds = (self.task.commands.colored, f"hidden_{self.task.commands.colored}")
+        subjects = {fact.subject for fact in scene.past}
+        handled = {one.color for one in scene.objects if one.name in subjects and one.kind in kinds}
+        return handled == {one.color for one in self.color_values[:1]}
+
+    @property
     def scene_colors(self) -> tuple[str, ...]:
         """The colors that goals of this scene can have, in the order of the task's vocabulary."""
         return _scene_colors(self.task.name, self.episode.scene)

@@ -11,6 +11,9 @@ from typing import TypeVar
 
 import numpy as np
 
+from roboirg.core.episode import Episode
+from roboirg.language.templates import DRAWS
+
 Option = TypeVar("Option")
 
 
@@ -23,7 +26,7 @@ class TemplateSampler:
     spelling draws other words.
 
     Attributes:
-        key: language version, task and seed.
+        key: `DRAWS`, task and seed.
         log: ``purpose/index`` of every choice, in order.
     """
 
@@ -42,6 +45,12 @@ class TemplateSampler:
     def _take(self, purpose: str, options: Sequence[Option], index: int) -> Option:
         self.log.append(f"{purpose}/{index}")
         return options[index]
+
+
+def sampler_of(episode: Episode, variant: int = 0) -> TemplateSampler:
+    """Return the sampler of an episode; each variant draws its words anew, 0 is what is told."""
+    key = f"{DRAWS}|{episode.task}|{episode.seed}"
+    return TemplateSampler(f"{key}|{variant}" if variant else key)
 
 
 def _generator(key: str, purpose: str) -> np.random.Generator:

@@ -8,19 +8,23 @@ shows, and which goals a task can have. `docs/interpreter.md` explains its parts
 from __future__ import annotations
 
 import functools
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping, Sequence
 from typing import NamedTuple
 
-from roboirg.core.episode import Goal, Scene
-from roboirg.reader.alternatives import take_remaining
+from roboirg.core.episode import Goal, Scene, SlotValue
+from roboirg.reader.calculations import read_calculation, with_calculation
 from roboirg.reader.command import is_command, read_command
 from roboirg.reader.comprehension import ComprehensionGap, find_gaps, is_unknown_command
 from roboirg.reader.constraints import goal_constraints
 from roboirg.reader.discourse_context import names_camera, read_discourse, read_remark
+from roboirg.reader.leftovers import left_over
 from roboirg.reader.negations import is_negated_command, unread_negations
+from roboirg.reader.paraphrases import paraphrased
+from roboirg.reader.pick_order import in_order
 from roboirg.reader.preferences import with_preference
 from roboirg.reader.reference_resolution import ReferenceResolver
-from roboirg.reader.selections import read_selection, with_selection
+from roboirg.reader.repetitions import added_up
+from roboirg.reader.selections import read_selection, unsettled_choice, with_selection
 from roboirg.reader.temporal_relations import mentioned_times
 from roboirg.reader.tokens import Sentence, split_sentences
 from roboirg.reader.vocabulary import VERBS
@@ -59,7 +63,7 @@ def interpret(text: str, scene: Scene, task: str) -> Interpretation:
         UnknownNameError: there is no such task.
     """
     candidates = _possible_goals(scene, task)
-    sentences = tuple(map(take_remaining, split_sentences(text)))
+    sentences = paraphrased(split_sentences(text))
     first, last = _command_span(sentences)
     gaps = _command_gaps(sentences, first, last)
     if gaps:
@@ -69,9 +73,18 @@ def interpret(text: str, scene: Scene, task: str) -> Interpretation:
             _distinct(word for gap in gaps for word in gap.words),
         )
     before = sentences[:first]
-    context = with_selection(with_preference(read_discourse(before), before), before)
-    words = _joined(sentences[first:last])
+    said = tuple(words for words in before if read_calculation(words) is None)
+    introduced = with_preference(read_discourse(said), said)
+    context = with_calculation(with_selection(introduced, said), before)
+    slots = candidates[0].as_mapping() if candidates else {}
+    words, unread = _settled(_joined(sentences[first:last]), scene, slots)
+    if unread:
+        return Interpretation((), tuple(f'does not understand "{one}"' for one in unread))
     command = read_command(words)
+    open_choice = unsettled_choice(introduced, context, command.text)
+    unused = (*left_over(command, tuple(slots)), *([open_choice] if open_choice else []))
+    if unused:
+        return Interpretation((), unused)
     times = context.times | mentioned_times(command.text)
     resolver = ReferenceResolver(scene, context, times, mirrored=names_camera(words))
     constraints = goal_constraints(candidates, command, resolver)
@@ -81,7 +94,29 @@ def interpret(text: str, scene: Scene, task: str) -> Interpretation:
         unmet = [limit for limit in constraints if not any(map(limit.fits, candidates))]
         complaints += [limit.complaint for limit in unmet]
         complaints = complaints or ["no goal of the task fits everything that the text says"]
+    if len(goals) > 1 and not complaints:
+        complaints = [_left_open(goals)]
     return Interpretation(goals, _distinct(complaints))
+
+
+def _settled(
+    words: Sentence, scene: Scene, slots: Mapping[str, SlotValue]
+) -> tuple[Sentence, tuple[str, ...]]:
+    """Return a command with its picks in order and its repetitions added up, and what is unread."""
+    order = ""
+    if "colors" in slots and "counts" not in slots:
+        words, order = in_order(words)
+    words, again = added_up(words, repeats="repeats" in slots, seen=bool(scene.past))
+    return words, tuple(filter(None, (again, order)))
+
+
+def _left_open(goals: Sequence[Goal]) -> str:
+    """Return the complaint that the words leave more than one goal."""
+    values = {slot: list(dict.fromkeys(goal[slot] for goal in goals)) for slot, _ in goals[0].slots}
+    left = {slot: found for slot, found in values.items() if len(found) > 1}
+    found = next(iter(left.values()))
+    named = (" and ".join(map(str, one)) if isinstance(one, tuple) else str(one) for one in found)
+    return f"leaves {' and '.join(left)} open: it can be {' or '.join(named)}"
 
 
 @functools.lru_cache(maxsize=64)
@@ -92,6 +127,8 @@ def _possible_goals(scene: Scene, task: str) -> tuple[Goal, ...]:
 
 def _commands(words: Sentence) -> bool:
     """Return whether a sentence gives a command, understood or not."""
+    if read_calculation(words) is not None:
+        return False
     if is_command(words) or is_negated_command(words):
         return True
     # "Leave out the former" chooses; it is no command with an unknown verb.

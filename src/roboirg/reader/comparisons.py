@@ -14,7 +14,7 @@ _COMPARATIVE = Phrases({
     "the one that is farther to the left":
         r"\b(?:farther|further) (?:over )?(?:to|on) (?:the|your) (?P<side>left|right)\b",
     "the one that is farther away from you":
-        r"\b(?P<far>farther|further)(?: away)?(?: from you)?\b",
+        r"\b(?P<far>farther|further)(?: away)?(?: from you)?\b(?! (?:over|to|on)\b)",
 })  # fmt: skip
 _TIE = 0.01
 """Meters; the same words may mean things that differ by less."""

@@ -14,6 +14,7 @@ from roboirg.reader.negations import OBJECT, VERB, unread_negations
 from roboirg.reader.phrases import Phrases
 from roboirg.reader.places import place_mentions
 from roboirg.reader.quantities import quantities
+from roboirg.reader.repetitions import more_mentions
 from roboirg.reader.several_amounts import several_amounts
 from roboirg.reader.tokens import Sentence, color_of, number_of, word_set
 from roboirg.reader.vocabulary import (
@@ -45,7 +46,14 @@ _AFTER_VERB = Phrases({
     "": "$",
 })  # fmt: skip
 _BEFORE_UNKNOWN_VERB = BEFORE_VERB | {"you"}
-_COMPARISON = Phrases({"fewer than three": r"\b(?P<word>more|fewer|less)\b(?: than \w+)?"})
+_COMPARISON = Phrases({
+    "fewer than three": r"\b(?P<word>more|fewer|less)\b(?: than \w+)?",
+    "two cubes than the difference":
+        r"\b(?<!other )(?<!rather )(?<!different )(?<!later )(?<!earlier )(?<!moment )"
+        r"(?P<than>than)\b",
+    "take the difference": r"(?<!in )(?<!times )(?<!cycles )\b(?P<sum>total|sum|difference|gap)\b",
+    "half as many": r"\b(?P<part>half|double|triple)\b(?: as)?(?: many| often)?",
+})  # fmt: skip
 _SWINGING = word_set("swing swinging forth")
 _DIFFERENCES = word_set("difference gap")
 _BOTH_TARGETS = Phrases(
@@ -173,11 +181,12 @@ def _unread_comparisons(words: Sentence) -> Iterator[ComprehensionGap]:
     """Yield the comparisons that are no part of a number, such as *fewer than three*."""
     text = " ".join(words)
     spans = [(quantity.start, quantity.end) for quantity in quantities(text)]
-    spans += [found.span() for found in several_amounts(text)]
+    spans += [found.span() for found in (*several_amounts(text), *more_mentions(text))]
     for found in _COMPARISON.finditer(text):
         if not any(start <= found.start() < end for start, end in spans):
             yield ComprehensionGap(
-                f'does not understand the comparison "{found[0]}"', (found["word"],)
+                f'does not understand the comparison "{found[0]}"',
+                (next(filter(None, found.groups())),),
             )
 
 
@@ -196,4 +205,5 @@ def _locates(words: Sentence, at: int) -> bool:
         return _HIDDEN.search(" ".join(words[:at])) is None
     if words[at] == "next":
         return following == ("to",)
-    return words[at] in PLACE_WORDS
+    # "The placement closest in time to that one" is no place.
+    return words[at] in PLACE_WORDS and words[at + 1 : at + 4] != ("in", "time", "to")

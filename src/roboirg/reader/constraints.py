@@ -12,7 +12,7 @@ from roboirg.reader.ordinals import read_position
 from roboirg.reader.quantities import read_times
 from roboirg.reader.reference_resolution import Amounts, ReferenceResolver, common_options
 from roboirg.reader.several_amounts import read_several_amounts
-from roboirg.reader.temporal_relations import read_temporal_relation
+from roboirg.reader.temporal_relations import TemporalRelation, read_temporal_relation
 
 GoalTest = Callable[[Goal], bool]
 
@@ -39,9 +39,17 @@ def goal_constraints(
         constraints.append(_text("color", common_options(map(resolver.colors_of, things))))
     constraints += _numbers(slots, candidates, command, resolver)
     if "relation" in slots:
-        moments = resolver.moments(read_temporal_relation(command.text))
+        when = _moment(command.text)
+        moments = resolver.moments_at(read_position(command.text)) if when is None else None
+        moments = moments or resolver.moments(when)
         constraints.append(_text("relation", moments))
     return constraints
+
+
+def _moment(text: str) -> TemporalRelation | None:
+    """Return the description of a moment; *there* points at the place of an introduced one."""
+    pointed = TemporalRelation("introduced") if "there" in text.split() else None
+    return read_temporal_relation(text) or pointed
 
 
 def _numbers(

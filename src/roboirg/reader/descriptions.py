@@ -20,7 +20,7 @@ from roboirg.reader.tokens import (
 )
 
 _PRONOUNS = word_set("it them")
-_POINTED = word_set("cube box tape one color")
+_POINTED = word_set("cube box tape one color container")
 _PLACE_NOUNS = word_set("place spot position location")
 _SERIES_NOUNS = word_set("visit placement time pass placing stay occasion")
 _FORMER = {"former": 0, "latter": -1}
@@ -29,10 +29,10 @@ _MENTIONED = Phrases({
         r"\bthe (?:cubes?|box|container|tapes?|ones?) (?:that )?i (?:just )?"
         r"(?:mentioned|named|spoke of)\b",
 })  # fmt: skip
-_CHOSEN = Phrases({
+CHOSEN = Phrases({
     "the cube I want":
         r"\b(?:the|my) (?P<noun>cubes?|box|container|tapes?|ones?|color|place|spot) i "
-        r"(?:mean|meant|want|wanted|asked for|favor|chose|choose|prefer|preferred|decided on"
+        r"(?:mean|meant|want|wanted|need|asked for|favor|chose|choose|prefer|preferred|decided on"
         r"|settled on|picked|selected|opted for)\b",
 })  # fmt: skip
 _OTHERS = Phrases({
@@ -85,7 +85,9 @@ _THAN = Phrases(
         "a color different from red": "different from|different to|differs from|unlike",
         "a cube that is not in those colors": "not (?:in|of|among|one of|part of)",
         "the cube that is neither red nor blue": "neither",
-        "any color except red": "except|apart from|outside",
+        "any color except red": r"(?:(?<=color )|(?<=cube )|(?<=one )|(?<=box )"
+        r"|(?<=tape ))(?:except|apart from|outside)"
+        rf"(?= (?:for )?(?:the|those|that|these|this|{COLOR})\b)",
         "a cube of another color":
             "(?:another|(?:a|an|some|any) (?:different|other|new|distinct|alternative|separate))"
             " color",
@@ -97,7 +99,7 @@ _COMPLEMENT = Phrases({
     "the cube in the other color": r"\bin the other color\b(?! (?:of|in|from)\b)",
     "the other color of those two":
         rf"\bthe other (?:one |color |(?:{THING}|{THINGS}) )?(?:of|in|from)\b"
-        r"(?! (?:the |those |these )?(?:two )?moments)",
+        r"(?! (?:the |those |these )?(?:two )?(?:moments|visits|placements))",
     "the one of these two that is not red":
         r"\bthe (?:one|color) (?:of|in|from)\b.*\b(?:not|other than|except)\b",
 })  # fmt: skip
@@ -112,7 +114,7 @@ def describe(words: Sentence) -> Description:
     text = " ".join(words)
     colors = colors_in(words)
     comparison = read_comparison(text)
-    if comparison is not None and _THAN.search(text):
+    if comparison is not None and (not colors or _THAN.search(text)):
         return Description("compared", colors, comparison=comparison)
     places = read_places(words)
     if places:
@@ -122,7 +124,7 @@ def describe(words: Sentence) -> Description:
     if _THAN.search(text):
         return Description("not", colors)
     if colors:
-        return Description("color", colors[:1])
+        return Description("color", tuple(dict.fromkeys(colors)))
     return _choice(text) or _pointer(words) or Description("any")
 
 
@@ -137,7 +139,7 @@ def _choice(text: str) -> Description | None:
     """Read ``the cube I want`` and ``the other one``: the chosen value comes first."""
     if _MENTIONED.search(text):
         return Description("introduced", times=mentioned_times(text))
-    for phrases, position in ((_CHOSEN, 0), (_OTHERS, 1)):
+    for phrases, position in ((CHOSEN, 0), (_OTHERS, 1)):
         found = phrases.search(text)
         if found:
             plain: DescriptionKind = "remaining" if position else "introduced"
@@ -155,7 +157,7 @@ def _pointer(words: Sentence) -> Description | None:
         if position is not None and after not in _SERIES_NOUNS:
             kind: DescriptionKind = "introduced place" if after in _PLACE_NOUNS else "introduced"
             return Description(kind, times=times, position=position)
-        if word in _PRONOUNS or (before == "that" and word in _POINTED):
+        if word in _PRONOUNS or (before in ("that", "this") and word in _POINTED):
             return Description("introduced")
     return None
 

@@ -62,6 +62,7 @@ class DiscourseContext(NamedTuple):
         places: introduced places.
         times: whether the places are those before or after things move.
         mirrored: whether left and right are those of the front camera's picture.
+        selected: whether a remark singles one of two values out.
     """
 
     colors: tuple[str, ...] = ()
@@ -76,6 +77,12 @@ class DiscourseContext(NamedTuple):
     places: tuple[NamedPlace, ...] = ()
     times: frozenset[Time] = frozenset()
     mirrored: bool = False
+    selected: bool = False
+
+    def introduces_pair(self) -> bool:
+        """Return whether two values of one kind are introduced."""
+        pairs = (self.colors, self.places, self.numbers, self.positions, self.moments)
+        return any(len(pair) == 2 for pair in pairs)  # noqa: PLR2004
 
 
 def names_camera(words: Sentence) -> bool:

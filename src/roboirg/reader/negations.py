@@ -11,7 +11,7 @@ import re
 
 from roboirg.reader.phrases import Phrases
 from roboirg.reader.temporal_relations import NOT_NAMED, NOT_THAT
-from roboirg.reader.tokens import COLOR, NUMBER, THING, Sentence
+from roboirg.reader.tokens import COLOR, NUMBER, THING, Sentence, word_set
 from roboirg.reader.vocabulary import GERUNDS, VERBS, may_be_verb
 
 VERB = rf"(?:{'|'.join(sorted(VERBS))})\b"
@@ -46,7 +46,8 @@ _NEGATION = Phrases(
         "Put the blue cube instead of the red cube into the bin.": "without|instead|rather than",
         "Put minus two red cubes into the bin.": rf"minus(?= {NUMBER}\b)",
         "Stop putting red cubes into the bin.": rf"stop(?= (?:{'|'.join(sorted(GERUNDS))})\b)",
-        "Put neither cube into the bin.":
+        "Take the except red cube.": "except|apart from|outside",
+    "Put neither cube into the bin.":
             rf"neither(?= (?:the )?(?:{COLOR}|{THING}|container)\b)",
         "Put all cubes but the red ones into the bin.":
             r"(?:all|any|every|anything|everything)(?: \w+){0,2}"
@@ -70,7 +71,10 @@ _READ_ELSEWHERE = Phrases({
     "Do not forget to press the button.": rf"\bnot {_REMARK}",
     "Put it where it was at the moment she did not choose.":
         r"\b(?:she|he) (?:would|did|does) not\b",
-    "Stop the cube on visit no 3.": rf"\bno {NUMBER}\b",
+    "Stop the cube on visit no 3.": rf"\b(?:visit|pass|placement|time|stay|number) no {NUMBER}\b",
+    "Take a cube of any color except red.":
+        r"\b(?:color|cube|one|box|tape) (?:except|apart from|outside)\b"
+        rf"(?= (?:for )?(?:the|those|that|these|this|{COLOR})\b)",
     "Take the cube that is neither red nor blue.": rf"{_OF_COLORS} {COLOR} n?or {COLOR}\b",
     "Take the cube that is neither of those.": rf"{_OF_COLORS} of (?:those|these|them|the two)\b",
     "Stop the cube on the visit whose number is that minus 4.":
@@ -79,9 +83,13 @@ _READ_ELSEWHERE = Phrases({
 """Ways that other modules read; they may overlap."""
 
 
+_FORBIDDING = word_set("not dont never avoid refrain")
+"""Every phrase of `_PROHIBITION` has one of these words."""
+
+
 def is_negated_command(words: Sentence) -> bool:
     """Return whether a sentence forbids something: ``do not put the cube there``."""
-    return bool(_prohibitions(" ".join(words)))
+    return not _FORBIDDING.isdisjoint(words) and bool(_prohibitions(" ".join(words)))
 
 
 def unread_negations(words: Sentence) -> tuple[str, ...]:

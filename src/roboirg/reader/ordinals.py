@@ -7,7 +7,7 @@ from collections.abc import Collection
 from typing import Literal, NamedTuple
 
 from roboirg.reader.phrases import Phrases
-from roboirg.reader.quantities import CountExpression, read_value
+from roboirg.reader.quantities import ADVERBS, CountExpression, read_value
 from roboirg.reader.tokens import NUMBER, ORDINAL, number_of, ordinal_of
 
 Base = int | Literal["that", "last", "other"]
@@ -39,15 +39,30 @@ _NEXT = Phrases({
 })  # fmt: skip
 _NEIGHBOR = Phrases({
     "the placement that is a neighbor of that":
-        r"\b(?:neighbor\w* (?:of|to)|adjacent to|next to|(?:just |right )?before or after)\b",
+        r"\b(?:neighbor\w* (?:of|to)|adjacent to|next to|(?:just |right )?before or after"
+        r"|(?:closest|nearest) in time to)\b",
 })  # fmt: skip
 _PENULTIMATE = Phrases({
     "its second to last visit": rf"\b(?P<rank>{ORDINAL}|next) (?:to|from) (?:the )?last\b",
     "its penultimate visit": r"\bpenultimate\b",
 })  # fmt: skip
+_WAITED = Phrases({
+    "after it has passed three times, stop it":
+        r"\b(?:let|allow|wait|after|once|until|when)\b "
+        r"(?:(?!stop|press|push|hit|halt)[\w']+ ){1,8}?"
+        rf"(?:(?P<times>{NUMBER}) (?:times?|passes|visits)|(?P<adverb>once|twice|thrice))\b",
+})  # fmt: skip
+"""So many visits pass before the one that is meant."""
 _BARE = Phrases({
+    "on the first of the two targets":
+        rf"\b(?P<of>{ORDINAL}|last) of (?:the|these|those|all|its)? ?(?:{NUMBER} )?"
+        r"(?:targets|discs|placements|visits)\b",
+    "where the robot first put the cube": rf"\b(?P<when>{ORDINAL}|last) (?:put|placed|set|laid)\b",
+    "the target used last": rf"\b(?:used|put|visited) (?P<used>{ORDINAL}|last)\b(?! of)",
+    "to last target": rf"\b(?P<at>{ORDINAL}|last) (?:target|disc)\b",
+    "the target of the later one": r"\bthe (?P<later>later|earlier) (?:one|of the two)\b",
     "the target on which it was placed third":
-        rf"\b(?:its|the|placed) (?P<ordinal>{ORDINAL}|last)\b",
+        rf"\b(?:its|the|placed) (?P<ordinal>{ORDINAL}|last)\b(?! of (?:them|those|these)\b)",
 })  # fmt: skip
 _POINTER = Phrases({
     "during that very visit": rf"\b(?:that|this|the same) (?:very )?(?:one|number|{_NOUN})\b",
@@ -55,10 +70,13 @@ _POINTER = Phrases({
 })  # fmt: skip
 _OTHER = Phrases({
     "during the other visit": rf"\bthe other {_NOUN}\b",
+    "during the other of the two visits":
+        rf"\bthe other (?:one )?of (?:the two|those|these|them) {_NOUN}s?\b",
     "during the visit that is left": rf"\bthe {_NOUN} that is left\b",
     "during the visit other than that":
         rf"\bthe {_NOUN} (?:of (?:the two|them|those) )?other than that\b",
 })  # fmt: skip
+_RANKS: dict[str, Base] = {"earlier": 1, "later": "last"}
 _LATER = ("after", "following", "later than", "behind", "next")
 
 
@@ -123,6 +141,11 @@ def read_position(text: str) -> OrdinalExpression | None:
 
 
 def _read_relative(text: str) -> OrdinalExpression | None:
+    waited = _WAITED.search(text)
+    if waited and _ELEMENT.search(text) is None:
+        return OrdinalExpression(
+            number_of(waited["times"] or "") or ADVERBS[waited["adverb"]], (1,)
+        )
     # First of all: the "one" of "the preceding one" is no number.
     following = _NEXT.search(text)
     if following:
@@ -152,7 +175,8 @@ def _read_named(text: str) -> OrdinalExpression | None:
     found = _ELEMENT.search(text)
     if found is None and not _POINTER.search(text):
         found = _BARE.search(text)
-        return OrdinalExpression(_ordinal(found["ordinal"])) if found else None
+        rank = next(filter(None, found.groups())) if found else None
+        return OrdinalExpression(_RANKS.get(rank) or _ordinal(rank)) if rank else None
     return OrdinalExpression("that" if found is None else _number(found))
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 
 
 class Phrases:
@@ -32,3 +32,36 @@ class Phrases:
 
     def finditer(self, text: str) -> Iterator[re.Match[str]]:
         return self._any.finditer(text)
+
+
+class Rewrites:
+    """Rules that put other words for some words of a text, one after another.
+
+    Args:
+        rules: for each the words of which a text must have one, ``::``, a pattern of words joined
+            by spaces, ``=>``, and what replaces it.
+        parts: patterns for names in capital letters that the rules use.
+    """
+
+    def __init__(self, *rules: str, parts: Mapping[str, str]) -> None:
+        named = re.compile("|".join(parts))
+        self._rules: list[tuple[frozenset[str], re.Pattern[str], str]] = []
+        for rule in rules:
+            words, _, rest = rule.partition(":: ")
+            pattern, _, replacement = rest.partition("=>")
+            full = named.sub(lambda name: parts[name[0]], pattern.removesuffix(" "))
+            self._rules.append((frozenset(words.split()), re.compile(full), replacement))
+        self._triggers = frozenset().union(*(words for words, _, _ in self._rules))
+
+    def leaves(self, present: Collection[str]) -> bool:
+        """Return whether a text with these words stays as it is."""
+        return self._triggers.isdisjoint(present)
+
+    def apply(self, text: str, present: Collection[str]) -> str:
+        """Return a text with all replacements; `present` are its words."""
+        for triggers, pattern, replacement in self._rules:
+            if not triggers.isdisjoint(present):
+                changed = " ".join(pattern.sub(f"{replacement} ", text).split())
+                if changed != text:
+                    text, present = changed, frozenset(changed.split())
+        return text

@@ -181,11 +181,13 @@ def _read_one(words: Sentence, at: int, depth: int) -> tuple[Place, int] | None:
 
 
 def _read_side(words: Sentence, at: int) -> tuple[Place, int] | None:
-    """Read ``left box``, ``tape on your right``, ``boxes on the left and on the right``."""
+    """Read ``left box``, ``box on your left and the one on your right``, ``boxes on the left``."""
     word, following = _word(words, at), _word(words, at + 1)
     if word in _SIDES and following in _PAIRED:
         return DirectionalPlace(_SIDES[word], 0), at + 2
-    second = word == "and" and not _BOTH.isdisjoint(words[:at])
+    second = (word == "and" and not _BOTH.isdisjoint(words[:at])) or (
+        word == "one" and not _PAIRED.isdisjoint(words[:at])
+    )
     if not (word in _PAIRED | _BOTH or second) or following not in _TO_A_SIDE:
         return None
     after = at + 2

@@ -9,14 +9,19 @@ from roboirg.reader.phrases import Phrases
 from roboirg.reader.temporal_relations import PressRelation, named_moments
 from roboirg.reader.tokens import Sentence
 
-_FIRST = Phrases({
+_PREFERRED = Phrases({
     "She prefers the moment before the press to the one after it.":
-        r"\b(?:prefers?|likes?|loves?|chose|chooses|picked|keeps)\b",
+        r"\b(?:prefers?|likes?|loves?|finds?|chose|chooses|picked|keeps?)\b",
 })  # fmt: skip
-_LAST = Phrases({
+_LEFT = Phrases({
     "She gave up the moment before the press for the one after it.":
-        r"\b(?:trades?|swapped|gave up|gives up|skips?|dropped|leaves)\b.*\bfor\b",
+        r"\b(?:trades?|swap(?:s|ped)?|g[ai]ve?s? up|skips?|dropped|leaves)\b.*\bfor\b",
 })  # fmt: skip
+_REVERSED = Phrases({
+    "She likes the moment before the press less than the one after it.":
+        r"\b(?:not|never|less|worse)\b",
+})  # fmt: skip
+"""Each of these words makes the other moment the preferred one."""
 
 
 def preferred_moment(words: Sentence) -> PressRelation | None:
@@ -25,9 +30,10 @@ def preferred_moment(words: Sentence) -> PressRelation | None:
     moments = named_moments(text)
     if len(set(moments)) != 2 or len(moments) != 2:  # noqa: PLR2004 - the two moments
         return None
-    if _LAST.search(text):
-        return moments[1]
-    return moments[0] if _FIRST.search(text) else None
+    left = _LEFT.search(text) is not None
+    if not left and _PREFERRED.search(text) is None:
+        return None
+    return moments[(left + sum(1 for _ in _REVERSED.finditer(text))) % 2]
 
 
 def with_preference(context: DiscourseContext, sentences: Iterable[Sentence]) -> DiscourseContext:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import re
 from collections.abc import Callable, Iterable
 from typing import Literal, NamedTuple
@@ -60,12 +61,13 @@ _NOUNS = rf"(?: (?:times?|{THING}|{THINGS}|ones?|visits?|{COLOR}|such|of|the|the
 _TO = (
     r"(?:(?:the|their|that|this) (?:combined )?(?P<combined>total|sum|difference|gap)\b"
     rf"(?: between them| (?:of|between) (?P<left>{NUMBER}) and (?P<right>{NUMBER}))?"
-    rf"|(?P<quantity>that|it|this|the|{NUMBER})\b)"
+    rf"|(?P<quantity>that|it|this|the(?! (?:target|disc|video|button|left|right)\b)|{NUMBER})\b)"
 )
 _MORE = "more|larger|greater|higher|bigger|above|over"
 _LESS = "fewer|less|smaller|lower|below|under"
 _STEP = Phrases({
     "two more red cubes than that":
+        rf"(?<!\bthe )(?<!red )(?<!green )(?<!blue )"
         rf"\b(?P<step>{NUMBER}){_NOUNS}{{0,3}} (?P<way>{_MORE}|{_LESS}){_NOUNS}{{0,5}}(?: than)? "
         f"{_TO}",
 })  # fmt: skip
@@ -80,8 +82,11 @@ _SCALED = Phrases({
 })  # fmt: skip
 _SAME = Phrases({
     "that many of them": r"\b(?:that|as|this|so|equally) (?:many|often)\b",
-    "the same number of blue cubes": r"\b(?:that|this|the same) (?:number|amount) of\b",
-    "my lucky number of blue cubes": r"\bmy (?:\w+ )?number of\b",
+    "the same number of blue cubes":
+        r"\b(?:that same|that|this|the (?:exact |very )?same) (?:number|amount) of\b",
+    "my lucky number of blue cubes":
+        r"\b(?:my (?:\w+ )?|the (?:right|correct|chosen|selected|preferred|desired|agreed|final) )"
+        r"number of\b",
     "the number of times I mentioned": r"\bthe number of times(?= i\b)",
 })  # fmt: skip
 _REMAINING = Phrases({
@@ -159,6 +164,7 @@ _READINGS: tuple[Reading, ...] = (
 """Phrases, reader, and whether it is a plain number; of two that overlap, the first one counts."""
 
 
+@functools.lru_cache(maxsize=8192)
 def quantities(text: str) -> tuple[Quantity, ...]:
     """Return all quantities of a sentence, in order."""
     found: list[Quantity] = []
@@ -186,12 +192,17 @@ def read_value(text: str) -> CountExpression | None:
     return next((one.expression for one in quantities(text) if one.expression.derived), None)
 
 
-def read_times(text: str) -> CountExpression | None:
-    """Return the number of repetitions; None if the text gives none."""
+def times_mentions(text: str) -> list[Quantity]:
+    """Return the numbers of repetitions of a text, those that point or derive one first."""
     found = quantities(text)
     plain = [one for one in found if one.plain]
     times = [one for one in found if not one.plain]
-    times += [
+    return times + [
         one for one in plain if text[one.start : one.end] in ADVERBS or _TIMES.match(text, one.end)
     ]
+
+
+def read_times(text: str) -> CountExpression | None:
+    """Return the number of repetitions; None if the text gives none."""
+    times = times_mentions(text)
     return times[0].expression if times else None

@@ -90,6 +90,9 @@ class ReferenceResolver:
         """Return the amount of each color that words for all of them mean."""
         if not (words.amounts or self._context.amounts):
             self._complain("amounts")
+        elif not words.amounts and len(self._context.colors) > len(self._context.amounts):
+            self._complain("an amount of each color")
+            return [dict.fromkeys(self._colors())]
         return [{color: numbers} for color, numbers in words.results(self._context.amounts)]
 
     def repeats(self, count: CountExpression | None) -> set[int] | None:
@@ -136,6 +139,13 @@ class ReferenceResolver:
             # Without a preference, either of the two may be the other one.
             return set(MOMENTS) - moments if len(moments) == 1 else set(MOMENTS)
         return moments
+
+    def moments_at(self, position: OrdinalExpression | None) -> set[PressRelation] | None:
+        """Return the moments of the elements of the series that fit a description."""
+        if position is None or position.points or self._series_length() != len(MOMENTS):
+            return None
+        numbers = position.results((), (), len(MOMENTS))
+        return None if numbers is None else {MOMENTS[number - 1] for number in numbers}
 
     def _introduced_moments(self, when: TemporalRelation) -> set[PressRelation]:
         """Return the moments to start from: the preferred one, if a choice has to be made."""

@@ -11,6 +11,7 @@ import re
 from collections.abc import Iterable
 from typing import TypeVar
 
+from roboirg.reader.descriptions import CHOSEN
 from roboirg.reader.discourse_context import DiscourseContext
 from roboirg.reader.phrases import Phrases
 from roboirg.reader.tokens import Sentence
@@ -33,7 +34,7 @@ _ACCEPTED = Phrases(
     {
         "Why not": "why not",
         "I could not live without": r"not (?:do |be |live )?without",
-        "I would not give up": "not (?:give up|trade|miss|swap|exchange)",
+        "I would not give up": "not (?:give up|part with|trade|miss|swap|exchange)",
         "Not the latter, but": "but",
         "I would go for": "for",
     },
@@ -47,7 +48,9 @@ _REJECTED = Phrases(
         "You may leave out": r"\b(?:leave|left|rule|ruled) out",
         "Set": r"\bset",
         "Forget about": r"\b(?:forget|never mind|skip|ignore)(?: about)?",
-        "I gave up": r"\b(?:gave|give) up",
+        "I gave up": r"\b(?:gave|give|passed) up",
+    "I am done with": r"\bdone with",
+    "I meant the former when I said": r"\bi said",
         "I want the latter instead of": r"\b(?:instead of|rather than)",
         "I swapped": r"\b(?:swapped|swap|exchanged)",
         "I prefer the latter to":
@@ -61,16 +64,20 @@ _REJECTED = Phrases(
 """Ways to set a pointer aside by the words before it, unless they accept it."""
 _REJECTED_AFTER = Phrases({
     ", no, the latter": "^(?:[,;] )?no [,;]",
-    "is out of the question": r"^(?:is|are|was) (?:out|not|off)\b",
+    "is out of the question": r"^(?:is|are|was) (?:definitely )?(?:out|not|off)\b",
+    "less than the latter": "^less than",
 })  # fmt: skip
 """Ways to set a pointer aside by the words after it."""
+
+
+_ASIDE = Phrases({"I have ruled instead out": r"\b(?:not|no|never|out|aside|without|instead|up)\b"})
 
 
 @functools.lru_cache(maxsize=8192)
 def read_selection(words: Sentence) -> int | None:
     """Return the index of the chosen value, 0 or 1; None if a sentence chooses none of two.
 
-    A sentence that contradicts itself chooses none.
+    A sentence that contradicts itself, or sets something aside in unknown words, chooses none.
     """
     text = " ".join(words)
     found = list(_POINTER.finditer(text))
@@ -82,7 +89,12 @@ def read_selection(words: Sentence) -> int | None:
     for number, (pointer, name) in enumerate(zip(found, named, strict=True)):
         index = 1 - known if name is None else name
         end = found[number + 1].start() if number + 1 < len(found) else len(text)
-        rejected = _is_rejected(text[: pointer.start()], text[pointer.end() : end])
+        before, after = text[: pointer.start()].strip(), text[pointer.end() : end].strip()
+        rejected = _is_rejected(before, after)
+        if not (rejected or number or _ACCEPTED.search(before)) and _ASIDE.search(before):
+            return None
+        if rejected and not number and len(list(_ASIDE.finditer(before))) > 1:
+            return None
         chosen.add(1 - index if rejected else index)
     return chosen.pop() if len(chosen) == 1 else None
 
@@ -95,7 +107,6 @@ def _index(pointer: re.Match[str]) -> int | None:
 
 def _is_rejected(before: str, after: str) -> bool:
     """Return whether a pointer is set aside by the words before it, or by those after it."""
-    before, after = before.strip(), after.strip()
     if _REJECTED_AFTER.search(after):
         return True
     return _ACCEPTED.search(before) is None and _REJECTED.search(before) is not None
@@ -111,12 +122,30 @@ def with_selection(context: DiscourseContext, sentences: Iterable[Sentence]) -> 
         return context
     index = chosen[-1]
     return context._replace(
+        selected=True,
         colors=_reordered(context.colors, index),
         places=_reordered(context.places, index),
         numbers=_narrowed(context.numbers, index),
         positions=_narrowed(context.positions, index),
         moments=_narrowed(context.moments, index),
     )
+
+
+def unsettled_choice(before: DiscourseContext, context: DiscourseContext, command: str) -> str:
+    """Return why a choice between two values stays open; empty if it does not.
+
+    Args:
+        before: what the sentences introduce.
+        context: the same, with the selection.
+        command: the words of the command.
+    """
+    pair = before.introduces_pair()
+    if context.selected and not pair and (context.colors or context.places):
+        return "nothing before the command introduces two values of which to choose one"
+    named_again = context.preferred_color or context.preferred_moment or context.preferred_position
+    if not context.selected and pair and not named_again and CHOSEN.search(command):
+        return "nothing before the command says which of two values is meant"
+    return ""
 
 
 def _reordered(pair: tuple[Value, ...], index: int) -> tuple[Value, ...]:

@@ -18,6 +18,17 @@ _SPELLINGS = (
     ("can't", "can not"),
     ("won't", "will not"),
     ("n't", " not"),
+    ("'re ", " are "),
+    ("'ve ", " have "),
+    ("'ll ", " will "),
+    ("'d ", " would "),
+    ("i'm ", "i am "),
+    ("it's ", "it is "),
+    ("that's ", "that is "),
+    ("what's ", "what is "),
+    ("where's ", "where is "),
+    ("->", " to "),
+    (" + ", " and "),
     ("(s)", "s"),
     ("colour", "color"),
     ("neighbour", "neighbor"),
@@ -44,7 +55,11 @@ def word_set(words: str) -> frozenset[str]:
     return frozenset(words.split())
 
 
-SYNONYMS = {"block": "cube", "blocks": "cubes"}
+SYNONYMS = {
+    "block": "cube", "blocks": "cubes", "circle": "target", "circles": "targets",
+    "trash": "bin", "cup": "container", "cups": "containers", "lid": "container",
+    "movie": "video", "demo": "video", "clip": "video", "repick": "pick", "till": "until",
+}  # fmt: skip
 """Words that are read as others; `vocabulary.register_words` adds those of other packages."""
 
 FILLERS = word_set("please okay kindly carefully gently slowly quickly softly neatly calmly")

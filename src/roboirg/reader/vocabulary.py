@@ -55,15 +55,16 @@ _NOUNS = word_set(
     "table robot video camera picture beginning start outset end pair couple color colors amount "
     "place places spot position location press presses swaps swap order way hand mind "
     "neighbor neighbors action actions motion motions movement task process steps sequence "
-    "demonstration side total whole object objects cycle cycles sum difference gap"
+    "demonstration side total whole object objects cycle cycles sum difference gap exact "
+    "desired agreed"
 )
 _PRONOUNS = word_set(
     "he she it them they you yourself i me us we what when where which who whichever there here "
     "then everything anything something"
 )
 _VERB_FORMS = word_set(
-    "asked decided settled selected opted favor favorite own special prefers skip give gave choice "
-    "left pick "
+    "trade asked decided settled selected opted favor favorite own special prefers skip give gave "
+    "choice left pick "
     "combined named mentioned spoke others new distinct alternative separate "
     "is are was were be been am do does did done has had have stops stopped hides hid hidden "
     "covers covered picked lifted raised placed moved moves pressed presses swapped changed "
@@ -73,7 +74,8 @@ _VERB_FORMS = word_set(
     "painted being held work preceded followed ready colored watch watched repeated reaches "
     "reach reached arrives "
     "arrived passed shown demonstrated contains contained visited finished finish done completed "
-    "complete remembering recalling returns returned according based initial original correct"
+    "comes came gets got cross crosses crossed visiting pushed made shows complete remembering"
+    "  recalling returns returned according based initial original correct"
 )
 _COMPARISONS = word_set(
     "nearer closer farther further away "

@@ -83,6 +83,21 @@ def named_values(text: str, slot: str, vocabulary: SlotVocabulary) -> tuple[Name
     )
 
 
+def marked_text(text: str, slot: str, vocabulary: SlotVocabulary) -> str:
+    """Return a text in which the rank of mention stands for each named value of a slot.
+
+    *Red and blue; not the blue one* becomes *rank0 and rank1; not the rank1 one*.
+    """
+    found: list[str] = []
+    ranks: dict[Value, int] = {}
+    for sentence in _sentences(text):
+        words = list(sentence)
+        for place, value in _values(sentence, slot, vocabulary):
+            words[place] = f"rank{ranks.setdefault(value, len(ranks))}"
+        found += words
+    return " ".join(found)
+
+
 # Cached: every slot and every rule reads the same text.
 @functools.lru_cache(maxsize=1024)
 def _sentences(text: str) -> tuple[Sentence, ...]:

@@ -2,49 +2,31 @@
 
 from __future__ import annotations
 
-import statistics
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from fractions import Fraction
-from typing import Literal, NamedTuple, get_args
+from typing import NamedTuple, cast
 
-from roboirg.core.episode import Episode, Goal
-from roboirg.language.instruction import Instruction
+from roboirg.core.episode import Goal
 from roboirg.language.instruction import hidden_slots as hidden_in
 from roboirg.shortcuts.command_chance import blind_goals, right_share
+from roboirg.shortcuts.goal_learner import Told
 from roboirg.shortcuts.goal_vocabulary import values_in
 from roboirg.shortcuts.surface_rules import SURFACE_RULES
-from roboirg.shortcuts.text_guess import goal_share, guess_goal, slot_share
+from roboirg.shortcuts.text_guess import TextGuess, goal_share, guess_goal, slot_share
 
 CHANCE = "chance"
-
-Told = tuple[Episode, Instruction]
-"""An episode and one of its instructions."""
-Grouping = Literal["pattern", "task"]
-GROUPINGS: tuple[Grouping, ...] = get_args(Grouping)
 
 
 class ShortcutScore(NamedTuple):
     """The score of one shortcut on one instruction.
 
     Attributes:
-        slots: for each hidden slot the expected share of its values that are right, 0 to 1.
+        slots: for each slot that counts the expected share of its values that are right, 0 to 1.
         goal: the probability that the whole goal is right.
     """
 
-    slots: tuple[Fraction, ...]
+    slots: Mapping[str, Fraction]
     goal: Fraction
-
-
-class ShortcutShares(NamedTuple):
-    """Mean scores over instructions.
-
-    Attributes:
-        slots: over all hidden slots; None if nothing is hidden.
-        goals: over all instructions.
-    """
-
-    slots: float | None
-    goals: float
 
 
 Scorer = Callable[[Told], ShortcutScore]
@@ -57,14 +39,21 @@ def hidden_slots(told: Told) -> tuple[str, ...]:
     return tuple(slot for slot, _ in episode.goal.slots if slot in hidden)
 
 
+def counted_slots(told: Told) -> tuple[str, ...]:
+    """Return the slots that count: those that the instruction names as touched, or all hidden."""
+    touched = cast("list[str]", told[1].metadata.get("touched", []))
+    slots = tuple(slot for slot, _ in told[0].goal.slots if slot in touched)
+    return slots or hidden_slots(told)
+
+
 def score_chance(told: Told) -> ShortcutScore:
     """Score a blind guess among the goals that command and scene leave; see `blind_goals`."""
     episode, instruction = told
     goals = blind_goals(instruction, episode)
-    slots = tuple(
-        sum((_overlap(goal, episode.goal, slot) for goal in goals), Fraction(0)) / len(goals)
-        for slot in hidden_slots(told)
-    )
+    slots = {
+        slot: sum((_overlap(goal, episode.goal, slot) for goal in goals), Fraction(0)) / len(goals)
+        for slot in counted_slots(told)
+    }
     return ShortcutScore(slots, right_share(goals, episode))
 
 
@@ -74,12 +63,17 @@ def _overlap(guess: Goal, goal: Goal, slot: str) -> Fraction:
     return Fraction(right, len(wanted))
 
 
+def score_guess(guess: TextGuess, told: Told) -> ShortcutScore:
+    """Score a guess of the whole goal."""
+    goal = told[0].goal
+    slots = {slot: slot_share(guess, slot, goal[slot]) for slot in counted_slots(told)}
+    return ShortcutScore(slots, goal_share(guess, told[0]))
+
+
 def score_rule(rule: str, told: Told) -> ShortcutScore:
     """Score a surface rule, which sees the text of the instruction only."""
     episode, instruction = told
-    guess = guess_goal(rule, instruction.text, episode.task)
-    slots = tuple(slot_share(guess, slot, episode.goal[slot]) for slot in hidden_slots(told))
-    return ShortcutScore(slots, goal_share(guess, episode))
+    return score_guess(guess_goal(rule, instruction.text, episode.task), told)
 
 
 def rule_scorers() -> Mapping[str, Scorer]:
@@ -89,26 +83,3 @@ def rule_scorers() -> Mapping[str, Scorer]:
         return lambda told: score_rule(rule, told)
 
     return {CHANCE: score_chance, **{rule: scorer(rule) for rule in SURFACE_RULES}}
-
-
-def mean_shares(scores: Sequence[ShortcutScore]) -> ShortcutShares:
-    """Return the mean over one or more instructions; every hidden slot weighs the same."""
-    slots = [share for score in scores for share in score.slots]
-    return ShortcutShares(
-        slots=float(statistics.mean(slots)) if slots else None,
-        goals=float(statistics.mean(score.goal for score in scores)),
-    )
-
-
-def group_told(
-    told: Iterable[Told], by: Grouping | None = None
-) -> dict[tuple[str, ...], list[Told]]:
-    """Group instructions by setting, and within it by reasoning pattern or task if wanted."""
-    groups: dict[tuple[str, ...], list[Told]] = {}
-    for episode, instruction in told:
-        key: tuple[str, ...] = (instruction.setting,)
-        if by is not None:
-            pattern = instruction.metadata["pattern"] or "–"
-            key = (*key, str(pattern) if by == "pattern" else episode.task)
-        groups.setdefault(key, []).append((episode, instruction))
-    return groups

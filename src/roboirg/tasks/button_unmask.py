@@ -14,8 +14,7 @@ from roboirg.core.episode import Difficulty, Goal, Scene, Stage
 from roboirg.core.footprints import Region
 from roboirg.core.word_pools import Pools
 from roboirg.tasks.shared import unmask
-from roboirg.tasks.shared.fixtures import button_keep_out, draw_button
-from roboirg.tasks.shared.unmask import CONTAINERS, GAP, PICKS, REGION
+from roboirg.tasks.shared.fixtures import draw_button
 from roboirg.tasks.task import Task, Wording
 
 BUTTON_REGION = Region(-0.2, 0.0, 0.05, 0.05)
@@ -23,13 +22,7 @@ BUTTON_REGION = Region(-0.2, 0.0, 0.05, 0.05)
 
 def sample(rng: np.random.Generator, difficulty: Difficulty) -> tuple[Scene, Goal]:
     """Draw a button, then containers as in VideoUnmask; the first ones are to be lifted."""
-    button = draw_button(rng, BUTTON_REGION)
-    obstacles = [button_keep_out(button)]
-    containers = unmask.draw_containers(rng, CONTAINERS[difficulty], REGION, GAP, obstacles)
-    cubes = unmask.hide_cubes(rng, containers)
-    colors = tuple(str(cube.color) for cube in cubes[: PICKS[difficulty]])
-    scene = Scene((button, *containers, *cubes), motions=unmask.appearing(containers))
-    return scene, Goal.of(colors=colors)
+    return unmask.sample(rng, difficulty, [draw_button(rng, BUTTON_REGION)])
 
 
 def stages(scene: Scene, goal: Goal) -> tuple[Stage, ...]:
@@ -51,7 +44,7 @@ COMMANDS = unmask.seen_commands(
         test=(
             Wording("Push the button, then raise {colors.0}."),
             Wording("Push the button and pick up {colors.0}."),
-            Wording("Start with a push of the button, then raise {colors.0}."),
+            Wording("Start by pushing the button, then raise {colors.0}."),
             Wording("Push the button, raise {colors.0}, put it back, raise {colors.1}.", 2),
             Wording("Push the button, pick up {colors.0}, lower it, pick up {colors.1}.", 2),
             Wording("Push the button, raise {colors.0}, lay it down, raise {colors.1}.", 2),

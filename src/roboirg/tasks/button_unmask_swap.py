@@ -81,7 +81,7 @@ COMMANDS = replace(
             test=(
                 Wording("Push both buttons, then raise {colors.0}."),
                 Wording("Push both buttons and pick up {colors.0}."),
-                Wording("Start with a push of both buttons, then raise {colors.0}."),
+                Wording("Start by pushing both buttons, then raise {colors.0}."),
                 Wording("Push both buttons, raise {colors.0}, put it back, raise {colors.1}.", 2),
                 Wording(
                     "Push both buttons, pick up {colors.0}, lower it, pick up {colors.1}.",
@@ -92,7 +92,7 @@ COMMANDS = replace(
         )
     ),
     by_place="the container over the cube now {place}",
-    things_at="the cube[|s] now {place}",
+    things_at="the cube now {place}",
 )
 
 TASK = Task(

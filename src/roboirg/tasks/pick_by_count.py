@@ -103,7 +103,7 @@ COMMANDS = Commands(
     colors=TAPES,
     by_place="the tape {place}",
     pointed="tape",
-    things_at="the tape[|s] {place}",
+    things_at="the tape {place}",
     wordings=Pools(
         train=(
             Wording("Take {color} and place it on the target {repeats}."),

@@ -87,7 +87,7 @@ COMMANDS = Commands(
     colors=(*BOXES, TAPE),
     by_place="the box {place}",
     pointed="box",
-    things_at="the box[|es] {place}",
+    things_at="the box {place}",
     wordings=Pools(
         train=(
             Wording("Put the tape into {color}."),
@@ -95,7 +95,7 @@ COMMANDS = Commands(
             Wording("Drop the tape into {color}."),
         ),
         test=(
-            Wording("Lay the tape into {color}."),
+            Wording("Lay the tape in {color}."),
             Wording("Move the tape into {color}."),
             Wording("Please set the tape into {color}."),
         ),

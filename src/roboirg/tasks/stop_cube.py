@@ -141,7 +141,7 @@ COMMANDS = Commands(
         ),
         test=(
             Wording("Push the button so that the cube stops on the target {visit}."),
-            Wording("With the button, halt the cube on the target {visit}."),
+            Wording("Halt the cube on the target {visit} by pushing the button."),
             Wording("Push the button to make the cube stop on the target {visit}."),
         ),
     ),

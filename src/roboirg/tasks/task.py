@@ -42,11 +42,11 @@ class Commands:
         by_color: how to refer to the object by a color; ``{cube}`` is the colored object.
         by_place: how to refer to the object by a place, after its count if it has one:
             ``cube[|s] ...``.
-        by_rank: the same by ``the former`` or ``the first`` of several places; none if it is the
-            same with *at the former place*.
+        by_rank: the same by ``the former`` or ``the first`` of several places; none if these words
+            stand alone.
         pointed: kind of object that a place distinguishes among all objects of that kind: the
             colored one if the things to handle are not there yet.
-        things_at: how to introduce one or more of them by their places.
+        things_at: how to introduce one of them by its place.
     """
 
     wordings: Pools[Wording]
@@ -57,7 +57,7 @@ class Commands:
     by_place: str = "the cube {place}"
     by_rank: str | None = None
     pointed: ObjectKind = "cube"
-    things_at: str = "the cube[|s] {place}"
+    things_at: str = "the cube {place}"
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,24 +7,12 @@ Facts: RoboMME.
 
 from __future__ import annotations
 
-import numpy as np
-
-from roboirg.core.episode import Difficulty, Goal, Scene, Stage
+from roboirg.core.episode import Scene, Stage
 from roboirg.core.word_pools import Pools
 from roboirg.tasks.shared import unmask, video_stages
-from roboirg.tasks.shared.unmask import CONTAINERS, GAP, PICKS, REGION
 from roboirg.tasks.task import Task, Wording
 
 HOLD_STEPS = 64
-
-
-def sample(rng: np.random.Generator, difficulty: Difficulty) -> tuple[Scene, Goal]:
-    """Draw containers, three of them over a cube; the first ones are to be lifted."""
-    containers = unmask.draw_containers(rng, CONTAINERS[difficulty], REGION, GAP)
-    cubes = unmask.hide_cubes(rng, containers)
-    colors = tuple(str(cube.color) for cube in cubes[: PICKS[difficulty]])
-    scene = Scene((*containers, *cubes), motions=unmask.appearing(containers))
-    return scene, Goal.of(colors=colors)
 
 
 def demonstration(_scene: Scene) -> tuple[Stage, ...]:
@@ -58,7 +46,7 @@ TASK = Task(
     suite="permanence",
     code=6,
     spatial=True,
-    sample=sample,
+    sample=unmask.sample,
     goals=unmask.goals,
     stages=unmask.pick_stages,
     commands=COMMANDS,

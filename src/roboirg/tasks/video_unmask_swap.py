@@ -51,7 +51,7 @@ COMMANDS = replace(
         )
     ),
     by_place="the container that was {place} at first",
-    things_at="the container[|s] that [was|were] {place} at first",
+    things_at="the container that was {place} at first",
 )
 
 TASK = Task(

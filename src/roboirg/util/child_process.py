@@ -6,35 +6,23 @@ The kernel kills a child when the thread that started it ends, so start it in a 
 from __future__ import annotations
 
 import contextlib
-import json
 import multiprocessing
 import os
 import signal
-import socket
-import subprocess
-import sys
 import threading
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from multiprocessing import resource_tracker
 from multiprocessing.connection import Connection
 from multiprocessing.process import BaseProcess
-from typing import IO, Any, NamedTuple, Self, cast
+from typing import Any, NamedTuple, Self, cast
 
-from roboirg.util.process_guard import begin, descendants
+from roboirg.util.process_guard import begin
 
 GRACE_S = 2.0
 """How long a child may take to exit once its channel is closed."""
-GUARD_S = 5.0
-"""How long a guard may take to end all that an interpreter has started."""
 _SAFE_PATH = "PYTHONSAFEPATH"
 """Variable that keeps the working directory, where a policy may lie, from the import path."""
 _starting = threading.Lock()
-
-# The first thing the interpreter gets is the import path.
-_BOOT = (
-    "import json, sys; sys.path[:] = json.loads(sys.argv.pop()); "
-    "from roboirg.util.process_guard import run_main; run_main()"
-)
 
 
 class ChildExit(NamedTuple):
@@ -60,43 +48,15 @@ class ChildExit(NamedTuple):
         return f"the process ended with exit code {self.code}"
 
 
-class _Interpreter(subprocess.Popen[bytes]):
-    """The guard of an interpreter; ends as that has ended, once nothing of it is left."""
-
-    @property
-    def exitcode(self) -> int | None:
-        return self.poll()
-
-    def kill(self) -> None:
-        """Let the guard kill all; if something has stopped it, kill it and them."""
-        self.terminate()
-        self.join(GUARD_S)
-        if self.poll() is None:
-            for pid in descendants(self.pid):
-                with contextlib.suppress(OSError):
-                    os.kill(pid, signal.SIGKILL)
-        super().kill()
-
-    def join(self, timeout: float | None = None) -> None:
-        with contextlib.suppress(subprocess.TimeoutExpired):
-            self.wait(timeout)
-
-
 class ChildProcess:
-    """A child process and our end of its channel; made by `spawn` or `run_module`.
+    """A child process and our end of its channel; made by `spawn`.
 
     Attributes:
         connection: readable when the child has sent something, or is dead.
-        output: what the child prints, if that does not go where this process prints.
     """
 
-    def __init__(
-        self,
-        process: BaseProcess | _Interpreter,
-        connection: Connection,
-        output: IO[bytes] | None = None,
-    ) -> None:
-        self._process, self.connection, self.output = process, connection, output
+    def __init__(self, process: BaseProcess, connection: Connection) -> None:
+        self._process, self.connection = process, connection
 
     @classmethod
     def spawn(cls, work: Callable[..., None], *args: Any, daemon: bool = False) -> Self:  # noqa: ANN401
@@ -116,42 +76,15 @@ class ChildProcess:
         )
         with _safe_path():
             resource_tracker.ensure_running()  # which would unblock what is blocked below
-            with _without_interrupts():
+            with without_interrupts():
                 process.start()
         # Only the child may keep this end open: then its death reads as end of file.
         theirs.close()
         return cls(process, ours)
 
-    @classmethod
-    def run_module(cls, module: str, variables: Mapping[str, str | None]) -> Self:
-        """Start ``main(connection)`` of a module in an interpreter that knows nothing of this one.
-
-        The script and command line of this process are kept from it. It has the environment of this
-        process and `variables`; those that are None it has not. When it ends, a guard between the
-        two ends all that it has started, and our end of the channel reads as end of file.
-        """
-        ours, theirs = socket.socketpair()
-        wanted = {**os.environ, **variables}
-        with theirs, _without_interrupts():
-            number = theirs.fileno()
-            arguments = (str(number), str(os.getpid()), module, json.dumps(sys.path))
-            process = _Interpreter(
-                [sys.executable, "-P", "-c", _BOOT, *arguments],
-                pass_fds=[number],
-                stdin=subprocess.DEVNULL,
-                stdout=subprocess.PIPE,
-                stderr=subprocess.STDOUT,
-                env={name: value for name, value in wanted.items() if value is not None},
-            )
-        child = cls(process, Connection(os.dup(ours.fileno())), process.stdout)
-        threading.Thread(target=_hang_up, args=(process, ours), daemon=True).start()
-        return child
-
     @property
     def pid(self) -> int:
         """Its process id."""
-        if isinstance(self._process, _Interpreter):
-            return next(iter(descendants(self._process.pid)), self._process.pid)
         return cast("int", self._process.pid)  # it has been started
 
     @property
@@ -195,10 +128,8 @@ class ChildProcess:
 
     def _end_group(self) -> None:
         # Not SIGKILL: Python's resource trackers are among them, and have to clean up.
-        # An interpreter's guard has seen to it.
-        if not isinstance(self._process, _Interpreter):
-            with contextlib.suppress(OSError):
-                os.killpg(self.pid, signal.SIGTERM)
+        with contextlib.suppress(OSError):
+            os.killpg(self.pid, signal.SIGTERM)
 
 
 def serve(connection: Connection, answer: Callable[[Any], Any]) -> None:
@@ -216,7 +147,7 @@ def serve(connection: Connection, answer: Callable[[Any], Any]) -> None:
 
 
 @contextlib.contextmanager
-def _without_interrupts() -> Iterator[None]:
+def without_interrupts() -> Iterator[None]:
     """Block Ctrl-C here, and in a process that is started, which ignores it as soon as it can."""
     before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:
@@ -244,10 +175,3 @@ def _begin_work(
     os.environ.pop(_SAFE_PATH, None)
     begin(parent)
     work(connection, *args)
-
-
-def _hang_up(process: _Interpreter, line: socket.socket) -> None:
-    """Close a channel when its process has ended, even if others have its other end, too."""
-    process.wait()
-    with line, contextlib.suppress(OSError):
-        line.shutdown(socket.SHUT_RDWR)

@@ -36,10 +36,6 @@ def discover(package: ModuleType, attribute: str, kind: type[Thing], group: str)
     Returns:
         Ours in the order of the modules' names, then those of other packages in the order of the
         entry points' names.
-
-    Raises:
-        InvalidValueError: an entry point cannot be loaded, is of another kind, or takes a name
-            that is already in use; the sentence names its package.
     """
     found = discover_in_modules(package, attribute, kind)
     taken = {one.name: "roboirg" for one in found}

@@ -8,9 +8,9 @@ import importlib
 import os
 import resource
 import signal
+import socket
 import sys
 import time
-from multiprocessing.connection import Connection
 from pathlib import Path
 
 from roboirg.util.freed_memory import keep_freed_memory
@@ -21,15 +21,15 @@ _PR_SET_PDEATHSIG, _PR_SET_CHILD_SUBREAPER = 1, 36
 
 
 def run_main() -> None:
-    """Run ``main(connection)`` of a module in a child of this process, which guards it.
+    """Run ``main(line)`` of a module in a child of this process, which guards it.
 
-    The command line holds the descriptor of the channel, the parent's process id and the module.
+    The command line holds the descriptor of a socket, the parent's process id and the module.
     """
     number, parent, module = sys.argv[1:]
     sys.argv[1:] = []
     begin(int(parent))
     _guard(int(number))
-    importlib.import_module(module).main(Connection(int(number)))
+    importlib.import_module(module).main(socket.socket(fileno=int(number)))
 
 
 def begin(parent: int) -> None:
@@ -56,7 +56,7 @@ def _guard(number: int) -> None:
     Where there are no subreapers and no ``/proc``, as on macOS, that is the child's process group.
 
     Args:
-        number: descriptor of the channel, which is the child's alone.
+        number: descriptor of the socket, which is the child's alone.
     """
     waited = {signal.SIGCHLD, signal.SIGTERM}
     signal.pthread_sigmask(signal.SIG_BLOCK, waited)

@@ -15,18 +15,17 @@ from roboirg.core.instruction_options import InstructionOptions
 from roboirg.evaluation.grounding_items.answer_file import Answer
 from roboirg.evaluation.grounding_items.grounding_item import LETTERS, GroundingItem
 from roboirg.evaluation.grounding_items.verdicts import right_reply
-from roboirg.language.settings import EXPLICIT
-from roboirg.language.variants import instructions
 from roboirg.policies.vlm.goal_schema import goal_schema
 from roboirg.shortcuts import SURFACE_RULES, draw_goal, guess_goal
 from roboirg.shortcuts.command_chance import fitting_goals
-from roboirg.shortcuts.learned_floor import LearnedFloor, places_of
-from roboirg.shortcuts.shortcut_tables import TRAINING_SPLIT
+from roboirg.shortcuts.goal_learner import Heard
+from roboirg.shortcuts.shortcut_tables import learn_goals
+from roboirg.shortcuts.text_guess import TextGuess
 from roboirg.tasks import goals_of
-from roboirg.tasks.splits.splits import get_episode, split_episodes
+from roboirg.tasks.splits.splits import get_episode
 
 ORACLE, CHANCE, COMMAND = "oracle", "chance", "command"
-LEARNED_EXPLICIT, LEARNED_SETTING = "words-explicit", "words-setting"
+TEXT_ONLY = "text-only"
 
 Guess = Callable[[GroundingItem, Episode, np.random.Generator], Goal | None]
 """Returns the goal that an item is taken to mean; None for none of the scene."""
@@ -49,17 +48,17 @@ def floor_answers(name: str, items: Sequence[GroundingItem], seed: int = 0) -> I
     """
     if name not in FLOORS:
         raise UnknownNameError("floor", name, FLOORS)
-    learned = _learn(items, name) if name in (LEARNED_EXPLICIT, LEARNED_SETTING) else {}
+    learned = _learn(items) if name == TEXT_ONLY else {}
     for item in items:
         rng = np.random.default_rng([seed, zlib.crc32(f"{name} {item.id}".encode())])
         if name == ORACLE:
             for kind in ("slots", "choice", "points"):
                 yield Answer(item.id, kind, right_reply(item, kind))
             continue
-        if learned:
-            yield from _goal_answers(item, learned[item.id], rng)
-            continue
         episode = get_episode(item.task, item.split, item.episode)
+        if learned:
+            yield from _goal_answers(item, draw_goal(learned[item.id], episode, rng), rng)
+            continue
         yield from _goal_answers(item, _GUESSES[name](item, episode, rng), rng)
         if name == CHANCE:
             yield Answer(item.id, "points", _random_points(item, rng))
@@ -107,31 +106,20 @@ _GUESSES: Mapping[str, Guess] = {
     **{rule: functools.partial(_rule_goal, rule) for rule in SURFACE_RULES},
 }
 
-FLOORS = (ORACLE, *_GUESSES, LEARNED_EXPLICIT, LEARNED_SETTING)
+FLOORS = (ORACLE, *_GUESSES, TEXT_ONLY)
 """Names: the truth; a goal of the scene at random; one that fits the command alone; the surface
-rules; and classifiers of words, trained on explicit instructions or those of the same options."""
+rules; and the learner of words, trained on the same options."""
 
 
-def _learn(items: Sequence[GroundingItem], name: str) -> dict[str, Goal | None]:
-    """Return what a floor that learned from the words of the train split makes of each item."""
+def _learn(items: Sequence[GroundingItem]) -> dict[str, TextGuess]:
+    """Return what the learner of words alone makes of each item."""
     groups: dict[tuple[str, InstructionOptions], list[GroundingItem]] = {}
     for item in items:
         groups.setdefault((item.task, item.options), []).append(item)
-    found: dict[str, Goal | None] = {}
+    found: dict[str, TextGuess] = {}
     for (task, options), members in groups.items():
-        wanted = InstructionOptions(EXPLICIT) if name == LEARNED_EXPLICIT else options
-        predicted = _trained(task, wanted).predict([item.text for item in members])
-        goals = {
-            tuple(map(str, places_of(goal.as_mapping(), task).values())): goal
-            for goal in goal_schema(task).answers
-        }
-        for item, places in zip(members, predicted, strict=True):
-            found[item.id] = goals.get(tuple(places.values()))
+        learner = learn_goals(task, options, scenes=0)
+        heard = [Heard(one.text, one.hidden_slots) for one in members]
+        guesses = learner.guesses("text-only", heard)
+        found |= {item.id: guess for item, guess in zip(members, guesses, strict=True)}
     return found
-
-
-@functools.lru_cache(maxsize=256)
-def _trained(task: str, options: InstructionOptions) -> LearnedFloor:
-    episodes = split_episodes([task], [TRAINING_SPLIT])
-    told = instructions(episodes, (options.setting,), (options.form,), options)
-    return LearnedFloor(list(told))

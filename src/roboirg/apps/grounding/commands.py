@@ -106,7 +106,7 @@ def score_grounding(
         str | None,
         typer.Option(
             help="Add floors, separated by commas: oracle, chance, command, first-mention, "
-            "last-mention, elimination, surface, words-explicit, words-setting, or all."
+            "last-mention, elimination, surface, text-only, or all."
         ),
     ] = None,
     write_floors: Annotated[

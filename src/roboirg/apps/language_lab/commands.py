@@ -165,33 +165,40 @@ def score_shortcuts(
     settings: Settings = "all",
     words: PlanWords = NO_PLAN,
     by: Annotated[
-        str | None, typer.Option(help="A row for each pattern or task of a setting.")
+        str | None, typer.Option(help="A row for each pattern, task or slot of a setting.")
     ] = None,
     learned: Annotated[
-        bool, typer.Option(help="Add floors learned from the words of the train split (a minute).")
+        bool, typer.Option(help="Add what is learned from words or scenes alone (minutes).")
     ] = False,
 ) -> None:
-    """Score rules that see the words only, next to chance: how much needs no understanding.
+    """Score rules and learners that see words or scenes alone: how much needs no understanding.
 
     Example: roboirg language shortcuts --settings reasoning --by pattern
     """
     from roboirg.evaluation.plan.option_parsing import parse_splits
-    from roboirg.shortcuts.learned_floor import check_learning_support
-    from roboirg.shortcuts.shortcut_scores import GROUPINGS
-    from roboirg.shortcuts.shortcut_tables import TRAINING_SPLIT, shortcut_rows, shortcut_table
+    from roboirg.shortcuts.goal_learner import check_learning_support
+    from roboirg.shortcuts.shortcut_tables import (
+        GROUPINGS,
+        JUDGING_SPLIT,
+        LEARNING_SCENES,
+        TRAINING_SPLIT,
+        shortcut_rows,
+        shortcut_table,
+    )
 
     splits = () if split.strip().lower() == "none" else parse_splits(split)
     grouping = None if by is None else known_name("row", by, GROUPINGS)
     if learned:
         check_learning_support()
-        if TRAINING_SPLIT in splits:
+        if not {TRAINING_SPLIT, JUDGING_SPLIT}.isdisjoint(splits):
             raise InvalidValueError(
-                f"--learned learns from the split {TRAINING_SPLIT}, so --split {split} would test "
-                "it on what it has seen; ask for val or test."
+                f"--learned learns from the splits {TRAINING_SPLIT} and {JUDGING_SPLIT}, so "
+                f"--split {split} would test it on what it has seen; ask for test."
             )
     options = replace(words.options(), form=words.form())
     names, chosen = known_tasks(tasks, options.wordings), known_settings(settings)
-    rows = shortcut_rows(names, splits, chosen, options, seeds=seeds, by=grouping, learned=learned)
+    scenes = LEARNING_SCENES if learned else None
+    rows = shortcut_rows(names, splits, chosen, options, seeds=seeds, by=grouping, learning=scenes)
     if not rows:
         raise InvalidValueError(
             f"There is nothing to score: no episode of {', '.join(names)} in {', '.join(chosen)}."

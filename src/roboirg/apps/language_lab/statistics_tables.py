@@ -42,8 +42,8 @@ _RELATIONS = [
     "neighbor",
     *(
         f"{one.name}, {step}"
-        for step in ("total", "difference")
-        for one in open_templates.TWO_STEP_RELATIONS
+        for step in open_templates.COMBINATIONS
+        for one in open_templates.SECOND_STEPS
     ),
     *(one.words for one in open_templates.COMPARATIVES.everything),
     "favorite",

@@ -26,7 +26,7 @@ from roboirg.core.instruction_options import DEFAULT_DELIVERY, InstructionOption
 from roboirg.evaluation.grounding_items.question_set import EpisodeName, ExportRequest
 from roboirg.evaluation.plan.plan import Plan
 from roboirg.evaluation.records.record import Job
-from roboirg.language.settings import EXPLICIT, plain_settings
+from roboirg.language.settings import EXPLICIT
 from roboirg.tasks.splits.splits import SIZES
 from roboirg.util.atomic_write import write_atomically
 
@@ -142,10 +142,9 @@ class ListeningStudy(BaseModel):
         episodes = [EpisodeName(task, plan.split, one) for task, one in self._cells]
         training = [*self._practice(), *self._checks()]
         episodes += [EpisodeName(job.task, TRAINING, job.episode) for job in training]
-        named = plain_settings() if plan.settings == "all" else plan.settings
         return ExportRequest(
             episodes=tuple(dict.fromkeys(episodes)),
-            settings=tuple(dict.fromkeys((EXPLICIT, *named))),
+            settings=tuple(dict.fromkeys((EXPLICIT, *plan.setting_names))),
             forms=plan.forms,
             options=replace(plan.options, stages=plan.stages[0], delivery=DEFAULT_DELIVERY),
             frames_every=self.frames_every,

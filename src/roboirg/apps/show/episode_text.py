@@ -18,6 +18,7 @@ from roboirg.core.instruction_options import InstructionOptions
 from roboirg.core.motions import Away, Glow, Motion, Point, Shuttle, Swap, Vanish
 from roboirg.judging import plain_subgoal
 from roboirg.language.generator import find_refusal, instruct_with
+from roboirg.reader import interpret
 
 MINIMUM_WIDTH = 100
 """Columns if the output is not a terminal."""
@@ -95,6 +96,8 @@ def instructions_table(
         for form in ("implicit",) if setting == "explicit" else ("implicit", "resolved"):
             text = instruct_with(episode, replace(chosen, form=form)).text
             table.add_row(setting if form == "implicit" else "", form, escape(text))
+            for complaint in interpret(text, episode.scene, episode.task).not_understood:
+                table.add_row("", "", f"[red]the interpreter {escape(complaint)}[/]")
     return table
 
 

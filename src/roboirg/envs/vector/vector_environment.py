@@ -19,10 +19,11 @@ from numpy.typing import ArrayLike, NDArray
 from roboirg.core.actions import check_chunk, find_action_space
 from roboirg.core.episode import Episode
 from roboirg.core.errors import InvalidActionError, InvalidValueError, UnknownNameError
+from roboirg.core.observations import FetchedDemonstration
 from roboirg.envs.env_options import EnvOptions
 from roboirg.envs.env_settings import EnvSettings, choose_index
 from roboirg.envs.environment import RoboIRGEnv
-from roboirg.envs.vector.drawn_on_demand import LazyObservation, WorkerVideo
+from roboirg.envs.vector.drawn_on_demand import LazyObservation
 from roboirg.envs.vector.vector_infos import stack_infos
 from roboirg.envs.vector.vector_workers import (
     Recipe,
@@ -251,7 +252,8 @@ class RoboIRGVectorEnv(gymnasium.vector.VectorEnv[Batch, Any, NDArray[Any]]):
         if "demonstration" in info:
             self._starts[index] += 1
             read = partial(self._read_video, index=index, start=self._starts[index])
-            info["demonstration"] = WorkerVideo(info["demonstration"], read)
+            fields, arrays = info["demonstration"]
+            info["demonstration"] = FetchedDemonstration(fields, arrays, read)
         if answer.final is not None:
             info["final_obs"], info["final_info"] = _Opaque(answer.final[0]), answer.final[1]
         return info
@@ -277,15 +279,17 @@ class RoboIRGVectorEnv(gymnasium.vector.VectorEnv[Batch, Any, NDArray[Any]]):
         self._processes.ask(dict.fromkeys(range(self.num_envs), ("draw", ((field,),))))
         return self._arrays[field].copy()
 
-    def _read_video(self, field: str, *, index: int, start: int) -> NDArray[Any]:
-        """Return a field of the video that a sub-environment began its episode with."""
+    def _read_video(
+        self, fields: Sequence[str], *, index: int, start: int
+    ) -> dict[str, NDArray[Any]]:
+        """Return fields of the video that a sub-environment began its episode with."""
         if start != self._starts[index]:
             raise InvalidValueError(
-                f"{field!r} of an earlier episode's video was not drawn; read it before "
+                f"{fields[0]!r} of an earlier episode's video was not drawn; read it before "
                 f"sub-environment {index} starts the next episode."
             )
-        found: NDArray[Any] = self._processes.ask({index: ("read_video", (field,))})[index]
-        return found
+        found = self._processes.ask({index: ("read_video", (fields,))})[index]
+        return cast("dict[str, NDArray[Any]]", found)
 
     def _per_environment(self, name: str, value: Any) -> list[Any]:  # noqa: ANN401
         """Return a value for each sub-environment."""

@@ -70,7 +70,8 @@ class Transition(NamedTuple):
 
     Attributes:
         texts: the fields of the observation that are not arrays.
-        info: its info; the video of a reset is described by `VideoFields`.
+        info: its info; that of a reset has the names of the video's fields, and those fields that
+            need no drawing.
         reward: of a step.
         terminated: of a step.
         truncated: of a step.
@@ -84,20 +85,6 @@ class Transition(NamedTuple):
     terminated: bool = False
     truncated: bool = False
     final: tuple[dict[str, Any], dict[str, Any]] | None = None
-
-
-class VideoFields(NamedTuple):
-    """A demonstration that stays with its worker.
-
-    Attributes:
-        fields: names of all fields.
-        arrays: the fields that need no drawing.
-        length: control steps in the video.
-    """
-
-    fields: tuple[str, ...]
-    arrays: dict[str, NDArray[Any]]
-    length: int
 
 
 class SubEnvironment:
@@ -125,7 +112,7 @@ class SubEnvironment:
         self._video = video = info["demonstration"]
         fields = tuple(video)
         arrays = {field: video[field] for field in fields if field not in self._drawn}
-        info["demonstration"] = VideoFields(fields, arrays, video.length)
+        info["demonstration"] = fields, arrays
         return Transition(self._share(observation), info)
 
     def step(self, chunk: NDArray[Any], then: dict[str, Any] | None) -> Transition:
@@ -142,9 +129,9 @@ class SubEnvironment:
         for field, picture in self._env.read_pictures(fields).items():
             self._arrays[field][self._index] = picture
 
-    def read_video(self, field: str) -> NDArray[Any]:
-        """Return a field of the demonstration of the current episode."""
-        return self._video[field]
+    def read_video(self, fields: Sequence[str]) -> dict[str, NDArray[Any]]:
+        """Return fields of the demonstration of the current episode."""
+        return {field: self._video[field] for field in fields}
 
     def call(self, name: str, args: Sequence[Any], options: Mapping[str, Any]) -> Any:  # noqa: ANN401
         """Call a method of the environment, or return an attribute."""

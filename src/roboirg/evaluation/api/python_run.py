@@ -28,12 +28,7 @@ RUNS = Path("runs")
 def python_plan(
     policies: AnyPolicy | Sequence[AnyPolicy] | Mapping[str, AnyPolicy], **options: object
 ) -> Plan:
-    """Return a checked plan; options may be Python values or text as on the command line.
-
-    Raises:
-        UnknownNameError: a policy, task, setting, … does not exist.
-        InvalidValueError: a number or combination is out of range.
-    """
+    """Return a checked plan; options may be Python values or text as on the command line."""
     named = _named(policies)
     specs = {name: spec_of(policy) for name, policy in named.items()}
     for spec in specs.values():

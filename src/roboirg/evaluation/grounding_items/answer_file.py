@@ -73,11 +73,7 @@ def read_answers(path: Path, items: Sequence[GroundingItem]) -> list[Answer]:
 
 
 def write_answers(path: Path, answers: Iterable[Answer]) -> None:
-    """Write answers as JSON lines.
-
-    Raises:
-        InvalidValueError: the file cannot be written.
-    """
+    """Write answers as JSON lines."""
     lines = (
         json.dumps({"id": one.id, "kind": one.kind, "reply": one.reply}) + "\n" for one in answers
     )

@@ -151,11 +151,7 @@ def encode_items(items: list[GroundingItem]) -> bytes:
 
 
 def write_items(items: list[GroundingItem], folder: Path) -> bytes:
-    """Write the items of a dataset into its folder; return the content of the file.
-
-    Raises:
-        InvalidValueError: the file cannot be written.
-    """
+    """Write the items of a dataset into its folder; return the content of the file."""
     content = encode_items(items)
     write_atomically(folder / ITEMS_FILE, content)
     return content

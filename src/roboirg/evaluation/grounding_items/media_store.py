@@ -52,11 +52,7 @@ def store_media(folder: Path, episode: Episode, every: int, most: int) -> Episod
 
 
 def store_content(folder: Path, kind: str, content: bytes, suffix: str) -> str:
-    """Store a file under a name that follows from its content; return its path in the dataset.
-
-    Raises:
-        InvalidValueError: it cannot be written.
-    """
+    """Store a file under a name that follows from its content; return its path in the dataset."""
     name = hashlib.sha256(content).hexdigest()[:NAME_DIGITS]
     path = folder / kind / f"{name}{suffix}"
     if not path.exists():

@@ -38,9 +38,6 @@ def pointed_kinds(task_name: str) -> tuple[ObjectKind, ...]:
 
     These are the kinds of which different goals of a scene need different objects. If there are
     none, as where goals differ in a number only, it is the kind that the robot handles first.
-
-    Raises:
-        UnknownNameError: there is no such task.
     """
     task = get_task(task_name)
     found: dict[ObjectKind, None] = {}

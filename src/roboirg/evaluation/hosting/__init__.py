@@ -5,6 +5,6 @@
 | `hosted_policy` | the world's process | a policy whose methods are calls to its host |
 | `host_pool`, `policy_host` | the supervisor | queues, batches, deadlines, attribution |
 | `policy_child` | the supervisor | one policy process: start, exchange messages, end |
-| `host_process`, `hosted_episode` | the policy's process | carries out the calls; holds no world |
-| `messages` | all | schema of the messages; arrays in shared memory; nothing is ever unpickled |
+| `host_process` | the policy's process | carries out the calls; holds no world |
+| `messages` | all | schema of the messages and how they travel; nothing is ever unpickled |
 """

@@ -3,23 +3,20 @@
 from __future__ import annotations
 
 import contextlib
-import os
 import socket
 import threading
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from multiprocessing.connection import Connection
 from typing import Any, Self
 
 from roboirg.core.errors import InvalidValueError
-from roboirg.evaluation.hosting.messages import encode, read_call
-from roboirg.evaluation.hosting.policy_child import ChildLostError, PolicyChild
+from roboirg.evaluation.episode_errors import EpisodeLostError
+from roboirg.evaluation.hosting.messages import receive_calls, send
+from roboirg.evaluation.hosting.policy_child import PolicyChild
 from roboirg.evaluation.hosting.policy_host import HostSession, PolicyHost
 
 DEFAULT_BATCH = 16
-_PER_EPISODE = 2
-"""File descriptors with which an episode begins: a connection, and a block of shared memory."""
 
 Connect = Callable[[], socket.socket]
 """Returns a new line to a pool, for a process with worlds."""
@@ -84,18 +81,16 @@ class HostPool:
         return theirs
 
     def serve(self, line: socket.socket) -> None:
-        """Serve the worlds at the other end of a line."""
+        """Serve the world at the other end of a line, one episode after the other."""
         self._lines.append(line)
-        threading.Thread(
-            target=self._accept, args=(line,), name="policy hosts", daemon=True
-        ).start()
+        threading.Thread(target=self._serve, args=(line,), name="hosted world", daemon=True).start()
 
     @property
     def pids(self) -> list[int]:
         """The process ids of the policies' processes."""
         return [child.pid for child in self._children()]
 
-    def loss(self) -> ChildLostError | None:
+    def loss(self) -> EpisodeLostError | None:
         """Return how a policy's process died since the last call; None if all are alive."""
         return next(filter(None, (child.loss() for child in self._children())), None)
 
@@ -123,35 +118,28 @@ class HostPool:
     def __exit__(self, *_exception: object) -> None:
         self.close()
 
-    def _accept(self, line: socket.socket) -> None:
-        """Serve the episodes that begin on a line until its process ends."""
-        with line, contextlib.suppress(OSError):
-            while True:
-                _, descriptors, *_ = socket.recv_fds(line, 1, 2)
-                if len(descriptors) != _PER_EPISODE:  # the line was closed
-                    return
-                threading.Thread(
-                    target=self._serve, args=descriptors, name="hosted world", daemon=True
-                ).start()
-
-    def _serve(self, connection: int, block: int) -> None:
-        """Carry out the calls of one episode until its world hangs up."""
-        session, host = HostSession(Connection(connection), block), None
-        try:
-            with contextlib.suppress(EOFError, OSError):
-                while True:
-                    call = read_call(session.connection.recv_bytes())
-                    if call.method == "open":
-                        session.alone = call.alone
-                        host = self._host_for(call.spec, session)
-                    if host is None:
-                        return
-                    session.connection.send_bytes(encode(host.call(session, call)))
-        finally:
-            session.connection.close()
-            if host is not None:
-                host.leave(session)
-            os.close(block)
+    def _serve(self, line: socket.socket) -> None:
+        """Carry out the calls of a world until it hangs up."""
+        host: PolicyHost | None = None
+        with line:
+            session = HostSession(line)
+            try:
+                with contextlib.suppress(EOFError, OSError):
+                    while True:
+                        (call,) = receive_calls(line)
+                        if call.method == "open":
+                            if host is not None:  # the world gave up the episode before
+                                host.leave(session)
+                            session = HostSession(line, call.alone)
+                            host = self._host_for(call.spec, session)
+                        if host is None:
+                            return
+                        send(line, host.call(session, call))
+                        if not session.started:
+                            host.leave(session)
+            finally:
+                if host is not None:
+                    host.leave(session)
 
     def _host_for(self, spec: str, session: HostSession) -> PolicyHost | None:
         """Return the host of a policy with the fewest episodes, and end what is not needed."""
@@ -177,6 +165,6 @@ class HostPool:
         variables = {} if device is None else {"CUDA_VISIBLE_DEVICES": device}
 
         def start() -> PolicyChild:
-            return self._starter.submit(PolicyChild.start, variables).result()
+            return self._starter.submit(PolicyChild, variables).result()
 
         return PolicyHost(start, self._settings.batch, self._settings.policy_timeout_s)

@@ -10,42 +10,46 @@ import contextlib
 import functools
 import io
 import os
+import socket
 import sys
 import threading
-from collections.abc import Sequence
-from multiprocessing.connection import Connection
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from numpy.typing import NDArray
+
+from roboirg.core.actions import ActionSpace
 from roboirg.core.errors import MissingDependencyError
+from roboirg.core.inference_facts import inference_facts
+from roboirg.core.observations import FetchedDemonstration
 from roboirg.evaluation.episode_errors import describe_error, one_line
-from roboirg.evaluation.hosting.hosted_episode import HostedEpisode
 from roboirg.evaluation.hosting.messages import (
     MAX_TEXT,
-    Ask,
     Call,
-    Failure,
-    Opened,
     Outcome,
-    encode,
-    read_call,
-    read_calls,
-    receive_descriptor,
+    Question,
+    receive_calls,
+    send,
 )
-from roboirg.policies.by_name.loading import policy_needs, policy_version
+from roboirg.evaluation.policy_calls import check_rows, dump_metadata, policy_subgoal, policy_usage
+from roboirg.policies.by_name.loading import make_policy, policy_needs, policy_version
+from roboirg.policies.contract.base import close_policy, tell_policy
+from roboirg.policies.contract.policy_needs import PolicyNeeds
 from roboirg.policies.contract.random_state import RandomState
 
 
 class HostProcess:
-    """Carries out calls until the connection closes.
+    """Carries out calls until the line closes.
 
     Args:
-        connection: to the supervisor.
+        line: to the supervisor.
     """
 
-    def __init__(self, connection: Connection) -> None:
-        self._connection = connection
-        self._episodes: dict[int, HostedEpisode] = {}
+    def __init__(self, line: socket.socket) -> None:
+        self._line = line
+        self._episodes: dict[int, tuple[Any, RandomState, ActionSpace]] = {}
         self._read_fields: dict[str, None] = {}
         self._asking: set[int] = set()
         self._home, self._thread = os.getcwd(), threading.get_ident()  # noqa: PTH109
@@ -54,8 +58,8 @@ class HostProcess:
         """Answer every message."""
         with contextlib.suppress(EOFError, OSError):
             while True:
-                calls = read_calls(self._connection.recv_bytes())
-                self._connection.send_bytes(encode(self._answer(calls)))
+                calls = receive_calls(self._line)
+                send(self._line, self._answer(calls))
 
     def _answer(self, calls: Sequence[Call]) -> list[Outcome]:
         with contextlib.suppress(OSError):
@@ -70,42 +74,72 @@ class HostProcess:
         return outcomes
 
     def _outcome(self, call: Call) -> Outcome:
-        # What belongs to the next call is not left in the socket, whatever happens in this one.
-        block = receive_descriptor(self._connection) if call.method == "open" else -1
         try:
-            return self._carry_out(call, block)
+            if call.method == "describe":
+                return Outcome(needs=policy_needs(call.spec), version=policy_version(call.spec))
+            if call.method == "open":
+                return self._open(call)
+            return self._carry_out(call, *self._episodes[call.session])
         except BaseException as error:  # noqa: BLE001 - policies may raise anything
             return _failure(error)
 
-    def _carry_out(self, call: Call, block: int) -> Outcome:
-        if call.method == "describe":
-            return Opened(policy_needs(call.spec), policy_version(call.spec))
-        if call.method == "open":
-            ask = functools.partial(self.ask, call.session)
-            episode = HostedEpisode(call, block, ask, self._read_fields)
-            self._episodes[call.session] = episode
-            return episode.describe(call.spec)
-        episode = self._episodes[call.session]
-        if call.method == "close":
-            del self._episodes[call.session]
-        with episode.random:
-            found: Outcome = getattr(episode, call.method)(call)
-        return found
+    def _open(self, call: Call) -> Outcome:
+        """Begin an episode with a policy of its own; returns what the world must know of it."""
+        random = RandomState(call.seed)
+        with random:
+            policy: Any = make_policy(call.spec, call.seed)
+        # Pixels of subgoals are for privileged policies, and those have no host.
+        needs = replace(PolicyNeeds.of(policy), grounded=False)
+        self._episodes[call.session] = policy, random, needs.action_space
+        return Outcome(
+            needs=needs,
+            version=policy_version(call.spec),
+            together=callable(getattr(policy, "act_together", None)),
+            reads=tuple(self._read_fields),
+        )
+
+    def _carry_out(
+        self,
+        call: Call,
+        policy: Any,  # noqa: ANN401 - somebody's class
+        random: RandomState,
+        space: ActionSpace,
+    ) -> Outcome:
+        """Call a method of a policy; `reset` and `hear` return its metadata."""
+        with random:
+            match call.method:
+                case "reset":
+                    fetch = functools.partial(self._fetch, call.session)
+                    fields, arrays = call.value["fields"], call.value["arrays"]
+                    video = FetchedDemonstration(fields, arrays, fetch)
+                    policy.reset(call.value["instruction"], video)
+                    return Outcome(
+                        metadata=dump_metadata(policy), inference=inference_facts(policy)
+                    )
+                case "hear":
+                    tell_policy(policy, call.value)
+                case "act":
+                    return _acted(policy, space, policy.act(_observation(call)))
+                case "usage":
+                    return Outcome(usage=policy_usage(policy))
+                case "close":
+                    del self._episodes[call.session]
+                    close_policy(policy)
+                    return Outcome()
+            return Outcome(metadata=dump_metadata(policy))
 
     def _act_together(self, calls: Sequence[Call]) -> list[Outcome]:
         """Ask about several episodes at once; a failure is not attributed to any of them."""
-        episodes = [self._episodes[call.session] for call in calls]
         try:
-            observations = [one.read(call) for one, call in zip(episodes, calls, strict=True)]
-            first: Any = episodes[0].policy
+            policies, _, spaces = zip(*(self._episodes[one.session] for one in calls), strict=True)
             RandomState.set_aside()
-            chunks = first.act_together([one.policy for one in episodes], observations)
-            return [one.actions(rows) for one, rows in zip(episodes, chunks, strict=True)]
+            chunks = policies[0].act_together(list(policies), list(map(_observation, calls)))
+            return [_acted(*one) for one in zip(policies, spaces, chunks, strict=True)]
         except BaseException as error:  # noqa: BLE001 - policies may raise anything
             return [_failure(error)] * len(calls)
 
-    def ask(self, session: int, question: Ask) -> Call:
-        """Ask the world of an episode whose call is under way.
+    def _fetch(self, session: int, fields: Sequence[str]) -> Mapping[str, NDArray[Any]]:
+        """Return fields of the video of an episode whose call is under way.
 
         Raises:
             RuntimeError: no call of this episode is under way in this thread, or the world is gone.
@@ -115,33 +149,52 @@ class HostProcess:
                 "pictures of the demonstration can be read only while a call of the policy is "
                 "under way, by the thread that was called"
             )
-        question.session = session
-        self._connection.send_bytes(encode(question))
-        answer = read_call(self._connection.recv_bytes())
+        self._read_fields.update(dict.fromkeys(fields))
+        send(self._line, Question(session, tuple(fields)))
+        (answer,) = receive_calls(self._line)
         if answer.method == "gone":
             raise RuntimeError("the episode has ended")
-        return answer
+        found: Mapping[str, NDArray[Any]] = answer.value
+        return found
 
 
-def _failure(error: BaseException) -> Failure:
+def _observation(call: Call) -> Any:  # noqa: ANN401 - an `Observation`
+    """Return the observation of a call; sequences travel as lists."""
+    if "history" in call.value:
+        call.value["history"] = tuple(call.value["history"])
+    return call.value
+
+
+def _acted(policy: Any, space: ActionSpace, rows: Any) -> Outcome:  # noqa: ANN401
+    """Return what a policy's `act` returned, checked, for a message."""
+    chunk = check_rows(rows, space)
+    return Outcome(
+        rows=chunk.tobytes(),
+        size=chunk.shape[1],
+        latency_s=float(getattr(policy, "latency_s", 0.0)),
+        subgoal=policy_subgoal(policy),
+    )
+
+
+def _failure(error: BaseException) -> Outcome:
     """Return kind, message and traceback of an exception that is being handled."""
     if isinstance(error, MissingDependencyError):
-        return Failure("missing", one_line(error))
+        return Outcome("missing", one_line(error))
     try:
         found = describe_error("policy", error)
     except BaseException:  # noqa: BLE001 - its attributes are a policy's code, too
-        return Failure("policy", "it raised an exception that cannot be described")
+        return Outcome("policy", "it raised an exception that cannot be described")
     kind: Any = found.kind  # of the policy, never of the environment
-    return Failure(kind, str(found)[:MAX_TEXT], found.details)
+    return Outcome(kind, str(found)[:MAX_TEXT], found.details)
 
 
-def main(connection: Connection) -> None:
+def main(line: socket.socket) -> None:
     """Serve a supervisor; runs in a process of its own."""
     if isinstance(sys.stdout, io.TextIOWrapper):
         sys.stdout.reconfigure(line_buffering=True)
     if sys.path[-1] == str(Path.cwd()):  # where a command puts it: its policy's files come first
         sys.path.insert(0, sys.path.pop())
-    HostProcess(connection).serve()
+    HostProcess(line).serve()
     with contextlib.suppress(Exception):
         sys.stdout.flush()
     os._exit(0)  # threads that a policy left behind must not keep this process

@@ -7,14 +7,12 @@ policy's.
 from __future__ import annotations
 
 import contextlib
-import mmap
 import os
 import socket
 import sys
 import time
 from collections.abc import Sequence
-from multiprocessing.connection import Connection
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,32 +23,23 @@ from roboirg.core.inference_facts import InferenceFacts
 from roboirg.core.observations import Demonstration, Observation
 from roboirg.evaluation.episode_errors import EpisodeError, EpisodeLostError, attribute_errors
 from roboirg.evaluation.hosting.messages import (
-    Acted,
-    Ask,
     Call,
-    Failure,
-    Lost,
-    Opened,
-    Payload,
-    Told,
-    encode,
-    map_block,
-    new_block,
-    pack_payload,
+    Outcome,
+    Question,
+    Reply,
     read_supervisor,
+    receive,
+    send,
 )
 from roboirg.evaluation.policy_calls import read_metadata
 from roboirg.policies.contract.policy_urls import is_url
 
 _DRAWN = ("_rgb", "_depth")
 """How the fields of a demonstration end that are drawn when they are read."""
-_SENT = "the policy's process sent"
-
-Found = TypeVar("Found", Opened, Told, Acted)
 
 
 class HostedPolicy:
-    """A policy in its host's process, for one episode.
+    """A policy in its host's process, for one episode; a line has one after the other.
 
     Args:
         hosts: the line on which to ask for its host, of `HostPool.connect`.
@@ -63,7 +52,8 @@ class HostedPolicy:
         metadata: as the policy reports them, from `reset` on.
         inference: what its process computes with, from `reset` on.
         waited_s: seconds that its calls waited for others.
-        latency_s: seconds that its last actions took on its own robot, if it reports that.
+        latency_s: seconds that its last actions took on the robot it is meant for, if it reports
+            them.
         subgoal: what it named after its last actions, if anything.
 
     Raises:
@@ -73,22 +63,16 @@ class HostedPolicy:
     """
 
     def __init__(self, hosts: socket.socket, spec: str, seed: int, *, alone: bool = False) -> None:
-        self._spec = spec
+        self._spec, self._hosts = spec, hosts
         self.metadata: dict[str, JsonValue] = {}
         self.inference: InferenceFacts | None = None
         self.waited_s = self.latency_s = 0.0
         self.subgoal: str | None = None
         self._demonstration: Demonstration = {}
-        self._sent: Payload = pack_payload(None)
         self._is_open = True
-        with contextlib.ExitStack() as undo:
-            self._connection, self._block = _begin_episode(hosts)
-            undo.callback(self._block.close)
-            undo.callback(self._connection.close)
-            found = self._call(Opened, Call("open", spec=spec, seed=seed, alone=alone))
-            found.needs.declare_on(self)
-            self.version, self._reads = found.version, found.reads
-            self._end = undo.pop_all()
+        found = self._call(Call("open", spec=spec, seed=seed, alone=alone))
+        found.needs.declare_on(self)
+        self.version, self._reads = found.version, found.reads
 
     def reset(self, instruction: str, demonstration: Demonstration) -> None:
         """Begin the episode."""
@@ -101,89 +85,96 @@ class HostedPolicy:
             "fields": list(demonstration),
             "arrays": self._drawn(now),
         }
-        found = self._call(Told, self._pack("reset", value))
+        found = self._call(Call("reset", value=value))
         self._take_metadata(found)
         self.inference = found.inference
 
     def act(self, observation: Observation) -> NDArray[np.float64]:
         """Return the next actions (n, 8) or (n, 7)."""
-        found = self._call(Acted, self._pack("act", observation))
+        found = self._call(Call("act", value=observation))
         self.latency_s, self.subgoal = found.latency_s, found.subgoal
         if not found.rows or len(found.rows) % (8 * found.size):
-            raise EpisodeError("policy", f"{_SENT} actions in part", "")
+            raise EpisodeError("policy", "the policy's process sent actions in part", "")
         return np.frombuffer(found.rows, np.float64).reshape(-1, found.size).copy()
 
     def hear(self, text: str, step: int) -> None:
-        """Let the policy hear what was said."""
-        utterance = {"text": text, "step": step}
-        self._take_metadata(self._call(Told, Call("hear", utterances=(utterance,))))
+        """Pass on what was said."""
+        self._take_metadata(self._call(Call("hear", value=[{"text": text, "step": step}])))
 
     def usage(self) -> dict[str, float]:
         """Return the cost of the episode; empty after an error."""
-        return dict(self._call(Told, Call("usage")).usage) if self._is_open else {}
+        return dict(self._call(Call("usage")).usage) if self._is_open else {}
 
     def close(self) -> None:
         """End the episode; repeated calls do nothing."""
         is_open, self._is_open = self._is_open, False
-        with self._end, contextlib.suppress(EpisodeLostError):  # what is lost needs no end
-            if is_open:
-                self._call(Told, Call("close"))
+        if is_open:
+            with contextlib.suppress(EpisodeLostError):  # what is lost needs no end
+                self._call(Call("close"))
 
-    def _call(self, kind: type[Found], call: Call) -> Found:
+    def _call(self, call: Call) -> Outcome:
         """Call the host, draw what it asks for, and return the outcome.
 
         Raises:
-            EpisodeError: the policy raised, or broke its process.
+            EpisodeError: the policy raised, or broke its process; or the world cannot draw.
             EpisodeLostError: the process was lost through no fault of this episode.
             MissingDependencyError: a package that one of our own policies needs is missing.
         """
         start = time.perf_counter()
         try:
-            self._connection.send_bytes(encode(call))
-            while isinstance(reply := read_supervisor(self._connection.recv_bytes()), Ask):
-                self._connection.send_bytes(encode(self._draw(reply)))
+            reply, failure = self._exchange(call)
         except (EOFError, OSError) as error:
             self._is_open = False
-            raise _lost() from error
-        except EpisodeError:
-            self._is_open = False  # the host waits for an answer
-            raise
+            raise EpisodeLostError(
+                "infrastructure", "the policy's host is gone", alone=False
+            ) from error
         _print(reply.output)
         self.waited_s += max(time.perf_counter() - start - reply.seconds, 0.0)
-        outcome = reply.outcome
-        if isinstance(outcome, Failure | Lost):
-            raise self._error(outcome)
-        if not isinstance(outcome, kind):
-            raise EpisodeError("policy", f"{_SENT} something else than was asked for", "")
-        return outcome
+        self._is_open = self._is_open and reply.outcome is not None
+        if failure is not None:
+            raise failure
+        if reply.outcome is None or reply.outcome.error is not None:
+            raise self._error(reply)
+        return reply.outcome
 
-    def _error(self, outcome: Failure | Lost) -> Exception:
-        """Return what a failure raises here."""
-        if isinstance(outcome, Failure):
-            if outcome.kind != "missing":
-                return EpisodeError(outcome.kind, outcome.message, outcome.details)
-            if is_url(self._spec):
-                return MissingDependencyError(outcome.message)
-            return EpisodeError("policy", outcome.message, "")
-        self._is_open = False
-        if outcome.again:
-            return EpisodeLostError(outcome.kind, outcome.message, alone=outcome.alone)
-        return EpisodeError(outcome.kind, outcome.message, "")
+    def _exchange(self, call: Call) -> tuple[Reply, Exception | None]:
+        """Return the reply to a call, and what was raised while pictures were drawn for it."""
+        failure: Exception | None = None
+        send(self._hosts, [call])
+        while isinstance(reply := read_supervisor(receive(self._hosts)), Question):
+            answer = Call("gone")
+            try:
+                with attribute_errors("environment"):
+                    answer = Call("answer", value=self._draw(reply.fields))
+            except Exception as error:  # noqa: BLE001 - raised once the policy has returned
+                failure = error
+            send(self._hosts, [answer])
+        return reply, failure
 
-    def _take_metadata(self, found: Told) -> None:
+    def _error(self, reply: Reply) -> Exception:
+        """Return what a loss, or a policy's exception, raises here."""
+        match reply.outcome:
+            case None if reply.again:
+                return EpisodeLostError(reply.kind, reply.message, alone=reply.alone)
+            case None:
+                return EpisodeError(reply.kind, reply.message, "")
+            case Outcome(error="missing", message=words):
+                # Only our own client of a URL can ask the user to install something.
+                known = is_url(self._spec)
+                return MissingDependencyError(words) if known else EpisodeError("policy", words, "")
+            case Outcome(error, message, details):
+                kind: Any = error
+                return EpisodeError(kind, message, details)
+
+    def _take_metadata(self, found: Outcome) -> None:
         try:
             self.metadata = read_metadata(found.metadata, is_ours=False)
         except (InvalidValueError, ValueError) as error:
             raise EpisodeError("policy", str(error), "") from error
 
-    def _draw(self, question: Ask) -> Call:
-        """Return the answer to a question of the policy's process."""
-        if question.start is not None:
-            self._sent.copy_to(self._block, question.start)
-            return Call("answer")
-        wanted = [field for field in self._demonstration if field in question.fields]
-        with attribute_errors("environment"):
-            return self._pack("answer", self._drawn(wanted))
+    def _draw(self, fields: Sequence[str]) -> dict[str, NDArray[Any]]:
+        """Return the fields of the video that a policy's process asks for, if there are such."""
+        return self._drawn([field for field in self._demonstration if field in fields])
 
     def _drawn(self, fields: Sequence[str]) -> dict[str, NDArray[Any]]:
         draw = getattr(self._demonstration, "draw", None)
@@ -193,26 +184,6 @@ class HostedPolicy:
             draw()  # all cameras in one replay
         return {field: self._demonstration[field] for field in fields}
 
-    def _pack(self, method: str, value: object) -> Call:
-        """Put the arrays of a value into shared memory; return the rest as a call."""
-        self._sent = pack_payload(value)
-        self._sent.copy_to(self._block, 0)
-        return Call(method, tree=self._sent.tree, size=self._sent.size)
-
-
-def _begin_episode(hosts: socket.socket) -> tuple[Connection, mmap.mmap]:
-    """Return a connection to the supervisor, and memory shared with the policy's process."""
-    ours, theirs = socket.socketpair()
-    block = new_block()
-    with theirs:
-        try:
-            socket.send_fds(hosts, [b"\0"], [theirs.fileno(), block])
-        except OSError as error:
-            ours.close()
-            os.close(block)
-            raise _lost() from error
-    return Connection(ours.detach()), map_block(block)
-
 
 def _print(output: bytes) -> None:
     """Print what the policy printed, so that it is in the log of its episode."""
@@ -220,7 +191,3 @@ def _print(output: bytes) -> None:
         with contextlib.suppress(OSError):
             sys.stderr.flush()
             os.write(sys.__stderr__.fileno() if sys.__stderr__ else 2, output)
-
-
-def _lost() -> EpisodeLostError:
-    return EpisodeLostError("infrastructure", "the policy's host is gone", alone=False)

@@ -5,8 +5,9 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from roboirg.core.errors import InvalidValueError, MissingDependencyError
-from roboirg.evaluation.hosting.messages import Call, Failure, Opened
-from roboirg.evaluation.hosting.policy_child import ChildLostError, PolicyChild
+from roboirg.evaluation.episode_errors import EpisodeLostError
+from roboirg.evaluation.hosting.messages import Call
+from roboirg.evaluation.hosting.policy_child import PolicyChild
 from roboirg.policies.by_name.loading import (
     is_foreign,
     is_privileged,
@@ -76,24 +77,22 @@ def _describe_ours(spec: str) -> PolicyDescription:
 
 
 def _describe_apart(spec: str) -> PolicyDescription:
-    child = PolicyChild.start()
+    child = PolicyChild()
     try:
         with DeadlineWatch(child.kill) as watch:
             watch.begin(LIMIT_S)
             reply = child.exchange([Call("describe", spec=spec)])
-    except ChildLostError as error:
+    except EpisodeLostError as error:
         late = f"its module was not imported within {LIMIT_S:g} s"
         why = error if watch.acted_after is None else late
         raise InvalidValueError(f"Policy {spec!r} cannot be loaded: {why}.") from error
     finally:
         child.end()
-    match reply:
-        case [Opened() as found]:
-            # Whether it is privileged is not for its own process to say.
-            return PolicyDescription(found.version, is_privileged(spec), found.needs)
-        case [Failure(kind="missing") as failure]:
-            raise MissingDependencyError(failure.message)
-        case [Failure() as failure]:
-            raise InvalidValueError(failure.message)
-        case _:
-            raise InvalidValueError(f"Policy {spec!r} cannot be loaded: it sent no description.")
+    if not isinstance(reply, list) or len(reply) != 1:
+        raise InvalidValueError(f"Policy {spec!r} cannot be loaded: it sent no description.")
+    (found,) = reply
+    if found.error is not None:
+        missing = found.error == "missing"
+        raise (MissingDependencyError if missing else InvalidValueError)(found.message)
+    # Whether it is privileged is not for its own process to say.
+    return PolicyDescription(found.version, is_privileged(spec), found.needs)

@@ -10,30 +10,30 @@ others that can be carried out together.
 from __future__ import annotations
 
 import itertools
+import socket
 import threading
 import time
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from multiprocessing.connection import Connection
 
+from roboirg.evaluation.episode_errors import EpisodeLostError
 from roboirg.evaluation.hosting.messages import (
-    Ask,
     Call,
-    Failure,
-    Lost,
-    Opened,
     Outcome,
+    Question,
     Reply,
-    Told,
-    encode,
-    read_call,
+    receive_calls,
+    send,
 )
-from roboirg.evaluation.hosting.policy_child import ChildLostError, PolicyChild
+from roboirg.evaluation.hosting.policy_child import PolicyChild
 from roboirg.util.deadline_watch import DeadlineWatch
 
 GATHER_S = 0.003
 """How long a call waits for others that could be carried out together with it."""
+
+MOST_QUESTIONS = 64
+"""How often a call may ask for the video of an episode; a field is kept once it is read."""
 
 PHASES: Mapping[str, str] = {
     "open": "policy's constructor",
@@ -43,7 +43,7 @@ PHASES: Mapping[str, str] = {
     "usage": "policy's close()",
     "close": "policy's close()",
 }
-_ENDING = ChildLostError("infrastructure", "the run is ending")
+_ENDING = EpisodeLostError("infrastructure", "the run is ending", alone=False)
 _numbers = itertools.count(1)
 
 
@@ -52,20 +52,18 @@ class HostSession:
     """An episode that a host serves.
 
     Attributes:
-        connection: to its world.
-        block: descriptor of its shared memory.
-        number: unique in this process.
+        line: to its world.
         alone: whether it must not be asked about together with others.
+        number: unique in this process.
         started: which of the host's processes serves it; 0 before it is open.
         together: whether its policy can be asked about several episodes at once.
         call: the latest.
         reply: to it; None while it waits or is under way.
     """
 
-    connection: Connection
-    block: int
-    number: int = field(default_factory=lambda: next(_numbers))
+    line: socket.socket
     alone: bool = False
+    number: int = field(default_factory=lambda: next(_numbers))
     started: int = 0
     together: bool = False
     call: Call = field(default_factory=lambda: Call("open"))
@@ -111,7 +109,7 @@ class PolicyHost:
             self._waiting.popleft()
             self._is_busy = True
             calls = self._gather(session)
-        replies = [Reply(Lost("infrastructure", "the policy's host failed", again=True))]
+        replies = [Reply(message="the policy's host failed", again=True)]
         try:
             replies = self._carry_out(calls)
         finally:
@@ -166,17 +164,17 @@ class PolicyHost:
         # Those that join others are of the process that is alive.
         if self._is_stopped or (method != "open" and first.started != self._starts):
             loss = _ENDING if self._is_stopped else self._loss
-            return [Reply(_again(loss) if method != "close" else Told())] * len(sessions)
+            return [_again(loss) if method != "close" else Reply(Outcome())] * len(sessions)
         self._limit.acted_after = None
         try:
             outcomes, seconds = self._exchange(sessions)
-        except ChildLostError as loss:
+        except EpisodeLostError as loss:
             return self._attribute(sessions, loss)
         printed = b"" if self.child is None else self.child.take_output()
-        if len(sessions) > 1 and any(isinstance(one, Failure) for one in outcomes):
-            failed = ChildLostError("policy", "a call for several episodes failed")
-            return [Reply(_again(failed, alone=True))] * len(sessions)
-        if isinstance(outcomes[0], Opened):
+        if len(sessions) > 1 and any(one.error is not None for one in outcomes):
+            failed = _lost("a call for several episodes failed")
+            return [_again(failed, alone=True)] * len(sessions)
+        if method == "open" and outcomes[0].error is None:
             first.started, first.together = self._starts, outcomes[0].together
         elif method == "close":
             first.started = 0
@@ -187,26 +185,25 @@ class PolicyHost:
         """Send calls to the process, and return the outcomes and the seconds that it took."""
         child = self._started_child()
         by_number = {session.number: session for session in sessions}
-        block = sessions[0].block if sessions[0].call.method == "open" else None
-        message: Call | list[Call] = [session.call for session in sessions]
+        calls = [session.call for session in sessions]
         spent_s = 0.0
-        while True:
+        for _ in range(MOST_QUESTIONS * len(sessions)):
             start = time.monotonic()
             self._limit.begin(None if self._timeout_s is None else self._timeout_s - spent_s)
             try:
-                reply = child.exchange(message, block)
+                reply = child.exchange(calls)
             finally:
                 self._limit.begin(None)
                 spent_s += time.monotonic() - start
-            block = None
             if isinstance(reply, list):
                 if len(reply) != len(sessions):
-                    raise ChildLostError("policy", "the process sent too few or too many results")
+                    raise _lost("the process sent too few or too many results")
                 return reply, spent_s
             if reply.session not in by_number:
-                raise ChildLostError("policy", "the process asked for the video of another episode")
+                raise _lost("the process asked for the video of another episode")
             # What the world takes to draw is not the policy's time.
-            message = _ask(by_number[reply.session], reply)
+            calls = [_ask(by_number[reply.session], reply)]
+        raise _lost("the process asked for the video again and again")
 
     def _started_child(self) -> PolicyChild:
         if self.child is None:
@@ -217,13 +214,13 @@ class PolicyHost:
             self.child.exchange([])
         return self.child
 
-    def _forget_child(self, loss: ChildLostError) -> None:
+    def _forget_child(self, loss: EpisodeLostError) -> None:
         """Give up a process that is dead; the episodes that it served are played again."""
         if self.child is not None:
             self.child.end()
         self.child, self._starts, self._loss = None, self._starts + 1, loss
 
-    def _attribute(self, sessions: Sequence[HostSession], loss: ChildLostError) -> list[Reply]:
+    def _attribute(self, sessions: Sequence[HostSession], loss: EpisodeLostError) -> list[Reply]:
         """Attribute the loss of the process to the call that was under way."""
         printed = b""
         if self.child is not None:
@@ -232,21 +229,26 @@ class PolicyHost:
         self._forget_child(loss)
         phase = PHASES[sessions[0].call.method]
         if len(sessions) > 1 or self._is_stopped:
-            return [Reply(_again(loss, alone=not self._is_stopped))] * len(sessions)
+            return [_again(loss, alone=not self._is_stopped)] * len(sessions)
         if self._limit.acted_after is not None:
             words = f"the {phase} did not return within {self._timeout_s:g} s"
-            return [Reply(Lost("timeout", words), output=printed)]
-        return [Reply(Lost(loss.kind, f"{loss} in the {phase}"), output=printed)]
+            return [Reply(output=printed, kind="timeout", message=words)]
+        return [Reply(output=printed, kind=loss.kind, message=f"{loss} in the {phase}")]
 
 
-def _ask(session: HostSession, question: Ask) -> Call:
+def _ask(session: HostSession, question: Question) -> Call:
     """Return the answer of a world."""
     try:
-        session.connection.send_bytes(encode(question))
-        return read_call(session.connection.recv_bytes())
+        send(session.line, question)
+        (answer,) = receive_calls(session.line)
     except (EOFError, OSError):
         return Call("gone")
+    return answer
 
 
-def _again(loss: ChildLostError, *, alone: bool = False) -> Lost:
-    return Lost(loss.kind, str(loss), again=True, alone=alone)
+def _lost(message: str) -> EpisodeLostError:
+    return EpisodeLostError("policy", message, alone=False)
+
+
+def _again(loss: EpisodeLostError, *, alone: bool = False) -> Reply:
+    return Reply(kind=loss.kind, message=str(loss), again=True, alone=alone)

@@ -87,11 +87,7 @@ def means_all(text: str) -> bool:
 
 
 def parse_splits(text: str) -> tuple[Split, ...]:
-    """Return the splits of a name: train, val or test, or ``all`` of them.
-
-    Raises:
-        UnknownNameError: there is no such split of fixed episodes.
-    """
+    """Return the splits of a name: train, val or test, or ``all`` of them."""
     return SPLITS if means_all(text) else (splits.check_fixed_split(text),)
 
 
@@ -142,30 +138,18 @@ def _of_difficulty(
 
 
 def parse_stages(text: str) -> tuple[int, ...]:
-    """Parse stages of the contextual setting, such as ``1,5``.
-
-    Raises:
-        InvalidValueError: the text is not a list of numbers.
-    """
+    """Parse stages of the contextual setting, such as ``1,5``."""
     sets = "; ".join(",".join(map(str, stages)) for stages in language.STAGE_SETS)
     return _union(_parse_ranges("list of stages", text, f"the possible lists are {sets}"))
 
 
 def parse_stage_sets(text: str) -> tuple[tuple[int, ...], ...]:
-    """Parse several lists of stages, such as ``1,5; 1-5``.
-
-    Raises:
-        InvalidValueError: one of them is not a list of numbers.
-    """
+    """Parse several lists of stages, such as ``1,5; 1-5``."""
     return tuple(dict.fromkeys(map(parse_stages, text.split(";"))))
 
 
 def parse_numbers(kind: str, text: str) -> tuple[int, ...]:
-    """Parse numbers and ranges separated by commas, such as ``0,3,5-9``.
-
-    Raises:
-        InvalidValueError: the text is something else, or a very long list.
-    """
+    """Parse numbers and ranges separated by commas, such as ``0,3,5-9``."""
     return _union(_parse_ranges(kind, text, _NUMBERS_HINT))
 
 

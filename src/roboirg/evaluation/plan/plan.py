@@ -24,6 +24,7 @@ from pydantic import (
 from roboirg import language, policies, tasks
 from roboirg.core.actions import find_action_space
 from roboirg.core.arms import TOLD, check_arm
+from roboirg.core.delivery import TURNS
 from roboirg.core.errors import InvalidValueError
 from roboirg.core.field_types import CONTROLS, NAME
 from roboirg.core.instruction_options import (
@@ -64,6 +65,9 @@ REQUIRED = "required"
 """Instead of a wording file in a plan: one must be given when the plan is run."""
 
 
+SettingsName = Literal["all", "every"]
+SETTINGS_NAMES: tuple[SettingsName, ...] = get_args(SettingsName)
+
 PolicyProcessMode = Literal["own", "shared"]
 POLICY_PROCESSES: tuple[PolicyProcessMode, ...] = get_args(PolicyProcessMode)
 
@@ -88,8 +92,11 @@ class Plan(BaseModel):
     """Built-in names, package.module:Class, or addresses; NAME=SPEC gives one a name of its own."""
     tasks: tuple[str, ...]
     """Tasks or suites; all for the whole benchmark."""
-    settings: tuple[str, ...] | Literal["all"] = "all"
-    """Settings; all for every setting that can express the episode, without the harder ones."""
+    settings: tuple[str, ...] | SettingsName = "all"
+    """Settings; all for every setting that can express the episode, without the harder ones; every
+    for these, too."""
+    in_turns: tuple[str, ...] = ()
+    """Settings that are also played with the utterances one after another."""
     forms: tuple[str, ...] = ("implicit",)
     """implicit, resolved or both."""
     split: str = "test"
@@ -196,8 +203,8 @@ class Plan(BaseModel):
         if not self.policy_seeds:
             raise InvalidValueError("The plan has no policy seeds; it needs at least one.")
         several = (self.policies, self.tasks, self.forms, self.episodes, self.policy_seeds)
-        settings = plain_settings() if self.settings == "all" else self.settings
-        size = math.prod(map(len, (*several, settings, self.stages, self.arms)))
+        several = (*several, self.setting_names, self.stages, self.arms)
+        size = math.prod(map(len, several))
         if size > MOST_JOBS:
             raise InvalidValueError(
                 f"The plan has up to {size:,} episodes; a plan has at most {MOST_JOBS:,}."
@@ -218,6 +225,13 @@ class Plan(BaseModel):
                     f"Two policies are named {name!r}: {specs[name]} and {spec}."
                 )
         return specs
+
+    @property
+    def setting_names(self) -> tuple[str, ...]:
+        """The settings that may be played."""
+        if self.settings == "all":
+            return plain_settings()
+        return tuple(all_settings()) if self.settings == "every" else self.settings
 
     @property
     def hosting(self) -> HostSettings | None:
@@ -318,16 +332,16 @@ class Plan(BaseModel):
             return ()
         known = tuple(name for name in self.tasks if name in tasks.every_task())
         settings = self.settings
-        if settings != "all":
+        if not isinstance(settings, str):
             settings = tuple(name for name in settings if name in all_settings())
         return self.model_copy(update={"tasks": known, "settings": settings}).jobs()
 
     def settings_of(self, task: str, episode: int) -> tuple[str, ...]:
         """Return the settings in which an episode is played."""
-        if self.settings == "all":
-            found = language.expressible(splits.get_episode(task, self.split, episode))
-            return tuple(name for name in found if name in plain_settings())
-        return self.settings
+        if not isinstance(self.settings, str):
+            return self.settings
+        found = language.expressible(splits.get_episode(task, self.split, episode))
+        return tuple(name for name in found if name in self.setting_names)
 
     def _jobs_of(
         self,
@@ -372,7 +386,10 @@ class Plan(BaseModel):
         chosen = {option: getattr(self.options, option) for option in rule.reads - {"stages"}}
         for form in self.forms if rule.implicit else (usual.form,):
             for stages in self.stages if "stages" in rule.reads else (usual.stages,):
-                yield replace(usual, form=form, stages=stages, **chosen)
+                options = replace(usual, form=form, stages=stages, **chosen)
+                yield options
+                if setting in self.in_turns and options.delivery != TURNS:
+                    yield replace(options, delivery=TURNS)
 
     def _is_left_out(self, task: str, episode: int, options: InstructionOptions) -> bool:
         """Return whether a harder setting cannot express an episode that its plain one can.
@@ -391,7 +408,9 @@ class Plan(BaseModel):
         """Yield one job for each instruction that the language may not be able to express."""
         # All settings with the default frame are only those that can express the episode.
         usual = (
-            self.settings == "all" and self.options.frame == DEFAULT_FRAME and self.wordings is None
+            isinstance(self.settings, str)
+            and self.options.frame == DEFAULT_FRAME
+            and self.wordings is None
         )
         for task in self.tasks:
             for episode in self.episodes[:1] if usual else self.episodes:
@@ -404,6 +423,8 @@ class Plan(BaseModel):
         check_names("kind of meshes", (self.meshes,), MESHES)
         for arm in self.arms:
             check_arm(arm)
+        turned = [name for name, one in all_settings().items() if "delivery" in one.reads]
+        check_names("setting in turns", self.in_turns, turned)
         for name, least in (("max_steps", 1), ("tries", 1), ("batch", 1)):
             if getattr(self, name) < least:
                 raise InvalidValueError(
@@ -422,7 +443,7 @@ class Plan(BaseModel):
 
     def _check_settings(self, task: str) -> None:
         has = language.settings_of(tasks.get_task(task))
-        for setting in () if self.settings == "all" else self.settings:
+        for setting in () if isinstance(self.settings, str) else self.settings:
             check_names("setting", (setting,), language.setting_names())
             if setting not in has:
                 raise InvalidValueError(

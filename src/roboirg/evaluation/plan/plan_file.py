@@ -26,6 +26,7 @@ _LISTS = frozenset(
         "policies",
         "tasks",
         "settings",
+        "in_turns",
         "forms",
         "episodes",
         "policy_seeds",

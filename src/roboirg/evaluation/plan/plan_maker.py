@@ -23,7 +23,15 @@ from roboirg.evaluation.plan.option_parsing import (
     parse_policies,
     parse_stage_sets,
 )
-from roboirg.evaluation.plan.plan import LONG_PROMPTS, REQUIRED, RETRYABLE, Plan, nest_options
+from roboirg.evaluation.plan.plan import (
+    LONG_PROMPTS,
+    REQUIRED,
+    RETRYABLE,
+    SETTINGS_NAMES,
+    Plan,
+    SettingsName,
+    nest_options,
+)
 from roboirg.evaluation.records.film import VIDEO_MODES
 from roboirg.evaluation.records.record import ERROR_KINDS, ErrorKind
 from roboirg.language import FORMS
@@ -41,6 +49,7 @@ def make_plan(
     stages: str = "1-5",
     retry_on: str = ",".join(RETRYABLE),
     devices: str = "",
+    in_turns: str = "",
     **options: object,
 ) -> Plan:
     """Return a checked plan from options as typed on the command line.
@@ -48,7 +57,8 @@ def make_plan(
     Args:
         policies: names or addresses; names may be separated by commas.
         tasks: names separated by commas; ``all`` anywhere selects all.
-        settings: names separated by commas; ``all`` anywhere selects all.
+        settings: names separated by commas; ``all`` anywhere selects all but the harder ones, and
+            ``every`` these, too.
         forms: names separated by commas.
         episodes: ``4`` for the first four, a list such as ``0,3,5-9``, or difficulties: ``hard``.
         policy_seeds: a list of numbers.
@@ -56,6 +66,7 @@ def make_plan(
         stages: a list of numbers, or several lists separated by semicolons.
         retry_on: kinds of errors separated by commas, or ``none``.
         devices: names separated by commas; none for one process on any device.
+        in_turns: names of settings, separated by commas; none for no setting.
         **options: other fields of `Plan`, and options of instructions by their own names.
 
     Raises:
@@ -75,7 +86,7 @@ def make_plan(
         plan = Plan(
             policies=parse_policies(policies),
             tasks=names,
-            settings="all" if means_all(settings) else parse_names("setting", settings),
+            settings=_settings(settings),
             forms=parse_names("form", forms),
             episodes=parse_episodes(episodes, split, names),
             policy_seeds=parse_numbers("policy seed", policy_seeds),
@@ -83,6 +94,7 @@ def make_plan(
             stages=parse_stage_sets(stages),
             retry_on=_error_kinds(retry_on),
             devices=parse_names("device", devices) if devices else (),
+            in_turns=parse_names("setting", in_turns) if in_turns else (),
             **nest_options(options),
         )
     except ValidationError as error:
@@ -137,6 +149,13 @@ def _explain(error: ValidationError) -> InvalidValueError:
         return cause
     name = ".".join(str(part) for part in first["loc"])
     return InvalidValueError(f"{name} is {first['input']!r}: {first['msg']}.")
+
+
+def _settings(text: str) -> tuple[str, ...] | SettingsName:
+    names = parse_names("setting", text)
+    typed = {name.lower() for name in names}
+    # Names of several settings: the longest list of them.
+    return next((name for name in reversed(SETTINGS_NAMES) if name in typed), names)
 
 
 def _task_names(text: str) -> tuple[str, ...]:

@@ -101,12 +101,7 @@ def too_long_text(audit: PromptAudit, verdict: PromptVerdict) -> str | None:
 
 
 def prompt_shares(jobs: Iterable[Job]) -> tuple[PromptShares, ...]:
-    """Return for each policy how many episodes are cut, by setting, in the order of the jobs.
-
-    Raises:
-        InvalidValueError: a policy's declaration is invalid.
-        MissingDependencyError: the library that reads a tokenizer's file is not installed.
-    """
+    """Return for each policy how many episodes are cut, by setting, in the order of the jobs."""
     limits: dict[str, PromptLimit | None] = {}
     counts: dict[str, dict[str, Verdicts]] = {}
     verdicts: dict[tuple[object, ...], PromptVerdict] = {}

@@ -31,10 +31,6 @@ def write_parquet(records: Iterable[Record], path: Path) -> int:
 
     Returns:
         Number of rows.
-
-    Raises:
-        MissingDependencyError: pyarrow is not installed.
-        InvalidValueError: the file cannot be written.
     """
     check_parquet_support()
     import pyarrow as pa

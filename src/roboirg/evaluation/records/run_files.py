@@ -54,11 +54,7 @@ def _is_below(path: Path, folder: Path) -> bool:
 
 
 def store_plan(content: bytes, folder: Path) -> None:
-    """Write the newest plan of a run; another one that was there goes to ``plans/``.
-
-    Raises:
-        InvalidValueError: a file cannot be written.
-    """
+    """Write the newest plan of a run; another one that was there goes to ``plans/``."""
     newest = folder / PLAN_FILE
     if newest.is_file():
         before = newest.read_bytes()
@@ -69,11 +65,7 @@ def store_plan(content: bytes, folder: Path) -> None:
 
 
 def keep_earlier_plan(content: bytes, folder: Path) -> None:
-    """Write a plan that is not the newest.
-
-    Raises:
-        InvalidValueError: the file cannot be written.
-    """
+    """Write a plan that is not the newest."""
     path = folder / EARLIER_PLANS / f"{short_hash(content)}.json"
     if not path.exists():
         path.parent.mkdir(parents=True, exist_ok=True)

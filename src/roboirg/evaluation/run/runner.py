@@ -127,11 +127,7 @@ def run_plan(
 
 
 def episode_runner(plan: Plan, folder: Path) -> EpisodeRunner:
-    """Return what plays a plan's jobs into a folder.
-
-    Raises:
-        MissingDependencyError: the plan wants videos, which cannot be written.
-    """
+    """Return what plays a plan's jobs into a folder."""
     if plan.video != "off":
         check_video_support()
     return EpisodeRunner(

@@ -5,11 +5,12 @@ from __future__ import annotations
 from roboirg.core.motions import Swap
 from roboirg.language.instruction import REFERENCE
 from roboirg.language.landmarks import MARGIN
+from roboirg.language.number_words import plural
 from roboirg.language.open_reasoning import open_templates as templates
 from roboirg.language.patterns.pattern import Derived, Pattern
 from roboirg.language.phrases import Phrase, anaphor, antecedent, fill, plain
 from roboirg.language.request import InstructionRequest
-from roboirg.language.slot_types import described
+from roboirg.language.slot_types import amount, described
 
 TWO, THREE = 2, 3
 
@@ -39,7 +40,7 @@ def _allows_amount(request: InstructionRequest) -> bool:
 def _exclude_amount(request: InstructionRequest) -> Derived:
     (color,) = request.color_values
     (excluded,) = (one for one in _present(request) if one != color.value)
-    words = _cube(request, excluded, plural=request.count_of(color) > 1)
+    words = _another(request, excluded, many=request.count_of(color) > 1)
     notes = {"patterns": ["color exclusion"]}
     return Derived(_context(request, excluded), described(request, [words]), notes)
 
@@ -50,7 +51,7 @@ def _exclude_amount(request: InstructionRequest) -> Derived:
 def _excluded(request: InstructionRequest) -> tuple[str, str] | None:
     """Return the excluded color, and the one that is left beside the goal's; None if not three."""
     colors, goal = _present(request), [one.color for one in request.color_values]
-    if not request.values_of("color") or len(colors) != THREE:
+    if not request.values_of("color") or len(colors) != THREE or request.shows_color:
         return None
     others = [one for one in colors if one not in goal]
     if len(goal) == TWO:
@@ -83,6 +84,9 @@ def _exclude_by_place(request: InstructionRequest) -> Derived:
     assert found is not None  # noqa: S101 - `_allows_place`
     excluded, left = found
     possible = _comparatives(request, left)
+    if any("left" in one.text for one in request.task.commands.wordings.everything):
+        # "Further to your left from your right" is hard to hear.
+        possible = [one for one in possible if one.axis == 0] or possible
     chosen = request.sampler.pick("comparative", possible)
     opposite = next(
         one
@@ -90,9 +94,7 @@ def _exclude_by_place(request: InstructionRequest) -> Derived:
         if (one.axis, one.sign) == (chosen.axis, -chosen.sign)
     )
     things = [
-        request.by_color(
-            color, (*_cube(request, excluded), *plain(f" {_standing(request, words)}"))
-        )
+        request.by_color(color, plain(f"the one {_standing(request, words)}"))
         for color, words in zip(request.color_values, (chosen, opposite), strict=False)
     ]
     first = request.color_values[0]
@@ -101,14 +103,15 @@ def _exclude_by_place(request: InstructionRequest) -> Derived:
         "relation": chosen.words,
         "candidates": {first.slot: sorted((first.color, left))},
     }
-    return Derived(_context(request, excluded), described(request, things), notes)
+    context, remark = _context(request, excluded), _remaining(request, excluded)
+    return Derived(context, described(request, things), notes, remark)
 
 
 def _standing(request: InstructionRequest, words: templates.Comparative) -> str:
     """Return the comparison, with its time where things change places."""
     if any(isinstance(motion, Swap) for motion in request.episode.scene.motions):
         return f"that was {words.words} at first"
-    return f"that is {words.words}"
+    return words.words
 
 
 def _context(request: InstructionRequest, excluded: str) -> Phrase:
@@ -116,17 +119,27 @@ def _context(request: InstructionRequest, excluded: str) -> Phrase:
     return fill(template, {"color": antecedent(excluded, REFERENCE, excluded)})
 
 
-def _cube(request: InstructionRequest, excluded: str, *, plural: bool = False) -> Phrase:
-    """Return ``the cube of another color``, or ``cubes of another color``."""
-    counted = bool(request.values_of("amount"))
-    noun = f"{request.task.commands.colored}{'s' if plural else ''}"
-    words = request.pick("another color", templates.ANOTHER_COLOR)
+def _remaining(request: InstructionRequest, excluded: str) -> Phrase:
+    """Return a remark on the two things that are left."""
+    things = plural(request.task.commands.colored)
+    others = (
+        antecedent(f"the two {things} that are not {excluded}", REFERENCE, excluded)
+        if request.resolved
+        else anaphor(f"the other two {things}", "other", REFERENCE, excluded)
+    )
+    return fill(request.pick("remaining", templates.REMAINING), {"others": others})
+
+
+def _another(request: InstructionRequest, excluded: str, *, many: bool) -> Phrase:
+    """Return ``cubes of another color``."""
     another = (
         antecedent(f"a color other than {excluded}", REFERENCE, excluded)
         if request.resolved
-        else anaphor(words, "other", REFERENCE, excluded)
+        else anaphor(
+            request.pick("another color", templates.ANOTHER_COLOR), "other", REFERENCE, excluded
+        )
     )
-    return (*plain(f"{noun} of " if counted else f"the {noun} of "), *another)
+    return (*plain(f"{amount.noun(2 if many else 1)} of "), *another)
 
 
 ONE_OF_TWO = Pattern(_allows_amount, _exclude_amount)

@@ -6,7 +6,7 @@ from roboirg.language.balanced_draw import draw_balanced
 from roboirg.language.instruction import REFERENCE
 from roboirg.language.open_reasoning import open_templates as templates
 from roboirg.language.patterns.pattern import Derived, Pattern
-from roboirg.language.phrases import anaphor, antecedent, fill
+from roboirg.language.phrases import anaphor, antecedent, fill, plain
 from roboirg.language.request import InstructionRequest
 from roboirg.language.slot_types import relation
 from roboirg.language.templates.derivations import MOMENTS
@@ -24,7 +24,8 @@ def _derive(request: InstructionRequest) -> Derived:
     template = request.pick("preference", templates.PREFERENCES[0 if favorite_first else 1])
     slots = {str(goal_value.value): goal_value.slot, other: REFERENCE}
     named = {one: antecedent(words[one], slots[one], one) for one in (favorite, least)}
-    context = fill(template, {"yes": named[favorite], "no": named[least]})
+    who = plain(request.pick("who", templates.WHO))
+    context = fill(template, {"who": who, "yes": named[favorite], "no": named[least]})
     pools = templates.FAVORITES if goal_is_favorite else templates.NOT_FAVORITES
     pointer = request.pick("favorite", pools)
     resolved = MOMENTS[favorite] if goal_is_favorite else f"that is not {MOMENTS[favorite]}"

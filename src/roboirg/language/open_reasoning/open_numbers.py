@@ -1,48 +1,141 @@
-"""Open number deduction: a relation to the total of two numbers, or to their difference."""
+"""Open number deduction: two numbers, and a calculation that leads from them to the goal's.
+
+The numbers are drawn without the goal, among those from which calculations lead to every number of
+the scene. So they say nothing about the goal, and as far as possible neither does a calculation
+without its numbers.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from typing import Literal, NamedTuple
+import functools
+import itertools
+import math
+from collections import defaultdict
+from collections.abc import Callable, Collection, Mapping
+from typing import NamedTuple
 
 from roboirg.language.instruction import REFERENCE
 from roboirg.language.number_words import CARDINALS, cardinal
 from roboirg.language.open_reasoning import open_templates as templates
 from roboirg.language.patterns.pattern import Derived, Pattern
-from roboirg.language.phrases import Phrase, anaphor, antecedent, fill, plain
+from roboirg.language.phrases import Phrase, anaphor, antecedent, fill, listed, plain
 from roboirg.language.request import GoalValue, InstructionRequest
+from roboirg.language.rivals.rival_templates import NUMBER_PAIRS
 from roboirg.language.slot_types import Fields, amount
 from roboirg.language.slot_types.ordinal import wrapped
 
-LARGEST = len(CARDINALS) - 1
 NUMBER_SLOTS = ("repeats", "counts", "visit", "placement")
+COMBINED: Mapping[str, Callable[[int, int], int]] = {
+    "total": lambda first, second: first + second,
+    "difference": lambda first, second: abs(first - second),
+    "larger": max,
+    "smaller": min,
+}
+ROUNDS = 30
+"""After which the shares hardly change."""
+TICKETS = 400
+TICKETS_OF_RESULT = 60
+"""Into which the shares of numbers, and of the ways to a result, are rounded."""
 
-Step = Literal["total", "difference"]
+PARTIAL = 0.7
+"""The factor by which the share of what leads to some choices alone shrinks each time."""
+
+Numbers = tuple[int, int]
 
 
-class Quantities(NamedTuple):
-    """Two numbers, and what is made of them."""
+class Calculation(NamedTuple):
+    """Two steps from two numbers to a result."""
 
-    first: int
-    second: int
-    step: Step
+    combination: str
+    second: templates.SecondStep
 
 
-def quantities(reference: int) -> list[Quantities]:
-    """Return all pairs of different numbers with this total or difference, in both orders."""
-    numbers = range(1, LARGEST + 1)
+def calculations(numbers: Numbers, result: int) -> list[Calculation]:
+    """Return all calculations that lead from two numbers to a result."""
     return [
-        Quantities(first, second, step)
-        for first in numbers
-        for second in numbers
-        for step, found in _steps(first, second)
-        if first != second and found == reference
+        Calculation(name, step)
+        for (name, combine), step in itertools.product(COMBINED.items(), templates.SECOND_STEPS)
+        if step.result(combine(*numbers)) == result
     ]
 
 
-def _steps(first: int, second: int) -> Iterator[tuple[Step, int]]:
-    yield "total", first + second
-    yield "difference", abs(first - second)
+Way = tuple[Numbers, int, Calculation]
+"""Numbers, what follows from them, and how."""
+Tickets = Mapping[Numbers, Mapping[int, tuple[Calculation, ...]]]
+"""By numbers and result, each calculation as often as its share."""
+
+
+@functools.cache
+def balanced_ways(choices: tuple[int, ...]) -> tuple[tuple[Numbers, ...], Tickets]:
+    """Return numbers as often as they are to be drawn, and then calculations for each result.
+
+    Numbers lead to all choices, the smaller one comes first. The shares are fitted so that numbers
+    go with all choices equally often, and a calculation too, as nearly as the numbers allow.
+    """
+    shares: dict[Way, float] = {}
+    for numbers in itertools.combinations(range(1, len(CARDINALS)), 2):
+        ways = [(numbers, one, way) for one in choices for way in calculations(numbers, one)]
+        if {result for _, result, _ in ways} == set(choices):
+            shares |= dict.fromkeys(ways, 1.0)
+    for _ in range(ROUNDS):
+        for part, mean in ((_calculation, _arithmetic), (_numbers, _geometric)):
+            _level(shares, choices, part, mean)
+    total = sum(shares.values())
+    drawn: list[Numbers] = []
+    found: dict[Numbers, dict[int, tuple[Calculation, ...]]] = {}
+    for numbers, group in itertools.groupby(shares, _numbers):
+        ways = list(group)
+        count = round(sum(shares[way] for way in ways) / total * TICKETS)
+        drawn += [numbers] * count
+        if count:
+            found[numbers] = {
+                choice: _tickets({way[2]: shares[way] for way in ways if way[1] == choice})
+                for choice in choices
+            }
+    return tuple(drawn), found
+
+
+def _tickets(shares: Mapping[Calculation, float]) -> tuple[Calculation, ...]:
+    total = sum(shares.values())
+    return tuple(
+        one
+        for one, share in shares.items()
+        for _ in range(round(share / total * TICKETS_OF_RESULT))
+    )
+
+
+def _level(
+    shares: dict[Way, float],
+    choices: tuple[int, ...],
+    part: Callable[[Way], object],
+    mean: Callable[[Collection[float]], float],
+) -> None:
+    """Scale the shares so that each part of them leads to all choices equally often."""
+    sums: dict[object, dict[int, float]] = defaultdict(lambda: dict.fromkeys(choices, 0.0))
+    for way, share in shares.items():
+        sums[part(way)][way[1]] += share
+    for way in shares:
+        found = sums[part(way)]
+        if found[way[1]]:
+            shares[way] *= mean(found.values()) / found[way[1]]
+        if not all(found.values()):
+            shares[way] *= PARTIAL  # it cannot lead to all of them
+
+
+def _calculation(way: Way) -> object:
+    return way[2]
+
+
+def _numbers(way: Way) -> Numbers:
+    return way[0]
+
+
+def _arithmetic(values: Collection[float]) -> float:
+    return sum(values) / len(values)
+
+
+def _geometric(values: Collection[float]) -> float:
+    return math.prod(values) ** (1 / len(values))
 
 
 def _goal_value(request: InstructionRequest) -> GoalValue | None:
@@ -51,87 +144,65 @@ def _goal_value(request: InstructionRequest) -> GoalValue | None:
     return found[0] if len(found) == 1 else None
 
 
-def relations(result: int, choices: set[int]) -> list[templates.TwoStepRelation]:
-    """Return the relations that lead to a result without giving it away.
-
-    Only those that lead to every number of the scene say nothing about it. *Twice* leads to even
-    ones alone, and is used where there are several.
-    """
-    found: list[templates.TwoStepRelation] = []
-    for relation in templates.TWO_STEP_RELATIONS:
-        reached = {one for one in choices if _possible(relation, one)}
-        if result in reached and (reached == choices or (relation.factor > 1 and len(reached) > 1)):
-            found.append(relation)
-    return found
-
-
-def _possible(relation: templates.TwoStepRelation, result: int) -> bool:
-    reference = relation.reference(result)
-    return reference is not None and bool(quantities(reference))
-
-
-def _relations(
-    request: InstructionRequest, goal_value: GoalValue
-) -> list[templates.TwoStepRelation]:
-    choices = {number for one in request.alternative_numbers(goal_value.slot) for number in one[:1]}
-    return relations(goal_value.number, choices)
+def _choices(request: InstructionRequest, goal_value: GoalValue) -> tuple[int, ...]:
+    found = {number for one in request.alternative_numbers(goal_value.slot) for number in one[:1]}
+    return tuple(sorted(found))
 
 
 def _allows(request: InstructionRequest) -> bool:
     goal_value = _goal_value(request)
-    return goal_value is not None and bool(_relations(request, goal_value))
+    return goal_value is not None and len(_choices(request, goal_value)) > 1
 
 
 def _derive(request: InstructionRequest) -> Derived:
     goal_value = _goal_value(request)
     assert goal_value is not None  # noqa: S101 - `_allows`
-    relation = request.sampler.pick("two-step relation", _relations(request, goal_value))
-    reference = relation.reference(goal_value.number) or 0
-    possible = quantities(reference)
-    step = request.sampler.pick("step", sorted({one.step for one in possible}))
-    chosen = request.sampler.pick("quantities", [one for one in possible if one.step == step])
-    template = request.pick("two quantities", templates.TWO_QUANTITIES)
-    context = fill(
-        template,
-        {
-            "first": antecedent(cardinal(chosen.first), REFERENCE, chosen.first),
-            "second": antecedent(cardinal(chosen.second), REFERENCE, chosen.second),
-        },
-    )
+    drawn, tickets = balanced_ways(_choices(request, goal_value))
+    numbers = request.sampler.pick("two numbers", drawn)
+    calculation = request.sampler.pick("calculation", tickets[numbers][goal_value.number])
+    first, second = request.sampler.pick("order of numbers", (numbers, numbers[::-1]))
+    named = [antecedent(cardinal(one), REFERENCE, one) for one in (first, second)]
+    context = fill(request.pick("two numbers said", NUMBER_PAIRS), {"things": listed(named)})
     notes: dict[str, object] = {
         "patterns": ["number deduction"],
-        "relation": f"{relation.name}, {step}",
-        "reference": [chosen.first, chosen.second],
+        "relation": f"{calculation.second.name}, {calculation.combination}",
+        "reference": [first, second],
     }
-    pointer = _pointer(request, chosen, reference)
-    return Derived(context, _fields(request, goal_value, relation, pointer), notes)
+    remark = _steps(request, calculation, (first, second))
+    return Derived(context, _fields(request, goal_value), notes, remark)
 
 
-def _pointer(request: InstructionRequest, chosen: Quantities, reference: int) -> Phrase:
-    pools = templates.TOTALS if chosen.step == "total" else templates.DIFFERENCES
-    words = request.pick(chosen.step, pools)
-    if not request.resolved:
-        return anaphor(words, chosen.step, REFERENCE, reference)
-    joint = "of" if chosen.step == "total" else "between"
-    pair = f"{cardinal(chosen.first)} and {cardinal(chosen.second)}"
-    return antecedent(f"the {chosen.step} {joint} {pair}", REFERENCE, reference)
+def _steps(request: InstructionRequest, calculation: Calculation, numbers: Numbers) -> Phrase:
+    """Return the sentence that calculates; resolved, it names both numbers."""
+    both = " and ".join(map(str, numbers))
+    words = request.pick("the numbers", templates.NUMBERS)
+    named = (
+        antecedent(" and ".join(map(cardinal, numbers)), REFERENCE, both)
+        if request.resolved
+        else anaphor(words, "them", REFERENCE, both)
+    )
+    template = request.pick("calculation frame", templates.CALCULATIONS)
+    for field, pools in (
+        ("steps", calculation.second.words),
+        ("first", templates.COMBINATIONS[calculation.combination]),
+    ):
+        (inner,) = pools.of(request.pool)
+        template = template.replace(f"{{{field}}}", inner)
+    return fill(template, {"numbers": named})
 
 
-def _fields(
-    request: InstructionRequest,
-    goal_value: GoalValue,
-    relation: templates.TwoStepRelation,
-    pointer: Phrase,
-) -> Fields:
-    if goal_value.slot == "repeats":
-        return {goal_value.field: fill(relation.times, {"number": pointer})}
+def _fields(request: InstructionRequest, goal_value: GoalValue) -> Fields:
+    """Return ``that many times``, ``that many red cubes``, ``the visit with that number``.
+
+    These point at the sentence before, in the same command, so they are no mentions.
+    """
     if goal_value.slot == "counts":
         (color,) = request.color_values
-        shade = antecedent(color.color, color.slot, color.value)
-        return amount.amounts([fill(relation.cubes, {"color": shade, "number": pointer})])
-    noun = plain(f"the {goal_value.slot_type} whose number is ")
-    value = fill(relation.value, {"number": pointer})
-    return wrapped(request, goal_value, (*noun, *value))
+        # The plural fits any number.
+        return amount.amounts([amount.amount(plain("that many"), amount.cubes(color, 2))])
+    if goal_value.slot == "repeats":
+        return {goal_value.field: plain(request.pick("that many times", templates.THAT_MANY))}
+    return wrapped(request, goal_value, plain(f"the {goal_value.slot_type} with that number"))
 
 
 TWO_STEPS = Pattern(_allows, _derive)

@@ -1,7 +1,12 @@
-"""Wordings of open reasoning, in which no single word of the context or the command is the key."""
+"""Wordings of open reasoning, in which no single word of the context or the command is the key.
+
+The pools say the same in different constructions: steps to follow against a description of the
+result, for example.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import NamedTuple
 
 from roboirg.core.word_pools import Pools
@@ -12,19 +17,41 @@ EXCLUDED_COLORS = Pools(
         "I am tired of {color}.",
         "{color} is dull.",
         "I have too much {color}.",
+        "{color} hurts my eyes.",
+        "My sister hates {color}.",
+        "We never use {color}.",
+        "{color} is not for me.",
+        "Enough of {color}.",
+        "{color} makes me sad.",
     ),
     test=(
         "{color} bores me.",
         "I avoid {color}.",
         "{color} is out of fashion.",
         "I never wear {color}.",
+        "{color} does not suit me.",
+        "I cannot stand {color}.",
+        "{color} reminds me of school.",
+        "My brother hates {color}.",
+        "I have seen enough {color}.",
+        "Everyone dislikes {color}.",
     ),
 )
 ANOTHER_COLOR = Pools(
     train=("another color", "a different color", "some other color", "a new color"),
-    test=("any other color", "a distinct color", "an alternative color", "a separate color"),
+    test=("any other color", "a color other than that", "any different color", "some new color"),
 )
-"""Next to one excluded color; two of them are left."""
+"""Next to one excluded color, where two of them are left but only one is there."""
+REMAINING = Pools(
+    train=("Look at {others}.", "Consider {others}.", "Think of {others}.", "I mean {others}."),
+    test=(
+        "That leaves {others}.",
+        "I like {others}.",
+        "{others} are fine.",
+        "Only {others} will do.",
+    ),
+)
+"""Names the two things that are left, of which the command compares where they stand."""
 
 
 class Comparative(NamedTuple):
@@ -56,142 +83,123 @@ COMPARATIVES = Pools(
     ),
 )
 
-TWO_QUANTITIES = Pools(
-    train=(
-        "I drew {first} and {second}.",
-        "Ann said {first}, Bob said {second}.",
-        "The dice show {first} and {second}.",
-        "My scores are {first} and {second}.",
+COMBINATIONS: Mapping[str, Pools[str]] = {
+    "total": Pools(train=("add {numbers} up",), test=("the sum of {numbers}",)),
+    "difference": Pools(
+        train=("take the difference between {numbers}",), test=("the gap between {numbers}",)
     ),
+    "larger": Pools(train=("take the larger of {numbers}",), test=("the higher of {numbers}",)),
+    "smaller": Pools(train=("take the smaller of {numbers}",), test=("the lower of {numbers}",)),
+}
+"""The first step of a calculation."""
+NUMBERS = Pools(
+    train=("those numbers", "these numbers", "the numbers", "those"),
+    test=("them", "these", "the figures", "those figures"),
+)
+CALCULATIONS = Pools(
+    train=("{steps}.", "Now {steps}.", "Let's {steps}.", "Please {steps}."),
     test=(
-        "The cards say {first} and {second}.",
-        "Tom wrote {first}, Ella wrote {second}.",
-        "We counted {first} and {second}.",
-        "My results were {first} and {second}.",
+        "My number is {steps}.",
+        "I am thinking of {steps}.",
+        "The number I want is {steps}.",
+        "I mean {steps}.",
     ),
 )
-TOTALS = Pools(
-    train=("the total", "their total", "that total", "the combined total"),
-    test=("the sum", "their sum", "that sum", "the combined sum"),
-)
-DIFFERENCES = Pools(
-    train=("the difference", "their difference", "that difference", "the difference between them"),
-    test=("the gap", "their gap", "that gap", "the gap between them"),
-)
+"""Before the command, which asks for *that many*."""
 
 
-class TwoStepRelation(NamedTuple):
-    """The relation of a number to a total or a difference.
+class SecondStep(NamedTuple):
+    """The second step of a calculation.
 
     Attributes:
-        name: for records.
-        times: words for a number of repetitions.
-        cubes: words for a number of cubes of a color.
-        value: words for a number.
-        offset: the result is ``factor * reference + offset``.
+        name: for records; the number in it is in the words, too, whatever the result.
+        words: by pool, around the words for the first step, ``{first}``.
+        offset: the result is ``factor * first + offset``.
         factor: see `offset`.
     """
 
     name: str
-    times: str
-    cubes: str
-    value: str
+    words: Pools[str]
     offset: int = 0
     factor: float = 1.0
 
-    def reference(self, result: int) -> int | None:
-        """Return the total or difference from which a result follows; None if it is no whole."""
-        reference = (result - self.offset) / self.factor
-        return int(reference) if reference.is_integer() else None
+    def result(self, first: int) -> int | None:
+        """Return what follows from the result of the first step; None if it is no number."""
+        found = self.factor * first + self.offset
+        return int(found) if found >= 1 and found.is_integer() else None
 
 
-TWO_STEP_RELATIONS = (
-    TwoStepRelation(
-        "one fewer",
-        "one time fewer than {number}",
-        "one fewer {color} cube than {number}",
-        "one less than {number}",
-        offset=-1,
-    ),
-    TwoStepRelation(
-        "one more",
-        "one more time than {number}",
-        "one more {color} cube than {number}",
-        "one more than {number}",
-        offset=1,
-    ),
-    TwoStepRelation(
-        "two fewer",
-        "two fewer times than {number}",
-        "two fewer {color} cubes than {number}",
-        "two less than {number}",
-        offset=-2,
-    ),
-    TwoStepRelation(
-        "half",
-        "half as many times as {number}",
-        "half as many {color} cubes as {number}",
-        "half of {number}",
-        factor=0.5,
-    ),
-    TwoStepRelation(
-        "twice",
-        "twice as many times as {number}",
-        "twice as many {color} cubes as {number}",
-        "twice {number}",
-        factor=2.0,
-    ),
+def _step(name: str, train: str, test: str, offset: int = 0, factor: float = 1.0) -> SecondStep:
+    return SecondStep(name, Pools((train,), (test,)), offset, factor)
+
+
+SECOND_STEPS = (
+    _step("itself", "{first}", "{first}"),
+    _step("one less", "{first} and subtract one", "one less than {first}", -1),
+    _step("one more", "{first} and add one", "one more than {first}", 1),
+    _step("two less", "{first} and subtract two", "two less than {first}", -2),
+    _step("two more", "{first} and add two", "two more than {first}", 2),
+    _step("three less", "{first} and subtract three", "three less than {first}", -3),
+    _step("four less", "{first} and subtract four", "four less than {first}", -4),
+    _step("five less", "{first} and subtract five", "five less than {first}", -5),
+    _step("half", "{first} and halve it", "half of {first}", factor=0.5),
+    _step("double", "{first} and double it", "double {first}", factor=2.0),
 )
-"""Relations that most numbers allow; *two more* would tell that the result is at least three."""
+THAT_MANY = Pools(train=("that many times",), test=("that number of times",))
 
+WHO = Pools(
+    train=("My sister", "My aunt", "My daughter", "Grandma", "Mom"),
+    test=("My brother", "My uncle", "My son", "Grandpa", "Dad"),
+)
 PREFERENCES = (
     Pools(
         train=(
-            "My sister prefers the moment {yes} to the one {no}.",
-            "My sister likes the moment {yes} more than the one {no}.",
+            "{who} likes the moment {yes} more than the one {no}.",
+            "{who} would not trade the moment {yes} for the one {no}.",
         ),
         test=(
-            "My brother likes the moment {yes} better than the one {no}.",
-            "My brother chose the moment {yes} over the one {no}.",
+            "{who} finds the moment {yes} better than the one {no}.",
+            "{who} would not give up the moment {yes} for the one {no}.",
         ),
     ),
     Pools(
         train=(
-            "My sister would trade the moment {no} for the one {yes}.",
-            "My sister gave up the moment {no} for the one {yes}.",
+            "{who} likes the moment {no} less than the one {yes}.",
+            "{who} would trade the moment {no} for the one {yes}.",
         ),
         test=(
-            "My brother swapped the moment {no} for the one {yes}.",
-            "My brother would skip the moment {no} for the one {yes}.",
+            "{who} finds the moment {no} worse than the one {yes}.",
+            "{who} would give up the moment {no} for the one {yes}.",
         ),
     ),
 )
-"""Two moments, the favorite one named first, or last."""
+"""Two moments, the favorite one named first, or last; the same words lead to both."""
 FAVORITES = Pools(
     train=(
-        "at her preferred moment",
-        "at the moment she prefers",
+        "at the moment she would pick",
+        "at the moment she would not skip",
         "at the moment she would choose",
-        "at the moment of her choice",
+        "at the moment she would not give up",
     ),
     test=(
-        "at his favorite moment",
         "at the moment he would keep",
-        "at the moment he would pick",
-        "at the moment of his choice",
+        "at the moment he would not drop",
+        "at the moment he would prefer",
+        "at the moment he would not trade away",
     ),
 )
 NOT_FAVORITES = Pools(
     train=(
         "at the moment she would skip",
-        "at the moment she did not choose",
-        "at the moment she does not prefer",
-        "at the moment she gave up",
+        "at the moment she would not pick",
+        "at the moment she would give up",
+        "at the moment she would not choose",
     ),
     test=(
-        "at the moment he would give up",
+        "at the moment he would drop",
         "at the moment he would not keep",
-        "at the moment he would not pick",
-        "at the moment he did not keep",
+        "at the moment he would trade away",
+        "at the moment he would not prefer",
     ),
 )
+"""As often with *not* as the favorite ones, and of the same verbs."""

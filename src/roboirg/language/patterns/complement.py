@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from roboirg.language.instruction import REFERENCE
-from roboirg.language.number_words import cardinal, ordinal
+from roboirg.language.number_words import cardinal, ordinal, plural
 from roboirg.language.patterns.pattern import Derived, Pattern
 from roboirg.language.phrases import Phrase, anaphor, antecedent, fill, plain, sentences
 from roboirg.language.request import GoalValue, InstructionRequest
@@ -40,7 +40,7 @@ def _complement(request: InstructionRequest) -> Derived:
     remark = request.pick("taken", derivations.TAKEN_REMARKS)
     context = sentences(
         [
-            fill(template, {"pair": (*named[0], *plain(" and "), *named[1])}),
+            fill(template, {"things": (*named[0], *plain(" and "), *named[1])}),
             fill(remark, {"single": single}),
         ]
     )
@@ -72,7 +72,8 @@ def _pointing(request: InstructionRequest, pair: ValuePair) -> Phrase:
     """Return ``the other visit``."""
     kind = "count" if pair.slot == "counts" else pair.word_kind
     template = request.pick(f"other {kind}", derivations.OTHERS[kind])
-    words = template.format(noun=pair_noun(request, pair))
+    noun = pair_noun(request, pair)
+    words = template.format(noun=noun, nouns=plural(noun))
     return anaphor(words, "other", pair.meant.slot, pair.meant.value)
 
 

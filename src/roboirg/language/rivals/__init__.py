@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
+from roboirg.language.rivals.pair_draw import draw_pair
 from roboirg.language.rivals.pair_words import (
     pair_command,
     pair_introduction,
     pair_notes,
     pair_reinforcement,
 )
-from roboirg.language.rivals.value_pair import (
-    ValuePair,
-    draw_pair,
-    pair_refusal,
-)
+from roboirg.language.rivals.value_pair import ValuePair, pair_refusal
 
 RIVAL_SETTINGS = ("direct-rival", "contextual-rival", "spatial-rival")
 """The settings that introduce a rival."""

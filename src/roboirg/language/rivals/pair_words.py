@@ -6,11 +6,12 @@ from collections.abc import Callable, Mapping
 
 from roboirg.core.word_pools import Pools
 from roboirg.language.instruction import REFERENCE, Expression
-from roboirg.language.number_words import cardinal, ordinal, plural
+from roboirg.language.number_words import cardinal, ordinal
 from roboirg.language.phrases import Phrase, anaphor, antecedent, fill, plain, sentences
 from roboirg.language.request import GoalValue, InstructionRequest, UtteranceSpec
 from roboirg.language.rivals import rival_templates as templates
-from roboirg.language.rivals.value_pair import PairDraw, ValuePair
+from roboirg.language.rivals.pair_draw import PairDraw
+from roboirg.language.rivals.value_pair import ValuePair
 from roboirg.language.slot_types import Fields, amount, described, relation, stated
 from roboirg.language.slot_types.ordinal import wrapped
 from roboirg.language.templates.derivations import MOMENTS
@@ -40,15 +41,14 @@ def pair_introduction(request: InstructionRequest, draw: PairDraw) -> UtteranceS
     )
     pools = INTRODUCTIONS[draw.pair.word_kind]
     template = request.pick("pair introduction of rivals", pools)
-    words = fill(template, {"pair": (*first, *plain(" and "), *second)})
+    words = fill(template, {"things": (*first, *plain(" and "), *second)})
     return UtteranceSpec("introduction", words)
 
 
 def pair_reinforcement(request: InstructionRequest, draw: PairDraw) -> UtteranceSpec:
     """Return one more remark on both values."""
     values = " and ".join(str(value.value) for value in draw.introduced)
-    nouns = pair_noun(request, draw.pair) if _many(draw) else plural(pair_noun(request, draw.pair))
-    ref = anaphor(f"those {nouns}", "them", REFERENCE, values)
+    ref = anaphor("both", "them", REFERENCE, values)
     template = request.pick("pair reinforcement", templates.PAIR_REINFORCEMENTS)
     return UtteranceSpec("reinforcement", fill(template, {"ref": ref}))
 
@@ -131,11 +131,6 @@ def value_name(request: InstructionRequest, pair: ValuePair, value: GoalValue) -
     return f"the {ordinal(value.number)} {kind}"
 
 
-def _many(draw: PairDraw) -> bool:
-    """Return whether each of the two values is several things."""
-    return draw.pair.word_kind == "amount"
-
-
 def _pointer(draw: PairDraw, value: GoalValue, thing: str, *, points: bool) -> Phrase:
     if not points:
         return the_other(value, f"the other {thing}")
@@ -148,7 +143,9 @@ def _pointer(draw: PairDraw, value: GoalValue, thing: str, *, points: bool) -> P
 
 
 def _introduced(request: InstructionRequest, draw: PairDraw, value: GoalValue) -> str:
-    """Return the words of the introduction, where the second moment has the words of both."""
+    """Return the words of the introduction, where the second value has the noun for both."""
+    if draw.pair.word_kind in ("color", "amount") and value is draw.introduced[0]:
+        return f"the {value.color}"
     if draw.pair.word_kind != "relation":
         return value_name(request, draw.pair, value)
     return MOMENTS[str(value.value)] if value is draw.introduced[1] else f"right {value.value}"
@@ -174,7 +171,7 @@ def _chosen_fields(request: InstructionRequest, draw: PairDraw) -> Fields:
 
 
 def _counted(request: InstructionRequest, draw: PairDraw) -> Fields:
-    """Return ``my number of the red cubes``; resolved, ``two of the red cubes``."""
+    """Return ``the right number of red cubes``; resolved, ``two red cubes``."""
     meant, (color,) = draw.pair.meant, request.color_values
     words = request.pick("rival number", templates.NUMBERS_OF)
     number = (
@@ -182,5 +179,6 @@ def _counted(request: InstructionRequest, draw: PairDraw) -> Fields:
         if request.resolved
         else anaphor(words, "choice", meant.slot, meant.value)
     )
-    # The plural fits any number.
-    return amount.amounts([(*number, *plain(" of the "), *amount.cubes(color, 2))])
+    # The plural fits any number that is not named.
+    count = meant.number if request.resolved else 2
+    return amount.amounts([amount.amount(number, amount.cubes(color, count))])

@@ -13,57 +13,101 @@ from typing import Literal, NamedTuple
 from roboirg.core.word_pools import Pools
 
 THING_PAIRS = Pools(
-    train=("I like {pair}.", "I see {pair}.", "Here are {pair}.", "I painted {pair}."),
-    test=("I know {pair}.", "I noticed {pair}.", "There are {pair}.", "{pair} are nice."),
+    train=(
+        "Here are {things}.",
+        "I see {things}.",
+        "I painted {things}.",
+        "We talked about {things}.",
+        "My kids love {things}.",
+        "We have {things}.",
+        "Ben brought {things}.",
+        "You can see {things}.",
+        "Dad bought {things}.",
+        "Grandma likes {things}.",
+        "My sister has {things}.",
+        "Mom bought {things}.",
+        "Everyone can see {things}.",
+        "{things} look good.",
+        "{things} were presents.",
+    ),
+    test=(
+        "I noticed {things}.",
+        "Dad made {things}.",
+        "I spotted {things}.",
+        "{things} caught my eye.",
+        "{things} are nice.",
+        "My son likes {things}.",
+        "Our guests liked {things}.",
+        "I bought {things}.",
+        "Mom gave me {things}.",
+        "This is about {things}.",
+        "Uncle Tom found {things}.",
+        "Consider {things}.",
+    ),
 )
 NUMBER_PAIRS = Pools(
     train=(
-        "{pair} are my numbers.",
-        "I like the numbers {pair}.",
-        "I thought of {pair}.",
-        "The dice show {pair}.",
+        "I rolled {things}.",
+        "I thought of {things}.",
+        "The dice show {things}.",
+        "Dad said {things}.",
+        "We got {things}.",
+        "My scores were {things}.",
+        "{things} are my lucky numbers.",
+        "{things} came up.",
+        "My kids picked {things}.",
+        "Ann wrote down {things}.",
     ),
     test=(
-        "I drew the numbers {pair}.",
-        "{pair} are good numbers.",
-        "The cards say {pair}.",
-        "I read {pair}.",
+        "I drew {things}.",
+        "The cards say {things}.",
+        "My results were {things}.",
+        "Ella wrote {things}.",
+        "{things} won the raffle.",
+        "{things} are on my tickets.",
+        "Grandpa guessed {things}.",
+        "The twins chose {things}.",
+        "Tom noted {things}.",
     ),
 )
 ELEMENT_PAIRS = Pools(
-    train=("I like {pair}.", "We talked about {pair}.", "I know {pair}.", "{pair} are nice."),
-    test=("I noted {pair}.", "{pair} are special.", "I care about {pair}.", "Think of {pair}."),
+    train=(
+        "I like {things}.",
+        "We talked about {things}.",
+        "{things} are special.",
+        "My kids picked {things}.",
+        "I am thinking of {things}.",
+        "Ann wrote down {things}.",
+    ),
+    test=(
+        "I noted {things}.",
+        "I care about {things}.",
+        "{things} matter to me.",
+        "Think of {things}.",
+        "Grandpa mentioned {things}.",
+        "This is about {things}.",
+    ),
 )
 """For visits and placements."""
 MOMENT_PAIRS = Pools(
     train=(
-        "I like the moments {pair}.",
-        "I know the moments {pair}.",
-        "We talked about the moments {pair}.",
-        "The moments {pair} are nice.",
+        "I liked the moments {things}.",
+        "We talked about the moments {things}.",
+        "I remember the moments {things}.",
+        "My kids loved the moments {things}.",
     ),
     test=(
-        "I noted the moments {pair}.",
-        "The moments {pair} are special.",
-        "I care about the moments {pair}.",
-        "Think of the moments {pair}.",
+        "I enjoyed the moments {things}.",
+        "The moments {things} were special.",
+        "I keep thinking of the moments {things}.",
+        "This is about the moments {things}.",
     ),
 )
 PAIR_REINFORCEMENTS = Pools(
-    train=(
-        "I often think of {ref}.",
-        "{ref} make me smile.",
-        "I know {ref} well.",
-        "I am fond of {ref}.",
-    ),
-    test=(
-        "{ref} mean a lot to me.",
-        "I keep thinking of {ref}.",
-        "{ref} please me.",
-        "I am happy with {ref}.",
-    ),
+    train=("I like {ref}.", "{ref} are great.", "I enjoy {ref}.", "{ref} are useful."),
+    test=("{ref} are fine.", "I love {ref}.", "{ref} look good.", "I remember {ref}."),
 )
-"""One more remark about both values."""
+"""One more remark about both values; short, as two remarks and a command come with it."""
 
 
 class Pointers(NamedTuple):
@@ -119,16 +163,26 @@ MENTIONED = Pools(
 ReferenceKind = Literal["alone", "set aside", "preference", "contrast", "correction"]
 
 SINGLED = Pools(
-    train=("I mean {yes}.", "I want {yes}.", "Why not {yes}?", "I cannot do without {yes}."),
+    train=(
+        "I mean {yes}.",
+        "Let's take {yes}.",
+        "I would not give up {yes}.",
+        "I cannot do without {yes}.",
+    ),
     test=(
         "I have chosen {yes}.",
-        "My choice is {yes}.",
+        "I will go with {yes}.",
         "I would not trade {yes}.",
-        "I would not give up {yes}.",
+        "I would not part with {yes}.",
     ),
 )
 SET_ASIDE = Pools(
-    train=("I leave out {no}.", "I have set {no} aside.", "Not {no}.", "I do not mean {no}."),
+    train=(
+        "Let's leave out {no}.",
+        "I am done with {no}.",
+        "I do not mean {no}.",
+        "I do not want {no}.",
+    ),
     test=(
         "Forget about {no}.",
         "I have ruled out {no}.",
@@ -139,44 +193,69 @@ SET_ASIDE = Pools(
 CHOICES: dict[ReferenceKind, tuple[Pools[str], Pools[str]]] = {
     "preference": (
         Pools(
-            train=("I prefer {yes} to {no}.", "I favor {yes} over {no}."),
-            test=("I like {yes} better than {no}.", "I chose {yes} over {no}."),
+            train=("I prefer {yes} to {no}.", "I like {yes} more than {no}."),
+            test=("I chose {yes} over {no}.", "I picked {yes} rather than {no}."),
         ),
         Pools(
-            train=("I gave up {no} for {yes}.", "Instead of {no}, I want {yes}."),
-            test=("I swapped {no} for {yes}.", "Rather than {no}, I chose {yes}."),
+            train=("Instead of {no}, I want {yes}.", "I like {no} less than {yes}."),
+            test=("I passed up {no} for {yes}.", "Rather than {no}, I picked {yes}."),
         ),
     ),
     "contrast": (
         Pools(
             train=("I mean {yes}, not {no}.", "I want {yes} and not {no}."),
-            test=("It is {yes}, not {no}.", "My choice is {yes} and not {no}."),
+            test=(
+                "It is {yes}, and not {no}.",
+                "I want {yes}, definitely not {no}.",
+            ),
         ),
         Pools(
-            train=("I did not mean {no} but {yes}.", "I do not want {no} but {yes}."),
-            test=("It is not {no} but {yes}.", "My choice is not {no} but {yes}."),
+            train=("I do not mean {no} but {yes}.", "I do not want {no} but {yes}."),
+            test=(
+                "It is not {no}, it is {yes}.",
+                "Definitely not {no}, I want {yes}.",
+            ),
         ),
     ),
     "correction": (
         Pools(
-            train=("I mean {yes} and by no means {no}.", "I want {yes}, no longer {no}."),
-            test=("It is {yes} and in no case {no}.", "My choice is {yes}, no longer {no}."),
+            train=("I mean {yes}, no longer {no}.", "I want {yes}, no longer {no}."),
+            test=(
+                "I meant {yes} when I said {no}.",
+                "I want {yes}, I said {no} by mistake.",
+            ),
         ),
         Pools(
-            train=("I mean {no} - no, {yes}.", "I want {no}; no, {yes}."),
-            test=("It is {no} - no, {yes}.", "My choice is {no}; no, {yes}."),
+            train=("I mean {no} - no, {yes}.", "Let's take {no} - no, {yes}."),
+            test=(
+                "I said {no} when I meant {yes}.",
+                "I said {no} by mistake, I want {yes}.",
+            ),
         ),
     ),
 }
-"""Remarks with both fields: those with the meant value first, and those with it last."""
+"""Remarks with both fields: those with the meant value first, and those with it last.
+
+*Not X but Y* and a *no* that takes back are in training alone; the others are for tests.
+"""
 
 CLAUSES = Pools(
-    train=("I mean", "I want", "I asked for", "I favor"),
-    test=("I chose", "I prefer", "I selected", "I opted for"),
+    train=("I mean", "I want", "I asked for", "I need"),
+    test=("I chose", "I prefer", "I picked", "I selected"),
 )
 """Follow the noun in the command: *the cube I mean*."""
 NUMBERS_OF = Pools(
-    train=("my number", "my own number", "my chosen number", "my favorite number"),
-    test=("my preferred number", "my final number", "my special number", "my given number"),
+    train=(
+        "the right number of",
+        "the chosen number of",
+        "the desired number of",
+        "the agreed number of",
+    ),
+    test=(
+        "the correct number of",
+        "the selected number of",
+        "the preferred number of",
+        "the final number of",
+    ),
 )
-"""For a number of cubes: *my number of the red cubes*."""
+"""For a number of cubes: *the right number of red cubes*."""

@@ -1,18 +1,16 @@
-"""The pair of an episode: the value that is meant, its rival, and how one of them is chosen."""
+"""The pairs of an episode: the value that is meant, and others that could be its rival."""
 
 from __future__ import annotations
 
 import functools
 from collections.abc import Callable, Iterator, Mapping
-from typing import Literal, NamedTuple
+from typing import NamedTuple
 
 from roboirg.core.episode import Difficulty, Goal, Split
 from roboirg.core.goal_slots import COLOR_SLOTS
-from roboirg.language.balanced_draw import draw_balanced
 from roboirg.language.instruction import REFERENCE
 from roboirg.language.landmarks import Landmark
 from roboirg.language.request import GoalValue, InstructionRequest
-from roboirg.language.rivals import rival_templates as templates
 from roboirg.tasks import get_task
 from roboirg.tasks.splits.splits import split_episodes
 
@@ -20,7 +18,6 @@ SPLIT: Split = "train"
 """Its goals show which numbers are usual for a difficulty."""
 NUMBER_SLOTS = ("repeats", "counts", "visit", "placement")
 
-Fill = Literal["other", "both"]
 Locate = Callable[[InstructionRequest, GoalValue], Mapping[int, list[Landmark]]]
 """Returns the landmarks of a thing of a color, by class."""
 
@@ -53,40 +50,11 @@ class ValuePair(NamedTuple):
         return self.rival.slot == self.meant.slot
 
 
-class PairDraw(NamedTuple):
-    """A pair, and how the words choose one of its values.
-
-    Attributes:
-        pair: the values.
-        meant_first: whether the meant one is introduced first.
-        kind: kind of the remark that chooses.
-        text: its template.
-        fill: of a template with two fields: whether both values are pointed at, or the one is
-            *the other*.
-        points_at_meant: if not both: whether the pointer is for the meant value.
-        pointers: the words that point.
-    """
-
-    pair: ValuePair
-    meant_first: bool
-    kind: templates.ReferenceKind
-    text: str
-    fill: Fill
-    points_at_meant: bool
-    pointers: templates.Pointers
-
-    @property
-    def introduced(self) -> tuple[GoalValue, GoalValue]:
-        """The values in the order of the introduction."""
-        meant, rival = self.pair
-        return (meant, rival) if self.meant_first else (rival, meant)
-
-
 def pair_refusal(request: InstructionRequest, locate: Locate | None = None) -> str | None:
     """Return why an episode can have no rival; None if it can."""
     if request.wordings is not None:
         return "commands from a wording file have no rivals"
-    return None if _pairs(request, locate) else _lack(request, locate)
+    return None if rival_pairs(request, locate) else _lack(request, locate)
 
 
 def _lack(request: InstructionRequest, locate: Locate | None) -> str:
@@ -98,54 +66,22 @@ def _lack(request: InstructionRequest, locate: Locate | None) -> str:
     return "no landmark singles out a second thing that the goal could ask for"
 
 
-def draw_pair(request: InstructionRequest, locate: Locate | None = None) -> PairDraw:
-    """Draw a slot, its rival, and the words that choose.
+def rival_pairs(request: InstructionRequest, locate: Locate | None) -> list[ValuePair]:
+    """Draw one of the slots that can have a rival, and return all pairs of its value.
 
-    `locate` returns landmarks, where both values must have one; None for all slots.
+    A color that the video gives away has none: its words would tell nothing.
     """
-    pairs = _pairs(request, locate)
-    slot = request.sampler.pick("rival slot", list(dict.fromkeys(one.slot for one in pairs)))
-    pair = request.sampler.pick("rival", [one for one in pairs if one.slot == slot])
-    bits = draw_balanced(request, "rival order")
-    kind, text, fill = _remark(request, points_at_meant=bits.second)
-    pointers: tuple[templates.Pointers, ...] = (templates.RANKS,)
-    if slot in COLOR_SLOTS and fill == "other":  # two of the longer ones would be too long
-        pointers = (templates.RANKS, templates.RANKS, *templates.MENTIONED.of(request.pool))
-    return PairDraw(
-        pair,
-        bits.first,
-        kind,
-        text,
-        fill,
-        bits.second,
-        request.sampler.pick("rival pointers", pointers),
-    )
-
-
-def _remark(
-    request: InstructionRequest, *, points_at_meant: bool
-) -> tuple[templates.ReferenceKind, str, Fill]:
-    """Draw a remark; alone it has one pointer, and the others have two fields."""
-    kind = request.sampler.pick("rival reference", ("alone", *templates.CHOICES))
-    if kind == "alone":
-        name: templates.ReferenceKind = "alone" if points_at_meant else "set aside"
-        options = templates.SINGLED if points_at_meant else templates.SET_ASIDE
-        return name, request.pick(f"{name} remark", options), "other"
-    meant_first, meant_last = templates.CHOICES[kind]
-    fill: Fill = request.sampler.pick("rival fill", ("other", "both"))
-    if fill == "both":
-        # The first of two pointers is then right as often as a single one is.
-        chosen = meant_first if points_at_meant else meant_last
-    else:
-        chosen = request.sampler.pick("rival remark order", (meant_first, meant_last))
-    return kind, request.pick(f"{kind} remark", chosen), fill
-
-
-def _pairs(request: InstructionRequest, locate: Locate | None) -> list[ValuePair]:
-    found = [pair for pair in possible_pairs(request) if locate is None or pair.slot in COLOR_SLOTS]
-    if locate is None:
-        return found
-    return [pair for pair in found if all(locate(request, value) for value in pair)]
+    found = [
+        pair
+        for pair in possible_pairs(request)
+        if (locate is None or pair.slot in COLOR_SLOTS)
+        and not (pair.slot in COLOR_SLOTS and request.shows_color)
+        and (locate is None or all(locate(request, value) for value in pair))
+    ]
+    if not found:
+        return []
+    slot = request.sampler.pick("rival slot", list(dict.fromkeys(one.slot for one in found)))
+    return [pair for pair in found if pair.slot == slot]
 
 
 def possible_pairs(request: InstructionRequest) -> Iterator[ValuePair]:

@@ -37,21 +37,28 @@ def say(request: InstructionRequest) -> InstructionSpec:
 
 
 def discourse(
-    request: InstructionRequest, introduce: Say, reinforce: Say, command: Say, distractor: str
+    request: InstructionRequest,
+    introduce: Say,
+    reinforce: Say,
+    command: Say,
+    distractor: str,
+    longest: int = 100,
 ) -> InstructionSpec:
     """Return the requested stages.
 
     `introduce` says the first stage, `reinforce` one more remark on what was introduced, and
-    `command` the last stage.
+    `command` the last stage; a distractor has at most the number `longest` of words, and a
+    cue fewer.
     """
     stages = request.options.stages
     utterances = [introduce(request)]
     if REINFORCEMENT in stages:
         utterances.append(reinforce(request))
-    distracting = distractors(request, distractor) if DISTRACTOR in stages else ()
+    distracting = distractors(request, distractor, longest) if DISTRACTOR in stages else ()
     utterances += [UtteranceSpec("distractor", phrase) for phrase, _ in distracting]
     if CUE in stages:
-        cue = request.pick("cue", remarks.CUES)
+        cues = [one for one in remarks.CUES.of(request.pool) if _length(one) < longest]
+        cue = request.sampler.pick("cue", cues)
         utterances.append(UtteranceSpec("cue", plain(cue)))
     utterances.append(command(request))
     notes: dict[str, object] = {"stages": list(stages)}
@@ -76,9 +83,11 @@ class _Distractor(NamedTuple):
     thing: str | None
 
 
-def distractors(request: InstructionRequest, kind: str) -> tuple[_Distractor, ...]:
+def distractors(
+    request: InstructionRequest, kind: str, longest: int = 100
+) -> tuple[_Distractor, ...]:
     """Return the requested number of remarks; a longer list begins with every shorter one."""
-    source = _competing(request) if kind == "competing" else _neutral(request)
+    source = _competing(request) if kind == "competing" else _neutral(request, longest)
     return tuple(itertools.islice(source, request.options.distractors))
 
 
@@ -87,9 +96,15 @@ def _says_it(command: UtteranceSpec) -> bool:
     return any(piece.tag is not None and piece.tag.expression == "it" for piece in command.phrase)
 
 
-def _neutral(request: InstructionRequest) -> Iterator[_Distractor]:
+def _length(remark: str) -> int:
+    return len(remark.split())
+
+
+def _neutral(request: InstructionRequest, longest: int) -> Iterator[_Distractor]:
+    known = remarks.NEUTRAL_DISTRACTORS.of(request.pool)
+    short = [one for one in known if _length(one.text) <= longest]
     # The order stays the same in each cycle, so that repetitions are as far apart as possible.
-    for remark in request.sampler.cycle("distractor", remarks.NEUTRAL_DISTRACTORS.of(request.pool)):
+    for remark in request.sampler.cycle("distractor", short):
         yield _Distractor(plain(remark.text), remark.thing)
 
 

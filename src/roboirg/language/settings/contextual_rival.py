@@ -15,6 +15,9 @@ from roboirg.language.rivals import (
 from roboirg.language.settings import contextual
 from roboirg.language.settings.setting import Setting
 
+LONGEST = 4
+"""Words of a distractor, and one more than those of a cue; the command has a remark before it."""
+
 
 def say(request: InstructionRequest) -> InstructionSpec:
     """Return the requested stages; a competing distractor would name one value too many."""
@@ -25,6 +28,7 @@ def say(request: InstructionRequest) -> InstructionSpec:
         lambda asked: pair_reinforcement(asked, pair),
         lambda asked: pair_command(asked, pair),
         DEFAULT_DISTRACTOR,
+        LONGEST,
     )
     return InstructionSpec(said.utterances, {**said.notes, **pair_notes(pair)})
 

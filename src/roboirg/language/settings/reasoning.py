@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from roboirg.language.patterns import PATTERNS, Pattern
+from roboirg.language.phrases import sentences
 from roboirg.language.request import InstructionRequest, InstructionSpec, UtteranceSpec
 from roboirg.language.settings.setting import Setting
 from roboirg.language.slot_types import stated
@@ -54,6 +55,8 @@ def say_pattern(
     rule = rules[0] if len(rules) == 1 else request.sampler.pick(f"{name} rule", rules)
     derived = rule.derive(request)
     command = request.command(stated(request) | derived.fields)
+    if derived.remark:
+        command = sentences([derived.remark, command])
     utterances = (
         UtteranceSpec("introduction", derived.context),
         UtteranceSpec("command", command),

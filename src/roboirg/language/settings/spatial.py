@@ -8,8 +8,10 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 
+from roboirg.core.word_pools import Pools
 from roboirg.language.instruction import Expression
 from roboirg.language.landmarks import FRAMES, SIMPLE, Landmark, landmarks
+from roboirg.language.number_words import plural
 from roboirg.language.phrases import Phrase, anaphor, antecedent, fill, listed
 from roboirg.language.request import GoalValue, InstructionRequest, InstructionSpec, UtteranceSpec
 from roboirg.language.settings.setting import Setting
@@ -24,6 +26,10 @@ POINTING: Mapping[int, tuple[Pointer, ...]] = {
 }
 _STANDS_ALONE = re.compile(r"the (?P<noun>\w+) \{place\}")
 """Words for a thing at a place, with nothing in between or after it."""
+PAIR = 2
+_NOUN = re.compile(r"^the \w+")
+_TIME = re.compile(r" (?:now|at first)\b")
+"""Said of the first of two things, it goes for both."""
 NO_LANDMARK = "no landmark singles out a target"
 LONGEST = {1: 12, 2: 6, 3: 5}
 """The length that a landmark should have beside others, in `_length`; see `templates`."""
@@ -104,43 +110,65 @@ def _pointed(
 ) -> Phrase:
     """Return the command's words for a thing, which name its place or point at it."""
     words, expression = pointer
-    several = expression != "there"
-    ranked = several and request.task.commands.by_rank is not None
+    if expression != "there":
+        return at_place(request, color, landmark, anaphor(words, expression, *_of(color)))
     if request.resolved:
-        named = f"the one {landmark.phrase}" if ranked else landmark.phrase
-        place = antecedent(named, color.slot, color.value)
+        place = antecedent(landmark.phrase, *_of(color))
     else:
-        words = f"at {words} place" if several and not ranked else words
-        place = anaphor(words, expression, color.slot, color.value)
-    template = request.task.commands.by_rank if ranked else None
+        place = anaphor(words, expression, *_of(color))
+    template = None
     stands_alone = _STANDS_ALONE.fullmatch(request.task.commands.by_place)
-    if not several and request.wordings is None and stands_alone:
+    if request.wordings is None and stands_alone:
         # "The one there": the noun is that of the introduction.
         noun = request.sampler.pick("noun there", (stands_alone["noun"], "one"))
-        named = f"the {stands_alone['noun']} {landmark.phrase}"
         place = (
-            antecedent(named, color.slot, color.value)
+            antecedent(f"the {stands_alone['noun']} {landmark.phrase}", *_of(color))
             if request.resolved
-            else anaphor(f"the {noun} there", expression, color.slot, color.value)
+            else anaphor(f"the {noun} there", expression, *_of(color))
         )
         template = "{place}"
     return request.by_place(color, place, plural=request.count_of(color) > 1, template=template)
 
 
+def _of(color: GoalValue) -> tuple[str, str | int]:
+    return color.slot, color.value
+
+
+def at_place(
+    request: InstructionRequest, value: GoalValue, landmark: Landmark, words: Phrase
+) -> Phrase:
+    """Return the command's words for one of several things; resolved, they name its place."""
+    commands = request.task.commands
+    if commands.by_rank is not None:
+        named, template = f"the one {landmark.phrase}", commands.by_rank
+    else:
+        first = value == request.color_values[0]
+        named = commands.things_at if first else _TIME.sub("", commands.things_at)
+        named = named.format(place=landmark.phrase)
+        handled = commands.pointed == commands.thing
+        template = "{place}" if handled else commands.by_color.replace("{cube}", "{place}")
+    place = antecedent(named, *_of(value)) if request.resolved else words
+    return request.by_place(value, place, plural=request.count_of(value) > 1, template=template)
+
+
 def introduction(
-    request: InstructionRequest, colors: Sequence[GoalValue], marks: Sequence[Landmark]
+    request: InstructionRequest,
+    colors: Sequence[GoalValue],
+    marks: Sequence[Landmark],
+    sentences: Pools[str] = introductions.PLACE_INTRODUCTIONS,
 ) -> UtteranceSpec:
     """Name the places."""
-    several = len(marks) > 1
-    places = listed(
-        [
-            antecedent(landmark.phrase, color.slot, color.value)
-            for color, landmark in zip(colors, marks, strict=True)
-        ]
-    )
-    things = fill(request.task.commands.things_at, {"place": places}, plural=several)
-    template = request.pick("place introduction", introductions.PLACE_INTRODUCTIONS)
-    return UtteranceSpec("introduction", fill(template, {"things": things}, plural=several))
+    first = request.task.commands.things_at
+    rest = _TIME.sub("", _NOUN.sub("the one", first))
+    if len(marks) > PAIR:  # short: "the cubes closest to you, farthest to your left and ..."
+        first, rest = _NOUN.sub(lambda noun: plural(noun[0]), first), "{place}"
+    things = [
+        fill(template, {"place": antecedent(landmark.phrase, color.slot, color.value)})
+        for template, color, landmark in zip((first, rest, rest), colors, marks, strict=False)
+    ]
+    sentence = request.pick("place introduction", sentences)
+    words = fill(sentence, {"things": listed(things)}, plural=len(marks) > 1)
+    return UtteranceSpec("introduction", words)
 
 
 SETTING = Setting(

@@ -4,15 +4,21 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
+from roboirg.core.word_pools import Pools
 from roboirg.language.landmarks import Landmark
-from roboirg.language.phrases import Phrase, antecedent, fill, plain, sentences
+from roboirg.language.phrases import sentences
 from roboirg.language.request import GoalValue, InstructionRequest, InstructionSpec, UtteranceSpec
 from roboirg.language.rivals import draw_pair, pair_notes, pair_refusal
 from roboirg.language.rivals.pair_words import choosing_remark, chosen, the_other
+from roboirg.language.rivals.rival_templates import THING_PAIRS
 from roboirg.language.settings import spatial
 from roboirg.language.settings.setting import Setting
 from roboirg.language.slot_types import described, stated
+from roboirg.language.templates.introductions import PLACE_INTRODUCTIONS
 
+INTRODUCTIONS = Pools(
+    *((*places, *pairs) for places, pairs in zip(PLACE_INTRODUCTIONS, THING_PAIRS, strict=True))
+)
 PLACES = 2
 """Places that the introduction names: the meant one and its rival."""
 
@@ -42,33 +48,16 @@ def say(request: InstructionRequest) -> InstructionSpec:
     if draw.pair.ordered:
         pointing.append((rival, the_other(rival, f"the other {noun}")))
     things = [
-        _chosen_thing(request, value, places[value.field], words) for value, words in pointing
+        spatial.at_place(request, value, places[value.field], words) for value, words in pointing
     ]
     command = request.command(stated(request) | described(request, things))
     shown = [places[value.field] for value in draw.introduced]
     utterances = (
-        spatial.introduction(request, draw.introduced, shown),
+        spatial.introduction(request, draw.introduced, shown, INTRODUCTIONS),
         UtteranceSpec("command", sentences([remark, command])),
     )
     notes = {**spatial.landmark_notes(request, shown), **pair_notes(draw)}
     return InstructionSpec(utterances, notes)
-
-
-def _chosen_thing(
-    request: InstructionRequest, value: GoalValue, landmark: Landmark, words: Phrase
-) -> Phrase:
-    """Return the command's words for one of two things; resolved, they name its place."""
-    commands = request.task.commands
-    if commands.by_rank is not None:
-        named, template = f"the one {landmark.phrase}", commands.by_rank
-    else:
-        named = "".join(
-            piece.text for piece in fill(commands.things_at, {"place": plain(landmark.phrase)})
-        )
-        handled = commands.pointed == commands.thing
-        template = "{place}" if handled else commands.by_color.replace("{cube}", "{place}")
-    place = antecedent(named, value.slot, value.value) if request.resolved else words
-    return request.by_place(value, place, plural=request.count_of(value) > 1, template=template)
 
 
 def _drawn(request: InstructionRequest, value: GoalValue) -> Landmark:

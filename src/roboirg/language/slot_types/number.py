@@ -12,7 +12,8 @@ from roboirg.language.templates import introductions, remarks
 COMPETING_NUMBERS = tuple(range(1, 11))
 """The numbers that a competing remark may name."""
 SAME_NUMBER = Pools(
-    train=("just as often", "exactly as often"), test=("equally often", "just that often")
+    train=("the same number of times", "just as many times"),
+    test=("that same number of times", "that number of times"),
 )
 """Words that fit once, too."""
 
@@ -26,7 +27,7 @@ def _stated(_request: InstructionRequest, goal_values: tuple[GoalValue, ...]) ->
 
 
 def _reduced(request: InstructionRequest, goal_values: tuple[GoalValue, ...]) -> Fields:
-    """Return ``just as often``."""
+    """Return ``the same number of times``."""
     words = request.pick("same number", SAME_NUMBER)
     return {
         goal_value.field: anaphor(words, "that", goal_value.slot, goal_value.value)

@@ -5,4 +5,6 @@ trained on. Training and test have wordings of their own (`roboirg.core.word_poo
 short, because many policies cut what they hear after 64 tokens, some after 48; a test counts.
 """
 
-LANGUAGE_VERSION = "2.1.0"
+LANGUAGE_VERSION = "3.0.0"
+DRAWS = "2.1.0"
+"""Key of all random draws: an older version, so that only the words that were mended changed."""

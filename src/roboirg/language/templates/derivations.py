@@ -21,8 +21,8 @@ EXCLUDED_INTRODUCTIONS = Pools(
     ),
 )
 SINGLED_INTRODUCTIONS = Pools(
-    train=("I prefer {single}.", "{single} is better.", "I want {single}."),
-    test=("I choose {single}.", "{single} is nice.", "{single} is best."),
+    train=("My sister took {single}.", "{single} is taken.", "I have enough {single}."),
+    test=("Dad chose {single}.", "{single} is already taken.", "My friend took {single}."),
 )
 
 
@@ -48,10 +48,8 @@ EXCLUSIONS = Pools(
         Exclusion("{thing}[|s] whose color is {excluded}", "not in that pair", "neither {colors}"),
     ),
     test=(
-        Exclusion("{thing}[|s] which [is|are] {excluded}", "neither of these", "neither {colors}"),
-        Exclusion(
-            "{thing}[|s] which [is|are] {excluded}", "neither of the two", "neither {colors}"
-        ),
+        Exclusion("{thing}[|s] that [is|are] {excluded}", "neither of these", "neither {colors}"),
+        Exclusion("{thing}[|s] that [is|are] {excluded}", "neither of the two", "neither {colors}"),
         Exclusion(
             "{thing}[|s] with a color that is {excluded}", "not in that pair", "neither {colors}"
         ),
@@ -67,11 +65,15 @@ SINGLE_EXCLUSIONS = Pools(
             "different from that",
             "different from {colors}",
         ),
-        Exclusion("{thing}[|s] of a color {excluded}", "other than that", "other than {colors}"),
+        Exclusion(
+            "{thing}[|s] that [is|are] any color {excluded}",
+            "other than that",
+            "other than {colors}",
+        ),
     ),
     test=(
-        Exclusion("{thing}[|s] with a color {excluded}", *_DIFFERENT),
-        Exclusion("{thing}[|s] in a color {excluded}", *_OTHER_THAN),
+        Exclusion("{thing}[|s] in a color that is {excluded}", *_DIFFERENT),
+        Exclusion("{thing}[|s] in any color {excluded}", *_OTHER_THAN),
     ),
 )
 COMPLEMENT = "the {thing} in {other}"
@@ -85,21 +87,19 @@ TAKEN_REMARKS = Pools(
 """Said of the one of two values that is not meant."""
 OTHERS = {
     "color": Pools(
-        train=("the other {noun}", "the one of the two other than that"),
-        test=("the other {noun} of those", "the one of them other than that"),
+        train=("the other {noun}", "the other one of those {nouns}"),
+        test=("the other of the two {nouns}", "the other one of the two {nouns}"),
     ),
     "amount": Pools(train=("of the other {noun}",), test=("of the others",)),
-    "number": Pools(
-        train=("the other number of times",), test=("the number of times that is left",)
-    ),
+    "number": Pools(train=("the other number of times",), test=("the other number of times",)),
     "count": Pools(train=("the other number",), test=("the other number",)),
     "visit": Pools(
-        train=("the other {noun}", "the {noun} that is left"),
-        test=("the other {noun} of those", "the {noun} other than that"),
+        train=("the other {noun}",),
+        test=("the other of those {nouns}",),
     ),
     "placement": Pools(
         train=("the other {noun}",),
-        test=("the other {noun} of those", "the {noun} that is left"),
+        test=("the other of those {nouns}",),
     ),
 }
 """The value that is left, by kind of words."""
@@ -117,14 +117,14 @@ MOMENT_ANAPHORS = ("at that moment", "then")
 BOTH_MOMENTS = "right before and right after the button press"
 TWO_MOMENTS_INTRODUCTIONS = Pools(
     train=(
-        "Of the moments {pair}, I prefer {single}.",
-        "Among the moments {pair}, {single} was nicer.",
+        "Of the moments {pair}, my sister prefers {single}.",
+        "Between the moments {pair}, Dad chose {single}.",
         "Of what happened {pair}, my brother liked {single}.",
     ),
     test=(
-        "Of the parts {pair}, I would choose {single}.",
+        "Of the parts {pair}, my uncle would choose {single}.",
         "Between the parts {pair}, my sister chose {single}.",
-        "Comparing the moments {pair}, my choice is {single}.",
+        "Given the moments {pair}, Mom picked {single}.",
     ),
 )
 NEIGHBOR_INTRODUCTIONS = Pools(
@@ -141,7 +141,7 @@ NEIGHBOR_INTRODUCTIONS = Pools(
 )
 MOMENT_COMPLEMENT = "at the other moment"
 RESOLVED_MOMENT_COMPLEMENT = "at the other moment, not {single}"
-NEIGHBOR = "the placement just before or after {single}"
+NEIGHBOR = "the placement closest in time to {single}"
 """Of two placements, each is the other's neighbor; *earlier* would give it away."""
 
 
@@ -199,7 +199,7 @@ RELATIONS = (
     ),
     Relation(
         "two fewer",
-        "two times fewer than {number}",
+        "two fewer times than {number}",
         "two fewer {color} cubes than {number}",
         "two fewer {number}",
         offset=-2,
@@ -254,8 +254,8 @@ STEPS = (
     Step("two before", "two before {reference}", -2, spells=2),
 )
 NEIGHBORS = {
-    1: Step("neighbor", "just before or after {reference}", -1),
-    2: Step("neighbor", "just before or after {reference}", 1),
+    1: Step("neighbor", "closest in time to {reference}", -1),
+    2: Step("neighbor", "closest in time to {reference}", 1),
 }
 """The steps in a series of two elements, by position."""
 COUNTED_STEPS = (

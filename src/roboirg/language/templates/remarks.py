@@ -19,21 +19,21 @@ COLOR_REINFORCEMENTS = Pools(
     test=(
         "I made {ref}.",
         "I treasure {ref}.",
-        "I keep {ref} safe.",
-        "I drew {ref}.",
+        "I cleaned {ref}.",
+        "I found {ref}.",
     ),
 )
 NUMBER_REINFORCEMENTS = Pools(
-    train=("{ref} brings luck.", "I trust {ref}.", "I dreamed of {ref}."),
-    test=("{ref} follows me.", "{ref} suits me.", "{ref} feels right."),
+    train=("{ref} brings me luck.", "I remember {ref}.", "I dreamed of {ref}."),
+    test=("I like {ref}.", "{ref} feels lucky.", "{ref} feels right."),
 )
 VISIT_REINFORCEMENTS = Pools(
     train=("I must see {ref}.", "{ref} will be fun.", "I am ready for {ref}."),
-    test=("{ref} will be great.", "I cannot miss {ref}.", "I expect a lot from {ref}."),
+    test=("{ref} will be great.", "I cannot miss {ref}.", "I am excited about {ref}."),
 )
 VIDEO_REINFORCEMENTS = Pools(
-    train=("I often recall {ref}.", "{ref} made me laugh.", "I talk a lot about {ref}."),
-    test=("{ref} surprised me.", "I admire {ref}.", "I could watch {ref} forever."),
+    train=("I often think of {ref}.", "{ref} made me laugh.", "I talk a lot about {ref}."),
+    test=("{ref} surprised me.", "I loved {ref}.", "I could watch {ref} forever."),
 )
 """For placements and moments."""
 
@@ -86,7 +86,7 @@ NEUTRAL_DISTRACTORS = Pools(
         NeutralRemark("The dishes are still dirty."),
         NeutralRemark("The kids are at school."),
         NeutralRemark("Breakfast was too short."),
-        NeutralRemark("I owe him a letter."),
+        NeutralRemark("I owe Mom a letter."),
         NeutralRemark("The train was crowded.", "the train"),
         NeutralRemark("A cat is asleep outside.", "a cat"),
         NeutralRemark("My hands are cold."),
@@ -168,17 +168,17 @@ COMPETING_MOMENT_DISTRACTORS = Pools(
 
 CUES = Pools(
     train=(
-        "Here is your task.",
+        "Pay attention.",
         "Now do this.",
         "Time to work.",
-        "This is what I need.",
+        "Listen closely.",
         "Please listen.",
     ),
     test=(
         "Here is my request.",
         "Please do this.",
         "Okay, here goes.",
-        "Your job is this.",
+        "Get ready.",
         "Now listen.",
     ),
 )

@@ -25,10 +25,16 @@ from roboirg.core.errors import SceneRejectedError
 from roboirg.core.footprints import Circle, Footprint, Rectangle, Region, place
 from roboirg.core.motions import Away, Point
 from roboirg.core.word_pools import Pools
+from roboirg.tasks.shared.fixtures import button_keep_out
 from roboirg.tasks.task import Commands, Wording
 
 APPEAR_STEP = 32
 """The step at which all containers appear over the cubes at once."""
+CONTAINERS: dict[Difficulty, int] = {"easy": 3, "medium": 5, "hard": 15}
+"""Upper bounds: placement ends at the first container without a free place."""
+PICKS: dict[Difficulty, int] = {"easy": 1, "medium": 1, "hard": 2}
+REGION = Region(0.0, 0.0, 0.2, 0.2)
+GAP = 0.04
 
 
 def container_footprint(container: SceneObject) -> Rectangle:
@@ -37,15 +43,16 @@ def container_footprint(container: SceneObject) -> Rectangle:
     return Rectangle(container.position.x, container.position.y, half, half, container.yaw)
 
 
-def draw_containers(
-    rng: np.random.Generator,
-    count: int,
-    region: Region,
-    gap: float,
-    obstacles: Sequence[Footprint] = (),
-) -> list[SceneObject]:
-    """Draw up to `count` containers in one region; see `draw_containers_in`."""
-    return draw_containers_in(rng, [region] * count, gap, obstacles)
+def sample(
+    rng: np.random.Generator, difficulty: Difficulty, buttons: Sequence[SceneObject] = ()
+) -> tuple[Scene, Goal]:
+    """Draw containers that stay in their places, three over a cube; the first are to be lifted."""
+    obstacles = [button_keep_out(button) for button in buttons]
+    containers = draw_containers_in(rng, [REGION] * CONTAINERS[difficulty], GAP, obstacles)
+    cubes = hide_cubes(rng, containers)
+    colors = tuple(str(cube.color) for cube in cubes[: PICKS[difficulty]])
+    scene = Scene((*buttons, *containers, *cubes), motions=appearing(containers))
+    return scene, Goal.of(colors=colors)
 
 
 def draw_containers_in(
@@ -159,7 +166,7 @@ def hidden_commands(wordings: Pools[Wording]) -> Commands:
         by_color="the container over {cube}",
         by_place="the container {place}",
         pointed="container",
-        things_at="the container[|s] {place}",
+        things_at="the container {place}",
         wordings=wordings,
     )
 
@@ -173,11 +180,3 @@ def seen_commands(wordings: Pools[Wording]) -> Commands:
         pointed="hidden_cube",
         wordings=wordings,
     )
-
-
-CONTAINERS: dict[Difficulty, int] = {"easy": 3, "medium": 5, "hard": 15}
-"""Upper bounds: placement ends at the first container without a free place."""
-PICKS: dict[Difficulty, int] = {"easy": 1, "medium": 1, "hard": 2}
-
-REGION = Region(0.0, 0.0, 0.2, 0.2)
-GAP = 0.04

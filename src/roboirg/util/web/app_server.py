@@ -36,9 +36,6 @@ class AppServer:
     Attributes:
         socket: that listens.
         host: address at which it listens.
-
-    Raises:
-        InvalidValueError: the port is not available, or the address is not this machine's.
     """
 
     def __init__(

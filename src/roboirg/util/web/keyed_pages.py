@@ -87,9 +87,6 @@ class KeyedPageServer(AppServer):
         host: address to listen at.
         port: 0 for any free port.
         statuses: of the responses to errors; other errors of the package have status 400.
-
-    Raises:
-        InvalidValueError: the port is not available, or the address is not this machine's.
     """
 
     def __init__(

@@ -33,9 +33,6 @@ def check_page_support(page: str) -> None:
 
     Args:
         page: its name, for the message.
-
-    Raises:
-        MissingDependencyError: Jinja is not installed.
     """
     with extra_needed(f"{page} needs Jinja", "report"):
         import jinja2  # noqa: F401 - an extra

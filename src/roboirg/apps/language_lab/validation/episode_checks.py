@@ -78,7 +78,7 @@ def not_read_back(instruction: Instruction, episode: Episode, read: Read) -> Ite
     """Yield the prompt unless it reads as exactly the goal and is understood to the end."""
     found = read(instruction.text)
     if found.goals != (episode.goal,) or found.not_understood:
-        yield "read back", instruction.text
+        yield "read back", _with_cause(instruction.text, found)
 
 
 def not_self_contained(
@@ -87,7 +87,11 @@ def not_self_contained(
     """Yield an explicit or resolved command that does not read as the goal on its own."""
     found = read(instruction.command)
     if found.goals != (episode.goal,) or found.not_understood:
-        yield "self-contained", instruction.command
+        yield "self-contained", _with_cause(instruction.command, found)
+
+
+def _with_cause(words: str, found: Interpretation) -> str:
+    return "; the interpreter ".join([words, *found.not_understood])
 
 
 def not_needed(

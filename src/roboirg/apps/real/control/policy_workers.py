@@ -27,7 +27,6 @@ from roboirg.evaluation.episode_errors import (
 )
 from roboirg.evaluation.hosting.host_pool import HostPool, HostSettings
 from roboirg.evaluation.hosting.hosted_policy import HostedPolicy
-from roboirg.evaluation.hosting.policy_child import ChildLostError
 from roboirg.evaluation.policy_calls import policy_metadata
 from roboirg.evaluation.records.record import ErrorKind
 from roboirg.policies.by_name.loading import make_policy
@@ -154,7 +153,7 @@ class PolicyThread:
         except queue.Empty:
             return None
 
-    def loss(self) -> ChildLostError | None:
+    def loss(self) -> EpisodeLostError | None:
         """Return how the policy's process died; None while it is alive."""
         return None
 
@@ -185,7 +184,7 @@ class PolicyProcess(PolicyThread):
         (pid,) = self._hosts.pids
         return pid
 
-    def loss(self) -> ChildLostError | None:
+    def loss(self) -> EpisodeLostError | None:
         """Return how the policy's process died; None while it is alive."""
         return self._hosts.loss()
 

@@ -15,6 +15,7 @@ from roboirg.evaluation.analysis.page.entries import EpisodeEntries, Run
 from roboirg.evaluation.analysis.stats.cells import FAIRNESS, EvalConditions, PolicyRun, Versions
 from roboirg.evaluation.analysis.stats.comparison import compare
 from roboirg.evaluation.analysis.stats.comparison_text import sentences
+from roboirg.evaluation.analysis.stats.headline import headline_notes
 from roboirg.evaluation.analysis.stats.heard_rates import count_heard, heard_notes
 from roboirg.evaluation.analysis.stats.intervals import SEED
 from roboirg.language.settings import EXPLICIT
@@ -39,6 +40,7 @@ def run_warnings(entries: EpisodeEntries) -> list[RunWarning]:
         *(RunWarning("warning", text) for text in _cut(entries)),
         *(RunWarning("note", text) for text in _without_reference(entries)),
         *(RunWarning("note", text) for text in _private(entries)),
+        *(RunWarning("note", text) for text in headline_notes(entries.cells, entries.names)),
     ]
 
 
@@ -167,7 +169,7 @@ def _without_reference(entries: EpisodeEntries) -> Iterable[str]:
     if len(entries.names) == 1:
         yield (
             "Only one policy: without the forgetful listener’s results next to it, a rate does not "
-            "show how much of it is chance (roboirg tables RUN --chance adds the chance level)."
+            "show how much of it is chance (roboirg tables RUN --floors chance adds the level)."
         )
     if all(key.options.setting != EXPLICIT for key in entries.cells):
         yield "Explicit was not played, so there is no gap to it."

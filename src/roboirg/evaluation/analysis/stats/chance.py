@@ -5,7 +5,8 @@ it, or among all goals if none fits. Its expected success is the chance level. I
 playing, assuming flawless execution: the share of these goals that have the stages of the right
 one. Where the words leave two values, as with a rival, it is a guess among these. A shortcut
 listener draws its goal by a surface rule; its expected success is the probability that this goal is
-right. Nothing is estimated.
+right. Nothing of this is estimated. Learned floors have the level that was measured for the task
+and setting, on the test split or random scenes.
 """
 
 from __future__ import annotations
@@ -15,8 +16,16 @@ from collections.abc import Iterable
 from fractions import Fraction
 
 from roboirg.core.instruction_options import InstructionOptions
+from roboirg.evaluation.analysis.stats.measured_floors import (
+    LEARNED,
+    RANDOM,
+    TEST,
+    FloorKey,
+    measured_floors,
+)
 from roboirg.evaluation.play.job_instruction import instruct_job
 from roboirg.evaluation.records.record import Job
+from roboirg.language.templates import LANGUAGE_VERSION
 from roboirg.shortcuts import SURFACE_RULES, goal_share, guess_goal
 from roboirg.shortcuts.command_chance import blind_goals, right_share
 from roboirg.tasks import get_task
@@ -24,8 +33,8 @@ from roboirg.tasks.other_goals import begins_with
 from roboirg.tasks.splits.splits import get_episode
 
 CHANCE = "chance"
-FLOORS = (CHANCE, *SURFACE_RULES)
-"""The policies: the forgetful listener, and the shortcut listeners by the names of their rules."""
+FLOORS = (CHANCE, *SURFACE_RULES, *LEARNED)
+"""The forgetful listener, the shortcut listeners by the names of their rules, and learners."""
 
 
 def chance_level(jobs: Iterable[Job]) -> Fraction | None:
@@ -39,7 +48,8 @@ def chance_level(jobs: Iterable[Job]) -> Fraction | None:
 def floor_level(floor: str, jobs: Iterable[Job]) -> Fraction | None:
     """Return the same as `chance_level` for any of `FLOORS`."""
     instructions = dict.fromkeys((job.task, job.split, job.episode, job.column) for job in jobs)
-    levels = [_level(floor, *each) for each in instructions]
+    found = [_level(floor, *each) for each in instructions]
+    levels = [level for level in found if level is not None]
     return sum(levels, Fraction(0)) / len(levels) if levels else None
 
 
@@ -55,7 +65,14 @@ def silent_chance(task: str, split: str, number: int) -> float:
 
 
 @functools.lru_cache(maxsize=65_536)
-def _level(floor: str, task: str, split: str, number: int, options: InstructionOptions) -> Fraction:
+def _level(
+    floor: str, task: str, split: str, number: int, options: InstructionOptions
+) -> Fraction | None:
+    if floor in LEARNED:
+        key = FloorKey(TEST if split == TEST else RANDOM, options.setting, task)
+        measured = (measured_floors(LANGUAGE_VERSION) or {}).get(key)
+        is_usual = options == InstructionOptions(options.setting)
+        return Fraction(str(measured.shares[floor].goals)) if measured and is_usual else None
     job = Job(policy="", task=task, split=split, episode=number, options=options)
     episode, instruction = get_episode(task, split, number), instruct_job(job)
     if floor == CHANCE:

@@ -253,7 +253,8 @@ def _floor_rows(floor: str, which: RateTable, columns: Sequence[Column], cells: 
             entries[task] = Entry(
                 None if level is None else percent(level), applies=_applies(task, options)
             )
-        rows.append(Row(options.setting, floor, "chance", with_averages(columns, entries)))
+        if any(entry.percent is not None for entry in entries.values()):
+            rows.append(Row(options.setting, floor, "chance", with_averages(columns, entries)))
     return rows
 
 

@@ -26,6 +26,7 @@ from roboirg.evaluation.analysis.stats.cells import (
     policy_order,
     sort_cells,
 )
+from roboirg.evaluation.analysis.stats.headline import headline_notes
 from roboirg.evaluation.analysis.stats.heard_rates import count_heard, heard_notes
 from roboirg.evaluation.analysis.stats.option_labels import (
     REFERENCE,
@@ -67,7 +68,7 @@ class RunTable:
         columns: the instruction options.
         cells: results by scope (a task or `ALL`) and options.
         differences: of the explicit cells from the published rates.
-        heard: a sentence if some of its prompts were cut, or may have been.
+        notes: sentences about prompts that were cut, or may have been, and its headline number.
     """
 
     policy_run: PolicyRun
@@ -76,7 +77,7 @@ class RunTable:
     columns: tuple[InstructionOptions, ...]
     cells: dict[tuple[Scope, InstructionOptions], ScopeResults]
     differences: AllDifferences
-    heard: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
 
 
 def make_run_tables(records: Sequence[Summary], planned: Sequence[Job] = ()) -> list[RunTable]:
@@ -95,7 +96,10 @@ def make_run_tables(records: Sequence[Summary], planned: Sequence[Job] = ()) -> 
             label,
             results,
             _explicit_differences(policy_run, cells),
-            heard=tuple(heard_notes(heard, {policy_run: label})),
+            notes=(
+                *heard_notes(heard, {policy_run: label}),
+                *headline_notes(cells, {policy_run: label}),
+            ),
         )
         for policy_run, label in labels(cells).items()
     ]
@@ -161,7 +165,7 @@ def _make_run_table(
     results: dict[ScopeKey, ScopeResults],
     differences: AllDifferences,
     *,
-    heard: tuple[str, ...],
+    notes: tuple[str, ...],
 ) -> RunTable:
     cells = {
         (key.scope, key.options): one
@@ -177,7 +181,7 @@ def _make_run_table(
         tuple(sorted(columns, key=options_sort_key)),
         cells,
         differences,
-        heard,
+        notes,
     )
 
 
@@ -254,7 +258,7 @@ def _legend(tables: Sequence[RunTable]) -> list[str]:
 def _caption(table: RunTable) -> str:
     first = f"{where_played([table.policy_run.conditions])} {_sizes(table)}"
     notes = comparison_notes(table.differences, {table.policy_run: table.label})
-    return "\n".join([first, *notes, *table.heard])
+    return "\n".join([first, *notes, *table.notes])
 
 
 def _explicit_signs(table: RunTable) -> dict[str, str]:

@@ -17,6 +17,7 @@ from roboirg.evaluation.analysis.stats.cells import (
     PolicyRun,
     labels,
 )
+from roboirg.evaluation.analysis.stats.headline import headline_notes
 from roboirg.evaluation.analysis.stats.intervals import wilson_interval
 from roboirg.evaluation.analysis.stats.option_labels import (
     has_default_options,
@@ -67,6 +68,7 @@ def notes_of(
         *_incomplete_notes(shown.values(), entries),
         *_version_notes(policy_runs),
         *_omission_notes(which, cells, tasks),
+        *(headline_notes(cells, labels(cells)) if which == "main" else ()),
         *_absent_notes({key.task for key in shown}),
         *_twin_notes(rows),
         *_published_notes(which, rows),

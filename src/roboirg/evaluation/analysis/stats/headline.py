@@ -1,0 +1,144 @@
+"""The headline number: the mean gap to explicit over the settings that words alone do not solve."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from roboirg.core.instruction_options import InstructionOptions
+from roboirg.core.plain_text import counted
+from roboirg.evaluation.analysis.stats.cells import CellKey, CellResults, Cells, PolicyRun
+from roboirg.evaluation.analysis.stats.intervals import (
+    DRAWS,
+    SEED,
+    Interval,
+    Rows,
+    percentile_interval,
+    resampled_rates,
+    without_spread,
+)
+from roboirg.evaluation.analysis.stats.measured_floors import measured_floors, settings_at_chance
+from roboirg.evaluation.analysis.stats.option_labels import REFERENCE
+from roboirg.evaluation.analysis.stats.paired_tests import Pairs
+from roboirg.evaluation.analysis.stats.rates import points
+from roboirg.language.templates import LANGUAGE_VERSION
+
+
+@dataclass(frozen=True, slots=True)
+class Headline:
+    """The headline number of a policy run.
+
+    Attributes:
+        settings: over which the gap is the mean; a setting's is the mean over its tasks.
+        gap: to explicit on the same episodes, -1 to 1.
+        interval: from the paired bootstrap over episodes, which all settings share.
+        episodes: number of episodes.
+        is_complete: whether every planned trial of these cells has a verdict.
+    """
+
+    settings: tuple[str, ...]
+    gap: float
+    interval: Interval | None
+    episodes: int
+    is_complete: bool
+
+    @property
+    def text(self) -> str:
+        """The number, its interval, and what it is over."""
+        ends = (
+            ""
+            if self.interval is None
+            else (f" (95 % interval {' to '.join(points(end, 1) for end in self.interval)})")
+        )
+        partial = "" if self.is_complete else ", incomplete"
+        return (
+            f"{points(self.gap, 1)} points to explicit{ends}, the mean over the settings that "
+            f"words alone do not solve: {', '.join(self.settings)}; "
+            f"{counted(self.episodes, 'episode')}{partial}"
+        )
+
+
+def headline_notes(cells: Cells, names: Mapping[PolicyRun, str]) -> Iterator[str]:
+    """Yield a sentence with the headline number of each policy run that played what it needs.
+
+    For a run in words whose floors were not measured, the sentence gives the reason.
+    """
+    for policy_run, name in names.items():
+        floors = policy_run.versions and measured_floors(policy_run.versions.language)
+        wanted = settings_at_chance(floors or measured_floors(LANGUAGE_VERSION) or {})
+        found = measure_headline(cells, policy_run, wanted)
+        if found is None or policy_run.versions is None:
+            continue
+        if policy_run.conditions.wordings is not None:
+            yield (
+                f"{name} has no headline number: the floors are those of our own words of each "
+                f"split, and it was played in {policy_run.conditions.text('wordings')}."
+            )
+        elif not floors:
+            yield (
+                f"{name} has no headline number: no floors were measured for its language version "
+                f"{policy_run.versions.language}."
+            )
+        else:
+            yield f"Headline of {name}: {found.text}."
+
+
+def measure_headline(
+    cells: Cells, policy_run: PolicyRun, settings: Sequence[str], draws: int = DRAWS
+) -> Headline | None:
+    """Return the headline number; None unless all settings were played next to explicit."""
+    options = [InstructionOptions(name) for name in settings]
+    explicit = {
+        key.task: cell
+        for key, cell in cells.items()
+        if key.policy_run == policy_run and key.options == REFERENCE
+    }
+    own = {
+        task: [cells.get(CellKey(policy_run, task, one), CellResults()) for one in options]
+        for task in explicit
+    }
+    rows = [_paired_rows(own[task], explicit[task]) for task in explicit]
+    rows = [one for one in rows if len(one)]
+    if not settings or not rows or not np.concatenate(rows)[:, 1::4].any(axis=0).all():
+        return None
+    rng = np.random.default_rng(SEED)
+    sizes = [len(one) for one in rows]
+    # Resampling equal rows only gives the rates themselves.
+    value = _mean_gap([resampled_rates([one.sum(axis=0)[None]], rng, 1) for one in rows])
+    drawn = _mean_gap([resampled_rates([one], rng, draws) for one in rows])
+    interval = percentile_interval(drawn, sizes)
+    if interval is not None and np.ptp(drawn) == 0:
+        interval = without_spread(float(drawn[0]), sum(sizes), least=-1.0)
+    played = [cell for task in own for cell in (explicit[task], *own[task])]
+    is_complete = not any(cell.errors or cell.missing for cell in played)
+    return Headline(tuple(settings), float(value[0]), interval, sum(sizes), is_complete)
+
+
+def _paired_rows(settings: Sequence[CellResults], explicit: CellResults) -> Rows:
+    """Return a row for each episode of a task: the columns of `Pairs.rows` for each setting.
+
+    They are 0 where the setting has no verdict.
+    """
+    reference = explicit.by_episode()
+    places = {episode: place for place, episode in enumerate(sorted(reference))}
+    rows = np.zeros((len(places), 4 * len(settings)), dtype=np.int64)
+    for column, cell in enumerate(settings):
+        shared = sorted(cell.by_episode().keys() & reference.keys())
+        at = [places[episode] for episode in shared]
+        rows[at, 4 * column : 4 * column + 4] = Pairs.of(cell, explicit).rows
+    return rows[rows.any(axis=1)]
+
+
+def _mean_gap(rates: Sequence[NDArray[np.float64]]) -> NDArray[np.float64]:
+    """Return the mean gap of each resample, over settings, and before that over their tasks.
+
+    Args:
+        rates: for each task the rates of each setting and of explicit, shape (draws, 2 k).
+    """
+    gaps = np.stack([one[:, 0::2] - one[:, 1::2] for one in rates])
+    tasks = (~np.isnan(gaps)).sum(axis=0)
+    with np.errstate(invalid="ignore"):
+        return np.asarray((np.nansum(gaps, axis=0) / tasks).mean(axis=1))

@@ -1,0 +1,86 @@
+"""The draw of a pair, and of the words that choose one of its values."""
+
+from __future__ import annotations
+
+from typing import Literal, NamedTuple
+
+from roboirg.core.goal_slots import COLOR_SLOTS
+from roboirg.language.balanced_draw import draw_balanced
+from roboirg.language.request import GoalValue, InstructionRequest
+from roboirg.language.rivals import rival_templates as templates
+from roboirg.language.rivals.balanced_rivals import balanced_rival
+from roboirg.language.rivals.value_pair import Locate, ValuePair, rival_pairs
+
+Fill = Literal["other", "both"]
+
+
+class PairDraw(NamedTuple):
+    """A pair, and how the words choose one of its values.
+
+    Attributes:
+        pair: the values.
+        meant_first: whether the meant one is introduced first.
+        kind: kind of the remark that chooses.
+        text: its template.
+        fill: of a template with two fields: whether both values are pointed at, or the one is
+            *the other*.
+        points_at_meant: if not both: whether the pointer is for the meant value.
+        pointers: the words that point.
+    """
+
+    pair: ValuePair
+    meant_first: bool
+    kind: templates.ReferenceKind
+    text: str
+    fill: Fill
+    points_at_meant: bool
+    pointers: templates.Pointers
+
+    @property
+    def introduced(self) -> tuple[GoalValue, GoalValue]:
+        """The values in the order of the introduction."""
+        meant, rival = self.pair
+        return (meant, rival) if self.meant_first else (rival, meant)
+
+
+def draw_pair(request: InstructionRequest, locate: Locate | None = None) -> PairDraw:
+    """Draw a slot, its rival, and the words that choose.
+
+    `locate` returns landmarks, where both values must have one; None for all slots.
+    """
+    pairs = rival_pairs(request, locate)
+    slot = pairs[0].slot
+    pair = balanced_rival(request, pairs, locate)
+    bits = draw_balanced(request, "rival order")
+    kind, text, fill = _remark(request, points_at_meant=bits.second)
+    pointers: tuple[templates.Pointers, ...] = (templates.RANKS,)
+    if slot in COLOR_SLOTS and kind in ("alone", "set aside"):  # beside another they are too long
+        pointers = (templates.RANKS, templates.RANKS, *templates.MENTIONED.of(request.pool))
+    return PairDraw(
+        pair,
+        bits.first,
+        kind,
+        text,
+        fill,
+        bits.second,
+        request.sampler.pick("rival pointers", pointers),
+    )
+
+
+def _remark(
+    request: InstructionRequest, *, points_at_meant: bool
+) -> tuple[templates.ReferenceKind, str, Fill]:
+    """Draw a remark; alone it has one pointer, and the others have two fields."""
+    kind = request.sampler.pick("rival reference", ("alone", *templates.CHOICES))
+    if kind == "alone":
+        name: templates.ReferenceKind = "alone" if points_at_meant else "set aside"
+        options = templates.SINGLED if points_at_meant else templates.SET_ASIDE
+        return name, request.pick(f"{name} remark", options), "other"
+    meant_first, meant_last = templates.CHOICES[kind]
+    fill: Fill = request.sampler.pick("rival fill", ("other", "both"))
+    if fill == "both":
+        # The first of two pointers is then right as often as a single one is.
+        chosen = meant_first if points_at_meant else meant_last
+    else:
+        chosen = request.sampler.pick("rival remark order", (meant_first, meant_last))
+    return kind, request.pick(f"{kind} remark", chosen), fill

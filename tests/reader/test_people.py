@@ -1,0 +1,55 @@
+"""Sentences as people type them are understood, or refused by name; none is misread."""
+
+from collections import Counter
+from pathlib import Path
+
+import pytest
+
+from roboirg.reader import interpret
+from roboirg.tasks.splits import get_episode
+
+PEOPLE = Path(__file__).parent / "people"
+UNDERSTOOD = {"sentences": 255, "held_out": 55}
+"""Sentences that are understood at least."""
+
+
+def sections(name):
+    """Yield task, episode, expected goal (``?``: to be refused) and sentence."""
+    task = index = ""
+    for line in (PEOPLE / f"{name}.txt").read_text().splitlines():
+        if line.startswith("["):
+            task, index, _ = line.strip("[]").split()
+        elif line and not line.startswith("#"):
+            yield task, int(index), *line.split(" | ", 1)
+
+
+def said(goal):
+    """Return a goal in the notation of the files."""
+    slots = goal.as_mapping()
+    if "counts" in slots:
+        pairs = zip(slots["colors"], slots["counts"], strict=True)
+        return " ".join(f"{color} {count}" for color, count in pairs)
+    values = (one if isinstance(one, tuple) else (one,) for one in slots.values())
+    return " ".join(str(part) for one in values for part in one)
+
+
+@pytest.mark.parametrize("name", UNDERSTOOD)
+def test_no_sentence_of_people_is_misread_and_most_are_understood(name):
+    verdicts = Counter()
+    for task, index, goal, text in sections(name):
+        found = interpret(text, get_episode(task, "test", index).scene, task)
+        if len(found.goals) == 1 and not found.not_understood:
+            assert said(found.goals[0]) == goal, text
+            verdicts["understood"] += 1
+        else:
+            assert found.not_understood, text
+            verdicts["refused"] += 1
+    assert verdicts.total() == {"sentences": 300, "held_out": 100}[name]
+    assert verdicts["understood"] >= UNDERSTOOD[name], verdicts
+
+
+def test_the_sentences_cover_all_tasks_and_several_hands():
+    lines = (PEOPLE / "sentences.txt").read_text().splitlines()
+    named = [line.strip("[]").split() for line in lines if line.startswith("[")]
+    assert len({task for task, _, _ in named}) == 11
+    assert len({hand for _, _, hand in named}) == 5

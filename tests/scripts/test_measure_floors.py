@@ -1,0 +1,48 @@
+"""The floors of the file and of the documentation are those of the words of today."""
+
+import measure_floors
+import pytest
+
+from roboirg.evaluation.analysis.stats import measured_floors as stored
+from roboirg.evaluation.analysis.stats.measured_floors import FloorKey, read_floors
+from roboirg.language.templates import LANGUAGE_VERSION
+
+AGAIN = "measure them anew: python scripts/measure_floors.py"
+
+
+def test_the_documentation_has_the_tables_of_the_file():
+    page = measure_floors.PAGE.read_text(encoding="utf-8")
+    assert measure_floors.TABLES.search(page)
+    assert page == measure_floors.page_text(), "python scripts/measure_floors.py --tables"
+
+
+def test_the_file_holds_what_is_measured():
+    """Chance and rules on the test split again; the learners learn from less here."""
+    pytest.importorskip("sklearn")
+    rows = measure_floors.measure(("StopCube",), scenes=8, learning=100)
+    found, kept = (
+        read_floors(measure_floors.file_text(rows)),
+        stored.measured_floors(LANGUAGE_VERSION),
+    )
+    assert kept is not None, AGAIN
+    own = {key: one for key, one in found.items() if key.task and key.split == stored.TEST}
+    assert len(own) > 8
+    for key, one in own.items():
+        assert one.count == kept[key].count, AGAIN
+        for name in ("chance", "rules"):
+            assert one.shares[name] == kept[key].shares[name], AGAIN
+        for name in ("text-only", "scene-only"):
+            again = pytest.approx(kept[key].shares[name].slots, abs=0.25)
+            assert one.shares[name].slots == again, AGAIN
+
+
+def test_lines_are_read_as_they_were_written():
+    rows = measure_floors.measure(("StopCube",), scenes=4, learning=0)
+    found = read_floors(measure_floors.file_text(rows))
+    for row in rows:
+        one = found[FloorKey(*row.group)]
+        assert one.count == row.count
+        assert one.excess == pytest.approx(row.excess, abs=1e-4)
+        for name in ("chance", "majority", "text-only", "scene-only", "union"):
+            assert one.shares[name] == pytest.approx(row.shares[name], abs=1e-4)
+    assert next(iter(found)) == FloorKey("random", "direct")
