@@ -1,0 +1,154 @@
+"""Things by what is seen around them, or by what happens to them; no words name a color.
+
+The colors of a scene are exchangeable: no place is more likely for one of them. So the words say
+nothing about the goal's color.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections import Counter
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
+
+from roboirg.core.episode import Scene, SceneObject
+from roboirg.core.motions import Away, Swap
+from roboirg.language.grounded import grounded_templates as templates
+from roboirg.language.grounded.clue import Clue
+from roboirg.language.landmarks import LandmarkClass, Ranking, Selector, candidates_in, selectors
+from roboirg.language.request import GoalValue, InstructionRequest
+
+AXES = ("x", "y")
+FEW = 3
+"""Things of which two are set aside."""
+TWO = 2
+_ANCHORS = (LandmarkClass.EXTREME, LandmarkClass.FIXTURE)
+
+
+def thing_clues(request: InstructionRequest, color: GoalValue) -> list[Clue]:
+    """Return the clues to the thing of a color, none of which names a color."""
+    if len(request.scene_colors) < TWO:
+        return []
+    scene, task = request.episode.scene, request.task.commands
+    if request.values_of("placement") or request.values_of("relation"):
+        return _carried(request)
+    targets = request.objects_to_point_at(color)
+    words = [_places(request, scene, targets)]
+    if request.values_of("amount"):
+        # Some cubes arrive later: the words must fit before and afterwards.
+        complete = replace(scene, motions=())
+        words += [_places(request, complete, targets)] if complete != scene else []
+    common = [one for one in words[0] if all(one in others for others in words[1:])]
+    clues = [one._replace(words=f"the {_noun(request)} {one.words}") for one in common]
+    if task.thing == "container":
+        clues += _moves(request, color)
+    return clues
+
+
+def anchors(scene: Scene, thing: str) -> Iterator[Selector]:
+    """Yield the short words for single places: extremes, and the closest to a fixture."""
+    for one in selectors(scene, thing, "robot"):
+        if one.landmark.kind > LandmarkClass.FIXTURE:
+            break
+        if one.landmark.kind in _ANCHORS and not one.landmark.phrase.startswith("at your"):
+            yield one
+
+
+def _noun(request: InstructionRequest) -> str:
+    return request.task.commands.pointed.removeprefix("hidden_")
+
+
+def _standing(request: InstructionRequest) -> templates.Standing:
+    words = request.task.commands.things_at
+    if words.endswith("at first"):
+        return templates.STOOD
+    return templates.STANDS_NOW if "now" in words else templates.STANDS
+
+
+def _places(
+    request: InstructionRequest, scene: Scene, targets: Sequence[SceneObject]
+) -> list[Clue]:
+    """Return the words that single out one of the targets, from what stands around it."""
+    thing = request.task.commands.pointed
+    things, pool, stands = candidates_in(scene, thing), request.pool, _standing(request)
+    named = [(one.landmark.phrase, found) for one in anchors(scene, thing) if (found := one.select())]
+    fields = {**stands._asdict(), "noun": _noun(request)}
+    found: list[Clue] = []
+    for axis in AXES:
+        if len(things) % 2 and len(things) > 1:
+            middle = Ranking(directed(axis, 1)).select(things, len(things) // 2)
+            if middle in targets:
+                found += [
+                    Clue("betweenness", one.format(**fields))
+                    for one in templates.MIDDLES[axis].of(pool)
+                ]
+    for anchor, other in named:
+        others = [item for item in things if item is not other]
+        if nearness(other).select(others, 0) in targets:
+            found += [
+                Clue("bridging", one.format(anchor=anchor, **fields))
+                for one in templates.NEIGHBORS.of(pool)
+            ]
+    for (first, one), (second, other) in itertools.combinations(named, 2):
+        left = [item for item in things if item not in (one, other)]
+        if len(things) == FEW and len(left) == 1 and left[0] in targets:
+            found += [
+                Clue("sets", words.format(first=first, second=second, **fields))
+                for words in templates.LEFT_OVER.of(pool)
+            ]
+    return found
+
+
+def nearness(anchor: SceneObject) -> Ranking:
+    """Return the order by the distance from a thing, the nearest first."""
+    x, y, _ = anchor.position
+    return Ranking(lambda item: -math.hypot(item.position.x - x, item.position.y - y))
+
+
+def directed(axis: str, sign: int) -> Callable[[SceneObject], float]:
+    """Return the coordinate along an axis of the robot base frame, in either direction."""
+    return lambda item: sign * (item.position.x if axis == "x" else item.position.y)
+
+
+def other_color_clues(request: InstructionRequest) -> list[Clue]:
+    """Return the words for the cubes of the other one of two colors, in BinFill."""
+    (color,), scene = request.color_values, request.episode.scene
+    if len(request.scene_colors) != TWO or late(scene):
+        return []
+    return [
+        Clue("sets", words.format(anchor=one.landmark.phrase), of_handled=True)
+        for one in anchors(scene, "cube")
+        for words in templates.OTHER_COLOR.of(request.pool)
+        if (found := one.select()) is not None and found.color != color.value
+    ]
+
+
+def late(scene: Scene) -> bool:
+    """Return whether some cubes arrive later."""
+    return any(isinstance(motion, Away) and motion.under is None for motion in scene.motions)
+
+
+def _moves(request: InstructionRequest, color: GoalValue) -> list[Clue]:
+    """Return the words for a container by how often it changes places."""
+    scene = request.episode.scene
+    swaps = [motion for motion in scene.motions if isinstance(motion, Swap)]
+    if not swaps:
+        return []
+    moves = Counter({item.name: 0 for item in scene.of_kind("container")})
+    moves.update(name for swap in swaps for name in (swap.first, swap.second))
+    (over,) = (item.inside for item in scene.objects if item.color == color.value)
+    shown = templates.SHOWN_MOVES if request.episode.demonstration else templates.COMING_MOVES
+    most = max(moves.values())
+    kinds = {"still": 0, "most": most}
+    return [
+        Clue("events", f"the container {words}", of_handled=True)
+        for kind, number in kinds.items()
+        if [name for name, found in moves.items() if found == number] == [over]
+        for words in shown[kind].of(request.pool)
+    ]
+
+
+def _carried(request: InstructionRequest) -> list[Clue]:
+    """Return the words for the cube in the video, which is the goal's in every scene."""
+    return [Clue("events", words) for words in templates.CARRIED.of(request.pool)]
