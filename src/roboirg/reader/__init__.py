@@ -18,6 +18,7 @@ from roboirg.reader.comprehension import ComprehensionGap, find_gaps, is_unknown
 from roboirg.reader.constraints import goal_constraints
 from roboirg.reader.discourse_context import names_camera, read_discourse, read_remark
 from roboirg.reader.negations import is_negated_command, unread_negations
+from roboirg.reader.observations import observe
 from roboirg.reader.preferences import with_preference
 from roboirg.reader.reference_resolution import ReferenceResolver
 from roboirg.reader.selections import read_selection, with_selection
@@ -59,7 +60,10 @@ def interpret(text: str, scene: Scene, task: str) -> Interpretation:
         UnknownNameError: there is no such task.
     """
     candidates = _possible_goals(scene, task)
-    sentences = tuple(map(take_remaining, split_sentences(text)))
+    said = tuple(map(take_remaining, split_sentences(text)))
+    sentences, unclear = observe(said, scene, candidates)
+    if unclear:
+        return Interpretation((), unclear)
     first, last = _command_span(sentences)
     gaps = _command_gaps(sentences, first, last)
     if gaps:

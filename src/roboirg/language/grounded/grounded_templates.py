@@ -18,53 +18,64 @@ class Standing(NamedTuple):
         be: begins the clause of a place.
         adjective: the same before an adjectival phrase, which needs no clause.
         have: begins the clause of what is around it.
-        end: follows the place.
+        neighbor: what stands nearest to another thing.
     """
 
     be: str
     adjective: str
     have: str
-    end: str = ""
+    neighbor: str
 
 
-STANDS = Standing("that is ", "", "that has ")
-STANDS_NOW = Standing("that is now ", "now ", "that now has ")
-STOOD = Standing("that was ", "that was ", "that had ", " at first")
+STANDS = Standing("that is ", "", "that has ", "the nearest neighbor")
+STANDS_NOW = Standing(
+    "that is now ", "now ", "that now has ", "the {noun} that is now the nearest neighbor"
+)
+STOOD = Standing(
+    "that at first was ",
+    "that at first was ",
+    "that at first had ",
+    "the {noun} that at first was the nearest neighbor",
+)
 
 MIDDLES = {
     "y": Pools(
-        train=("{adjective}in the middle from left to right{end}",),
-        test=("{have}the same number of {noun}s on its left and on its right{end}",),
+        train=("the {noun} {adjective}in the middle from left to right",),
+        test=("the {noun} {have}as many {noun}s to its left as to its right",),
     ),
     "x": Pools(
-        train=("{adjective}in the middle from near to far{end}",),
-        test=("{have}the same number of {noun}s in front of it and behind it{end}",),
+        train=("the {noun} {adjective}in the middle from near to far",),
+        test=("the {noun} {have}as many {noun}s in front of it as behind it",),
     ),
 }
 """In the middle of a row, from left to right (y) or from near to far (x)."""
 NEIGHBORS = Pools(
-    train=("{adjective}nearest to the {noun} {anchor}{end}",),
-    test=("{be}the nearest neighbor of the {noun} {anchor}{end}",),
+    train=("the {noun} {adjective}nearest to the one {anchor}",),
+    test=("{neighbor} of the {noun} {anchor}",),
 )
-"""The nearest one to another one, which has a place of its own."""
+SECOND_NEIGHBORS = Pools(
+    train=("the {noun} {adjective}second nearest to the one {anchor}",),
+    test=("{second_neighbor} of the {noun} {anchor}",),
+)
+"""The nearest one to another one, which has a place of its own; or the second nearest."""
 LEFT_OVER = Pools(
-    train=("{be}neither {first} nor {second}{end}",),
-    test=("other than the one {adjective}{first} and the one {adjective}{second}{end}",),
+    train=("the {noun} {be}neither {first} nor {second}",),
+    test=("the {noun} other than the one {adjective}{first} and the one {adjective}{second}",),
 )
 """Of three things, the one that is left without two."""
 OTHER_COLOR = Pools(
-    train=("of a color other than that of the cube {anchor}",),
-    test=("that differ in color from the cube {anchor}",),
+    train=("the cubes of a color other than that of the cube {anchor}",),
+    test=("the cubes that differ in color from the cube {anchor}",),
 )
 """Of cubes in two colors, those of the other one."""
 
 SHOWN_MOVES = {
-    "still": Pools(train=("that never moved",), test=("that stayed where it was",)),
-    "most": Pools(train=("that moved most often",), test=("that moved more often than the rest",)),
+    "still": Pools(train=("the container that never moved",), test=("the container that stayed where it was",)),
+    "most": Pools(train=("the container that moved most often",), test=("the container that moved more often than the rest",)),
 }
 COMING_MOVES = {
-    "still": Pools(train=("that never moves",), test=("that stays where it is",)),
-    "most": Pools(train=("that moves most often",), test=("that moves more often than the rest",)),
+    "still": Pools(train=("the container that never moves",), test=("the container that stays where it is",)),
+    "most": Pools(train=("the container that moves most often",), test=("the container that moves more often than the rest",)),
 }
 """Containers by how often they change places: never, or more often than every other one."""
 CARRIED = Pools(
@@ -79,7 +90,7 @@ SWAPS = Pools(
 BESIDE = Pools(
     train=(
         "once for every {cube} now {side} than the cube in the video",
-        "once for the cube in the video and once for every {cube} now {side} than it",
+        "once for the cube in the video and once for every {cube} now {side} than it is",
     ),
     test=(
         "as many times as there are {cube}s now {side} than the lifted one",
@@ -124,15 +135,33 @@ BEFORE_PRESS = Pools(
     test=("the placement that the button press followed",),
 )
 PLACEMENT_AT = Pools(
-    train=("the placement {anchor}",), test=("the placement on the target {anchor}",)
+    train=("the placement {anchor}",), test=("the placement that was made {anchor}",)
 )
 PLACEMENT_MOVED = {
     "moved": Pools(
-        train=("the placement on the target that moved in the end",),
-        test=("the placement on the target that later changed places",),
+        train=("the placement whose target moved in the end",),
+        test=("the placement whose target later changed places",),
     ),
     "still": Pools(
-        train=("the placement on the target that never moved",),
-        test=("the placement on the target that stayed where it was",),
+        train=("the placement whose target never moved",),
+        test=("the placement whose target stayed where it was",),
     ),
 }
+PLACEMENT_INTRODUCTIONS = Pools(
+    train=(
+        "I liked {which}.",
+        "I keep thinking about {which}.",
+        "I often think of {which}.",
+        "The video had one part that I liked: {which}.",
+        "What I liked in the video was {which}.",
+        "I was pleased with {which}.",
+    ),
+    test=(
+        "My favorite was {which}.",
+        "I well remember {which}.",
+        "What impressed me in the video was {which}.",
+        "I was impressed by {which}.",
+        "I have not forgotten {which}.",
+        "{which} was the best part of the video.",
+    ),
+)

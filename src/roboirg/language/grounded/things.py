@@ -9,14 +9,14 @@ from __future__ import annotations
 import itertools
 import math
 from collections import Counter
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 
 from roboirg.core.episode import Scene, SceneObject
 from roboirg.core.motions import Away, Swap
 from roboirg.language.grounded import grounded_templates as templates
 from roboirg.language.grounded.clue import Clue
-from roboirg.language.landmarks import LandmarkClass, Ranking, Selector, candidates_in, selectors
+from roboirg.language.landmarks import LandmarkClass, Ranking, candidates_in, selectors
 from roboirg.language.request import GoalValue, InstructionRequest
 
 AXES = ("x", "y")
@@ -24,12 +24,13 @@ FEW = 3
 """Things of which two are set aside."""
 TWO = 2
 _ANCHORS = (LandmarkClass.EXTREME, LandmarkClass.FIXTURE)
+"""Of the two things that are set aside, and of the cube whose color is excluded."""
+_LINKS = (*_ANCHORS, LandmarkClass.RANK, LandmarkClass.CORNER)
+"""Of the thing whose neighbor is meant."""
 
 
 def thing_clues(request: InstructionRequest, color: GoalValue) -> list[Clue]:
     """Return the clues to the thing of a color, none of which names a color."""
-    if len(request.scene_colors) < TWO:
-        return []
     scene, task = request.episode.scene, request.task.commands
     if request.values_of("placement") or request.values_of("relation"):
         return _carried(request)
@@ -39,20 +40,25 @@ def thing_clues(request: InstructionRequest, color: GoalValue) -> list[Clue]:
         # Some cubes arrive later: the words must fit before and afterwards.
         complete = replace(scene, motions=())
         words += [_places(request, complete, targets)] if complete != scene else []
-    common = [one for one in words[0] if all(one in others for others in words[1:])]
-    clues = [one._replace(words=f"the {_noun(request)} {one.words}") for one in common]
+    clues = [one for one in words[0] if all(one in others for others in words[1:])]
     if task.thing == "container":
         clues += _moves(request, color)
     return clues
 
 
-def anchors(scene: Scene, thing: str) -> Iterator[Selector]:
-    """Yield the short words for single places: extremes, and the closest to a fixture."""
+def _anchors(
+    scene: Scene, thing: str, kinds: Sequence[LandmarkClass] = _ANCHORS
+) -> list[tuple[str, SceneObject]]:
+    """Return words for single places, each with what stands there."""
+    found: list[tuple[str, SceneObject]] = []
     for one in selectors(scene, thing, "robot"):
         if one.landmark.kind > LandmarkClass.FIXTURE:
             break
-        if one.landmark.kind in _ANCHORS and not one.landmark.phrase.startswith("at your"):
-            yield one
+        item = one.select()
+        # "At your far left" needs a verb.
+        if item and one.landmark.kind in kinds and not one.landmark.phrase.startswith("at "):
+            found.append((one.landmark.phrase, item))
+    return found
 
 
 def _noun(request: InstructionRequest) -> str:
@@ -72,8 +78,13 @@ def _places(
     """Return the words that single out one of the targets, from what stands around it."""
     thing = request.task.commands.pointed
     things, pool, stands = candidates_in(scene, thing), request.pool, _standing(request)
-    named = [(one.landmark.phrase, found) for one in anchors(scene, thing) if (found := one.select())]
-    fields = {**stands._asdict(), "noun": _noun(request)}
+    noun = _noun(request)
+    neighbor = stands.neighbor.format(noun=noun)
+    second = neighbor.replace("nearest", "second nearest")
+    fields = {
+        **stands._asdict(),
+        **{"noun": noun, "neighbor": neighbor, "second_neighbor": second},
+    }
     found: list[Clue] = []
     for axis in AXES:
         if len(things) % 2 and len(things) > 1:
@@ -83,21 +94,42 @@ def _places(
                     Clue("betweenness", one.format(**fields))
                     for one in templates.MIDDLES[axis].of(pool)
                 ]
-    for anchor, other in named:
-        others = [item for item in things if item is not other]
-        if nearness(other).select(others, 0) in targets:
-            found += [
-                Clue("bridging", one.format(anchor=anchor, **fields))
-                for one in templates.NEIGHBORS.of(pool)
-            ]
-    for (first, one), (second, other) in itertools.combinations(named, 2):
+    found += _neighbors(_anchors(scene, thing, _LINKS), things, targets, templates.NEIGHBORS.of(pool), fields)
+    for (first, one), (second, other) in itertools.combinations(_anchors(scene, thing), 2):
         left = [item for item in things if item not in (one, other)]
-        if len(things) == FEW and len(left) == 1 and left[0] in targets:
+        if len(things) == FEW and len(left) == 1 and left[0] in targets and _differ(first, second):
             found += [
                 Clue("sets", words.format(first=first, second=second, **fields))
                 for words in templates.LEFT_OVER.of(pool)
             ]
-    return found
+    if found or len(things) <= FEW:
+        return found
+    seconds = templates.SECOND_NEIGHBORS.of(pool)
+    return _neighbors(_anchors(scene, thing), things, targets, seconds, fields, rank=1)
+
+
+def _neighbors(
+    anchors: Sequence[tuple[str, SceneObject]],
+    things: Sequence[SceneObject],
+    targets: Sequence[SceneObject],
+    wordings: Sequence[str],
+    fields: Mapping[str, str],
+    rank: int = 0,
+) -> list[Clue]:
+    """Return the words for a target that stands nearest to a thing with a place of its own."""
+    return [
+        Clue("bridging", words.format(anchor=anchor, **fields))
+        for anchor, other in anchors
+        if nearness(other).select([item for item in things if item is not other], rank) in targets
+        for words in wordings
+    ]
+
+
+def _differ(first: str, second: str) -> bool:
+    """Return whether two places do not lie along the same line: near and far, left and right."""
+    references = ({*words.split()} & {"left", "right", "you", "button", "target", "bin"} for words in (first, second))
+    (one,), (other,) = references
+    return one != other and {one, other} != {"left", "right"}
 
 
 def nearness(anchor: SceneObject) -> Ranking:
@@ -117,10 +149,10 @@ def other_color_clues(request: InstructionRequest) -> list[Clue]:
     if len(request.scene_colors) != TWO or late(scene):
         return []
     return [
-        Clue("sets", words.format(anchor=one.landmark.phrase), of_handled=True)
-        for one in anchors(scene, "cube")
+        Clue("sets", words.format(anchor=anchor), of_handled=True)
+        for anchor, found in _anchors(scene, "cube")
         for words in templates.OTHER_COLOR.of(request.pool)
-        if (found := one.select()) is not None and found.color != color.value
+        if found.color != color.value
     ]
 
 
@@ -142,7 +174,7 @@ def _moves(request: InstructionRequest, color: GoalValue) -> list[Clue]:
     most = max(moves.values())
     kinds = {"still": 0, "most": most}
     return [
-        Clue("events", f"the container {words}", of_handled=True)
+        Clue("events", words, of_handled=True)
         for kind, number in kinds.items()
         if [name for name, found in moves.items() if found == number] == [over]
         for words in shown[kind].of(request.pool)

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
+from roboirg.core.episode import Goal
 from roboirg.language.grounded import (
     Clue,
     amount_clues,
@@ -17,6 +18,7 @@ from roboirg.language.grounded import (
     repeat_clues,
     thing_clues,
 )
+from roboirg.language.grounded.grounded_templates import PLACEMENT_INTRODUCTIONS
 from roboirg.language.phrases import Phrase, anaphor, antecedent, fill, listed, plain, sentences
 from roboirg.language.request import GoalValue, InstructionRequest, InstructionSpec, UtteranceSpec
 from roboirg.language.settings.setting import Setting
@@ -68,7 +70,7 @@ def _clues(request: InstructionRequest) -> Clues:
     """Return a clue for each value that the words leave to what is seen, in order of speaking."""
     found: dict[GoalValue, Clue] = {}
     for value in request.goal_values:
-        sought = _SOUGHT.get(value.slot)
+        sought = _SOUGHT.get(value.slot) if _is_open(request, value.slot) else None
         clue = draw_clue(request, f"{value.field} seen", sought(request, value)) if sought else None
         if clue is not None:
             found[value] = clue
@@ -81,10 +83,24 @@ def _clues(request: InstructionRequest) -> Clues:
     return found
 
 
+def _is_open(request: InstructionRequest, slot: str) -> bool:
+    """Return whether several goals of the scene agree in all other slots, in any order."""
+    goal = _others(request.episode.goal, slot)
+    goals = request.task.goals(request.episode.scene)
+    return sum(_others(one, slot) == goal for one in goals) > 1
+
+
+def _others(goal: Goal, slot: str) -> list[str]:
+    return sorted(str(value) for name, content in goal.slots if name != slot for value in
+                  (content if isinstance(content, tuple) else (content,)))
+
+
 def _thing_clues(request: InstructionRequest, value: GoalValue) -> list[Clue]:
-    counted = bool(request.values_of("amount")) and len(request.color_values) == 1
-    others = other_color_clues(request) if counted else []
-    return [*thing_clues(request, value), *others]
+    clues = thing_clues(request, value)
+    if len(request.color_values) > 1:
+        # Two sets in one sentence are too long.
+        return [one for one in clues if one.kind != "sets"]
+    return [*clues, *(other_color_clues(request) if request.values_of("amount") else [])]
 
 
 def _amount_clues(request: InstructionRequest, value: GoalValue) -> list[Clue]:
@@ -163,7 +179,7 @@ def _counts(request: InstructionRequest, value: GoalValue, clue: Clue) -> tuple[
 
 def _placed(request: InstructionRequest, value: GoalValue, clue: Clue) -> tuple[Phrase, Fields]:
     said = antecedent(clue.words, value.slot, value.value)
-    template = request.pick("placement introduction", introductions.PLACEMENT_INTRODUCTIONS)
+    template = request.pick("seen placement", PLACEMENT_INTRODUCTIONS)
     pointing = anaphor("that placement", "that", value.slot, value.value)
     target = (*plain("the target of "), *(said if request.resolved else pointing))
     return fill(template, {"which": said}), {value.field: target}
