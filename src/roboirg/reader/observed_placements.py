@@ -42,8 +42,10 @@ def observed_placement(text: str, scene: Scene, *, moments: bool) -> Iterator[Sp
     pressed = [fact.kind for fact in scene.past].index("pressed")
     names = [f"the {one} placement" for one in _ORDINALS]
     if moments:
-        names = [f"the placement right {'before' if at < pressed else 'after'} the button press"
-                 for at in range(len(shown))]
+        names = [
+            f"the placement right {'before' if at < pressed else 'after'} the button press"
+            for at in range(len(shown))
+        ]
     for start, end, found in _placements(text, scene, shown, pressed):
         yield start, end, names[found[0]] if len(found) == 1 and found[0] >= 0 else None
 

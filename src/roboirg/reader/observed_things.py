@@ -18,14 +18,15 @@ _TIE = 0.01
 """Meters; the same words may mean things that differ by less."""
 
 _NOUN = "(?P<noun>cube|container)"
-_WHEN = "(?:(?:that )?(?P<when>at first |)(?:is |was )?(?:now )?)?"
-_HAS = "that (?P<when>at first |)(?:now )?(?:has|had)"
+_FIRST = "(?P<when>initially |at first |)"
+_WHEN = f"(?:(?:that )?{_FIRST}(?:is |was )?(?:now )?)?"
+_HAS = f"that {_FIRST}(?:now )?(?:has|had)"
 _IN_A_ROW = Phrases({
     "the cube in the middle from left to right":
         rf"the {_NOUN} {_WHEN}in the middle from (?P<way>left to right|near to far)\b",
 })  # fmt: skip
 _AS_MANY = Phrases({
-    "the container that at first had as many containers in front of it as behind it":
+    "the container that initially had as many containers in front of it as behind it":
         rf"the {_NOUN} {_HAS} as many (?:cubes|containers) "
         r"(?P<way>to its left as to its right|in front of it as behind it)\b",
 })  # fmt: skip
@@ -34,8 +35,8 @@ _NEAREST = Phrases({
 })  # fmt: skip
 _NEIGHBOR = Phrases({
     "the nearest neighbor of the cube closest to you":
-        rf"the (?:(?:cube|container) that (?P<when>at first |)(?:is |was )(?:now )?the )?"
-        rf"(?P<second>second )?nearest neighbor of the {_NOUN} ",
+        "the (?:current |(?P<when>initial |))(?P<second>second )?"
+        f"nearest neighbor of the {_NOUN} ",
 })  # fmt: skip
 _NEITHER = Phrases({
     "the cube that is neither closest to you nor closest to the button":
@@ -48,7 +49,7 @@ _OTHER_THAN = Phrases({
 })  # fmt: skip
 _AND_THE_ONE = Phrases({
     "and the one closest to the button":
-        " and the one (?:(?:that )?(?:at first )?(?:is |was )?(?:now )?)?",
+        " and the one (?:(?:that )?(?:initially |at first )?(?:is |was )?(?:now )?)?",
 })  # fmt: skip
 _OTHER_COLOR = Phrases({
     "the cubes that differ in color from the cube closest to you":
@@ -126,7 +127,9 @@ def _left_over(text: str, scene: Scene, start: Phrases, joint: Phrases) -> Itera
             continue
         left: list[SceneObject] = []
         for at_time in _scenes(scene, found["noun"], found["when"]):
-            gone = {item for place, _ in (first, second) for item in _at(place, at_time, found["noun"])}
+            gone = {
+                item for place, _ in (first, second) for item in _at(place, at_time, found["noun"])
+            }
             left += [item for item in present(at_time, found["noun"]) if item not in gone]
         yield found.start(), second[1], _named(left, scene, found["noun"])
 

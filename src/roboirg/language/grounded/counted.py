@@ -31,7 +31,10 @@ def repeat_clues(request: InstructionRequest, number: GoalValue) -> list[Clue]:
     scene = request.episode.scene
     if not scene.past or scene.past[0].kind != "picked":
         return []
-    draws = [("swaps", "", ""), *(("beside", axis, color) for axis in AXES for color in _colors(request))]
+    draws = [
+        ("swaps", "", ""),
+        *(("beside", axis, color) for axis in AXES for color in _colors(request)),
+    ]
     order = request.sampler.cycle("counted", draws)
     for _ in draws:
         kind, axis, color = next(order)
@@ -58,7 +61,9 @@ def _beside(request: InstructionRequest, number: GoalValue, axis: str, color: st
     scene, purpose = request.episode.scene, f"{axis}-{color}"
     sign = request.sampler.pick(f"side-{purpose}", (1, -1))
     cubes = [_at_last(request, item) for item in scene.of_kind("cube") if item.color == color]
-    (shown,) = (_at_last(request, item) for item in scene.objects if item.name == scene.past[0].subject)
+    (shown,) = (
+        _at_last(request, item) for item in scene.objects if item.name == scene.past[0].subject
+    )
     # The cube itself counts where all are alike, so that each of one to three is possible.
     alike = len(_colors(request)) == 1
     added = 1 if alike else request.sampler.pick(f"itself-{purpose}", (0, 1))

@@ -16,51 +16,46 @@ class Standing(NamedTuple):
 
     Attributes:
         be: begins the clause of a place.
-        adjective: the same before an adjectival phrase, which needs no clause.
+        adverb: the same before a phrase that needs no clause.
         have: begins the clause of what is around it.
-        neighbor: what stands nearest to another thing.
+        adjective: before a noun.
     """
 
     be: str
-    adjective: str
+    adverb: str
     have: str
-    neighbor: str
+    adjective: str
 
 
-STANDS = Standing("that is ", "", "that has ", "the nearest neighbor")
-STANDS_NOW = Standing(
-    "that is now ", "now ", "that now has ", "the {noun} that is now the nearest neighbor"
-)
-STOOD = Standing(
-    "that at first was ",
-    "that at first was ",
-    "that at first had ",
-    "the {noun} that at first was the nearest neighbor",
-)
+STANDS = Standing("that is ", "", "that has ", "")
+STANDS_NOW = Standing("that is now ", "now ", "that now has ", "current ")
+STOOD = Standing("that initially was ", "initially ", "that initially had ", "initial ")
 
 MIDDLES = {
     "y": Pools(
-        train=("the {noun} {adjective}in the middle from left to right",),
+        train=("the {noun} {adverb}in the middle from left to right",),
         test=("the {noun} {have}as many {noun}s to its left as to its right",),
     ),
     "x": Pools(
-        train=("the {noun} {adjective}in the middle from near to far",),
+        train=("the {noun} {adverb}in the middle from near to far",),
         test=("the {noun} {have}as many {noun}s in front of it as behind it",),
     ),
 }
 """In the middle of a row, from left to right (y) or from near to far (x)."""
-NEIGHBORS = Pools(
-    train=("the {noun} {adjective}nearest to the one {anchor}",),
-    test=("{neighbor} of the {noun} {anchor}",),
+NEIGHBORS = (
+    Pools(
+        train=("the {noun} {adverb}nearest to the one {anchor}",),
+        test=("the {adjective}nearest neighbor of the {noun} {anchor}",),
+    ),
+    Pools(
+        train=("the {noun} {adverb}second nearest to the one {anchor}",),
+        test=("the {adjective}second nearest neighbor of the {noun} {anchor}",),
+    ),
 )
-SECOND_NEIGHBORS = Pools(
-    train=("the {noun} {adjective}second nearest to the one {anchor}",),
-    test=("{second_neighbor} of the {noun} {anchor}",),
-)
-"""The nearest one to another one, which has a place of its own; or the second nearest."""
+"""The nearest one to another one, which has a place of its own; and the second nearest."""
 LEFT_OVER = Pools(
     train=("the {noun} {be}neither {first} nor {second}",),
-    test=("the {noun} other than the one {adjective}{first} and the one {adjective}{second}",),
+    test=("the {noun} other than the one {adverb}{first} and the one {adverb}{second}",),
 )
 """Of three things, the one that is left without two."""
 OTHER_COLOR = Pools(
@@ -70,12 +65,22 @@ OTHER_COLOR = Pools(
 """Of cubes in two colors, those of the other one."""
 
 SHOWN_MOVES = {
-    "still": Pools(train=("the container that never moved",), test=("the container that stayed where it was",)),
-    "most": Pools(train=("the container that moved most often",), test=("the container that moved more often than the rest",)),
+    "still": Pools(
+        train=("the container that never moved",), test=("the container that stayed where it was",)
+    ),
+    "most": Pools(
+        train=("the container that moved most often",),
+        test=("the container that moved more often than the rest",),
+    ),
 }
 COMING_MOVES = {
-    "still": Pools(train=("the container that never moves",), test=("the container that stays where it is",)),
-    "most": Pools(train=("the container that moves most often",), test=("the container that moves more often than the rest",)),
+    "still": Pools(
+        train=("the container that never moves",), test=("the container that stays where it is",)
+    ),
+    "most": Pools(
+        train=("the container that moves most often",),
+        test=("the container that moves more often than the rest",),
+    ),
 }
 """Containers by how often they change places: never, or more often than every other one."""
 CARRIED = Pools(

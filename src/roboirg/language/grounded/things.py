@@ -14,6 +14,7 @@ from dataclasses import replace
 
 from roboirg.core.episode import Scene, SceneObject
 from roboirg.core.motions import Away, Swap
+from roboirg.core.word_pools import PoolName
 from roboirg.language.grounded import grounded_templates as templates
 from roboirg.language.grounded.clue import Clue
 from roboirg.language.landmarks import LandmarkClass, Ranking, candidates_in, selectors
@@ -61,10 +62,6 @@ def _anchors(
     return found
 
 
-def _noun(request: InstructionRequest) -> str:
-    return request.task.commands.pointed.removeprefix("hidden_")
-
-
 def _standing(request: InstructionRequest) -> templates.Standing:
     words = request.task.commands.things_at
     if words.endswith("at first"):
@@ -76,58 +73,63 @@ def _places(
     request: InstructionRequest, scene: Scene, targets: Sequence[SceneObject]
 ) -> list[Clue]:
     """Return the words that single out one of the targets, from what stands around it."""
-    thing = request.task.commands.pointed
-    things, pool, stands = candidates_in(scene, thing), request.pool, _standing(request)
-    noun = _noun(request)
-    neighbor = stands.neighbor.format(noun=noun)
-    second = neighbor.replace("nearest", "second nearest")
-    fields = {
-        **stands._asdict(),
-        **{"noun": noun, "neighbor": neighbor, "second_neighbor": second},
-    }
-    found: list[Clue] = []
-    for axis in AXES:
-        if len(things) % 2 and len(things) > 1:
-            middle = Ranking(directed(axis, 1)).select(things, len(things) // 2)
-            if middle in targets:
-                found += [
-                    Clue("betweenness", one.format(**fields))
-                    for one in templates.MIDDLES[axis].of(pool)
-                ]
-    found += _neighbors(_anchors(scene, thing, _LINKS), things, targets, templates.NEIGHBORS.of(pool), fields)
-    for (first, one), (second, other) in itertools.combinations(_anchors(scene, thing), 2):
-        left = [item for item in things if item not in (one, other)]
-        if len(things) == FEW and len(left) == 1 and left[0] in targets and _differ(first, second):
-            found += [
-                Clue("sets", words.format(first=first, second=second, **fields))
-                for words in templates.LEFT_OVER.of(pool)
-            ]
-    if found or len(things) <= FEW:
-        return found
-    seconds = templates.SECOND_NEIGHBORS.of(pool)
-    return _neighbors(_anchors(scene, thing), things, targets, seconds, fields, rank=1)
+    thing, pool = request.task.commands.pointed, request.pool
+    things = candidates_in(scene, thing)
+    fields = {**_standing(request)._asdict(), "noun": thing.removeprefix("hidden_")}
+    found = _middles(things, targets, pool, fields)
+    for rank, anchors in enumerate((_anchors(scene, thing, _LINKS), _anchors(scene, thing))):
+        # The second nearest one is only said where there is nothing simpler.
+        if rank and (found or len(things) <= FEW):
+            break
+        for anchor, other in anchors:
+            others = [item for item in things if item is not other]
+            if nearness(other).select(others, rank) in targets:
+                wordings = templates.NEIGHBORS[rank].of(pool)
+                found += [Clue("bridging", one.format(anchor=anchor, **fields)) for one in wordings]
+    return found + _left_over(things, targets, _anchors(scene, thing), pool, fields)
 
 
-def _neighbors(
-    anchors: Sequence[tuple[str, SceneObject]],
+def _middles(
     things: Sequence[SceneObject],
     targets: Sequence[SceneObject],
-    wordings: Sequence[str],
+    pool: PoolName,
     fields: Mapping[str, str],
-    rank: int = 0,
 ) -> list[Clue]:
-    """Return the words for a target that stands nearest to a thing with a place of its own."""
-    return [
-        Clue("bridging", words.format(anchor=anchor, **fields))
-        for anchor, other in anchors
-        if nearness(other).select([item for item in things if item is not other], rank) in targets
-        for words in wordings
-    ]
+    found: list[Clue] = []
+    for axis in AXES:
+        middle = Ranking(directed(axis, 1)).select(things, len(things) // 2)
+        if len(things) % 2 and len(things) > 1 and middle in targets:
+            wordings = templates.MIDDLES[axis].of(pool)
+            found += [Clue("betweenness", one.format(**fields)) for one in wordings]
+    return found
+
+
+def _left_over(
+    things: Sequence[SceneObject],
+    targets: Sequence[SceneObject],
+    anchors: Sequence[tuple[str, SceneObject]],
+    pool: PoolName,
+    fields: Mapping[str, str],
+) -> list[Clue]:
+    """Return the words for one of three things, without the two others."""
+    found: list[Clue] = []
+    for (first, one), (second, other) in itertools.combinations(anchors, 2):
+        left = [item for item in things if item not in (one, other)]
+        if len(things) == FEW and len(left) == 1 and left[0] in targets and _differ(first, second):
+            wordings = templates.LEFT_OVER.of(pool)
+            found += [
+                Clue("sets", words.format(first=first, second=second, **fields))
+                for words in wordings
+            ]
+    return found
 
 
 def _differ(first: str, second: str) -> bool:
     """Return whether two places do not lie along the same line: near and far, left and right."""
-    references = ({*words.split()} & {"left", "right", "you", "button", "target", "bin"} for words in (first, second))
+    references = (
+        {*words.split()} & {"left", "right", "you", "button", "target", "bin"}
+        for words in (first, second)
+    )
     (one,), (other,) = references
     return one != other and {one, other} != {"left", "right"}
 

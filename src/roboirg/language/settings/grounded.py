@@ -91,8 +91,12 @@ def _is_open(request: InstructionRequest, slot: str) -> bool:
 
 
 def _others(goal: Goal, slot: str) -> list[str]:
-    return sorted(str(value) for name, content in goal.slots if name != slot for value in
-                  (content if isinstance(content, tuple) else (content,)))
+    return sorted(
+        str(value)
+        for name, content in goal.slots
+        if name != slot
+        for value in (content if isinstance(content, tuple) else (content,))
+    )
 
 
 def _thing_clues(request: InstructionRequest, value: GoalValue) -> list[Clue]:
@@ -159,7 +163,9 @@ def _pointed(request: InstructionRequest, colors: Clues) -> list[Phrase]:
 
 def _repeats(request: InstructionRequest, value: GoalValue, clue: Clue) -> tuple[Phrase, Fields]:
     said = antecedent(clue.words, value.slot, value.value)
-    remark = fill(request.pick("number introduction", introductions.NUMBER_INTRODUCTIONS), {"times": said})
+    remark = fill(
+        request.pick("number introduction", introductions.NUMBER_INTRODUCTIONS), {"times": said}
+    )
     words = request.pick("same number", number.SAME_NUMBER)
     return remark, {
         value.field: said if request.resolved else anaphor(words, "that", value.slot, value.value)
@@ -172,7 +178,9 @@ def _counts(request: InstructionRequest, value: GoalValue, clue: Clue) -> tuple[
     said = (*antecedent(clue.words, value.slot, value.value), *cubes)
     if clue.after:
         said = (*said, *plain(" "), *antecedent(clue.after, value.slot, value.value))
-    remark = fill(request.pick("amount introduction", introductions.AMOUNT_INTRODUCTIONS), {"things": said})
+    remark = fill(
+        request.pick("amount introduction", introductions.AMOUNT_INTRODUCTIONS), {"things": said}
+    )
     pointing = (*anaphor("that many", "that", value.slot, value.value), *cubes)
     return remark, amount.amounts([said if request.resolved else pointing])
 
