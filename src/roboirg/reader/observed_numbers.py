@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 
 from roboirg.core.episode import Scene, SceneObject
@@ -104,5 +105,5 @@ def _along(side: str, item: SceneObject, scene: Scene) -> float:
     if side.endswith("button"):
         (button,) = scene.of_kind("button")
         x, y = x - button.position.x, y - button.position.y
-        return sign * (x * x + y * y) ** 0.5
+        return sign * math.hypot(x, y)
     return sign * (x if side.endswith("you") else y)

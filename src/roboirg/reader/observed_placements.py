@@ -34,7 +34,7 @@ _ORDINALS = ("first", "second", "third", "fourth", "fifth")
 
 
 def observed_placement(text: str, scene: Scene, *, moments: bool) -> Iterator[Span]:
-    """Yield the words for one placement, each with its number, or with its moment about the press."""
+    """Yield the words for one placement, each with its number, or its moment about the press."""
     shown = [scene[str(fact.place)] for fact in scene.past if fact.kind == "placed"]
     shown = [item for item in shown if item.kind == "target"]
     if not shown:

@@ -31,7 +31,8 @@ _AS_MANY = Phrases({
         r"(?P<way>to its left as to its right|in front of it as behind it)\b",
 })  # fmt: skip
 _NEAREST = Phrases({
-    "the cube nearest to the one closest to you": rf"the {_NOUN} {_WHEN}(?P<second>second )?nearest to the one ",
+    "the cube nearest to the one closest to you":
+        rf"the {_NOUN} {_WHEN}(?P<second>second )?nearest to the one ",
 })  # fmt: skip
 _NEIGHBOR = Phrases({
     "the nearest neighbor of the cube closest to you":

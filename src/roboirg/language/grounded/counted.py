@@ -6,6 +6,7 @@ draw fits every number of the scene equally often, so that the words say nothing
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 
 from roboirg.core.episode import SceneObject
@@ -67,6 +68,8 @@ def _beside(request: InstructionRequest, number: GoalValue, axis: str, color: st
     # The cube itself counts where all are alike, so that each of one to three is possible.
     alike = len(_colors(request)) == 1
     added = 1 if alike else request.sampler.pick(f"itself-{purpose}", (0, 1))
+    if alike and not _in_clear_order(cubes, axis):
+        return None
     counted = count_beside([one for one in cubes if one.name != shown.name], shown, axis, sign)
     if counted is None or counted + added != number.number:
         return None
@@ -97,16 +100,26 @@ def count_beside(
     return sum(one > 0 for one in away)
 
 
+def _in_clear_order(things: Sequence[SceneObject], axis: str) -> bool:
+    """Return whether all are clear from each other; else a middle one is clear more rarely."""
+    places = sorted(map(directed(axis, 1), things))
+    return all(after - before >= MARGIN for before, after in itertools.pairwise(places))
+
+
 def amount_clues(request: InstructionRequest, count: GoalValue) -> list[Clue]:
-    """Return the clue to BinFill's only number of cubes, if the episode has one."""
-    scene, (color,) = request.episode.scene, request.color_values
-    if late(scene):
+    """Return the clue to BinFill's only number of cubes, if the scene has a single color.
+
+    Where there are several, large numbers go with certain words.
+    """
+    scene, color = request.episode.scene, request.color_values[0]
+    if late(scene) or len(request.scene_colors) > 1:
         return []
     cubes = request.objects_to_point_at(color)
-    draws = ["all but", *(f"{axis} {kind}" for axis in AXES for kind in ("bin", "button"))]
+    # Along x, bin and button lie at the ends of the cubes' region: nearly all are on one side.
+    draws = ["all but", "y bin", "y button"]
     order = request.sampler.cycle("counted", draws)
-    for _ in draws:
-        axis, _, fixture = next(order).partition(" ")
+    for draw in itertools.islice(order, len(draws)):
+        axis, _, fixture = draw.partition(" ")
         if axis == "all":
             if len(cubes) - count.number == LEFT:
                 words = request.pick("all but", templates.ALL_BUT)

@@ -64,25 +64,16 @@ OTHER_COLOR = Pools(
 )
 """Of cubes in two colors, those of the other one."""
 
-SHOWN_MOVES = {
-    "still": Pools(
-        train=("the container that never moved",), test=("the container that stayed where it was",)
-    ),
-    "most": Pools(
-        train=("the container that moved most often",),
-        test=("the container that moved more often than the rest",),
-    ),
-}
-COMING_MOVES = {
-    "still": Pools(
-        train=("the container that never moves",), test=("the container that stays where it is",)
-    ),
-    "most": Pools(
-        train=("the container that moves most often",),
-        test=("the container that moves more often than the rest",),
-    ),
-}
+_STILL = Pools(train=("the container that never {moved}",), test=("the container that {stayed}",))
+_MOST = Pools(
+    train=("the container that {moved} most often",),
+    test=("the container that {moved} more often than the rest",),
+)
+MOVES = {"still": _STILL, "most": _MOST}
 """Containers by how often they change places: never, or more often than every other one."""
+SHOWN = {"moved": "moved", "stayed": "stayed where it was"}
+COMING = {"moved": "moves", "stayed": "stays where it is"}
+"""The verbs, for moves in the video and for those to come."""
 CARRIED = Pools(
     train=("the cube that was moved in the video", "the cube that the video is about"),
     test=("the cube that the robot carried in the video", "the cube that the robot held"),

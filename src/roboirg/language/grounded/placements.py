@@ -12,7 +12,7 @@ from roboirg.language.grounded.things import directed, nearness
 from roboirg.language.landmarks import Ranking
 from roboirg.language.request import GoalValue, InstructionRequest
 
-KEPT = {2: (2, 4), 3: (3, 4), 4: (4, 4)}
+KEPT = {2: (2, 6), 3: (3, 6), 4: (4, 6)}
 """Share of the videos with two to four placements that count from the end.
 
 A placement of a short series is more often the goal than one of a long one; with these shares

@@ -172,14 +172,14 @@ def _moves(request: InstructionRequest, color: GoalValue) -> list[Clue]:
     moves = Counter({item.name: 0 for item in scene.of_kind("container")})
     moves.update(name for swap in swaps for name in (swap.first, swap.second))
     (over,) = (item.inside for item in scene.objects if item.color == color.value)
-    shown = templates.SHOWN_MOVES if request.episode.demonstration else templates.COMING_MOVES
+    verbs = templates.SHOWN if request.episode.demonstration else templates.COMING
     most = max(moves.values())
     kinds = {"still": 0, "most": most}
     return [
-        Clue("events", words, of_handled=True)
+        Clue("events", words.format(**verbs), of_handled=True)
         for kind, number in kinds.items()
         if [name for name, found in moves.items() if found == number] == [over]
-        for words in shown[kind].of(request.pool)
+        for words in templates.MOVES[kind].of(request.pool)
     ]
 
 

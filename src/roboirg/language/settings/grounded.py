@@ -107,17 +107,13 @@ def _thing_clues(request: InstructionRequest, value: GoalValue) -> list[Clue]:
     return [*clues, *(other_color_clues(request) if request.values_of("amount") else [])]
 
 
-def _amount_clues(request: InstructionRequest, value: GoalValue) -> list[Clue]:
-    return amount_clues(request, value) if len(request.color_values) == 1 else []
-
-
 _SOUGHT = {
     "repeats": repeat_clues,
     "placement": placement_clues,
     "relation": placement_clues,
     "color": _thing_clues,
     "colors": _thing_clues,
-    "counts": _amount_clues,
+    "counts": amount_clues,
 }
 """The clues to a value, by slot; those to a visit are missing, because nothing can be counted."""
 
@@ -142,14 +138,11 @@ def _pointed(request: InstructionRequest, colors: Clues) -> list[Phrase]:
     if len(colors) == 1:
         pointers = (request.sampler.pick("color anaphor", color.SINGLE),)
     things: list[Phrase] = []
-    for (value, clue), (words, expression) in zip(colors.items(), pointers, strict=True):
-        if _several(request, clue):
-            words, expression = "them", "them"
-        place = (
-            antecedent(clue.words, value.slot, value.value)
-            if request.resolved
-            else anaphor(words, expression, value.slot, value.value)
-        )
+    for (value, clue), pointer in zip(colors.items(), pointers, strict=True):
+        words, expression = amount.THEM[0] if _several(request, clue) else pointer
+        place = anaphor(words, expression, value.slot, value.value)
+        if request.resolved:
+            place = antecedent(clue.words, value.slot, value.value)
         if _several(request, clue):
             things.append((*plain("of "), *place))
             continue
@@ -163,11 +156,9 @@ def _pointed(request: InstructionRequest, colors: Clues) -> list[Phrase]:
 
 def _repeats(request: InstructionRequest, value: GoalValue, clue: Clue) -> tuple[Phrase, Fields]:
     said = antecedent(clue.words, value.slot, value.value)
-    remark = fill(
-        request.pick("number introduction", introductions.NUMBER_INTRODUCTIONS), {"times": said}
-    )
+    template = request.pick("number introduction", introductions.NUMBER_INTRODUCTIONS)
     words = request.pick("same number", number.SAME_NUMBER)
-    return remark, {
+    return fill(template, {"times": said}), {
         value.field: said if request.resolved else anaphor(words, "that", value.slot, value.value)
     }
 
@@ -178,11 +169,10 @@ def _counts(request: InstructionRequest, value: GoalValue, clue: Clue) -> tuple[
     said = (*antecedent(clue.words, value.slot, value.value), *cubes)
     if clue.after:
         said = (*said, *plain(" "), *antecedent(clue.after, value.slot, value.value))
-    remark = fill(
-        request.pick("amount introduction", introductions.AMOUNT_INTRODUCTIONS), {"things": said}
-    )
+    template = request.pick("amount introduction", introductions.AMOUNT_INTRODUCTIONS)
     pointing = (*anaphor("that many", "that", value.slot, value.value), *cubes)
-    return remark, amount.amounts([said if request.resolved else pointing])
+    command = amount.amounts([said if request.resolved else pointing])
+    return fill(template, {"things": said}), command
 
 
 def _placed(request: InstructionRequest, value: GoalValue, clue: Clue) -> tuple[Phrase, Fields]:
