@@ -7,7 +7,6 @@ placement* as *the third placement*. The other modules read the sentence that is
 from __future__ import annotations
 
 import functools
-import re
 from collections.abc import Callable, Iterator, Sequence
 from typing import NamedTuple
 
@@ -15,11 +14,12 @@ from roboirg.core.episode import Goal, Scene
 from roboirg.reader.observed_numbers import observed_amount, observed_times
 from roboirg.reader.observed_placements import observed_placement
 from roboirg.reader.observed_things import observed_thing
+from roboirg.reader.phrases import Phrases
 from roboirg.reader.tokens import COLOR, Sentence
 
 Span = tuple[int, int, str | None]
 """First character, one past the last, and what the words between stand for; None if unclear."""
-_LIKE = re.compile(rf"\blike the ({COLOR}) cube\b")
+_LIKE = Phrases({"two cubes like the red cube": rf"\blike the ({COLOR}) cube\b"})
 Find = Callable[[str, Scene], Iterator[Span]]
 
 
@@ -37,7 +37,13 @@ def observe(sentences: tuple[Sentence, ...], scene: Scene, goals: Sequence[Goal]
     """
     moments = bool(goals) and "relation" in goals[0].as_mapping()
     placement = functools.partial(observed_placement, moments=moments)
-    finders: tuple[Find, ...] = (observed_thing, observed_times, observed_amount, placement)
+    finders: tuple[Find, ...] = (
+        observed_thing,
+        observed_times,
+        observed_amount,
+        placement,
+        _likeness,
+    )
     read: list[Sentence] = []
     complaints: list[str] = []
     for sentence in sentences:
@@ -48,6 +54,11 @@ def observe(sentences: tuple[Sentence, ...], scene: Scene, goals: Sequence[Goal]
                     complaints.append(f'sees nothing or several things for "{text[start:end]}"')
                 else:
                     text = f"{text[:start]}{meaning}{text[end:]}"
-        # "Two cubes like the red cube" are two red ones, not three cubes.
-        read.append(tuple(_LIKE.sub(r"like the \1 ones", text).split()))
+        read.append(tuple(text.split()))
     return Observed(tuple(read), tuple(dict.fromkeys(complaints)))
+
+
+def _likeness(text: str, _scene: Scene) -> Iterator[Span]:
+    """Yield *like the red cube*, which is no further cube, as *like the red ones*."""
+    for found in _LIKE.finditer(text):
+        yield (*found.span(), f"like the {found[1]} ones")

@@ -35,8 +35,9 @@ _ORDINALS = ("first", "second", "third", "fourth", "fifth")
 
 def observed_placement(text: str, scene: Scene, *, moments: bool) -> Iterator[Span]:
     """Yield the words for one placement, each with its number, or its moment about the press."""
-    shown = [scene[str(fact.place)] for fact in scene.past if fact.kind == "placed"]
-    shown = [item for item in shown if item.kind == "target"]
+    targets = {item.name: item for item in scene.of_kind("target")}
+    placed = [str(fact.place) for fact in scene.past if fact.kind == "placed"]
+    shown = [targets[name] for name in placed if name in targets]
     if not shown:
         return
     pressed = [fact.kind for fact in scene.past].index("pressed")

@@ -43,14 +43,14 @@ _NEITHER = Phrases({
     "the cube that is neither closest to you nor closest to the button":
         rf"the {_NOUN} {_WHEN}neither ",
 })  # fmt: skip
-_NOR = Phrases({"nor closest to the button": " nor "})
+_NOR = Phrases({"nor closest to the button": "nor "})
 _OTHER_THAN = Phrases({
     "the cube other than the one closest to you and the one closest to the button":
         rf"the {_NOUN} other than the one {_WHEN}",
 })  # fmt: skip
 _AND_THE_ONE = Phrases({
     "and the one closest to the button":
-        " and the one (?:(?:that )?(?:initially |at first )?(?:is |was )?(?:now )?)?",
+        "and the one (?:(?:that )?(?:initially |at first )?(?:is |was )?(?:now )?)?",
 })  # fmt: skip
 _OTHER_COLOR = Phrases({
     "the cubes that differ in color from the cube closest to you":
@@ -122,7 +122,7 @@ def _left_over(text: str, scene: Scene, start: Phrases, joint: Phrases) -> Itera
     """Yield the words for what is left without two other things."""
     for found in start.finditer(text):
         first = _place(text, found.end())
-        then = joint.match(text, first[1]) if first else None
+        then = joint.match(text, first[1] + 1) if first else None
         second = _place(text, then.end()) if then else None
         if first is None or second is None:
             continue

@@ -19,7 +19,16 @@ from roboirg.language.grounded import (
     thing_clues,
 )
 from roboirg.language.grounded.grounded_templates import PLACEMENT_INTRODUCTIONS
-from roboirg.language.phrases import Phrase, anaphor, antecedent, fill, listed, plain, sentences
+from roboirg.language.phrases import (
+    Phrase,
+    anaphor,
+    antecedent,
+    fill,
+    listed,
+    plain,
+    sentences,
+    swap_particles,
+)
 from roboirg.language.request import GoalValue, InstructionRequest, InstructionSpec, UtteranceSpec
 from roboirg.language.settings.setting import Setting
 from roboirg.language.slot_types import Fields, amount, color, described, number, stated
@@ -57,11 +66,10 @@ def say(request: InstructionRequest) -> InstructionSpec:
         "touched": list(dict.fromkeys(value.slot for value in clues)),
         "pattern": kinds[0],
         "patterns": list(dict.fromkeys(kinds)),
-        "frame": request.frame,
     }
     utterances = (
         UtteranceSpec("introduction", sentences(remarks)),
-        UtteranceSpec("command", request.command(fields)),
+        UtteranceSpec("command", swap_particles(request.command(fields))),
     )
     return InstructionSpec(utterances, notes)
 
