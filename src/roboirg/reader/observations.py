@@ -36,12 +36,9 @@ def observe(sentences: tuple[Sentence, ...], scene: Scene, goals: Sequence[Goal]
     If goals have a relation to the press, placements are named by it, else by their number.
     """
     moments = bool(goals) and "relation" in goals[0].as_mapping()
-    placement = functools.partial(observed_placement, moments=moments)
+    placed = functools.partial(observed_placement, moments=moments)
     finders: tuple[Find, ...] = (
-        observed_thing,
-        observed_times,
-        observed_amount,
-        placement,
+        *(observed_thing, observed_times, observed_amount, placed),
         _likeness,
     )
     read: list[Sentence] = []

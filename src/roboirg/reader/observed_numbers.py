@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Sequence
 
 from roboirg.core.episode import Scene, SceneObject
@@ -13,10 +12,7 @@ from roboirg.reader.tokens import COLOR, NUMBER, number_of
 
 Span = tuple[int, int, str | None]
 _TIE = 0.01
-_SIDE = (
-    "(?P<side>farther to your left|farther to your right|closer to you|farther from you"
-    "|closer to the button|farther from the button)"
-)
+_SIDE = "(?P<side>farther to your (?:left|right)|closer to you|farther from you)"
 _SWAPS = Phrases({
     "once for every time that cubes changed places":
         r"once for every time that cubes changed places\b",
@@ -58,7 +54,7 @@ def observed_times(text: str, scene: Scene) -> Iterator[Span]:
             for item in last.of_kind("cube")
             if item != reference and found["color"] in (None, item.color)
         ]
-        count = _count(cubes, reference, found["side"], last)
+        count = _count(cubes, reference, found["side"])
         if count is not None and (found["itself"] or found["more"]):
             count += 1
         yield (*found.span(), _number(count, "times"))
@@ -73,7 +69,7 @@ def observed_amount(text: str, scene: Scene) -> Iterator[Span]:
     for found in _AMOUNT.finditer(text):
         color = found["color"] or found["shade"]
         (reference,) = scene.of_kind(found["fixture"])
-        counted = _count(_of_color(scene, color), reference, found["side"], scene)
+        counted = _count(_of_color(scene, color), reference, found["side"])
         yield (*found.span(), _number(counted, f"of the {color} cubes"))
 
 
@@ -88,22 +84,11 @@ def _number(count: int | None, noun: str) -> str | None:
     return "once" if (count, noun) == (1, "times") else f"{count} {noun}"
 
 
-def _count(
-    things: Sequence[SceneObject], reference: SceneObject, side: str, scene: Scene
-) -> int | None:
+def _count(things: Sequence[SceneObject], reference: SceneObject, side: str) -> int | None:
     """Return how many things lie beyond another one, in a direction; None for near ties."""
-    away = [_along(side, item, scene) - _along(side, reference, scene) for item in things]
+    axis = 0 if side.endswith("you") else 1
+    sign = -1 if side == "closer to you" or side.endswith("right") else 1
+    away = [sign * (item.position[axis] - reference.position[axis]) for item in things]
     if any(abs(one) <= _TIE for one in away):
         return None
     return sum(one > 0 for one in away)
-
-
-def _along(side: str, item: SceneObject, scene: Scene) -> float:
-    """Return how far a thing is in a direction."""
-    x, y, _ = item.position
-    sign = -1.0 if side.startswith("closer") or side.endswith("right") else 1.0
-    if side.endswith("button"):
-        (button,) = scene.of_kind("button")
-        x, y = x - button.position.x, y - button.position.y
-        return sign * math.hypot(x, y)
-    return sign * (x if side.endswith("you") else y)

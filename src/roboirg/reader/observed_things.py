@@ -32,11 +32,11 @@ _AS_MANY = Phrases({
 })  # fmt: skip
 _NEAREST = Phrases({
     "the cube nearest to the one closest to you":
-        rf"the {_NOUN} {_WHEN}(?P<second>second )?nearest to the one ",
+        rf"the {_NOUN} {_WHEN}(?P<second>(?:second|2nd) )?nearest to the one ",
 })  # fmt: skip
 _NEIGHBOR = Phrases({
     "the nearest neighbor of the cube closest to you":
-        "the (?:current |(?P<when>initial |))(?P<second>second )?"
+        "the (?:current |(?P<when>initial |))(?P<second>(?:second|2nd) )?"
         f"nearest neighbor of the {_NOUN} ",
 })  # fmt: skip
 _NEITHER = Phrases({
@@ -51,10 +51,6 @@ _OTHER_THAN = Phrases({
 _AND_THE_ONE = Phrases({
     "and the one closest to the button":
         "and the one (?:(?:that )?(?:initially |at first )?(?:is |was )?(?:now )?)?",
-})  # fmt: skip
-_OTHER_COLOR = Phrases({
-    "the cubes that differ in color from the cube closest to you":
-        "the cubes (?:of a color other than that of|that differ in color from) the (?P<noun>cube) ",
 })  # fmt: skip
 _MOVES = Phrases({
     "the container that never moved":
@@ -74,7 +70,6 @@ def observed_thing(text: str, scene: Scene) -> Iterator[Span]:
     yield from _neighbors(text, scene)
     yield from _left_over(text, scene, _NEITHER, _NOR)
     yield from _left_over(text, scene, _OTHER_THAN, _AND_THE_ONE)
-    yield from _other_color(text, scene)
     yield from _moving(text, scene)
     carried = {scene[fact.subject] for fact in scene.past if fact.kind == "placed"}
     for found in _CARRIED.finditer(text) if carried else ():
@@ -133,17 +128,6 @@ def _left_over(text: str, scene: Scene, start: Phrases, joint: Phrases) -> Itera
             }
             left += [item for item in present(at_time, found["noun"]) if item not in gone]
         yield found.start(), second[1], _named(left, scene, found["noun"])
-
-
-def _other_color(text: str, scene: Scene) -> Iterator[Span]:
-    for found in _OTHER_COLOR.finditer(text):
-        read = _place(text, found.end())
-        if read is None:
-            continue
-        anchors = {item.color for item in _at(read[0], scene, "cube")}
-        others = {item for item in present(scene, "cube") if item.color not in anchors}
-        named = _named(others, scene, "cube")
-        yield found.start(), read[1], named and f"{named}s"
 
 
 def _moving(text: str, scene: Scene) -> Iterator[Span]:

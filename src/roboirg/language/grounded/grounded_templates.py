@@ -58,12 +58,6 @@ LEFT_OVER = Pools(
     test=("the {noun} other than the one {adverb}{first} and the one {adverb}{second}",),
 )
 """Of three things, the one that is left without two."""
-OTHER_COLOR = Pools(
-    train=("the cubes of a color other than that of the cube {anchor}",),
-    test=("the cubes that differ in color from the cube {anchor}",),
-)
-"""Of cubes in two colors, those of the other one."""
-
 _STILL = Pools(train=("the container that never {moved}",), test=("the container that {stayed}",))
 _MOST = Pools(
     train=("the container that {moved} most often",),

@@ -23,18 +23,18 @@ from roboirg.language.request import GoalValue, InstructionRequest
 AXES = ("x", "y")
 FEW = 3
 """Things of which two are set aside."""
-TWO = 2
 _ANCHORS = (LandmarkClass.EXTREME, LandmarkClass.FIXTURE)
-"""Of the two things that are set aside, and of the cube whose color is excluded."""
+"""Of the two things that are set aside."""
 _LINKS = (*_ANCHORS, LandmarkClass.RANK, LandmarkClass.CORNER)
 """Of the thing whose neighbor is meant."""
 
 
 def thing_clues(request: InstructionRequest, color: GoalValue) -> list[Clue]:
     """Return the clues to the thing of a color, none of which names a color."""
-    scene, task = request.episode.scene, request.task.commands
+    scene = request.episode.scene
     if request.values_of("placement") or request.values_of("relation"):
-        return _carried(request)
+        # The cube in the video is the goal's in every scene.
+        return [Clue("events", words) for words in templates.CARRIED.of(request.pool)]
     targets = request.objects_to_point_at(color)
     words = [_places(request, scene, targets)]
     if request.values_of("amount"):
@@ -42,9 +42,7 @@ def thing_clues(request: InstructionRequest, color: GoalValue) -> list[Clue]:
         complete = replace(scene, motions=())
         words += [_places(request, complete, targets)] if complete != scene else []
     clues = [one for one in words[0] if all(one in others for others in words[1:])]
-    if task.thing == "container":
-        clues += _moves(request, color)
-    return clues
+    return clues + _moves(request, color)
 
 
 def _anchors(
@@ -126,11 +124,7 @@ def _left_over(
 
 def _differ(first: str, second: str) -> bool:
     """Return whether two places do not lie along the same line: near and far, left and right."""
-    references = (
-        {*words.split()} & {"left", "right", "you", "button", "target", "bin"}
-        for words in (first, second)
-    )
-    (one,), (other,) = references
+    one, other = first.rsplit(maxsplit=1)[-1], second.rsplit(maxsplit=1)[-1]
     return one != other and {one, other} != {"left", "right"}
 
 
@@ -143,19 +137,6 @@ def nearness(anchor: SceneObject) -> Ranking:
 def directed(axis: str, sign: int) -> Callable[[SceneObject], float]:
     """Return the coordinate along an axis of the robot base frame, in either direction."""
     return lambda item: sign * (item.position.x if axis == "x" else item.position.y)
-
-
-def other_color_clues(request: InstructionRequest) -> list[Clue]:
-    """Return the words for the cubes of the other one of two colors, in BinFill."""
-    (color,), scene = request.color_values, request.episode.scene
-    if len(request.scene_colors) != TWO or late(scene):
-        return []
-    return [
-        Clue("sets", words.format(anchor=anchor), of_handled=True)
-        for anchor, found in _anchors(scene, "cube")
-        for words in templates.OTHER_COLOR.of(request.pool)
-        if found.color != color.value
-    ]
 
 
 def late(scene: Scene) -> bool:
@@ -171,18 +152,12 @@ def _moves(request: InstructionRequest, color: GoalValue) -> list[Clue]:
         return []
     moves = Counter({item.name: 0 for item in scene.of_kind("container")})
     moves.update(name for swap in swaps for name in (swap.first, swap.second))
-    (over,) = (item.inside for item in scene.objects if item.color == color.value)
+    over = next(item.inside for item in scene.objects if item.color == color.value)
     verbs = templates.SHOWN if request.episode.demonstration else templates.COMING
-    most = max(moves.values())
-    kinds = {"still": 0, "most": most}
+    kinds = {"still": 0, "most": max(moves.values())}
     return [
         Clue("events", words.format(**verbs), of_handled=True)
         for kind, number in kinds.items()
         if [name for name, found in moves.items() if found == number] == [over]
         for words in templates.MOVES[kind].of(request.pool)
     ]
-
-
-def _carried(request: InstructionRequest) -> list[Clue]:
-    """Return the words for the cube in the video, which is the goal's in every scene."""
-    return [Clue("events", words) for words in templates.CARRIED.of(request.pool)]

@@ -13,7 +13,6 @@ from roboirg.language.grounded import (
     Clue,
     amount_clues,
     draw_clue,
-    other_color_clues,
     placement_clues,
     repeat_clues,
     thing_clues,
@@ -108,11 +107,9 @@ def _others(goal: Goal, slot: str) -> list[str]:
 
 
 def _thing_clues(request: InstructionRequest, value: GoalValue) -> list[Clue]:
-    clues = thing_clues(request, value)
-    if len(request.color_values) > 1:
-        # Two sets in one sentence are too long.
-        return [one for one in clues if one.kind != "sets"]
-    return [*clues, *(other_color_clues(request) if request.values_of("amount") else [])]
+    single = len(request.color_values) == 1
+    # Two sets in one sentence are too long.
+    return [one for one in thing_clues(request, value) if single or one.kind != "sets"]
 
 
 _SOUGHT = {
@@ -128,15 +125,9 @@ _SOUGHT = {
 
 def _introduced(request: InstructionRequest, colors: Clues) -> Phrase:
     """Return a sentence that describes the things."""
-    several = len(colors) > 1 or any(_several(request, clue) for clue in colors.values())
     things = [antecedent(clue.words, value.slot, value.value) for value, clue in colors.items()]
     template = request.pick("place introduction", introductions.PLACE_INTRODUCTIONS)
-    return fill(template, {"things": listed(things)}, plural=several)
-
-
-def _several(request: InstructionRequest, clue: Clue) -> bool:
-    """Return whether a clue describes all cubes of a color: *the cubes that differ from ...*."""
-    return clue.of_handled and bool(request.values_of("amount"))
+    return fill(template, {"things": listed(things)}, plural=len(things) > 1)
 
 
 def _pointed(request: InstructionRequest, colors: Clues) -> list[Phrase]:
@@ -147,13 +138,9 @@ def _pointed(request: InstructionRequest, colors: Clues) -> list[Phrase]:
         pointers = (request.sampler.pick("color anaphor", color.SINGLE),)
     things: list[Phrase] = []
     for (value, clue), pointer in zip(colors.items(), pointers, strict=True):
-        words, expression = amount.THEM[0] if _several(request, clue) else pointer
-        place = anaphor(words, expression, value.slot, value.value)
+        place = anaphor(*pointer, value.slot, value.value)
         if request.resolved:
             place = antecedent(clue.words, value.slot, value.value)
-        if _several(request, clue):
-            things.append((*plain("of "), *place))
-            continue
         template = commands.by_rank or commands.by_color.replace("{cube}", "{place}")
         if clue.of_handled or (commands.pointed == commands.thing and commands.by_rank is None):
             template = "{place}"
