@@ -71,8 +71,8 @@ def test_the_table_says_what_decides(task):
         stated = [int(share) for share in shares.split(" / ")] if "/" in shares else [0, 0, 0]
         for difficulty, share in zip(DIFFICULTIES, stated, strict=True):
             assert (share == 0) == (counts[difficulty] == 0) or share < 5
-            # Sixty easy scenes, thirty of the others.
-            assert abs(counts[difficulty] / scenes[difficulty] - share / 100) < 0.3
+            # Sixty easy scenes, thirty of the others: room for chance.
+            assert abs(counts[difficulty] / scenes[difficulty] - share / 100) < 0.4
 
 
 @pytest.mark.parametrize("task", GROUNDED)
