@@ -150,7 +150,9 @@ def test_the_words_do_not_go_with_the_goal(task, slot):
                         if slot in said.metadata["touched"])  # fmt: skip
         expected = max(prior.values()) / prior.total()
         # Four standard deviations: fixed seeds, and the same for all groups.
-        assert max(group.values()) / size <= expected + 4 * (expected * (1 - expected) / size) ** 0.5
+        assert (
+            max(group.values()) / size <= expected + 4 * (expected * (1 - expected) / size) ** 0.5
+        )
 
 
 def test_what_has_nothing_to_see_is_refused():
