@@ -47,7 +47,9 @@ def language_card() -> str:
         parts.append(f"## {task.name}")
         parts += [_example(task.name, one.setting) for one in variants if one.task == task.name]
     parts += [_patterns_by_task(), _phrases()]
-    parts.append("## Harder settings\n\nWith a rival, and with open reasoning.")
+    parts.append(
+        "## Harder settings\n\nWith a rival, with open reasoning, and grounded in what is seen."
+    )
     parts += [_harder_example(*one) for one in _harder_variants()]
     return "\n\n".join(parts) + "\n"
 

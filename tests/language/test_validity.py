@@ -39,6 +39,8 @@ def test_every_instruction_is_valid(task, split, episodes):
     assert not found.failures
     read = {setting: found.texts[task, setting] for setting in settings_of(get_task(task))}
     rivals, open_ones = told(found, task, "direct-rival"), told(found, task, "reasoning-open")
+    seen = read.pop("grounded", 0)
+    assert seen == (2 * told(found, task, "grounded") if seen else 0)
     # Two forms; four sets of stages with two kinds of distractors, or with a rival; two frames.
     spatial = read.pop("spatial", 4 * episodes) + read.pop("spatial-rival", 0)
     assert read == {

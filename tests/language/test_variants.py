@@ -44,6 +44,7 @@ def test_every_combination_of_options_is_there():
             "reasoning-open": 2,
             "contextual-rival": 8,
             "spatial-rival": 4,
+            "grounded": 2,
         }
         assert {one.setting for one in others} <= most_of.keys()
         for setting, most in most_of.items():

@@ -37,6 +37,7 @@ from roboirg.language.wordings.wording_store import find_wordings
 from roboirg.tasks import get_task
 
 _DEFAULT_METADATA: dict[str, object] = {
+    "touched": [],
     "pattern": None,
     "patterns": [],
     "relation": None,

@@ -19,6 +19,7 @@ from roboirg.reader.constraints import goal_constraints
 from roboirg.reader.discourse_context import names_camera, read_discourse, read_remark
 from roboirg.reader.leftovers import left_over
 from roboirg.reader.negations import is_negated_command, unread_negations
+from roboirg.reader.observations import observe
 from roboirg.reader.paraphrases import paraphrased
 from roboirg.reader.pick_order import in_order
 from roboirg.reader.preferences import with_preference
@@ -63,7 +64,9 @@ def interpret(text: str, scene: Scene, task: str) -> Interpretation:
         UnknownNameError: there is no such task.
     """
     candidates = _possible_goals(scene, task)
-    sentences = paraphrased(split_sentences(text))
+    sentences, unclear = observe(paraphrased(split_sentences(text)), scene, candidates)
+    if unclear:
+        return Interpretation((), unclear)
     first, last = _command_span(sentences)
     gaps = _command_gaps(sentences, first, last)
     if gaps:

@@ -20,13 +20,13 @@ def objects_at(
     if "at first" in times or not times:
         found += [item.name for item in find_objects(place, scene, kind, mirrored=mirrored)]
     if "at last" in times or not times:
-        final = _final_scene(scene)
+        final = scene_at_last(scene)
         found += [item.name for item in find_objects(place, final, kind, mirrored=mirrored)]
     return tuple(scene[name] for name in dict.fromkeys(found))
 
 
 @functools.lru_cache(maxsize=256)
-def _final_scene(scene: Scene) -> Scene:
+def scene_at_last(scene: Scene) -> Scene:
     """Return the scene with everything where it stands after the last swap."""
     places = {item.name: item.position for item in scene.objects}
     for motion in scene.motions:

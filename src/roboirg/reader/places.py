@@ -294,7 +294,7 @@ def find_objects(
     Cubes that appear later are not compared; containers appear together. If `mirrored`, left and
     right are those of the front camera's picture.
     """
-    return _find(place, _present(scene, kind), scene, mirrored=mirrored)
+    return _find(place, present(scene, kind), scene, mirrored=mirrored)
 
 
 def _find(
@@ -342,7 +342,8 @@ def _orders(
         yield [item for item in candidates if item is not anchor], away, _TIE
 
 
-def _present(scene: Scene, kind: str) -> list[SceneObject]:
+def present(scene: Scene, kind: str) -> list[SceneObject]:
+    """Return the things of a kind, open or hidden, without cubes that appear later."""
     late: set[str] = set()
     if kind == "cube":
         motions = [motion for motion in scene.motions if isinstance(motion, Away)]
@@ -388,7 +389,7 @@ def _tangent(item: SceneObject) -> float:
 def _anchors(place: RelativePlace, scene: Scene, *, mirrored: bool) -> tuple[SceneObject, ...]:
     if not isinstance(place.anchor, str):
         return find_objects(place.anchor, scene, place.kind, mirrored=mirrored)
-    like = _present(scene, place.kind)
+    like = present(scene, place.kind)
     if color_of(place.anchor):
         like = [item for item in like if item.color == place.anchor]
     return tuple(like) if len(like) == 1 else ()

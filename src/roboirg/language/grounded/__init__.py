@@ -1,0 +1,17 @@
+"""Grounded references: words whose referent only the scene or the video shows."""
+
+from __future__ import annotations
+
+from roboirg.language.grounded.clue import Clue, draw_clue
+from roboirg.language.grounded.counted import amount_clues, repeat_clues
+from roboirg.language.grounded.placements import placement_clues
+from roboirg.language.grounded.things import thing_clues
+
+__all__ = [
+    "Clue",
+    "amount_clues",
+    "draw_clue",
+    "placement_clues",
+    "repeat_clues",
+    "thing_clues",
+]

@@ -1,0 +1,163 @@
+"""Things by what is seen around them, or by what happens to them; no words name a color.
+
+The colors of a scene are exchangeable: no place is more likely for one of them. So the words say
+nothing about the goal's color.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections import Counter
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+
+from roboirg.core.episode import Scene, SceneObject
+from roboirg.core.motions import Away, Swap
+from roboirg.core.word_pools import PoolName
+from roboirg.language.grounded import grounded_templates as templates
+from roboirg.language.grounded.clue import Clue
+from roboirg.language.landmarks import LandmarkClass, Ranking, candidates_in, selectors
+from roboirg.language.request import GoalValue, InstructionRequest
+
+AXES = ("x", "y")
+FEW = 3
+"""Things of which two are set aside."""
+_ANCHORS = (LandmarkClass.EXTREME, LandmarkClass.FIXTURE)
+"""Of the two things that are set aside."""
+_LINKS = (*_ANCHORS, LandmarkClass.RANK, LandmarkClass.CORNER)
+"""Of the thing whose neighbor is meant."""
+
+
+def thing_clues(request: InstructionRequest, color: GoalValue) -> list[Clue]:
+    """Return the clues to the thing of a color, none of which names a color."""
+    scene = request.episode.scene
+    if request.values_of("placement") or request.values_of("relation"):
+        # The cube in the video is the goal's in every scene.
+        return [Clue("events", words) for words in templates.CARRIED.of(request.pool)]
+    targets = request.objects_to_point_at(color)
+    words = [_places(request, scene, targets)]
+    if request.values_of("amount"):
+        # Some cubes arrive later: the words must fit before and afterwards.
+        complete = replace(scene, motions=())
+        words += [_places(request, complete, targets)] if complete != scene else []
+    clues = [one for one in words[0] if all(one in others for others in words[1:])]
+    return clues + _moves(request, color)
+
+
+def _anchors(
+    scene: Scene, thing: str, kinds: Sequence[LandmarkClass] = _ANCHORS
+) -> list[tuple[str, SceneObject]]:
+    """Return words for single places, each with what stands there."""
+    found: list[tuple[str, SceneObject]] = []
+    for one in selectors(scene, thing, "robot"):
+        if one.landmark.kind > LandmarkClass.FIXTURE:
+            break
+        item = one.select()
+        # "At your far left" needs a verb.
+        if item and one.landmark.kind in kinds and not one.landmark.phrase.startswith("at "):
+            found.append((one.landmark.phrase, item))
+    return found
+
+
+def _standing(request: InstructionRequest) -> templates.Standing:
+    words = request.task.commands.things_at
+    if words.endswith("at first"):
+        return templates.STOOD
+    return templates.STANDS_NOW if "now" in words else templates.STANDS
+
+
+def _places(
+    request: InstructionRequest, scene: Scene, targets: Sequence[SceneObject]
+) -> list[Clue]:
+    """Return the words that single out one of the targets, from what stands around it."""
+    thing, pool = request.task.commands.pointed, request.pool
+    things = candidates_in(scene, thing)
+    fields = {**_standing(request)._asdict(), "noun": thing.removeprefix("hidden_")}
+    found = _middles(things, targets, pool, fields)
+    for rank, anchors in enumerate((_anchors(scene, thing, _LINKS), _anchors(scene, thing))):
+        # The second nearest one is only said where there is nothing simpler.
+        if rank and (found or len(things) <= FEW):
+            break
+        for anchor, other in anchors:
+            others = [item for item in things if item is not other]
+            if nearness(other).select(others, rank) in targets:
+                wordings = templates.NEIGHBORS[rank].of(pool)
+                found += [Clue("bridging", one.format(anchor=anchor, **fields)) for one in wordings]
+    return found + _left_over(things, targets, _anchors(scene, thing), pool, fields)
+
+
+def _middles(
+    things: Sequence[SceneObject],
+    targets: Sequence[SceneObject],
+    pool: PoolName,
+    fields: Mapping[str, str],
+) -> list[Clue]:
+    found: list[Clue] = []
+    for axis in AXES:
+        middle = Ranking(directed(axis, 1)).select(things, len(things) // 2)
+        if len(things) % 2 and len(things) > 1 and middle in targets:
+            wordings = templates.MIDDLES[axis].of(pool)
+            found += [Clue("betweenness", one.format(**fields)) for one in wordings]
+    return found
+
+
+def _left_over(
+    things: Sequence[SceneObject],
+    targets: Sequence[SceneObject],
+    anchors: Sequence[tuple[str, SceneObject]],
+    pool: PoolName,
+    fields: Mapping[str, str],
+) -> list[Clue]:
+    """Return the words for one of three things, without the two others."""
+    found: list[Clue] = []
+    for (first, one), (second, other) in itertools.combinations(anchors, 2):
+        left = [item for item in things if item not in (one, other)]
+        if len(things) == FEW and len(left) == 1 and left[0] in targets and _differ(first, second):
+            wordings = templates.LEFT_OVER.of(pool)
+            found += [
+                Clue("sets", words.format(first=first, second=second, **fields))
+                for words in wordings
+            ]
+    return found
+
+
+def _differ(first: str, second: str) -> bool:
+    """Return whether two places do not lie along the same line: near and far, left and right."""
+    one, other = first.rsplit(maxsplit=1)[-1], second.rsplit(maxsplit=1)[-1]
+    return one != other and {one, other} != {"left", "right"}
+
+
+def nearness(anchor: SceneObject) -> Ranking:
+    """Return the order by the distance from a thing, the nearest first."""
+    x, y, _ = anchor.position
+    return Ranking(lambda item: -math.hypot(item.position.x - x, item.position.y - y))
+
+
+def directed(axis: str, sign: int) -> Callable[[SceneObject], float]:
+    """Return the coordinate along an axis of the robot base frame, in either direction."""
+    return lambda item: sign * (item.position.x if axis == "x" else item.position.y)
+
+
+def late(scene: Scene) -> bool:
+    """Return whether some cubes arrive later."""
+    return any(isinstance(motion, Away) and motion.under is None for motion in scene.motions)
+
+
+def _moves(request: InstructionRequest, color: GoalValue) -> list[Clue]:
+    """Return the words for a container by how often it changes places."""
+    scene = request.episode.scene
+    swaps = [motion for motion in scene.motions if isinstance(motion, Swap)]
+    if not swaps:
+        return []
+    moves = Counter({item.name: 0 for item in scene.of_kind("container")})
+    moves.update(name for swap in swaps for name in (swap.first, swap.second))
+    over = next(item.inside for item in scene.objects if item.color == color.value)
+    verbs = templates.SHOWN if request.episode.demonstration else templates.COMING
+    kinds = {"still": 0, "most": max(moves.values())}
+    return [
+        Clue("events", words.format(**verbs), of_handled=True)
+        for kind, number in kinds.items()
+        if [name for name, found in moves.items() if found == number] == [over]
+        for words in templates.MOVES[kind].of(request.pool)
+    ]

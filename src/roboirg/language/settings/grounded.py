@@ -1,0 +1,200 @@
+"""The grounded setting: the introduction describes what only the scene or the video shows.
+
+The command points back at it. Slots for which there is nothing to see stay explicit; an episode
+without any other slot is refused.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from roboirg.core.episode import Goal
+from roboirg.language.grounded import (
+    Clue,
+    amount_clues,
+    draw_clue,
+    placement_clues,
+    repeat_clues,
+    thing_clues,
+)
+from roboirg.language.grounded.grounded_templates import PLACEMENT_INTRODUCTIONS
+from roboirg.language.phrases import (
+    Phrase,
+    anaphor,
+    antecedent,
+    fill,
+    listed,
+    plain,
+    sentences,
+    swap_particles,
+)
+from roboirg.language.request import GoalValue, InstructionRequest, InstructionSpec, UtteranceSpec
+from roboirg.language.settings.setting import Setting
+from roboirg.language.slot_types import Fields, amount, color, described, number, stated
+from roboirg.language.templates import introductions
+from roboirg.tasks import Task
+
+MOST_COLORS = 2
+"""Colors that the words describe; three would be too many words, and mostly all there are."""
+Clues = Mapping[GoalValue, Clue]
+
+
+def refusal(request: InstructionRequest) -> str | None:
+    """Return why nothing in an episode can be described by what is seen; None if something can."""
+    if request.wordings is not None:
+        return "it has no words for commands from outside"
+    return None if _clues(request) else "nothing to see in this scene singles out a slot's value"
+
+
+def say(request: InstructionRequest) -> InstructionSpec:
+    """Return an introduction that describes what is seen, and a command that points back at it."""
+    clues = _clues(request)
+    remarks: list[Phrase] = []
+    fields = stated(request)
+    for value, clue in clues.items():
+        if value.slot not in ("color", "colors"):
+            remark, field = _WORDS[value.slot](request, value, clue)
+            remarks.append(remark)
+            fields |= field
+    colors = {value: clue for value, clue in clues.items() if value.slot in ("color", "colors")}
+    if colors:
+        remarks.append(_introduced(request, colors))
+        fields |= described(request, _pointed(request, colors))
+    kinds = [clue.kind for clue in clues.values()]
+    notes: dict[str, object] = {
+        "touched": list(dict.fromkeys(value.slot for value in clues)),
+        "pattern": kinds[0],
+        "patterns": list(dict.fromkeys(kinds)),
+    }
+    utterances = (
+        UtteranceSpec("introduction", sentences(remarks)),
+        UtteranceSpec("command", swap_particles(request.command(fields))),
+    )
+    return InstructionSpec(utterances, notes)
+
+
+def _clues(request: InstructionRequest) -> Clues:
+    """Return a clue for each value that the words leave to what is seen, in order of speaking."""
+    found: dict[GoalValue, Clue] = {}
+    for value in request.goal_values:
+        sought = _SOUGHT.get(value.slot) if _is_open(request, value.slot) else None
+        clue = draw_clue(request, f"{value.field} seen", sought(request, value)) if sought else None
+        if clue is not None:
+            found[value] = clue
+    colors = request.color_values
+    if len(colors) > MOST_COLORS or any(one not in found for one in colors):
+        # The words describe all colors of the goal, or none.
+        found = {value: clue for value, clue in found.items() if value not in colors}
+    if any(one.slot == "colors" for one in found):
+        found = {value: clue for value, clue in found.items() if value.slot != "counts"}
+    return found
+
+
+def _is_open(request: InstructionRequest, slot: str) -> bool:
+    """Return whether several goals of the scene agree in all other slots, in any order."""
+    goal = _others(request.episode.goal, slot)
+    goals = request.task.goals(request.episode.scene)
+    return sum(_others(one, slot) == goal for one in goals) > 1
+
+
+def _others(goal: Goal, slot: str) -> list[str]:
+    return sorted(
+        str(value)
+        for name, content in goal.slots
+        if name != slot
+        for value in (content if isinstance(content, tuple) else (content,))
+    )
+
+
+def _thing_clues(request: InstructionRequest, value: GoalValue) -> list[Clue]:
+    single = len(request.color_values) == 1
+    # Two sets in one sentence are too long.
+    return [one for one in thing_clues(request, value) if single or one.kind != "sets"]
+
+
+_SOUGHT = {
+    "repeats": repeat_clues,
+    "placement": placement_clues,
+    "relation": placement_clues,
+    "color": _thing_clues,
+    "colors": _thing_clues,
+    "counts": amount_clues,
+}
+"""The clues to a value, by slot; those to a visit are missing, because nothing can be counted."""
+
+
+def _introduced(request: InstructionRequest, colors: Clues) -> Phrase:
+    """Return a sentence that describes the things."""
+    things = [antecedent(clue.words, value.slot, value.value) for value, clue in colors.items()]
+    template = request.pick("place introduction", introductions.PLACE_INTRODUCTIONS)
+    return fill(template, {"things": listed(things)}, plural=len(things) > 1)
+
+
+def _pointed(request: InstructionRequest, colors: Clues) -> list[Phrase]:
+    """Return the command's words for the things to handle."""
+    commands = request.task.commands
+    pointers: Sequence[color.Pointer] = color.FORMER
+    if len(colors) == 1:
+        pointers = (request.sampler.pick("color anaphor", color.SINGLE),)
+    things: list[Phrase] = []
+    for (value, clue), pointer in zip(colors.items(), pointers, strict=True):
+        place = anaphor(*pointer, value.slot, value.value)
+        if request.resolved:
+            place = antecedent(clue.words, value.slot, value.value)
+        template = commands.by_rank or commands.by_color.replace("{cube}", "{place}")
+        if clue.of_handled or (commands.pointed == commands.thing and commands.by_rank is None):
+            template = "{place}"
+        plural = request.count_of(value) > 1
+        things.append(request.by_place(value, place, plural=plural, template=template))
+    return things
+
+
+def _repeats(request: InstructionRequest, value: GoalValue, clue: Clue) -> tuple[Phrase, Fields]:
+    said = antecedent(clue.words, value.slot, value.value)
+    template = request.pick("number introduction", introductions.NUMBER_INTRODUCTIONS)
+    words = request.pick("same number", number.SAME_NUMBER)
+    return fill(template, {"times": said}), {
+        value.field: said if request.resolved else anaphor(words, "that", value.slot, value.value)
+    }
+
+
+def _counts(request: InstructionRequest, value: GoalValue, clue: Clue) -> tuple[Phrase, Fields]:
+    (shade,) = request.color_values
+    cubes = (*plain(" of the "), *amount.cubes(shade, MOST_COLORS))
+    said = (*antecedent(clue.words, value.slot, value.value), *cubes)
+    if clue.after:
+        said = (*said, *plain(" "), *antecedent(clue.after, value.slot, value.value))
+    template = request.pick("amount introduction", introductions.AMOUNT_INTRODUCTIONS)
+    pointing = (*anaphor("that many", "that", value.slot, value.value), *cubes)
+    command = amount.amounts([said if request.resolved else pointing])
+    return fill(template, {"things": said}), command
+
+
+def _placed(request: InstructionRequest, value: GoalValue, clue: Clue) -> tuple[Phrase, Fields]:
+    said = antecedent(clue.words, value.slot, value.value)
+    template = request.pick("seen placement", PLACEMENT_INTRODUCTIONS)
+    pointing = anaphor("that placement", "that", value.slot, value.value)
+    target = (*plain("the target of "), *(said if request.resolved else pointing))
+    return fill(template, {"which": said}), {value.field: target}
+
+
+_WORDS = {"repeats": _repeats, "counts": _counts, "placement": _placed, "relation": _placed}
+
+
+def _applies_to(task: Task) -> bool:
+    """Return whether a task has anything to look at: StopCube and the real tasks do not."""
+    return task.suite != "real" and task.name != "StopCube"
+
+
+SETTING = Setting(
+    name="grounded",
+    order=5,
+    summary="the introduction describes what only the scene or the video shows",
+    color="#44AA99",
+    say=say,
+    applies_to=_applies_to,
+    refusal=refusal,
+    reads=frozenset({"delivery"}),
+    example=2,
+    plain="direct",
+)

@@ -1,0 +1,186 @@
+"""Things by what is around them or happens to them: *the nearest neighbor*, *the middle*, moves."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Callable, Collection, Iterator, Sequence
+
+from roboirg.core.episode import Scene, SceneObject
+from roboirg.core.motions import Swap
+from roboirg.reader.object_positions import objects_at, scene_at_last
+from roboirg.reader.phrases import Phrases
+from roboirg.reader.places import Place, place_mentions, present
+from roboirg.reader.temporal_relations import Time
+
+Span = tuple[int, int, str | None]
+_TIE = 0.01
+"""Meters; the same words may mean things that differ by less."""
+
+_NOUN = "(?P<noun>cube|container)"
+_FIRST = "(?P<when>initially |at first |)"
+_WHEN = f"(?:(?:that )?{_FIRST}(?:is |was )?(?:now )?)?"
+_HAS = f"that {_FIRST}(?:now )?(?:has|had)"
+_IN_A_ROW = Phrases({
+    "the cube in the middle from left to right":
+        rf"the {_NOUN} {_WHEN}in the middle from (?P<way>left to right|near to far)\b",
+})  # fmt: skip
+_AS_MANY = Phrases({
+    "the container that initially had as many containers in front of it as behind it":
+        rf"the {_NOUN} {_HAS} as many (?:cubes|containers) "
+        r"(?P<way>to its left as to its right|in front of it as behind it)\b",
+})  # fmt: skip
+_NEAREST = Phrases({
+    "the cube nearest to the one closest to you":
+        rf"the {_NOUN} {_WHEN}(?P<second>(?:second|2nd) )?nearest to the one ",
+})  # fmt: skip
+_NEIGHBOR = Phrases({
+    "the nearest neighbor of the cube closest to you":
+        "the (?:current |(?P<when>initial |))(?P<second>(?:second|2nd) )?"
+        f"nearest neighbor of the {_NOUN} ",
+})  # fmt: skip
+_NEITHER = Phrases({
+    "the cube that is neither closest to you nor closest to the button":
+        rf"the {_NOUN} {_WHEN}neither ",
+})  # fmt: skip
+_NOR = Phrases({"nor closest to the button": "nor "})
+_OTHER_THAN = Phrases({
+    "the cube other than the one closest to you and the one closest to the button":
+        rf"the {_NOUN} other than the one {_WHEN}",
+})  # fmt: skip
+_AND_THE_ONE = Phrases({
+    "and the one closest to the button":
+        "and the one (?:(?:that )?(?:initially |at first )?(?:is |was )?(?:now )?)?",
+})  # fmt: skip
+_MOVES = Phrases({
+    "the container that never moved":
+        "the container that (?:(?P<still>never move[sd]|stay(?:s|ed) where it (?:is|was))"
+        r"|move[sd] (?:most often|more often than the rest))\b",
+})  # fmt: skip
+_CARRIED = Phrases({
+    "the cube that was moved in the video":
+        "the cube that (?:was moved in the video|the video is about"
+        r"|the robot (?:held|carried)(?: in the video)?)\b",
+})  # fmt: skip
+
+
+def observed_thing(text: str, scene: Scene) -> Iterator[Span]:
+    """Yield the words for one thing, each with its color in words."""
+    yield from _middles(text, scene)
+    yield from _neighbors(text, scene)
+    yield from _left_over(text, scene, _NEITHER, _NOR)
+    yield from _left_over(text, scene, _OTHER_THAN, _AND_THE_ONE)
+    yield from _moving(text, scene)
+    carried = {scene[fact.subject] for fact in scene.past if fact.kind == "placed"}
+    for found in _CARRIED.finditer(text) if carried else ():
+        yield (*found.span(), _named(carried, scene, "cube"))
+
+
+def _middles(text: str, scene: Scene) -> Iterator[Span]:
+    for phrases in (_IN_A_ROW, _AS_MANY):
+        for found in phrases.finditer(text):
+            axis = 1 if "left" in found["way"] else 0
+            middles: list[SceneObject] = []
+            for at_time in _scenes(scene, found["noun"], found["when"]):
+                things = present(at_time, found["noun"])
+                middles += _middle(things, axis)
+            yield (*found.span(), _named(middles, scene, found["noun"]))
+
+
+def _middle(things: Sequence[SceneObject], axis: int) -> list[SceneObject]:
+    """Return what has as many things on one side as on the other."""
+    found: list[SceneObject] = []
+    for item in things:
+        away = [other.position[axis] - item.position[axis] for other in things if other != item]
+        sides = [sum(sign * one > _TIE for one in away) for sign in (1, -1)]
+        if sides[0] == sides[1] > 0 and sum(sides) == len(away):
+            found.append(item)
+    return found
+
+
+def _neighbors(text: str, scene: Scene) -> Iterator[Span]:
+    for phrases in (_NEAREST, _NEIGHBOR):
+        for found in phrases.finditer(text):
+            read = _place(text, found.end())
+            if read is None:
+                continue
+            place, end = read
+            nearest: list[SceneObject] = []
+            for at_time in _scenes(scene, found["noun"], found["when"]):
+                for anchor in _at(place, at_time, found["noun"]):
+                    others = [item for item in present(at_time, found["noun"]) if item != anchor]
+                    nearest += _ranked(others, _distance(anchor), 2 if found["second"] else 1)
+            yield found.start(), end, _named(nearest, scene, found["noun"])
+
+
+def _left_over(text: str, scene: Scene, start: Phrases, joint: Phrases) -> Iterator[Span]:
+    """Yield the words for what is left without two other things."""
+    for found in start.finditer(text):
+        first = _place(text, found.end())
+        then = joint.match(text, first[1] + 1) if first else None
+        second = _place(text, then.end()) if then else None
+        if first is None or second is None:
+            continue
+        left: list[SceneObject] = []
+        for at_time in _scenes(scene, found["noun"], found["when"]):
+            gone = {
+                item for place, _ in (first, second) for item in _at(place, at_time, found["noun"])
+            }
+            left += [item for item in present(at_time, found["noun"]) if item not in gone]
+        yield found.start(), second[1], _named(left, scene, found["noun"])
+
+
+def _moving(text: str, scene: Scene) -> Iterator[Span]:
+    moves = Counter({item.name: 0 for item in scene.of_kind("container")})
+    for motion in scene.motions:
+        if isinstance(motion, Swap):
+            moves.update((motion.first, motion.second))
+    for found in _MOVES.finditer(text) if moves else ():
+        wanted = 0 if found["still"] else max(moves.values())
+        things = [scene[name] for name, number in moves.items() if number == wanted]
+        yield (*found.span(), _named(things, scene, "container"))
+
+
+def _scenes(scene: Scene, noun: str, when: str | None) -> tuple[Scene, ...]:
+    """Return the scene at the times that the words may mean: before and after things move."""
+    if when or noun == "cube":
+        return (scene,)
+    return (scene, scene_at_last(scene))
+
+
+def _place(text: str, start: int) -> tuple[Place, int] | None:
+    """Return the place whose words begin at a character, and where they end."""
+    words = tuple(text[start:].split())
+    found = next(place_mentions(words), None)
+    if found is None or found.start:
+        return None
+    return found.place, start + len(" ".join(words[: found.end]))
+
+
+def _at(place: Place, scene: Scene, noun: str) -> tuple[SceneObject, ...]:
+    first: tuple[Time, ...] = ("at first",)
+    return objects_at(place, scene, noun, first, mirrored=False)
+
+
+def _distance(anchor: SceneObject) -> Callable[[SceneObject], float]:
+    return lambda item: math.dist(item.position[:2], anchor.position[:2])
+
+
+def _ranked(
+    things: Sequence[SceneObject], measure: Callable[[SceneObject], float], rank: int
+) -> list[SceneObject]:
+    """Return what has a rank, small measures first, with everything that ties with it."""
+    if rank > len(things):
+        return []
+    wanted = sorted(map(measure, things))[rank - 1]
+    return [item for item in things if abs(measure(item) - wanted) <= _TIE]
+
+
+def _named(things: Collection[SceneObject], scene: Scene, noun: str) -> str | None:
+    """Return words with the only color of some things; None if they have none or several."""
+    cubes = [item if item.color else scene.hidden_in(item.name) for item in things]
+    colors = {cube.color if cube else None for cube in cubes}
+    if len(colors) != 1 or None in colors:
+        return None
+    words = f"the {colors.pop()} cube"
+    return f"the container over {words}" if noun == "container" else words
