@@ -214,6 +214,14 @@ class Primitive(NamedTuple):
     height: float = 0.07
 
 
+ROBOT = "robot"
+"""Subject of a primitive that handles no object."""
+PICKS = frozenset({"pick_cube", "pick_container"})
+"""Primitives that take their subject into the hand."""
+HANDLES_HELD = frozenset({"place_on", "put_down", "drop_into", "put_into", "move_over"})
+"""Primitives whose subject is in the hand: to repeat one, the pick is repeated first."""
+
+
 @dataclass(frozen=True, slots=True)
 class Stage:
     """One step of the plan: what must happen next, what must not, and the oracle's movement.

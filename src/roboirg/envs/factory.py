@@ -30,7 +30,7 @@ def make(task: str | Episode, **options: Unpack[EnvOptions]) -> RoboIRGEnv:
         split: train, val, test or random.
         episode: index of the episode in the split, from 0; None if the seed of each reset
             chooses it.
-        actions: joint_angle, ee_pose or waypoint.
+        actions: joint_angle, ee_pose, waypoint or choice.
         cameras: cameras whose pictures observations hold; () renders nothing.
         depth: add depth for the same cameras.
         calibration: add extrinsic and intrinsic matrices for the same cameras.
