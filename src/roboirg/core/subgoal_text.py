@@ -10,6 +10,13 @@ _POINT = re.compile(r" at <(\d{1,4}), (\d{1,4})>")
 
 Point = tuple[int, int]
 """Row and column in the front picture."""
+_STEPS = re.compile(r" for (\d{1,4}) steps?$")
+
+
+def split_steps(words: str) -> tuple[str, int | None]:
+    """Return words without the number of control steps at their end, and that number."""
+    found = _STEPS.search(words)
+    return _STEPS.sub("", words), None if found is None else int(found[1])
 
 
 def split_point(subgoal: str) -> tuple[str, Point | None]:

@@ -121,14 +121,14 @@ class ChoiceController:
 
     def _motion(self, choice: Choice, point: tuple[int, int]) -> Primitive | None:
         """Return the motion of a choice; None if nothing is left to wait for or to point at."""
-        from roboirg.simulation.expert.things import held_thing, nearest_thing, things_in_sight
+        from roboirg.simulation.expert.things import held_thing, nearest_thing, present_things
 
         world = self._world
         ahead = (one for one in choice.primitives if not 0 < one.steps <= world.elapsed)
         motion = next(ahead, None)
         if motion is None or choice.kind is None:
             meant = None if motion is None else motion.place
-        elif (found := nearest_thing(things_in_sight(world, (choice.kind,)), point)) is None:
+        elif (found := nearest_thing(present_things(world, (choice.kind,)), point)) is None:
             return None
         else:
             meant = found[0].item.name

@@ -56,7 +56,7 @@ class GeminiPlanner(VLMPlanner):
     kind = "gemini"
     options_type: ClassVar[type[BaseModel]] = GeminiOptions
 
-    def __init__(self, options: GeminiOptions) -> None:
+    def __init__(self, options: GeminiOptions, _kind: str = "") -> None:
         super().__init__(options)
         self.options = options
         self.observe_every = options.observe_every

@@ -62,7 +62,7 @@ class MemerPlanner(VLMPlanner):
     kind = "memer"
     options_type: ClassVar[type[BaseModel]] = MemerOptions
 
-    def __init__(self, options: MemerOptions) -> None:
+    def __init__(self, options: MemerOptions, _kind: str = "") -> None:
         super().__init__(options)
         self.options = options
         self.observe_every = options.stride

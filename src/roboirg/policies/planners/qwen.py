@@ -78,7 +78,7 @@ class QwenPlanner(VLMPlanner):
     kind = "qwen"
     options_type: ClassVar[type[BaseModel]] = QwenOptions
 
-    def __init__(self, options: QwenOptions) -> None:
+    def __init__(self, options: QwenOptions, _kind: str = "") -> None:
         super().__init__(options)
         self.options = options
         self._video: Clip | None = None

@@ -24,28 +24,25 @@ class Thing(NamedTuple):
 
     Attributes:
         item: its data.
-        pixel: row and column of its origin in the front picture, rounded.
+        pixel: row and column of its origin in the front picture, rounded; None outside of it.
     """
 
     item: SceneObject
-    pixel: Point
+    pixel: Point | None
 
 
-def things_in_sight(world: World, kinds: Collection[str]) -> tuple[Thing, ...]:
-    """Return the objects of some kinds that are in the world and whose origin is in the picture."""
-    found = (
-        Thing(body.item, pixel)
+def present_things(world: World, kinds: Collection[str]) -> tuple[Thing, ...]:
+    """Return the objects of some kinds that are in the world now."""
+    return tuple(
+        Thing(body.item, origin_pixel(body))
         for name, body in world.bodies.items()
-        if body.item.kind in kinds
-        and name not in world.absent
-        and (pixel := origin_pixel(body)) is not None
+        if body.item.kind in kinds and name not in world.absent
     )
-    return tuple(found)
 
 
 def nearest_thing(things: Iterable[Thing], point: Point) -> tuple[Thing, float] | None:
     """Return the thing whose origin is nearest to a point, and how many pixels; None of none."""
-    measured = [(math.dist(one.pixel, point), one) for one in things]
+    measured = [(math.dist(one.pixel, point), one) for one in things if one.pixel is not None]
     if not measured:
         return None
     distance, thing = min(measured, key=lambda one: one[0])

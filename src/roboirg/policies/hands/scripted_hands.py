@@ -1,0 +1,260 @@
+"""The scripted hands: follow subgoals in words with the motions of the scripted expert."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from roboirg.core.conditions import Fact
+from roboirg.core.episode import HANDLES_HELD, PICKS, ROBOT, Primitive
+from roboirg.core.errors import MotionPlanningError
+from roboirg.core.observations import Demonstration, Observation
+from roboirg.policies.contract.base import SubgoalEnd
+from roboirg.policies.hands.subgoal_words import WAIT_STEPS, Request, read_subgoal
+
+if TYPE_CHECKING:
+    from roboirg.envs.environment import RoboIRGEnv
+    from roboirg.simulation.expert.primitives import MotionPrimitives
+
+SCRIPTED_HANDS = "scripted hands"
+"""Version of a system with these hands, by which rows and pages are marked."""
+REACH_PIXELS = 24
+"""Farthest that the origin of a thing may be from a point that means it."""
+MOST_STEPS = 400
+"""Control steps after which a motion is given up."""
+
+_EFFECTS: dict[str, tuple[str, ...]] = {
+    "pick_cube": ("picked",),
+    "pick_container": ("lifted",),
+    "place_on": ("placed",),
+    "drop_into": ("binned",),
+    "put_into": ("binned",),
+    "move_over": ("over",),
+    "put_down": ("lying", "put_down"),
+    "hover": ("hovering",),
+}
+"""Facts that come of a motion; pressing has an event instead, and waiting has none."""
+
+
+class RefusedError(Exception):
+    """A subgoal fits nothing or several things; caught by `ScriptedHands.follow`."""
+
+
+class ScriptedHands:
+    """Executes subgoals of RoboMME's grammar on what their words or their point select.
+
+    Privileged: it reads the poses of all objects, but neither the goal nor the instruction. A
+    motion that has begun is carried to its end; what is named meanwhile is not followed. The motion
+    just done is not repeated until another was made, so that a subgoal may stand. A refusal takes
+    no control step.
+
+    Attributes:
+        endings: how each subgoal ended, in order.
+    """
+
+    cameras: tuple[str, ...] = ()
+    version = SCRIPTED_HANDS
+
+    def __init__(self, seed: int = 0) -> None:
+        self.seed = seed
+        self._env: RoboIRGEnv | None = None
+        self._start()
+
+    def attach(self, env: RoboIRGEnv) -> None:
+        """Receive the environment in which the expert acts."""
+        self._env = env
+
+    def reset(self, instruction: str, demonstration: Demonstration) -> None:  # noqa: ARG002
+        """Begin an episode; the instruction is the planner's."""
+        from roboirg.simulation.expert.primitives import MotionPrimitives
+
+        self._start()
+        env = self._attached
+        self._expert = MotionPrimitives(env.session.world)
+        self._began = env.session.world.elapsed
+
+    @property
+    def metadata(self) -> dict[str, Any]:
+        """What acts, for the records."""
+        return {"hands": "scripted"}
+
+    def usage(self) -> dict[str, float]:
+        """Return how many subgoals were refused, and how many came to nothing."""
+        ends = [one.how for one in self.endings]
+        failed = sum(how not in ("done", "refused") for how in ends)
+        return {"refused": ends.count("refused"), "missed": failed}
+
+    def follow(self, subgoal: str) -> None:
+        """Begin the motion of a subgoal, or refuse it; without effect while a motion is made."""
+        self.settle()
+        if self._motion is not None:
+            return
+        self._subgoal, self._thing = subgoal, None
+        try:
+            motion = self._find_motion(subgoal)
+        except RefusedError as error:
+            self._end("refused", str(error))
+            return
+        if motion.kind != "hold" and self._done == _act_of(motion):
+            self._end("done")
+            return
+        self._motion, self._steps = motion, 0
+        self._since = self._elapsed
+        self._chunks = self._wait(motion) if motion.kind == "hold" else self._moves(motion)
+
+    def settle(self) -> None:
+        """Plan the next move of the motion under way, and report the motion if it is over."""
+        if self._motion is None or self._next is not None:
+            return
+        if self._steps > MOST_STEPS and self._motion.kind != "hold":
+            self._end("time-out", f"it took more than {MOST_STEPS} steps")
+            return
+        try:
+            self._next = next(self._chunks, None)
+        except MotionPlanningError as error:
+            self._end("blocked", str(error))
+            return
+        if self._next is None:
+            came = self._came_about(self._motion)
+            self._end("done" if came else "missed", "" if came else _why_missed(self._motion))
+
+    def act(self, observation: Observation) -> NDArray[np.floating[Any]]:  # noqa: ARG002
+        """Return the next move; without a motion, actions that hold still."""
+        self.settle()
+        rows, self._next = self._next, None
+        if rows is None:
+            return self._still(WAIT_STEPS)
+        self._steps += len(rows)
+        return rows
+
+    def _start(self) -> None:
+        self.endings: list[SubgoalEnd] = []
+        self._expert: MotionPrimitives | None = None
+        self._motion: Primitive | None = None
+        self._done: tuple[str, ...] | None = None
+        self._chunks: Iterator[NDArray[np.float64]] = iter(())
+        self._next: NDArray[np.float64] | None = None
+        self._subgoal, self._thing = "", None
+        self._began = self._since = self._steps = 0
+
+    @property
+    def _attached(self) -> RoboIRGEnv:
+        if self._env is None:
+            raise RuntimeError("ScriptedHands needs attach(env) before reset().")
+        return self._env
+
+    @property
+    def _elapsed(self) -> int:
+        return self._attached.session.world.elapsed
+
+    def _end(self, how: Any, why: str = "") -> None:  # noqa: ANN401
+        step = self._elapsed - self._began
+        self.endings.append(SubgoalEnd(self._subgoal, how, why, self._thing, step))
+        if self._motion is not None:
+            self._done = _act_of(self._motion) if how == "done" else None
+        self._motion = self._next = None
+
+    def _find_motion(self, subgoal: str) -> Primitive:
+        """Return the motion of a subgoal, with the objects that it means."""
+        from roboirg.simulation.expert.things import held_thing
+
+        request = read_subgoal(subgoal)
+        if request is None:
+            raise RefusedError("these words are no subgoal that the hands know")
+        held = held_thing(self._attached.session.world)
+        if request.kind in HANDLES_HELD and held is None:
+            raise RefusedError("nothing is in the hand")
+        thing = None if request.thing is None else self._select(request)
+        self._thing = held if thing is None and request.kind in HANDLES_HELD else thing
+        match request.kind:
+            case "hold":
+                return Primitive("hold", ROBOT, steps=request.steps)
+            case "press":
+                return self._press(request, thing)
+            case "put_down":
+                return Primitive("put_down", str(held), height=self._release_height())
+            case kind if kind in PICKS or kind == "hover":
+                return Primitive(kind, str(thing))  # type: ignore[arg-type]
+            case kind:
+                return Primitive(kind, str(held), thing)  # type: ignore[arg-type]
+
+    def _select(self, request: Request) -> str:
+        """Return the name of the object that the point means, or else the words."""
+        from roboirg.simulation.expert.things import nearest_thing, present_things
+
+        things = present_things(self._attached.session.world, (str(request.thing),))
+        if request.point is not None:
+            found = nearest_thing(things, request.point)
+            if found is None or found[1] > REACH_PIXELS:
+                row, column = request.point
+                raise RefusedError(
+                    f"no {request.thing} is within {REACH_PIXELS} pixels of <{row}, {column}>"
+                )
+            return found[0].item.name
+        fits = [one.item for one in things if request.color in (None, one.item.color)]
+        if request.side is not None and fits:
+            position = self._attached.session.world.bodies
+            by_y = sorted(fits, key=lambda one: position[one.name].position.y)
+            fits = [by_y[0 if request.side == "right" else -1]]
+        if len(fits) != 1:
+            count = "nothing fits" if not fits else f"{len(fits)} things fit"
+            raise RefusedError(f"{count} the words {request.meant!r}; a point would say which")
+        return fits[0].name
+
+    def _press(self, request: Request, thing: str | None) -> Primitive:
+        """Return the press of a button; straight down if the hand is above it already."""
+        if request.thing != "button":  # the point is that of the target
+            thing = self._select(Request("press", "button"))
+        above = Fact("hovering", ROBOT, str(thing)) in self._attached.session.world.facts
+        return Primitive("press_below" if above else "press", str(thing))
+
+    def _release_height(self) -> float:
+        """Return the tool height at which this task's expert lets go of what it puts down."""
+        from roboirg.tasks.choices import choices_of
+
+        motions = (one.primitives[0] for one in choices_of(self._attached.episode))
+        heights = [one.height for one in motions if one.kind == "put_down"]
+        return heights[0] if heights else Primitive("put_down", ROBOT).height
+
+    def _moves(self, motion: Primitive) -> Iterator[NDArray[np.float64]]:
+        if self._expert is None:
+            raise RuntimeError("ScriptedHands needs reset() before follow().")
+        return self._expert.execute(motion)
+
+    def _wait(self, motion: Primitive) -> Iterator[NDArray[np.float64]]:
+        if motion.steps:
+            yield self._still(motion.steps)
+
+    def _still(self, steps: int) -> NDArray[np.float64]:
+        """Return actions that keep the arm and the gripper as they are."""
+        arm = self._attached.session.world.robot.arm_positions
+        gripper = 1.0 if self._expert is None else self._expert.gripper
+        return np.tile(np.append(arm, gripper), (steps, 1))
+
+    def _came_about(self, motion: Primitive) -> bool:
+        """Return whether a motion had its effect."""
+        session = self._attached.session
+        if motion.kind in ("press", "press_below"):
+            pressed = Fact("pressed", motion.subject)
+            late = (one for one in reversed(session.events) if one.step > self._since)
+            return any(one.holds and one.fact == pressed for one in late)
+        wanted = _EFFECTS.get(motion.kind)
+        subject = ROBOT if motion.kind == "hover" else motion.subject
+        place = motion.subject if motion.kind == "hover" else motion.place
+        return wanted is None or any(
+            Fact(kind, subject, place) in session.world.facts for kind in wanted
+        )
+
+
+def _act_of(motion: Primitive) -> tuple[str, ...]:
+    """Return what a motion does, however it gets there."""
+    return motion.kind.removesuffix("_below"), motion.subject, motion.place or ""
+
+
+def _why_missed(motion: Primitive) -> str:
+    if motion.kind in PICKS:
+        return "nothing is in the gripper"
+    return "the motion had no effect"
