@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 import io
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from typing import NamedTuple
@@ -22,6 +23,8 @@ CONTROL_RATE = 20
 QUALITY = 23
 """x264's constant rate factor, its default."""
 JPEG_QUALITY = 90
+SHEET_SIDE = 4
+"""Frames in a row, and rows, of a sheet."""
 
 
 class Picture(NamedTuple):
@@ -58,6 +61,30 @@ def sample_evenly(frames: Pixels, most: int) -> Pixels:
         return frames
     kept: Pixels = frames[np.linspace(0, len(frames) - 1, most).round().astype(int)]
     return kept
+
+
+def contact_sheets(frames: Pixels, labels: Sequence[str]) -> Iterator[Pixels]:
+    """Yield sheets of frames at half their size, in reading order, each with its label.
+
+    Args:
+        frames: uint8 (T, height, width, 3).
+        labels: T short texts.
+    """
+    import cv2
+
+    small = np.ascontiguousarray(frames[:, ::2, ::2])
+    for frame, label in zip(small, labels, strict=True):
+        for color, width in (((0, 0, 0), 3), ((255, 255, 255), 1)):
+            cv2.putText(frame, label, (4, 14), cv2.FONT_HERSHEY_SIMPLEX, 0.45, color, width)
+    columns = SHEET_SIDE
+    for start in range(0, len(small), columns**2):
+        part = small[start : start + columns**2]
+        count = -(-len(part) // columns) * columns
+        tiles = np.zeros((count, *part.shape[1:]), np.uint8)
+        tiles[: len(part)] = part
+        height, width = part.shape[1:3]
+        grid = tiles.reshape(-1, columns, height, width, 3).swapaxes(1, 2)
+        yield grid.reshape(-1, columns * width, 3)
 
 
 def encode_png(picture: Picture) -> bytes:

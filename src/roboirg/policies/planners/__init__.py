@@ -19,11 +19,10 @@ PLANNERS: Mapping[str, str] = {
     "oracle": f"{_HERE}.oracle_planner:OraclePlanner",
     **dict.fromkeys(_OF_GOALS, f"{_HERE}.goal_planner:GoalPlanner"),
     "fixed": f"{_HERE}.goal_planner:FixedPlanner",
-    "qwen": f"{_HERE}.qwen:QwenPlanner",
-    "gemini": f"{_HERE}.gemini:GeminiPlanner",
-    "memer": f"{_HERE}.memer:MemerPlanner",
+    **dict.fromkeys(("qwen", "gemini", "memer", "stateless"), f"{_HERE}.vlm_planner:VLMPlanner"),
 }
-"""Import paths of the classes, whose attribute ``options_type`` is the type of their options."""
+"""Import paths of the classes. ``options_type`` is the type of a class's options, and ``settings``,
+if it has that, the defaults that belong to a kind."""
 
 
 def make_planner(kind: str, options: Mapping[str, Any], origin: str) -> Planner:
@@ -42,5 +41,6 @@ def make_planner(kind: str, options: Mapping[str, Any], origin: str) -> Planner:
         raise UnknownNameError("planner", kind, PLANNERS)
     planner_class = pkgutil.resolve_name(PLANNERS[kind])
     options_type: type[BaseModel] = planner_class.options_type
-    planner: Planner = planner_class(check_options(options_type, options, origin), kind)
+    values = {**getattr(planner_class, "settings", {}).get(kind, {}), **options}
+    planner: Planner = planner_class(check_options(options_type, values, origin), kind)
     return planner

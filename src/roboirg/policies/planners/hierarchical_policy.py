@@ -23,7 +23,7 @@ from roboirg.policies.planners.observation_merging import (
     DemonstrationSubset,
     select_history,
 )
-from roboirg.policies.planners.planner import Planner
+from roboirg.policies.planners.planner import WHEN_DONE, Planner
 
 if TYPE_CHECKING:
     from roboirg.envs.environment import RoboIRGEnv
@@ -50,7 +50,8 @@ class HierarchicalPolicy:
         endings: how subgoals ended, if the policy reports it.
 
     Raises:
-        InvalidValueError: the policy has no method ``follow``.
+        InvalidValueError: the policy has no method ``follow``, or does not report how subgoals
+            end, on which the planner waits.
     """
 
     def __init__(self, planner: Planner, policy: Policy, name: str | None = None) -> None:
@@ -71,8 +72,13 @@ class HierarchicalPolicy:
         self._observed = self._step = self._rows = 0
         self.subgoal: str | None = None
         self._told, self._gave_up = 0, False
-        if isinstance(policy, ReportingFollower):
-            planner.reports = True  # type: ignore[attr-defined]
+        reports = isinstance(policy, ReportingFollower)
+        if getattr(planner, "asked", None) == WHEN_DONE and not reports:
+            raise InvalidValueError(
+                f"The planner is asked {WHEN_DONE}, but {type(policy).__name__} does not report "
+                "how subgoals end; set asked=each-chunk or asked='every N steps'."
+            )
+        planner.reports = reports  # type: ignore[attr-defined]
 
     @property
     def endings(self) -> list[SubgoalEnd]:
@@ -117,9 +123,7 @@ class HierarchicalPolicy:
         """Pass the planner's subgoal to the policy, and return the policy's actions."""
         history = observation.get("history", ())
         self._step += (
-            len(history) * (self.needs.observe_every or 1)
-            if self._many_steps
-            else self._rows
+            len(history) * (self.needs.observe_every or 1) if self._many_steps else self._rows
         )
         views = [
             select_history(observation, self._observed, self.needs.observe_every, one.observe_every)

@@ -98,9 +98,7 @@ class OraclePlanner:
         return self._last is not None and self._last.how in ("missed", "refused")
 
 
-def stage_subgoal(
-    env: RoboIRGEnv, stages: Sequence[Stage], index: int, *, grounded: bool
-) -> str:
+def stage_subgoal(env: RoboIRGEnv, stages: Sequence[Stage], index: int, *, grounded: bool) -> str:
     """Return a stage as a subgoal for hands: with its object's origin, and with how long to wait.
 
     Args:
