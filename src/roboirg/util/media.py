@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from roboirg.core.extras import extra_needed
+from roboirg.util.text_overlay import draw_text
 
 Pixels = NDArray[np.uint8]
 
@@ -70,12 +71,10 @@ def contact_sheets(frames: Pixels, labels: Sequence[str]) -> Iterator[Pixels]:
         frames: uint8 (T, height, width, 3).
         labels: T short texts.
     """
-    import cv2
-
     small = np.ascontiguousarray(frames[:, ::2, ::2])
     for frame, label in zip(small, labels, strict=True):
-        for color, width in (((0, 0, 0), 3), ((255, 255, 255), 1)):
-            cv2.putText(frame, label, (4, 14), cv2.FONT_HERSHEY_SIMPLEX, 0.45, color, width)
+        draw_text(frame, label, 4, 14, 0.45, (0, 0, 0), thickness=3)
+        draw_text(frame, label, 4, 14, 0.45, (255, 255, 255))
     columns = SHEET_SIDE
     for start in range(0, len(small), columns**2):
         part = small[start : start + columns**2]

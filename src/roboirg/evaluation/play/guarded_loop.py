@@ -117,9 +117,7 @@ class GuardedLoop(EpisodeLoop):
             if end.how == "refused":
                 self._note_subgoal(end.subgoal)
             if found and found[-1].text == end.subgoal and found[-1].ended is None:
-                found[-1] = replace(
-                    found[-1], ended=end.how, why=end.why or None, thing=end.thing
-                )
+                found[-1] = replace(found[-1], ended=end.how, why=end.why or None, thing=end.thing)
         self._ends = len(ends)
 
     def _note_subgoal(self, subgoal: str) -> None:
@@ -130,6 +128,8 @@ class GuardedLoop(EpisodeLoop):
             if found[-1].ended in (None, "done"):
                 return  # it stands
         _, point = split_point(subgoal)
+        if self._writer is not None:
+            self._writer.point = point
         verdict = judge_subgoal(subgoal, stage, self.env.objects_at(point) if point else None)
         found.append(
             SubgoalRecord(

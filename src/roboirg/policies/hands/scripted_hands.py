@@ -12,6 +12,7 @@ from roboirg.core.conditions import Fact
 from roboirg.core.episode import HANDLES_HELD, PICKS, ROBOT, Primitive
 from roboirg.core.errors import MotionPlanningError
 from roboirg.core.observations import Demonstration, Observation
+from roboirg.core.subgoal_text import SCRIPTED_HANDS
 from roboirg.policies.contract.base import SubgoalEnd
 from roboirg.policies.hands.subgoal_words import WAIT_STEPS, Request, read_subgoal
 
@@ -19,8 +20,6 @@ if TYPE_CHECKING:
     from roboirg.envs.environment import RoboIRGEnv
     from roboirg.simulation.expert.primitives import MotionPrimitives
 
-SCRIPTED_HANDS = "scripted hands"
-"""Version of a system with these hands, by which rows and pages are marked."""
 REACH_PIXELS = 24
 """Farthest that the origin of a thing may be from a point that means it."""
 MOST_STEPS = 400

@@ -202,8 +202,13 @@ class VLMPlanner:
         return self._subgoal
 
     def usage(self) -> dict[str, float]:
-        """Return the cost of the episode, and whether the model said that the task is complete."""
-        return {**self._vlm.usage(), **({"finished": 1.0} if self._finished else {})}
+        """Return the cost of the episode, and how the planning ended, if the model ended it.
+
+        ``finished``: it said that the task is complete; ``unreadable``: its last replies were of no
+        use.
+        """
+        ended = {"finished": self._finished, "unreadable": self._useless > 0}
+        return {**self._vlm.usage(), **{name: 1.0 for name, holds in ended.items() if holds}}
 
     def close(self) -> None:
         """Close the connection."""
