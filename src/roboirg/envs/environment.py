@@ -197,7 +197,7 @@ class RoboIRGEnv(gymnasium.Env[dict[str, Any], NDArray[np.floating[Any]]]):
         )
         self._after_step(self.session.judge.published)
         state = self._current
-        shown = {
+        shown: dict[str, Any] = {
             "demonstration": make_video(
                 self.episode, recording, self._spec, state.video_proprioception
             ),

@@ -58,10 +58,12 @@ class Clip:
 
 def sample_evenly(frames: Pixels, most: int) -> Pixels:
     """Return at most `most` frames, evenly spaced, including the first and the last."""
-    if len(frames) <= most:
-        return frames
-    kept: Pixels = frames[np.linspace(0, len(frames) - 1, most).round().astype(int)]
-    return kept
+    return frames if len(frames) <= most else frames[evenly_spaced(len(frames), most)]
+
+
+def evenly_spaced(count: int, most: int) -> NDArray[np.intp]:
+    """Return at most `most` of `count` places, evenly spaced, including the first and the last."""
+    return np.linspace(0, count - 1, min(count, most)).round().astype(np.intp)
 
 
 def contact_sheets(frames: Pixels, labels: Sequence[str]) -> Iterator[Pixels]:

@@ -109,7 +109,7 @@ def _system(spec: str, name: str, options: Mapping[str, str]) -> Build:
 
 
 def _planner(_spec: str, name: str, options: Mapping[str, str]) -> Build:
-    """Return the builder of a planner with hands; its options and its model's stand side by side."""
+    """Return the builder of a planner with hands; its model's options stand beside its own."""
     from roboirg.policies.by_name.systems import HANDS, SCRIPTED, System, build_system
 
     of_model = {key: value for key, value in options.items() if key in ModelOptions.model_fields}

@@ -80,7 +80,8 @@ def load_system(
         name_or_file: a name such as ``GroundSG-QwenVL``, or a TOML file with the same entries.
         overrides: ``server`` (host:port of the policy), ``vlm`` (URL of the planner's model),
             ``model`` (its name), ``hands`` (``scripted``, or the spec of a policy that follows
-            subgoals, instead of its own), ``policy.OPTION``, ``planner.OPTION``, ``planner.model.OPTION``.
+            subgoals, instead of its own), ``policy.OPTION``, ``planner.OPTION``,
+            ``planner.model.OPTION``.
         seed: of the policy's own random choices.
 
     Raises:

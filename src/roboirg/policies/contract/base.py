@@ -64,6 +64,9 @@ class SubgoalFollower(Policy, Protocol):
         """
 
 
+EndKind = Literal["done", "missed", "blocked", "time-out", "refused"]
+
+
 class SubgoalEnd(NamedTuple):
     """How a policy that reports it has followed a subgoal.
 
@@ -77,7 +80,7 @@ class SubgoalEnd(NamedTuple):
     """
 
     subgoal: str
-    how: Literal["done", "missed", "blocked", "time-out", "refused"]
+    how: EndKind
     why: str = ""
     thing: str | None = None
     step: int = 0

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -13,12 +14,13 @@ from roboirg.core.episode import HANDLES_HELD, PICKS, ROBOT, Primitive
 from roboirg.core.errors import MotionPlanningError
 from roboirg.core.observations import Demonstration, Observation
 from roboirg.core.subgoal_text import SCRIPTED_HANDS
-from roboirg.policies.contract.base import SubgoalEnd
+from roboirg.policies.contract.base import EndKind, SubgoalEnd
 from roboirg.policies.hands.subgoal_words import WAIT_STEPS, Request, read_subgoal
 
 if TYPE_CHECKING:
     from roboirg.envs.environment import RoboIRGEnv
     from roboirg.simulation.expert.primitives import MotionPrimitives
+    from roboirg.simulation.world import World
 
 REACH_PIXELS = 24
 """Farthest that the origin of a thing may be from a point that means it."""
@@ -42,6 +44,27 @@ class RefusedError(Exception):
     """A subgoal fits nothing or several things; caught by `ScriptedHands.follow`."""
 
 
+@dataclass
+class _Underway:
+    """The motion that is being made.
+
+    Attributes:
+        subgoal: that asked for it.
+        motion: what is done.
+        thing: name of the object that was meant.
+        chunks: its moves.
+        since: control steps of the world at its beginning.
+        next: the move that comes next, once it is planned.
+    """
+
+    subgoal: str
+    motion: Primitive
+    thing: str | None
+    chunks: Iterator[NDArray[np.float64]]
+    since: int
+    next: NDArray[np.float64] | None = None
+
+
 class ScriptedHands:
     """Executes subgoals of RoboMME's grammar on what their words or their point select.
 
@@ -59,8 +82,12 @@ class ScriptedHands:
 
     def __init__(self, seed: int = 0) -> None:
         self.seed = seed
+        self.endings: list[SubgoalEnd] = []
         self._env: RoboIRGEnv | None = None
-        self._start()
+        self._expert: MotionPrimitives | None = None
+        self._underway: _Underway | None = None
+        self._done: tuple[str, ...] = ()
+        self._began = 0
 
     def attach(self, env: RoboIRGEnv) -> None:
         """Receive the environment in which the expert acts."""
@@ -70,10 +97,9 @@ class ScriptedHands:
         """Begin an episode; the instruction is the planner's."""
         from roboirg.simulation.expert.primitives import MotionPrimitives
 
-        self._start()
-        env = self._attached
-        self._expert = MotionPrimitives(env.session.world)
-        self._began = env.session.world.elapsed
+        world = self._world
+        self.endings, self._underway, self._done = [], None, ()
+        self._expert, self._began = MotionPrimitives(world), world.elapsed
 
     @property
     def metadata(self) -> dict[str, Any]:
@@ -89,55 +115,44 @@ class ScriptedHands:
     def follow(self, subgoal: str) -> None:
         """Begin the motion of a subgoal, or refuse it; without effect while a motion is made."""
         self.settle()
-        if self._motion is not None:
+        if self._underway is not None:
             return
-        self._subgoal, self._thing = subgoal, None
         try:
-            motion = self._find_motion(subgoal)
+            motion, thing = self._find_motion(subgoal)
         except RefusedError as error:
-            self._end("refused", str(error))
+            self._report(subgoal, "refused", str(error))
             return
         if motion.kind != "hold" and self._done == _act_of(motion):
-            self._end("done")
+            self._report(subgoal, "done", thing=thing)
             return
-        self._motion, self._steps = motion, 0
-        self._since = self._elapsed
-        self._chunks = self._wait(motion) if motion.kind == "hold" else self._moves(motion)
+        moves = self._wait(motion.steps) if motion.kind == "hold" else self._moves(motion)
+        self._underway = _Underway(subgoal, motion, thing, moves, self._world.elapsed)
 
     def settle(self) -> None:
         """Plan the next move of the motion under way, and report the motion if it is over."""
-        if self._motion is None or self._next is not None:
+        now = self._underway
+        if now is None or now.next is not None:
             return
-        if self._steps > MOST_STEPS and self._motion.kind != "hold":
-            self._end("time-out", f"it took more than {MOST_STEPS} steps")
+        took = self._world.elapsed - now.since
+        if took > MOST_STEPS and now.motion.kind != "hold":
+            self._end(now, "time-out", f"it took more than {MOST_STEPS} steps")
             return
         try:
-            self._next = next(self._chunks, None)
+            now.next = next(now.chunks, None)
         except MotionPlanningError as error:
-            self._end("blocked", str(error))
+            self._end(now, "blocked", str(error))
             return
-        if self._next is None:
-            came = self._came_about(self._motion)
-            self._end("done" if came else "missed", "" if came else _why_missed(self._motion))
+        if now.next is None:
+            came = self._came_about(now)
+            self._end(now, "done" if came else "missed", "" if came else _why_missed(now.motion))
 
     def act(self, observation: Observation) -> NDArray[np.floating[Any]]:  # noqa: ARG002
         """Return the next move; without a motion, actions that hold still."""
         self.settle()
-        rows, self._next = self._next, None
-        if rows is None:
+        if self._underway is None or self._underway.next is None:
             return self._still(WAIT_STEPS)
-        self._steps += len(rows)
+        rows, self._underway.next = self._underway.next, None
         return rows
-
-    def _start(self) -> None:
-        self.endings: list[SubgoalEnd] = []
-        self._expert: MotionPrimitives | None = None
-        self._motion: Primitive | None = None
-        self._done: tuple[str, ...] | None = None
-        self._chunks: Iterator[NDArray[np.float64]] = iter(())
-        self._next: NDArray[np.float64] | None = None
-        self._subgoal, self._thing = "", None
-        self._began = self._since = self._steps = 0
 
     @property
     def _attached(self) -> RoboIRGEnv:
@@ -146,45 +161,46 @@ class ScriptedHands:
         return self._env
 
     @property
-    def _elapsed(self) -> int:
-        return self._attached.session.world.elapsed
+    def _world(self) -> World:
+        return self._attached.session.world
 
-    def _end(self, how: Any, why: str = "") -> None:  # noqa: ANN401
-        step = self._elapsed - self._began
-        self.endings.append(SubgoalEnd(self._subgoal, how, why, self._thing, step))
-        if self._motion is not None:
-            self._done = _act_of(self._motion) if how == "done" else None
-        self._motion = self._next = None
+    def _end(self, now: _Underway, how: EndKind, why: str) -> None:
+        self._underway = None
+        self._done = _act_of(now.motion) if how == "done" else ()
+        self._report(now.subgoal, how, why, now.thing)
 
-    def _find_motion(self, subgoal: str) -> Primitive:
-        """Return the motion of a subgoal, with the objects that it means."""
+    def _report(self, subgoal: str, how: EndKind, why: str = "", thing: str | None = None) -> None:
+        step = self._world.elapsed - self._began
+        self.endings.append(SubgoalEnd(subgoal, how, why, thing, step))
+
+    def _find_motion(self, subgoal: str) -> tuple[Primitive, str | None]:
+        """Return the motion of a subgoal, and the name of the object that it means."""
         from roboirg.simulation.expert.things import held_thing
 
         request = read_subgoal(subgoal)
         if request is None:
             raise RefusedError("these words are no subgoal that the hands know")
-        held = held_thing(self._attached.session.world)
+        held = held_thing(self._world)
         if request.kind in HANDLES_HELD and held is None:
             raise RefusedError("nothing is in the hand")
         thing = None if request.thing is None else self._select(request)
-        self._thing = held if thing is None and request.kind in HANDLES_HELD else thing
         match request.kind:
             case "hold":
-                return Primitive("hold", ROBOT, steps=request.steps)
+                return Primitive("hold", ROBOT, steps=request.steps), None
             case "press":
-                return self._press(request, thing)
+                return self._press(request, thing), thing
             case "put_down":
-                return Primitive("put_down", str(held), height=self._release_height())
-            case kind if kind in PICKS or kind == "hover":
-                return Primitive(kind, str(thing))  # type: ignore[arg-type]
+                return Primitive("put_down", str(held), height=self._release_height()), held
+            case kind if kind in HANDLES_HELD:
+                return Primitive(kind, str(held), thing), thing
             case kind:
-                return Primitive(kind, str(held), thing)  # type: ignore[arg-type]
+                return Primitive(kind, str(thing)), thing
 
     def _select(self, request: Request) -> str:
         """Return the name of the object that the point means, or else the words."""
         from roboirg.simulation.expert.things import nearest_thing, present_things
 
-        things = present_things(self._attached.session.world, (str(request.thing),))
+        things = present_things(self._world, (str(request.thing),))
         if request.point is not None:
             found = nearest_thing(things, request.point)
             if found is None or found[1] > REACH_PIXELS:
@@ -195,7 +211,7 @@ class ScriptedHands:
             return found[0].item.name
         fits = [one.item for one in things if request.color in (None, one.item.color)]
         if request.side is not None and fits:
-            position = self._attached.session.world.bodies
+            position = self._world.bodies
             by_y = sorted(fits, key=lambda one: position[one.name].position.y)
             fits = [by_y[0 if request.side == "right" else -1]]
         if len(fits) != 1:
@@ -207,7 +223,7 @@ class ScriptedHands:
         """Return the press of a button; straight down if the hand is above it already."""
         if request.thing != "button":  # the point is that of the target
             thing = self._select(Request("press", "button"))
-        above = Fact("hovering", ROBOT, str(thing)) in self._attached.session.world.facts
+        above = Fact("hovering", ROBOT, str(thing)) in self._world.facts
         return Primitive("press_below" if above else "press", str(thing))
 
     def _release_height(self) -> float:
@@ -223,22 +239,22 @@ class ScriptedHands:
             raise RuntimeError("ScriptedHands needs reset() before follow().")
         return self._expert.execute(motion)
 
-    def _wait(self, motion: Primitive) -> Iterator[NDArray[np.float64]]:
-        if motion.steps:
-            yield self._still(motion.steps)
+    def _wait(self, steps: int) -> Iterator[NDArray[np.float64]]:
+        if steps:
+            yield self._still(steps)
 
     def _still(self, steps: int) -> NDArray[np.float64]:
         """Return actions that keep the arm and the gripper as they are."""
-        arm = self._attached.session.world.robot.arm_positions
+        arm = self._world.robot.arm_positions
         gripper = 1.0 if self._expert is None else self._expert.gripper
         return np.tile(np.append(arm, gripper), (steps, 1))
 
-    def _came_about(self, motion: Primitive) -> bool:
+    def _came_about(self, now: _Underway) -> bool:
         """Return whether a motion had its effect."""
-        session = self._attached.session
+        session, motion = self._attached.session, now.motion
         if motion.kind in ("press", "press_below"):
             pressed = Fact("pressed", motion.subject)
-            late = (one for one in reversed(session.events) if one.step > self._since)
+            late = (one for one in reversed(session.events) if one.step > now.since)
             return any(one.holds and one.fact == pressed for one in late)
         wanted = _EFFECTS.get(motion.kind)
         subject = ROBOT if motion.kind == "hover" else motion.subject

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from typing import NamedTuple
 
-from roboirg.core.episode import ALL_COLORS
+from roboirg.core.episode import ALL_COLORS, PrimitiveKind
 from roboirg.core.subgoal_text import Point, split_point, split_steps
 
 WAIT_STEPS = 16
@@ -15,7 +15,7 @@ _COLOR = rf"(?:(?P<color>{'|'.join(ALL_COLORS)}) )?"
 _ORDINAL = "(?:first|second|third|fourth|fifth|sixth|seventh|eighth|ninth|tenth)"
 _TIME = rf"(?: for the {_ORDINAL} time)?"
 _HELD = r"(?:it|the (?:\w+ )?(?:cube|tape|container))"
-_FORMS: tuple[tuple[str, str, str | None], ...] = (
+_FORMS: tuple[tuple[str, PrimitiveKind, str | None], ...] = (
     (
         rf"pick up (?:the|a) (?:{_ORDINAL} )?(?:correct )?{_COLOR}(?P<thing>cube|tape){_TIME}",
         "pick_cube",
@@ -57,7 +57,7 @@ class Request(NamedTuple):
         steps: of waiting.
     """
 
-    kind: str
+    kind: PrimitiveKind
     thing: str | None = None
     color: str | None = None
     side: str | None = None

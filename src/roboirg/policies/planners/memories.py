@@ -23,7 +23,7 @@ from roboirg.policies.vlm.model_content import ChatTurn, Part, summary_clip
 from roboirg.policies.vlm.models import ModelQuery
 from roboirg.policies.vlm.prompt_files import SHARED, Prompts, load_prompts
 from roboirg.util.json_reply import UnparsableReplyError, json_object, text_of
-from roboirg.util.media import VIDEO_RATE, Clip, Picture, Pixels, contact_sheets, sample_evenly
+from roboirg.util.media import VIDEO_RATE, Clip, Picture, Pixels, contact_sheets, evenly_spaced
 
 PLACE = "[at]"
 FINISHED = ""
@@ -96,7 +96,6 @@ class Memory(ABC):
         self,
         observation: Observation,
         instruction: str,
-        last: str | None,
         ends: Sequence[SubgoalEnd],
     ) -> ModelQuery:
         """Return the next query; `ends` is how subgoals ended, as far as that is reported."""
@@ -148,7 +147,6 @@ class SubgoalMemory(Memory):
         self,
         observation: Observation,
         instruction: str,
-        last: str | None,  # noqa: ARG002
         ends: Sequence[SubgoalEnd],  # noqa: ARG002
     ) -> ModelQuery:
         """Show demonstration, task, past subgoals and the newest picture."""
@@ -204,7 +202,6 @@ class ConversationMemory(Memory):
         self,
         observation: Observation,
         instruction: str,
-        last: str | None,  # noqa: ARG002
         ends: Sequence[SubgoalEnd],  # noqa: ARG002
     ) -> ModelQuery:
         """Add a turn with the frames since the last one."""
@@ -285,7 +282,6 @@ class KeyframeMemory(Memory):
         self,
         observation: Observation,  # noqa: ARG002
         instruction: str,
-        last: str | None,  # noqa: ARG002
         ends: Sequence[SubgoalEnd],  # noqa: ARG002
     ) -> ModelQuery:
         """Show the demonstration, the task, the key frames and the recent frames."""
@@ -366,7 +362,6 @@ class PictureMemory(Memory):
         self,
         observation: Observation,
         instruction: str,
-        last: str | None,  # noqa: ARG002
         ends: Sequence[SubgoalEnd],
     ) -> ModelQuery:
         """Show task, video, done subgoals, pictures of the past and the newest picture."""
@@ -422,9 +417,8 @@ MEMORIES: Mapping[str, type[Memory]] = {
 
 def _sheets(frames: Pixels, most: int, every: int) -> Iterator[Picture]:
     """Yield sheets of at most `most` evenly spread frames, each with its control step."""
-    steps = np.arange(1, len(frames) + 1) * every
-    kept = sample_evenly(np.arange(len(frames)), most)
-    for sheet in contact_sheets(frames[kept], [str(step) for step in steps[kept]]):
+    kept = evenly_spaced(len(frames), most)
+    for sheet in contact_sheets(frames[kept], [str((place + 1) * every) for place in kept]):
         yield Picture(sheet)
 
 

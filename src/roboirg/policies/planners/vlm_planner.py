@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
+from dataclasses import dataclass, field
 from typing import Any
 
 from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
@@ -112,6 +113,33 @@ SETTINGS: Mapping[str, Mapping[str, Any]] = {
 """The named settings: options that differ from the defaults."""
 
 
+@dataclass
+class _Planning:
+    """State of one episode.
+
+    Attributes:
+        instruction: everything that was said.
+        subgoal: the last one.
+        ends: how subgoals ended, each once.
+        chunks: chunks of the policy so far.
+        periods: number of the last period of ``every N steps``.
+        useless: unusable replies in a row.
+        news: whether something has happened on which ``when-done`` waits.
+        refused: whether the last subgoal was refused.
+        finished: whether the model said that the task is complete.
+    """
+
+    instruction: str
+    subgoal: str | None = None
+    ends: list[SubgoalEnd] = field(default_factory=list)
+    chunks: int = 0
+    periods: int = 0
+    useless: int = 0
+    news: bool = False
+    refused: bool = False
+    finished: bool = False
+
+
 class VLMPlanner:
     """Queries a model for subgoals, with pictures of the front camera only.
 
@@ -138,7 +166,7 @@ class VLMPlanner:
         self.observe_every = self.memory.observe_every
         self.demonstration_frames = self.memory.demonstration_frames
         self._vlm = VLMQuery(options.model, self.prompts["again"])
-        self._start("")
+        self._now = _Planning("")
 
     @property
     def asked(self) -> str:
@@ -165,41 +193,41 @@ class VLMPlanner:
     def reset(self, instruction: str, demonstration: Demonstration) -> None:
         """Forget the last episode and begin another."""
         self._vlm.start()
-        self._start(instruction)
+        self._now = _Planning(instruction)
         self.memory.begin(demonstration)
 
     def hear(self, text: str, step: int) -> None:  # noqa: ARG002
         """Remember an utterance; the next query quotes everything that was said."""
-        self._instruction = f"{self._instruction} {text}"
-        self._news = True
+        self._now.instruction = f"{self._now.instruction} {text}"
+        self._now.news = True
 
     def learn(self, end: SubgoalEnd) -> None:
         """Remember how a subgoal ended; one that stands is done once."""
-        self._news = True
-        self._refused = end.how == "refused"
-        if not self._ends or self._ends[-1][:3] != end[:3]:
-            self._ends.append(end)
+        self._now.news = True
+        self._now.refused = end.how == "refused"
+        if not self._now.ends or self._now.ends[-1][:3] != end[:3]:
+            self._now.ends.append(end)
 
     def plan(self, observation: Observation, step: int) -> str | None:
         """Return the subgoal from now on: a new one if a query is due, else the last."""
-        if not self._refused:
+        now = self._now
+        if not now.refused:
             self.memory.watch(observation, step)
-            is_turn = self._chunks % self.options.keep == 0
-            self._chunks += 1
-            if self._finished or not (is_turn and self._due(step)):
-                return self._subgoal
-        self._news = self._refused = False
-        query = self.memory.query(observation, self._instruction, self._subgoal, self._ends)
-        answer = self._vlm.ask(query, self.memory.parser(self._subgoal))
+            is_turn = now.chunks % self.options.keep == 0
+            now.chunks += 1
+            if now.finished or not (is_turn and self._due(step)):
+                return now.subgoal
+        now.news = now.refused = False
+        query = self.memory.query(observation, now.instruction, now.ends)
+        answer = self._vlm.ask(query, self.memory.parser(now.subgoal))
         if answer is None:
-            self._useless += 1
-            self._news = True
+            now.useless += 1
+            now.news = True
         else:
-            self._useless = 0
-            subgoal = self.memory.keep(answer, self._instruction)
-            self._finished = subgoal == FINISHED
-            self._subgoal = None if self._finished else subgoal
-        return self._subgoal
+            subgoal = self.memory.keep(answer, now.instruction)
+            now.useless, now.finished = 0, subgoal == FINISHED
+            now.subgoal = None if now.finished else subgoal
+        return now.subgoal
 
     def usage(self) -> dict[str, float]:
         """Return the cost of the episode, and how the planning ended, if the model ended it.
@@ -207,37 +235,27 @@ class VLMPlanner:
         ``finished``: it said that the task is complete; ``unreadable``: its last replies were of no
         use.
         """
-        ended = {"finished": self._finished, "unreadable": self._useless > 0}
+        ended = {"finished": self._now.finished, "unreadable": self._now.useless > 0}
         return {**self._vlm.usage(), **{name: 1.0 for name, holds in ended.items() if holds}}
 
     def close(self) -> None:
         """Close the connection."""
         self._vlm.close()
 
-    def _start(self, instruction: str) -> None:
-        self._instruction = instruction
-        self._subgoal: str | None = None
-        self._ends: list[SubgoalEnd] = []
-        self._chunks = self._periods = self._useless = 0
-        self._news = self._refused = self._finished = False
-
     def _due(self, step: int) -> bool:
         """Return whether to query the model now."""
-        period = self.options.period
-        if period is not None:
-            periods, new_period = step // period, step // period > self._periods
-            self._periods = periods
-            return self._subgoal is None or (new_period and step >= self.options.first_pause)
-        if self.options.asked == WHEN_DONE:
-            if self._useless >= MOST_USELESS:
-                return False
-            return (self._subgoal is None or self._news) and (
-                self._subgoal is None or step >= self.options.first_pause
-            )
-        if self._subgoal is None:
+        now, period = self._now, self.options.period
+        is_new = period is None or step // period > now.periods
+        now.periods = 0 if period is None else step // period
+        waits = self.options.asked == WHEN_DONE
+        if waits and now.useless >= MOST_USELESS:
+            return False
+        if now.subgoal is None:
             return True
-        text, _ = split_point(self._subgoal)
-        held = (one for one in self.options.holds if step <= one.until)
-        return step >= self.options.first_pause and not any(
-            re.fullmatch(one.says, text) for one in held
+        words, _ = split_point(now.subgoal)
+        is_held = any(
+            step <= one.until and re.fullmatch(one.says, words) for one in self.options.holds
+        )
+        return (
+            is_new and (now.news or not waits) and step >= self.options.first_pause and not is_held
         )

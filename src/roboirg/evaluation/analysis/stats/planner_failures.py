@@ -64,16 +64,10 @@ def _when_time_is_up(record: Record) -> str:
         return "stopped early"
     if record.usage.get("unreadable") or (record.usage.get("unparsed") and not acts):
         return "unreadable"
-    if not acts:
-        return "stopped early"
-    last = acts[-1]
-    if last.ended == "refused":
-        return "refused"
-    if last.ended in ("missed", "blocked", "time-out"):
-        return "hands"
-    if record.steps - last.step > IDLE_STEPS:
-        return "stopped early"
-    return "went on too long"
+    if not acts or record.steps - acts[-1].step > IDLE_STEPS:
+        return "refused" if acts and acts[-1].ended == "refused" else "stopped early"
+    ends = {"refused": "refused", "done": "went on too long", None: "went on too long"}
+    return ends.get(acts[-1].ended, "hands")
 
 
 def _last_verdict(record: Record) -> str | None:

@@ -38,7 +38,7 @@ class _PlannerCell:
     episodes: int = 0
     verdicts: Counter[str] = field(default_factory=Counter)
     failures: Counter[str] = field(default_factory=Counter)
-    costs: Counter[str] = field(default_factory=Counter)
+    costs: defaultdict[str, float] = field(default_factory=lambda: defaultdict(float))
 
     def add(self, record: Record) -> None:
         """Add a record."""
