@@ -8,6 +8,8 @@ MOST_SUBGOAL_LETTERS = 300
 """Characters; the policies that follow subgoals truncate after 128 tokens."""
 SCRIPTED_HANDS = "scripted hands"
 """Version of the scripted expert where it follows subgoals; rows and pages are marked by it."""
+UNKNOWN_WORDS = "these words are no subgoal that the hands know"
+"""Why hands refuse words of no known form."""
 _POINT = re.compile(r" at <(\d{1,4}), (\d{1,4})>")
 
 Point = tuple[int, int]

@@ -124,8 +124,8 @@ class GuardedLoop(EpisodeLoop):
         """Keep a subgoal if it or the stage that is due is new."""
         stage, found = self.env.session.judge.published, self._result.subgoals
         due = None if stage is None else plain_subgoal(stage)
-        stands = found and found[-1].ended in (None, "done")
-        if stands and (found[-1].text, found[-1].due) == (subgoal, due):
+        tries_again = found and found[-1].ended in ("missed", "blocked", "time-out")
+        if found and not tries_again and (found[-1].text, found[-1].due) == (subgoal, due):
             return
         _, point = split_point(subgoal)
         if self._writer is not None:

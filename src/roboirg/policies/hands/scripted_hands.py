@@ -13,7 +13,7 @@ from roboirg.core.conditions import Fact
 from roboirg.core.episode import HANDLES_HELD, PICKS, ROBOT, Primitive
 from roboirg.core.errors import MotionPlanningError
 from roboirg.core.observations import Demonstration, Observation
-from roboirg.core.subgoal_text import SCRIPTED_HANDS
+from roboirg.core.subgoal_text import SCRIPTED_HANDS, UNKNOWN_WORDS
 from roboirg.policies.contract.base import EndKind, SubgoalEnd
 from roboirg.policies.hands.subgoal_words import WAIT_STEPS, Request, read_subgoal
 
@@ -179,7 +179,7 @@ class ScriptedHands:
 
         request = read_subgoal(subgoal)
         if request is None:
-            raise RefusedError("these words are no subgoal that the hands know")
+            raise RefusedError(UNKNOWN_WORDS)
         held = held_thing(self._world)
         if request.kind in HANDLES_HELD and held is None:
             raise RefusedError("nothing is in the hand")

@@ -25,6 +25,8 @@ from roboirg.policies.vlm.prompt_files import SHARED, Prompts, load_prompts
 from roboirg.util.json_reply import UnparsableReplyError, json_object, text_of
 from roboirg.util.media import VIDEO_RATE, Clip, Picture, Pixels, contact_sheets, evenly_spaced
 
+Ends = Sequence[SubgoalEnd]
+"""How subgoals ended, as far as the policy reports it."""
 PLACE = "[at]"
 FINISHED = ""
 """Stands for the answer that the task is complete."""
@@ -92,13 +94,8 @@ class Memory(ABC):
         """Record an observation; called at every chunk, with or without a query."""
 
     @abstractmethod
-    def query(
-        self,
-        observation: Observation,
-        instruction: str,
-        ends: Sequence[SubgoalEnd],
-    ) -> ModelQuery:
-        """Return the next query; `ends` is how subgoals ended, as far as that is reported."""
+    def query(self, observation: Observation, instruction: str, ends: Ends) -> ModelQuery:
+        """Return the next query."""
 
     @abstractmethod
     def parser(self, last: str | None) -> Callable[[str], Any]:
@@ -143,12 +140,7 @@ class SubgoalMemory(Memory):
         super().begin(demonstration)
         self._history: list[str] = []
 
-    def query(
-        self,
-        observation: Observation,
-        instruction: str,
-        ends: Sequence[SubgoalEnd],  # noqa: ARG002
-    ) -> ModelQuery:
+    def query(self, observation: Observation, instruction: str, ends: Ends) -> ModelQuery:  # noqa: ARG002
         """Show demonstration, task, past subgoals and the newest picture."""
         history = "; ".join(f"{number}. {one}" for number, one in enumerate(self._history, 1))
         said = self.own.fill("history", history=history) if history else self.own.fill("first")
@@ -198,12 +190,7 @@ class ConversationMemory(Memory):
             frames.append(front_picture(observation))
         self._frames += frames
 
-    def query(
-        self,
-        observation: Observation,
-        instruction: str,
-        ends: Sequence[SubgoalEnd],  # noqa: ARG002
-    ) -> ModelQuery:
+    def query(self, observation: Observation, instruction: str, ends: Ends) -> ModelQuery:  # noqa: ARG002
         """Add a turn with the frames since the last one."""
         self._frames = self._frames or [front_picture(observation)]
         when, fields = "next", ("description", "subgoal")
@@ -278,12 +265,7 @@ class KeyframeMemory(Memory):
         kept = {at for one in wanted if (at := self._latest_before(one)) is not None}
         self._recent = {at: self._recent[at] for at in sorted(kept)}
 
-    def query(
-        self,
-        observation: Observation,  # noqa: ARG002
-        instruction: str,
-        ends: Sequence[SubgoalEnd],  # noqa: ARG002
-    ) -> ModelQuery:
+    def query(self, observation: Observation, instruction: str, ends: Ends) -> ModelQuery:  # noqa: ARG002
         """Show the demonstration, the task, the key frames and the recent frames."""
         count = len(self._recent)
         position = {"type": "integer", "enum": list(range(1, count + 1))}
@@ -358,12 +340,7 @@ class PictureMemory(Memory):
         """Keep the pictures of the history."""
         self._past += [front_picture(earlier) for earlier in observation.get("history", ())]
 
-    def query(
-        self,
-        observation: Observation,
-        instruction: str,
-        ends: Sequence[SubgoalEnd],
-    ) -> ModelQuery:
+    def query(self, observation: Observation, instruction: str, ends: Ends) -> ModelQuery:
         """Show task, video, done subgoals, pictures of the past and the newest picture."""
         return self._single(self._parts(observation, instruction, ends))
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from roboirg.core.subgoal_text import split_point, split_steps
+from roboirg.core.subgoal_text import UNKNOWN_WORDS, split_point, split_steps
 from roboirg.evaluation.records.record import Record, SubgoalRecord
 
 IDLE_STEPS = 400
@@ -27,7 +27,7 @@ _OF_VERDICT: Mapping[str, str] = {
 }
 PLANNER_FAILURES: Mapping[str, str] = {
     "no answer": "its model was silent, late or out of reach; such episodes are errors, in no rate",
-    "unreadable": "the last replies of its model were no subgoal",
+    "unreadable": "the last replies of its model were no subgoal of a known form",
     "refused": "its last subgoals fitted nothing or several things",
     "wrong thing": "it had another thing handled, or one on the other side",
     "wrong place": "it had the right thing put elsewhere",
@@ -64,10 +64,12 @@ def _when_time_is_up(record: Record) -> str:
         return "stopped early"
     if record.usage.get("unreadable") or (record.usage.get("unparsed") and not acts):
         return "unreadable"
-    if not acts or record.steps - acts[-1].step > IDLE_STEPS:
-        return "refused" if acts and acts[-1].ended == "refused" else "stopped early"
-    ends = {"refused": "refused", "done": "went on too long", None: "went on too long"}
-    return ends.get(acts[-1].ended, "hands")
+    last = acts[-1] if acts else None
+    if last is not None and last.ended == "refused":
+        return "unreadable" if last.why == UNKNOWN_WORDS else "refused"
+    if last is None or record.steps - last.step > IDLE_STEPS:
+        return "stopped early"
+    return "went on too long" if last.ended in ("done", None) else "hands"
 
 
 def _last_verdict(record: Record) -> str | None:
