@@ -1,6 +1,5 @@
 """Planners with a known fault, as replies of a model to the stateless planner."""
 
-import json
 import time
 
 from planning_fakes import Late, fake_vlm
@@ -34,32 +33,24 @@ def replies_of(episode, goal):
 
 def with_fault(fault, episode):
     """The replies of a model with a fault, or None if the episode leaves no room for it."""
-    goal = episode.goal
-    color, repeats = goal.text("color"), goal.number("repeats")
-    right = list(replies_of(episode, goal))
+    color, repeats = episode.goal.text("color"), episode.goal.number("repeats")
     others = [one.color for one in episode.scene.of_kind("cube") if one.color != color]
-    match fault:
-        case "none":
-            return [*right, "done"]
-        case "wrong count":
-            other = repeats - 1 if repeats > 1 else repeats + 1
-            return [*replies_of(episode, Goal.of(color=color, repeats=other)), "done"]
-        case "stopped early":
-            return [*right[:2], "done"]
-        case "wrong thing":
-            wrong = Goal.of(color=others[0], repeats=repeats) if others else None
-            return wrong and [*replies_of(episode, wrong), "done"]
-        case "refused":
-            return ["put it into the bin"]
-        case "unreadable":
-            return ["la la la"]
-        case "went on too long":
-            return [one for _ in range(40) for one in (right[0], "put it down")]
-        case "never":
-            return [Late(NEVER)]
-        case "late":
-            return [Late(1.5)]
-    raise ValueError(fault)
+    if fault == "wrong thing" and not others:
+        return None
+    right = list(replies_of(episode, episode.goal))
+    meant = {
+        "wrong count": (color, repeats - 1 if repeats > 1 else repeats + 1),
+        "wrong thing": (others[0] if others else color, repeats),
+    }.get(fault, (color, repeats))
+    other = list(replies_of(episode, Goal.of(color=meant[0], repeats=meant[1])))
+    return {
+        "stopped early": [*right[:2], "done"],
+        "refused": ["put it into the bin"],
+        "unreadable": ["la la la"],
+        "went on too long": [right[0], "put it down"] * 40,
+        "never": [Late(NEVER)],
+        "late": [Late(1.5)],
+    }.get(fault, [*other, "done"])
 
 
 def record_of(fault, index):
@@ -72,8 +63,3 @@ def record_of(fault, index):
         job = Job(policy=spec, task=TASK, split="test", episode=index,
                   options=InstructionOptions("explicit"))  # fmt: skip
         return make_record(job, play_episode(job), started_at=time.strftime("%FT%TZ"))
-
-
-def replies_from(path):
-    """The replies in a file, one JSON text a line: a stub server that answers from a file."""
-    return [json.loads(line) for line in path.read_text().splitlines()]
