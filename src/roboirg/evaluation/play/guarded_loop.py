@@ -57,7 +57,7 @@ class GuardedLoop(EpisodeLoop):
         self._job, self._space, self._writer = job, space, writer
         self._result, self._guard = result, guard
         self._is_ours = not is_foreign(job.policy_spec)
-        self._ends = 0
+        self._reports, self._ends = bool(getattr(policy, "reports", False)), 0
 
     def play(self) -> dict[str, Any]:
         """Play the episode, and record its status."""
@@ -124,6 +124,8 @@ class GuardedLoop(EpisodeLoop):
         """Keep a subgoal if it or the stage that is due is new."""
         stage, found = self.env.session.judge.published, self._result.subgoals
         due = None if stage is None else plain_subgoal(stage)
+        if found and self._reports and found[-1].text == subgoal and found[-1].ended is None:
+            return  # it is still being done
         tries_again = found and found[-1].ended in ("missed", "blocked", "time-out")
         if found and not tries_again and (found[-1].text, found[-1].due) == (subgoal, due):
             return

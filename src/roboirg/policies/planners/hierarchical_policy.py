@@ -47,6 +47,7 @@ class HierarchicalPolicy:
     Attributes:
         needs: of both.
         subgoal: the planner's newest, for the records.
+        reports: whether the policy reports how subgoals end.
         endings: how subgoals ended, if the policy reports it.
 
     Raises:
@@ -78,7 +79,7 @@ class HierarchicalPolicy:
                 f"The planner is asked {WHEN_DONE}, but {type(policy).__name__} does not report "
                 "how subgoals end; set asked=each-chunk or asked='every N steps'."
             )
-        planner.reports = reports  # type: ignore[attr-defined]
+        planner.reports = self.reports = reports  # type: ignore[attr-defined]
 
     @property
     def endings(self) -> list[SubgoalEnd]:

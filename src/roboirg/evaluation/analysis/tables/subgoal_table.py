@@ -25,8 +25,8 @@ _COSTS: Mapping[str, str] = {
     "input_tokens": "tokens in",
     "output_tokens": "tokens out",
     "cost_usd": "US$",
-    "refused": "refused",
-    "missed": "missed",
+    "refused": "refusals",
+    "missed": "misses",
 }
 """What a planner costs: keys of a record's usage, and their headings."""
 
