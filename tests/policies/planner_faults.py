@@ -59,7 +59,8 @@ def record_of(fault, index):
     if replies is None:
         return None
     with fake_vlm(replies) as server:
-        spec = f"planner:stateless?base_url={server.url}/v1&timeout_s=1&retries=0&model=stub"
+        model = f"base_url={server.url}/v1&model=stub&timeout_s=1&retries=0"
+        spec = f"planner:stateless?{model}&observe_every=400"  # few pictures are drawn
         job = Job(policy=spec, task=TASK, split="test", episode=index,
                   options=InstructionOptions("explicit"))  # fmt: skip
         return make_record(job, play_episode(job), started_at=time.strftime("%FT%TZ"))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from fractions import Fraction
 from typing import Any, ClassVar, Literal
 
@@ -98,8 +98,12 @@ class Memory(ABC):
         """Return the next query."""
 
     @abstractmethod
-    def parser(self, last: str | None) -> Callable[[str], Any]:
-        """Return what parses the reply to the last query, given the last subgoal."""
+    def parse(self, text: str, last: str | None) -> Any:  # noqa: ANN401
+        """Parse the reply to the last query, given the last subgoal.
+
+        Raises:
+            UnparsableReplyError: it holds no subgoal.
+        """
 
     @abstractmethod
     def keep(self, answer: Any, instruction: str) -> str:  # noqa: ANN401
@@ -148,9 +152,9 @@ class SubgoalMemory(Memory):
         now = (self.own.fill("now"), Picture(front_picture(observation)))
         return self._single((*self._video_parts(), self._goal(instruction), said, *now, question))
 
-    def parser(self, last: str | None) -> Callable[[str], Any]:  # noqa: ARG002
-        """Parse the model's text in one line, for the history, and the subgoal with pixels."""
-        return lambda text: (normalize_subgoal(text), parse_boxes(text))
+    def parse(self, text: str, last: str | None) -> tuple[str, str]:  # noqa: ARG002
+        """Return the model's text in one line, for the history, and the subgoal with pixels."""
+        return normalize_subgoal(text), parse_boxes(text)
 
     def keep(self, answer: Any, instruction: str) -> str:  # noqa: ANN401, ARG002
         """Add the subgoal to the history if its words are new."""
@@ -200,18 +204,10 @@ class ConversationMemory(Memory):
         system = self.own.fill("system", forms=self.forms(), places=self.places())
         return ModelQuery(system, (*self._turns, self._turn), _schema(fields))
 
-    def parser(self, last: str | None) -> Callable[[str], Any]:
-        """Parse a text and its subgoal; the last one if it says the task is complete."""
-
-        def parse(text: str) -> tuple[str, str]:
-            subgoal = parse_points(text_of(json_object(text), "subgoal"))
-            if not says_finished(subgoal):
-                return text, subgoal
-            if last is None:
-                raise UnparsableReplyError("Nothing has been done yet.")
-            return text, last
-
-        return parse
+    def parse(self, text: str, last: str | None) -> tuple[str, str]:
+        """Return the text and its subgoal; the last one if it says that the task is complete."""
+        subgoal = parse_points(text_of(json_object(text), "subgoal"))
+        return text, str(last) if _finishes(subgoal, last) else subgoal
 
     def keep(self, answer: Any, instruction: str) -> str:  # noqa: ANN401
         """Keep the turn and its reply."""
@@ -272,25 +268,18 @@ class KeyframeMemory(Memory):
         schema = _schema(("current_subtask",), keyframe_positions=position)
         return self._single(self._parts(instruction, str(count)), schema)
 
-    def parser(self, last: str | None) -> Callable[[str], Any]:  # noqa: ARG002
-        """Parse a subgoal, and positions of recent frames, counted from 1."""
-        count = len(self._recent)
-
-        def parse(text: str) -> tuple[str, list[int]]:
-            reply = json_object(text)
-            subgoal = parse_boxes(text_of(reply, "current_subtask"))
-            positions = reply.get("keyframe_positions")
-            if not isinstance(positions, list):
-                raise UnparsableReplyError(
-                    "The field 'keyframe_positions' has to be a list of numbers."
-                )
-            if any(type(one) is not int or not 1 <= one <= count for one in positions):
-                raise UnparsableReplyError(
-                    f"Positions of frames are whole numbers from 1 to {count}."
-                )
-            return subgoal, positions
-
-        return parse
+    def parse(self, text: str, last: str | None) -> tuple[str, list[int]]:  # noqa: ARG002
+        """Return a subgoal, and positions of recent frames, counted from 1."""
+        reply, count = json_object(text), len(self._recent)
+        subgoal = parse_boxes(text_of(reply, "current_subtask"))
+        positions = reply.get("keyframe_positions")
+        if not isinstance(positions, list):
+            raise UnparsableReplyError(
+                "The field 'keyframe_positions' has to be a list of numbers."
+            )
+        if any(type(one) is not int or not 1 <= one <= count for one in positions):
+            raise UnparsableReplyError(f"Positions of frames are whole numbers from 1 to {count}.")
+        return subgoal, positions
 
     def keep(self, answer: Any, instruction: str) -> str:  # noqa: ANN401, ARG002
         """Add the chosen frames."""
@@ -344,19 +333,11 @@ class PictureMemory(Memory):
         """Show task, video, done subgoals, pictures of the past and the newest picture."""
         return self._single(self._parts(observation, instruction, ends))
 
-    def parser(self, last: str | None) -> Callable[[str], Any]:
-        """Parse the last line of the reply."""
-
-        def parse(text: str) -> str:
-            lines = [line for line in text.splitlines() if line.strip()]
-            subgoal = parse_points(lines[-1] if lines else "")
-            if not says_finished(subgoal):
-                return subgoal
-            if last is None:
-                raise UnparsableReplyError("Nothing has been done yet.")
-            return FINISHED
-
-        return parse
+    def parse(self, text: str, last: str | None) -> str:
+        """Return the subgoal in the last line of the reply."""
+        lines = [line for line in text.splitlines() if line.strip()]
+        subgoal = parse_points(lines[-1] if lines else "")
+        return FINISHED if _finishes(subgoal, last) else subgoal
 
     def keep(self, answer: Any, instruction: str) -> str:  # noqa: ANN401, ARG002
         """Return the subgoal; the policy reports what comes of it."""
@@ -390,6 +371,13 @@ MEMORIES: Mapping[str, type[Memory]] = {
     "keyframes": KeyframeMemory,
     "pictures": PictureMemory,
 }
+
+
+def _finishes(subgoal: str, last: str | None) -> bool:
+    """Return whether a subgoal says that the task is complete; not before anything was done."""
+    if says_finished(subgoal) and last is None:
+        raise UnparsableReplyError("Nothing has been done yet.")
+    return says_finished(subgoal)
 
 
 def _sheets(frames: Pixels, most: int, every: int) -> Iterator[Picture]:

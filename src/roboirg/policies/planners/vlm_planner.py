@@ -219,7 +219,7 @@ class VLMPlanner:
                 return now.subgoal
         now.news = now.refused = False
         query = self.memory.query(observation, now.instruction, now.ends)
-        answer = self._vlm.ask(query, self.memory.parser(now.subgoal))
+        answer = self._vlm.ask(query, lambda text: self.memory.parse(text, now.subgoal))
         if answer is None:
             now.useless += 1
             now.news = True
