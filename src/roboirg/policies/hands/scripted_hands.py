@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
@@ -13,7 +14,7 @@ from roboirg.core.conditions import Fact
 from roboirg.core.episode import HANDLES_HELD, PICKS, ROBOT, Primitive
 from roboirg.core.errors import MotionPlanningError
 from roboirg.core.observations import Demonstration, Observation
-from roboirg.core.subgoal_text import SCRIPTED_HANDS, UNKNOWN_WORDS
+from roboirg.core.subgoal_text import SCRIPTED_HANDS, UNKNOWN_WORDS, split_point
 from roboirg.policies.contract.base import EndKind, SubgoalEnd
 from roboirg.policies.hands.subgoal_words import WAIT_STEPS, Request, read_subgoal
 
@@ -86,7 +87,7 @@ class ScriptedHands:
         self._env: RoboIRGEnv | None = None
         self._expert: MotionPrimitives | None = None
         self._underway: _Underway | None = None
-        self._done: tuple[str, ...] = ()
+        self._last: _Underway | None = None
         self._began = 0
 
     def attach(self, env: RoboIRGEnv) -> None:
@@ -98,7 +99,7 @@ class ScriptedHands:
         from roboirg.simulation.expert.primitives import MotionPrimitives
 
         world = self._world
-        self.endings, self._underway, self._done = [], None, ()
+        self.endings, self._underway, self._last = [], None, None
         self._expert, self._began = MotionPrimitives(world), world.elapsed
 
     @property
@@ -117,12 +118,15 @@ class ScriptedHands:
         self.settle()
         if self._underway is not None:
             return
+        if self._last is not None and _says_the_same(subgoal, self._last.subgoal):
+            self._report(subgoal, "done", thing=self._last.thing)
+            return
         try:
             motion, thing = self._find_motion(subgoal)
         except RefusedError as error:
             self._report(subgoal, "refused", str(error))
             return
-        if motion.kind != "hold" and self._done == _act_of(motion):
+        if self._last is not None and _act_of(motion) == _act_of(self._last.motion):
             self._report(subgoal, "done", thing=thing)
             return
         moves = self._wait(motion.steps) if motion.kind == "hold" else self._moves(motion)
@@ -166,7 +170,7 @@ class ScriptedHands:
 
     def _end(self, now: _Underway, how: EndKind, why: str) -> None:
         self._underway = None
-        self._done = _act_of(now.motion) if how == "done" else ()
+        self._last = now if how == "done" and now.motion.kind != "hold" else None
         self._report(now.subgoal, how, why, now.thing)
 
     def _report(self, subgoal: str, how: EndKind, why: str = "", thing: str | None = None) -> None:
@@ -262,6 +266,14 @@ class ScriptedHands:
         return wanted is None or any(
             Fact(kind, subject, place) in session.world.facts for kind in wanted
         )
+
+
+def _says_the_same(subgoal: str, other: str) -> bool:
+    """Return whether two subgoals have the same words, and points that may mean the same thing."""
+    (words, point), (other_words, other_point) = split_point(subgoal), split_point(other)
+    if point is None or other_point is None:
+        return subgoal == other
+    return words == other_words and math.dist(point, other_point) <= REACH_PIXELS
 
 
 def _act_of(motion: Primitive) -> tuple[str, ...]:
