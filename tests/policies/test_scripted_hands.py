@@ -125,8 +125,11 @@ def test_a_point_outweighs_words_and_the_record_has_both():
     assert end.thing != red.item.name
     # What is held is *it*; the motion just done is not repeated.
     steps = env.session.world.elapsed
-    assert do(env, hands, f"pick up the cube at <{row}, {column}>").how == "done"
+    hands.follow(end.subgoal)
+    assert [one.how for one in hands.endings] == ["done", "done"]
     assert env.session.world.elapsed == steps
+    hands.follow(f"pick up the cube at <{row}, {column}>")  # it is no longer there
+    assert hands.endings[-1].how == "refused"
     assert do(env, hands, "put it down").thing == other.item.name
 
 
