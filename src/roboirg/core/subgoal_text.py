@@ -10,6 +10,8 @@ SCRIPTED_HANDS = "scripted hands"
 """Version of the scripted expert where it follows subgoals; rows and pages are marked by it."""
 UNKNOWN_WORDS = "these words are no subgoal that the hands know"
 """Why hands refuse words of no known form."""
+EMPTY_HAND = "nothing is in the hand"
+"""Why hands refuse to put something somewhere."""
 _POINT = re.compile(r" at <(\d{1,4}), (\d{1,4})>")
 
 Point = tuple[int, int]

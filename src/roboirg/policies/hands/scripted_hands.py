@@ -14,7 +14,7 @@ from roboirg.core.conditions import Fact
 from roboirg.core.episode import HANDLES_HELD, PICKS, ROBOT, Primitive
 from roboirg.core.errors import MotionPlanningError
 from roboirg.core.observations import Demonstration, Observation
-from roboirg.core.subgoal_text import SCRIPTED_HANDS, UNKNOWN_WORDS, split_point
+from roboirg.core.subgoal_text import EMPTY_HAND, SCRIPTED_HANDS, UNKNOWN_WORDS, split_point
 from roboirg.policies.contract.base import EndKind, SubgoalEnd
 from roboirg.policies.hands.subgoal_words import WAIT_STEPS, Request, read_subgoal
 
@@ -186,7 +186,7 @@ class ScriptedHands:
             raise RefusedError(UNKNOWN_WORDS)
         held = held_thing(self._world)
         if request.kind in HANDLES_HELD and held is None:
-            raise RefusedError("nothing is in the hand")
+            raise RefusedError(EMPTY_HAND)
         thing = None if request.thing is None else self._select(request)
         match request.kind:
             case "hold":

@@ -10,6 +10,7 @@ from pydantic import BaseModel, ConfigDict
 from roboirg.core.episode import HANDLES_HELD, Stage
 from roboirg.core.errors import InvalidValueError
 from roboirg.core.observations import Demonstration, Observation
+from roboirg.core.subgoal_text import EMPTY_HAND
 from roboirg.policies.contract.base import SubgoalEnd
 
 if TYPE_CHECKING:
@@ -95,7 +96,8 @@ class OraclePlanner:
         return self.env.subgoal
 
     def _lost(self) -> bool:
-        return self._last is not None and self._last.how in ("missed", "refused")
+        end = self._last
+        return end is not None and (end.how == "missed" or end.why == EMPTY_HAND)
 
 
 def stage_subgoal(env: RoboIRGEnv, stages: Sequence[Stage], index: int, *, grounded: bool) -> str:
