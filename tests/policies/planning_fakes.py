@@ -11,6 +11,7 @@ from collections.abc import Callable
 from contextlib import contextmanager
 from fractions import Fraction
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from pathlib import Path
 from types import SimpleNamespace
 
 import av
@@ -156,8 +157,11 @@ def google_reply(text):
 
 
 @contextmanager
-def fake_vlm(answer: Callable):
-    """A running server; `answer` may be a list of replies, the last of which stays."""
+def fake_vlm(answer: Callable | list | Path):
+    """A running server; `answer` may be a list of replies, the last of which stays, or the path of
+    a file with one reply a line, as JSON texts."""
+    if isinstance(answer, Path):
+        answer = [json.loads(line) for line in answer.read_text().splitlines()]
     if isinstance(answer, list):
         left = list(answer)
         reply = lambda _body: left.pop(0) if len(left) > 1 else left[0]  # noqa: E731

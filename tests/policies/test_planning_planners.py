@@ -14,20 +14,15 @@ import roboirg
 from roboirg.core.errors import InvalidValueError
 from roboirg.policies import Policy, PrivilegedPolicy, play
 from roboirg.policies.builtin.oracle_policy import OraclePolicy
-from roboirg.policies.planners.gemini import GeminiOptions, GeminiPlanner
+from roboirg.policies.planners import make_planner as make_by_kind
 from roboirg.policies.planners.hierarchical_policy import HierarchicalPolicy, with_planner
-from roboirg.policies.planners.memer import MemerOptions, MemerPlanner
 from roboirg.policies.planners.oracle_planner import OracleOptions, OraclePlanner
-from roboirg.policies.planners.qwen import QwenOptions, QwenPlanner
+from roboirg.policies.planners.vlm_planner import PlannerOptions
 
 CHUNK = 16
 GO = "pick up the red cube at <|box_start|>(500,250)<|box_end|>"
 SUBGOAL = "pick up the red cube at <128, 64>"
-KINDS = {
-    "qwen": (QwenPlanner, QwenOptions),
-    "gemini": (GeminiPlanner, GeminiOptions),
-    "memer": (MemerPlanner, MemerOptions),
-}
+KINDS = ("qwen", "gemini", "memer")
 ANSWERS = {
     "qwen": GO,
     "gemini": json.dumps({"description": "x", "subgoal_sequence": [], "subgoal":
@@ -73,9 +68,9 @@ class Fingers(OraclePolicy):
 
 
 def make_planner(kind, server, provider="openai", **more):
-    planner_class, options_class = KINDS[kind]
-    own = {key: more.pop(key) for key in list(more) if key in options_class.model_fields}
-    return planner_class(options_class(model=model_options(server, provider, **more), **own))
+    own = {key: more.pop(key) for key in list(more) if key in PlannerOptions.model_fields}
+    model = model_options(server, provider, **more)
+    return make_by_kind(kind, {"model": model, **own}, "the test")
 
 
 def moment(step):
@@ -247,7 +242,7 @@ def test_gemini_converses_in_clips():
 
 def test_gemini_shows_a_picture_where_there_is_no_clip():
     with fake_vlm([ANSWERS["gemini"]]) as server:
-        planner = make_planner("gemini", server, period=3, first_pause=0)
+        planner = make_planner("gemini", server, asked="every 3 steps", first_pause=0)
         drive(planner, 6, chunk=3)
         assert [pictures(body) for body in server.requests] == [[0], [0, 3], [0, 3, 6]]
 
@@ -295,7 +290,7 @@ def test_memer_shows_recent_frames_and_remembers_what_it_chose():
     # 0; 0, 4, 16 make 4 and 16, where 16 and 18 make 18; then 64 besides.
     memory = [[], [0], [4, 16], [4, 18], [4, 18]]
     assert shown == [kept + new for kept, new in zip(memory, recent, strict=True)]
-    assert list(planner.memory) == [4, 18, 64]
+    assert list(planner.memory.frames) == [4, 18, 64]
 
 
 @pytest.mark.parametrize("positions", [[0], [9], ["1"], [True], "1", None])
@@ -304,7 +299,7 @@ def test_memer_refuses_positions_that_there_are_not(positions):
         planner = make_planner("memer", server)
         drive(planner, 16)
         assert planner.usage()["unparsed"] == 2
-        assert planner.memory == {}
+        assert planner.memory.frames == {}
 
 
 def test_memer_may_be_told_to_keep_the_newest_key_frames_only():
@@ -312,7 +307,7 @@ def test_memer_may_be_told_to_keep_the_newest_key_frames_only():
     with fake_vlm([choose]) as server:
         planner = make_planner("memer", server, most=2)
         drive(planner, 96)
-        assert list(planner.memory) == [66, 82]
+        assert list(planner.memory.frames) == [66, 82]
 
 
 @pytest.mark.parametrize("subgoals", ["simple", "grounded"])

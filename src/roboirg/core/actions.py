@@ -32,12 +32,14 @@ class ActionSpace(NamedTuple):
         low: smallest sensible value of each number; smaller ones are accepted.
         high: largest sensible value of each number.
         describe: the numbers in words.
+        takes_many_steps: whether one action takes many control steps.
     """
 
     name: str
     low: NDArray[np.float64]
     high: NDArray[np.float64]
     describe: str
+    takes_many_steps: bool = False
 
     @property
     def size(self) -> int:
@@ -60,12 +62,35 @@ _POSE = "x, y, z in m, roll, pitch, yaw in rad and the gripper"
 EE_POSE = ActionSpace("ee_pose", _POSE_LOW, _POSE_HIGH, f"{_POSE} in [-1, 1]")
 """Pose of the tool center, world frame, extrinsic x-y-z angles; one control step."""
 
-WAYPOINT = ActionSpace("waypoint", _POSE_LOW, _POSE_HIGH, f"{_POSE}, -1 to close it, +1 to open it")
+WAYPOINT = ActionSpace(
+    "waypoint",
+    _POSE_LOW,
+    _POSE_HIGH,
+    f"{_POSE}, -1 to close it, +1 to open it",
+    takes_many_steps=True,
+)
 """The same pose, reached by a straight move of many steps; then the gripper closes or opens."""
 
+NO_POINT = -1.0
+CHOICE = ActionSpace(
+    "choice",
+    np.array([0.0, NO_POINT, NO_POINT]),
+    np.array([3.0, 255.0, 255.0]),
+    f"the number of a choice (a is 0), row and column of a point or {NO_POINT:g}, {NO_POINT:g}",
+    takes_many_steps=True,
+)
+"""RoboMME's multi-choice mode: one of the task's motions, and a point of the front picture."""
+
 ACTION_SPACES: Mapping[str, ActionSpace] = {
-    space.name: space for space in (JOINT_ANGLE, EE_POSE, WAYPOINT)
+    space.name: space for space in (JOINT_ANGLE, EE_POSE, WAYPOINT, CHOICE)
 }
+
+
+def choice_action(label: str, point: tuple[float, float] | None = None) -> NDArray[np.float64]:
+    """Return the action of a choice: its letter, and row and column of the point if it has one."""
+    if len(label) != 1 or not label.isascii() or not label.isalpha():
+        raise InvalidActionError(f"Choice {label!r} is no letter.")
+    return np.array([ord(label.lower()) - ord("a"), *(point or (NO_POINT, NO_POINT))])
 
 
 def find_action_space(name: object) -> ActionSpace:

@@ -164,6 +164,24 @@ class Goal:
         return dict(self.slots)
 
 
+PrimitiveKind = Literal[
+    "pick_cube",
+    "place_on",
+    "drop_into",
+    "put_into",
+    "move_over",
+    "put_down",
+    "pick_container",
+    "press",
+    "press_below",
+    "hover",
+    "hold",
+    "hold_until",
+    "retreat",
+    "go_home",
+]
+
+
 class Primitive(NamedTuple):
     """The movement by which the oracle completes a stage.
 
@@ -192,26 +210,19 @@ class Primitive(NamedTuple):
         height: of the tool where it lets go, m, for ``put_down``.
     """
 
-    kind: Literal[
-        "pick_cube",
-        "place_on",
-        "drop_into",
-        "put_into",
-        "move_over",
-        "put_down",
-        "pick_container",
-        "press",
-        "press_below",
-        "hover",
-        "hold",
-        "hold_until",
-        "retreat",
-        "go_home",
-    ]
+    kind: PrimitiveKind
     subject: str
     place: str | None = None
     steps: int = 0
     height: float = 0.07
+
+
+ROBOT = "robot"
+"""Subject of a primitive that handles no object."""
+PICKS = frozenset({"pick_cube", "pick_container"})
+"""Primitives that take their subject into the hand."""
+HANDLES_HELD = frozenset({"place_on", "put_down", "drop_into", "put_into", "move_over"})
+"""Primitives whose subject is in the hand: to repeat one, the pick is repeated first."""
 
 
 @dataclass(frozen=True, slots=True)

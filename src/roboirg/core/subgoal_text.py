@@ -6,10 +6,23 @@ import re
 
 MOST_SUBGOAL_LETTERS = 300
 """Characters; the policies that follow subgoals truncate after 128 tokens."""
+SCRIPTED_HANDS = "scripted hands"
+"""Version of the scripted expert where it follows subgoals; rows and pages are marked by it."""
+UNKNOWN_WORDS = "these words are no subgoal that the hands know"
+"""Why hands refuse words of no known form."""
+EMPTY_HAND = "nothing is in the hand"
+"""Why hands refuse to put something somewhere."""
 _POINT = re.compile(r" at <(\d{1,4}), (\d{1,4})>")
 
 Point = tuple[int, int]
 """Row and column in the front picture."""
+_STEPS = re.compile(r" for (\d{1,4}) steps?$")
+
+
+def split_steps(words: str) -> tuple[str, int | None]:
+    """Return words without the number of control steps at their end, and that number."""
+    found = _STEPS.search(words)
+    return _STEPS.sub("", words), None if found is None else int(found[1])
 
 
 def split_point(subgoal: str) -> tuple[str, Point | None]:

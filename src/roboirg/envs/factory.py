@@ -32,7 +32,7 @@ def make(task: str | Episode, **options: Unpack[EnvOptions]) -> RoboIRGEnv:
             chooses it.
         arm: told, or a control arm: other words, or another goal, for the same scene
             (docs/controls.md).
-        actions: joint_angle, ee_pose or waypoint.
+        actions: joint_angle, ee_pose, waypoint or choice.
         cameras: cameras whose pictures observations hold; () renders nothing.
         depth: add depth for the same cameras.
         calibration: add extrinsic and intrinsic matrices for the same cameras.

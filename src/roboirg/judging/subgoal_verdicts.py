@@ -7,7 +7,7 @@ from collections.abc import Collection
 from typing import Literal, get_args
 
 from roboirg.core.episode import Stage
-from roboirg.core.subgoal_text import split_point
+from roboirg.core.subgoal_text import split_point, split_steps
 from roboirg.judging.judge import plain_subgoal
 
 SubgoalVerdict = Literal["right", "wrong_thing", "wrong_place", "wrong_count", "lost"]
@@ -33,7 +33,8 @@ def judge_subgoal(
     """
     if due is None:
         return "lost"
-    said = " ".join(split_point(subgoal)[0].lower().split()).rstrip(".")
+    words = " ".join(split_point(subgoal)[0].lower().split()).rstrip(".")
+    said, _ = split_steps(words)  # how long to wait is no part of the due stage's words
     right = plain_subgoal(due)
     if said == right:
         misses = None not in (pointed_at, due.points_at) and due.points_at not in (pointed_at or ())

@@ -89,6 +89,11 @@ class World:
         for _ in range(physics_settings.PHYSICS_STEPS):
             self._physics.step()
 
+    @property
+    def absent(self) -> frozenset[str]:
+        """Names of the objects that are out of the world; their positions mean nothing."""
+        return self._motions.absent()
+
     def note_stage(self, index: int) -> None:
         """Record the step at which a stage became due, for the motions that wait for it."""
         self._stages.setdefault(index, self.elapsed)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 import io
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from typing import NamedTuple
@@ -12,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from roboirg.core.extras import extra_needed
+from roboirg.util.text_overlay import draw_text
 
 Pixels = NDArray[np.uint8]
 
@@ -22,6 +24,8 @@ CONTROL_RATE = 20
 QUALITY = 23
 """x264's constant rate factor, its default."""
 JPEG_QUALITY = 90
+SHEET_SIDE = 4
+"""Frames in a row, and rows, of a sheet."""
 
 
 class Picture(NamedTuple):
@@ -54,10 +58,34 @@ class Clip:
 
 def sample_evenly(frames: Pixels, most: int) -> Pixels:
     """Return at most `most` frames, evenly spaced, including the first and the last."""
-    if len(frames) <= most:
-        return frames
-    kept: Pixels = frames[np.linspace(0, len(frames) - 1, most).round().astype(int)]
-    return kept
+    return frames if len(frames) <= most else frames[evenly_spaced(len(frames), most)]
+
+
+def evenly_spaced(count: int, most: int) -> NDArray[np.intp]:
+    """Return at most `most` of `count` places, evenly spaced, including the first and the last."""
+    return np.linspace(0, count - 1, min(count, most)).round().astype(np.intp)
+
+
+def contact_sheets(frames: Pixels, labels: Sequence[str]) -> Iterator[Pixels]:
+    """Yield sheets of frames at half their size, in reading order, each with its label.
+
+    Args:
+        frames: uint8 (T, height, width, 3).
+        labels: T short texts.
+    """
+    small = np.ascontiguousarray(frames[:, ::2, ::2])
+    for frame, label in zip(small, labels, strict=True):
+        draw_text(frame, label, 4, 14, 0.45, (0, 0, 0), thickness=3)
+        draw_text(frame, label, 4, 14, 0.45, (255, 255, 255))
+    columns = SHEET_SIDE
+    for start in range(0, len(small), columns**2):
+        part = small[start : start + columns**2]
+        count = -(-len(part) // columns) * columns
+        tiles = np.zeros((count, *part.shape[1:]), np.uint8)
+        tiles[: len(part)] = part
+        height, width = part.shape[1:3]
+        grid = tiles.reshape(-1, columns, height, width, 3).swapaxes(1, 2)
+        yield grid.reshape(-1, columns * width, 3)
 
 
 def encode_png(picture: Picture) -> bytes:

@@ -16,6 +16,7 @@ from roboirg.evaluation.records.action_log import read_actions
 from roboirg.evaluation.records.record import Record
 from roboirg.evaluation.records.store import read_records
 from roboirg.policies.by_name.policy_specs import PolicyKind, PolicyMaker
+from roboirg.tasks.choices import choices_of
 
 if TYPE_CHECKING:
     from roboirg.envs.environment import RoboIRGEnv
@@ -96,7 +97,8 @@ def _joint_rows(env: RoboIRGEnv, folder: Path, digest: str) -> Iterator[NDArray[
     from roboirg.simulation.controllers import make_controller
 
     log = read_actions(folder, digest)
-    controller = make_controller(find_action_space(log.space), env.session.world.robot)
+    choices = choices_of(env.episode)
+    controller = make_controller(find_action_space(log.space), env.session.world, choices)
     for row in log.rows:
         yield from controller.trajectories(row)
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, cast
 
 from roboirg.core.observations import CAMERAS
+from roboirg.core.subgoal_text import Point
 from roboirg.evaluation.play.video_writer import PictureSource
 from roboirg.evaluation.records.film import VideoOptions
 from roboirg.evaluation.records.record import Record
@@ -35,7 +36,7 @@ class DrivingSession:
             failed.
         options: of the live pictures.
         caption: what was said so far; unused, as `say` gets it.
-        longest_caption: unused.
+        longest_caption, point: unused.
         env: the environment, once it is there.
     """
 
@@ -43,6 +44,7 @@ class DrivingSession:
     options: VideoOptions = field(default_factory=lambda: VideoOptions(every=3))
     caption: str = ""
     longest_caption: str = ""
+    point: Point | None = None
     env: RoboIRGEnv | None = None
 
     def __post_init__(self) -> None:

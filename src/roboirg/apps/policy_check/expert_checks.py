@@ -21,7 +21,7 @@ from roboirg.apps.policy_check.conventions import ANSWER_CONVENTIONS, INPUT_CONV
 from roboirg.apps.policy_check.expert_episode import ExpertEpisode, ExpertMoment, RecordExpert
 from roboirg.apps.policy_check.picture_formats import change_observation
 from roboirg.apps.policy_check.policy_player import PolicyPlayer
-from roboirg.core.actions import ARM_JOINTS, JOINT_ANGLE, WAYPOINT
+from roboirg.core.actions import ARM_JOINTS, JOINT_ANGLE
 
 FITS = 0.5
 """Of the error of holding still: a policy below it knows where the expert goes."""
@@ -56,7 +56,7 @@ def check_expert(player: PolicyPlayer, record: RecordExpert | None) -> Iterator[
         player: of the policy.
         record: returns the expert's episode; None to check nothing.
     """
-    if record is None or player.constant or player.space is WAYPOINT:
+    if record is None or player.constant or player.space.takes_many_steps:
         return
     rows = max(map(len, player.first_rollout.chunks))
     try:

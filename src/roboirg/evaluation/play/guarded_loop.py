@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from msgspec.structs import replace
 from numpy.typing import ArrayLike, NDArray
 
 from roboirg.core.actions import ActionSpace
@@ -58,6 +59,7 @@ class GuardedLoop(EpisodeLoop):
         self._job, self._space, self._writer = job, space, writer
         self._result, self._guard = result, guard
         self._is_ours = not is_foreign(job.policy_spec)
+        self._reports, self._ends = bool(getattr(policy, "reports", False)), 0
 
     def play(self) -> dict[str, Any]:
         """Play the episode, and record its status."""
@@ -105,18 +107,35 @@ class GuardedLoop(EpisodeLoop):
         with self._guard.policy("policy's act()", "policy_act"):
             rows = next_actions(self.policy, observation, self._space)
             subgoal = policy_subgoal(self.policy)
-        if subgoal is not None:
-            with self._guard.environment("env_subgoal"):
+        with self._guard.environment("env_subgoal"):
+            self._note_ends()
+            if subgoal is not None:
                 self._note_subgoal(subgoal)
         return rows
+
+    def _note_ends(self) -> None:
+        """Keep how subgoals ended, and those that were refused meanwhile."""
+        ends = getattr(self.policy, "endings", ()) if self._is_ours else ()
+        for end in ends[self._ends :]:
+            found = self._result.subgoals
+            if end.how == "refused":
+                self._note_subgoal(end.subgoal)
+            if found and found[-1].text == end.subgoal and found[-1].ended is None:
+                found[-1] = replace(found[-1], ended=end.how, why=end.why or None, thing=end.thing)
+        self._ends = len(ends)
 
     def _note_subgoal(self, subgoal: str) -> None:
         """Keep a subgoal if it or the stage that is due is new."""
         stage, found = self.env.session.judge.published, self._result.subgoals
         due = None if stage is None else plain_subgoal(stage)
-        if found and (found[-1].text, found[-1].due) == (subgoal, due):
+        if found and self._reports and found[-1].text == subgoal and found[-1].ended is None:
+            return  # it is still being done
+        tries_again = found and found[-1].ended in ("missed", "blocked", "time-out")
+        if found and not tries_again and (found[-1].text, found[-1].due) == (subgoal, due):
             return
         _, point = split_point(subgoal)
+        if self._writer is not None:
+            self._writer.point = point
         verdict = judge_subgoal(subgoal, stage, self.env.objects_at(point) if point else None)
         found.append(
             SubgoalRecord(

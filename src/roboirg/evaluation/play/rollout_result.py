@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from pydantic import JsonValue
 
 from roboirg import language
-from roboirg.core.actions import find_action_space
+from roboirg.core.actions import CHOICE, find_action_space
 from roboirg.core.arms import TOLD
 from roboirg.core.conditions import Fact
 from roboirg.core.delivery import TURNS, PromptVerdict
@@ -240,7 +240,7 @@ def make_record(
         goal=dict(episode.goal.as_mapping()),
         # Exactly what a reader of the file gets.
         metadata=json.loads(json.dumps(dict(instruction.metadata))),
-        privileged=policy.is_privileged,
+        privileged=policy.is_privileged or result.action_space == CHOICE.name,
         policy_version=policy.version,
         server_version=server_version(result.policy_metadata),
         action_log=action_log,

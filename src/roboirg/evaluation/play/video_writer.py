@@ -15,6 +15,8 @@ from numpy.typing import NDArray
 
 from roboirg.core.errors import EndOfRunError
 from roboirg.core.extras import extra_needed
+from roboirg.core.observations import FRONT
+from roboirg.core.subgoal_text import Point
 from roboirg.evaluation.records.film import LAST_FRAME_REPEATS, VideoOptions
 from roboirg.util.text_overlay import draw_text, wrap_text
 
@@ -26,6 +28,9 @@ Frame = NDArray[np.uint8]
 
 DEMONSTRATION_COLOR = (255, 176, 32)
 """RGB of the border around the frames of the demonstration."""
+
+RING_COLOR, RING_RADIUS, RING_WIDTH = (255, 230, 0), 6, 2
+"""RGB and pixels of the ring around the point of a subgoal."""
 
 BORDER = 6
 GAP = 4
@@ -53,11 +58,13 @@ class FrameSink(Protocol):
         options: how often there is a frame, and its format.
         caption: what was said so far.
         longest_caption: everything that will have been said.
+        point: row and column of the planner's subgoal in the front picture, if it has one.
     """
 
     options: VideoOptions
     caption: str
     longest_caption: str
+    point: Point | None
 
     def add_frame(self, source: PictureSource, is_demonstration: bool = False) -> None:
         """Take the current pictures."""
@@ -100,6 +107,15 @@ def compose_frame(
     return np.concatenate([frame, _caption_bar(caption, frame.shape[1], longest_caption)])
 
 
+def _with_ring(picture: Frame, point: Point) -> Frame:
+    """Return a copy of a picture with a ring around a point; inside it the picture is unchanged."""
+    rows, columns = np.indices(picture.shape[:2])
+    distance = np.hypot(rows - point[0], columns - point[1])
+    marked = picture.copy()
+    marked[np.abs(distance - RING_RADIUS) <= RING_WIDTH / 2] = RING_COLOR
+    return marked
+
+
 @functools.lru_cache(maxsize=8)
 def _caption_bar(caption: str, width: int, longest: str) -> Frame:
     """Return a caption as an image; its height is even, because H.264 needs that."""
@@ -128,6 +144,7 @@ class VideoWriter:
     Attributes:
         caption: text below the pictures; set before the first frame.
         longest_caption: text for which there is room below the pictures, if the caption grows.
+        point: row and column in the front picture, marked by a yellow ring.
         error: why the video could not be written, or None.
     """
 
@@ -135,6 +152,7 @@ class VideoWriter:
     options: VideoOptions = field(default_factory=VideoOptions)
     caption: str = field(default="", init=False)
     longest_caption: str = field(default="", init=False)
+    point: Point | None = field(default=None, init=False)
     error: Exception | None = field(default=None, init=False)
     _container: OutputContainer | None = field(default=None, init=False, repr=False)
     _stream: VideoStream | None = field(default=None, init=False, repr=False)
@@ -156,6 +174,9 @@ class VideoWriter:
             return
         try:
             pictures = [source.picture(camera) for camera in self.options.cameras]
+            if self.point is not None and FRONT in self.options.cameras:
+                place = self.options.cameras.index(FRONT)
+                pictures[place] = _with_ring(pictures[place], self.point)
             frame = compose_frame(
                 pictures,
                 self.caption,

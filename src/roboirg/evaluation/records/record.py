@@ -214,6 +214,10 @@ class SubgoalRecord(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fi
         point: row and column in the front picture, if it has them.
         due: the stage that was due, in words; None after the last one.
         verdict: whether it is what was due, as in `roboirg.judging.subgoal_verdicts`.
+        ended: how it ended, as in `roboirg.policies.contract.base.SubgoalEnd`; None if the policy
+            reports no ends, or the episode ended first.
+        why: why it was not done.
+        thing: name of the object that the hands took it to mean; a point outweighs words.
     """
 
     step: Whole
@@ -221,6 +225,9 @@ class SubgoalRecord(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fi
     point: tuple[Whole, Whole] | None = None
     due: Name | None = None
     verdict: Name
+    ended: Name | None = None
+    why: Cause | None = None
+    thing: Name | None = None
 
 
 class Attribution(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):

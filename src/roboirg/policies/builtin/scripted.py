@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from roboirg.core.conditions import Fact
-from roboirg.core.episode import Goal, Stage
+from roboirg.core.episode import HANDLES_HELD, Goal, Stage
 from roboirg.core.observations import Demonstration, Observation
 from roboirg.judging import Judge
 from roboirg.tasks import get_task, with_goal
@@ -28,8 +28,6 @@ LISTENING_STEPS = 5
 """Control steps at rest between two observations while the command has not been heard."""
 MAX_RETRIES = 3
 """Retries of failed primitives per episode."""
-UNDOES_PICK = frozenset({"place_on", "put_down", "drop_into", "put_into", "move_over"})
-"""Primitives that need an object in the gripper: to repeat one, the pick is repeated first."""
 
 
 class ScriptedPolicy(ABC):
@@ -121,7 +119,7 @@ def _execute(
             index += 1
         elif retries < MAX_RETRIES:
             retries += 1
-            index -= stage.primitive.kind in UNDOES_PICK and index > 0
+            index -= stage.primitive.kind in HANDLES_HELD and index > 0
         else:
             return
 

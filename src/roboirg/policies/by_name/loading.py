@@ -16,7 +16,7 @@ from roboirg.policies.by_name.policy_classes import (
     find_class,
     make_from_class,
 )
-from roboirg.policies.by_name.systems import find_system
+from roboirg.policies.by_name.systems import HANDS, SCRIPTED, find_system
 from roboirg.policies.contract.base import Policy
 from roboirg.policies.contract.policy_needs import PolicyNeeds
 from roboirg.policies.contract.policy_urls import is_url, parse_query
@@ -90,9 +90,13 @@ def is_foreign(spec: str) -> bool:
     kind, colon, rest = spec.partition(":")
     if spec in BUILTIN or is_url(spec) or not colon:
         return False
+    name, _, query = rest.partition("?")
     if kind == policy_specs.SYSTEM:
-        name, _, query = rest.partition("?")
-        return is_foreign(find_system(name, parse_query(spec, query)).policy)
+        policy = find_system(name, parse_query(spec, query)).policy
+        return policy != SCRIPTED and is_foreign(policy)
+    if kind == policy_specs.PLANNER:
+        hands = parse_query(spec, query).get(HANDS, SCRIPTED)
+        return hands != SCRIPTED and is_foreign(hands)
     return not policy_specs.comes_with_us(kind)
 
 

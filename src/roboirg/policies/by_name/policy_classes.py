@@ -184,7 +184,7 @@ def _module_of(file: str) -> str:
 def _examples() -> list[str]:
     urls = (f"{scheme}://…" for scheme in url_schemes())
     kinds = (f"{kind}:…" for kind in entry_names(KINDS_GROUP))
-    return [*urls, "system:NAME", "vlm-listener:PROVIDER", *kinds]
+    return [*urls, "system:NAME", "planner:KIND", "vlm-listener:PROVIDER", *kinds]
 
 
 def _parameters(policy_class: type[Any]) -> Mapping[str, inspect.Parameter]:

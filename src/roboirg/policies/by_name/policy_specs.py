@@ -3,6 +3,7 @@
 | spec | meaning |
 | --- | --- |
 | ``system:NAME?server=host:port&vlm=URL`` | a system of the paper, or of a file |
+| ``planner:KIND?hands=scripted&model=NAME`` | a planner, and the scripted expert as its hands |
 | ``vlm-listener:PROVIDER?model=NAME&base_url=URL`` | a model names the goal |
 
 Installed packages add kinds through entry points of the group ``roboirg.policy_kinds``: an entry
@@ -31,6 +32,7 @@ if TYPE_CHECKING:
     from roboirg.envs.environment import RoboIRGEnv
 
 SYSTEM = "system"
+PLANNER = "planner"
 LISTENER = "vlm-listener"
 PolicyMaker = Callable[[int], Policy]
 """Makes a policy from a seed, without network or the libraries of providers."""
@@ -102,6 +104,20 @@ def _system(spec: str, name: str, options: Mapping[str, str]) -> PolicyMaker:
     return lambda seed: build_system(system, seed)
 
 
+def _planner(_spec: str, name: str, options: Mapping[str, str]) -> PolicyMaker:
+    """Return what makes planners with hands; its model's options stand next to its own."""
+    from roboirg.policies.by_name.systems import HANDS, SCRIPTED, System, build_system
+
+    of_model = {key: value for key, value in options.items() if key in ModelOptions.model_fields}
+    own: dict[str, Any] = {key: value for key, value in options.items() if key not in of_model}
+    hands = own.pop(HANDS, SCRIPTED)
+    if of_model:
+        own["model"] = of_model
+    planner = {"kind": name, **own}
+    system = System(name=f"{PLANNER}:{name}", about="", policy=hands, planner=planner)
+    return lambda seed: build_system(system, seed)
+
+
 def _listener(_spec: str, name: str, options: Mapping[str, str]) -> PolicyMaker:
     """Return what makes VLM listeners; its options and its model's stand side by side."""
     own = [option for option in ListenerOptions.model_fields if option != "model"]
@@ -117,7 +133,11 @@ def _listener(_spec: str, name: str, options: Mapping[str, str]) -> PolicyMaker:
     return lambda seed: VLMListener(checked, seed)
 
 
-OURS = (PolicyKind(SYSTEM, _system), PolicyKind(LISTENER, _listener))
+OURS = (
+    PolicyKind(SYSTEM, _system),
+    PolicyKind(PLANNER, _planner),
+    PolicyKind(LISTENER, _listener),
+)
 
 
 @functools.cache

@@ -22,11 +22,13 @@ from roboirg.policies.planners.hierarchical_policy import with_planner
 PACKAGE, FOLDER = "roboirg.policies.by_name", "system_files"
 SUFFIX = ".toml"
 
-SERVER, VLM, MODEL = "server", "vlm", "model"
+SERVER, VLM, MODEL, HANDS = "server", "vlm", "model", "hands"
+SCRIPTED = "scripted"
 POLICY, PLANNER = "policy.", "planner."
 SHORTCUTS: Mapping[str, str] = {VLM: "planner.model.base_url", MODEL: "planner.model.model"}
 """Short names of options, and the entries that they set."""
-OPTIONS = (SERVER, *SHORTCUTS, "policy.OPTION", "planner.OPTION", "planner.model.OPTION")
+HANDS_CLASS = "roboirg.policies.hands.scripted_hands:ScriptedHands"
+OPTIONS = (SERVER, HANDS, *SHORTCUTS, "policy.OPTION", "planner.OPTION", "planner.model.OPTION")
 
 
 class Published(BaseModel):
@@ -77,7 +79,9 @@ def load_system(
     Args:
         name_or_file: a name such as ``GroundSG-QwenVL``, or a TOML file with the same entries.
         overrides: ``server`` (host:port of the policy), ``vlm`` (URL of the planner's model),
-            ``model`` (its name), ``policy.OPTION``, ``planner.OPTION``, ``planner.model.OPTION``.
+            ``model`` (its name), ``hands`` (``scripted``, or the spec of a policy that follows
+            subgoals, instead of its own), ``policy.OPTION``, ``planner.OPTION``,
+            ``planner.model.OPTION``.
         seed: of the policy's own random choices.
 
     Raises:
@@ -115,7 +119,8 @@ def find_system(name_or_file: str, overrides: Mapping[str, str]) -> System:
 
 def build_system(system: System, seed: int) -> Policy:
     """Make the policy of a system; nothing is connected."""
-    policy = make_from_class(system.policy, find_class(system.policy), seed)
+    spec = HANDS_CLASS if system.policy == SCRIPTED else system.policy
+    policy = make_from_class(spec, find_class(spec), seed)
     if system.planner is None:
         return policy
     options = dict(system.planner)
@@ -128,9 +133,11 @@ def _overridden(system: System, overrides: Mapping[str, str], origin: str) -> Sy
     policy, planner = system.policy, system.planner
     for option, value in overrides.items():
         entry = SHORTCUTS.get(option, option)
-        if option == SERVER or option.startswith(POLICY):
+        if option == HANDS and planner is not None:
+            policy = value
+        elif option == SERVER or option.startswith(POLICY):
             policy = _policy_with(policy, option, value, origin)
-        elif not entry.startswith(PLANNER):
+        elif option != HANDS and not entry.startswith(PLANNER):
             raise UnknownNameError(f"option of {origin}", option, OPTIONS)
         elif planner is None:
             raise InvalidValueError(f"Option {option!r}: {origin} has no planner.")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from typing import TYPE_CHECKING, Any, Protocol, runtime_checkable
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,7 +20,7 @@ class Policy(Protocol):
 
     The class attribute ``cameras`` selects the pictures of observations, for example ``()``; by
     default there are both. ``actions`` names the action space of `act`: ``"joint_angle"`` (the
-    default), ``"ee_pose"`` or ``"waypoint"``.
+    default), ``"ee_pose"``, ``"waypoint"`` or ``"choice"``.
 
     Pictures of the demonstration are rendered when they are read. ``demonstration_frames = 4``
     keeps every fourth, ``"none"`` none. With ``observe_every = n`` each observation has a
@@ -49,7 +49,7 @@ class Policy(Protocol):
         """Return the next n >= 1 actions; all are executed before the next call.
 
         Returns:
-            Shape (n, 8), or (n, 7) in the action spaces ee_pose and waypoint.
+            Shape (n, 8); (n, 7) in the spaces ee_pose and waypoint, (n, 3) in choice.
         """
 
 
@@ -62,6 +62,42 @@ class SubgoalFollower(Policy, Protocol):
 
         Called by a planner before `act`; the subgoal holds until the next call.
         """
+
+
+EndKind = Literal["done", "missed", "blocked", "time-out", "refused"]
+
+
+class SubgoalEnd(NamedTuple):
+    """How a policy that reports it has followed a subgoal.
+
+    Attributes:
+        subgoal: as it was named.
+        how: ``done``; ``missed``, nothing came of the motion; ``blocked``, the arm cannot get
+            there; ``time-out``, it took too long; ``refused``, it fits nothing or several things.
+        why: the reason, for all but ``done``.
+        thing: name of the object that was meant.
+        step: the policy's control steps until then.
+    """
+
+    subgoal: str
+    how: EndKind
+    why: str = ""
+    thing: str | None = None
+    step: int = 0
+
+
+@runtime_checkable
+class ReportingFollower(SubgoalFollower, Protocol):
+    """A policy that says how its subgoals end; the scripted hands are one.
+
+    Attributes:
+        endings: of this episode, in order.
+    """
+
+    endings: list[SubgoalEnd]
+
+    def settle(self) -> None:
+        """Report the motion under way if it is over; called before a planner is asked."""
 
 
 @runtime_checkable

@@ -1,4 +1,4 @@
-"""Planners, one file each, made from a kind and options."""
+"""Planners, made from a kind and options."""
 
 from __future__ import annotations
 
@@ -12,13 +12,17 @@ from roboirg.core.errors import UnknownNameError
 from roboirg.policies.contract.option_checking import check_options
 from roboirg.policies.planners.planner import Planner
 
+_HERE = "roboirg.policies.planners"
+_OF_GOALS = ("listener", "forgetful", "first-mention", "last-mention", "elimination", "surface")
+
 PLANNERS: Mapping[str, str] = {
-    "oracle": "roboirg.policies.planners.oracle_planner:OraclePlanner",
-    "qwen": "roboirg.policies.planners.qwen:QwenPlanner",
-    "gemini": "roboirg.policies.planners.gemini:GeminiPlanner",
-    "memer": "roboirg.policies.planners.memer:MemerPlanner",
+    "oracle": f"{_HERE}.oracle_planner:OraclePlanner",
+    **dict.fromkeys(_OF_GOALS, f"{_HERE}.goal_planner:GoalPlanner"),
+    "fixed": f"{_HERE}.goal_planner:FixedPlanner",
+    **dict.fromkeys(("qwen", "gemini", "memer", "stateless"), f"{_HERE}.vlm_planner:VLMPlanner"),
 }
-"""Import paths of the classes, whose attribute ``options_type`` is the type of their options."""
+"""Import paths of the classes. ``options_type`` is the type of a class's options, and ``settings``,
+if it has that, the defaults that belong to a kind."""
 
 
 def make_planner(kind: str, options: Mapping[str, Any], origin: str) -> Planner:
@@ -37,5 +41,6 @@ def make_planner(kind: str, options: Mapping[str, Any], origin: str) -> Planner:
         raise UnknownNameError("planner", kind, PLANNERS)
     planner_class = pkgutil.resolve_name(PLANNERS[kind])
     options_type: type[BaseModel] = planner_class.options_type
-    planner: Planner = planner_class(check_options(options_type, options, origin))
+    values = {**getattr(planner_class, "settings", {}).get(kind, {}), **options}
+    planner: Planner = planner_class(check_options(options_type, values, origin), kind)
     return planner

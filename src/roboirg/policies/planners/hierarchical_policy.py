@@ -3,24 +3,34 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
-from roboirg.core.actions import WAYPOINT
 from roboirg.core.errors import InvalidValueError
 from roboirg.core.observations import Demonstration, Observation
-from roboirg.policies.contract.base import Policy, SubgoalFollower, close_policy, tell_policy
+from roboirg.policies.contract.base import (
+    Policy,
+    ReportingFollower,
+    SubgoalEnd,
+    SubgoalFollower,
+    close_policy,
+    tell_policy,
+)
 from roboirg.policies.contract.policy_needs import PolicyNeeds
 from roboirg.policies.planners.observation_merging import (
     DemonstrationSubset,
     select_history,
 )
-from roboirg.policies.planners.planner import Planner
+from roboirg.policies.planners.planner import WHEN_DONE, Planner
 
 if TYPE_CHECKING:
     from roboirg.envs.environment import RoboIRGEnv
+
+
+MOST_REFUSALS = 5
+"""Refusals in a row after which a planner is asked no more in the episode."""
 
 
 class HierarchicalPolicy:
@@ -37,9 +47,12 @@ class HierarchicalPolicy:
     Attributes:
         needs: of both.
         subgoal: the planner's newest, for the records.
+        reports: whether the policy reports how subgoals end.
+        endings: how subgoals ended, if the policy reports it.
 
     Raises:
-        InvalidValueError: the policy has no method ``follow``.
+        InvalidValueError: the policy has no method ``follow``, or does not report how subgoals
+            end, on which the planner waits.
     """
 
     def __init__(self, planner: Planner, policy: Policy, name: str | None = None) -> None:
@@ -52,12 +65,26 @@ class HierarchicalPolicy:
         own, of_planner = PolicyNeeds.of(policy), PolicyNeeds.of_planner(planner)
         self._parts = of_planner, own
         self.needs = own.merge(of_planner)
-        if self.needs.actions == WAYPOINT.name and self.needs.observe_every is None:
-            # Only the history shows how many control steps a waypoint took.
+        self._many_steps = self.needs.action_space.takes_many_steps
+        if self._many_steps and self.needs.observe_every is None:
+            # Only the history shows how many control steps an action took.
             self.needs = replace(self.needs, observe_every=1)
         self.needs.declare_on(self)
         self._observed = self._step = self._rows = 0
         self.subgoal: str | None = None
+        self._told, self._gave_up = 0, False
+        reports = isinstance(policy, ReportingFollower)
+        if getattr(planner, "asked", None) == WHEN_DONE and not reports:
+            raise InvalidValueError(
+                f"The planner is asked {WHEN_DONE}, but {type(policy).__name__} does not report "
+                "how subgoals end; set asked=each-chunk or asked='every N steps'."
+            )
+        planner.reports = self.reports = reports  # type: ignore[attr-defined]
+
+    @property
+    def endings(self) -> list[SubgoalEnd]:
+        """How subgoals ended in this episode; empty if the policy does not report it."""
+        return self.policy.endings if isinstance(self.policy, ReportingFollower) else []
 
     @property
     def version(self) -> str:
@@ -77,7 +104,8 @@ class HierarchicalPolicy:
     def reset(self, instruction: str, demonstration: Demonstration) -> None:
         """Begin an episode with both."""
         self.subgoal = None
-        self._observed = self._step = self._rows = 0
+        self._observed = self._step = self._rows = self._told = 0
+        self._gave_up = False
         views = [
             DemonstrationSubset(
                 demonstration, self.needs.demonstration_frames, one.demonstration_frames
@@ -95,24 +123,44 @@ class HierarchicalPolicy:
     def act(self, observation: Observation) -> NDArray[np.floating[Any]]:
         """Pass the planner's subgoal to the policy, and return the policy's actions."""
         history = observation.get("history", ())
-        # Except for waypoints, a row is a control step.
         self._step += (
-            len(history) * (self.needs.observe_every or 1)
-            if self.needs.actions == WAYPOINT.name
-            else self._rows
+            len(history) * (self.needs.observe_every or 1) if self._many_steps else self._rows
         )
         views = [
             select_history(observation, self._observed, self.needs.observe_every, one.observe_every)
             for one in self._parts
         ]
         self._observed += len(history)
-        subgoal = self.planner.plan(views[0], self._step)
-        if subgoal is not None and isinstance(self.policy, SubgoalFollower):
-            self.policy.follow(subgoal)
-            self.subgoal = subgoal
+        if not self._gave_up:
+            self._lead(views[0])
         rows = self.policy.act(views[1])
         self._rows = len(np.atleast_2d(rows))
         return rows
+
+    def _lead(self, view: Observation) -> None:
+        """Pass the planner's subgoal on; ask again where the policy refuses it."""
+        if isinstance(self.policy, ReportingFollower):
+            self.policy.settle()
+        for _ in range(MOST_REFUSALS):
+            self._tell()
+            subgoal = self.planner.plan(view, self._step)
+            if subgoal is None or not isinstance(self.policy, SubgoalFollower):
+                return
+            self.subgoal = subgoal
+            self.policy.follow(subgoal)
+            if not any(one.how == "refused" for one in self.endings[self._told :]):
+                return
+            view = cast("Observation", {**view, "history": ()})
+        self._tell()
+        self._gave_up = True
+
+    def _tell(self) -> None:
+        """Tell the planner how its subgoals ended."""
+        new = self.endings[self._told :]
+        self._told += len(new)
+        for end in new:
+            if hasattr(self.planner, "learn"):
+                self.planner.learn(end)
 
     def usage(self) -> dict[str, float]:
         """Return the cost of both."""

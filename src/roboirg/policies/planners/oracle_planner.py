@@ -2,21 +2,27 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, ClassVar, Literal
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any, Literal
 
 from pydantic import BaseModel, ConfigDict
 
+from roboirg.core.episode import HANDLES_HELD, Stage
 from roboirg.core.errors import InvalidValueError
 from roboirg.core.observations import Demonstration, Observation
+from roboirg.core.subgoal_text import EMPTY_HAND
+from roboirg.policies.contract.base import SubgoalEnd
 
 if TYPE_CHECKING:
     from roboirg.envs.environment import RoboIRGEnv
 
 Subgoals = Literal["grounded", "simple"]
+PRESS_STEPS = 28
+"""Control steps of a press from above the button until the button is down; it varies by two."""
 
 
 class OracleOptions(BaseModel):
-    """Options of the oracle planner.
+    """Options of the planners without a model.
 
     Attributes:
         subgoals: ``grounded``, with pixels of the objects, or ``simple``.
@@ -28,19 +34,32 @@ class OracleOptions(BaseModel):
 
 
 class OraclePlanner:
-    """Returns the judge's current stage as a subgoal. Privileged."""
+    """Returns the judge's current stage as a subgoal. Privileged.
 
-    options_type: ClassVar[type[BaseModel]] = OracleOptions
+    To hands that report, it says how many steps to wait, and names the pick again where what it
+    carried was lost.
+    """
+
+    options_type: type[BaseModel] = OracleOptions
     version = "built-in"
+    reports = False
 
-    def __init__(self, options: OracleOptions | None = None) -> None:
-        self.options = options or OracleOptions()
+    def __init__(self, options: OracleOptions | None = None, kind: str = "oracle") -> None:
+        self.options, self.kind = options or OracleOptions(), kind
         self.grounded = self.options.subgoals == "grounded"
         self._env: RoboIRGEnv | None = None
+        self._last: SubgoalEnd | None = None
 
     @property
     def metadata(self) -> dict[str, Any]:
-        return {"kind": "oracle", **self.options.model_dump(mode="json")}
+        return {"kind": self.kind, **self.options.model_dump(mode="json")}
+
+    @property
+    def env(self) -> RoboIRGEnv:
+        """The environment of the episode."""
+        if self._env is None:
+            raise RuntimeError(f"{type(self).__name__} needs attach(env) before plan().")
+        return self._env
 
     def attach(self, env: RoboIRGEnv) -> None:
         """Receive the environment.
@@ -55,11 +74,49 @@ class OraclePlanner:
             )
         self._env = env
 
-    def reset(self, instruction: str, demonstration: Demonstration) -> None:
-        """Do nothing: there is no state."""
+    def reset(self, instruction: str, demonstration: Demonstration) -> None:  # noqa: ARG002
+        """Begin an episode."""
+        self._last = None
 
-    def plan(self, observation: Observation, step: int) -> str:  # noqa: ARG002
+    def learn(self, end: SubgoalEnd) -> None:
+        """Remember how the last subgoal ended."""
+        self._last = end
+
+    def plan(self, observation: Observation, step: int) -> str | None:  # noqa: ARG002
         """Return the current stage in words."""
-        if self._env is None:
-            raise RuntimeError("OraclePlanner needs attach(env) before plan().")
-        return self._env.subgoal
+        judge = self.env.session.judge
+        stage = judge.published
+        if not self.reports or stage is None:
+            return self.env.subgoal
+        if stage.primitive.kind in HANDLES_HELD and self._lost():
+            return stage_subgoal(self.env, judge.stages, judge.index - 1, grounded=self.grounded)
+        if stage.primitive.kind == "hold_until":  # it is published one step longer than due
+            return stage_subgoal(self.env, judge.stages, judge.index, grounded=self.grounded)
+        return self.env.subgoal
+
+    def _lost(self) -> bool:
+        end = self._last
+        return end is not None and (end.how == "missed" or end.why == EMPTY_HAND)
+
+
+def stage_subgoal(env: RoboIRGEnv, stages: Sequence[Stage], index: int, *, grounded: bool) -> str:
+    """Return a stage as a subgoal for hands: with its object's origin, and with how long to wait.
+
+    Args:
+        env: in the state to describe.
+        stages: of the goal.
+        index: of the stage to name.
+        grounded: whether to add the pixel of the stage's object, if it has one and is in view.
+    """
+    from roboirg.simulation.expert.things import origin_pixel
+
+    stage = stages[index]
+    if stage.primitive.kind == "hold_until":
+        following = stages[index + 1].primitive
+        is_last = following.kind == "press_below"
+        until = following.steps - PRESS_STEPS if is_last else stage.primitive.steps
+        return f"{stage.subgoal} for {max(until - env.session.world.elapsed, 0)} steps"
+    pixel = origin_pixel(env.session.world.bodies[stage.points_at]) if stage.points_at else None
+    if not grounded or pixel is None:
+        return stage.subgoal.replace(" {at}", "")
+    return stage.subgoal.replace("{at}", f"at <{pixel[0]}, {pixel[1]}>")

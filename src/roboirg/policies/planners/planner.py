@@ -6,6 +6,9 @@ from typing import Protocol, runtime_checkable
 
 from roboirg.core.observations import Demonstration, Observation
 
+EACH_CHUNK, WHEN_DONE = "each-chunk", "when-done"
+"""When a planner is asked; ``every N steps`` is the third."""
+
 
 @runtime_checkable
 class Planner(Protocol):
@@ -14,7 +17,11 @@ class Planner(Protocol):
     As for policies, the attributes ``cameras`` (default: none), ``demonstration_frames``
     (``"none"``), ``observe_every`` and ``grounded`` are its needs, ``metadata``, ``usage()``
     and ``version`` go into the records, ``close()`` ends an episode, and ``attach(env)`` makes it
-    privileged, and ``hear(text, step)`` gets what is said after `reset`; all are optional.
+    privileged, and ``hear(text, step)`` gets what is said after `reset`. ``reports`` is set to
+    whether the policy reports how subgoals end, which a planner whose ``asked`` is ``when-done``
+    needs; ``learn(end)`` then gets each `roboirg.policies.contract.base.SubgoalEnd` before the next
+    call of `plan`. After a refusal `plan` is called again at the same step, with an empty history.
+    All are optional.
     """
 
     def reset(self, instruction: str, demonstration: Demonstration) -> None:

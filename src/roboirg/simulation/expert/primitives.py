@@ -17,7 +17,7 @@ from scipy.spatial.transform import Rotation
 
 from roboirg.core.actions import ARM_JOINTS
 from roboirg.core.conditions import Fact
-from roboirg.core.episode import ROBOT_BASE, Primitive
+from roboirg.core.episode import ROBOT, ROBOT_BASE, Primitive
 from roboirg.core.errors import MotionPlanningError
 from roboirg.core.motions import Point
 from roboirg.simulation.expert.grasping import grasp_rotations
@@ -62,6 +62,11 @@ class MotionPrimitives:
         self._world = world
         self._planner = MotionPlanner(world.robot)
         self._gripper = OPEN
+
+    @property
+    def gripper(self) -> float:
+        """The gripper action of the last trajectory."""
+        return self._gripper
 
     def execute(self, primitive: Primitive) -> Iterator[JointTrajectory]:
         """Yield the trajectories of a primitive; take the next after executing the last."""
@@ -146,7 +151,9 @@ class MotionPrimitives:
         yield self._move(_above(container, CONTAINER_HOVER), rotation)
 
     def _put_down(self, primitive: Primitive) -> Iterator[JointTrajectory]:
-        here = self._position(primitive.subject)
+        held = primitive.subject
+        tool = Point(*(float(one) for one in self._world.robot.tool_pose.p))
+        here = tool if held == ROBOT else self._position(held)
         rotation = self._rotation()
         yield self._move(_above(here, primitive.height), rotation)
         yield self._grip(OPEN)

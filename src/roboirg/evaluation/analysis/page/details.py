@@ -107,9 +107,12 @@ def event_text(event: EventRecord, names: Mapping[str, str]) -> str:
 
 
 def _subgoal_text(one: SubgoalRecord) -> str:
-    if one.verdict == "right":
-        return one.text
-    return f"{one.text} ({one.verdict.replace('_', ' ')}; due: {one.due or 'nothing'})"
+    parts = []
+    if one.verdict != "right":
+        parts += [one.verdict.replace("_", " "), f"due: {one.due or 'nothing'}"]
+    if one.ended is not None and one.ended != "done":
+        parts.append(f"{one.ended}: {one.why}" if one.why else one.ended)
+    return f"{one.text} ({'; '.join(parts)})" if parts else one.text
 
 
 def _mentions(record: Record, strings: Strings) -> list[list[int]]:

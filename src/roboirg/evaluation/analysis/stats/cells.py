@@ -18,6 +18,7 @@ import numpy as np
 from roboirg.core.arms import TOLD
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.core.observations import DemonstrationFrames
+from roboirg.core.subgoal_text import SCRIPTED_HANDS
 from roboirg.evaluation.analysis.stats.intervals import (
     DRAWS,
     Interval,
@@ -101,6 +102,8 @@ class Versions(NamedTuple):
 
 PRIVILEGED = " (privileged)"
 """Mark of policies that read the simulator's state."""
+HANDS = f" ({SCRIPTED_HANDS})"
+"""Mark of planners whose hands read it, while they see pictures and words."""
 
 
 class PolicyRun(NamedTuple):
@@ -137,7 +140,13 @@ class PolicyRun(NamedTuple):
     @property
     def marked_policy(self) -> str:
         """The policy's name, marked if it is privileged."""
-        return self.policy + PRIVILEGED * self.is_privileged
+        return self.policy + self.mark
+
+    @property
+    def mark(self) -> str:
+        """The mark of a privileged policy; empty for the others."""
+        has_hands = self.versions is not None and SCRIPTED_HANDS in self.versions.policy
+        return (HANDS if has_hands else PRIVILEGED) * self.is_privileged
 
 
 class CellKey(NamedTuple):
@@ -321,7 +330,7 @@ def labels(cells: Cells) -> dict[PolicyRun, str]:
     Privileged policies are marked, because their rates are no rates of policies.
     """
     policy_runs = list(dict.fromkeys(key.policy_run for key in cells))
-    return {one: _label(one, policy_runs) + PRIVILEGED * one.is_privileged for one in policy_runs}
+    return {one: _label(one, policy_runs) + one.mark for one in policy_runs}
 
 
 def _label(policy_run: PolicyRun, policy_runs: Sequence[PolicyRun]) -> str:

@@ -251,7 +251,7 @@ def _legend(tables: Sequence[RunTable]) -> list[str]:
     if any(cell.missing for cell in cells):
         legend.append(f"{MISSING_MARK} episodes are still to be played")
     if any(table.policy_run.is_privileged for table in tables):
-        legend.append("privileged policies use the simulator's state")
+        legend.append("privileged policies and scripted hands use the simulator's state")
     return legend
 
 

@@ -1,0 +1,287 @@
+"""The scripted hands: follow subgoals in words with the motions of the scripted expert."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from roboirg.core.conditions import Fact
+from roboirg.core.episode import HANDLES_HELD, PICKS, ROBOT, Primitive
+from roboirg.core.errors import MotionPlanningError
+from roboirg.core.observations import Demonstration, Observation
+from roboirg.core.subgoal_text import EMPTY_HAND, SCRIPTED_HANDS, UNKNOWN_WORDS, split_point
+from roboirg.policies.contract.base import EndKind, SubgoalEnd
+from roboirg.policies.hands.subgoal_words import WAIT_STEPS, Request, read_subgoal
+
+if TYPE_CHECKING:
+    from roboirg.envs.environment import RoboIRGEnv
+    from roboirg.simulation.expert.primitives import MotionPrimitives
+    from roboirg.simulation.world import World
+
+REACH_PIXELS = 24
+"""Farthest that the origin of a thing may be from a point that means it."""
+MOST_STEPS = 400
+"""Control steps after which a motion is given up."""
+
+_EFFECTS: dict[str, tuple[str, ...]] = {
+    "pick_cube": ("picked",),
+    "pick_container": ("lifted",),
+    "place_on": ("placed",),
+    "drop_into": ("binned",),
+    "put_into": ("binned",),
+    "move_over": ("over",),
+    "put_down": ("lying", "put_down"),
+    "hover": ("hovering",),
+}
+"""Facts that come of a motion; pressing has an event instead, and waiting has none."""
+
+
+class RefusedError(Exception):
+    """A subgoal fits nothing or several things; caught by `ScriptedHands.follow`."""
+
+
+@dataclass
+class _Underway:
+    """The motion that is being made.
+
+    Attributes:
+        subgoal: that asked for it.
+        motion: what is done.
+        thing: name of the object that was meant.
+        chunks: its moves.
+        since: control steps of the world at its beginning.
+        next: the move that comes next, once it is planned.
+    """
+
+    subgoal: str
+    motion: Primitive
+    thing: str | None
+    chunks: Iterator[NDArray[np.float64]]
+    since: int
+    next: NDArray[np.float64] | None = None
+
+
+class ScriptedHands:
+    """Executes subgoals of RoboMME's grammar on what their words or their point select.
+
+    Privileged: it reads the poses of all objects, but neither the goal nor the instruction. A
+    motion that has begun is carried to its end; what is named meanwhile is not followed. The motion
+    just done is not repeated until another was made, so that a subgoal may stand. A refusal takes
+    no control step.
+
+    Attributes:
+        endings: how each subgoal ended, in order.
+    """
+
+    cameras: tuple[str, ...] = ()
+    version = SCRIPTED_HANDS
+
+    def __init__(self, seed: int = 0) -> None:
+        self.seed = seed
+        self.endings: list[SubgoalEnd] = []
+        self._env: RoboIRGEnv | None = None
+        self._expert: MotionPrimitives | None = None
+        self._underway: _Underway | None = None
+        self._last: _Underway | None = None
+        self._began = 0
+
+    def attach(self, env: RoboIRGEnv) -> None:
+        """Receive the environment in which the expert acts."""
+        self._env = env
+
+    def reset(self, instruction: str, demonstration: Demonstration) -> None:  # noqa: ARG002
+        """Begin an episode; the instruction is the planner's."""
+        from roboirg.simulation.expert.primitives import MotionPrimitives
+
+        world = self._world
+        self.endings, self._underway, self._last = [], None, None
+        self._expert, self._began = MotionPrimitives(world), world.elapsed
+
+    @property
+    def metadata(self) -> dict[str, Any]:
+        """What acts, for the records."""
+        return {"hands": "scripted"}
+
+    def usage(self) -> dict[str, float]:
+        """Return how many subgoals were refused, and how many came to nothing."""
+        ends = [one.how for one in self.endings]
+        failed = sum(how not in ("done", "refused") for how in ends)
+        return {"refused": ends.count("refused"), "missed": failed}
+
+    def follow(self, subgoal: str) -> None:
+        """Begin the motion of a subgoal, or refuse it; without effect while a motion is made."""
+        self.settle()
+        if self._underway is not None:
+            return
+        if self._last is not None and _says_the_same(subgoal, self._last.subgoal):
+            self._report(subgoal, "done", thing=self._last.thing)
+            return
+        try:
+            motion, thing = self._find_motion(subgoal)
+        except RefusedError as error:
+            self._report(subgoal, "refused", str(error))
+            return
+        if self._last is not None and _act_of(motion) == _act_of(self._last.motion):
+            self._report(subgoal, "done", thing=thing)
+            return
+        moves = self._wait(motion.steps) if motion.kind == "hold" else self._moves(motion)
+        self._underway = _Underway(subgoal, motion, thing, moves, self._world.elapsed)
+
+    def settle(self) -> None:
+        """Plan the next move of the motion under way, and report the motion if it is over."""
+        now = self._underway
+        if now is None or now.next is not None:
+            return
+        took = self._world.elapsed - now.since
+        if took > MOST_STEPS and now.motion.kind != "hold":
+            self._end(now, "time-out", f"it took more than {MOST_STEPS} steps")
+            return
+        try:
+            now.next = next(now.chunks, None)
+        except MotionPlanningError as error:
+            self._end(now, "blocked", str(error))
+            return
+        if now.next is None:
+            came = self._came_about(now)
+            self._end(now, "done" if came else "missed", "" if came else _why_missed(now.motion))
+
+    def act(self, observation: Observation) -> NDArray[np.floating[Any]]:  # noqa: ARG002
+        """Return the next move; without a motion, actions that hold still."""
+        self.settle()
+        if self._underway is None or self._underway.next is None:
+            return self._still(WAIT_STEPS)
+        rows, self._underway.next = self._underway.next, None
+        return rows
+
+    @property
+    def _attached(self) -> RoboIRGEnv:
+        if self._env is None:
+            raise RuntimeError("ScriptedHands needs attach(env) before reset().")
+        return self._env
+
+    @property
+    def _world(self) -> World:
+        return self._attached.session.world
+
+    def _end(self, now: _Underway, how: EndKind, why: str) -> None:
+        self._underway = None
+        self._last = now if how == "done" and now.motion.kind != "hold" else None
+        self._report(now.subgoal, how, why, now.thing)
+
+    def _report(self, subgoal: str, how: EndKind, why: str = "", thing: str | None = None) -> None:
+        step = self._world.elapsed - self._began
+        self.endings.append(SubgoalEnd(subgoal, how, why, thing, step))
+
+    def _find_motion(self, subgoal: str) -> tuple[Primitive, str | None]:
+        """Return the motion of a subgoal, and the name of the object that it means."""
+        from roboirg.simulation.expert.things import held_thing
+
+        request = read_subgoal(subgoal)
+        if request is None:
+            raise RefusedError(UNKNOWN_WORDS)
+        held = held_thing(self._world)
+        if request.kind in HANDLES_HELD and held is None:
+            raise RefusedError(EMPTY_HAND)
+        thing = None if request.thing is None else self._select(request)
+        match request.kind:
+            case "hold":
+                return Primitive("hold", ROBOT, steps=request.steps), None
+            case "press":
+                return self._press(request, thing), thing
+            case "put_down":
+                return Primitive("put_down", str(held), height=self._release_height()), held
+            case kind if kind in HANDLES_HELD:
+                return Primitive(kind, str(held), thing), thing
+            case kind:
+                return Primitive(kind, str(thing)), thing
+
+    def _select(self, request: Request) -> str:
+        """Return the name of the object that the point means, or else the words."""
+        from roboirg.simulation.expert.things import nearest_thing, present_things
+
+        things = present_things(self._world, (str(request.thing),))
+        if request.point is not None:
+            found = nearest_thing(things, request.point)
+            if found is None or found[1] > REACH_PIXELS:
+                row, column = request.point
+                raise RefusedError(
+                    f"no {request.thing} is within {REACH_PIXELS} pixels of <{row}, {column}>"
+                )
+            return found[0].item.name
+        fits = [one.item for one in things if request.color in (None, one.item.color)]
+        if request.side is not None and fits:
+            position = self._world.bodies
+            by_y = sorted(fits, key=lambda one: position[one.name].position.y)
+            fits = [by_y[0 if request.side == "right" else -1]]
+        if len(fits) != 1:
+            count = "nothing fits" if not fits else f"{len(fits)} things fit"
+            raise RefusedError(f"{count} the words {request.meant!r}; a point would say which")
+        return fits[0].name
+
+    def _press(self, request: Request, thing: str | None) -> Primitive:
+        """Return the press of a button; straight down if the hand is above it already."""
+        if request.thing != "button":  # the point is that of the target
+            thing = self._select(Request("press", "button"))
+        above = Fact("hovering", ROBOT, str(thing)) in self._world.facts
+        return Primitive("press_below" if above else "press", str(thing))
+
+    def _release_height(self) -> float:
+        """Return the tool height at which this task's expert lets go of what it puts down."""
+        from roboirg.tasks.choices import choices_of
+
+        motions = (one.primitives[0] for one in choices_of(self._attached.episode))
+        heights = [one.height for one in motions if one.kind == "put_down"]
+        return heights[0] if heights else Primitive("put_down", ROBOT).height
+
+    def _moves(self, motion: Primitive) -> Iterator[NDArray[np.float64]]:
+        if self._expert is None:
+            raise RuntimeError("ScriptedHands needs reset() before follow().")
+        return self._expert.execute(motion)
+
+    def _wait(self, steps: int) -> Iterator[NDArray[np.float64]]:
+        if steps:
+            yield self._still(steps)
+
+    def _still(self, steps: int) -> NDArray[np.float64]:
+        """Return actions that keep the arm and the gripper as they are."""
+        arm = self._world.robot.arm_positions
+        gripper = 1.0 if self._expert is None else self._expert.gripper
+        return np.tile(np.append(arm, gripper), (steps, 1))
+
+    def _came_about(self, now: _Underway) -> bool:
+        """Return whether a motion had its effect."""
+        session, motion = self._attached.session, now.motion
+        if motion.kind in ("press", "press_below"):
+            pressed = Fact("pressed", motion.subject)
+            late = (one for one in reversed(session.events) if one.step > now.since)
+            return any(one.holds and one.fact == pressed for one in late)
+        wanted = _EFFECTS.get(motion.kind)
+        subject = ROBOT if motion.kind == "hover" else motion.subject
+        place = motion.subject if motion.kind == "hover" else motion.place
+        return wanted is None or any(
+            Fact(kind, subject, place) in session.world.facts for kind in wanted
+        )
+
+
+def _says_the_same(subgoal: str, other: str) -> bool:
+    """Return whether two subgoals have the same words, and points that may mean the same thing."""
+    (words, point), (other_words, other_point) = split_point(subgoal), split_point(other)
+    if point is None or other_point is None:
+        return subgoal == other
+    return words == other_words and math.dist(point, other_point) <= REACH_PIXELS
+
+
+def _act_of(motion: Primitive) -> tuple[str, ...]:
+    """Return what a motion does, however it gets there."""
+    return motion.kind.removesuffix("_below"), motion.subject, motion.place or ""
+
+
+def _why_missed(motion: Primitive) -> str:
+    if motion.kind in PICKS:
+        return "nothing is in the gripper"
+    return "the motion had no effect"

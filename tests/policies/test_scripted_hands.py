@@ -1,0 +1,310 @@
+"""The scripted hands: what they read, what they refuse, and what planners reach with them."""
+
+import math
+import re
+
+import numpy as np
+import planner_faults
+import pytest
+from planning_fakes import fake_vlm, words_of
+from selection import slow_but
+
+import roboirg
+from roboirg.core.actions import choice_action
+from roboirg.core.errors import InvalidActionError, InvalidValueError
+from roboirg.evaluation.analysis.stats.planner_failures import planner_failure
+from roboirg.evaluation.play.rollout_result import RolloutResult, make_record
+from roboirg.judging import plain_subgoal
+from roboirg.policies import make_policy, play
+from roboirg.policies.by_name.loading import is_privileged, needs_host
+from roboirg.policies.contract.policy_needs import PolicyNeeds
+from roboirg.policies.hands.scripted_hands import ScriptedHands
+from roboirg.policies.hands.subgoal_words import read_subgoal
+from roboirg.policies.planners import make_planner
+from roboirg.policies.planners.hierarchical_policy import MOST_REFUSALS, with_planner
+from roboirg.policies.planners.oracle_planner import OracleOptions, OraclePlanner
+from roboirg.tasks import all_tasks, get_task
+from roboirg.tasks.choices import choices_of
+from roboirg.tasks.splits.splits import get_episode
+
+TASKS = [name for name in all_tasks() if get_task(name).suite != "real"]
+AS_READ = {"press_below": "press", "hold_until": "hold"}
+
+
+def world_of(task, episode=0, **options):
+    """An environment and hands in it, at the beginning of their turn."""
+    env = roboirg.make(task, episode=episode, cameras=(), **options)
+    env.reset()
+    hands = ScriptedHands()
+    hands.attach(env)
+    hands.reset("", {})
+    return env, hands
+
+
+def do(env, hands, subgoal):
+    """Let hands follow a subgoal to its end; return how it ended."""
+    hands.follow(subgoal)
+    while not hands.endings or hands.endings[-1].subgoal != subgoal:
+        env.step_chunk(hands.act({}))
+        hands.settle()
+    return hands.endings[-1]
+
+
+def play_with(planner, task, episode=0, setting="explicit"):
+    policy = with_planner(planner, ScriptedHands())
+    needs = PolicyNeeds.of(policy).env_options
+    env = roboirg.make(task, episode=episode, setting=setting, **needs)
+    return play(env, policy), policy
+
+
+@pytest.mark.parametrize("task", TASKS)
+def test_every_subgoal_of_a_task_is_read_as_its_motion(task):
+    for index in range(8):
+        episode = get_episode(task, "test", index)
+        for goal in get_task(task).goals(episode.scene):
+            for stage in get_task(task).stages(episode.scene, goal):
+                kind = stage.primitive.kind
+                grounded = stage.subgoal.replace("{at}", "at <12, 200>")
+                for words in (plain_subgoal(stage), grounded):
+                    request = read_subgoal(words)
+                    assert request is not None, words
+                    assert request.kind == AS_READ.get(kind, kind)
+                    assert request.point == ((12, 200) if "<" in words else None)
+                if stage.points_at:
+                    assert request.thing == episode.scene[stage.points_at].kind
+
+
+@pytest.mark.parametrize(
+    ("words", "steps"), [("remain static", 16), ("Remain static for 40 steps.", 40)]
+)
+def test_waiting_carries_how_long(words, steps):
+    assert read_subgoal(words).steps == steps
+
+
+@pytest.mark.parametrize("words", ["", "la la la", "pick up the red banana", "press", "pick"])
+def test_other_words_are_no_subgoal(words):
+    assert read_subgoal(words) is None
+
+
+@pytest.mark.sim
+@pytest.mark.parametrize(
+    ("task", "words", "why"),
+    [
+        ("BinFill", "put it into the bin", "nothing is in the hand"),
+        ("BinFill", "pick up the purple cube", "nothing fits the words 'purple cube'"),
+        ("BinFill", "pick up the cube at <0, 0>", "no cube is within 24 pixels of <0, 0>"),
+        ("BinFill", "sing", "these words are no subgoal"),
+        ("VideoRepick", "pick up the correct cube", r"\d things fit the words 'cube'"),
+        ("VideoUnmask", "pick up the container that hides the red cube", "3 things fit"),
+        ("ButtonUnmaskSwap", "press the first button", "2 things fit the words 'button'"),
+    ],
+)
+def test_what_fits_nothing_or_several_things_is_refused_for_nothing(task, words, why):
+    env, hands = world_of(task)
+    before = env.session.world.elapsed
+    hands.follow(words)
+    assert hands.endings[-1].how == "refused"
+    assert re.search(why, hands.endings[-1].why)
+    assert env.session.world.elapsed == before
+    assert hands.usage() == {"refused": 1, "missed": 0}
+
+
+@pytest.mark.sim
+def test_a_point_outweighs_words_and_the_record_has_both():
+    from roboirg.simulation.expert.things import origin_pixel
+
+    env, hands = world_of("PickXtimes", 2)
+    red, other = (
+        next(one for one in env.session.world.bodies.values() if one.item.kind == "cube" and
+             (one.item.color == "red") is is_red)
+        for is_red in (True, False)
+    )  # fmt: skip
+    row, column = origin_pixel(other)
+    end = do(env, hands, f"pick up the red cube at <{row}, {column}>")
+    assert (end.how, end.thing) == ("done", other.item.name)
+    assert end.thing != red.item.name
+    # What is held is *it*; the motion just done is not repeated.
+    steps = env.session.world.elapsed
+    hands.follow(end.subgoal)
+    assert [one.how for one in hands.endings] == ["done", "done"]
+    assert env.session.world.elapsed == steps
+    hands.follow(f"pick up the cube at <{row}, {column}>")  # it is no longer there
+    assert hands.endings[-1].how == "refused"
+    assert do(env, hands, "put it down").thing == other.item.name
+
+
+@pytest.mark.sim
+def test_an_act_of_hands_without_a_subgoal_holds_still():
+    env, hands = world_of("PickXtimes")
+    arm = env.session.world.robot.arm_positions
+    rows = hands.act({})
+    assert rows.shape == (16, 8)
+    assert np.allclose(rows[:, :7], arm)
+
+
+@pytest.mark.sim
+@pytest.mark.parametrize("task", slow_but(["PickXtimes", "StopCube", "ButtonUnmaskSwap"], TASKS))
+def test_the_oracle_with_scripted_hands_succeeds(task):
+    planner = make_planner("oracle", {}, "the test")
+    info, policy = play_with(planner, task, episode=3)
+    assert info["status"] == "success", (info["cause"], policy.endings)
+    assert {one.how for one in policy.endings} <= {"done", "missed"}
+
+
+@pytest.mark.sim
+@pytest.mark.parametrize("task", slow_but(["StopCube", "VideoUnmask"], TASKS))
+def test_the_listener_plans_what_the_words_mean(task):
+    planner = make_planner("listener", {}, "the test")
+    assert play_with(planner, task, 1, "reasoning")[0]["status"] == "success"
+
+
+@pytest.mark.sim
+def test_a_fixed_plan_is_not_looked_at_again():
+    """Cubes do not move before they are picked; in PickXtimes the second pick is elsewhere."""
+    assert play_with(make_planner("fixed", {}, "x"), "VideoUnmask")[0]["status"] == "success"
+    info, policy = play_with(make_planner("fixed", {}, "x"), "PickXtimes", 0)
+    assert info["status"] == "failure"
+    assert "refused" in {one.how for one in policy.endings}
+
+
+class Askew(OraclePlanner):
+    """The oracle, 40 pixels off."""
+
+    def plan(self, observation, step):
+        subgoal = super().plan(observation, step)
+        return re.sub(
+            r"<(\d+), (\d+)>", lambda at: f"<{int(at[1])}, {max(int(at[2]) - 40, 0)}>", subgoal
+        )
+
+
+@pytest.mark.sim
+@pytest.mark.parametrize("task", slow_but(["VideoUnmask", "StopCube"], TASKS))
+def test_forty_pixels_off_is_another_thing_or_none(task):
+    info, policy = play_with(Askew(OracleOptions()), task)
+    assert info["status"] != "success"
+    ends = [one.how for one in policy.endings]
+    if info["status"] == "timeout" and ends[-MOST_REFUSALS:] == ["refused"] * MOST_REFUSALS:
+        assert len(ends) == MOST_REFUSALS  # and it was asked no more
+
+
+@pytest.mark.sim
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("fault", "named"),
+    [
+        ("none", None),
+        *((one, one) for one in ("wrong count", "stopped early", "wrong thing", "refused",
+                                 "unreadable", "went on too long")),
+        ("never", "no answer"),
+        ("late", "no answer"),
+    ],
+)  # fmt: skip
+def test_the_record_says_how_a_planner_failed(fault, named):
+    records = (planner_faults.record_of(fault, index) for index in range(6))
+    found = [planner_failure(record) for record in records if record is not None]
+    assert found
+    assert set(found) == {named}
+
+
+def test_a_record_without_a_planner_has_no_planners_failure():
+    job = planner_faults.Job(
+        policy="random", task="PickXtimes", split="test", episode=0,
+        options=planner_faults.InstructionOptions("explicit"),
+    )  # fmt: skip
+    record = make_record(job, RolloutResult("failure", cause="no"), started_at="now")
+    assert planner_failure(record) is None
+
+
+@pytest.mark.parametrize("model", ["", "&model=x"])
+def test_specs_name_planners_and_hands(model):
+    with fake_vlm(["x"]) as server:
+        at = f"base_url={server.url}/v1"
+        for spec in (
+            "planner:listener",
+            f"planner:stateless?{at}&model=x",
+            f"system:GroundSG-QwenVL?hands=scripted&vlm={server.url}/v1{model}",
+            f"system:MemER?hands=scripted&vlm={server.url}/v1{model}",
+            f"system:GroundSG-Gemini?hands=scripted{model}",
+        ):
+            assert is_privileged(spec)
+            assert not needs_host(spec)
+            policy = make_policy(spec, 0)
+            assert "scripted hands" in policy.version
+            assert policy.metadata["policy"] == {"hands": "scripted"}
+
+
+@pytest.mark.parametrize(
+    ("spec", "words"),
+    [
+        ("planner:stateless", "option model is missing"),
+        ("planner:stateless?model=x&recent=3", "remembers pictures has no option recent"),
+        ("planner:qwen?model=x&asked=often", "each-chunk, when-done or 'every N steps'"),
+        ("planner:qwen?model=x&asked=when-done&hands=mme-vla://localhost:1", "does not report"),
+        ("planner:orakel", "no planner 'orakel'"),
+        ("system:pi0.5?hands=scripted", "has no planner"),
+    ],
+)
+def test_wrong_specs_are_one_sentence(spec, words):
+    with pytest.raises(InvalidValueError, match=re.escape(words)):
+        make_policy(spec, 0)
+
+
+@pytest.mark.sim
+def test_the_stateless_planner_asks_when_a_subgoal_has_ended():
+    with fake_vlm(["remain static", "remain static for 5 steps", "?<", "done", "done"]) as server:
+        spec = f"planner:stateless?base_url={server.url}/v1&model=x"
+        policy = make_policy(spec, 0)
+        needs = PolicyNeeds.of(policy).env_options
+        env = roboirg.make("VideoUnmask", max_steps=60, **needs)
+        play(env, policy)
+        texts = [words_of(body) for body in server.requests]
+        assert len(texts) == 4  # after "done" it is asked no more
+        assert "nothing has been done" in texts[0]
+        assert "1. remain static: done (step 16)" in texts[1]
+        assert "2. remain static for 5 steps: done (step 21)" in texts[2]
+        assert policy.usage()["finished"] == 1
+
+
+@pytest.mark.parametrize(
+    ("task", "choices"),
+    [
+        ("BinFill", "pick_cube+ drop_into press"),
+        ("PickXtimes", "pick_cube+ place_on press"),
+        ("SwingXtimes", "pick_cube+ move_over+ put_down press"),
+        ("StopCube", "hover hold_until press_below"),
+        ("VideoUnmask", "pick_container+ put_down"),
+        ("VideoUnmaskSwap", "pick_container+ put_down"),
+        ("ButtonUnmask", "press pick_container+ put_down"),
+        ("ButtonUnmaskSwap", "press press pick_container+ put_down"),
+        ("VideoRepick", "pick_cube+ put_down press"),
+        ("VideoPlaceButton", "pick_cube+ place_on+ press"),
+        ("VideoPlaceOrder", "pick_cube+ place_on+ press"),
+    ],
+)
+def test_choices_are_robommes_in_every_episode(task, choices):
+    for index in range(50):
+        found = choices_of(get_episode(task, "test", index))
+        motions = [one.primitives[0].kind + "+" * (one.kind is not None) for one in found]
+        if task != "StopCube" or len(found) == 3:  # some episodes leave no time to wait
+            assert " ".join(motions) == choices
+        assert [one.label for one in found] == list("abcd"[: len(found)])
+
+
+@pytest.mark.sim
+def test_a_program_acts_by_choices():
+    from roboirg.simulation.expert.things import origin_pixel
+
+    env = roboirg.make("PickXtimes", episode=2, actions="choice", cameras=())
+    _, info = env.reset()
+    assert [one["label"] for one in info["available_multi_choices"]] == ["a", "b", "c"]
+    for wrong in ([3, 0, 0], [0, -1, -1], [0.5, 1, 1]):
+        with pytest.raises(InvalidActionError, match=r"Choice"):
+            env.step(wrong)
+    assert env.executed_actions == 0
+    while info["status"] == "ongoing":
+        motion = env.session.judge.published.primitive
+        label = {"pick_cube": "a", "place_on": "b", "press": "c"}[motion.kind]
+        point = origin_pixel(env.session.world.bodies[motion.subject]) if label == "a" else None
+        *_, info = env.step(choice_action(label, point))
+    assert info["status"] == "success"
+    assert math.isfinite(info["steps"])
