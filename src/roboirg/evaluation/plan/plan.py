@@ -203,8 +203,8 @@ class Plan(BaseModel):
         if not self.policy_seeds:
             raise InvalidValueError("The plan has no policy seeds; it needs at least one.")
         several = (self.policies, self.tasks, self.forms, self.episodes, self.policy_seeds)
-        several = (*several, self.setting_names, self.stages, self.arms)
-        size = math.prod(map(len, several))
+        words = (self.setting_names, self.stages, self.arms)
+        size = math.prod(map(len, (*several, *words)))
         if size > MOST_JOBS:
             raise InvalidValueError(
                 f"The plan has up to {size:,} episodes; a plan has at most {MOST_JOBS:,}."
