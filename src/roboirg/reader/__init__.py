@@ -33,6 +33,9 @@ from roboirg.tasks import get_task
 
 __all__ = ["Interpretation", "interpret"]
 
+_CALLS = {("get", word) for word in ("ready", "set", "going", "started")}
+"""How sentences begin that call for attention, with a verb of commands."""
+
 
 class Interpretation(NamedTuple):
     """The result of reading a text.
@@ -130,7 +133,7 @@ def _possible_goals(scene: Scene, task: str) -> tuple[Goal, ...]:
 
 def _commands(words: Sentence) -> bool:
     """Return whether a sentence gives a command, understood or not."""
-    if read_calculation(words) is not None:
+    if words[:2] in _CALLS or read_calculation(words) is not None:
         return False
     if is_command(words) or is_negated_command(words):
         return True
