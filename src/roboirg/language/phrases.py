@@ -14,7 +14,9 @@ from roboirg.language.instruction import Expression, Mention, Role, Utterance, U
 
 _MARK = re.compile(r"\{(?P<field>[a-z_.0-9]+)\}|\[(?P<one>[^\[\]|]*)\|(?P<many>[^\[\]|]*)\]")
 
-_PARTICLE = re.compile(r"(?<=\b(?:pick|lift|take|hold) )up $|(?<=\b(?:put|set|lay) )down $")
+_PARTICLE = re.compile(
+    r"(?<=\b(?:pick|lift|take|hold) )up $|(?<=\b(?:put|set|lay) )down $", re.IGNORECASE
+)
 _PRONOUNS = ("it", "them")
 
 

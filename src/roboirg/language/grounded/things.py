@@ -33,7 +33,10 @@ def thing_clues(request: InstructionRequest, color: GoalValue) -> list[Clue]:
     """Return the clues to the thing of a color, none of which names a color."""
     scene = request.episode.scene
     if request.values_of("placement") or request.values_of("relation"):
-        # The cube in the video is the goal's in every scene.
+        # The cube in the video is the goal's in every scene, but not that of an arm's other goal.
+        carried = {scene[fact.subject].color for fact in scene.past if fact.kind == "placed"}
+        if carried != {color.value}:
+            return []
         return [Clue("events", words) for words in templates.CARRIED.of(request.pool)]
     targets = request.objects_to_point_at(color)
     words = [_places(request, scene, targets)]
