@@ -103,7 +103,7 @@ def test_what_is_wrong_is_one_sentence_and_exit_code_2(
     ("fields", "sentence"),
     [
         ({"meshes": "lite"}, "Did you mean 'light'?"),
-        ({"actions": "joints"}, "known: joint_angle, ee_pose, waypoint."),
+        ({"actions": "joints"}, "known: joint_angle, ee_pose, waypoint, choice."),
         ({"tries": 0}, "tries is 0; it must be at least 1."),
         ({"tries": "many"}, "tries is 'many'"),
         ({"retry_on": ["conection"]}, "Did you mean 'connection'?"),

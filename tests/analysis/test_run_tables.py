@@ -213,7 +213,7 @@ def test_the_table_shows_rates_gaps_and_what_is_incomplete() -> None:
 def test_the_legend_explains_only_what_occurs() -> None:
     text = printed([record("success")])
     assert "in brackets" not in text
-    assert "privileged policies use the simulator's state" in text
+    assert "privileged policies and scripted hands use the simulator's state" in text
     assert "n = 1 episode per cell" in text
 
 

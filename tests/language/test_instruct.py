@@ -26,6 +26,7 @@ def test_every_task_has_the_settings_of_the_paper():
     assert harder == {
         **{f"{one}-rival": one for one in ("direct", "contextual", "spatial")},
         "reasoning-open": "reasoning",
+        "grounded": "direct",
     }
     expected = {
         (name, setting)

@@ -110,7 +110,7 @@ def test_direct_and_contextual_share_introduction_and_command(task):
 def test_only_these_settings_have_a_rival():
     for task in TASKS:
         episode = get_episode(task, "test", 3)
-        for setting in set(settings_of(get_task(task))) - {*SETTINGS, "reasoning-open"}:
+        for setting in set(settings_of(get_task(task))) - {*SETTINGS, "reasoning-open", "grounded"}:
             assert instruct(episode, setting).metadata["rival"] is None
 
 

@@ -52,7 +52,7 @@ def test_it_is_found_beside_the_benchmark(task):
     assert NAME not in tasks.find_tasks(["all"])
     assert plain_settings(task) == ("explicit", "direct", "reasoning", "contextual")
     assert set(settings_of(task)) - set(plain_settings(task)) == {
-        "direct-rival", "reasoning-open", "contextual-rival"
+        "direct-rival", "reasoning-open", "contextual-rival", "grounded"
     }  # fmt: skip
 
 

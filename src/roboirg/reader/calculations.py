@@ -49,7 +49,7 @@ _SENTENCES = tuple(
 )
 
 
-class Calculation(NamedTuple):
+class ReadCalculation(NamedTuple):
     """A number that follows from two others.
 
     Attributes:
@@ -74,7 +74,7 @@ class Calculation(NamedTuple):
 
 
 @functools.lru_cache(maxsize=8192)
-def read_calculation(words: Sentence) -> Calculation | None:
+def read_calculation(words: Sentence) -> ReadCalculation | None:
     """Return the calculation that a whole sentence describes; None if it is no calculation."""
     text = " ".join(words)
     for combine, sentence in _SENTENCES:
@@ -82,7 +82,7 @@ def read_calculation(words: Sentence) -> Calculation | None:
         if found is not None:
             named = number_of(found["left"] or ""), number_of(found["right"] or "")
             numbers = tuple(one for one in named if one is not None)
-            return Calculation(combine, _offset(found), _factor(found), numbers)
+            return ReadCalculation(combine, _offset(found), _factor(found), numbers)
     return None
 
 

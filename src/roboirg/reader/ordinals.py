@@ -52,7 +52,7 @@ _WAITED = Phrases({
         r"(?:(?!stop|press|push|hit|halt)[\w']+ ){1,8}?"
         rf"(?:(?P<times>{NUMBER}) (?:times?|passes|visits)|(?P<adverb>once|twice|thrice))\b",
 })  # fmt: skip
-"""So many visits pass before the one that is meant."""
+"""How many visits pass before the one that is meant."""
 _BARE = Phrases({
     "on the first of the two targets":
         rf"\b(?P<of>{ORDINAL}|last) of (?:the|these|those|all|its)? ?(?:{NUMBER} )?"

@@ -31,6 +31,7 @@ _IN_ORDER = Rewrites(
     r"first:: \bfirst (OVER)HUE(?=(?:JOIN)(?:ACT)?OVERHUE)=>\1\2",
     r"first:: HUEDOWN(?: ,)? but ACT?OVERHUE first\b=>\2 PAIR \1",
     r"first:: HUEDOWN(?: ,)? but first ACTOVERHUE=>\2 PAIR \1",
+    r"after that:: \band after that (?=the (?:former|latter)\b)=>and then lift",
     r"same:: \bdo (?:exactly )?the same (?:with|for|to|on) OVERHUE(?!s)"
     r"=>lift the container over \1",
     r"then finally also:: \b(it (?:(?:back|down|aside) )*(?:[,;] )?(?:and )?(?:then|also|finally) )"

@@ -147,24 +147,26 @@ POINTED = (
 )
 """Words for a thing, as a regular expression."""
 
+COUNTED = r"(?:(?:Please t|Now t|T)ake .*\. )?"
+"""A calculation of open reasoning, which is a sentence before the command."""
 UNSPOILED = {
     "StopCube": (
-        r"Use the button to stop the cube exactly as it reaches the target "
+        rf"{COUNTED}Use the button to stop the cube exactly as it reaches the target "
         r"(?:during (?:that visit|the (?:visit|other) .*|the .* visit but not .*)"
         r"|(?:one|two) visits? (?:earlier|later) than .*)"
     ),
     "VideoRepick": (
-        r"Pick up and put back down the cube that was picked up in the video, "
+        rf"{COUNTED}Pick up and put back down the cube that was picked up in the video, "
         r"doing so .*, then press the button"
     ),
     "VideoPlaceOrder": (
-        rf"After watching the video, place {POINTED} on "
+        rf"{COUNTED}After watching the video, place {POINTED} on "
         r"the target (?:of (?:that placement|the (?:other )?placement(?: (?!.* it was ).*)?"
         r"|the .* placement but not .*)|used (?:one|two) placements? (?:earlier|later) than .*)\."
     ),
     "VideoPlaceButton": (
         rf"After watching the video, place {POINTED} on "
-        r"the target (?:used (?:then|at .*)|of the placement just before or after .*)\."
+        r"the target (?:used (?:then|at .*)|of the placement (?:just before or after|closest in time to) .*)\."
     ),
 }
 """Good English around a referring expression, in the sentences that are hardest to fill."""

@@ -92,7 +92,7 @@ def _named(name: str, split: str) -> NamedEpisodes:
     needs_words = chosen.get("wordings") == REQUIRED
     if needs_words:
         del chosen["wordings"]  # of explicit episodes, which any words can express
-    plan = make_plan(["random"], **{**chosen, "split": split})
+    plan = make_plan(**{**chosen, "policies": ["random"], "split": split})
     return NamedEpisodes(frozenset(map(_key, plan.jobs())), needs_words)
 
 

@@ -101,7 +101,7 @@ class HostProcess:
     def _carry_out(
         self,
         call: Call,
-        policy: Any,  # noqa: ANN401 - somebody's class
+        policy: Any,  # noqa: ANN401 - of any class
         random: RandomState,
         space: ActionSpace,
     ) -> Outcome:

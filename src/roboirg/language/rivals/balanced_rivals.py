@@ -23,7 +23,7 @@ REFERENCE_SPLIT: Split = "train"
 """Its partners show how often each rival goes with a value, for episodes outside the splits."""
 
 
-class Entry(NamedTuple):
+class SplitEntry(NamedTuple):
     """An episode that can have a rival.
 
     Attributes:
@@ -64,12 +64,12 @@ def balanced_rival(
 @functools.cache
 def _partners(
     task: str, split: Split, locate: Locate | None, frame: str
-) -> tuple[Mapping[int, Entry], Mapping[int, str | int]]:
+) -> tuple[Mapping[int, SplitEntry], Mapping[int, str | int]]:
     """Return the episodes of a split that can have a rival, and the rivals of those with partners.
 
     Partners are found among the values that are left most often, so that few are left over.
     """
-    entries: dict[int, Entry] = {}
+    entries: dict[int, SplitEntry] = {}
     for episode in split_episodes([task], [split]):
         options = InstructionOptions(frame=frame)
         request = InstructionRequest(episode, get_task(task), options, sampler_of(episode))
@@ -77,7 +77,9 @@ def _partners(
         if pairs:
             (slot, meant), rivals = (pairs[0].slot, pairs[0].meant.value), pairs
             values = frozenset((slot, pair.rival.value) for pair in rivals)
-            entries[episode.index] = Entry(episode.seed, episode.difficulty, (slot, meant), values)
+            entries[episode.index] = SplitEntry(
+                episode.seed, episode.difficulty, (slot, meant), values
+            )
     partners: dict[int, str | int] = {}
     left = dict(entries)
     while left:

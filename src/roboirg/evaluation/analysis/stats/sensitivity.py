@@ -55,7 +55,7 @@ class Contrast(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Choice:
+class AnalysisChoice:
     """One way to analyze.
 
     Attributes:
@@ -85,10 +85,10 @@ class Robustness:
 
     label: str
     verdict: Direction
-    others: Mapping[Choice, Direction]
+    others: Mapping[AnalysisChoice, Direction]
 
     @property
-    def exceptions(self) -> tuple[Choice, ...]:
+    def exceptions(self) -> tuple[AnalysisChoice, ...]:
         """The choices under which the verdict is another one."""
         return tuple(one for one, verdict in self.others.items() if verdict != self.verdict)
 
@@ -101,7 +101,7 @@ class Robustness:
         return f"does not hold in {len(self.exceptions)} of {len(self.others)}: {listed}"
 
 
-USUAL = Choice("usual")
+USUAL = AnalysisChoice("usual")
 
 
 def try_choices(contrasts: Sequence[Contrast]) -> tuple[Robustness, ...]:
@@ -119,29 +119,29 @@ def try_choices(contrasts: Sequence[Contrast]) -> tuple[Robustness, ...]:
     )
 
 
-def choices_for(contrasts: Sequence[Contrast]) -> tuple[Choice, ...]:
+def choices_for(contrasts: Sequence[Contrast]) -> tuple[AnalysisChoice, ...]:
     """Return the choices other than the usual one that can change anything."""
     results = [one for each in contrasts for side in (each.first, each.second) for one in side]
     tasks = list(dict.fromkeys(one.task for one in results))
     seeds = sorted({one.policy_seed for one in results})
     processors = Counter(one.processor for one in results)
-    found: list[Choice] = []
+    found: list[AnalysisChoice] = []
     if any(one.outcome == "error" for one in results):
-        found.append(Choice("errors as failures", keep=_errors_as_failures))
+        found.append(AnalysisChoice("errors as failures", keep=_errors_as_failures))
     if len(seeds) > 1:
-        found += [Choice("seed", str(seed), keep=_only_seed(seed)) for seed in seeds]
-        found.append(Choice("unit", "trial", unit="trial"))
+        found += [AnalysisChoice("seed", str(seed), keep=_only_seed(seed)) for seed in seeds]
+        found.append(AnalysisChoice("unit", "trial", unit="trial"))
     if len(tasks) > 1:
-        found.append(Choice("unit", "task", unit="task"))
+        found.append(AnalysisChoice("unit", "task", unit="task"))
         if len({_suite(task) for task in tasks}) > 1:
-            found.append(Choice("equal weights of", "suites", weights="suite"))
+            found.append(AnalysisChoice("equal weights of", "suites", weights="suite"))
     if len({one.difficulty for one in results}) > 1:
-        found.append(Choice("equal weights of", "difficulties", weights="difficulty"))
+        found.append(AnalysisChoice("equal weights of", "difficulties", weights="difficulty"))
     if len(tasks) > 1:
-        found += [Choice("without", task, keep=_without_task(task)) for task in tasks]
+        found += [AnalysisChoice("without", task, keep=_without_task(task)) for task in tasks]
     if len(processors) > 1:
         usual = processors.most_common(1)[0][0]
-        found.append(Choice("one processor", keep=_only_processor(usual)))
+        found.append(AnalysisChoice("one processor", keep=_only_processor(usual)))
     return tuple(found)
 
 
@@ -169,7 +169,7 @@ def _suite(task: str) -> str:
     return "" if found is None else found.suite
 
 
-def _directions(contrasts: Iterable[Contrast], choice: Choice) -> list[Direction]:
+def _directions(contrasts: Iterable[Contrast], choice: AnalysisChoice) -> list[Direction]:
     """Return the verdicts under a choice, corrected over all contrasts that have any episode."""
     tested = [_tested(contrast, choice) for contrast in contrasts]
     corrected = iter(holm([p_value for _, p_value in filter(None, tested)]))
@@ -190,7 +190,7 @@ class _Unit(NamedTuple):
     difference: Fraction
 
 
-def _tested(contrast: Contrast, choice: Choice) -> tuple[float, float] | None:
+def _tested(contrast: Contrast, choice: AnalysisChoice) -> tuple[float, float] | None:
     """Return the mean difference and its p-value; None without a pair."""
     units = list(_units(choice.keep(contrast.first), choice.keep(contrast.second), choice.unit))
     if not units:
