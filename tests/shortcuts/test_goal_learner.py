@@ -107,7 +107,7 @@ def test_a_cue_of_the_scene_is_found_without_words():
     tasks = ((1000, 150), (5000, 50), (9000, 100))
     sets = [
         [
-            (episode, instruct(episode, "direct-rival"))
+            (episode, instruct(episode, "direct"))
             for episode in (get_episode(TASK, "random", first + one) for one in range(count))
         ]
         for first, count in tasks

@@ -47,7 +47,7 @@ def row(episode: Episode, instruction: Instruction) -> ExportRow:
         "stages": metadata["stages"],
         "distractor": metadata["distractor"],
         "distractors": metadata["distractors"],
-        "touched": metadata["touched"],
+        "touched": ", ".join(metadata["touched"]) or "none",
         "rival": str(metadata["rival"] or "none"),
         "rival_slot": metadata["rival_slot"] or "none",
         "rival_position": metadata["rival_position"] or "none",

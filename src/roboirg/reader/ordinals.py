@@ -50,7 +50,8 @@ _WAITED = Phrases({
     "after it has passed three times, stop it":
         r"\b(?:let|allow|wait|after|once|until|when)\b "
         r"(?:(?!stop|press|push|hit|halt)[\w']+ ){1,8}?"
-        rf"(?:(?P<times>{NUMBER}) (?:times?|passes|visits)|(?P<adverb>once|twice|thrice))\b",
+        rf"(?:(?P<times>{NUMBER}) (?:times?|passes|visits)(?! (?:later|earlier|before|after)\b)"
+        r"|(?P<adverb>once|twice|thrice))\b",
 })  # fmt: skip
 """How many visits pass before the one that is meant."""
 _BARE = Phrases({

@@ -32,7 +32,7 @@ _MORE = Phrases({
 })  # fmt: skip
 """What adds one to the repetitions before it, or a number."""
 _SEEN = Phrases({
-    "Pick it up again.": r"\b(?:pick|lift|take|grab)(?: [\w']+){0,9}?(?P<seen> again)\b",
+    "Pick it up again.": r"\b(?:pick|lift|take|grab)(?: [\w']+){0,16}?(?P<seen> again)\b",
     "Pick it up one more time.": rf"\b{NUMBER}(?P<before> more) times?\b(?! than)",
     "Pick it up two times more.": rf"\b{NUMBER} times?(?P<after> more)\b(?! than)",
 })  # fmt: skip

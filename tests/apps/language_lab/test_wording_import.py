@@ -147,7 +147,7 @@ POINTED = (
 )
 """Words for a thing, as a regular expression."""
 
-COUNTED = r"(?:(?:Please t|Now t|T)ake .*\. )?"
+COUNTED = r"(?:[^.]*\b(?:take|add)\b[^.]*\. )?"
 """A calculation of open reasoning, which is a sentence before the command."""
 UNSPOILED = {
     "StopCube": (
@@ -162,11 +162,12 @@ UNSPOILED = {
     "VideoPlaceOrder": (
         rf"{COUNTED}After watching the video, place {POINTED} on "
         r"the target (?:of (?:that placement|the (?:other )?placement(?: (?!.* it was ).*)?"
-        r"|the .* placement but not .*)|used (?:one|two) placements? (?:earlier|later) than .*)\."
+        r"|the (?:.* placement but not .*|placement with that number))|used (?:one|two) placements? (?:earlier|later) than .*)\."
     ),
     "VideoPlaceButton": (
         rf"After watching the video, place {POINTED} on "
-        r"the target (?:used (?:then|at .*)|of the placement (?:just before or after|closest in time to) .*)\."
+        r"the target (?:used (?:then|at .*)"
+        r"|of the placement (?:just before or after|closest in time to) .*)\."
     ),
 }
 """Good English around a referring expression, in the sentences that are hardest to fill."""
@@ -209,7 +210,7 @@ def test_no_expression_spoils_the_sentence_around_it(task):
     }
     for one in said:
         assert one.metadata["command"] != "own"
-        assert re.fullmatch(UNSPOILED[task], one.command), one.command
+        assert re.fullmatch(UNSPOILED[task], one.command, re.IGNORECASE), one.command
 
 
 @pytest.mark.slow
@@ -217,7 +218,7 @@ def test_no_expression_spoils_the_sentence_around_it(task):
 def test_no_expression_spoils_the_sentence_in_any_training_episode(task):
     commands = {one.command for one in pointed_commands(task, 100)}
     assert len(commands) > 20
-    assert not [one for one in commands if not re.fullmatch(UNSPOILED[task], one)]
+    assert not [one for one in commands if not re.fullmatch(UNSPOILED[task], one, re.IGNORECASE)]
 
 
 @pytest.mark.parametrize(
