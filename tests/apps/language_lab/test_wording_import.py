@@ -162,7 +162,8 @@ UNSPOILED = {
     "VideoPlaceOrder": (
         rf"{COUNTED}After watching the video, place {POINTED} on "
         r"the target (?:of (?:that placement|the (?:other )?placement(?: (?!.* it was ).*)?"
-        r"|the (?:.* placement but not .*|placement with that number))|used (?:one|two) placements? (?:earlier|later) than .*)\."
+        r"|the (?:.* placement but not .*|placement with that number))"
+        r"|used (?:one|two) placements? (?:earlier|later) than .*)\."
     ),
     "VideoPlaceButton": (
         rf"After watching the video, place {POINTED} on "
