@@ -19,7 +19,7 @@ _PARTS = {
     "PAIR": ", then the container over",
 }
 _IN_ORDER = Rewrites(
-    r"first:: \b((?:press|push|hit) (?:the |both |two )*buttons?) first\b=>\1",
+    r"first:: \b((?:press|push|hit) (?:the |both |two )*buttons?(?: on the table)?) first\b=>\1",
     r"first:: ^first (?=\w)=>",
     r"after:: HUEDOWNJOINafter DONE?OVERHUEDOWN=>\2 PAIR \1",
     r"before:: HUEDOWNJOINbefore DONE?OVERHUEDOWN=>\1 PAIR \2",
