@@ -22,9 +22,10 @@ _SWAPS = Phrases({
 _BESIDE = Phrases({
     "once for every red cube now closer to you than the cube in the video":
         "(?:(?P<itself>once for the cube in the video and )?once for every"
-        "|(?P<more>one time more than there are)|as many times as there are) "
+        "|as many times as there are) "
         rf"(?:(?P<color>{COLOR}) )?cubes? now {_SIDE} "
-        r"than (?:the cube in the video|the lifted one|it is)\b",
+        r"than (?:the cube in the video|the lifted one|it is)\b"
+        r"(?P<more>(?: ,)? and once more\b)?",
 })  # fmt: skip
 _ALL_BUT = Phrases({
     "all but three of the red cubes":
@@ -35,7 +36,7 @@ _ALL_BUT = Phrases({
 _AMOUNT = Phrases({
     "as many of the red cubes as there are closer to you than the bin":
         rf"(?:as many of the (?P<color>{COLOR}) cubes as there are"
-        rf"|one of the (?P<shade>{COLOR}) cubes for each that lies) "
+        rf"|the same number of the (?P<shade>{COLOR}) cubes as you see) "
         rf"{_SIDE} than the (?P<fixture>bin|button)\b",
 })  # fmt: skip
 

@@ -1,4 +1,4 @@
-"""Things by what is around them or happens to them: *the nearest neighbor*, *the middle*, moves."""
+"""Things by what is around them or happens to them: *the nearest one*, *the middle*, moves."""
 
 from __future__ import annotations
 
@@ -34,24 +34,16 @@ _NEAREST = Phrases({
     "the cube nearest to the one closest to you":
         rf"the {_NOUN} {_WHEN}(?P<second>(?:second|2nd) )?nearest to the one ",
 })  # fmt: skip
-_NEIGHBOR = Phrases({
-    "the nearest neighbor of the cube closest to you":
-        "the (?:current |(?P<when>initial |))(?P<second>(?:second|2nd) )?"
-        f"nearest neighbor of the {_NOUN} ",
-})  # fmt: skip
 _NEITHER = Phrases({
     "the cube that is neither closest to you nor closest to the button":
         rf"the {_NOUN} {_WHEN}neither ",
 })  # fmt: skip
 _NOR = Phrases({"nor closest to the button": "nor "})
-_OTHER_THAN = Phrases({
-    "the cube other than the one closest to you and the one closest to the button":
-        rf"the {_NOUN} other than the one {_WHEN}",
+_ONLY_NOT = Phrases({
+    "the only cube that is not closest to you or closest to the button":
+        rf"the only {_NOUN} {_WHEN}not ",
 })  # fmt: skip
-_AND_THE_ONE = Phrases({
-    "and the one closest to the button":
-        "and the one (?:(?:that )?(?:initially |at first )?(?:is |was )?(?:now )?)?",
-})  # fmt: skip
+_OR = Phrases({"or closest to the button": "or "})
 _MOVES = Phrases({
     "the container that never moved":
         "the container that (?:(?P<still>never move[sd]|stay(?:s|ed) where it (?:is|was))"
@@ -69,7 +61,7 @@ def observed_thing(text: str, scene: Scene) -> Iterator[Span]:
     yield from _middles(text, scene)
     yield from _neighbors(text, scene)
     yield from _left_over(text, scene, _NEITHER, _NOR)
-    yield from _left_over(text, scene, _OTHER_THAN, _AND_THE_ONE)
+    yield from _left_over(text, scene, _ONLY_NOT, _OR)
     yield from _moving(text, scene)
     carried = {scene[fact.subject] for fact in scene.past if fact.kind == "placed"}
     for found in _CARRIED.finditer(text) if carried else ():
@@ -99,18 +91,17 @@ def _middle(things: Sequence[SceneObject], axis: int) -> list[SceneObject]:
 
 
 def _neighbors(text: str, scene: Scene) -> Iterator[Span]:
-    for phrases in (_NEAREST, _NEIGHBOR):
-        for found in phrases.finditer(text):
-            read = _place(text, found.end())
-            if read is None:
-                continue
-            place, end = read
-            nearest: list[SceneObject] = []
-            for at_time in _scenes(scene, found["noun"], found["when"]):
-                for anchor in _at(place, at_time, found["noun"]):
-                    others = [item for item in present(at_time, found["noun"]) if item != anchor]
-                    nearest += _ranked(others, _distance(anchor), 2 if found["second"] else 1)
-            yield found.start(), end, _named(nearest, scene, found["noun"])
+    for found in _NEAREST.finditer(text):
+        read = _place(text, found.end())
+        if read is None:
+            continue
+        place, end = read
+        nearest: list[SceneObject] = []
+        for at_time in _scenes(scene, found["noun"], found["when"]):
+            for anchor in _at(place, at_time, found["noun"]):
+                others = [item for item in present(at_time, found["noun"]) if item != anchor]
+                nearest += _ranked(others, _distance(anchor), 2 if found["second"] else 1)
+        yield found.start(), end, _named(nearest, scene, found["noun"])
 
 
 def _left_over(text: str, scene: Scene, start: Phrases, joint: Phrases) -> Iterator[Span]:

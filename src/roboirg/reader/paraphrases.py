@@ -45,7 +45,7 @@ _RULES = Rewrites(
     r"without:: (?:, )?\bwithout doing anything\b=>",
     r"show:: (?: ,)?(?: and| then)* show meSTOP=>",
     # Who asks, and when
-    r": you:: START((?:(?:the|my) )?(?!\w+ing\b)(?:(?!is\b|was\b|are\b|VERB)[\w']+ "
+    r": you:: START((?:(?:the|my) )?(?!(?:\w+ing|with)\b)(?:(?!is\b|was\b|are\b|VERB)[\w']+ "
     r"|(?:that|which) is )+?)[,:] (?:you )?(MOVE)(?: (?:it|this one|them)\b)?(?! the\b)=>\2 \1",
     r"you:: \bi (?:would like|want|need|wish) (?:that )?you (?:to )?(?=VERB)=>and",
     r"glad if:: \bi would be (?:glad to (?:see|have)|happy if) (?:you )?=>and",

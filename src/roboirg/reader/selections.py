@@ -34,7 +34,8 @@ _ACCEPTED = Phrases(
     {
         "Why not": "why not",
         "I could not live without": r"not (?:do |be |live )?without",
-        "I would not give up": "not (?:give up|part with|trade|miss|swap|exchange)",
+        "I would not give up": "not (?:give up|part with|trade|miss|swap|exchange|resist|mind)",
+        "I would not say no to": "not (?:say no to|go wrong with)",
         "Not the latter, but": "but",
         "I would go for": "for",
     },
@@ -53,6 +54,7 @@ _REJECTED = Phrases(
     "I meant the former when I said": r"\bi said",
         "I want the latter instead of": r"\b(?:instead of|rather than)",
         "I swapped": r"\b(?:swapped|swap|exchanged)",
+        "I switched from": r"\b(?:switched|changed)\b.* from",
         "I prefer the latter to":
             r"\b(?:prefer(?:red)?|favor|better|more|chose|rather)\b.* (?:to|than|over)",
         "By no means": r"\bno (?:means|case|longer|way)",

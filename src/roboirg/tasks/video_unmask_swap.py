@@ -42,7 +42,7 @@ COMMANDS = replace(
             ),
             test=(
                 Wording("Keep the whole video in mind and raise {colors.0}."),
-                Wording("Recalling the whole video, raise {colors.0}."),
+                Wording("With the whole video in mind, raise {colors.0}."),
                 Wording("Going by all you saw, pick up {colors.0}."),
                 Wording("Raise {colors.0}, put it back, then raise {colors.1}.", 2),
                 Wording("Pick up {colors.0}, lay it down, then pick up {colors.1}.", 2),

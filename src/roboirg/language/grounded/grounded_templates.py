@@ -18,18 +18,16 @@ class Standing(NamedTuple):
         be: begins the clause of a place.
         adverb: the same before a phrase that needs no clause.
         have: begins the clause of what is around it.
-        adjective: before a noun.
     """
 
     be: str
     adverb: str
     have: str
-    adjective: str
 
 
-STANDS = Standing("that is ", "", "that has ", "")
-STANDS_NOW = Standing("that is now ", "now ", "that now has ", "current ")
-STOOD = Standing("that initially was ", "initially ", "that initially had ", "initial ")
+STANDS = Standing("that is ", "", "that has ")
+STANDS_NOW = Standing("that is now ", "now ", "that now has ")
+STOOD = Standing("that initially was ", "initially ", "that initially had ")
 
 MIDDLES = {
     "y": Pools(
@@ -45,17 +43,17 @@ MIDDLES = {
 NEIGHBORS = (
     Pools(
         train=("the {noun} {adverb}nearest to the one {anchor}",),
-        test=("the {adjective}nearest neighbor of the {noun} {anchor}",),
+        test=("the {noun} {be}nearest to the one {anchor}",),
     ),
     Pools(
         train=("the {noun} {adverb}second nearest to the one {anchor}",),
-        test=("the {adjective}second nearest neighbor of the {noun} {anchor}",),
+        test=("the {noun} {be}second nearest to the one {anchor}",),
     ),
 )
 """The nearest one to another one, which has a place of its own; and the second nearest."""
 LEFT_OVER = Pools(
     train=("the {noun} {be}neither {first} nor {second}",),
-    test=("the {noun} other than the one {adverb}{first} and the one {adverb}{second}",),
+    test=("the only {noun} {be}not {first} or {second}",),
 )
 """Of three things, the one that is left without two."""
 _STILL = Pools(train=("the container that never {moved}",), test=("the container that {stayed}",))
@@ -84,7 +82,7 @@ BESIDE = Pools(
     ),
     test=(
         "as many times as there are {cube}s now {side} than the lifted one",
-        "one time more than there are {cube}s now {side} than the lifted one",
+        "as many times as there are {cube}s now {side} than the lifted one, and once more",
     ),
 )
 """As many as the cubes on one side of the cube in the video, and one more than that."""
@@ -112,7 +110,7 @@ ALL_BUT = Pools(
 )
 AMOUNTS_BESIDE = Pools(
     train=(AmountWords("as many", "as there are {side} than the {fixture}"),),
-    test=(AmountWords("one", "for each that lies {side} than the {fixture}"),),
+    test=(AmountWords("the same number", "as you see {side} than the {fixture}"),),
 )
 
 FROM_THE_END = (
@@ -137,6 +135,21 @@ PLACEMENT_MOVED = {
         test=("the placement whose target stayed where it was",),
     ),
 }
+NUMBER_INTRODUCTIONS = Pools(
+    train=(
+        "I want this done {times}.",
+        "We will do this {times}.",
+        "This should happen {times}.",
+        "I would do it {times}.",
+    ),
+    test=(
+        "This has to be done {times}.",
+        "I would like it done {times}.",
+        "We need to do this {times}.",
+        "It must happen {times}.",
+    ),
+)
+"""For what is counted: *the bell rang once for every swap* would be a riddle."""
 PLACEMENT_INTRODUCTIONS = Pools(
     train=(
         "I liked {which}.",

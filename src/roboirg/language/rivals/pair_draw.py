@@ -78,9 +78,6 @@ def _remark(
         return name, request.pick(f"{name} remark", options), "other"
     meant_first, meant_last = templates.CHOICES[kind]
     fill: Fill = request.sampler.pick("rival fill", ("other", "both"))
-    if fill == "both":
-        # The first of two pointers is then right as often as a single one is.
-        chosen = meant_first if points_at_meant else meant_last
-    else:
-        chosen = request.sampler.pick("rival remark order", (meant_first, meant_last))
+    # "The other one" follows what it is other than; the first pointer is right half of the time.
+    chosen = meant_first if points_at_meant else meant_last
     return kind, request.pick(f"{kind} remark", chosen), fill

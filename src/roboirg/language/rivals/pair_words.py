@@ -133,7 +133,9 @@ def value_name(request: InstructionRequest, pair: ValuePair, value: GoalValue) -
 
 def _pointer(draw: PairDraw, value: GoalValue, thing: str, *, points: bool) -> Phrase:
     if not points:
-        return the_other(value, f"the other {thing}")
+        of_color = draw.pair.word_kind in ("color", "amount")
+        many = thing == "cubes"
+        return the_other(value, f"the other {'ones' if many else 'one' if of_color else thing}")
     first, second, first_many, second_many = draw.pointers
     if thing == "cubes":
         first, second = first_many, second_many

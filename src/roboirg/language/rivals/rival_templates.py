@@ -136,12 +136,6 @@ MENTIONED = Pools(
             "the first ones I mentioned",
             "the last ones I mentioned",
         ),
-        Pointers(
-            "the one I mentioned earlier",
-            "the one I mentioned later",
-            "the ones I mentioned earlier",
-            "the ones I mentioned later",
-        ),
     ),
     test=(
         Pointers(
@@ -149,12 +143,6 @@ MENTIONED = Pools(
             "the last one I named",
             "the first ones I named",
             "the last ones I named",
-        ),
-        Pointers(
-            "the one I named earlier",
-            "the one I named later",
-            "the ones I named earlier",
-            "the ones I named later",
         ),
     ),
 )
@@ -165,15 +153,15 @@ ReferenceKind = Literal["alone", "set aside", "preference", "contrast", "correct
 SINGLED = Pools(
     train=(
         "I mean {yes}.",
-        "Let's take {yes}.",
-        "I would not give up {yes}.",
-        "I cannot do without {yes}.",
+        "I would like {yes}.",
+        "I cannot resist {yes}.",
+        "I would not say no to {yes}.",
     ),
     test=(
         "I have chosen {yes}.",
         "I will go with {yes}.",
-        "I would not trade {yes}.",
-        "I would not part with {yes}.",
+        "I would not mind {yes}.",
+        "You cannot go wrong with {yes}.",
     ),
 )
 SET_ASIDE = Pools(
@@ -186,51 +174,39 @@ SET_ASIDE = Pools(
     test=(
         "Forget about {no}.",
         "I have ruled out {no}.",
-        "It is not {no}.",
+        "I do not need {no}.",
         "I did not choose {no}.",
     ),
 )
 CHOICES: dict[ReferenceKind, tuple[Pools[str], Pools[str]]] = {
     "preference": (
         Pools(
-            train=("I prefer {yes} to {no}.", "I like {yes} more than {no}."),
+            train=("I prefer {yes} to {no}.", "I like {yes} better than {no}."),
             test=("I chose {yes} over {no}.", "I picked {yes} rather than {no}."),
         ),
         Pools(
-            train=("Instead of {no}, I want {yes}.", "I like {no} less than {yes}."),
+            train=("Instead of {no}, I want {yes}.", "I would leave out {no} and choose {yes}."),
             test=("I passed up {no} for {yes}.", "Rather than {no}, I picked {yes}."),
         ),
     ),
     "contrast": (
         Pools(
             train=("I mean {yes}, not {no}.", "I want {yes} and not {no}."),
-            test=(
-                "It is {yes}, and not {no}.",
-                "I want {yes}, definitely not {no}.",
-            ),
+            test=("It is {yes} that I want, not {no}.", "I want {yes}, definitely not {no}."),
         ),
         Pools(
             train=("I do not mean {no} but {yes}.", "I do not want {no} but {yes}."),
-            test=(
-                "It is not {no}, it is {yes}.",
-                "Definitely not {no}, I want {yes}.",
-            ),
+            test=("I do not want {no}, I want {yes}.", "Definitely not {no}, I want {yes}."),
         ),
     ),
     "correction": (
         Pools(
-            train=("I mean {yes}, no longer {no}.", "I want {yes}, no longer {no}."),
-            test=(
-                "I meant {yes} when I said {no}.",
-                "I want {yes}, I said {no} by mistake.",
-            ),
+            train=("I now want {yes}, no longer {no}.", "I now mean {yes}, no longer {no}."),
+            test=("I now want {yes} instead of {no}.", "I switched to {yes} from {no}."),
         ),
         Pools(
             train=("I mean {no} - no, {yes}.", "Let's take {no} - no, {yes}."),
-            test=(
-                "I said {no} when I meant {yes}.",
-                "I said {no} by mistake, I want {yes}.",
-            ),
+            test=("I switched from {no} to {yes}.", "I gave up {no} for {yes}."),
         ),
     ),
 }

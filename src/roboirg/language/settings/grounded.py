@@ -17,7 +17,10 @@ from roboirg.language.grounded import (
     repeat_clues,
     thing_clues,
 )
-from roboirg.language.grounded.grounded_templates import PLACEMENT_INTRODUCTIONS
+from roboirg.language.grounded.grounded_templates import (
+    NUMBER_INTRODUCTIONS,
+    PLACEMENT_INTRODUCTIONS,
+)
 from roboirg.language.phrases import (
     Phrase,
     anaphor,
@@ -135,7 +138,11 @@ def _pointed(request: InstructionRequest, colors: Clues) -> list[Phrase]:
     commands = request.task.commands
     pointers: Sequence[color.Pointer] = color.FORMER
     if len(colors) == 1:
-        pointers = (request.sampler.pick("color anaphor", color.SINGLE),)
+        (clue,) = colors.values()
+        noun = commands.thing if clue.of_handled else commands.pointed
+        single = color.singles(noun.removeprefix("hidden_"))
+        pointers = (request.sampler.pick("color anaphor", single),)
+
     things: list[Phrase] = []
     for (value, clue), pointer in zip(colors.items(), pointers, strict=True):
         place = anaphor(*pointer, value.slot, value.value)
@@ -151,7 +158,7 @@ def _pointed(request: InstructionRequest, colors: Clues) -> list[Phrase]:
 
 def _repeats(request: InstructionRequest, value: GoalValue, clue: Clue) -> tuple[Phrase, Fields]:
     said = antecedent(clue.words, value.slot, value.value)
-    template = request.pick("number introduction", introductions.NUMBER_INTRODUCTIONS)
+    template = request.pick("number introduction", NUMBER_INTRODUCTIONS)
     words = request.pick("same number", number.SAME_NUMBER)
     return fill(template, {"times": said}), {
         value.field: said if request.resolved else anaphor(words, "that", value.slot, value.value)

@@ -119,12 +119,13 @@ def _pointed(
     template = None
     stands_alone = _STANDS_ALONE.fullmatch(request.task.commands.by_place)
     if request.wordings is None and stands_alone:
-        # "The one there": the noun is that of the introduction.
-        noun = request.sampler.pick("noun there", (stands_alone["noun"], "one"))
+        # "The one over there": the noun is that of the introduction.
+        noun = stands_alone["noun"]
+        words = request.sampler.pick("noun there", (noun, "one", f"{noun} over", "one over"))
         place = (
-            antecedent(f"the {stands_alone['noun']} {landmark.phrase}", *_of(color))
+            antecedent(f"the {noun} {landmark.phrase}", *_of(color))
             if request.resolved
-            else anaphor(f"the {noun} there", expression, *_of(color))
+            else anaphor(f"the {words} there", expression, *_of(color))
         )
         template = "{place}"
     return request.by_place(color, place, plural=request.count_of(color) > 1, template=template)

@@ -25,12 +25,14 @@ RANKS: tuple[Pointer, ...] = (
     ("the third of them", "third"),
 )  # fmt: skip
 """With *of them*: "the third from your right" would be a place."""
-SINGLE: tuple[Pointer, ...] = (
-    ("it", "it"), ("the one I mentioned", "one"), ("the one I mentioned earlier", "one"),
-)  # fmt: skip
-"""For the only thing that was introduced."""
 LISTS: Mapping[int, tuple[Pointer, ...]] = {2: FORMER, 3: RANKS}
 """For two or three introduced things, in their order."""
+
+
+def singles(noun: str) -> tuple[Pointer, ...]:
+    """Return the words for the only thing that was introduced; the natural ones come up more."""
+    own: tuple[Pointer, ...] = (("it", "it"), (f"that {noun}", "that"))
+    return (*own, *own, ("the one I mentioned earlier", "one"))
 
 
 class ColorReference(NamedTuple):
@@ -48,7 +50,7 @@ class ColorReference(NamedTuple):
 def draw_reference(
     request: InstructionRequest,
     goal_values: tuple[GoalValue, ...],
-    single: Sequence[Pointer] = SINGLE,
+    single: Sequence[Pointer] | None = None,
 ) -> ColorReference:
     """Draw whether other colors are introduced, too, and the words that point back."""
     colors = tuple(goal_value.color for goal_value in goal_values)
@@ -56,6 +58,7 @@ def draw_reference(
     manners = ["alone", *(["list"] if sizes else [])]
     if request.sampler.pick("introduced colors", manners) == "alone":
         if len(colors) == 1:
+            single = single or singles(request.task.commands.colored)
             return ColorReference(colors, (request.sampler.pick("color anaphor", single),))
         return ColorReference(colors, LISTS[len(colors)])
     size = request.sampler.pick("list length", sizes)

@@ -8,16 +8,16 @@ from roboirg.core.word_pools import Pools
 
 EXCLUDED_INTRODUCTIONS = Pools(
     train=(
-        "I like {colors}.",
-        "My room is {colors}.",
-        "{colors} [looks|look] good.",
-        "I use {colors}.",
+        "I am tired of {colors}.",
+        "We have enough {colors}.",
+        "{colors} [is|are] not for me.",
+        "I do not like {colors}.",
     ),
     test=(
-        "{colors} [suits|suit] me.",
-        "My hat is {colors}.",
-        "The flag is {colors}.",
-        "I wear {colors}.",
+        "I have seen enough {colors}.",
+        "{colors} [bores|bore] me.",
+        "We used {colors} yesterday.",
+        "My team avoids {colors}.",
     ),
 )
 SINGLED_INTRODUCTIONS = Pools(

@@ -18,13 +18,13 @@ COLOR_REINFORCEMENTS = Pools(
     ),
     test=(
         "I made {ref}.",
-        "I treasure {ref}.",
+        "I am happy with {ref}.",
         "I cleaned {ref}.",
         "I found {ref}.",
     ),
 )
 NUMBER_REINFORCEMENTS = Pools(
-    train=("{ref} brings me luck.", "I remember {ref}.", "I dreamed of {ref}."),
+    train=("{ref} brings me luck.", "I remember {ref}.", "I keep seeing {ref}."),
     test=("I like {ref}.", "{ref} feels lucky.", "{ref} feels right."),
 )
 VISIT_REINFORCEMENTS = Pools(
@@ -168,17 +168,17 @@ COMPETING_MOMENT_DISTRACTORS = Pools(
 
 CUES = Pools(
     train=(
-        "Pay attention.",
+        "Anyway, listen.",
         "Now do this.",
-        "Time to work.",
-        "Listen closely.",
+        "Okay, back to work.",
+        "Anyway, please do this.",
         "Please listen.",
     ),
     test=(
+        "Anyway, here goes.",
         "Here is my request.",
         "Please do this.",
-        "Okay, here goes.",
-        "Get ready.",
-        "Now listen.",
+        "So, here goes.",
+        "Okay, your turn.",
     ),
 )
