@@ -48,7 +48,7 @@ def _parquet(rows: Iterable[ExportRow]) -> bytes:
     special = {
         **dict.fromkeys(("episode", "seed", "words", "tokens", "distractors"), number),
         **dict.fromkeys(("landmark_classes", "stages"), numbers),
-        **dict.fromkeys(("patterns", "references", "landmarks", "touched", "templates"), texts),
+        **dict.fromkeys(("patterns", "references", "landmarks", "templates"), texts),
         "turns": pa.list_(_struct(("stage", text), ("start", number), ("text", text))),
         "mentions": pa.list_(
             _struct(
