@@ -155,11 +155,11 @@ PREFERENCES = (
     Pools(
         train=(
             "{who} likes the moment {yes} more than the one {no}.",
-            "{who} prefers the moment {yes} to the one {no}.",
+            "{who} would not miss the moment {yes} for the one {no}.",
         ),
         test=(
             "{who} finds the moment {yes} better than the one {no}.",
-            "{who} chose the moment {yes} over the one {no}.",
+            "{who} would not give up the moment {yes} for the one {no}.",
         ),
     ),
     Pools(
@@ -169,16 +169,37 @@ PREFERENCES = (
         ),
         test=(
             "{who} finds the moment {no} worse than the one {yes}.",
-            "{who} gave up the moment {no} for the one {yes}.",
+            "{who} would give up the moment {no} for the one {yes}.",
         ),
     ),
 )
 """Two moments, the favorite one named first, or last; the same words lead to both."""
 FAVORITES = Pools(
-    train=("at her favorite moment", "at the moment she would choose"),
-    test=("at the moment he prefers", "at the moment he would keep"),
+    train=(
+        "at the moment she would pick",
+        "at the moment she would not skip",
+        "at the moment she would choose",
+        "at the moment she would not give up",
+    ),
+    test=(
+        "at the moment he would keep",
+        "at the moment he would not drop",
+        "at the moment he would prefer",
+        "at the moment he would not trade away",
+    ),
 )
 NOT_FAVORITES = Pools(
-    train=("at the moment she would skip", "at the moment she would give up"),
-    test=("at the moment he would drop", "at the moment he would trade away"),
+    train=(
+        "at the moment she would skip",
+        "at the moment she would not pick",
+        "at the moment she would give up",
+        "at the moment she would not choose",
+    ),
+    test=(
+        "at the moment he would drop",
+        "at the moment he would not keep",
+        "at the moment he would trade away",
+        "at the moment he would not prefer",
+    ),
 )
+"""As often with *not* as the favorite ones, and of the same verbs."""
