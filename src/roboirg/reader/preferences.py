@@ -15,7 +15,7 @@ _PREFERRED = Phrases({
 })  # fmt: skip
 _LEFT = Phrases({
     "She gave up the moment before the press for the one after it.":
-        r"\b(?:trades?|swap(?:s|ped)?|g[ai]ve?s? up|skips?|dropped|leaves)\b.*\bfor\b",
+        r"\b(?:trades?|swap(?:s|ped)?|g[ai]ve?s? up|skips?|miss|dropped|leaves)\b.*\bfor\b",
 })  # fmt: skip
 _REVERSED = Phrases({
     "She likes the moment before the press less than the one after it.":

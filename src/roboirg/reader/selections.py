@@ -34,8 +34,7 @@ _ACCEPTED = Phrases(
     {
         "Why not": "why not",
         "I could not live without": r"not (?:do |be |live )?without",
-        "I would not give up": "not (?:give up|part with|trade|miss|swap|exchange|resist|mind)",
-        "I would not say no to": "not (?:say no to|go wrong with)",
+        "I would not give up": "not (?:give up|part with|trade|miss|swap|exchange|skip|mind|refuse|pass up)",
         "Not the latter, but": "but",
         "I would go for": "for",
     },

@@ -80,7 +80,9 @@ PAPER_PHRASES: Mapping[str, tuple[tuple[str, str], ...]] = {
         ("the other one", "the other (?:one|cube|visit|placement|moment|number)"),
     ),
     "contextual": (("the one I mentioned earlier", "the one i mentioned earlier"),),
-    "spatial": (("the cube there", "the cube (?:now )?there"), ("the one there", "the one there")),
+    "spatial": (("the cube there", "the cube (?:now |over )?there"),
+        ("the one there", "the one (?:over )?there"),
+    ),
 }  # fmt: skip
 """Phrases that the paper quotes or lists, by setting, each with its pattern in our commands."""
 RESOLVED_PHRASES = (("at the far right", "at your far right"), ("different from blue",

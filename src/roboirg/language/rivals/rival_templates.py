@@ -136,6 +136,12 @@ MENTIONED = Pools(
             "the first ones I mentioned",
             "the last ones I mentioned",
         ),
+        Pointers(
+            "the one I mentioned first",
+            "the one I mentioned last",
+            "the ones I mentioned first",
+            "the ones I mentioned last",
+        ),
     ),
     test=(
         Pointers(
@@ -143,6 +149,12 @@ MENTIONED = Pools(
             "the last one I named",
             "the first ones I named",
             "the last ones I named",
+        ),
+        Pointers(
+            "the one I named first",
+            "the one I named last",
+            "the ones I named first",
+            "the ones I named last",
         ),
     ),
 )
@@ -154,14 +166,14 @@ SINGLED = Pools(
     train=(
         "I mean {yes}.",
         "I would like {yes}.",
-        "I cannot resist {yes}.",
-        "I would not say no to {yes}.",
+        "I would not skip {yes}.",
+        "I would not refuse {yes}.",
     ),
     test=(
         "I have chosen {yes}.",
         "I will go with {yes}.",
         "I would not mind {yes}.",
-        "You cannot go wrong with {yes}.",
+        "I would not pass up {yes}.",
     ),
 )
 SET_ASIDE = Pools(

@@ -9,15 +9,15 @@ from roboirg.core.word_pools import Pools
 EXCLUDED_INTRODUCTIONS = Pools(
     train=(
         "I am tired of {colors}.",
-        "We have enough {colors}.",
-        "{colors} [is|are] not for me.",
-        "I do not like {colors}.",
+        "I dislike {colors}.",
+        "Enough of {colors}.",
+        "We never use {colors}.",
     ),
     test=(
-        "I have seen enough {colors}.",
         "{colors} [bores|bore] me.",
-        "We used {colors} yesterday.",
-        "My team avoids {colors}.",
+        "I avoid {colors}.",
+        "I never wear {colors}.",
+        "I cannot stand {colors}.",
     ),
 )
 SINGLED_INTRODUCTIONS = Pools(

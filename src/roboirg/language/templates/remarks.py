@@ -170,7 +170,7 @@ CUES = Pools(
     train=(
         "Anyway, listen.",
         "Now do this.",
-        "Okay, back to work.",
+        "Okay, let's go on.",
         "Anyway, please do this.",
         "Please listen.",
     ),

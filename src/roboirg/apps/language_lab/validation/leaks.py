@@ -70,7 +70,7 @@ def _spellings(value: SlotValue) -> frozenset[str]:
 
 
 def _without_pointers(instruction: Instruction) -> str:
-    """Return the command without *the first of them* and *the one I mentioned*.
+    """Return the command without *the first of them* and *the one I mentioned earlier*.
 
     Their numbers say nothing about the goal's.
     """
