@@ -35,7 +35,7 @@ PlanName = Annotated[
     typer.Option(
         "--plan",
         help="YAML file or a run's plan.json; or challenge, demo, paper, paper-context, "
-        "paper-planners, robomme or quick.",
+        "paper-planners, quick, robomme or standard.",
         rich_help_panel=options.EPISODES,
     ),
 ]
