@@ -37,6 +37,8 @@ def read(task, text, index=2):
         ("VideoUnmask", "Lift the container over red, put it down, and then the one over blue.",
          (("red", "blue"),)),
         ("VideoUnmask", "Show me the red cube.", (("red",),)),
+        ("VideoUnmask", "I like the red and the blue cube. Lift the former and then the latter.",
+         (("red", "blue"),)),
         ("PickXtimes", "Put the red cube on the target, then do it again.", ("red", 2)),
         ("PickXtimes", "Put the red cube on the target, and again, and again.", ("red", 3)),
         ("PickXtimes", "Put the red cube on the target. Repeat it two more times.", ("red", 3)),

@@ -25,7 +25,7 @@ _BARE_PRONOUNS = word_set("it them that")
 _PARTICLES = word_set("up down back")
 _SINGULAR = word_set("it cube one")
 _JOINTS = word_set(", ; and then finally afterwards next")
-_JOINED = word_set("container box one")
+_JOINED = word_set("container box one former latter first second third other")
 
 
 class Item(NamedTuple):
