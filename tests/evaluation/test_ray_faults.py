@@ -66,11 +66,15 @@ def actors(cluster: Any, name: str) -> list[int]:
     return list(map(int, found.stdout.split()))
 
 
-def after(folder: Path, count: int, act: Callable[[], object]) -> threading.Thread:
-    """Act in a thread as soon as that many records are stored."""
+def after(
+    folder: Path, count: int, act: Callable[[], object], run_ended: Callable[[], bool] | None = None
+) -> threading.Thread:
+    """Act in a thread as soon as that many records are stored; never, if the run ends before."""
 
     def run() -> None:
         while lines(folder) < count:
+            if run_ended is not None and run_ended():
+                return
             time.sleep(0.05)
         act()
 
@@ -115,13 +119,13 @@ def test_what_is_frozen_is_noticed_and_its_episode_played_elsewhere(
         frozen.append(actors(cluster, actor)[0])
         os.kill(frozen[0], signal.SIGSTOP)
 
-    freezer = after(tmp_path, 4, freeze)
     play = UntilReleased(tmp_path, 0.5, gate=tmp_path / "released")
     run = threading.Thread(
         target=run_plan, args=(PLAN, tmp_path, play, RayCluster(address=cluster.address))
     )
     run.start()
-    freezer.join()
+    after(tmp_path, 4, freeze, lambda: not run.is_alive()).join()
+    assert frozen, "the run ended before anything was frozen"
     while Path(f"/proc/{frozen[0]}").exists() and run.is_alive():
         time.sleep(0.1)
     play.gate.touch()

@@ -196,7 +196,11 @@ def check_agreement(lower):
         several = r"\b(cubes|containers|boxes|tapes|colors|those) (is|was|has)\b"
         assert not re.search(several, sentence), sentence
         # A relative clause has a verb of its own: "the corner that is near the robot".
-        main = re.sub(r"\b(that|which|whose color) (is|was)\b", r"\1", sentence)
+        main = re.sub(
+            r"\b(that|which|whose color) (?:(?:now|initially) )?(is|was|has|had)\b",
+            r"\1",
+            sentence,
+        )
         found = re.search(r"\b(is|are|was|were|has|have|looks?|makes?|stands?) ", main)
         subject = main[: found.start()] if found else ""
         if re.search(r"\b(i|you|we|they|those|there)( would| still| should really)? $", subject):

@@ -144,7 +144,9 @@ class ControlLoop:
             name: np.zeros((0, *np.shape(value)), np.asarray(value).dtype)
             for name, value in reading.fields.items()
         }
-        result.policy_metadata = self._request("reset", self._instruction, no_frames)
+        result.policy_metadata, result.needs, result.inference = self._request(
+            "reset", self._instruction, no_frames
+        )
         self._last = reading.joints
 
     def _run(self, job: Job, result: RolloutResult, watchdog: DeadlineWatch | None) -> None:

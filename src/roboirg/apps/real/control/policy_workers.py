@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from roboirg.apps.real.control.robot import HORIZON
 from roboirg.core.errors import EndOfRunError
+from roboirg.core.inference_facts import inference_facts
 from roboirg.core.observations import Demonstration, Observation
 from roboirg.evaluation.episode_errors import (
     EpisodeError,
@@ -31,6 +32,7 @@ from roboirg.evaluation.policy_calls import policy_metadata
 from roboirg.evaluation.records.record import ErrorKind
 from roboirg.policies.by_name.loading import make_policy
 from roboirg.policies.contract.base import Policy, PrivilegedPolicy
+from roboirg.policies.contract.policy_needs import PolicyNeeds
 
 if TYPE_CHECKING:
     from roboirg.envs.environment import RoboIRGEnv
@@ -58,6 +60,14 @@ class PolicyReply(NamedTuple):
         if self.error is not None:
             raise EpisodeError(*self.error)
         return self.value
+
+
+class PolicyFacts(NamedTuple):
+    """What a policy says about itself once it has been reset; the fields are those of a record."""
+
+    metadata: dict[str, Any]
+    needs: dict[str, Any]
+    inference: dict[str, Any]
 
 
 LoadPolicy = Callable[[str, int], Policy]
@@ -101,10 +111,11 @@ class PolicyDispatcher:
         if isinstance(self._policy, PrivilegedPolicy):
             self._policy.attach(env)
 
-    def _reset(self, instruction: str, demonstration: dict[str, Any]) -> dict[str, Any]:
+    def _reset(self, instruction: str, demonstration: dict[str, Any]) -> PolicyFacts:
         policy = self._require_policy()
         policy.reset(instruction, demonstration)
-        return policy_metadata(policy)
+        needs = PolicyNeeds.of(policy).declared
+        return PolicyFacts(policy_metadata(policy), needs, inference_facts(policy))
 
     def _act(self, observation: Any) -> Any:  # noqa: ANN401
         with self._scene_lock:  # the scene must not change while a policy plans in it
