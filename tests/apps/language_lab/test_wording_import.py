@@ -142,7 +142,10 @@ def test_referring_expressions_take_the_place_of_the_phrases():
     assert command("VideoUnmask", "spatial", colors=("red",)) == "Lift the container there"
 
 
-POINTED = r"(?:it|the former|the latter|the \w+ of them|that cube|the one I mentioned earlier|the .*cube.*)"
+POINTED = (
+    r"(?:it|the former|the latter|the \w+ of them|that cube"
+    r"|the one I mentioned earlier|the .*cube.*)"
+)
 """Words for a thing, as a regular expression."""
 
 COUNTED = r"(?:[^.]*\b(?:take|add)\b[^.]*\. )?"
