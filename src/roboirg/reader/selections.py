@@ -34,7 +34,8 @@ _ACCEPTED = Phrases(
     {
         "Why not": "why not",
         "I could not live without": r"not (?:do |be |live )?without",
-        "I would not give up": "not (?:give up|part with|trade|miss|swap|exchange|skip|mind|refuse|pass up)",
+        "I would not give up": "not (?:give up|part with|trade|miss|swap|exchange|skip)",
+        "I would not mind": "not (?:mind|refuse|pass up)",
         "Not the latter, but": "but",
         "I would go for": "for",
     },
