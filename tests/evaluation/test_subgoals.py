@@ -62,7 +62,8 @@ def test_records_keep_them_and_refuse_others() -> None:
 
 
 def test_the_page_and_the_table_show_them(tmp_path: Path) -> None:
-    course = RolloutResult("failure", cause="no", subgoals=list(SAID))
+    spent = {"calls": 3.0, "answered_s": 6.5, "waited_s": 2.25}
+    course = RolloutResult("failure", cause="no", subgoals=list(SAID), usage=spent)
     record = make_record(JOB, course, started_at="now")
     with RecordStore(tmp_path) as store:
         store.append(record)
@@ -71,7 +72,8 @@ def test_the_page_and_the_table_show_them(tmp_path: Path) -> None:
     assert "sing (lost; due: nothing)" in page
     words = ["tables", str(tmp_path), "--which", "subgoals", "--format", "markdown"]
     outcome = CliRunner().invoke(app, words)
-    assert "| 3 | 1 (33 %) | 1 (33 %) | 0 (0 %) | 0 (0 %) | 1 (33 %) |" in outcome.output
+    counts = "| 3 | 1 (33 %) | 1 (33 %) | 0 (0 %) | 0 (0 %) | 1 (33 %) |"
+    assert f"{counts} 3 | 6.5 | 2.25 |" in outcome.output
 
 
 class Planning:

@@ -12,7 +12,8 @@ from pydantic import BaseModel, ConfigDict, Field, field_validator, model_valida
 from roboirg.core.observations import Demonstration, Observation
 from roboirg.core.subgoal_text import split_point
 from roboirg.policies.contract.base import SubgoalEnd
-from roboirg.policies.planners.memories import FINISHED, MEMORIES, Memory, MemoryOptions
+from roboirg.policies.planners.memories import FINISHED, MEMORIES
+from roboirg.policies.planners.memory import Memory, MemoryOptions
 from roboirg.policies.planners.planner import EACH_CHUNK, WHEN_DONE
 from roboirg.policies.vlm.models import ModelOptions
 from roboirg.policies.vlm.models.model import config_version
