@@ -166,7 +166,7 @@ class VLMPlanner:
         self.memory: Memory = memory_class(options, self.prompts)
         self.observe_every = self.memory.observe_every
         self.demonstration_frames = self.memory.demonstration_frames
-        self._vlm = VLMQuery(options.model, self.prompts["again"])
+        self.vlm = VLMQuery(options.model, self.prompts["again"])
         self._now = _Planning("")
 
     @property
@@ -193,7 +193,7 @@ class VLMPlanner:
 
     def reset(self, instruction: str, demonstration: Demonstration) -> None:
         """Forget the last episode and begin another."""
-        self._vlm.start()
+        self.vlm.start()
         self._now = _Planning(instruction)
         self.memory.begin(demonstration)
 
@@ -220,7 +220,7 @@ class VLMPlanner:
                 return now.subgoal
         now.news = now.refused = False
         query = self.memory.query(observation, now.instruction, now.ends)
-        answer = self._vlm.ask(query, lambda text: self.memory.parse(text, now.subgoal))
+        answer = self.vlm.ask(query, lambda text: self.memory.parse(text, now.subgoal))
         if answer is None:
             now.useless += 1
             now.news = True
@@ -237,10 +237,10 @@ class VLMPlanner:
         use.
         """
         ended = {"finished": self._now.finished, "unreadable": self._now.useless > 0}
-        return {**self._vlm.usage(), **{name: 1.0 for name, holds in ended.items() if holds}}
+        return {**self.vlm.usage(), **{name: 1.0 for name, holds in ended.items() if holds}}
 
     def close(self) -> None:
-        self._vlm.close()
+        self.vlm.close()
 
     def _due(self, step: int) -> bool:
         """Return whether to query the model now."""
