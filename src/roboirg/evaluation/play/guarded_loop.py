@@ -20,7 +20,7 @@ from roboirg.evaluation.play.video_writer import FrameSink
 from roboirg.evaluation.policy_calls import next_actions, policy_metadata, policy_subgoal
 from roboirg.evaluation.records.record import Job, SubgoalRecord
 from roboirg.judging import judge_subgoal, plain_subgoal
-from roboirg.policies.by_name.loading import is_foreign, is_privileged
+from roboirg.policies.by_name.loading import is_foreign, is_privileged, planner_alone
 from roboirg.policies.contract.base import Policy
 from roboirg.policies.contract.play import EpisodeLoop
 from roboirg.policies.contract.policy_needs import PolicyNeeds
@@ -59,6 +59,7 @@ class GuardedLoop(EpisodeLoop):
         self._job, self._space, self._writer = job, space, writer
         self._result, self._guard = result, guard
         self._is_ours = not is_foreign(job.policy_spec)
+        self._knows_ends = self._is_ours or planner_alone(job.policy_spec) is not None
         self._reports, self._ends = bool(getattr(policy, "reports", False)), 0
 
     def play(self) -> dict[str, Any]:
@@ -115,7 +116,7 @@ class GuardedLoop(EpisodeLoop):
 
     def _note_ends(self) -> None:
         """Keep how subgoals ended, and those that were refused meanwhile."""
-        ends = getattr(self.policy, "endings", ()) if self._is_ours else ()
+        ends = getattr(self.policy, "endings", ()) if self._knows_ends else ()
         for end in ends[self._ends :]:
             found = self._result.subgoals
             if end.how == "refused":

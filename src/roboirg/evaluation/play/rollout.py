@@ -29,7 +29,7 @@ from roboirg.evaluation.episode_errors import (
     one_line,
 )
 from roboirg.evaluation.hosting.host_pool import HostSettings
-from roboirg.evaluation.hosting.hosted_policy import HostedPolicy
+from roboirg.evaluation.hosting.hosted_policy import HostedPlanner, HostedPolicy
 from roboirg.evaluation.hosting.policy_descriptions import PolicyDescription, describe_here
 from roboirg.evaluation.play.call_guard import CallGuard
 from roboirg.evaluation.play.guarded_loop import GuardedLoop
@@ -43,10 +43,12 @@ from roboirg.evaluation.records.action_log import write_actions
 from roboirg.evaluation.records.film import VideoMode, VideoOptions
 from roboirg.evaluation.records.record import Job, Record
 from roboirg.language.wordings.wording_store import open_wordings
-from roboirg.policies.by_name.loading import needs_host
+from roboirg.policies.by_name.loading import is_privileged, needs_host, planner_alone
+from roboirg.policies.by_name.systems import SCRIPTED, make_hands
 from roboirg.policies.contract.base import Policy, close_policy
 from roboirg.policies.contract.policy_needs import PolicyNeeds
 from roboirg.policies.contract.random_state import episode_policy_seed
+from roboirg.policies.planners.hierarchical_policy import HierarchicalPolicy, with_planner
 from roboirg.policies.prompt_length.declared_limit import prompt_limit
 from roboirg.policies.vlm.models.reply_store import ReplySettings, use_replies
 
@@ -203,9 +205,9 @@ def play_episode(
                 policy = load_policy(prepared, seed_secret)
             else:
                 seed = _policy_seed(prepared, seed_secret)
-                hosted = HostedPolicy(hosts, job.policy_spec, seed, alone=alone)
-                result.policy = PolicyDescription(hosted.version, is_privileged=False)
-                policy = hosted
+                policy = load_hosted_policy(hosts, job.policy_spec, seed, alone=alone)
+                privileged = is_privileged(job.policy_spec)
+                result.policy = PolicyDescription(policy.version, privileged)
             needs = job_needs(policy, job)
             result.prompt_limit = prompt_limit(needs)
         if refuse_long:
@@ -274,6 +276,16 @@ def load_policy(prepared: PreparedJob, seed_secret: str = "") -> Policy:
     return policy
 
 
+def load_hosted_policy(
+    hosts: socket, spec: str, seed: int, *, alone: bool = False
+) -> HostedPolicy | HierarchicalPolicy:
+    """Return a policy in a process of its own; scripted hands of a user's planner are in this."""
+    if (planner := planner_alone(spec)) is None:
+        return HostedPolicy(hosts, spec, seed, alone=alone)
+    hosted = HostedPlanner(hosts, planner, seed, alone=alone)
+    return with_planner(hosted, make_hands(SCRIPTED, seed), spec.partition("?")[0])
+
+
 def _policy_seed(prepared: PreparedJob, secret: str) -> int:
     job = prepared.job
     if job.arm == AGAIN:
@@ -295,5 +307,6 @@ def _close_policy(policy: Policy, result: RolloutResult, guard: CallGuard) -> No
                 close_policy(policy)
     except EpisodeError as error:
         result.details = result.details or error.details
-    if isinstance(policy, HostedPolicy):
-        result.timings["policy_wait"] = round(policy.waited_s, 6)
+    hosted = getattr(policy, "planner", policy)
+    if isinstance(hosted, HostedPolicy):
+        result.timings["policy_wait"] = round(hosted.waited_s, 6)
