@@ -125,7 +125,7 @@ def build_system(system: System, seed: int) -> Policy:
         return policy
     options = dict(system.planner)
     kind = str(options.pop("kind", ""))
-    planner = make_planner(kind, options, f"the planner of system {system.name}")
+    planner = make_planner(kind, options, f"the planner of system {system.name}", seed)
     return with_planner(planner, policy, system.name)
 
 

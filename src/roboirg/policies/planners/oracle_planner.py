@@ -44,7 +44,12 @@ class OraclePlanner:
     version = "built-in"
     reports = False
 
-    def __init__(self, options: OracleOptions | None = None, kind: str = "oracle") -> None:
+    def __init__(
+        self,
+        options: OracleOptions | None = None,
+        kind: str = "oracle",
+        seed: int = 0,  # noqa: ARG002 - of planners that choose
+    ) -> None:
         self.options, self.kind = options or OracleOptions(), kind
         self.grounded = self.options.subgoals == "grounded"
         self._env: RoboIRGEnv | None = None

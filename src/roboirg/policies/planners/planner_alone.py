@@ -25,7 +25,7 @@ class PlannerAlone:
 
     def __init__(self, planner: Planner) -> None:
         self._planner: Any = planner
-        self._planner.reports = True
+        planner.reports = True  # type: ignore[attr-defined]
         PolicyNeeds.of_planner(planner).declare_on(self)
         self.version = str(getattr(planner, "version", "unknown"))
         self.subgoal: str | None = None

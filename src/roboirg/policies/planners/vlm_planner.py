@@ -149,6 +149,7 @@ class VLMPlanner:
     Args:
         options: when it asks, what it remembers, and its model.
         kind: name of its setting, for the records.
+        seed: unused.
 
     Raises:
         InvalidValueError: the prompts cannot be read.
@@ -159,7 +160,7 @@ class VLMPlanner:
     cameras = ("front",)
     reports = False
 
-    def __init__(self, options: PlannerOptions, kind: str) -> None:
+    def __init__(self, options: PlannerOptions, kind: str, seed: int = 0) -> None:  # noqa: ARG002
         self.options, self.kind = options, kind
         memory_class = MEMORIES[options.remembers]
         self.prompts = load_prompts(memory_class.prompts, options.prompts)
