@@ -14,6 +14,7 @@ import hashlib
 import json
 import os
 import re
+import resource
 import subprocess
 import sys
 import tempfile
@@ -23,7 +24,7 @@ from collections.abc import Iterator, Mapping
 from datetime import datetime
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import cv2
 import numpy as np
@@ -112,8 +113,16 @@ def stub_model(answers: Mapping[str, str]) -> Iterator[tuple[str, list[str]]]:
     server.shutdown()
 
 
-def rate(task: str, address: str, workers: int) -> tuple[float, float]:
-    """Return episodes an hour, and the share of successes."""
+class Rate(NamedTuple):
+    """Episodes an hour, share of successes, and seconds of the processor for an episode."""
+
+    an_hour: float
+    successes: float
+    processor_s: float
+
+
+def rate(task: str, address: str, workers: int) -> Rate:
+    """Play a run and return its rate."""
     with tempfile.TemporaryDirectory() as folder:
         words = [
             *("--policy", f"planner:stateless?base_url={address}&model=stub"),
@@ -121,12 +130,16 @@ def rate(task: str, address: str, workers: int) -> tuple[float, float]:
             *("--workers", str(workers), "--out", folder),
         ]
         command = [sys.executable, "-m", "roboirg", "run", *words]
+        before = resource.getrusage(resource.RUSAGE_CHILDREN)
         subprocess.run(command, check=True, stdout=subprocess.DEVNULL)  # noqa: S603 - our own
+        after = resource.getrusage(resource.RUSAGE_CHILDREN)
         records = list(read_records(Path(folder)))
     starts = [datetime.fromisoformat(one.started_at).timestamp() for one in records]
     ends = [start + one.duration_s for start, one in zip(starts, records, strict=True)]
     successes = sum(one.outcome == "success" for one in records)
-    return 3600 * len(records) / (max(ends) - min(starts)), successes / len(records)
+    spent = sum(after[:2]) - sum(before[:2])
+    count = len(records)
+    return Rate(3600 * count / (max(ends) - min(starts)), successes / count, spent / count)
 
 
 def main() -> None:
@@ -135,9 +148,13 @@ def main() -> None:
         load = os.getloadavg()[1]
         with stub_model(oracle_answers(task, max(EPISODES.values()))) as (address, unknown):
             found = {workers: rate(task, address, workers) for workers in EPISODES}
-        ratio = found[16][0] / found[1][0]
-        rates = ", ".join(f"{count}: {one:.0f}/h ({ok:.0%})" for count, (one, ok) in found.items())
-        print(f"{task}: {ratio:.1f} ×; {rates}; {len(unknown)} unknown pictures; load {load:.1f}")
+        many, one = found[16], found[1]
+        cores = (os.cpu_count() or 1) * 3600 / many.processor_s
+        print(
+            f"{task}: {many.an_hour:.0f} episodes an hour, {many.an_hour / one.an_hour:.1f} × one"
+        )
+        print(f"worker ({one.an_hour:.0f}); cores allow {cores:.0f}, {many.an_hour / cores:.0%};")
+        print(f"{many.successes:.0%} succeed, {len(unknown)} unknown pictures; load {load:.1f}")
 
 
 if __name__ == "__main__":
