@@ -16,7 +16,7 @@ from roboirg.evaluation.hosting.policy_descriptions import describe_policy
 from roboirg.evaluation.play.rollout import play_episode
 from roboirg.evaluation.play.rollout_result import RolloutResult
 from roboirg.evaluation.records.record import Job
-from roboirg.policies.by_name.loading import is_privileged, needs_host
+from roboirg.policies.by_name.loading import is_privileged, make_policy, needs_host
 
 
 @pytest.fixture(autouse=True)
@@ -24,11 +24,14 @@ def _can_be_imported(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.syspath_prepend(Path(own_planners.__file__).parent)
 
 
-def play(spec: str) -> RolloutResult:
-    job = Job(policy=spec, task="VideoUnmask", split="test", episode=0, max_steps=60,
+def job_of(spec: str) -> Job:
+    return Job(policy=spec, task="VideoUnmask", split="test", episode=0, max_steps=60,
               options=InstructionOptions("explicit"))  # fmt: skip
+
+
+def play(spec: str) -> RolloutResult:
     with HostPool(HostSettings()) as pool, pool.connect() as line:
-        return play_episode(job, hosts=line)
+        return play_episode(job_of(spec), hosts=line)
 
 
 @pytest.mark.sim
@@ -64,6 +67,13 @@ def test_one_that_is_declared_runs_next_to_the_world() -> None:
     spec = "privileged:planner:own_planners:Insider"
     assert not needs_host(spec)
     assert play(spec).usage["process"] == os.getpid()
+    # So does any in a run whose policies share the worker's process.
+    shared = play_episode(job_of("planner:own_planners:Pointer"))
+    assert (shared.usage["process"], len(shared.subgoals)) == (os.getpid(), 2)
+    assert shared.policy is not None
+    assert shared.policy.version == "mine-1 + scripted hands"
+    with pytest.raises(InvalidValueError, match="has attach"):
+        make_policy("planner:own_planners:Insider", 0)
 
 
 @pytest.mark.parametrize(
