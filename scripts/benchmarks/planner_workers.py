@@ -40,7 +40,7 @@ from roboirg.policies.planners.oracle_planner import OraclePlanner
 
 ANSWER_S = 2.0
 EPISODES: Mapping[int, int] = {1: 3, 16: 48}
-"""Episodes of a run, by its number of workers."""
+"""Episodes of a run, by its number of workers; each is played with two seeds of the policy."""
 
 
 class _Notes(OraclePlanner):
@@ -127,6 +127,7 @@ def rate(task: str, address: str, workers: int) -> Rate:
         words = [
             *("--policy", f"planner:stateless?base_url={address}&model=stub"),
             *("--tasks", task, "--settings", "explicit", "--episodes", str(EPISODES[workers])),
+            *("--policy-seeds", "0,1"),
             *("--workers", str(workers), "--out", folder),
         ]
         command = [sys.executable, "-m", "roboirg", "run", *words]
