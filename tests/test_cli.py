@@ -417,6 +417,16 @@ def test_a_dry_run_counts_and_plays_nothing(roboirg, tmp_path: Path) -> None:
     assert not (tmp_path / "out").exists()
 
 
+def test_a_dry_run_says_what_models_will_be_asked(roboirg, tmp_path: Path) -> None:
+    model = "model=x&base_url=http://localhost:1/v1"
+    words = (*RUN, "--policy", f"p=planner:stateless?{model}", "--settings", "explicit")
+    said = roboirg(*words, "--dry-run", "--out", tmp_path / "out")
+    assert said.code == 0, said.err
+    assert "what models will be asked" in said.out
+    assert "not known" in said.out
+    assert not (tmp_path / "out").exists()
+
+
 @pytest.mark.parametrize(
     ("words", "caption"),
     [

@@ -10,8 +10,13 @@ from roboirg.evaluation.episode_errors import EpisodeError
 from roboirg.evaluation.plan.plan_maker import make_plan
 from roboirg.evaluation.records.store import RecordStore, read_index
 from roboirg.evaluation.run import world_speed
+from roboirg.evaluation.run.cost_estimate import model_costs
 from roboirg.evaluation.run.estimate import ORACLE_STEPS, cell_sizes, estimate, estimate_text
 from roboirg.evaluation.run.world_speed import ASSUMED, WorldSpeed, has_video, measure_world
+from roboirg.policies.vlm.models import ModelReply
+from roboirg.policies.vlm.models.reply_store import ReplySettings, ReplyStore
+from roboirg.tasks import get_task
+from roboirg.tasks.splits.splits import get_episode
 
 
 def test_cells_are_counted_by_policy_task_setting_and_form() -> None:
@@ -77,3 +82,38 @@ def test_without_a_world_the_speed_is_assumed(monkeypatch: pytest.MonkeyPatch) -
 
     monkeypatch.setattr(world_speed, "play_with", refuse)
     assert measure_world(small_plan(1).jobs()) == measure_world(()) == ASSUMED
+
+
+def test_what_models_will_be_asked_is_counted_and_measured(tmp_path: Path) -> None:
+    model = "model=x&base_url=http://localhost:1/v1"
+    names = {
+        "plans": f"planner:stateless?{model}&input_price=2&output_price=10",
+        "often": f"planner:qwen?{model}",
+        "listens": f"vlm-listener:openai?{model}&pictures=no",
+        "blind": "random",
+    }
+    specs = [f"{name}={spec}" for name, spec in names.items()]
+    tasks = "PickXtimes,VideoUnmask"
+    jobs = make_plan(specs, tasks=tasks, settings="explicit", episodes="3").jobs()
+    found = {one.policy: one for one in model_costs(jobs, jobs, tmp_path)}
+    assert list(found) == ["plans", "often", "listens"]
+    episodes = [get_episode(task, "test", index) for task in tasks.split(",") for index in range(3)]
+    stages = [len(get_task(one.task).stages(one.scene, one.goal)) for one in episodes]
+    assert found["plans"].sizes.calls == sum(stages) + len(stages)  # and one that says done
+    assert found["often"].sizes.calls > found["plans"].sizes.calls
+    assert found["listens"].sizes.calls == len(stages)
+    tokens = found["plans"].sizes
+    cost = (2 * tokens.input_tokens + 10 * tokens.output_tokens) / 1e6
+    assert found["plans"].cost_usd == pytest.approx(cost, rel=1e-3)
+    assert found["often"].cost_usd is None
+    assert tokens.input_tokens > 258 * tokens.calls  # a picture each
+
+    store = ReplyStore(ReplySettings(tmp_path), jobs[0].slug)
+    for call in range(2):
+        store.keep(str(call), ModelReply("done", 1000, 50), 0.0)
+        store.calls += 1
+    store.close()
+    known = {one.policy: one for one in model_costs(jobs, jobs, tmp_path)}
+    assert known["plans"].sizes == (tokens.calls, 1000 * tokens.calls, 50 * tokens.calls)
+    assert [one.measured for one in known.values()] == [2, 0, 0]
+    assert known["often"] == found["often"]

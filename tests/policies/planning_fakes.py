@@ -185,6 +185,11 @@ def model_options(server, provider="openai", **more):
     return ModelOptions(provider=provider, **settings)
 
 
+def spent(policy):
+    """What an episode cost, without the time that it took."""
+    return {name: value for name, value in policy.usage().items() if not name.endswith("_s")}
+
+
 def make_listener(server, provider="openai", **more):
     own = {key: more.pop(key) for key in list(more) if key in ListenerOptions.model_fields}
     return VLMListener(ListenerOptions(model=model_options(server, provider, **more), **own))

@@ -23,6 +23,7 @@ from planning_fakes import (
     fake_vlm,
     golden,
     make_listener,
+    spent,
     stand_in,
     words_of,
 )
@@ -214,7 +215,7 @@ def test_unparsable_replies_are_retried_once_then_counted():
     with fake_vlm(["no idea", good]) as server:
         policy = make_listener(server)
         assert policy.decide(env, "Do it.") == goal
-        assert policy.usage() == usage(calls=2)
+        assert spent(policy) == usage(calls=2)
         first, second = server.requests
         *same, said, complaint = second["messages"]
         assert same == first["messages"]
@@ -224,9 +225,9 @@ def test_unparsable_replies_are_retried_once_then_counted():
         policy = make_listener(server)
         with pytest.raises(NotUnderstoodError):
             policy.decide(env, "Do it.")
-        assert policy.usage() == usage(calls=2, unparsed=1)
+        assert spent(policy) == usage(calls=2, unparsed=1)
         assert policy.decide(env, "Do it.") == goal
-        assert policy.usage() == usage(calls=3, unparsed=1)
+        assert spent(policy) == usage(calls=3, unparsed=1)
 
 
 def usage(calls, unparsed=0, impossible=0):
@@ -251,7 +252,7 @@ def test_what_is_not_in_the_scene_is_counted_and_nothing_is_done():
         policy = make_listener(server)
         policy.attach(stand_in(episode))
         policy.reset("Do it.", {})
-        assert policy.usage() == usage(calls=1, impossible=1)
+        assert spent(policy) == usage(calls=1, impossible=1)
         assert policy.metadata["understood"] == {"color": absent, "repeats": 1}
 
 
@@ -276,7 +277,7 @@ def test_a_new_episode_has_a_new_account():
         for _ in range(2):
             policy.reset("Do it.", {})
             cost = (2 * TOKENS[0] * 2.0 + 2 * TOKENS[1] * 10.0) / 1e6
-            assert policy.usage() == {**usage(2, unparsed=1), "cost_usd": pytest.approx(cost)}
+            assert spent(policy) == {**usage(2, unparsed=1), "cost_usd": pytest.approx(cost)}
             assert policy.metadata["understood"] is None
 
 
@@ -366,7 +367,7 @@ def test_requests_are_as_captured(provider, shown):
         policy = make_listener(server, provider, frames=4, reasoning=True)
         policy._demonstration = video(shown)
         policy.decide(stand_in(episode, shade=9), instruct(episode, "direct").text)
-    assert policy.usage() == usage(1)
+    assert spent(policy) == usage(1)
     name = f"listener-{provider}-{'video' if shown else 'none'}"
     check_capture(name, golden(server.requests[0]))
 
@@ -389,8 +390,8 @@ def test_two_listeners_do_not_mix():
         env = stand_in(one)
         assert here.decide(env, env.instruction.text) == one.goal
         there.reset("Do it.", video(16))
-        assert here.usage() == usage(1)
-        assert there.usage() == usage(2, unparsed=1)
+        assert spent(here) == usage(1)
+        assert spent(there) == usage(2, unparsed=1)
         assert here.understood == one.goal
         assert there.understood is None
 

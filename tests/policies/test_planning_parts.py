@@ -18,7 +18,8 @@ from roboirg.policies.contract.policy_needs import (
     merge_demonstration_frames,
     merge_observe_every,
 )
-from roboirg.policies.planners.memories import MAX_GAP, merge_keyframes
+from roboirg.policies.planners.memories import merge_keyframes
+from roboirg.policies.planners.memory import MAX_GAP
 from roboirg.policies.planners.observation_merging import (
     DemonstrationSubset,
     select_history,

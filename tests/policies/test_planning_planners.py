@@ -7,7 +7,16 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from planning_fakes import KEY, KEY_VARIABLE, TOKENS, decoded, fake_vlm, golden, model_options
+from planning_fakes import (
+    KEY,
+    KEY_VARIABLE,
+    TOKENS,
+    decoded,
+    fake_vlm,
+    golden,
+    model_options,
+    spent,
+)
 from selection import slow_but
 
 import roboirg
@@ -340,7 +349,7 @@ def test_together_they_are_a_policy_and_costs_add_up(monkeypatch):
         policy = drive(planner, 32)
         assert isinstance(policy, Policy)
         assert not isinstance(policy, PrivilegedPolicy)
-        assert policy.usage() == {
+        assert spent(policy) == {
             "calls": 4,
             "input_tokens": 3 * TOKENS[0],
             "output_tokens": 3 * TOKENS[1],

@@ -152,10 +152,36 @@ def test_the_oracle_with_scripted_hands_succeeds(task):
 
 
 @pytest.mark.sim
+def test_the_oracle_points_at_what_the_arm_hides():
+    """What is put down stands between camera and thing: in 4 of 550 episodes of the test split."""
+    planner = make_planner("oracle", {}, "the test")
+    info, policy = play_with(planner, "VideoUnmaskSwap", episode=23)
+    assert info["status"] == "success", (info["cause"], policy.endings)
+
+
+@pytest.mark.sim
 @pytest.mark.parametrize("task", slow_but(["StopCube", "VideoUnmask"], TASKS))
 def test_the_listener_plans_what_the_words_mean(task):
     planner = make_planner("listener", {}, "the test")
     assert play_with(planner, task, 1, "reasoning")[0]["status"] == "success"
+
+
+@pytest.mark.sim
+def test_planners_guess_by_the_seed_of_the_policy():
+    """The command alone fits several goals in this episode."""
+    needs = PolicyNeeds.of(make_policy("planner:forgetful", 0)).env_options
+    env = roboirg.make("VideoUnmask", episode=0, setting="direct", **needs)
+    _, info = env.reset()
+
+    def first(seed):
+        policy = make_policy("planner:forgetful", seed)
+        policy.attach(env)
+        policy.reset(env.instruction.text, info["demonstration"])
+        return policy.planner.plan({}, 0)
+
+    assert first(3) == first(3)
+    assert len({first(seed) for seed in range(8)}) > 1
+    env.close()
 
 
 @pytest.mark.sim

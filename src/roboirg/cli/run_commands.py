@@ -73,7 +73,7 @@ def run(
     on_record: OnRecord = None,
     dry_run: Annotated[
         bool,
-        typer.Option("--dry-run", help="Only check, count the episodes and estimate the time."),
+        typer.Option("--dry-run", help="Only check, count the episodes, estimate time and costs."),
     ] = False,
     show_plan: Annotated[
         bool,
@@ -295,6 +295,39 @@ def _print_estimate(plan: Plan, folder: Path, workers: int | None) -> None:
     found = estimate(todo, played.values(), min(count, core_count()), speed)
     for line in estimate_text(found, len(jobs), count, speed):
         console.print(line, highlight=False)
+    _print_model_costs(todo, jobs, folder, console)
+
+
+def _print_model_costs(
+    todo: Sequence[Job], jobs: Sequence[Job], folder: Path, console: Console
+) -> None:
+    """Print what models are expected to be asked, and what that costs."""
+    from rich.table import Table
+
+    from roboirg.evaluation.run.cost_estimate import model_costs
+    from roboirg.util.console_width import widen
+
+    table = Table(title="what models will be asked, about", title_justify="left")
+    table.add_column("policy")
+    table.add_column("setting")
+    for name in ("calls", "tokens in", "tokens out", "US$"):
+        table.add_column(name, justify="right")
+    measured = 0
+    for one in model_costs(todo, jobs, folder):
+        cost = "not known" if one.cost_usd is None else f"{one.cost_usd:.2f}"
+        table.add_row(one.policy, one.setting, *(f"{size:,.0f}" for size in one.sizes), cost)
+        measured += one.measured
+    table.caption = (
+        "for a model that names the right subgoals, one call each or as its planner asks; tokens "
+        + (
+            "by the stored answers"
+            if measured
+            else "by letters and pictures, without thoughts; US$ by input_price and output_price"
+        )
+    )
+    if table.row_count:
+        widen(console, table)
+        console.print(table)
 
 
 def _print_prompt_shares(

@@ -29,7 +29,7 @@ from roboirg.apps.policy_check.turn_check import largest_difference, play_in_tur
 from roboirg.core.actions import check_chunk
 from roboirg.core.errors import MissingDependencyError, RoboIRGError
 from roboirg.core.plain_text import counted, verb_for
-from roboirg.policies.by_name.loading import needs_host
+from roboirg.policies.by_name.loading import needs_host, planner_alone
 from roboirg.policies.contract.base import tell_policy
 from roboirg.policies.contract.policy_needs import PolicyNeeds
 
@@ -184,7 +184,7 @@ def check_reset(player: PolicyPlayer) -> Iterator[CheckResult]:
 def check_turns(player: PolicyPlayer) -> Iterator[CheckResult]:
     """Check what a host relies on: episodes that share a process do not change each other."""
     spec = player.source
-    if not isinstance(spec, str) or not needs_host(spec):
+    if not isinstance(spec, str) or not needs_host(spec) or planner_alone(spec):
         return
     if not _is_deterministic(player):
         yield CheckResult("turns", NOTE, "Not checked: the policy is not deterministic.")

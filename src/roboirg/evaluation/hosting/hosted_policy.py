@@ -12,7 +12,7 @@ import socket
 import sys
 import time
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,6 +32,7 @@ from roboirg.evaluation.hosting.messages import (
     send,
 )
 from roboirg.evaluation.policy_calls import read_metadata
+from roboirg.policies.contract.base import SubgoalEnd
 from roboirg.policies.contract.policy_urls import is_url
 
 _DRAWN = ("_rgb", "_depth")
@@ -70,6 +71,7 @@ class HostedPolicy:
         self.subgoal: str | None = None
         self._demonstration: Demonstration = {}
         self._is_open = True
+        self._ends: list[SubgoalEnd] = []
         found = self._call(Call("open", spec=spec, seed=seed, alone=alone))
         found.needs.declare_on(self)
         self.version, self._reads = found.version, found.reads
@@ -183,6 +185,21 @@ class HostedPolicy:
         if draw is not None and len(drawn) == everything > 1:
             draw()  # all cameras in one replay
         return {field: self._demonstration[field] for field in fields}
+
+
+class HostedPlanner(HostedPolicy):
+    """A planner in its host's process, whose hands are in this one."""
+
+    def learn(self, end: SubgoalEnd) -> None:
+        """Keep how a subgoal ended for the next call."""
+        self._ends.append(end)
+
+    def plan(self, observation: Observation, step: int) -> str | None:
+        """Return the subgoal from now on."""
+        seen: dict[str, Any] = {**observation, "step": step, "ends": list(self._ends)}
+        self._ends.clear()
+        self.act(cast("Observation", seen))
+        return self.subgoal
 
 
 def _print(output: bytes) -> None:

@@ -12,10 +12,13 @@ from roboirg.policies.by_name.loading import (
     is_foreign,
     is_privileged,
     load_policy_class,
+    planner_alone,
     policy_needs,
     policy_version,
 )
+from roboirg.policies.by_name.systems import SCRIPTED, make_hands
 from roboirg.policies.contract.policy_needs import PolicyNeeds
+from roboirg.policies.planners.hierarchical_policy import joint_version
 from roboirg.util.deadline_watch import DeadlineWatch
 
 LIMIT_S = 600.0
@@ -81,7 +84,7 @@ def _describe_apart(spec: str) -> PolicyDescription:
     try:
         with DeadlineWatch(child.kill) as watch:
             watch.begin(LIMIT_S)
-            reply = child.exchange([Call("describe", spec=spec)])
+            reply = child.exchange([Call("describe", spec=planner_alone(spec) or spec)])
     except EpisodeLostError as error:
         late = f"its module was not imported within {LIMIT_S:g} s"
         why = error if watch.acted_after is None else late
@@ -95,4 +98,8 @@ def _describe_apart(spec: str) -> PolicyDescription:
         missing = found.error == "missing"
         raise (MissingDependencyError if missing else InvalidValueError)(found.message)
     # Whether it is privileged is not for its own process to say.
+    if planner_alone(spec) is not None:
+        hands = make_hands(SCRIPTED, 0)
+        needs = PolicyNeeds.of(hands).merge(found.needs)
+        return PolicyDescription(joint_version(found, hands), is_privileged(spec), needs)
     return PolicyDescription(found.version, is_privileged(spec), found.needs)

@@ -12,15 +12,16 @@ from numpy.typing import ArrayLike, NDArray
 from roboirg.core.actions import ActionSpace
 from roboirg.core.delivery import SpokenInstruction
 from roboirg.core.inference_facts import inference_facts
-from roboirg.core.observations import Demonstration
+from roboirg.core.observations import FRONT, Demonstration
 from roboirg.core.subgoal_text import split_point
 from roboirg.evaluation.play.call_guard import CallGuard
+from roboirg.evaluation.play.point_sheet import MOST_PICTURES, Pointing
 from roboirg.evaluation.play.rollout_result import RolloutResult
 from roboirg.evaluation.play.video_writer import FrameSink
 from roboirg.evaluation.policy_calls import next_actions, policy_metadata, policy_subgoal
 from roboirg.evaluation.records.record import Job, SubgoalRecord
 from roboirg.judging import judge_subgoal, plain_subgoal
-from roboirg.policies.by_name.loading import is_foreign, is_privileged
+from roboirg.policies.by_name.loading import is_foreign, is_privileged, planner_alone
 from roboirg.policies.contract.base import Policy
 from roboirg.policies.contract.play import EpisodeLoop
 from roboirg.policies.contract.policy_needs import PolicyNeeds
@@ -59,6 +60,8 @@ class GuardedLoop(EpisodeLoop):
         self._job, self._space, self._writer = job, space, writer
         self._result, self._guard = result, guard
         self._is_ours = not is_foreign(job.policy_spec)
+        self._knows_ends = self._is_ours or planner_alone(job.policy_spec) is not None
+        self._cameras = PolicyNeeds.of(policy).cameras
         self._reports, self._ends = bool(getattr(policy, "reports", False)), 0
 
     def play(self) -> dict[str, Any]:
@@ -115,7 +118,7 @@ class GuardedLoop(EpisodeLoop):
 
     def _note_ends(self) -> None:
         """Keep how subgoals ended, and those that were refused meanwhile."""
-        ends = getattr(self.policy, "endings", ()) if self._is_ours else ()
+        ends = getattr(self.policy, "endings", ()) if self._knows_ends else ()
         for end in ends[self._ends :]:
             found = self._result.subgoals
             if end.how == "refused":
@@ -136,6 +139,9 @@ class GuardedLoop(EpisodeLoop):
         _, point = split_point(subgoal)
         if self._writer is not None:
             self._writer.point = point
+        shown = self._result.pointings
+        if point is not None and FRONT in self._cameras and len(shown) < MOST_PICTURES:
+            shown.append(Pointing(self._result.steps, self.env.picture(FRONT).copy(), point))
         verdict = judge_subgoal(subgoal, stage, self.env.objects_at(point) if point else None)
         found.append(
             SubgoalRecord(

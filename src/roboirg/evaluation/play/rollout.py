@@ -29,31 +29,32 @@ from roboirg.evaluation.episode_errors import (
     one_line,
 )
 from roboirg.evaluation.hosting.host_pool import HostSettings
-from roboirg.evaluation.hosting.hosted_policy import HostedPolicy
+from roboirg.evaluation.hosting.hosted_policy import HostedPlanner, HostedPolicy
 from roboirg.evaluation.hosting.policy_descriptions import PolicyDescription, describe_here
 from roboirg.evaluation.play.call_guard import CallGuard
 from roboirg.evaluation.play.guarded_loop import GuardedLoop
 from roboirg.evaluation.play.job_instruction import PreparedJob
+from roboirg.evaluation.play.point_sheet import write_point_sheet
 from roboirg.evaluation.play.policy_environment import job_needs, make_env
 from roboirg.evaluation.play.prompt_shares import audit_job, too_long_text
 from roboirg.evaluation.play.rollout_result import RolloutResult, make_record, utc_now
 from roboirg.evaluation.play.video_writer import FrameSink, VideoWriter
 from roboirg.evaluation.policy_calls import policy_usage
 from roboirg.evaluation.records.action_log import write_actions
-from roboirg.evaluation.records.film import VideoMode, VideoOptions
+from roboirg.evaluation.records.film import VIDEO_FOLDER, VideoMode, VideoOptions, points_name
 from roboirg.evaluation.records.record import Job, Record
 from roboirg.language.wordings.wording_store import open_wordings
-from roboirg.policies.by_name.loading import needs_host
+from roboirg.policies.by_name.loading import is_privileged, needs_host, planner_alone
+from roboirg.policies.by_name.systems import SCRIPTED, make_hands
 from roboirg.policies.contract.base import Policy, close_policy
 from roboirg.policies.contract.policy_needs import PolicyNeeds
 from roboirg.policies.contract.random_state import episode_policy_seed
+from roboirg.policies.planners.hierarchical_policy import HierarchicalPolicy, with_planner
 from roboirg.policies.prompt_length.declared_limit import prompt_limit
 from roboirg.policies.vlm.models.reply_store import ReplySettings, use_replies
 
 PlayJob = Callable[[Job], Record]
 """Function that plays one job. Executors send it to other processes, so it must be picklable."""
-
-VIDEO_FOLDER = "videos"
 
 MAX_LOSSES = 20
 """How often an episode is played again because other episodes broke the policy's process."""
@@ -64,7 +65,7 @@ class EpisodeRunner:
     """Plays jobs with the simulator and real policies.
 
     Attributes:
-        folder: output folder of the run; videos go to ``videos/`` in it.
+        folder: output folder of the run; videos and sheets of points go to ``videos/`` in it.
         video: which episodes get a video.
         options: format of the videos.
         policy_timeout_s: seconds that one call of the policy may take, if a supervisor watches.
@@ -108,6 +109,7 @@ class EpisodeRunner:
             writer, result = self._play(job)
         video = self._finish_video(writer, result)
         error = None if writer is None else writer.error
+        write_point_sheet(result.pointings, self.folder / points_name(job.slug))
         log = result.action_log
         return make_record(
             job,
@@ -203,9 +205,9 @@ def play_episode(
                 policy = load_policy(prepared, seed_secret)
             else:
                 seed = _policy_seed(prepared, seed_secret)
-                hosted = HostedPolicy(hosts, job.policy_spec, seed, alone=alone)
-                result.policy = PolicyDescription(hosted.version, is_privileged=False)
-                policy = hosted
+                policy = load_hosted_policy(hosts, job.policy_spec, seed, alone=alone)
+                privileged = is_privileged(job.policy_spec)
+                result.policy = PolicyDescription(policy.version, privileged)
             needs = job_needs(policy, job)
             result.prompt_limit = prompt_limit(needs)
         if refuse_long:
@@ -274,6 +276,16 @@ def load_policy(prepared: PreparedJob, seed_secret: str = "") -> Policy:
     return policy
 
 
+def load_hosted_policy(
+    hosts: socket, spec: str, seed: int, *, alone: bool = False
+) -> HostedPolicy | HierarchicalPolicy:
+    """Return a policy in a process of its own; scripted hands of a user's planner are in this."""
+    if (planner := planner_alone(spec)) is None:
+        return HostedPolicy(hosts, spec, seed, alone=alone)
+    hosted = HostedPlanner(hosts, planner, seed, alone=alone)
+    return with_planner(hosted, make_hands(SCRIPTED, seed), spec.partition("?")[0])
+
+
 def _policy_seed(prepared: PreparedJob, secret: str) -> int:
     job = prepared.job
     if job.arm == AGAIN:
@@ -295,5 +307,6 @@ def _close_policy(policy: Policy, result: RolloutResult, guard: CallGuard) -> No
                 close_policy(policy)
     except EpisodeError as error:
         result.details = result.details or error.details
-    if isinstance(policy, HostedPolicy):
-        result.timings["policy_wait"] = round(policy.waited_s, 6)
+    hosted = getattr(policy, "planner", policy)
+    if isinstance(hosted, HostedPolicy):
+        result.timings["policy_wait"] = round(hosted.waited_s, 6)

@@ -17,6 +17,7 @@ from roboirg.core.errors import EndOfRunError
 from roboirg.core.extras import extra_needed
 from roboirg.core.observations import FRONT
 from roboirg.core.subgoal_text import Point
+from roboirg.evaluation.play.point_sheet import with_ring
 from roboirg.evaluation.records.film import LAST_FRAME_REPEATS, VideoOptions
 from roboirg.util.text_overlay import draw_text, wrap_text
 
@@ -28,9 +29,6 @@ Frame = NDArray[np.uint8]
 
 DEMONSTRATION_COLOR = (255, 176, 32)
 """RGB of the border around the frames of the demonstration."""
-
-RING_COLOR, RING_RADIUS, RING_WIDTH = (255, 230, 0), 6, 2
-"""RGB and pixels of the ring around the point of a subgoal."""
 
 BORDER = 6
 GAP = 4
@@ -107,15 +105,6 @@ def compose_frame(
     return np.concatenate([frame, _caption_bar(caption, frame.shape[1], longest_caption)])
 
 
-def _with_ring(picture: Frame, point: Point) -> Frame:
-    """Return a copy of a picture with a ring around a point; inside it the picture is unchanged."""
-    rows, columns = np.indices(picture.shape[:2])
-    distance = np.hypot(rows - point[0], columns - point[1])
-    marked = picture.copy()
-    marked[np.abs(distance - RING_RADIUS) <= RING_WIDTH / 2] = RING_COLOR
-    return marked
-
-
 @functools.lru_cache(maxsize=8)
 def _caption_bar(caption: str, width: int, longest: str) -> Frame:
     """Return a caption as an image; its height is even, because H.264 needs that."""
@@ -176,7 +165,7 @@ class VideoWriter:
             pictures = [source.picture(camera) for camera in self.options.cameras]
             if self.point is not None and FRONT in self.options.cameras:
                 place = self.options.cameras.index(FRONT)
-                pictures[place] = _with_ring(pictures[place], self.point)
+                pictures[place] = with_ring(pictures[place], self.point)
             frame = compose_frame(
                 pictures,
                 self.caption,

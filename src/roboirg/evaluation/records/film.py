@@ -1,13 +1,16 @@
-"""The format of the videos that a run records."""
+"""The videos that a run records: their format, and where they are."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Literal, get_args
 
 VideoMode = Literal["off", "failures", "all"]
 VIDEO_MODES: tuple[VideoMode, ...] = get_args(VideoMode)
 """Which episodes get a video."""
+VIDEO_FOLDER = "videos"
+_POINTS = "-points.jpg"
 LAST_FRAME_REPEATS = 8
 """The last frame stays for most of a second, so that a viewer sees how the episode ended."""
 
@@ -27,3 +30,14 @@ class VideoOptions:
     rate: int = 10
     cameras: tuple[str, ...] = ("front", "wrist")
     quality: int = 28
+
+
+def points_name(slug: str) -> str:
+    """Return the path, in a run's folder, of the sheet with a planner's points in an episode."""
+    return f"{VIDEO_FOLDER}/{slug}{_POINTS}"
+
+
+def pointed_slugs(folder: Path) -> frozenset[str]:
+    """Return the slugs of a run's episodes that have such a sheet."""
+    found = (folder / VIDEO_FOLDER).glob(f"[!.]*{_POINTS}")
+    return frozenset(path.name.removesuffix(_POINTS) for path in found)

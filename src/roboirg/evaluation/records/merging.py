@@ -13,6 +13,7 @@ import msgspec
 from roboirg.core.errors import InvalidValueError
 from roboirg.evaluation.records.action_log import action_path
 from roboirg.evaluation.records.episode_log import log_path, logged_slugs
+from roboirg.evaluation.records.film import pointed_slugs, points_name
 from roboirg.evaluation.records.record import Summary
 from roboirg.evaluation.records.record_codec import (
     StoreError,
@@ -140,12 +141,14 @@ def _lines(
 
     A video whose file is missing is removed from its line.
     """
-    logs = logged_slugs(source)
+    logs, pointed = logged_slugs(source), pointed_slugs(source)
     for one, line in zip(wanted, run.lines(wanted), strict=True):
         if logs and (slug := one.slug) in logs:
             _copy_log(source, target, log_path(Path(), slug).as_posix())
+        if pointed and (slug := one.slug) in pointed:
+            _copy_present(points_name(slug), source, target)
         if one.action_log is not None:
-            _copy_actions(one.action_log, source, target)
+            _copy_present(action_path(Path(), one.action_log).as_posix(), source, target)
         if one.video is None or _copy_video(one.video, source, target):
             yield line
         else:
@@ -167,12 +170,11 @@ def _copy_video(name: str, source: Path, target: Path) -> bool:
     return True
 
 
-def _copy_actions(digest: str, source: Path, target: Path) -> None:
-    name = action_path(Path(), digest).as_posix()
-    actions, copy = run_file(source, name), run_file(target, name)
-    if actions.is_file() and not copy.exists():
+def _copy_present(name: str, source: Path, target: Path) -> None:
+    file, copy = run_file(source, name), run_file(target, name)
+    if file.is_file() and not copy.exists():
         copy.parent.mkdir(parents=True, exist_ok=True)
-        _copy_file(actions, copy)
+        _copy_file(file, copy)
 
 
 def _copy_log(source: Path, target: Path, name: str) -> None:

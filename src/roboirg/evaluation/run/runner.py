@@ -21,8 +21,9 @@ from roboirg.evaluation.episode_errors import MAX_CAUSE_LENGTH, format_cause
 from roboirg.evaluation.hosting.policy_descriptions import describe_policy
 from roboirg.evaluation.plan.plan import Plan
 from roboirg.evaluation.plan.stored_plans import write_plan
-from roboirg.evaluation.play.rollout import VIDEO_FOLDER, EpisodeRunner, PlayJob
+from roboirg.evaluation.play.rollout import EpisodeRunner, PlayJob
 from roboirg.evaluation.play.video_writer import check_video_support, without_unfinished_videos
+from roboirg.evaluation.records.film import VIDEO_FOLDER
 from roboirg.evaluation.records.record import Job, Record, Summary
 from roboirg.evaluation.records.record_codec import identity_key
 from roboirg.evaluation.records.store import (

@@ -6,6 +6,7 @@ import inspect
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, cast
+from urllib.parse import urlencode
 
 from roboirg.core.errors import InvalidValueError
 from roboirg.core.field_types import as_name
@@ -16,16 +17,14 @@ from roboirg.policies.by_name.policy_classes import (
     find_class,
     make_from_class,
 )
-from roboirg.policies.by_name.systems import HANDS, SCRIPTED, find_system
+from roboirg.policies.by_name.policy_specs import PRIVILEGED
+from roboirg.policies.by_name.systems import ELSEWHERE, HANDS, SCRIPTED, find_system
 from roboirg.policies.contract.base import Policy
 from roboirg.policies.contract.policy_needs import PolicyNeeds
 from roboirg.policies.contract.policy_urls import is_url, parse_query
 from roboirg.util.short_hash import short_hash
 
 _MAX_VERSION_LENGTH = 200
-
-PRIVILEGED = "privileged:"
-"""Before the spec of a foreign policy: the user lets it read the simulator's state."""
 
 
 def declares_privilege(spec: str) -> bool:
@@ -95,9 +94,26 @@ def is_foreign(spec: str) -> bool:
         policy = find_system(name, parse_query(spec, query)).policy
         return policy != SCRIPTED and is_foreign(policy)
     if kind == policy_specs.PLANNER:
+        if ":" in name:
+            return True
         hands = parse_query(spec, query).get(HANDS, SCRIPTED)
         return hands != SCRIPTED and is_foreign(hands)
     return not policy_specs.comes_with_us(kind)
+
+
+def planner_alone(spec: str) -> str | None:
+    """Return the spec of what gets a process of its own of a user's planner with scripted hands.
+
+    The hands stay with the world. None for other policies, and for a planner declared privileged.
+    """
+    kind, _, rest = spec.partition(":")
+    name, _, query = rest.partition("?")
+    if kind != policy_specs.PLANNER or ":" not in name:
+        return None
+    options = parse_query(spec, query)
+    if options.get(HANDS, SCRIPTED) != SCRIPTED:
+        return None
+    return f"{kind}:{name}?{urlencode({**options, HANDS: ELSEWHERE})}"
 
 
 def needs_host(spec: str) -> bool:
@@ -118,7 +134,7 @@ def is_privileged(spec: str) -> bool:
     """
     try:
         if declares_privilege(spec) or is_foreign(spec):
-            return declares_privilege(spec)
+            return declares_privilege(spec) or planner_alone(spec) is not None
         return hasattr(_declaring(spec), "attach")
     except InvalidValueError:
         return False
@@ -156,12 +172,10 @@ def _declaring(spec: str) -> object:
 
 def _refuse_undeclared(spec: str, policy: object) -> None:
     """Raise if a foreign policy or its class has ``attach``, which its spec does not declare."""
-    if not declares_privilege(spec) and is_foreign(spec) and hasattr(policy, "attach"):
-        raise InvalidValueError(
-            f"Policy {spec!r} has attach(), with which a policy reads the simulator's state; "
-            f"declare that as {PRIVILEGED + spec!r}, in Python with roboirg.Privileged(policy), or "
-            "remove attach()."
-        )
+    # With scripted hands the whole has attach; the planner, which is all that is foreign, must not.
+    part = policy if planner_alone(spec) is None else getattr(policy, "planner", None)
+    if not declares_privilege(spec) and is_foreign(spec) and hasattr(part, "attach"):
+        raise policy_specs.undeclared_error(spec)
 
 
 def server_version(metadata: Mapping[str, Any]) -> str | None:

@@ -8,7 +8,8 @@ from dataclasses import dataclass
 from types import ModuleType
 from typing import Any
 
-from roboirg.policies.by_name.loading import PRIVILEGED, undeclared
+from roboirg.policies.by_name.loading import undeclared
+from roboirg.policies.by_name.policy_specs import PRIVILEGED
 
 MODULE = "roboirg_local_policies"
 """Name of a module that exists in this process only; it holds what no other process can import."""

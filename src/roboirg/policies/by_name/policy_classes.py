@@ -17,8 +17,10 @@ from roboirg.policies.contract.base import Policy
 from roboirg.policies.contract.batch_policy import make_batched, takes_batches
 from roboirg.policies.contract.policy_needs import PolicyNeeds
 from roboirg.policies.contract.policy_urls import is_url
+from roboirg.policies.planners.planner import Planner
 from roboirg.policies.remote.protocols import protocols_by_scheme
 from roboirg.util.discovery import entry_names
+from roboirg.util.short_hash import short_hash
 
 _MAX_SHOWN = 3
 
@@ -60,6 +62,22 @@ def find_class(spec: str) -> type[Any]:
         policy_class = _url_class(spec)
         _check_needs(spec, policy_class(spec))
         return policy_class
+    return _import_class(spec, ("reset", "act"))
+
+
+def make_planner_of_class(spec: str, seed: int) -> Planner:
+    """Make a planner of ``package.module:Class``; raises like `find_class`.
+
+    Without a ``version`` of its own it gets a fingerprint of the file that defines it.
+    """
+    found = _import_class(spec, ("reset", "plan"))
+    planner: Planner = _construct(spec, found, seed)
+    if not hasattr(planner, "version"):
+        planner.version = short_hash(Path(inspect.getfile(found)).read_bytes())  # type: ignore[attr-defined]
+    return planner
+
+
+def _import_class(spec: str, methods: tuple[str, ...]) -> type[Any]:
     if spec not in BUILTIN and ":" not in spec:
         if (hint := _describe_module(spec)) is not None:
             raise InvalidValueError(f"Policy {spec!r} {hint}")
@@ -78,7 +96,7 @@ def find_class(spec: str) -> type[Any]:
             f"Policy {spec!r}: {name!r} in module {module_name} is of type "
             f"{type(found).__name__}, not a class."
         )
-    _check_class(spec, found)
+    _check_class(spec, found, methods)
     return found
 
 
@@ -105,7 +123,7 @@ def _construct(spec: str, policy_class: type[Any], seed: int) -> Any:  # noqa: A
     return policy_class(seed=seed) if "seed" in _parameters(policy_class) else policy_class()
 
 
-def _check_class(spec: str, policy_class: type[Any]) -> None:
+def _check_class(spec: str, policy_class: type[Any], methods: tuple[str, ...]) -> None:
     """Raise for a class with which every episode would end in an error."""
     name = policy_class.__name__
     if takes_batches(policy_class) and hasattr(policy_class, "attach"):
@@ -113,7 +131,7 @@ def _check_class(spec: str, policy_class: type[Any]) -> None:
             f"Policy {spec!r}: class {name} has attach() and act_batch(); a privileged policy is "
             "asked about one episode at a time."
         )
-    for method in () if takes_batches(policy_class) else ("reset", "act"):
+    for method in () if takes_batches(policy_class) else methods:
         if not hasattr(policy_class, method):
             raise InvalidValueError(f"Policy {spec!r}: class {name} has no method {method}().")
         if not callable(getattr(policy_class, method)):

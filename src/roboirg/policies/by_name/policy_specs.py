@@ -4,6 +4,7 @@
 | --- | --- |
 | ``system:NAME?server=host:port&vlm=URL`` | a system of the paper, or of a file |
 | ``planner:KIND?hands=scripted&model=NAME`` | a planner, and the scripted expert as its hands |
+| ``planner:package.module:Class?hands=scripted`` | a planner of the user's own |
 | ``vlm-listener:PROVIDER?model=NAME&base_url=URL`` | a model names the goal |
 
 Installed packages add kinds through entry points of the group ``roboirg.policy_kinds``: an entry
@@ -19,11 +20,12 @@ from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from roboirg.core.errors import InvalidValueError, UnknownNameError
-from roboirg.policies.by_name.policy_classes import KINDS_GROUP
+from roboirg.policies.by_name.policy_classes import KINDS_GROUP, make_planner_of_class
 from roboirg.policies.contract.base import Policy
 from roboirg.policies.contract.option_checking import check_options
 from roboirg.policies.contract.policy_needs import PolicyNeeds
 from roboirg.policies.contract.policy_urls import parse_query
+from roboirg.policies.planners.planner_alone import PlannerAlone
 from roboirg.policies.vlm.models import ModelOptions
 from roboirg.policies.vlm.vlm_listener import ListenerOptions, VLMListener
 from roboirg.util.discovery import entry_names, find_entry
@@ -34,6 +36,8 @@ if TYPE_CHECKING:
 SYSTEM = "system"
 PLANNER = "planner"
 LISTENER = "vlm-listener"
+PRIVILEGED = "privileged:"
+"""Before the spec of a foreign policy: the user lets it read the simulator's state."""
 PolicyMaker = Callable[[int], Policy]
 """Makes a policy from a seed, without network or the libraries of providers."""
 
@@ -104,10 +108,12 @@ def _system(spec: str, name: str, options: Mapping[str, str]) -> PolicyMaker:
     return lambda seed: build_system(system, seed)
 
 
-def _planner(_spec: str, name: str, options: Mapping[str, str]) -> PolicyMaker:
+def _planner(spec: str, name: str, options: Mapping[str, str]) -> PolicyMaker:
     """Return what makes planners with hands; its model's options stand next to its own."""
     from roboirg.policies.by_name.systems import HANDS, SCRIPTED, System, build_system
 
+    if ":" in name:
+        return _planner_of_class(spec, name, options)
     of_model = {key: value for key, value in options.items() if key in ModelOptions.model_fields}
     own: dict[str, Any] = {key: value for key, value in options.items() if key not in of_model}
     hands = own.pop(HANDS, SCRIPTED)
@@ -116,6 +122,35 @@ def _planner(_spec: str, name: str, options: Mapping[str, str]) -> PolicyMaker:
     planner = {"kind": name, **own}
     system = System(name=f"{PLANNER}:{name}", about="", policy=hands, planner=planner)
     return lambda seed: build_system(system, seed)
+
+
+def _planner_of_class(spec: str, name: str, options: Mapping[str, str]) -> PolicyMaker:
+    """Return what makes planners of a class with hands, or without."""
+    from roboirg.policies.by_name.systems import ELSEWHERE, HANDS, SCRIPTED, make_hands
+    from roboirg.policies.planners.hierarchical_policy import with_planner
+
+    if others := sorted(options.keys() - {HANDS}):
+        raise UnknownNameError(f"option of {spec}:", others[0], [HANDS])
+    hands = options.get(HANDS, SCRIPTED)
+
+    def make(seed: int) -> Policy:
+        planner = make_planner_of_class(name, seed)
+        if hands == ELSEWHERE:
+            if hasattr(planner, "attach"):
+                raise undeclared_error(f"{PLANNER}:{name}")
+            return PlannerAlone(planner)
+        return with_planner(planner, make_hands(hands, seed), f"{PLANNER}:{name}")
+
+    return make
+
+
+def undeclared_error(spec: str) -> InvalidValueError:
+    """Return the error of a foreign policy that has ``attach``, which its spec does not declare."""
+    return InvalidValueError(
+        f"Policy {spec!r} has attach(), with which a policy reads the simulator's state; "
+        f"declare that as {PRIVILEGED + spec!r}, in Python with roboirg.Privileged(policy), or "
+        "remove attach()."
+    )
 
 
 def _listener(_spec: str, name: str, options: Mapping[str, str]) -> PolicyMaker:

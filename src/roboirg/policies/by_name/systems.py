@@ -23,7 +23,8 @@ PACKAGE, FOLDER = "roboirg.policies.by_name", "system_files"
 SUFFIX = ".toml"
 
 SERVER, VLM, MODEL, HANDS = "server", "vlm", "model", "hands"
-SCRIPTED = "scripted"
+SCRIPTED, ELSEWHERE = "scripted", "elsewhere"
+"""Hands next to the world; and none, as a planner's own process has none."""
 POLICY, PLANNER = "policy.", "planner."
 SHORTCUTS: Mapping[str, str] = {VLM: "planner.model.base_url", MODEL: "planner.model.model"}
 """Short names of options, and the entries that they set."""
@@ -119,14 +120,19 @@ def find_system(name_or_file: str, overrides: Mapping[str, str]) -> System:
 
 def build_system(system: System, seed: int) -> Policy:
     """Make the policy of a system; nothing is connected."""
-    spec = HANDS_CLASS if system.policy == SCRIPTED else system.policy
-    policy = make_from_class(spec, find_class(spec), seed)
+    policy = make_hands(system.policy, seed)
     if system.planner is None:
         return policy
     options = dict(system.planner)
     kind = str(options.pop("kind", ""))
-    planner = make_planner(kind, options, f"the planner of system {system.name}")
+    planner = make_planner(kind, options, f"the planner of system {system.name}", seed)
     return with_planner(planner, policy, system.name)
+
+
+def make_hands(spec: str, seed: int) -> Policy:
+    """Make the policy of a spec, or the scripted hands; nothing is connected."""
+    spec = HANDS_CLASS if spec == SCRIPTED else spec
+    return make_from_class(spec, find_class(spec), seed)
 
 
 def _overridden(system: System, overrides: Mapping[str, str], origin: str) -> System:

@@ -25,13 +25,14 @@ PLANNERS: Mapping[str, str] = {
 if it has that, the defaults that belong to a kind."""
 
 
-def make_planner(kind: str, options: Mapping[str, Any], origin: str) -> Planner:
+def make_planner(kind: str, options: Mapping[str, Any], origin: str, seed: int = 0) -> Planner:
     """Make a planner.
 
     Args:
         kind: one of `PLANNERS`.
         options: of that kind.
         origin: of the options, for error messages.
+        seed: of its own random choices.
 
     Raises:
         UnknownNameError: there is no such planner, or it has no such option.
@@ -42,5 +43,5 @@ def make_planner(kind: str, options: Mapping[str, Any], origin: str) -> Planner:
     planner_class = pkgutil.resolve_name(PLANNERS[kind])
     options_type: type[BaseModel] = planner_class.options_type
     values = {**getattr(planner_class, "settings", {}).get(kind, {}), **options}
-    planner: Planner = planner_class(check_options(options_type, values, origin), kind)
+    planner: Planner = planner_class(check_options(options_type, values, origin), kind, seed)
     return planner

@@ -34,11 +34,13 @@ class GoalPlanner(OraclePlanner):
     gives no goal of the scene, and before everything has been said, it names nothing.
     """
 
-    def __init__(self, options: OracleOptions | None = None, kind: str = "listener") -> None:
+    def __init__(
+        self, options: OracleOptions | None = None, kind: str = "listener", seed: int = 0
+    ) -> None:
         super().__init__(options, kind)
         self.grounded = False  # it reads the pixels itself
         decider: type[ScriptedPolicy] = pkgutil.resolve_name(DECIDERS[kind])
-        self._decider = decider()
+        self._decider = decider(seed)
         self._heard: list[str] = []
         self._stages: Sequence[Stage] | None = None
         self._index = self._retries = 0
@@ -94,8 +96,10 @@ class GoalPlanner(OraclePlanner):
 class FixedPlanner(GoalPlanner):
     """Makes the listener's plan at the start, and never looks again: what fails is not repeated."""
 
-    def __init__(self, options: OracleOptions | None = None, kind: str = "fixed") -> None:
-        super().__init__(options, kind)
+    def __init__(
+        self, options: OracleOptions | None = None, kind: str = "fixed", seed: int = 0
+    ) -> None:
+        super().__init__(options, kind, seed)
         self._plan: list[str] = []
 
     def begin(self, stages: Sequence[Stage]) -> None:

@@ -89,8 +89,7 @@ class HierarchicalPolicy:
     @property
     def version(self) -> str:
         """The versions of both."""
-        versions = (getattr(one, "version", "unknown") for one in (self.planner, self.policy))
-        return " + ".join(str(version) for version in versions)
+        return joint_version(self.planner, self.policy)
 
     @property
     def metadata(self) -> dict[str, Any]:
@@ -160,7 +159,8 @@ class HierarchicalPolicy:
         self._told += len(new)
         for end in new:
             if hasattr(self.planner, "learn"):
-                self.planner.learn(end)
+                # Names of objects are the world's: they would do the remembering.
+                self.planner.learn(end._replace(thing=None))
 
     def usage(self) -> dict[str, float]:
         """Return the cost of both."""
@@ -187,6 +187,11 @@ class PrivilegedHierarchicalPolicy(HierarchicalPolicy):
         for one in (self.planner, self.policy):
             if hasattr(one, "attach"):
                 one.attach(env)
+
+
+def joint_version(*parts: object) -> str:
+    """Return the versions of a planner and its policy as one."""
+    return " + ".join(str(getattr(one, "version", "unknown")) for one in parts)
 
 
 def with_planner(planner: Planner, policy: Policy, name: str | None = None) -> HierarchicalPolicy:

@@ -44,7 +44,12 @@ class OraclePlanner:
     version = "built-in"
     reports = False
 
-    def __init__(self, options: OracleOptions | None = None, kind: str = "oracle") -> None:
+    def __init__(
+        self,
+        options: OracleOptions | None = None,
+        kind: str = "oracle",
+        seed: int = 0,  # noqa: ARG002 - of planners that choose
+    ) -> None:
         self.options, self.kind = options or OracleOptions(), kind
         self.grounded = self.options.subgoals == "grounded"
         self._env: RoboIRGEnv | None = None
@@ -88,11 +93,13 @@ class OraclePlanner:
         stage = judge.published
         if not self.reports or stage is None:
             return self.env.subgoal
-        if stage.primitive.kind in HANDLES_HELD and self._lost():
-            return stage_subgoal(self.env, judge.stages, judge.index - 1, grounded=self.grounded)
-        if stage.primitive.kind == "hold_until":  # it is published one step longer than due
-            return stage_subgoal(self.env, judge.stages, judge.index, grounded=self.grounded)
-        return self.env.subgoal
+        index, kind = judge.index, stage.primitive.kind
+        lost = kind in HANDLES_HELD and self._lost()
+        # A stage is published one step longer than it is due, which counts for waiting only.
+        if lost or (kind != "hold_until" and judge.stages[index] is not stage):
+            index -= 1
+        # The environment's own pixel is of what is seen: the arm may hide the object in part.
+        return stage_subgoal(self.env, judge.stages, index, grounded=self.grounded)
 
     def _lost(self) -> bool:
         end = self._last

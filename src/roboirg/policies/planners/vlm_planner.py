@@ -12,7 +12,8 @@ from pydantic import BaseModel, ConfigDict, Field, field_validator, model_valida
 from roboirg.core.observations import Demonstration, Observation
 from roboirg.core.subgoal_text import split_point
 from roboirg.policies.contract.base import SubgoalEnd
-from roboirg.policies.planners.memories import FINISHED, MEMORIES, Memory, MemoryOptions
+from roboirg.policies.planners.memories import FINISHED, MEMORIES
+from roboirg.policies.planners.memory import Memory, MemoryOptions
 from roboirg.policies.planners.planner import EACH_CHUNK, WHEN_DONE
 from roboirg.policies.vlm.models import ModelOptions
 from roboirg.policies.vlm.models.model import config_version
@@ -148,6 +149,7 @@ class VLMPlanner:
     Args:
         options: when it asks, what it remembers, and its model.
         kind: name of its setting, for the records.
+        seed: unused.
 
     Raises:
         InvalidValueError: the prompts cannot be read.
@@ -158,14 +160,14 @@ class VLMPlanner:
     cameras = ("front",)
     reports = False
 
-    def __init__(self, options: PlannerOptions, kind: str) -> None:
+    def __init__(self, options: PlannerOptions, kind: str, seed: int = 0) -> None:  # noqa: ARG002
         self.options, self.kind = options, kind
         memory_class = MEMORIES[options.remembers]
         self.prompts = load_prompts(memory_class.prompts, options.prompts)
         self.memory: Memory = memory_class(options, self.prompts)
         self.observe_every = self.memory.observe_every
         self.demonstration_frames = self.memory.demonstration_frames
-        self._vlm = VLMQuery(options.model, self.prompts["again"])
+        self.vlm = VLMQuery(options.model, self.prompts["again"])
         self._now = _Planning("")
 
     @property
@@ -192,7 +194,7 @@ class VLMPlanner:
 
     def reset(self, instruction: str, demonstration: Demonstration) -> None:
         """Forget the last episode and begin another."""
-        self._vlm.start()
+        self.vlm.start()
         self._now = _Planning(instruction)
         self.memory.begin(demonstration)
 
@@ -219,7 +221,7 @@ class VLMPlanner:
                 return now.subgoal
         now.news = now.refused = False
         query = self.memory.query(observation, now.instruction, now.ends)
-        answer = self._vlm.ask(query, lambda text: self.memory.parse(text, now.subgoal))
+        answer = self.vlm.ask(query, lambda text: self.memory.parse(text, now.subgoal))
         if answer is None:
             now.useless += 1
             now.news = True
@@ -236,10 +238,10 @@ class VLMPlanner:
         use.
         """
         ended = {"finished": self._now.finished, "unreadable": self._now.useless > 0}
-        return {**self._vlm.usage(), **{name: 1.0 for name, holds in ended.items() if holds}}
+        return {**self.vlm.usage(), **{name: 1.0 for name, holds in ended.items() if holds}}
 
     def close(self) -> None:
-        self._vlm.close()
+        self.vlm.close()
 
     def _due(self, step: int) -> bool:
         """Return whether to query the model now."""

@@ -74,7 +74,8 @@ class VLMQuery:
         """Return calls, tokens and queries without a usable reply; the cost if prices are known.
 
         What was ``stored`` by an earlier try cost nothing again; ``anew`` is what was stored with
-        something else sent, and ``waited_s`` the time that the service made wait.
+        something else sent; ``answered_s`` the time that its answers took, and ``waited_s`` that in
+        queues and while it was busy.
         """
         usage: dict[str, float] = {
             "calls": self.calls,

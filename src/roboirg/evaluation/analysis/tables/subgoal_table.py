@@ -25,6 +25,8 @@ _COSTS: Mapping[str, str] = {
     "input_tokens": "tokens in",
     "output_tokens": "tokens out",
     "cost_usd": "US$",
+    "answered_s": "s for answers",
+    "waited_s": "s in queues",
     "refused": "refusals",
     "missed": "misses",
 }

@@ -29,22 +29,24 @@ class PaidModel:
         stored: replies that came from the store.
         anew: calls that were stored with something else sent, as by another machine.
         waited_s: seconds spent waiting for the service or for a turn.
+        answered_s: seconds in which the service answered.
     """
 
     def __init__(self, model: Model, options: ModelOptions) -> None:
         self._model, self._options = model, options
         self._service = f"{options.model} at {options.address()}"
-        self.stored = self.anew = 0
-        self.waited_s = 0.0
+        self.start()
 
     def start(self) -> None:
         """Reset the counts for a new episode."""
         self.stored = self.anew = 0
-        self.waited_s = 0.0
+        self.waited_s = self.answered_s = 0.0
 
     def counts(self) -> dict[str, float]:
         """Return the counts by name."""
-        return {"stored": self.stored, "anew": self.anew, "waited_s": round(self.waited_s, 3)}
+        times = {"waited_s": self.waited_s, "answered_s": self.answered_s}
+        rounded = {name: round(seconds, 3) for name, seconds in times.items()}
+        return {"stored": self.stored, "anew": self.anew, **rounded}
 
     def answer(self, query: ModelQuery) -> ModelReply:
         """Send a query and return the reply; see `Model`.
@@ -88,9 +90,12 @@ class PaidModel:
             before = time.monotonic()
             if store is not None:
                 store.wait_for_turn(self._service, self._options.requests_per_minute)
-            self.waited_s += time.monotonic() - before
+            asked = time.monotonic()
+            self.waited_s += asked - before
             try:
-                return self._model.answer(query)
+                reply = self._model.answer(query)
+                self.answered_s += time.monotonic() - asked
+                return reply
             except PolicyConnectionError as error:
                 is_busy = isinstance(error, ModelBusyError)
                 wanted = error.retry_after_s if isinstance(error, ModelBusyError) else None

@@ -90,4 +90,7 @@ def call_with_timeout(seconds: float, call: Callable[[], Value], what: str) -> V
 
 def timeout_error(what: str, seconds: float) -> PolicyTimeoutError:
     """Return the error for a reply that took too long."""
-    return PolicyTimeoutError(f"{what} did not answer within {seconds:g} s.")
+    return PolicyTimeoutError(
+        f"{what} did not answer within {seconds:g} s; timeout_s "
+        "allows it more, and max_output_tokens shortens answers."
+    )

@@ -1,0 +1,62 @@
+"""A planner as a policy, whose hands are in another process."""
+
+from __future__ import annotations
+
+from typing import Any, cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from roboirg.core.observations import Demonstration, Observation
+from roboirg.policies.contract.base import SubgoalEnd, close_policy, tell_policy
+from roboirg.policies.contract.policy_needs import PolicyNeeds
+from roboirg.policies.planners.planner import Planner
+
+
+class PlannerAlone:
+    """Names subgoals and does nothing; its process holds no world.
+
+    Args:
+        planner: gets how subgoals ended (``ends``) and the ``step`` from observations.
+
+    Attributes:
+        subgoal: the newest.
+    """
+
+    def __init__(self, planner: Planner) -> None:
+        self._planner: Any = planner
+        planner.reports = True  # type: ignore[attr-defined]
+        PolicyNeeds.of_planner(planner).declare_on(self)
+        self.version = str(getattr(planner, "version", "unknown"))
+        self.subgoal: str | None = None
+
+    @property
+    def metadata(self) -> dict[str, Any]:
+        """The planner's."""
+        return dict(getattr(self._planner, "metadata", {}))
+
+    def reset(self, instruction: str, demonstration: Demonstration) -> None:
+        """Begin an episode."""
+        self.subgoal = None
+        self._planner.reset(instruction, demonstration)
+
+    def hear(self, text: str, step: int) -> None:
+        """Pass on what was said."""
+        tell_policy(self._planner, [{"text": text, "step": step}])
+
+    def act(self, observation: Observation) -> NDArray[np.float64]:
+        """Let the planner name a subgoal; the action means nothing."""
+        seen: dict[str, Any] = dict(observation)
+        ends, step = seen.pop("ends"), seen.pop("step")
+        for end in ends if hasattr(self._planner, "learn") else ():
+            self._planner.learn(SubgoalEnd(*end))
+        self.subgoal = self._planner.plan(cast("Observation", seen), step)
+        return np.zeros((1, 8))
+
+    def usage(self) -> dict[str, float]:
+        """Return the planner's cost."""
+        return dict(self._planner.usage()) if hasattr(self._planner, "usage") else {}
+
+    def close(self) -> None:
+        """Close the planner."""
+        close_policy(self._planner)

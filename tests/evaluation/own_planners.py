@@ -1,0 +1,49 @@
+"""Planners of a user, each with another habit; they look around in their process."""
+
+import gc
+import os
+
+
+class Pointer:
+    """Names two subgoals of a form, and then the second again."""
+
+    cameras = ("front",)
+    version = "mine-1"
+
+    def reset(self, instruction, demonstration):
+        self.said, self.ends, self.pictures = instruction, [], 0
+
+    def learn(self, end):
+        self.ends.append(end)
+
+    def plan(self, observation, step):
+        self.pictures += observation["front_rgb"].shape == (256, 256, 3)
+        return "pick up the container" if self.ends else "remain static for 5 steps"
+
+    @property
+    def metadata(self):
+        kinds = {type(one).__name__ for one in gc.get_objects()}
+        return {"world": bool(kinds & {"World", "RoboIRGEnv", "Goal"})}
+
+    def usage(self):
+        named = sum(one.thing is not None for one in self.ends)
+        return {"process": os.getpid(), "pictures": self.pictures, "named": named}
+
+
+class Insider(Pointer):
+    """Asks for the world."""
+
+    def attach(self, env):
+        self.env = env
+
+
+class Quitter(Pointer):
+    """Ends its process."""
+
+    def plan(self, observation, step):
+        os._exit(3)
+
+
+class NoPlanner:
+    def reset(self, instruction, demonstration):
+        pass

@@ -1,0 +1,90 @@
+"""A planner of the user's own has a process of its own; its scripted hands stay with the world."""
+
+from __future__ import annotations
+
+import os
+import re
+from pathlib import Path
+
+import own_planners
+import pytest
+
+from roboirg.core.errors import InvalidValueError
+from roboirg.core.instruction_options import InstructionOptions
+from roboirg.evaluation.hosting.host_pool import HostPool, HostSettings
+from roboirg.evaluation.hosting.policy_descriptions import describe_policy
+from roboirg.evaluation.play.rollout import play_episode
+from roboirg.evaluation.play.rollout_result import RolloutResult
+from roboirg.evaluation.records.record import Job
+from roboirg.policies.by_name.loading import is_privileged, make_policy, needs_host
+
+
+@pytest.fixture(autouse=True)
+def _can_be_imported(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.syspath_prepend(Path(own_planners.__file__).parent)
+
+
+def job_of(spec: str) -> Job:
+    return Job(policy=spec, task="VideoUnmask", split="test", episode=0, max_steps=60,
+              options=InstructionOptions("explicit"))  # fmt: skip
+
+
+def play(spec: str) -> RolloutResult:
+    with HostPool(HostSettings()) as pool, pool.connect() as line:
+        return play_episode(job_of(spec), hosts=line)
+
+
+@pytest.mark.sim
+def test_it_sees_pictures_and_words_only() -> None:
+    spec = "planner:own_planners:Pointer"
+    assert needs_host(spec)
+    result = play(spec)
+    assert result.outcome == "failure", result.cause
+    assert [(one.text, one.ended) for one in result.subgoals] == [
+        ("remain static for 5 steps", "done"),
+        ("pick up the container", "refused"),
+    ]
+    spent = result.usage
+    assert spent["process"] != os.getpid()
+    assert (spent["refused"], spent["named"]) == (5, 0)
+    assert spent["pictures"] == 1 + 5  # one where it named the first, and five refusals
+    assert result.policy_metadata["planner"] == {"world": False}
+    # The whole is marked as it acts by the simulator's state, and described alike beforehand.
+    known = describe_policy(spec)
+    assert result.policy is not None
+    assert known[:2] == result.policy[:2] == ("mine-1 + scripted hands", True)
+    assert is_privileged(spec)
+
+
+@pytest.mark.sim
+def test_what_it_breaks_ends_its_own_episode() -> None:
+    result = play("planner:own_planners:Quitter")
+    assert (result.outcome, result.error) == ("error", "policy")
+
+
+@pytest.mark.sim
+def test_one_that_is_declared_runs_next_to_the_world() -> None:
+    spec = "privileged:planner:own_planners:Insider"
+    assert not needs_host(spec)
+    assert play(spec).usage["process"] == os.getpid()
+    # So does any in a run whose policies share the worker's process.
+    shared = play_episode(job_of("planner:own_planners:Pointer"))
+    assert (shared.usage["process"], len(shared.subgoals)) == (os.getpid(), 2)
+    assert shared.policy is not None
+    assert shared.policy.version == "mine-1 + scripted hands"
+    with pytest.raises(InvalidValueError, match="has attach"):
+        make_policy("planner:own_planners:Insider", 0)
+
+
+@pytest.mark.parametrize(
+    ("spec", "words"),
+    [
+        ("planner:own_planners:Insider", "has attach()"),
+        ("planner:own_planners:NoPlanner", "class NoPlanner has no method plan()"),
+        ("planner:own_planners:Nothing", "has no class 'Nothing'"),
+        ("planner:own_planners:Pointer?keep=2", "no option of planner:own_planners:Pointer"),
+    ],
+)
+def test_wrong_ones_are_one_sentence(spec: str, words: str) -> None:
+    with pytest.raises(InvalidValueError, match=re.escape(words)):
+        describe_policy(spec)
