@@ -221,9 +221,11 @@ def test_an_episode_is_driven_in_a_browser(served, open_page, wait_s, monkeypatc
     assert left.value.code in (0, None), capsys.readouterr()
 
     out = folder.parent / "demonstrations"
+    plan = folder.parent / "driven.yaml"
+    plan.write_text(f"demonstrations: {{policy: 'recorded:{folder}?policy=person'}}")
     words = ["export", "demonstrations", "--tasks", TASK, "--split", "test", "--episodes", "1-1",
              "--settings", "contextual", "--pictures", "none", "--workers", "0",
-             "--policy", f"recorded:{folder}?policy=person", "--out", str(out)]  # fmt: skip
+             "--plan", str(plan), "--out", str(out)]  # fmt: skip
     monkeypatch.setattr("sys.argv", ["roboirg", *words])
     with pytest.raises(SystemExit) as left:
         cli.main()
