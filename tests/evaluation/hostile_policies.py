@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import contextlib
 import gc
+import json
 import os
 import signal
 import socket
 import sys
+import tempfile
 import threading
 import time
 from pathlib import Path
@@ -157,6 +159,22 @@ class SurrogateKey(Hostile):
 class SurrogateCost(Hostile):
     def usage(self) -> dict[str, float]:
         return {"\ud800": 1.0}
+
+
+class Debtor(Hostile):
+    def usage(self) -> dict[str, float]:
+        return {"cost_usd": -1e300, "calls": 1e308, "input_tokens": 5.0}
+
+
+class WordlessTokenizer(Hostile):
+    """Names a tokenizer that knows no word, not even that for unknown ones."""
+
+    prompt_tokens = 5
+
+    def __init__(self, seed: int = 0) -> None:
+        self.tokenizer = str(Path(tempfile.mkdtemp(), "tokenizer.json"))
+        model = {"type": "WordLevel", "vocab": {"a": 0}, "unk_token": "[U]"}
+        Path(self.tokenizer).write_text(json.dumps({"version": "1.0", "model": model}))
 
 
 class Printer(Hostile):
@@ -423,7 +441,16 @@ SPOILED = {
     "Renderless": "policy: No device.",
 }
 """Those whose episodes end in an error, and how its cause begins."""
-HARMLESS = ("Searcher", "Patcher", "Leaker", "Wanderer", "SurrogateCost", "Printer")
+HARMLESS = (
+    "Searcher",
+    "Patcher",
+    "Leaker",
+    "Wanderer",
+    "SurrogateCost",
+    "Printer",
+    "Debtor",
+    "WordlessTokenizer",
+)
 """Those that fail like any policy that does not do the task."""
 
 SPEC = f"{Path(__file__).stem}:{{}}".format

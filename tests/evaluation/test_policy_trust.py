@@ -77,6 +77,10 @@ def test_what_a_policy_breaks_is_its_own(
             assert record.outcome == expected[record.episode]
     for record in found[hostile_policies.SPEC("Searcher")]:
         assert record.policy_metadata == {"world": False, "job": False, "goal": False}
+    for record in found[hostile_policies.SPEC("Debtor")]:
+        assert record.usage == {"input_tokens": 5.0}
+    for record in found[hostile_policies.SPEC("WordlessTokenizer")]:
+        assert (record.prompt, record.prompt_verdict) == (None, "unknown")
     beside = hostile_policies.Searcher()
     job, *_ = jobs = plan.jobs()  # alive while it searches
     world = PaperWorld(job)

@@ -183,12 +183,23 @@ def test_a_json_tokenizer_is_read(tmp_path):
     assert read_tokenizer(str(path))("put the cube.") == Tokens(1, (3, 7, 12, 13), 1)
 
 
+def test_a_tokenizer_that_panics_is_an_error(tmp_path):
+    tokenizers = pytest.importorskip("tokenizers")
+    model = tokenizers.Tokenizer(tokenizers.models.WordLevel({"[U]": 0}, unk_token="[U]"))  # noqa: S106
+    pattern = tokenizers.Regex(r"^(([a-z ,.])+.)+[A-Z]([a-z ])+$|((.|\w)+)+[!]")
+    model.pre_tokenizer = tokenizers.pre_tokenizers.Split(pattern, "isolated")
+    path = str(tmp_path / "tokenizer.json")
+    model.save(path)
+    with pytest.raises(InvalidValueError, match="cannot be used as a tokenizer of the library"):
+        read_tokenizer(path)("put the green cube on the target, twice")
+
+
 def test_tokenizers_that_cannot_be_read(tmp_path, monkeypatch):
     with pytest.raises(InvalidValueError, match="is not a file"):
         read_tokenizer(str(tmp_path / "none.model"))
     for name, content in (("bad.model", "no model"), ("empty.model", "")):
         (tmp_path / name).write_text(content)
-        with pytest.raises(InvalidValueError, match="not a SentencePiece model"):
+        with pytest.raises(InvalidValueError, match="cannot be used as a SentencePiece model"):
             read_tokenizer(str(tmp_path / name))
     with (tmp_path / "large.json").open("wb") as file:
         file.truncate(2**40)  # takes no space

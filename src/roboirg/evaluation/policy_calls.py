@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import math
 import re
 from typing import Any, cast
 
@@ -151,7 +150,7 @@ def _check_keys(metadata: dict[str, Any], *, is_ours: bool) -> None:
 
 
 def policy_usage(policy: Policy) -> dict[str, float]:
-    """Return the finite costs that a policy reports; empty if it reports none.
+    """Return the costs that a policy reports; those below 0 or beyond reason are left out.
 
     Raises:
         InvalidValueError: there are too many, or a name is not a short text.
@@ -165,4 +164,4 @@ def policy_usage(policy: Policy) -> dict[str, float]:
             f"usage() has {len(usage)} entries; it may have at most {MAX_COSTS}, with names of at "
             f"most {MAX_COSTS} characters."
         )
-    return {name: cost for name, cost in usage.items() if math.isfinite(cost)}
+    return {name: cost for name, cost in usage.items() if 0 <= cost < _TOO_LARGE}

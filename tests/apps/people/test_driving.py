@@ -221,8 +221,8 @@ def test_an_episode_is_driven_in_a_browser(served, open_page, wait_s, monkeypatc
     assert left.value.code in (0, None), capsys.readouterr()
 
     out = folder.parent / "demonstrations"
-    plan = folder.parent / "plan.yaml"
-    plan.write_text(f"demonstrations:\n  policy: recorded:{folder}?policy=person\n")
+    plan = folder.parent / "driven.yaml"
+    plan.write_text(f"demonstrations: {{policy: 'recorded:{folder}?policy=person'}}")
     words = ["export", "demonstrations", "--tasks", TASK, "--split", "test", "--episodes", "1-1",
              "--settings", "contextual", "--pictures", "none", "--workers", "0",
              "--plan", str(plan), "--out", str(out)]  # fmt: skip

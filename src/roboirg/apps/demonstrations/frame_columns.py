@@ -34,7 +34,6 @@ _KEYS: Mapping[str, Mapping[str, str]] = {
         "action": "actions",
     },
 }
-_VECTORS = {"float32": np.float32, "bool": np.bool_, "int64": np.int64}
 _SIZE = 256
 
 

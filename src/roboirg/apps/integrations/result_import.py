@@ -254,4 +254,3 @@ _READERS: Mapping[str, Callable[[Path, ImportOptions], Iterator[Record]]] = {
     "inspect": _read_inspect,
     "jsonl": _read_lines,
 }
-HARNESSES = tuple(_READERS)

@@ -139,20 +139,6 @@ def opened_run(path: Path) -> Iterator[Path]:
         yield folder
 
 
-def read_manifest(path: Path) -> PackManifest:
-    """Read what a pack says about itself.
-
-    Raises:
-        StoreError: the file is no pack.
-    """
-    try:
-        with open_regular(path) as file, zipfile.ZipFile(file) as archive:
-            return _manifest(archive, path)
-    except UNREADABLE_ARCHIVE as error:
-        words = printable(" ".join(str(error).split()))[:_MOST_SHOWN].rstrip(".")
-        raise StoreError(f"{path} is no packed run: {words}.") from error
-
-
 def _manifest(archive: zipfile.ZipFile, path: Path) -> PackManifest:
     try:
         if archive.getinfo(MANIFEST).file_size > _MAX_MANIFEST_BYTES:

@@ -69,7 +69,6 @@ SettingsName = Literal["all", "every"]
 SETTINGS_NAMES: tuple[SettingsName, ...] = get_args(SettingsName)
 
 PolicyProcessMode = Literal["own", "shared"]
-POLICY_PROCESSES: tuple[PolicyProcessMode, ...] = get_args(PolicyProcessMode)
 
 LongPrompts = Literal["send", "refuse"]
 LONG_PROMPTS: tuple[LongPrompts, ...] = get_args(LongPrompts)

@@ -210,8 +210,8 @@ def play_episode(
                 result.policy = PolicyDescription(policy.version, privileged)
             needs = job_needs(policy, job)
             result.prompt_limit = prompt_limit(needs)
-        if refuse_long:
-            _refuse_long_prompt(prepared, result)
+            if refuse_long:
+                _refuse_long_prompt(prepared, result)
         play_with(policy, job, needs, result, guard, writer)
     except EpisodeError as error:
         result.record_error(error.kind, error.cause, error.details)

@@ -271,9 +271,12 @@ def _audit(
     if result.prompt_limit is None:
         return None, UNDECLARED
     steps = [one.step for one in utterances]
-    if steps == [None] * len(steps):  # it ended before anything was said
-        return audit_job(job, result.prompt_limit, instruction)
-    return audit_prompt(instruction, steps, result.prompt_limit)
+    try:
+        if steps == [None] * len(steps):  # it ended before anything was said
+            return audit_job(job, result.prompt_limit, instruction)
+        return audit_prompt(instruction, steps, result.prompt_limit)
+    except InvalidValueError:  # its tokenizer does not read this text
+        return None, "unknown"
 
 
 def _versions() -> dict[str, Any]:

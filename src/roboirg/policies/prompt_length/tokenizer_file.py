@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import contextlib
 import functools
 import os
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from roboirg.core.errors import InvalidValueError
+from roboirg.core.errors import InvalidValueError, RoboIRGError
 from roboirg.core.extras import extra_needed
 from roboirg.policies.prompt_length.prompt_audit import LINE_BREAK_TOKENS, Tokenize, Tokens
 from roboirg.util.regular_file import read_regular
@@ -33,17 +35,35 @@ def _read(path: str) -> Tokenize:
         raise InvalidValueError(
             f"The tokenizer {path!r} is not a file; give a SentencePiece model or a tokenizer.json."
         ) from error
-    return (_read_json if path.endswith(JSON) else _read_sentencepiece)(path, content)
+    with _attributed_to(path):
+        tokenize = (_read_json if path.endswith(JSON) else _read_sentencepiece)(path, content)
+
+    def tokenize_or_raise(text: str) -> Tokens:
+        with _attributed_to(path):
+            return tokenize(text)
+
+    return tokenize_or_raise
+
+
+@contextlib.contextmanager
+def _attributed_to(path: str) -> Iterator[None]:
+    """Raise `InvalidValueError` for what a library raises: `tokenizers` panics on some texts."""
+    try:
+        yield
+    except (RoboIRGError, KeyboardInterrupt):
+        raise
+    except BaseException as error:
+        kind = (
+            "tokenizer of the library tokenizers" if path.endswith(JSON) else "SentencePiece model"
+        )
+        raise InvalidValueError(f"The tokenizer {path!r} cannot be used as a {kind}.") from error
 
 
 def _read_sentencepiece(path: str, content: bytes) -> Tokenize:
     with extra_needed(f"The tokenizer {path!r} needs sentencepiece", "tokens"):
         import sentencepiece
-    try:
-        model: Any = sentencepiece.SentencePieceProcessor()
-        model.LoadFromSerializedProto(content)
-    except (OSError, RuntimeError, ValueError) as error:
-        raise _unreadable(path, "a SentencePiece model") from error
+    model: Any = sentencepiece.SentencePieceProcessor()
+    model.LoadFromSerializedProto(content)
 
     # The name depends on the version; so does whether places count characters or bytes.
     encode = getattr(model, "encode_as_immutable_proto", None) or model.encode_as_proto
@@ -62,10 +82,7 @@ def _read_sentencepiece(path: str, content: bytes) -> Tokenize:
 def _read_json(path: str, content: bytes) -> Tokenize:
     with extra_needed(f"The tokenizer {path!r} needs tokenizers", "tokens"):
         import tokenizers
-    try:
-        model: Any = tokenizers.Tokenizer.from_buffer(content)
-    except Exception as error:  # the library raises nothing narrower
-        raise _unreadable(path, "a tokenizer of the library tokenizers") from error
+    model: Any = tokenizers.Tokenizer.from_buffer(content)
     model.no_truncation()
     model.no_padding()
     # The library keeps these when it cuts a text.
@@ -76,7 +93,3 @@ def _read_json(path: str, content: bytes) -> Tokenize:
         return Tokens(kept, tuple(end for _, end in found), LINE_BREAK_TOKENS)
 
     return tokenize
-
-
-def _unreadable(path: str, kind: str) -> InvalidValueError:
-    return InvalidValueError(f"The tokenizer {path!r} is not {kind}.")

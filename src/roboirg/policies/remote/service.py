@@ -32,14 +32,13 @@ MAX_STEPS_SHOWN = 1500
 all that it did in an episode of the challenge."""
 
 
-def request_limit(step_bytes: int, steps: int = MAX_STEPS_SHOWN) -> int:
+def request_limit(step_bytes: int) -> int:
     """Return the size in bytes that a message needs at most.
 
     Args:
         step_bytes: of the pictures of a step; everything else of it is far below 1 KiB.
-        steps: that a message shows.
     """
-    return MIB + steps * (step_bytes + 1024)
+    return MIB + MAX_STEPS_SHOWN * (step_bytes + 1024)
 
 
 class Service(ABC):

@@ -54,7 +54,7 @@ class Transport(NamedTuple):
 WEBSOCKET = Transport(
     "websocket",
     "roboirg.policies.remote.client.websocket_connection:WebsocketConnection",
-    "roboirg.policies.remote.serving.websocket_server:open_websocket",
+    "roboirg.policies.remote.serving.websocket_server:WebsocketServer",
 )
 """One binary msgpack message per request and per reply; the metadata come first."""
 HTTP = Transport(

@@ -59,18 +59,17 @@ def describe_device(device: sapien.Device) -> RenderDevice:
     return RenderDevice(name, alias, any(word in name.lower() for word in _SOFTWARE_NAMES))
 
 
-def find_render_device(name: str | None = None) -> sapien.Device:
+def find_render_device() -> sapien.Device:
     """Return the device that draws the pictures.
 
-    Args:
-        name: SAPIEN's name of a device; by default ``ROBOIRG_RENDER_DEVICE``, and if that is not
-            set the first GPU that can render, else lavapipe.
+    It is the one that ``ROBOIRG_RENDER_DEVICE`` names, or the first GPU that can render, else
+    lavapipe.
 
     Raises:
         MissingDependencyError: SAPIEN is not installed.
         RenderDeviceError: the named device cannot render or does not exist, or none can.
     """
-    name = name or os.environ.get(DEVICE_VARIABLE) or None
+    name = os.environ.get(DEVICE_VARIABLE) or None
     if name is not None:
         return _named_device(name)
     software = None

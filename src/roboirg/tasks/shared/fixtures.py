@@ -136,16 +136,16 @@ def marker_over(target: SceneObject, name: str) -> SceneObject:
 
 
 def draw_bin(
-    rng: np.random.Generator, region: Region, obstacles: Sequence[Obstacle], name: str = "bin"
+    rng: np.random.Generator, region: Region, obstacles: Sequence[Obstacle]
 ) -> SceneObject:
     """Draw a bin whose center is in the region and whose walls touch no obstacle."""
 
     def draw() -> SceneObject:
         x, y = region.draw(rng)
         yaw = (2.0 * rng.random() - 1.0) * BIN_YAW
-        return SceneObject(name, "bin", Point(x, y, object_sizes.BIN_HEIGHT / 2), yaw)
+        return SceneObject("bin", "bin", Point(x, y, object_sizes.BIN_HEIGHT / 2), yaw)
 
-    return placed(name, draw, bin_footprint, obstacles)
+    return placed("bin", draw, bin_footprint, obstacles)
 
 
 def bin_keep_out(item: SceneObject) -> Rectangle:

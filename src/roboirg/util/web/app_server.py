@@ -157,11 +157,6 @@ async def read_body(request: Request, limit: int, timeout_s: float = TIMEOUT_S) 
     return bytes(body)
 
 
-def header_values(request: Request, name: str) -> list[str]:
-    """Return all values of a header."""
-    return request.headers.getlist(name)
-
-
 def error_handler(status: int) -> Callable[[Request, Exception], Response]:
     """Return the handler of errors whose message is the response."""
     return lambda _, error: PlainTextResponse(f"{error}\n", status)

@@ -33,7 +33,6 @@ from roboirg.util.web.app_server import (
     AppServer,
     RequestGuard,
     error_handler,
-    header_values,
     read_body,
 )
 from roboirg.util.web.request_origin import LOOPBACK, is_own_request, names_of_this_machine
@@ -116,7 +115,7 @@ class KeyedPageServer(AppServer):
 
     def _refuse(self, request: Request) -> Response | None:
         """Exchange the key for a cookie, or refuse a request without it."""
-        hosts, origins = header_values(request, "host"), header_values(request, "origin")
+        hosts, origins = request.headers.getlist("host"), request.headers.getlist("origin")
         # A proxy may add HTTPS: the page is then the same host's.
         plain = [one.replace("https://", "http://", 1) for one in origins]
         own = is_own_request(hosts, plain, self._names)

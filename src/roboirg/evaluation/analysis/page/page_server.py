@@ -19,7 +19,7 @@ from starlette.staticfiles import StaticFiles
 
 from roboirg.core.errors import RoboIRGError
 from roboirg.evaluation.records.store import RECORDS_FILE
-from roboirg.util.web.app_server import AppServer, RequestGuard, error_handler, header_values
+from roboirg.util.web.app_server import AppServer, RequestGuard, error_handler
 from roboirg.util.web.request_origin import LOOPBACK, LOOPBACK_NAMES, is_own_request
 
 PAGES = ("/", "/index.html", "/report.html")
@@ -82,7 +82,7 @@ class _RunFiles(StaticFiles):
 
 def _refuse(request: Request) -> Response | None:
     """Return the response to a request that comes from a page of another site."""
-    hosts, origins = header_values(request, "host"), header_values(request, "origin")
+    hosts, origins = request.headers.getlist("host"), request.headers.getlist("origin")
     if is_own_request(hosts, origins, LOOPBACK_NAMES):
         return None
     return PlainTextResponse("403 Forbidden\n", 403)

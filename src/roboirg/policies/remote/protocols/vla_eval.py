@@ -28,7 +28,7 @@ than the instruction."""
 _ENVELOPE = Transport(
     "websocket",
     "roboirg.policies.remote.client.envelope_connection:EnvelopeConnection",
-    "roboirg.policies.remote.serving.websocket_server:open_websocket",
+    "roboirg.policies.remote.serving.websocket_server:WebsocketServer",
 )
 
 

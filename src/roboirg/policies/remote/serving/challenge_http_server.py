@@ -18,7 +18,7 @@ with extra_needed("Serving over HTTP needs Starlette and uvicorn", "remote"):
     from starlette.responses import PlainTextResponse, Response
     from starlette.routing import Route
 
-    from roboirg.util.web.app_server import AppServer, RequestGuard, header_values, read_body
+    from roboirg.util.web.app_server import AppServer, RequestGuard, read_body
 
 
 def open_http(service: Service, metadata: Mapping[str, Any], options: ServerOptions) -> AppServer:
@@ -55,7 +55,7 @@ def open_http(service: Service, metadata: Mapping[str, Any], options: ServerOpti
 
     def refuse(request: Request) -> Response | None:
         """Refuse foreign pages, and POST without the key, before the body is read."""
-        hosts, origins = header_values(request, "host"), header_values(request, "origin")
+        hosts, origins = request.headers.getlist("host"), request.headers.getlist("origin")
         if refusal := options.refusal(hosts, origins):
             return PlainTextResponse(f"{refusal}\n", 403)
         # The challenge's clients send no key with GET.

@@ -111,16 +111,3 @@ class WebsocketServer:
                 if isinstance(reply, str):
                     await connection.close(_INTERNAL_ERROR, "Internal server error.")
                     return
-
-
-def open_websocket(
-    service: Service, metadata: Mapping[str, Any], options: ServerOptions
-) -> WebsocketServer:
-    """Return a server that listens; it answers once `serve_forever` is called.
-
-    Args:
-        service: answers messages.
-        metadata: sent first on every connection.
-        options: address, key and time limit.
-    """
-    return WebsocketServer(service, metadata, options)
