@@ -226,7 +226,10 @@ def _statistics(data: RunData) -> Items:
 def _sensitivity(data: RunData) -> Items:
     for policy_run, name in data.names.items():
         own = [one for owner, one in data.results if owner == policy_run]
-        for found in try_choices(gap_contrasts(own)):
+        tried = try_choices(gap_contrasts(own))
+        if not tried:
+            yield MethodItem(name, f"{NOT_REPORTED}: no setting was played next to explicit")
+        for found in tried:
             verdict = {"open": "no clear gap to explicit"}.get(
                 found.verdict, f"{found.verdict} than explicit"
             )
