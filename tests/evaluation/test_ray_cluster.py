@@ -28,7 +28,7 @@ pytestmark = pytest.mark.slow
 
 ray = pytest.importorskip("ray")
 
-PLAN = small_plan(10)
+PLAN = small_plan(5).model_copy(update={"arms": ("told", "silent")})
 
 
 def all_comparable(folder: Path) -> list[dict[str, object]]:

@@ -8,6 +8,7 @@ import pytest
 from wire_episode import INSTRUCTION, moment, video
 
 from roboirg.core.errors import InvalidValueError, MissingDependencyError, UnknownNameError
+from roboirg.core.inference_facts import inference_facts
 from roboirg.policies import Policy, load_policy_class, make_policy
 from roboirg.policies.by_name.loading import policy_version
 from roboirg.policies.lerobot_policy import load
@@ -35,8 +36,10 @@ def checkpoint(monkeypatch):
     """A package `lerobot` with a model that adds up what it sees."""
     torch = pytest.importorskip("torch")
 
-    class Model:
+    class Model(torch.nn.Module):
         def __init__(self):
+            super().__init__()
+            self.weight = torch.nn.Parameter(torch.zeros(1, dtype=torch.bfloat16))
             self.batches, self.resets = [], 0
 
         def reset(self):
@@ -78,6 +81,9 @@ def test_a_checkpoint_is_fed_its_own_names(checkpoint):
     policy.reset(INSTRUCTION, video(0))
     first = policy.act(moment(1))
     assert first.shape == (4, 8)
+    facts = inference_facts(policy)
+    assert (facts.dtypes, facts.devices) == (("bfloat16",), ("cpu",))
+    assert policy.metadata["preprocessing"] == "the checkpoint's own processors"
     batch = checkpoint.model.batches[0]
     assert batch["task"] == [INSTRUCTION]
     picture = batch["observation.images.front"]

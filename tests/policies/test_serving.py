@@ -1,6 +1,7 @@
 """Policies of this process behind real sockets: inputs, outputs and errors."""
 
 import os
+import platform
 import signal
 import subprocess
 import sys
@@ -99,6 +100,8 @@ def test_a_served_policy_gets_what_the_client_was_given(protocol, monkeypatch):
             assert client.metadata["policy"] == HERE
             assert client.metadata["protocol"] == protocol
             assert client.metadata["device"]
+            assert client.metadata["libraries"]["numpy"] == np.__version__
+            assert client.metadata["python"] == platform.python_version()
             assert client.metadata["flags"] == "XLA_FLAGS=--xla_gpu_autotune_level=0"
     one, two = Recorder.episodes
     assert (one.seed, two.seed) == (7, 7)

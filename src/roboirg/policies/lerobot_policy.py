@@ -31,6 +31,7 @@ _BATCH = 8
 _NOISELESS = frozenset({"act"})
 """Types of checkpoints that draw no noise when they act."""
 _CONFIG = "config.json"
+_PROCESSORS = "the checkpoint's own processors"
 
 
 class LeRobotPolicyOptions(UrlOptions):
@@ -114,6 +115,8 @@ class LeRobotPolicy:
         self.place = parts.place
         self.prompt_tokens = self.options.prompt_tokens or read_prompt_tokens(parts.place)
         self.prompt_added, self.tokenizer = self.options.prompt_added, self.options.tokenizer
+        self.metadata = {"preprocessing": _PROCESSORS, "text_normalization": _PROCESSORS}
+        self.model: Any = None  # records name its number types and devices
 
     @property
     def version(self) -> str:
@@ -132,7 +135,7 @@ class LeRobotPolicy:
             MissingDependencyError: LeRobot or PyTorch is not installed.
             InvalidValueError: the checkpoint needs an input that does not exist.
         """
-        model = load(self.place, self.options.device).model
+        model = self.model = load(self.place, self.options.device).model
         before = dict(vars(model))
         model.reset()
         # What the reset replaced, such as a queue of actions, belongs to the episode.

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from roboirg.core.errors import InvalidValueError, UnknownNameError
+from roboirg.core.inference_facts import inference_facts
 from roboirg.policies.by_name.loading import (
     is_privileged,
     load_policy_class,
@@ -74,10 +75,13 @@ def open_server(
         return make_policy(spec, seed)
 
     found = protocols[protocol]
+    process = inference_facts(None)
     metadata = {
         "policy": spec,
         "version": policy_version(spec),
         "protocol": protocol,
+        "python": process.python,
+        "libraries": process.libraries,
         **describe_arithmetic(),
     }
     listen = found.clients[protocol].transport.load_server()

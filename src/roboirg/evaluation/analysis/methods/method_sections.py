@@ -34,7 +34,11 @@ from roboirg.evaluation.records.store import iterate_records, read_results
 from roboirg.language import settings_of
 from roboirg.language.settings import EXPLICIT
 from roboirg.tasks import all_tasks, every_task
+from roboirg.tasks.splits.splits import shipped_splits, slot_key
 from roboirg.util.media import CONTROL_RATE
+
+MEASURED = {"dtype": "dtypes", "device": "devices", "libraries": "libraries", "python": "python"}
+"""What a policy may declare, and the field of its process's own report."""
 
 
 class MethodItem(NamedTuple):
@@ -108,12 +112,7 @@ def _horizon(results: Sequence[Summary], played: Mapping[str, PlayedFacts]) -> I
 
 def _precision(results: Sequence[Summary], played: Mapping[str, PlayedFacts]) -> Items:
     for name, facts in played.items():
-        known = {
-            DECLARABLE["dtype"]: _either(facts, "dtype", "dtypes"),
-            DECLARABLE["device"]: _either(facts, "device", "devices"),
-            DECLARABLE["libraries"]: _either(facts, "libraries", "libraries"),
-            "Python": facts.measured("python"),
-        }
+        known = {DECLARABLE[key]: _either(facts, key, name) for key, name in MEASURED.items()}
         where = "computed by a server; " if facts.is_remote else ""
         yield MethodItem(name, where + "; ".join(f"{key}: {value}" for key, value in known.items()))
     yield MethodItem("roboirg", _distinct(one.package_version for one in results))
@@ -183,11 +182,17 @@ def _training(played: Mapping[str, PlayedFacts]) -> Items:
 
 def _screening(jobs: Sequence[Job]) -> Items:
     scenes = {(one.task, one.split, one.episode) for one in jobs}
+    numbers = [one[2] for one in scenes]
     yield MethodItem(
         "scenes",
         f"{len(scenes)}, of {counted(len({one[0] for one in scenes}), 'task')}, split "
-        f"{_distinct(one[1] for one in scenes)}: the first ones of the split; none was left out "
-        "after it was played",
+        f"{_distinct(one[1] for one in scenes)}, chosen by number ({min(numbers)} to "
+        f"{max(numbers)}); none was left out after it was played",
+    )
+    yield MethodItem(
+        "seeds that were passed over when these scenes were sampled",
+        f"{sum(map(_passed_over, scenes))}: no room for an object, a setting that cannot express "
+        "the scene, or not solved by the oracle; published scenes have none",
     )
     absent = [name for name in all_tasks() if name not in {one[0] for one in scenes}]
     yield MethodItem("tasks that were not played", ", ".join(absent) or "none")
@@ -202,6 +207,12 @@ def _screening(jobs: Sequence[Job]) -> Items:
             f"{len(own)} of {possible} scenes of {counted(len(has), 'task')}; "
             f"{possible - len(own)} refused, because the setting cannot express them",
         )
+
+
+def _passed_over(scene: tuple[str, str, int]) -> int:
+    task, split, number = scene
+    found = shipped_splits().get(task)
+    return found.passed_over.get(slot_key(split, number), 0) if found else 0
 
 
 def _has_setting(task: str, setting: str) -> bool:
@@ -226,7 +237,10 @@ def _statistics(data: RunData) -> Items:
 def _sensitivity(data: RunData) -> Items:
     for policy_run, name in data.names.items():
         own = [one for owner, one in data.results if owner == policy_run]
-        for found in try_choices(gap_contrasts(own)):
+        tried = try_choices(gap_contrasts(own))
+        if not tried:
+            yield MethodItem(name, f"{NOT_REPORTED}: no setting was played next to explicit")
+        for found in tried:
             verdict = {"open": "no clear gap to explicit"}.get(
                 found.verdict, f"{found.verdict} than explicit"
             )
@@ -247,7 +261,9 @@ def _controls(data: RunData, jobs: Sequence[Job]) -> Items:
     controls = [one for one in data.names if one.is_privileged]
     listed = [f"{data.names[one]}: {_rates(data, one)}" for one in controls]
     yield MethodItem("privileged policies as controls", "; ".join(listed) or "none")
-    yield MethodItem("arms", ", ".join(sorted({one.arm for _, one in data.results})))
+    arms = Counter(job.arm for job in jobs)
+    listed = [f"{arm} {counted(count, 'episode')}" for arm, count in arms.items()]
+    yield MethodItem("arms, without what has no such arm", ", ".join(listed))
     forms = sorted({one.form for one in jobs if one.setting != EXPLICIT})
     yield MethodItem("forms of the implicit settings", ", ".join(forms) or "none")
 

@@ -18,6 +18,7 @@ DECLARABLE = {
     "dtype": "number type of inference",
     "device": "device of inference",
     "libraries": "versions of libraries",
+    "python": "Python",
     "text_normalization": "what it does to the text",
 }
 """Keys of a policy's ``metadata`` that methods sections read, and what they stand for."""
