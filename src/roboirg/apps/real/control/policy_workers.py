@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from roboirg.apps.real.control.robot import HORIZON
 from roboirg.core.errors import EndOfRunError
-from roboirg.core.inference_facts import inference_facts
+from roboirg.core.inference_facts import InferenceFacts, inference_facts
 from roboirg.core.observations import Demonstration, Observation
 from roboirg.evaluation.episode_errors import (
     EpisodeError,
@@ -67,7 +67,7 @@ class PolicyFacts(NamedTuple):
 
     metadata: dict[str, Any]
     needs: dict[str, Any]
-    inference: dict[str, Any]
+    inference: InferenceFacts
 
 
 LoadPolicy = Callable[[str, int], Policy]
