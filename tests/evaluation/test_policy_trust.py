@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import re
 import resource
+import signal
 import sys
 import tempfile
 import time
@@ -21,7 +22,7 @@ from msgspec.structs import replace
 
 from roboirg.cli.options import add_working_directory
 from roboirg.core.errors import InvalidValueError
-from roboirg.evaluation.episode_errors import EpisodeError, attribute_errors
+from roboirg.evaluation.episode_errors import EpisodeError, Terminated, attribute_errors
 from roboirg.evaluation.hosting.host_pool import HostPool, HostSettings
 from roboirg.evaluation.hosting.hosted_policy import HostedPolicy
 from roboirg.evaluation.plan.plan import Plan
@@ -312,6 +313,15 @@ def test_in_the_worlds_process_too_it_is_the_policy(error: type[BaseException]) 
 
 def test_ctrl_c_is_the_users_where_it_can_be() -> None:
     with pytest.raises(KeyboardInterrupt), attribute_errors("policy"):
+        raise KeyboardInterrupt
+
+
+def test_sigterm_is_the_users_where_ctrl_c_is_ignored(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A shell without a terminal starts what is in the background so."""
+    monkeypatch.setattr(signal, "getsignal", lambda _number: signal.SIG_IGN)
+    with pytest.raises(Terminated), attribute_errors("environment"):
+        raise Terminated
+    with pytest.raises(EpisodeError), attribute_errors("environment"):
         raise KeyboardInterrupt
 
 

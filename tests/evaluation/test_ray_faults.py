@@ -205,7 +205,8 @@ import sys
 from pathlib import Path
 from evaluation_fakes import FakePlayer, small_plan
 from roboirg.evaluation.run.ray_cluster import RayCluster
-from roboirg.evaluation.run.runner import Terminated, run_plan
+from roboirg.evaluation.episode_errors import Terminated
+from roboirg.evaluation.run.runner import run_plan
 folder = Path(sys.argv[1])
 try:
     run_plan(small_plan(8), folder, FakePlayer(folder, 0.5), RayCluster(address=sys.argv[2]))

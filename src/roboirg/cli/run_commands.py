@@ -126,10 +126,11 @@ def play(
     plan: Plan, out: Path, executor: Executor, *, retry: bool, on_record: str | None = None
 ) -> RunSummary:
     """Play a plan with a progress bar; exits the process when it is interrupted."""
+    from roboirg.evaluation.episode_errors import Terminated
     from roboirg.evaluation.plan.stored_plans import with_secret
     from roboirg.evaluation.run.progress import ConsoleReporter
     from roboirg.evaluation.run.record_hook import CommandHook, HookedReporter
-    from roboirg.evaluation.run.runner import Terminated, episode_runner, run_plan
+    from roboirg.evaluation.run.runner import episode_runner, run_plan
     from roboirg.util.console_width import progress_console
     from roboirg.util.freed_memory import keep_freed_memory
 

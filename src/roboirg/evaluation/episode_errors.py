@@ -24,6 +24,10 @@ MAX_DETAILS_LENGTH = 20_000
 """Most characters of a traceback; its end is kept."""
 
 
+class Terminated(KeyboardInterrupt):
+    """The process received SIGTERM; handled like Ctrl-C, and never a policy's own."""
+
+
 class EpisodeError(Exception):
     """An error ended the episode before it could be judged.
 
@@ -71,7 +75,7 @@ def attribute_errors(source: ErrorSource) -> Iterator[None]:
     """
     try:
         yield
-    except (EndOfRunError, EpisodeError, EpisodeLostError):
+    except (EndOfRunError, EpisodeError, EpisodeLostError, Terminated):
         raise
     except (Exception, SystemExit, GeneratorExit, KeyboardInterrupt) as error:
         # Policies may raise anything. Where Ctrl-C is ignored, as in workers, it is not the user's.

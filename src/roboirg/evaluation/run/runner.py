@@ -17,7 +17,7 @@ import msgspec
 from roboirg.core.episode import ENVIRONMENT_VERSION
 from roboirg.core.errors import InvalidValueError
 from roboirg.core.plain_text import counted
-from roboirg.evaluation.episode_errors import MAX_CAUSE_LENGTH, format_cause
+from roboirg.evaluation.episode_errors import MAX_CAUSE_LENGTH, Terminated, format_cause
 from roboirg.evaluation.hosting.policy_descriptions import describe_policy
 from roboirg.evaluation.plan.plan import Plan
 from roboirg.evaluation.plan.stored_plans import write_plan
@@ -41,10 +41,6 @@ from roboirg.tasks.splits.splits import get_episode
 
 UNREACHABLE_AFTER = 20
 """After this many consecutive connection errors, skip the rest of this policy."""
-
-
-class Terminated(KeyboardInterrupt):
-    """The process received SIGTERM; handled like Ctrl-C."""
 
 
 class RunSummary(NamedTuple):

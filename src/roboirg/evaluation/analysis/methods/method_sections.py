@@ -126,16 +126,20 @@ def _either(facts: PlayedFacts, key: str, name: str) -> str:
 
 
 def _observations(results: Sequence[Summary], played: Mapping[str, PlayedFacts]) -> Items:
+    blind = all(facts.need("cameras") == "none" for facts in played.values())
+    devices = _distinct(one.render_device for one in results)
+    drawn = "not rendered, as no policy has a camera" if blind else f"rendered on {devices}"
     yield MethodItem(
         "source",
         f"simulated, environment version {_distinct(one.environment_version for one in results)}, "
-        f"{_distinct(one.meshes for one in results)} meshes, rendered on "
-        f"{_distinct(one.render_device for one in results)}",
+        f"{_distinct(one.meshes for one in results)} meshes, {drawn}",
     )
     for name, facts in played.items():
+        cameras = facts.need("cameras")
+        size = "" if cameras == "none" else ", 256 × 256 pixels"
         yield MethodItem(
             name,
-            f"cameras: {facts.need('cameras')}, 256 × 256 pixels, depth: {facts.need('depth')}; "
+            f"cameras: {cameras}{size}, depth: {facts.need('depth')}; "
             f"frames of the video: {facts.need('demonstration_frames')}; "
             f"{DECLARABLE['preprocessing']}: {facts.said('preprocessing')}",
         )
