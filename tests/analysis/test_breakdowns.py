@@ -121,7 +121,7 @@ def test_labels_are_what_the_record_says(records: tuple[Record, ...]) -> None:
     contextual = one(records, "PickXtimes", "contextual", says="it")
     assert BREAKDOWNS["pattern"].labels(reasoning) == (reasoning.metadata["pattern"],)
     assert BREAKDOWNS["pattern"].labels(direct) == ()
-    assert BREAKDOWNS["expression"].labels(direct) == ("one", "that")
+    assert BREAKDOWNS["expression"].labels(direct) == ("that",)
     assert BREAKDOWNS["slots"].labels(direct) == ("2",)
     assert BREAKDOWNS["slots"].labels(reasoning) == ("1",)
     assert BREAKDOWNS["rival"].labels(direct) == ()

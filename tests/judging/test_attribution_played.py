@@ -69,8 +69,8 @@ def test_hands_that_do_another_task_well_fail_by_grounding(task: str) -> None:
 @pytest.mark.parametrize(
     ("task", "episode", "failure", "subject"),
     [
-        ("VideoUnmask", 0, "wrong_object", "container"),
-        ("PickXtimes", 0, "wrong_count", "cube"),
+        ("VideoUnmask", 1, "wrong_object", "container"),
+        ("PickXtimes", 1, "wrong_count", "cube"),
         ("VideoPlaceOrder", 1, "wrong_place", "cube"),
     ],
 )
