@@ -144,7 +144,7 @@ def kill_in_the_middle(folder: Path, *words: str) -> None:
 def test_workers_and_kills_leave_no_trace_in_the_records(tmp_path: Path) -> None:
     folders = [tmp_path / name for name in ("one", "two", "killed")]
     plan = tmp_path / "plan.yaml"
-    plan.write_text("seed_secret: a secret of three runs")
+    plan.write_text("seed_secret: a secret of the runs")
     words = [
         (*SMALL_RUN, "--plan", str(plan), "--workers", str(min(number, 2)), "--out", str(folder))
         for number, folder in enumerate(folders, start=1)

@@ -170,15 +170,15 @@ CUES = Pools(
     train=(
         "Anyway, listen.",
         "Now do this.",
-        "Okay, let's go on.",
-        "Anyway, please do this.",
+        "Okay, listen.",
+        "So, listen.",
         "Please listen.",
     ),
     test=(
         "Anyway, here goes.",
         "Here is my request.",
         "Please do this.",
-        "So, here goes.",
-        "Okay, your turn.",
+        "Here goes.",
+        "Your turn.",
     ),
 )

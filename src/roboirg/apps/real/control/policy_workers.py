@@ -214,6 +214,7 @@ class ChunkedPolicy:
 
     def __init__(self, policy: Policy) -> None:
         self._policy = policy
+        PolicyNeeds.of(policy).declare_on(self)
         self._left: NDArray[np.floating[Any]] = np.zeros((0, 8))
 
     def attach(self, env: RoboIRGEnv) -> None:
