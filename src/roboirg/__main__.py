@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import signal
+from types import FrameType
 
 
 def main() -> None:
@@ -15,13 +16,20 @@ def main() -> None:
 
     try:
         if handled:
-            signal.signal(signal.SIGINT, signal.default_int_handler)
+            signal.signal(signal.SIGINT, _interrupt)
         run()
     except KeyboardInterrupt:
         _stop()
     finally:
         if handled:
             signal.signal(signal.SIGINT, _stop)
+
+
+def _interrupt(number: int, frame: FrameType | None) -> None:
+    """Raise KeyboardInterrupt, but where Python's imports would lose it, stop at once."""
+    if frame is not None and frame.f_code.co_filename == "<frozen importlib._bootstrap>":
+        _stop()
+    signal.default_int_handler(number, frame)
 
 
 def _stop(*_signal: object) -> None:
