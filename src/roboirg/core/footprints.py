@@ -83,7 +83,7 @@ class Region(NamedTuple):
 def overlap(first: Footprint, second: Obstacle) -> bool:
     """Return whether a footprint touches or overlaps an obstacle.
 
-    As in RoboMME, a line beside a rectangle counts as clear of it only if their projections on a
+    As in RoboMME, a line next to a rectangle counts as clear of it only if their projections on a
     side of the rectangle or on the line are apart: not those across the line.
     """
     if isinstance(second, Line):

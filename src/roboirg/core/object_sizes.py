@@ -52,7 +52,7 @@ BOX_HALF = 0.065
 """Half the outer side of an open box."""
 BOX_WALL = 0.005
 BOX_HEIGHT = 0.04
-"""Low enough for the hand, 0.2 wide, to pick a tape right beside it."""
+"""Low enough for the hand, 0.2 wide, to pick a tape right next to it."""
 BOX_FLOOR = 0.002
 
 TAPE_RADIUS = 0.0275

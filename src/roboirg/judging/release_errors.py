@@ -1,6 +1,6 @@
-"""Releases beside the expected place, failed grasps, and the early acts that they excuse.
+"""Releases next to the expected place, failed grasps, and the early acts that they excuse.
 
-An act that comes too early may be right: a policy that drops its cube beside the target and goes
+An act that comes too early may be right: a policy that drops its cube next to the target and goes
 on has counted correctly. So the episode is judged again as if each release had been at its
 expected place. If the act is allowed then, the first such release is the failure. An act after a
 failed grasp is excused if it skips nothing but what needs that grasp.
@@ -19,7 +19,7 @@ from roboirg.judging.judge import Judge, Status, describe_expected, describe_obj
 
 
 class MisplacedRelease(NamedTuple):
-    """A picked object that came to lie beside its expected place.
+    """A picked object that came to lie next to its expected place.
 
     Attributes:
         missing: the placing that the stage expected.
@@ -74,7 +74,7 @@ def describe_missed_grasp(
 
 
 def describe_release(replay: EpisodeReplay, grip: FactInterval, step: int) -> FailureAttribution:
-    """Return the failure of an object that was released beside its expected place.
+    """Return the failure of an object that was released next to its expected place.
 
     `grip` is the last interval in which it was picked or lifted; `step` is when it lay there.
     """

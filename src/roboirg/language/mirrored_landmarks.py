@@ -23,7 +23,7 @@ def exchange_sides(words: str) -> str:
 def mirrored_objects(episode: Episode, instruction: Instruction) -> Mapping[str, frozenset[str]]:
     """Return the objects that an instruction's places mean with left and right exchanged.
 
-    Where the goal counts cubes, a place only tells their color, so all cubes of a color stand for
+    Where the goal counts cubes, a place only gives their color, so all cubes of a color stand for
     one another. No object is given that the instruction means as well.
 
     Returns:

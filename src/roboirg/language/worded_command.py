@@ -73,7 +73,7 @@ class WordedCommand:
         return self.phrases.get(name) or self.phrases.get(name.partition(".")[0], {})
 
     def fits(self, goal: Goal, pointed: Collection[str] = ()) -> bool:
-        """Return whether the template tells a goal.
+        """Return whether the template states a goal.
 
         It must have the fields in `pointed`, which referring expressions fill, and needs no words
         for their values.
@@ -195,7 +195,7 @@ def _gives_way(name: str, before: str, phrase: StatedPhrase, after: str) -> bool
 
 
 def goal_fields(goal: Goal) -> dict[str, str]:
-    """Return the value of each field that tells a goal: ``{"color": "red", "repeats": "3"}``.
+    """Return the value of each field that states a goal: ``{"color": "red", "repeats": "3"}``.
 
     A color with a count is one field, ``cubes.0``, with a value such as ``"2 red"``.
     """

@@ -2,7 +2,7 @@
 
 Exclusions such as ``a color other than red`` and ``the one of these two that is not red`` are read
 in `descriptions`, and ``not that moment`` in `temporal_relations`. Every other negation is a gap:
-what a speaker does not want tells too little about the goal.
+what a speaker does not want says too little about the goal.
 """
 
 from __future__ import annotations

@@ -80,7 +80,8 @@ PAPER_PHRASES: Mapping[str, tuple[tuple[str, str], ...]] = {
         ("the other one", "the other (?:one|cube|visit|placement|moment|number)"),
     ),
     "contextual": (("the one I mentioned earlier", "the one i mentioned earlier"),),
-    "spatial": (("the cube there", "the cube (?:now |over )?there"),
+    "spatial": (
+        ("the cube there", "the cube (?:now |over )?there"),
         ("the one there", "the one (?:over )?there"),
     ),
 }  # fmt: skip

@@ -71,7 +71,6 @@ class HostedPolicy:
         self.subgoal: str | None = None
         self._demonstration: Demonstration = {}
         self._is_open = True
-        self._ends: list[SubgoalEnd] = []
         found = self._call(Call("open", spec=spec, seed=seed, alone=alone))
         found.needs.declare_on(self)
         self.version, self._reads = found.version, found.reads
@@ -189,6 +188,10 @@ class HostedPolicy:
 
 class HostedPlanner(HostedPolicy):
     """A planner in its host's process, whose hands are in this one."""
+
+    def __init__(self, hosts: socket.socket, spec: str, seed: int, *, alone: bool = False) -> None:
+        super().__init__(hosts, spec, seed, alone=alone)
+        self._ends: list[SubgoalEnd] = []
 
     def learn(self, end: SubgoalEnd) -> None:
         """Keep how a subgoal ended for the next call."""

@@ -81,10 +81,11 @@ def _describe_ours(spec: str) -> PolicyDescription:
 
 def _describe_apart(spec: str) -> PolicyDescription:
     child = PolicyChild()
+    planner = planner_alone(spec)
     try:
         with DeadlineWatch(child.kill) as watch:
             watch.begin(LIMIT_S)
-            reply = child.exchange([Call("describe", spec=planner_alone(spec) or spec)])
+            reply = child.exchange([Call("describe", spec=planner or spec)])
     except EpisodeLostError as error:
         late = f"its module was not imported within {LIMIT_S:g} s"
         why = error if watch.acted_after is None else late
@@ -98,7 +99,7 @@ def _describe_apart(spec: str) -> PolicyDescription:
         missing = found.error == "missing"
         raise (MissingDependencyError if missing else InvalidValueError)(found.message)
     # Whether it is privileged is not for its own process to say.
-    if planner_alone(spec) is not None:
+    if planner is not None:
         hands = make_hands(SCRIPTED, 0)
         needs = PolicyNeeds.of(hands).merge(found.needs)
         return PolicyDescription(joint_version(found, hands), is_privileged(spec), needs)

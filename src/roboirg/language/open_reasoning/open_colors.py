@@ -1,4 +1,4 @@
-"""Open color exclusion: one color is excluded, and the scene tells which of two others is meant."""
+"""Open color exclusion: one color is excluded, and the scene shows which of two others is meant."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ def _present(request: InstructionRequest) -> tuple[str, ...]:
     return tuple(dict.fromkeys(str(color) for color in found if color is not None))
 
 
-# One color of two: what is left is one of the two other colors, and only the scene tells which.
+# One color of two: what is left is one of the two other colors, and only the scene shows which.
 
 
 def _allows_amount(request: InstructionRequest) -> bool:
@@ -49,7 +49,7 @@ def _exclude_amount(request: InstructionRequest) -> Derived:
 
 
 def _excluded(request: InstructionRequest) -> tuple[str, str] | None:
-    """Return the excluded color, and the one that is left beside the goal's; None if not three."""
+    """Return the excluded color, and the one that is left next to the goal's; None if not three."""
     colors, goal = _present(request), [one.color for one in request.color_values]
     if not request.values_of("color") or len(colors) != THREE or request.shows_color:
         return None

@@ -27,9 +27,7 @@ INTRODUCTIONS: Mapping[str, Pools[str]] = {
     "placement": templates.ELEMENT_PAIRS,
     "relation": templates.MOMENT_PAIRS,
 }
-_POINTER_CLASSES: tuple[Expression, ...] = (
-    "former", "latter", "first", "last", "earlier", "later",
-)  # fmt: skip
+_POINTER_CLASSES: tuple[Expression, ...] = ("former", "latter", "first", "last")
 
 
 def pair_introduction(request: InstructionRequest, draw: PairDraw) -> UtteranceSpec:
@@ -132,12 +130,13 @@ def value_name(request: InstructionRequest, pair: ValuePair, value: GoalValue) -
 
 
 def _pointer(draw: PairDraw, value: GoalValue, thing: str, *, points: bool) -> Phrase:
+    several = thing == "cubes"
     if not points:
-        of_color = draw.pair.word_kind in ("color", "amount")
-        many = thing == "cubes"
-        return the_other(value, f"the other {'ones' if many else 'one' if of_color else thing}")
+        if draw.pair.word_kind in ("color", "amount"):
+            thing = "ones" if several else "one"
+        return the_other(value, f"the other {thing}")
     first, second, first_many, second_many = draw.pointers
-    if thing == "cubes":
+    if several:
         first, second = first_many, second_many
     words = first if value is draw.introduced[0] else second
     found = next(one for one in _POINTER_CLASSES if one in words.split())

@@ -142,7 +142,6 @@ def _pointed(request: InstructionRequest, colors: Clues) -> list[Phrase]:
         noun = commands.thing if clue.of_handled else commands.pointed
         single = color.singles(noun.removeprefix("hidden_"))
         pointers = (request.sampler.pick("color anaphor", single),)
-
     things: list[Phrase] = []
     for (value, clue), pointer in zip(colors.items(), pointers, strict=True):
         place = anaphor(*pointer, value.slot, value.value)
