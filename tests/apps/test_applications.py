@@ -17,7 +17,7 @@ APPLICATIONS = sorted(path.parent.name for path in (layout.PACKAGE / "apps").glo
 
 KINDS_OF = {
     "demonstrations": {"recorded"},
-    "learned_listener": {"learned"},
+    "learning": {"learned"},
     "people": {"people"},
 }
 

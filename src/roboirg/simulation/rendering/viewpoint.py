@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import math
 
 import numpy as np
@@ -38,3 +39,9 @@ def to_front_camera(pose: sapien.Pose) -> NDArray[np.float64]:
     # x right, y down, z forward of x forward, y left, z up
     axes = np.array([[0, -1, 0, 0], [0, 0, -1, 0], [1, 0, 0, 0], [0, 0, 0, 1]], dtype=np.float64)
     return np.asarray(axes @ frame.to_transformation_matrix(), dtype=np.float64)
+
+
+@functools.cache
+def front_camera_matrix() -> NDArray[np.float64]:
+    """Return the transform (4, 4) from the world to the front camera (OpenCV)."""
+    return to_front_camera(sapien.Pose())

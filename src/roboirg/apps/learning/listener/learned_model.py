@@ -10,10 +10,10 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
-from roboirg.apps.learned_listener.detector_net import DetectorNet
-from roboirg.apps.learned_listener.labeled_views import LATER_STEP
-from roboirg.apps.learned_listener.listener_net import ListenerInput, ListenerNet, Vocabulary
-from roboirg.apps.learned_listener.object_relations import (
+from roboirg.apps.learning.detector_net import DetectorNet
+from roboirg.apps.learning.labeled_views import LATER_STEP
+from roboirg.apps.learning.listener.listener_net import ListenerInput, ListenerNet, Vocabulary
+from roboirg.apps.learning.listener.object_relations import (
     ObjectsInView,
     TablePlane,
     nothing_of,

@@ -105,15 +105,30 @@ def relate(
         plane: of the table.
         classes: names of classes; the first word of each is its kind.
     """
-    kinds = np.concatenate([view.kinds for view in views])
-    where = np.repeat(np.arange(len(views)), [len(view.kinds) for view in views])
     positions = plane.find(np.concatenate([view.places for view in views]))
+    kinds = [view.kinds for view in views]
+    return rank(kinds, positions, plane.corners, classes)
+
+
+def rank(
+    views: Sequence[NDArray[np.int64]], positions: Points, corners: Points, classes: Sequence[str]
+) -> ObjectsInView:
+    """Return objects that stand at positions with their ranks among their kind.
+
+    Args:
+        views: the numbers of classes of the objects of each picture, one or two.
+        positions: (n, 2) x and y of all of them, m.
+        corners: (4, 2) of the area where objects stand, m.
+        classes: names of classes; the first word of each is its kind.
+    """
+    kinds = np.concatenate(list(views))
+    where = np.repeat(np.arange(len(views)), [len(view) for view in views])
     relations = np.zeros((len(kinds), relation_count(len(classes))), np.uint8)
     names = np.array([name.split()[0] for name in classes])[kinds]
     groups = {(view, name) for view, name in zip(where, names, strict=True)}
     for view, name in groups:
         members = np.flatnonzero((where == view) & (names == name))
-        for landmark, others, values in _orders(members, kinds, where, positions, plane, classes):
+        for landmark, others, values in _orders(members, kinds, where, positions, corners, classes):
             _note_ranks(relations, landmark, others, values)
     return ObjectsInView(kinds, where, positions.astype(np.float32), relations, len(views))
 
@@ -129,12 +144,12 @@ def _orders(
     kinds: NDArray[np.int64],
     where: NDArray[np.int64],
     positions: Points,
-    plane: TablePlane,
+    corners: Points,
     classes: Sequence[str],
 ) -> Iterator[tuple[int, NDArray[np.int64], Points]]:
     """Yield landmarks, with objects of a kind and the value by which the landmark orders them."""
     own = positions[members]
-    points = np.vstack([np.array([ROBOT_BASE[:2]]), plane.corners])
+    points = np.vstack([np.array([ROBOT_BASE[:2]]), corners])
     far = np.linalg.norm(own[:, None] - points[None], axis=2)
     for landmark, values in enumerate([-own[:, 1], own[:, 0], *far.T]):
         yield landmark, members, values

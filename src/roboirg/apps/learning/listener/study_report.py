@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from roboirg.apps.learned_listener.listener_study import HELD_OUT, TEST, VARIANTS, StudyAnswer
+from roboirg.apps.learning.listener.listener_study import HELD_OUT, TEST, VARIANTS, StudyAnswer
 from roboirg.core.episode import ENVIRONMENT_VERSION
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.evaluation.analysis.figures.averages import draw_averages

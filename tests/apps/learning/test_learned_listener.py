@@ -5,8 +5,8 @@ import pytest
 from plan_files import plan_file
 from typer.testing import CliRunner
 
-from roboirg.apps.learned_listener.labeled_views import LATER_STEP, class_of, look
-from roboirg.apps.learned_listener.listener_study import VARIANTS
+from roboirg.apps.learning.labeled_views import LATER_STEP, class_of, look
+from roboirg.apps.learning.listener.listener_study import VARIANTS
 from roboirg.core.errors import InvalidValueError, MissingDependencyError
 from roboirg.main import app
 from roboirg.policies.by_name.loading import is_privileged, make_policy
@@ -64,7 +64,7 @@ def torch():
 
 
 def test_answers_fall_apart_into_parts_that_tell_them_apart(torch):
-    from roboirg.apps.learned_listener.listener_net import parts_of
+    from roboirg.apps.learning.listener.listener_net import parts_of
 
     assert parts_of('{"color": "red", "repeats": 2}') == ["color=red", "repeats=2"]
     assert parts_of('{"colors": ["red", "blue"]}') == [
@@ -79,7 +79,7 @@ def test_answers_fall_apart_into_parts_that_tell_them_apart(torch):
 
 def test_of_a_video_the_first_frame_and_a_later_one_are_seen():
     pytest.importorskip("torch")
-    from roboirg.apps.learned_listener.learned_model import pictures_to_see
+    from roboirg.apps.learning.listener.learned_model import pictures_to_see
 
     frames = [np.full((2, 2, 3), number, np.uint8) for number in range(9)]
     now = np.full((2, 2, 3), 99, np.uint8)
@@ -90,7 +90,7 @@ def test_of_a_video_the_first_frame_and_a_later_one_are_seen():
 
 def scene_of(*views):
     """What is seen of a scene with containers and red cubes."""
-    from roboirg.apps.learned_listener.object_relations import SeenObjects, TablePlane, relate
+    from roboirg.apps.learning.listener.object_relations import SeenObjects, TablePlane, relate
 
     classes = ("container", "cube red")
     seen = [
@@ -104,7 +104,7 @@ def scene_of(*views):
 
 
 def plan_of(**changes):
-    from roboirg.apps.learned_listener.listener_training import TrainingPlan
+    from roboirg.apps.learning.listener.listener_training import TrainingPlan
 
     few = TrainingPlan(("StopCube",), ("explicit", "direct"), detector_epochs=1, reader_epochs=8)
     return few._replace(**changes)
@@ -113,8 +113,8 @@ def plan_of(**changes):
 @pytest.fixture(scope="module")
 def trained(torch, tmp_path_factory):
     """Explicit and direct StopCube: the words are enough."""
-    from roboirg.apps.learned_listener.learned_model import save_model
-    from roboirg.apps.learned_listener.listener_training import train_listener
+    from roboirg.apps.learning.listener.learned_model import save_model
+    from roboirg.apps.learning.listener.listener_training import train_listener
 
     torch.set_num_threads(1)
     model = train_listener(plan_of(), 0, lambda *_: None)
@@ -125,7 +125,7 @@ def trained(torch, tmp_path_factory):
 
 @pytest.mark.sim
 def test_it_learns_and_its_file_is_the_same_listener(trained):
-    from roboirg.apps.learned_listener.learned_model import load_model
+    from roboirg.apps.learning.listener.learned_model import load_model
 
     model, path = trained
     again = load_model(path)
@@ -150,7 +150,7 @@ def test_it_learns_and_its_file_is_the_same_listener(trained):
 
 
 def test_by_place_other_goals_of_a_scene_are_told_too(torch):
-    from roboirg.apps.learned_listener import listener_training
+    from roboirg.apps.learning.listener import listener_training
 
     episode = get_episode("ButtonUnmask", "train", 3)
     plan = plan_of(tasks=(episode.task,), settings=("explicit", "spatial"), goals=3)
@@ -183,7 +183,7 @@ def test_it_plays_with_the_hands_of_the_oracle(trained):
 
 @pytest.mark.sim
 def test_the_same_plan_gives_the_same_listener(trained, torch):
-    from roboirg.apps.learned_listener.listener_training import train_listener
+    from roboirg.apps.learning.listener.listener_training import train_listener
 
     plan = plan_of(reader_epochs=1)
     one, other = (train_listener(plan, 0, lambda *_: None) for _ in range(2))
@@ -201,8 +201,8 @@ def test_files_that_are_no_listener_are_one_sentence(torch, tmp_path, content):
 
 
 def test_what_a_variant_does_not_get_changes_nothing(torch):
-    from roboirg.apps.learned_listener.learned_model import hide
-    from roboirg.apps.learned_listener.listener_net import ListenerInput
+    from roboirg.apps.learning.listener.learned_model import hide
+    from roboirg.apps.learning.listener.listener_net import ListenerInput
 
     seen = scene_of([("cube red", 0.0, 0.1)], [("container", 0.0, 0.1)])
     given = ListenerInput("StopCube", "Stop it.", seen)

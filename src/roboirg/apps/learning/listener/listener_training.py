@@ -2,33 +2,30 @@
 
 from __future__ import annotations
 
-import math
 import random
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from typing import Any, Generic, NamedTuple, TypeVar
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 import torch
 from pydantic import NonNegativeInt, PositiveInt
-from torch import nn
-from torch.nn import functional
 
-from roboirg.apps.learned_listener.detector_net import SIZE, DetectorNet, detector_loss
-from roboirg.apps.learned_listener.labeled_views import LabeledView, look
-from roboirg.apps.learned_listener.learned_model import LearnedModel, Without, hide
-from roboirg.apps.learned_listener.listener_net import (
+from roboirg.apps.learning.detector_net import SIZE, DetectorNet, detector_loss
+from roboirg.apps.learning.labeled_views import LabeledView, look
+from roboirg.apps.learning.listener.learned_model import LearnedModel, Without, hide
+from roboirg.apps.learning.listener.listener_net import (
     ListenerInput,
-    ListenerNet,
-    Vocabulary,
     make_vocabulary,
 )
-from roboirg.apps.learned_listener.object_relations import (
+from roboirg.apps.learning.listener.object_relations import (
     ObjectsInView,
     SeenObjects,
     TablePlane,
     fit_plane,
     relate,
 )
+from roboirg.apps.learning.listener.reader_training import lesson_of, train_reader
+from roboirg.apps.learning.trainer import Progress, Trainer, batch_count, batches
 from roboirg.core.episode import Episode, Split
 from roboirg.core.errors import InvalidValueError
 from roboirg.core.instruction_options import InstructionOptions
@@ -37,21 +34,14 @@ from roboirg.language import FORMS, LANGUAGE_VERSION
 from roboirg.language.instruction import Instruction
 from roboirg.language.settings import all_settings, settings_of
 from roboirg.language.variants import instructions
-from roboirg.policies.vlm.goal_schema import goal_schema
 from roboirg.tasks import get_task, goals_of, with_goal
 from roboirg.tasks.splits.splits import SIZES, get_episode
 from roboirg.util.parallel_map import parallel_map
 
 TRAINING_SPLIT: Split = "train"
-BATCH = 32
-DETECTOR_RATE, READER_RATE = 1e-2, 1e-3
-FORGOTTEN_WORDS = 0.05
-"""Share of the words that are unknown in training, so that new ones do no harm."""
+DETECTOR_RATE = 1e-2
 
 _NO_PICTURE = np.zeros((0, 0, 3), np.uint8)
-
-Progress = Callable[[str, int, int], None]
-One = TypeVar("One")
 
 
 class TrainingPlan(NamedTuple):
@@ -98,13 +88,6 @@ class SeenEpisodes(NamedTuple):
     classes: tuple[str, ...]
     detector: DetectorNet
     plane: TablePlane
-
-
-class _Lesson(NamedTuple):
-    """An instruction with the number of its goal among those of the task."""
-
-    given: ListenerInput
-    goal: int
 
 
 def train_listener(plan: TrainingPlan, workers: int, progress: Progress) -> LearnedModel:
@@ -170,10 +153,12 @@ def teach(scenes: SeenEpisodes, plan: TrainingPlan, progress: Progress) -> Learn
     told = [(episode, instruction.text) for episode, instruction in _instructions(scenes, plan)]
     vocabulary = make_vocabulary((text for _, text in told), scenes.classes, plan.tasks)
     lessons = [
-        _lesson(ListenerInput(episode.task, text, scenes.seen[episode.key]), episode, plan)
+        lesson_of(
+            hide(ListenerInput(episode.task, text, scenes.seen[episode.key]), plan.without), episode
+        )
         for episode, text in told
     ]
-    reader = _train_reader(lessons, vocabulary, plan, progress)
+    reader = train_reader(lessons, vocabulary, plan.reader_epochs, plan.seed, progress)
     about: dict[str, Any] = {**plan._asdict(), "language_version": LANGUAGE_VERSION}
     about |= {"tasks": list(plan.tasks), "settings": list(plan.settings)}
     return LearnedModel(vocabulary, scenes.detector, scenes.plane, reader, plan.without, about)
@@ -233,34 +218,17 @@ def _train_detector(
 ) -> DetectorNet:
     detector, rng = DetectorNet(len(classes)), random.Random(plan.seed)
     epochs = plan.detector_epochs
-    trainer = _Trainer[LabeledView](
+    trainer = Trainer[LabeledView](
         detector,
         lambda batch: detector_loss(detector, batch, classes),
         DETECTOR_RATE,
-        epochs * _batch_count(shown),
+        epochs * batch_count(shown),
     )
     for epoch in range(epochs):
-        trainer.run(_batches(shown, rng))
+        trainer.run(batches(shown, rng))
         progress("detector", epoch + 1, epochs)
     detector.eval()
     return detector
-
-
-def _train_reader(
-    lessons: Sequence[_Lesson], vocabulary: Vocabulary, plan: TrainingPlan, progress: Progress
-) -> ListenerNet:
-    reader, rng = ListenerNet(vocabulary), random.Random(plan.seed)
-    trainer = _Trainer[_Lesson](
-        reader,
-        lambda batch: _reader_loss(reader, batch),
-        READER_RATE,
-        plan.reader_epochs * _batch_count(lessons),
-    )
-    for epoch in range(plan.reader_epochs):
-        trainer.run(_even_batches([_forget(one, rng) for one in lessons], rng))
-        progress("reader", epoch + 1, plan.reader_epochs)
-    reader.eval()
-    return reader
 
 
 def _episodes(plan: TrainingPlan) -> Iterator[Episode]:
@@ -269,73 +237,3 @@ def _episodes(plan: TrainingPlan) -> Iterator[Episode]:
             get_episode(task, TRAINING_SPLIT, place) for place in range(SIZES[TRAINING_SPLIT])
         )
         yield from (get_episode(task, "random", place) for place in range(plan.scenes))
-
-
-def _lesson(given: ListenerInput, episode: Episode, plan: TrainingPlan) -> _Lesson:
-    schema = goal_schema(episode.task)
-    goal = list(schema.goals).index(schema.answers[episode.goal])
-    return _Lesson(hide(given, plan.without), goal)
-
-
-def _forget(lesson: _Lesson, rng: random.Random) -> _Lesson:
-    """Return a lesson in which some words have become unknown ones."""
-    words = lesson.given.text.split()
-    kept = ["…" if rng.random() < FORGOTTEN_WORDS else word for word in words]
-    return lesson._replace(given=lesson.given._replace(text=" ".join(kept)))
-
-
-def _reader_loss(net: ListenerNet, batch: Sequence[_Lesson]) -> torch.Tensor:
-    scores = net([one.given for one in batch])
-    losses = [
-        functional.cross_entropy(own[None], torch.tensor([one.goal]))
-        for own, one in zip(scores, batch, strict=True)
-    ]
-    return torch.stack(losses).mean()
-
-
-def _batch_count(lessons: Sequence[object]) -> int:
-    return math.ceil(len(lessons) / BATCH)
-
-
-def _batches(lessons: Sequence[One], rng: random.Random) -> Iterator[list[One]]:
-    mixed = rng.sample(lessons, len(lessons))
-    for start in range(0, len(mixed), BATCH):
-        yield mixed[start : start + BATCH]
-
-
-def _even_batches(lessons: Sequence[_Lesson], rng: random.Random) -> Iterator[list[_Lesson]]:
-    """Yield batches of lessons that are about equally long, which wastes no time on padding."""
-    mixed = sorted(rng.sample(lessons, len(lessons)), key=_length)
-    batches = [mixed[start : start + BATCH] for start in range(0, len(mixed), BATCH)]
-    yield from rng.sample(batches, len(batches))
-
-
-def _length(lesson: _Lesson) -> int:
-    return lesson.given.text.count(" ")
-
-
-class _Trainer(Generic[One]):
-    """Trains a network with AdamW; the rate falls to zero along a cosine."""
-
-    def __init__(
-        self,
-        net: nn.Module,
-        loss_of: Callable[[Sequence[One]], torch.Tensor],
-        rate: float,
-        steps: int,
-    ) -> None:
-        self._net, self._loss_of = net, loss_of
-        self._optimizer = torch.optim.AdamW(net.parameters(), lr=rate, weight_decay=0.01)
-        self._schedule = torch.optim.lr_scheduler.OneCycleLR(
-            self._optimizer, rate, total_steps=max(steps, 1), pct_start=0.1
-        )
-
-    def run(self, batches: Iterable[Sequence[One]]) -> None:
-        """Take a step for each batch."""
-        self._net.train()
-        for batch in batches:
-            self._optimizer.zero_grad()
-            self._loss_of(batch).backward()
-            nn.utils.clip_grad_norm_(self._net.parameters(), 1.0)
-            self._optimizer.step()
-            self._schedule.step()

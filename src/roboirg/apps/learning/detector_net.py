@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from torch import Tensor, nn
 from torch.nn import functional
 
-from roboirg.apps.learned_listener.labeled_views import LabeledView
-from roboirg.apps.learned_listener.object_relations import SeenObjects
+from roboirg.apps.learning.labeled_views import LabeledView
+from roboirg.apps.learning.listener.object_relations import SeenObjects
 
 CELL = 8
 """Pixels of a cell of the grid in which objects are found."""

@@ -10,7 +10,7 @@ from roboirg.policies.by_name.policy_specs import PolicyKind, PolicyMaker
 
 
 def _learned(spec: str, name: str, options: Mapping[str, str]) -> PolicyMaker:
-    from roboirg.apps.learned_listener.learned_listener import LearnedListener
+    from roboirg.apps.learning.listener.learned_listener import LearnedListener
 
     for option in options:
         raise UnknownNameError("option of learned:", option, [])

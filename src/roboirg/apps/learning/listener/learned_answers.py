@@ -16,7 +16,7 @@ from roboirg.policies.vlm.goal_schema import goal_schema
 from roboirg.util.media import Pixels
 
 if TYPE_CHECKING:
-    from roboirg.apps.learned_listener.learned_model import LearnedModel
+    from roboirg.apps.learning.listener.learned_model import LearnedModel
 
 
 def learned_answers(
@@ -29,7 +29,7 @@ def learned_answers(
         items: of the dataset.
         folder: of the dataset.
     """
-    from roboirg.apps.learned_listener.learned_model import pictures_to_see
+    from roboirg.apps.learning.listener.learned_model import pictures_to_see
 
     for item in items:
         frames = [_read(folder / path) for path in item.frames]

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from roboirg.apps.learned_listener.labeled_views import LATER_STEP
+from roboirg.apps.learning.labeled_views import LATER_STEP
 from roboirg.core.episode import Episode, Split
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.core.observations import FRONT
@@ -20,8 +20,9 @@ from roboirg.tasks.splits.splits import SIZES, get_episode
 from roboirg.util.parallel_map import parallel_map
 
 if TYPE_CHECKING:
-    from roboirg.apps.learned_listener.learned_model import LearnedModel, Pixels
-    from roboirg.apps.learned_listener.listener_training import Progress, TrainingPlan
+    from roboirg.apps.learning.listener.learned_model import LearnedModel, Pixels
+    from roboirg.apps.learning.listener.listener_training import TrainingPlan
+    from roboirg.apps.learning.trainer import Progress
 
 TEST: Split = "test"
 HELD_OUT: PoolName = "test"
@@ -91,8 +92,8 @@ def run_study(
         workers: processes that draw pictures; 0 uses this one.
         progress: called with a kind of work, what is done of it, and all of it.
     """
-    from roboirg.apps.learned_listener.learned_model import save_model
-    from roboirg.apps.learned_listener.listener_training import see_episodes, teach
+    from roboirg.apps.learning.listener.learned_model import save_model
+    from roboirg.apps.learning.listener.listener_training import see_episodes, teach
 
     scenes = see_episodes(plan, workers, progress)
     shown = list(_show_all(plan.tasks, workers, progress))
@@ -120,7 +121,7 @@ def _show_all(
 
 def pictures_of(episode: Episode) -> list[Pixels]:
     """Return the pictures that a learned listener looks at when it plays an episode."""
-    from roboirg.apps.learned_listener.learned_model import pictures_to_see
+    from roboirg.apps.learning.listener.learned_model import pictures_to_see
 
     # Only the first frame and the one at that step are looked at.
     env = RoboIRGEnv(episode, cameras=(FRONT,), demonstration_frames=LATER_STEP)

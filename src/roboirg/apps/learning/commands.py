@@ -13,7 +13,7 @@ from roboirg.core.errors import InvalidValueError
 from roboirg.core.plain_text import counted
 
 if TYPE_CHECKING:
-    from roboirg.apps.learned_listener.listener_training import TrainingPlan
+    from roboirg.apps.learning.listener.listener_training import TrainingPlan
 
 # Heavy modules are imported inside the commands, so that --help is fast.
 
@@ -55,7 +55,7 @@ def learn_listener(
 
     Example: roboirg learn listener --out listener.pt
     """
-    from roboirg.apps.learned_listener.learned_listener import check_learn_support
+    from roboirg.apps.learning.listener.learned_listener import check_learn_support
     from roboirg.util.processor import worker_count
 
     check_learn_support()
@@ -64,8 +64,8 @@ def learn_listener(
     if study:
         _run_study(plan, out, count)
         return
-    from roboirg.apps.learned_listener.learned_model import save_model
-    from roboirg.apps.learned_listener.listener_training import train_listener
+    from roboirg.apps.learning.listener.learned_model import save_model
+    from roboirg.apps.learning.listener.listener_training import train_listener
 
     check_output_file(out)
     save_model(train_listener(plan, count, _print_tenths()), out)
@@ -73,8 +73,8 @@ def learn_listener(
 
 
 def _run_study(plan: TrainingPlan, out: Path, workers: int) -> None:
-    from roboirg.apps.learned_listener.listener_study import run_study
-    from roboirg.apps.learned_listener.study_report import (
+    from roboirg.apps.learning.listener.listener_study import run_study
+    from roboirg.apps.learning.listener.study_report import (
         save_study_figure,
         study_cells,
         study_text,
@@ -102,13 +102,13 @@ def learned_answers(
 
     Example: roboirg learn answers listener.pt --data grounding --out answers.jsonl
     """
-    from roboirg.apps.learned_listener.learned_answers import learned_answers as answers_of
-    from roboirg.apps.learned_listener.learned_listener import check_learn_support
+    from roboirg.apps.learning.listener.learned_answers import learned_answers as answers_of
+    from roboirg.apps.learning.listener.learned_listener import check_learn_support
     from roboirg.evaluation.grounding_items.answer_file import write_answers
     from roboirg.evaluation.grounding_items.grounding_item import read_items
 
     check_learn_support()
-    from roboirg.apps.learned_listener.learned_model import load_model
+    from roboirg.apps.learning.listener.learned_model import load_model
 
     items, learned = read_items(data), load_model(model)
     write_answers(out, answers_of(learned, items, data))
@@ -116,8 +116,8 @@ def learned_answers(
 
 
 def _plan(words: TrainingWords, without: str) -> TrainingPlan:
-    from roboirg.apps.learned_listener.learned_model import WITHOUTS
-    from roboirg.apps.learned_listener.listener_training import TrainingPlan
+    from roboirg.apps.learning.listener.learned_model import WITHOUTS
+    from roboirg.apps.learning.listener.listener_training import TrainingPlan
     from roboirg.cli.names import known_name, known_settings, known_tasks
     from roboirg.core.word_pools import POOLS
 

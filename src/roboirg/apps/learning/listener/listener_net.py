@@ -11,7 +11,7 @@ from typing import NamedTuple
 import torch
 from torch import Tensor, nn
 
-from roboirg.apps.learned_listener.object_relations import VIEWS, ObjectsInView, relation_count
+from roboirg.apps.learning.listener.object_relations import VIEWS, ObjectsInView, relation_count
 from roboirg.policies.vlm.goal_schema import goal_schema
 
 WIDTH, HEADS, LAYERS = 96, 4, 3

@@ -12,7 +12,7 @@ from roboirg.policies.builtin.scripted import ScriptedPolicy
 from roboirg.tasks import goals_of
 
 if TYPE_CHECKING:
-    from roboirg.apps.learned_listener.learned_model import LearnedModel
+    from roboirg.apps.learning.listener.learned_model import LearnedModel
     from roboirg.envs.environment import RoboIRGEnv
 
 FRAMES_EVERY = 8
@@ -32,7 +32,7 @@ class LearnedListener(ScriptedPolicy):
     def __init__(self, path: Path, seed: int = 0) -> None:
         super().__init__(seed)
         check_learn_support()
-        from roboirg.apps.learned_listener.learned_model import file_version, load_model
+        from roboirg.apps.learning.listener.learned_model import file_version, load_model
 
         self.version = file_version(path)
         self.understood: Goal | None = None
@@ -53,7 +53,7 @@ class LearnedListener(ScriptedPolicy):
 
     def decide(self, env: RoboIRGEnv, instruction: str) -> Goal | None:
         """Return the goal that is understood; None if the scene does not have it."""
-        from roboirg.apps.learned_listener.learned_model import pictures_to_see
+        from roboirg.apps.learning.listener.learned_model import pictures_to_see
 
         frames = self._demonstration.get(f"{FRONT}_rgb", ())
         pictures = pictures_to_see(env.picture(FRONT), frames, FRAMES_EVERY)

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from roboirg.apps.learned_listener.object_relations import (
+from roboirg.apps.learning.listener.object_relations import (
     SeenObjects,
     TablePlane,
     fit_plane,

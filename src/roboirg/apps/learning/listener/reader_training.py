@@ -1,0 +1,78 @@
+"""Train the reader: instructions with what is seen, and the goals that they mean."""
+
+from __future__ import annotations
+
+import random
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import torch
+from torch.nn import functional
+
+from roboirg.apps.learning.listener.listener_net import ListenerInput, ListenerNet, Vocabulary
+from roboirg.apps.learning.trainer import Progress, Trainer, batch_count, even_batches
+from roboirg.core.episode import Episode
+from roboirg.policies.vlm.goal_schema import goal_schema
+
+READER_RATE = 1e-3
+FORGOTTEN_WORDS = 0.05
+"""Share of the words that are unknown in training, so that new ones do no harm."""
+
+
+class Lesson(NamedTuple):
+    """An instruction with the number of its goal among those of the task."""
+
+    given: ListenerInput
+    goal: int
+
+
+def lesson_of(given: ListenerInput, episode: Episode) -> Lesson:
+    """Return an instruction with its goal, the episode's own."""
+    schema = goal_schema(episode.task)
+    return Lesson(given, list(schema.goals).index(schema.answers[episode.goal]))
+
+
+def train_reader(
+    lessons: Sequence[Lesson], vocabulary: Vocabulary, epochs: int, seed: int, progress: Progress
+) -> ListenerNet:
+    """Return a reader that has learned from instructions.
+
+    Args:
+        lessons: the instructions.
+        vocabulary: what it can name.
+        epochs: passes over all of them.
+        seed: of their order.
+        progress: called after each pass.
+    """
+    reader, rng = ListenerNet(vocabulary), random.Random(seed)
+    trainer = Trainer[Lesson](
+        reader,
+        lambda batch: _reader_loss(reader, batch),
+        READER_RATE,
+        epochs * batch_count(lessons),
+    )
+    for epoch in range(epochs):
+        trainer.run(even_batches([_forget(one, rng) for one in lessons], rng, _length))
+        progress("reader", epoch + 1, epochs)
+    reader.eval()
+    return reader
+
+
+def _forget(lesson: Lesson, rng: random.Random) -> Lesson:
+    """Return a lesson in which some words have become unknown ones."""
+    words = lesson.given.text.split()
+    kept = ["…" if rng.random() < FORGOTTEN_WORDS else word for word in words]
+    return lesson._replace(given=lesson.given._replace(text=" ".join(kept)))
+
+
+def _reader_loss(net: ListenerNet, batch: Sequence[Lesson]) -> torch.Tensor:
+    scores = net([one.given for one in batch])
+    losses = [
+        functional.cross_entropy(own[None], torch.tensor([one.goal]))
+        for own, one in zip(scores, batch, strict=True)
+    ]
+    return torch.stack(losses).mean()
+
+
+def _length(lesson: Lesson) -> int:
+    return lesson.given.text.count(" ")

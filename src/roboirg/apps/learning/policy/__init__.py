@@ -1,0 +1,1 @@
+"""Policies that learn to act in waypoints from pictures, words and proprioception."""

@@ -1,0 +1,108 @@
+"""What the front camera makes of a place, and back: where on the table a point of a picture is."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from roboirg.apps.learning.policy.recording import RecordedEpisode
+from roboirg.apps.learning.policy.tracks import LookTokens
+from roboirg.simulation.rendering.viewpoint import FOCAL_LENGTH, SIZE, front_camera_matrix
+
+NEAR_TOOL = 0.07
+"""Meters in the plane from the tool within which the hand may hide a thing."""
+
+
+class SightNoise(NamedTuple):
+    """How labels differ from what a detector finds.
+
+    Attributes:
+        pixels: standard deviation of a place in the picture, pixels.
+        turn: of the angle, rad.
+        lost: probability that a thing is not found.
+        lost_near_tool: the same near the tool.
+    """
+
+    pixels: float = 0.7
+    turn: float = 0.08
+    lost: float = 0.02
+    lost_near_tool: float = 0.15
+
+
+class Sight(NamedTuple):
+    """Classes of things, and the height at which each stands on the table.
+
+    Attributes:
+        classes: names.
+        heights: (classes,) of their origins, m.
+    """
+
+    classes: tuple[str, ...]
+    heights: NDArray[np.float64]
+
+    def places(
+        self, classes: NDArray[np.int64], points: NDArray[np.floating]
+    ) -> NDArray[np.float32]:
+        """Return x and y (n, 2), m, of points (n, 2), column and row, of things on the table."""
+        matrix = front_camera_matrix()
+        rays = np.column_stack(
+            [(points - (SIZE / 2 - POINT_OFFSET)) / FOCAL_LENGTH, np.ones(len(points))]
+        )
+        turned = rays @ matrix[:3, :3]
+        eye = -matrix[:3, :3].T @ matrix[:3, 3]
+        reach = (self.heights[classes] - eye[2]) / turned[:, 2]
+        return np.asarray(eye[:2] + reach[:, None] * turned[:, :2], np.float32)
+
+
+POINT_OFFSET = 0.0
+"""Pixels from the corner of a pixel to where a point in it counts."""
+
+
+def points_of(positions: NDArray[np.floating]) -> NDArray[np.float64]:
+    """Return column and row (..., 2) in the front picture of positions (..., 3), m."""
+    matrix = front_camera_matrix()
+    seen = positions @ matrix[:3, :3].T + matrix[:3, 3]
+    flat: NDArray[np.float64] = SIZE / 2 + FOCAL_LENGTH * seen[..., :2] / seen[..., 2:]
+    return flat
+
+
+def heights_of(recorded: Sequence[RecordedEpisode]) -> Mapping[str, float]:
+    """Return the median height of each class of things at the first looks."""
+    found: dict[str, list[float]] = {}
+    for one in recorded:
+        for name, thing, is_seen in zip(one.classes, one.things[0], one.visible[0], strict=True):
+            if is_seen:
+                found.setdefault(name, []).append(float(thing[2]))
+        for look in (len(one.things) // 2,):
+            for name, thing, is_seen in zip(
+                one.classes, one.things[look], one.visible[look], strict=True
+            ):
+                if is_seen and name not in found:
+                    found.setdefault(name, []).append(float(thing[2]))
+    return {name: float(np.median(own)) for name, own in found.items()}
+
+
+def labeled_looks(
+    recorded: RecordedEpisode, sight: Sight, noise: SightNoise, rng: np.random.Generator
+) -> Iterator[tuple[LookTokens, NDArray[np.intp]]]:
+    """Yield what a detector might find at each look, and the numbers of the objects found."""
+    numbers = {name: number for number, name in enumerate(sight.classes)}
+    kinds = np.array([numbers.get(name, -1) for name in recorded.classes], np.int64)
+    positions = recorded.things[..., :3].astype(np.float64)
+    away = np.hypot(*np.moveaxis(positions[..., :2] - recorded.tool[:, None, :2], -1, 0))
+    lost = np.where(away < NEAR_TOOL, noise.lost_near_tool, noise.lost)
+    points = points_of(positions)
+    found = recorded.visible & (rng.random(lost.shape) >= lost) & (kinds >= 0)
+    found &= ((points >= 0) & (points < SIZE)).all(axis=-1)
+    points += rng.normal(0.0, noise.pixels, points.shape)
+    shape = points.shape[:2]
+    every = np.broadcast_to(np.maximum(kinds, 0), shape).ravel()
+    places = sight.places(every, points.reshape(-1, 2)).reshape(*shape, 2)
+    angles = 4.0 * (recorded.things[..., 3] + rng.normal(0.0, noise.turn, shape))
+    turns = np.stack([np.cos(angles), np.sin(angles)], -1).astype(np.float32)
+    for look, shown in enumerate(found):
+        objects = np.flatnonzero(shown)
+        yield LookTokens(kinds[objects], places[look, objects], turns[look, objects]), objects

@@ -1,0 +1,94 @@
+"""Follow things from look to look, so that what is remembered of one stays with it."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import linear_sum_assignment
+
+MOST_TRACKS = 24
+GATE = 0.4
+"""Meters from where a thing is expected at which it may be, at most: the hand moves fast."""
+NEVER = 10.0
+"""Meters that a thing of another class counts as."""
+
+
+class LookTokens(NamedTuple):
+    """The things found at one look.
+
+    Attributes:
+        classes: (n,) numbers of classes, from 0.
+        places: (n, 2) x and y on the table, m.
+        turns: (n, 2) cosine and sine of four times the angle about the vertical.
+    """
+
+    classes: NDArray[np.int64]
+    places: NDArray[np.float32]
+    turns: NDArray[np.float32]
+
+
+class Tracks:
+    """What is known of each thing that was ever seen; a thing stays in its class."""
+
+    def __init__(self) -> None:
+        self.count = 0
+        self._classes = np.zeros(MOST_TRACKS, np.int64)
+        self._places = np.zeros((MOST_TRACKS, 2), np.float32)
+        self._turns = np.zeros((MOST_TRACKS, 2), np.float32)
+        self._speeds = np.zeros((MOST_TRACKS, 2), np.float32)
+        self._seen = np.zeros(MOST_TRACKS, bool)
+
+    @property
+    def classes(self) -> NDArray[np.int64]:
+        """Classes (k,)."""
+        return self._classes[: self.count]
+
+    @property
+    def places(self) -> NDArray[np.float32]:
+        """Where each was last seen (k, 2), m."""
+        return self._places[: self.count]
+
+    @property
+    def turns(self) -> NDArray[np.float32]:
+        """How each was last seen to be turned (k, 2); see `LookTokens`."""
+        return self._turns[: self.count]
+
+    @property
+    def seen(self) -> NDArray[np.bool_]:
+        """Whether the last look shows each (k,)."""
+        return self._seen[: self.count]
+
+    def update(self, look: LookTokens) -> NDArray[np.int64]:
+        """Take in a look; returns the track of each of its things, -1 beyond the most tracks."""
+        mine = self._assign(look)
+        old = mine >= 0
+        own = mine[old]
+        way = look.places[old] - self._places[own]
+        followed = self._seen[own, None]
+        self._speeds[:] = 0.0
+        self._speeds[own] = np.where(followed, way, 0.0)
+        new = np.flatnonzero(~old)[: MOST_TRACKS - self.count]
+        mine[new] = self.count + np.arange(len(new))
+        self.count += len(new)
+        kept = mine >= 0
+        own = mine[kept]
+        self._seen[:] = False
+        self._seen[own], self._classes[own] = True, look.classes[kept]
+        self._places[own], self._turns[own] = look.places[kept], look.turns[kept]
+        return mine
+
+    def _assign(self, look: LookTokens) -> NDArray[np.int64]:
+        """Return the track of each thing, -1 for a new one; pairs are nearest in all."""
+        mine = np.full(len(look.classes), -1, np.int64)
+        if not self.count or not len(mine):
+            return mine
+        expected = self.places + self._speeds[: self.count]
+        away = look.places[:, None] - expected
+        far = np.hypot(away[..., 0], away[..., 1])
+        far[look.classes[:, None] != self.classes] = NEVER
+        things, tracks = linear_sum_assignment(np.minimum(far, NEVER))
+        near = far[things, tracks] <= GATE
+        mine[things[near]] = tracks[near]
+        return mine

@@ -1,0 +1,188 @@
+"""The scripted expert in waypoints, disturbed on the way: what a policy learns to act from."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from roboirg.core.actions import ARM_JOINTS, WAYPOINT
+from roboirg.core.episode import HANDLES_HELD, Goal, Primitive
+from roboirg.core.observations import Observation
+from roboirg.policies.builtin.oracle_policy import OraclePolicy
+from roboirg.simulation.expert.primitives import MotionPrimitives
+from roboirg.simulation.physics_settings import CLOSED, OPEN
+
+if TYPE_CHECKING:
+    from roboirg.envs.environment import RoboIRGEnv
+    from roboirg.simulation.panda import JointTrajectory
+
+LEAVE = 0.0
+"""Gripper value of a waypoint that neither opens nor closes it."""
+STILL = 1e-4
+"""Radians; a trajectory whose joints stay within this of their start moves only the gripper."""
+ON_THING = 0.012
+"""Meters in the plane within which a waypoint is at an object; some stay short of it."""
+FREE_HEIGHT = 0.09
+"""Tool height above which a disturbed waypoint touches nothing, m."""
+
+
+class Disturbance(NamedTuple):
+    """How far executed waypoints lie from the expert's; labels stay the expert's own.
+
+    Attributes:
+        free: probability that a waypoint in free space is moved.
+        plane: standard deviation of that in x and y, m.
+        height: of that in z, m.
+        turn: of that about the vertical, rad.
+        low: probability that a grasp or placement is moved, far enough to miss at times.
+        miss: standard deviation of that in x and y, m.
+    """
+
+    free: float = 0.5
+    plane: float = 0.015
+    height: float = 0.01
+    turn: float = 0.2
+    low: float = 0.12
+    miss: float = 0.025
+
+
+class ExpertWaypoint(NamedTuple):
+    """One decision of the expert.
+
+    Attributes:
+        action: (7,) the waypoint, undisturbed.
+        anchor: name of the object at whose place it is; None for the place of the tool.
+        turn: how the tool turns: ``keep``, ``align`` with the anchor, or ``home``.
+    """
+
+    action: NDArray[np.float64]
+    anchor: str | None
+    turn: str
+
+
+class WaypointExpert(OraclePolicy):
+    """Executes the true goal in waypoints, some of them disturbed.
+
+    Privileged. After a disturbance the expert goes on from where things are, so that its decisions
+    show how to recover; what has failed is tried again.
+
+    Attributes:
+        last: the decision that `act` has just made.
+    """
+
+    actions: ClassVar[str] = WAYPOINT.name
+
+    def __init__(self, seed: int = 0, disturbance: Disturbance | None = None) -> None:
+        super().__init__(seed)
+        self._disturbance = disturbance
+        self._rng = np.random.default_rng(seed)
+        self.last: ExpertWaypoint | None = None
+        self._gripper = OPEN
+        self._primitives: _WaypointPrimitives | None = None
+
+    def make_primitives(self, env: RoboIRGEnv) -> MotionPrimitives:
+        """Return the expert that executes the stages, without the retry in a narrow grip."""
+        self._primitives = _WaypointPrimitives(env.session.world)
+        return self._primitives
+
+    def decide(self, env: RoboIRGEnv, instruction: str) -> Goal:
+        """Return the episode's goal; the instruction is ignored."""
+        self._gripper = OPEN
+        self._rng = np.random.default_rng((env.episode.seed, self.seed))
+        return super().decide(env, instruction)
+
+    def act(self, observation: Observation) -> NDArray[np.floating[Any]]:
+        """Return the next waypoint (1, 7), perhaps disturbed; `last` is the undisturbed one."""
+        while True:
+            staged = next(self._chunks, None)
+            if staged is None:
+                action = self._here(LEAVE)
+                self.last = ExpertWaypoint(action, None, "keep")
+                return action[None]
+            self.stage, chunk = staged
+            decided = self._waypoint(chunk)
+            if decided is not None:
+                break
+        self.last = decided
+        return self._disturb(decided.action)[None]
+
+    def _waypoint(self, chunk: JointTrajectory) -> ExpertWaypoint | None:
+        """Return the waypoint of a trajectory; None if it moves neither tool nor gripper."""
+        gripper = float(chunk[-1, ARM_JOINTS])
+        if np.abs(chunk[:, :ARM_JOINTS] - chunk[0, :ARM_JOINTS]).max() < STILL:
+            if gripper not in (OPEN, CLOSED) or gripper == self._gripper:
+                return None
+            self._gripper = gripper
+            return ExpertWaypoint(self._here(gripper), None, "keep")
+        action = self._pose_at(chunk[-1, :ARM_JOINTS], LEAVE)
+        return ExpertWaypoint(action, *self._meaning(action))
+
+    def _meaning(self, action: NDArray[np.float64]) -> tuple[str | None, str]:
+        """Return the anchor of a move, and how the tool turns in it."""
+        env = self._attached()
+        tool = np.asarray(env.session.world.robot.tool_pose.p)
+        primitive = self._stage_primitive()
+        turn = _TURNS.get(primitive.kind, "keep")
+        is_up = action[2] > tool[2] + UP and np.hypot(*(action[:2] - tool[:2])) < ASIDE
+        if is_up:
+            return None, "keep"
+        name = primitive.place if primitive.kind in HANDLES_HELD else primitive.subject
+        body = env.session.world.bodies.get(str(name))
+        if body is not None and np.hypot(*(action[:2] - body.position[:2])) < ON_THING:
+            return str(name), turn
+        return None, "keep"
+
+    def _stage_primitive(self) -> Primitive:
+        if self.stage is None:
+            raise RuntimeError("WaypointExpert has no stage before its first chunk.")
+        return self.stage.primitive
+
+    def _here(self, gripper: float) -> NDArray[np.float64]:
+        robot = self._attached().session.world.robot
+        return self._pose_at(robot.arm_positions, gripper)
+
+    def _pose_at(self, arm: NDArray[np.floating[Any]], gripper: float) -> NDArray[np.float64]:
+        """Return the waypoint at joint positions (7)."""
+        if self._primitives is None:
+            raise RuntimeError("WaypointExpert needs reset() before act().")
+        position, rotation = self._primitives.tool_at(np.asarray(arm, np.float64))
+        return np.concatenate([position, rotation.as_euler("xyz"), [gripper]])
+
+    def _disturb(self, action: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return a waypoint moved at random, if it is its turn; gripper actions stay."""
+        how, rng = self._disturbance, self._rng
+        if how is None or action[-1] != LEAVE:
+            return action
+        moved = action.copy()
+        if action[2] > FREE_HEIGHT:
+            if rng.random() < how.free:
+                moved[:2] += rng.normal(0.0, how.plane, 2)
+                moved[2] += rng.normal(0.0, how.height)
+                moved[5] += rng.normal(0.0, how.turn)
+        elif rng.random() < how.low:
+            moved[:2] += rng.normal(0.0, how.miss, 2)
+        return moved
+
+
+UP = 0.05
+"""Meters by which a move rises to be one straight up."""
+ASIDE = 0.06
+"""Meters aside within which it still is."""
+_TURNS = {"pick_cube": "align", "pick_container": "align", "press": "home", "hover": "home"}
+
+
+class _WaypointPrimitives(MotionPrimitives):
+    """The expert's primitives; a failed grasp is repeated as a whole, with open fingers."""
+
+    def _grasp_and_lift(self, cube: str, opening: float) -> Iterator[JointTrajectory]:
+        if opening == OPEN:
+            yield from super()._grasp_and_lift(cube, opening)
+
+    def tool_at(self, arm: NDArray[np.float64]) -> tuple[NDArray[np.float64], Rotation]:
+        """Return position (m) and rotation of the tool at joint positions (7)."""
+        pose = self._planner.forward_kinematics(arm)
+        return pose.position, pose.rotation

@@ -1,0 +1,64 @@
+"""Training of small networks: batches, and steps with a falling rate."""
+
+from __future__ import annotations
+
+import math
+import random
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from typing import Generic, TypeVar
+
+import torch
+from torch import nn
+
+BATCH = 32
+One = TypeVar("One")
+Progress = Callable[[str, int, int], None]
+"""Called with a kind of work, what is done of it, and all of it."""
+
+
+def batch_count(lessons: Sequence[object], size: int = BATCH) -> int:
+    """Return the number of batches of lessons."""
+    return math.ceil(len(lessons) / size)
+
+
+def batches(lessons: Sequence[One], rng: random.Random, size: int = BATCH) -> Iterator[list[One]]:
+    """Yield lessons in random order, in batches."""
+    mixed = rng.sample(lessons, len(lessons))
+    for start in range(0, len(mixed), size):
+        yield mixed[start : start + size]
+
+
+def even_batches(
+    lessons: Sequence[One], rng: random.Random, length: Callable[[One], int], size: int = BATCH
+) -> Iterator[list[One]]:
+    """Yield batches of lessons that are about equally long, which wastes no time on padding."""
+    mixed = sorted(rng.sample(lessons, len(lessons)), key=length)
+    found = [mixed[start : start + size] for start in range(0, len(mixed), size)]
+    yield from rng.sample(found, len(found))
+
+
+class Trainer(Generic[One]):
+    """Trains a network with AdamW; the rate falls to zero along a cosine."""
+
+    def __init__(
+        self,
+        net: nn.Module,
+        loss_of: Callable[[Sequence[One]], torch.Tensor],
+        rate: float,
+        steps: int,
+    ) -> None:
+        self._net, self._loss_of = net, loss_of
+        self._optimizer = torch.optim.AdamW(net.parameters(), lr=rate, weight_decay=0.01)
+        self._schedule = torch.optim.lr_scheduler.OneCycleLR(
+            self._optimizer, rate, total_steps=max(steps, 1), pct_start=0.1
+        )
+
+    def run(self, batches: Iterable[Sequence[One]]) -> None:
+        """Take a step for each batch."""
+        self._net.train()
+        for batch in batches:
+            self._optimizer.zero_grad()
+            self._loss_of(batch).backward()
+            nn.utils.clip_grad_norm_(self._net.parameters(), 1.0)
+            self._optimizer.step()
+            self._schedule.step()
