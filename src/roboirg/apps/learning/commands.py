@@ -55,7 +55,7 @@ def learn_listener(
 
     Example: roboirg learn listener --out listener.pt
     """
-    from roboirg.apps.learning.listener.learned_listener import check_learn_support
+    from roboirg.apps.learning.learn_support import check_learn_support
     from roboirg.util.processor import worker_count
 
     check_learn_support()
@@ -102,8 +102,8 @@ def learned_answers(
 
     Example: roboirg learn answers listener.pt --data grounding --out answers.jsonl
     """
+    from roboirg.apps.learning.learn_support import check_learn_support
     from roboirg.apps.learning.listener.learned_answers import learned_answers as answers_of
-    from roboirg.apps.learning.listener.learned_listener import check_learn_support
     from roboirg.evaluation.grounding_items.answer_file import write_answers
     from roboirg.evaluation.grounding_items.grounding_item import read_items
 

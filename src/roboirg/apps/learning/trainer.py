@@ -53,12 +53,16 @@ class Trainer(Generic[One]):
             self._optimizer, rate, total_steps=max(steps, 1), pct_start=0.1
         )
 
-    def run(self, batches: Iterable[Sequence[One]]) -> None:
-        """Take a step for each batch."""
+    def run(self, batches: Iterable[Sequence[One]]) -> float:
+        """Take a step for each batch; returns the mean loss."""
         self._net.train()
+        losses = []
         for batch in batches:
             self._optimizer.zero_grad()
-            self._loss_of(batch).backward()
+            loss = self._loss_of(batch)
+            loss.backward()  # type: ignore[no-untyped-call]
+            losses.append(float(loss.detach()))
             nn.utils.clip_grad_norm_(self._net.parameters(), 1.0)
             self._optimizer.step()
             self._schedule.step()
+        return sum(losses) / max(1, len(losses))

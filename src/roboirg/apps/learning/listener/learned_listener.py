@@ -5,8 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from roboirg.apps.learning.learn_support import check_learn_support, file_version
 from roboirg.core.episode import Goal
-from roboirg.core.extras import extra_needed
 from roboirg.core.observations import FRONT, Demonstration
 from roboirg.policies.builtin.scripted import ScriptedPolicy
 from roboirg.tasks import goals_of
@@ -32,9 +32,9 @@ class LearnedListener(ScriptedPolicy):
     def __init__(self, path: Path, seed: int = 0) -> None:
         super().__init__(seed)
         check_learn_support()
-        from roboirg.apps.learning.listener.learned_model import file_version, load_model
+        from roboirg.apps.learning.listener.learned_model import load_model
 
-        self.version = file_version(path)
+        self.version = file_version(path, "listener")
         self.understood: Goal | None = None
         self._model: LearnedModel = load_model(path)
         self._demonstration: Demonstration = {}
@@ -60,9 +60,3 @@ class LearnedListener(ScriptedPolicy):
         self._demonstration = {}
         self.understood = self._model.understand(env.episode.task, instruction, pictures)
         return self.understood if self.understood in goals_of(env.episode) else None
-
-
-def check_learn_support() -> None:
-    """Check early that PyTorch is there."""
-    with extra_needed("A listener that learns needs PyTorch", "learn"):
-        import torch  # noqa: F401 - an extra, and slow to import

@@ -22,7 +22,6 @@ from roboirg.apps.learning.listener.object_relations import (
 from roboirg.core.episode import Goal
 from roboirg.core.errors import InvalidValueError
 from roboirg.policies.vlm.goal_schema import goal_schema
-from roboirg.util.short_hash import short_hash
 
 FORMAT = "roboirg-listener-2"
 Without = Literal["none", "pictures", "video", "words"]
@@ -153,14 +152,3 @@ def load_model(path: Path) -> LearnedModel:
     detector.eval()
     reader.eval()
     return LearnedModel(vocabulary, detector, plane, reader, content["without"], content["about"])
-
-
-def file_version(path: Path) -> str:
-    """Return a fingerprint of a trained listener's file."""
-    try:
-        return short_hash(path.read_bytes())
-    except OSError as error:
-        raise InvalidValueError(
-            f"The trained listener {str(path)!r} cannot be read ({error.strerror}); make one with: "
-            "roboirg learn listener --out PATH."
-        ) from error

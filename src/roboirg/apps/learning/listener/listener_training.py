@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import random
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -24,17 +24,14 @@ from roboirg.apps.learning.listener.object_relations import (
     fit_plane,
     relate,
 )
-from roboirg.apps.learning.listener.reader_training import lesson_of, train_reader
+from roboirg.apps.learning.listener.reader_training import lesson_of, said, train_reader
 from roboirg.apps.learning.trainer import Progress, Trainer, batch_count, batches
 from roboirg.core.episode import Episode, Split
 from roboirg.core.errors import InvalidValueError
-from roboirg.core.instruction_options import InstructionOptions
 from roboirg.core.word_pools import PoolName
-from roboirg.language import FORMS, LANGUAGE_VERSION
-from roboirg.language.instruction import Instruction
-from roboirg.language.settings import all_settings, settings_of
-from roboirg.language.variants import instructions
-from roboirg.tasks import get_task, goals_of, with_goal
+from roboirg.language import LANGUAGE_VERSION
+from roboirg.language.settings import settings_of
+from roboirg.tasks import get_task
 from roboirg.tasks.splits.splits import SIZES, get_episode
 from roboirg.util.parallel_map import parallel_map
 
@@ -150,7 +147,8 @@ def teach(scenes: SeenEpisodes, plan: TrainingPlan, progress: Progress) -> Learn
         progress: called with a kind of work, what is done of it, and all of it.
     """
     torch.manual_seed(plan.seed)
-    told = [(episode, instruction.text) for episode, instruction in _instructions(scenes, plan)]
+    spoken = said(scenes.episodes, plan.settings, plan.words, plan.goals, plan.seed)
+    told = [(episode, instruction.text) for episode, instruction in spoken]
     vocabulary = make_vocabulary((text for _, text in told), scenes.classes, plan.tasks)
     lessons = [
         lesson_of(
@@ -162,31 +160,6 @@ def teach(scenes: SeenEpisodes, plan: TrainingPlan, progress: Progress) -> Learn
     about: dict[str, Any] = {**plan._asdict(), "language_version": LANGUAGE_VERSION}
     about |= {"tasks": list(plan.tasks), "settings": list(plan.settings)}
     return LearnedModel(vocabulary, scenes.detector, scenes.plane, reader, plan.without, about)
-
-
-def _instructions(
-    scenes: SeenEpisodes, plan: TrainingPlan
-) -> Iterator[tuple[Episode, Instruction]]:
-    options = InstructionOptions(wordings=plan.words)
-    known = all_settings()
-    harder = [name for name in plan.settings if known[name].plain is not None]
-    plain = [name for name in plan.settings if name not in harder]
-    by_place = [name for name in plain if "frame" in known[name].reads]
-    others = [name for name in plain if name not in by_place]
-    yield from instructions(scenes.episodes, others, FORMS[:1], options)
-    yield from instructions(_with_goals(scenes.episodes, plan), by_place, FORMS[:1], options)
-    yield from instructions(scenes.episodes, harder, FORMS[:1], options)
-
-
-def _with_goals(episodes: Iterable[Episode], plan: TrainingPlan) -> Iterator[Episode]:
-    """Yield each episode, and again with other goals of its scene."""
-    rng = random.Random(plan.seed)
-    for episode in episodes:
-        yield episode
-        goals = goals_of(episode)
-        others = [goal for goal in goals if goal != episode.goal]
-        for goal in rng.sample(others, min(plan.goals - 1, len(others))):
-            yield with_goal(episode, goal)
 
 
 def _look(episode: Episode) -> tuple[LabeledView, ...]:

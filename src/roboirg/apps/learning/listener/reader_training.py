@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import random
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from typing import NamedTuple
 
 import torch
@@ -12,11 +12,53 @@ from torch.nn import functional
 from roboirg.apps.learning.listener.listener_net import ListenerInput, ListenerNet, Vocabulary
 from roboirg.apps.learning.trainer import Progress, Trainer, batch_count, even_batches
 from roboirg.core.episode import Episode
+from roboirg.core.instruction_options import InstructionOptions
+from roboirg.core.word_pools import PoolName
+from roboirg.language import FORMS
+from roboirg.language.instruction import Instruction
+from roboirg.language.settings import all_settings
+from roboirg.language.variants import instructions
 from roboirg.policies.vlm.goal_schema import goal_schema
+from roboirg.tasks import goals_of, with_goal
 
 READER_RATE = 1e-3
 FORGOTTEN_WORDS = 0.05
 """Share of the words that are unknown in training, so that new ones do no harm."""
+
+
+def said(
+    episodes: Sequence[Episode], settings: Sequence[str], words: PoolName, goals: int, seed: int
+) -> Iterator[tuple[Episode, Instruction]]:
+    """Yield the instructions of episodes, and of more goals of each scene where that teaches most.
+
+    Args:
+        episodes: the episodes.
+        settings: names; harder ones are left out where they cannot express an episode.
+        words: the pool of words.
+        goals: of each scene with an instruction by place; other settings have its own only.
+        seed: draws the goals.
+    """
+    options = InstructionOptions(wordings=words)
+    known = all_settings()
+    harder = [name for name in settings if known[name].plain is not None]
+    plain = [name for name in settings if name not in harder]
+    by_place = [name for name in plain if "frame" in known[name].reads]
+    others = [name for name in plain if name not in by_place]
+    yield from instructions(episodes, others, FORMS[:1], options)
+    more = list(with_more_goals(episodes, goals, seed))
+    yield from instructions(more, by_place, FORMS[:1], options)
+    yield from instructions(episodes, harder, FORMS[:1], options)
+
+
+def with_more_goals(episodes: Iterable[Episode], goals: int, seed: int) -> Iterator[Episode]:
+    """Yield each episode, and again with other goals of its scene."""
+    rng = random.Random(seed)
+    for episode in episodes:
+        yield episode
+        every = goals_of(episode)
+        others = [goal for goal in every if goal != episode.goal]
+        for goal in rng.sample(others, min(goals - 1, len(others))):
+            yield with_goal(episode, goal)
 
 
 class Lesson(NamedTuple):

@@ -14,6 +14,8 @@ from roboirg.apps.learning.policy.memories import HEADS, MEMORIES, WIDTH, Looks,
 LAYERS = 2
 WAVES = 5
 METERS = 0.5
+CLOSED = -1e4
+"""Score of a thing that cannot be chosen."""
 TOOL_NUMBERS = 9
 """x, y, z, cosine and sine of its angle, a finger's opening, video or not, time, and its log."""
 
@@ -94,7 +96,7 @@ class BodyNet(nn.Module):
         moves = self.move(first)
         queries = self.query.weight[None] + self.mixed(first)[:, None]
         scores = queries @ self.key(rest).transpose(1, 2) / math.sqrt(WIDTH)
-        scores = scores.masked_fill(closed[:, None], -1e4)
+        scores = scores.masked_fill(closed[:, None], CLOSED)
         shape = batch.decisions.shape
         return moves.view(*shape, -1), scores.view(*shape, *scores.shape[1:])
 

@@ -1,7 +1,7 @@
 """What a policy remembers: one class per kind of memory, all with the same inputs and outputs.
 
-A memory takes the embedded looks of an episode and gives, for each decision, a vector for each thing
-and one for the whole. Register another one with `MEMORIES`.
+A memory takes the embedded looks of an episode and gives, for each decision, a vector for each
+thing and one for the whole. Another memory is one class here, with its name in `MEMORIES`.
 """
 
 from __future__ import annotations

@@ -88,7 +88,7 @@ def waypoint(
     tool: NDArray[np.floating],
     place: NDArray[np.floating],
     turn: NDArray[np.floating],
-    home: NDArray[np.floating],
+    home: Sequence[float],
 ) -> NDArray[np.float64]:
     """Return the waypoint (7) of a kind.
 

@@ -1,9 +1,10 @@
-"""Recorded episodes as numbers for the network."""
+"""Recorded episodes, and episodes that are played, as numbers for the network."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import torch
@@ -11,7 +12,7 @@ from numpy.typing import NDArray
 
 from roboirg.apps.learning.policy.body_net import TOOL_NUMBERS, EpisodeBatch
 from roboirg.apps.learning.policy.moves import Decision, Move
-from roboirg.apps.learning.policy.recording import RecordedEpisode
+from roboirg.apps.learning.policy.recording import LOOK_EVERY, RecordedEpisode
 from roboirg.apps.learning.policy.sight import Sight, SightNoise, labeled_looks
 from roboirg.apps.learning.policy.tracks import LookTokens, Tracks
 
@@ -19,8 +20,8 @@ MINUTE = 1200.0
 """Control steps."""
 
 
-class EpisodeNumbers(NamedTuple):
-    """One episode for the network; T looks, K tracks, D decisions; see `EpisodeBatch`."""
+class LookNumbers(NamedTuple):
+    """The looks of an episode; T looks, K things; fields as in `EpisodeBatch`, without B."""
 
     classes: NDArray[np.int64]
     places: NDArray[np.float32]
@@ -28,6 +29,12 @@ class EpisodeNumbers(NamedTuple):
     seen: NDArray[np.bool_]
     known: NDArray[np.bool_]
     tool: NDArray[np.float32]
+
+
+class EpisodeNumbers(NamedTuple):
+    """An episode for the network; D decisions; fields as in `EpisodeBatch`, without B."""
+
+    looks: LookNumbers
     goal: NDArray[np.float32]
     decisions: NDArray[np.int64]
     moves: NDArray[np.int64]
@@ -35,75 +42,61 @@ class EpisodeNumbers(NamedTuple):
 
 
 class LookHistory:
-    """The looks of an episode so far, as rows that grow with the things that are seen."""
+    """The looks of an episode so far.
+
+    Attributes:
+        tracks: the things that were seen.
+    """
 
     def __init__(self) -> None:
-        self._tracks = Tracks()
-        self._rows: list[
-            tuple[NDArray[np.int64], NDArray[np.float32], NDArray[np.float32], NDArray[np.bool_]]
-        ] = []
+        self.tracks = Tracks()
+        self._rows: list[tuple[NDArray[Any], ...]] = []
         self._tools: list[NDArray[np.float32]] = []
 
     def __len__(self) -> int:
         return len(self._rows)
 
-    @property
-    def tracks(self) -> Tracks:
-        return self._tracks
-
     def add(
-        self, look: LookTokens, tool: NDArray[np.floating], *, is_video: bool, step: int
+        self, look: LookTokens, tool: NDArray[np.floating[Any]], *, is_video: bool, step: int
     ) -> NDArray[np.int64]:
-        """Add a look; returns the track of each of its things."""
-        mine = self._tracks.update(look)
-        now = self._tracks
+        """Add a look; returns the track of each of its things.
+
+        Args:
+            look: the things.
+            tool: (7,) pose and opening; see `RecordedEpisode`.
+            is_video: whether it is one of the video.
+            step: control steps since the start of the video or of the policy's turn.
+        """
+        mine = self.tracks.update(look)
+        now = self.tracks
         self._rows.append(
             (now.classes.copy(), now.places.copy(), now.turns.copy(), now.seen.copy())
         )
-        self._tools.append(tool_numbers(tool, is_video=is_video, step=step))
+        self._tools.append(_tool_numbers(tool, is_video=is_video, step=step))
         return mine
 
-    def numbers(
-        self,
-    ) -> tuple[
-        NDArray[np.int64],
-        NDArray[np.float32],
-        NDArray[np.float32],
-        NDArray[np.bool_],
-        NDArray[np.bool_],
-        NDArray[np.float32],
-    ]:
-        """Return classes, places, turns, seen, known and tool of all looks."""
-        length, count = len(self._rows), max(1, len(self._tracks.classes))
+    def numbers(self) -> LookNumbers:
+        """Return all looks; a thing has the place where it was last seen."""
+        length, count = len(self._rows), max(1, self.tracks.count)
         classes = np.zeros((length, count), np.int64)
-        places = np.zeros((length, count, 2), np.float32)
-        turns = np.zeros((length, count, 2), np.float32)
-        seen, known = np.zeros((length, count), bool), np.zeros((length, count), bool)
+        places, turns = (np.zeros((length, count, 2), np.float32) for _ in range(2))
+        seen, known = (np.zeros((length, count), bool) for _ in range(2))
         for look, (kinds, spots, angles, shown) in enumerate(self._rows):
             own = len(kinds)
             classes[look, :own], places[look, :own], turns[look, :own] = kinds, spots, angles
             seen[look, :own], known[look, :own] = shown, True
-        return classes, places, turns, seen, known, np.stack(self._tools)
+        return LookNumbers(classes, places, turns, seen, known, np.stack(self._tools))
 
 
-def tool_numbers(tool: NDArray[np.floating], *, is_video: bool, step: int) -> NDArray[np.float32]:
-    """Return what the network gets of the tool (7) and the time."""
+def _tool_numbers(
+    tool: NDArray[np.floating[Any]], *, is_video: bool, step: int
+) -> NDArray[np.float32]:
     x, y, z, _, _, yaw, finger = tool
-    time = step / MINUTE
-    values = [
-        x,
-        y,
-        z * 5.0,
-        np.cos(2 * yaw),
-        np.sin(2 * yaw),
-        finger * 25.0,
-        is_video,
-        time,
-        np.log1p(step) / 7.0,
-    ]
-    found = np.array(values, np.float32)
+    turn = math.cos(2 * yaw), math.sin(2 * yaw)
+    time = step / MINUTE, math.log1p(step) / 7.0
+    found = np.array([x, y, z * 5.0, *turn, finger * 25.0, is_video, *time], np.float32)
     if len(found) != TOOL_NUMBERS:
-        raise RuntimeError("TOOL_NUMBERS disagrees with tool_numbers.")
+        raise RuntimeError(f"The tool has {len(found)} numbers, not {TOOL_NUMBERS}.")
     return found
 
 
@@ -116,29 +109,37 @@ def to_numbers(
     noise: SightNoise,
     rng: np.random.Generator,
 ) -> EpisodeNumbers:
-    """Return an episode as a detector with that noise would have seen it."""
+    """Return a recorded episode as a detector with that noise would have seen it.
+
+    Args:
+        recorded: the episode.
+        decisions: of the episode.
+        goal: (parts,) 1 for each part of its goal.
+        sight: of the camera.
+        moves: the number of each kind of waypoint.
+        noise: of the detector.
+        rng: draws the noise.
+    """
     history = LookHistory()
     track_of: dict[int, int] = {}
+    times: list[int] = []
     chosen: list[int] = []
     due = {one.look: one for one in decisions}
-    # A look may belong to one decision only: opening and closing are part of the move before.
+    merged = set(recorded.looks.tolist()) - due.keys()
     for look, (tokens, objects) in enumerate(labeled_looks(recorded, sight, noise, rng)):
-        mine = history.add(
-            tokens,
-            recorded.tool[look],
-            is_video=bool(recorded.is_video[look]),
-            step=int(recorded.steps[look]),
-        )
-        track_of.update(
-            (int(thing), int(own)) for thing, own in zip(objects, mine, strict=True) if own >= 0
-        )
+        if look in merged and recorded.steps[look] % LOOK_EVERY:
+            continue  # who opens or closes the gripper with the move before does not look here
+        is_video, step = bool(recorded.is_video[look]), int(recorded.steps[look])
+        mine = history.add(tokens, recorded.tool[look], is_video=is_video, step=step)
+        track_of.update(zip(objects.tolist(), mine.tolist(), strict=True))
         if look in due:
+            times.append(len(history) - 1)
             chosen.append(track_of.get(due[look].thing, -1))
     own = [due[look] for look in sorted(due)]
     return EpisodeNumbers(
-        *history.numbers(),
+        history.numbers(),
         goal,
-        np.array([one.look for one in own], np.int64),
+        np.array(times, np.int64),
         np.array([moves.get(one.move, -1) for one in own], np.int64),
         np.array(chosen, np.int64),
     )
@@ -146,22 +147,23 @@ def to_numbers(
 
 def to_batch(episodes: Sequence[EpisodeNumbers]) -> EpisodeBatch:
     """Return episodes padded to the longest."""
+    looks = [one.looks for one in episodes]
     return EpisodeBatch(
-        *(_pad([getattr(one, name) for one in episodes], fill) for name, fill in _PADDED[:5]),
-        _pad([one.tool for one in episodes], 0),
-        _pad([np.ones(len(one.tool), bool) for one in episodes], fill=False),
+        _pad([one.classes for one in looks], 0),
+        _pad([one.places for one in looks], 0),
+        _pad([one.turns for one in looks], 0),
+        _pad([one.seen for one in looks], 0),
+        _pad([one.known for one in looks], 0),
+        _pad([one.tool for one in looks], 0),
+        _pad([np.ones(len(one.tool), bool) for one in looks], 0),
         torch.from_numpy(np.stack([one.goal for one in episodes])),
-        *(_pad([getattr(one, name) for one in episodes], fill) for name, fill in _PADDED[5:]),
+        _pad([one.decisions for one in episodes], 0),
+        _pad([one.moves for one in episodes], -1),
+        _pad([one.things for one in episodes], -1),
     )
 
 
-_PADDED: tuple[tuple[str, int], ...] = (
-    ("classes", 0), ("places", 0), ("turns", 0), ("seen", 0), ("known", 0),
-    ("decisions", 0), ("moves", -1), ("things", -1),
-)  # fmt: skip
-
-
-def _pad(arrays: Sequence[NDArray[np.generic]], fill: int) -> torch.Tensor:
+def _pad(arrays: Sequence[NDArray[Any]], fill: int) -> torch.Tensor:
     shape = tuple(max(own) for own in zip(*(one.shape for one in arrays), strict=True))
     padded = np.full((len(arrays), *shape), fill, arrays[0].dtype)
     for row, one in zip(padded, arrays, strict=True):

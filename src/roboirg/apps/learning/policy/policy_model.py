@@ -1,94 +1,236 @@
-"""What a policy has learned, in one file of plain tensors, and an episode that it plays."""
+"""What a policy has learned, in one file of plain tensors, and an episode as it sees it."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
+from collections.abc import Mapping, Sequence
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 import torch
 from numpy.typing import NDArray
 
+from roboirg.apps.learning.listener.listener_net import (
+    ListenerInput,
+    ListenerNet,
+    Vocabulary,
+    parts_of,
+)
+from roboirg.apps.learning.listener.object_relations import ObjectsInView, rank
 from roboirg.apps.learning.policy.body_net import BodyNet
 from roboirg.apps.learning.policy.moves import Move, waypoint
 from roboirg.apps.learning.policy.policy_data import EpisodeNumbers, LookHistory, to_batch
 from roboirg.apps.learning.policy.sight import Sight
+from roboirg.apps.learning.policy.task_net import TaskNet
 from roboirg.apps.learning.policy.thing_detector import ThingDetector
 from roboirg.apps.learning.policy.tracks import LookTokens
+from roboirg.core.errors import InvalidValueError
+from roboirg.policies.vlm.goal_schema import goal_schema
 
-HOME = np.array([np.pi, 0.0, 0.0])
+FORMAT = "roboirg-policy-1"
+FIRST_LOOKS = (0, 5)
+"""Looks at which the reader of words sees a video, two seconds apart; else it sees the first."""
+WORDLESS = "none"
+"""Words of a policy that was trained without any."""
+HOME = (math.pi, 0.0, 0.0)
+"""Roll, pitch and yaw of the tool at the beginning, rad."""
+_BATCH = 32
+
+Pictures = Sequence[NDArray[np.uint8]]
 
 
 class PolicyModel(NamedTuple):
     """A trained policy.
 
     Attributes:
-        sight: classes of things and their heights.
+        sight: classes of things, and the heights at which they stand.
         detector: finds them.
+        vocabulary: of words, classes, tasks and parts of goals.
+        task_net: names the task from words and the first looks.
+        reader: understands the goal from the same.
+        corners: (4, 2) of the area where things stand, m.
         moves: kinds of waypoints.
-        body: chooses.
-        parts: of goals.
-        about: how it was trained.
-        version: a fingerprint.
+        memory: what it remembers; a name of `MEMORIES`.
+        body: chooses the next waypoint.
+        about: how it was trained, for records.
     """
 
     sight: Sight
     detector: ThingDetector
+    vocabulary: Vocabulary
+    task_net: TaskNet
+    reader: ListenerNet
+    corners: NDArray[np.float64]
     moves: tuple[Move, ...]
+    memory: str
     body: BodyNet
-    parts: tuple[str, ...]
     about: dict[str, Any]
-    version: str
+
+    def understand(self, text: str, looks: Sequence[LookTokens]) -> NDArray[np.float32]:
+        """Return the task and the goal that an instruction means, as `goal_numbers` does.
+
+        Args:
+            text: everything that was said.
+            looks: the first one, and a later one of the video if there is one.
+        """
+        heard = "" if self.about["words"] == WORDLESS else text
+        seen = seen_things(looks, self.corners, self.sight.classes)
+        with torch.no_grad():
+            task = self.vocabulary.tasks[int(self.task_net([heard], [seen])[0].argmax())]
+            (scores,) = self.reader([ListenerInput(task, heard, seen)])
+        answer = list(goal_schema(task).goals)[int(scores.argmax())]
+        return goal_numbers(task, answer, self.vocabulary)
 
 
-class PlayedEpisode:
-    """One episode as the policy sees it."""
+def seen_things(
+    looks: Sequence[LookTokens], corners: NDArray[np.float64], classes: Sequence[str]
+) -> ObjectsInView:
+    """Return what is seen at one or two looks, for the reader."""
+    places = np.concatenate([one.places for one in looks]).astype(np.float64)
+    return rank([one.classes for one in looks], places, corners, classes)
 
-    def __init__(self, model: PolicyModel, goal: NDArray[np.float32]) -> None:
-        self._model, self._goal = model, goal
+
+def goal_numbers(task: str, answer: str, vocabulary: Vocabulary) -> NDArray[np.float32]:
+    """Return 1 for the task and for each part of an answer, else 0: (tasks + parts,)."""
+    found = np.zeros(len(vocabulary.tasks) + len(vocabulary.parts), np.float32)
+    found[vocabulary.tasks.index(task)] = 1.0
+    for part in parts_of(answer):
+        found[len(vocabulary.tasks) + vocabulary.parts.index(part)] = 1.0
+    return found
+
+
+class SeenEpisode:
+    """One episode as a policy sees it.
+
+    Args:
+        model: the policy.
+    """
+
+    def __init__(self, model: PolicyModel) -> None:
+        self._model = model
         self._history = LookHistory()
+        self._first: list[LookTokens] = []
+        self._video_looks = 0
 
     def look(
         self,
-        pictures: Sequence[NDArray[np.uint8]],
+        pictures: Pictures,
         tools: Sequence[NDArray[np.floating[Any]]],
         steps: Sequence[int],
         *,
         is_video: bool,
     ) -> None:
-        """See pictures."""
-        for start in range(0, len(pictures), 32):
-            part = slice(start, start + 32)
-            for found, tool, step in zip(
-                self._model.detector.find(pictures[part]), tools[part], steps[part], strict=True
-            ):
-                places = self._model.sight.places(found.classes, found.points)
-                self._history.add(
-                    LookTokens(found.classes, places, found.turns),
-                    tool,
-                    is_video=is_video,
-                    step=step,
-                )
+        """See pictures of the front camera.
+
+        Args:
+            pictures: in the order of time.
+            tools: (7,) the tool's pose and a finger's opening at each.
+            steps: control steps since the start of the video or of the policy's turn.
+            is_video: whether they are of the video.
+        """
+        for start in range(0, len(pictures), _BATCH):
+            part = slice(start, start + _BATCH)
+            found = self._model.detector.find(pictures[part])
+            for things, tool, step in zip(found, tools[part], steps[part], strict=True):
+                places = self._model.sight.places(things.classes, things.points)
+                tokens = LookTokens(things.classes, places, things.turns)
+                if len(self._history) in (FIRST_LOOKS if is_video else FIRST_LOOKS[:1]):
+                    self._first.append(tokens)
+                self._history.add(tokens, tool, is_video=is_video, step=step)
+
+    def understand(self, text: str) -> NDArray[np.float32]:
+        """Return the goal that an instruction means, as `PolicyModel.understand` does."""
+        return self._model.understand(text, self._first)
 
     @torch.no_grad()
-    def decide(self, tool: NDArray[np.floating[Any]]) -> NDArray[np.float64]:
-        """Return the next waypoint (7), after the last look."""
+    def decide(
+        self, goal: NDArray[np.float32], tool: NDArray[np.floating[Any]]
+    ) -> NDArray[np.float64]:
+        """Return the next waypoint (7), after the last look.
+
+        Args:
+            goal: as `understand` returns it.
+            tool: (7,) of the last look.
+        """
+        nothing = np.array([-1])
         numbers = EpisodeNumbers(
-            *self._history.numbers(),
-            self._goal,
-            np.array([len(self._history) - 1]),
-            np.array([-1]),
-            np.array([-1]),
+            self._history.numbers(), goal, np.array([len(self._history) - 1]), nothing, nothing
         )
         kinds, things = self._model.body(to_batch([numbers]))
         kind = int(kinds[0, 0].argmax())
         thing = int(things[0, 0, kind].argmax())
-        move = self._model.moves[kind]
         tracks = self._history.tracks
-        nothing = np.zeros(2)
-        place, turn = (
-            (tracks.places[thing], tracks.turns[thing])
-            if move.at_thing and tracks.count
-            else (nothing, nothing)
-        )
-        return waypoint(move, tool[:6], place, turn, HOME)
+        move = self._model.moves[kind]
+        if not move.at_thing or thing >= tracks.count:
+            here = np.asarray(tool[:2], np.float64)
+            return waypoint(move, tool, here, np.array([1.0, 0.0]), HOME)
+        return waypoint(move, tool, tracks.places[thing], tracks.turns[thing], HOME)
+
+
+def save_policy(model: PolicyModel, path: Path) -> None:
+    """Write a trained policy.
+
+    Raises:
+        InvalidValueError: the file cannot be written.
+    """
+    content = {
+        "format": FORMAT,
+        "classes": list(model.sight.classes),
+        "heights": torch.from_numpy(np.asarray(model.sight.heights)),
+        "vocabulary": {name: list(value) for name, value in model.vocabulary._asdict().items()},
+        "corners": torch.from_numpy(model.corners),
+        "moves": [list(move) for move in model.moves],
+        "memory": model.memory,
+        "about": model.about,
+        "detector": model.detector.state_dict(),
+        "task_net": model.task_net.state_dict(),
+        "reader": model.reader.state_dict(),
+        "body": model.body.state_dict(),
+    }
+    try:
+        torch.save(content, path)
+    except (OSError, RuntimeError) as error:
+        raise InvalidValueError(f"Cannot write {path}: {error}.") from error
+
+
+def load_policy(path: Path) -> PolicyModel:
+    """Return a trained policy; nothing of the file is executed.
+
+    Raises:
+        InvalidValueError: the file is none.
+    """
+    try:
+        content = torch.load(path, weights_only=True, map_location="cpu")
+        if content.get("format") != FORMAT:
+            raise InvalidValueError(f"its format is {content.get('format')!r}, not {FORMAT!r}")
+        return _read(content)
+    except Exception as error:
+        reason = str(error).splitlines()[0] if str(error) else type(error).__name__
+        raise InvalidValueError(
+            f"{str(path)!r} is no trained policy ({reason}); make one with: roboirg learn policy."
+        ) from error
+
+
+def _read(content: Mapping[str, Any]) -> PolicyModel:
+    vocabulary = Vocabulary(**{name: tuple(own) for name, own in content["vocabulary"].items()})
+    moves = tuple(Move(*move) for move in content["moves"])
+    sight = Sight(tuple(content["classes"]), content["heights"].numpy())
+    detector, reader = ThingDetector(len(sight.classes)), ListenerNet(vocabulary)
+    task_net = TaskNet(vocabulary)
+    body = make_body(sight, vocabulary, moves, content["memory"])
+    nets = {"detector": detector, "task_net": task_net, "reader": reader, "body": body}
+    for name, net in nets.items():
+        net.load_state_dict(content[name])
+        net.eval()
+    corners = content["corners"].numpy()
+    return PolicyModel(
+        sight, detector, vocabulary, task_net, reader, corners, moves, content["memory"], body,
+        content["about"],
+    )  # fmt: skip
+
+
+def make_body(sight: Sight, vocabulary: Vocabulary, moves: Sequence[Move], memory: str) -> BodyNet:
+    """Return an untrained body for these classes, goals and kinds of waypoints."""
+    goal_size = len(vocabulary.tasks) + len(vocabulary.parts)
+    return BodyNet(len(sight.classes), goal_size, [move.at_thing for move in moves], memory)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from roboirg.apps.learning.labeled_views import MIN_PIXELS, class_of
 from roboirg.apps.learning.policy.waypoint_expert import (
@@ -134,7 +134,8 @@ class _Recorder(EpisodeLoop):
             info["status"],
         )
 
-    def act(self, observation: dict[str, Any]) -> Any:
+    def act(self, observation: dict[str, Any]) -> ArrayLike:
+        """Look if that is not done yet, and note the expert's decision."""
         action = super().act(observation)
         if not self._rows or self._rows[-1][3] or self._rows[-1][4] != self._steps:
             self._look(is_video=False)
@@ -174,9 +175,7 @@ class _Recorder(EpisodeLoop):
 
 
 def _tool_of(world: World) -> tuple[float, ...]:
-    """Return the tool's pose, and the opening of a finger; angles differ from observations by
-    whole turns.
-    """
+    """Return the tool's pose and the opening of a finger; angles are from -pi to pi."""
     robot = world.robot
     return (*robot.tool_pose.p, *euler_angles(robot.tool_pose), float(robot.finger_positions[0]))
 

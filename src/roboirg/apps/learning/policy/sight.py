@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -48,17 +48,11 @@ class Sight(NamedTuple):
     ) -> NDArray[np.float32]:
         """Return x and y (n, 2), m, of points (n, 2), column and row, of things on the table."""
         matrix = front_camera_matrix()
-        rays = np.column_stack(
-            [(points - (SIZE / 2 - POINT_OFFSET)) / FOCAL_LENGTH, np.ones(len(points))]
-        )
+        rays = np.column_stack([(points - SIZE / 2) / FOCAL_LENGTH, np.ones(len(points))])
         turned = rays @ matrix[:3, :3]
         eye = -matrix[:3, :3].T @ matrix[:3, 3]
         reach = (self.heights[classes] - eye[2]) / turned[:, 2]
         return np.asarray(eye[:2] + reach[:, None] * turned[:, :2], np.float32)
-
-
-POINT_OFFSET = 0.0
-"""Pixels from the corner of a pixel to where a point in it counts."""
 
 
 def points_of(positions: NDArray[np.floating]) -> NDArray[np.float64]:
@@ -69,20 +63,15 @@ def points_of(positions: NDArray[np.floating]) -> NDArray[np.float64]:
     return flat
 
 
-def heights_of(recorded: Sequence[RecordedEpisode]) -> Mapping[str, float]:
-    """Return the median height of each class of things at the first looks."""
+def sight_of(recorded: Iterable[RecordedEpisode]) -> Sight:
+    """Return the classes of things that episodes show, each with its height when first seen."""
     found: dict[str, list[float]] = {}
     for one in recorded:
-        for name, thing, is_seen in zip(one.classes, one.things[0], one.visible[0], strict=True):
-            if is_seen:
-                found.setdefault(name, []).append(float(thing[2]))
-        for look in (len(one.things) // 2,):
-            for name, thing, is_seen in zip(
-                one.classes, one.things[look], one.visible[look], strict=True
-            ):
-                if is_seen and name not in found:
-                    found.setdefault(name, []).append(float(thing[2]))
-    return {name: float(np.median(own)) for name, own in found.items()}
+        for number in np.flatnonzero(one.visible.any(axis=0)):
+            first = int(one.visible[:, number].argmax())
+            found.setdefault(one.classes[number], []).append(float(one.things[first, number, 2]))
+    classes = tuple(sorted(found))
+    return Sight(classes, np.array([np.median(found[name]) for name in classes]))
 
 
 def labeled_looks(

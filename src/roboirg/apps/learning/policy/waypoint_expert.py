@@ -95,7 +95,7 @@ class WaypointExpert(OraclePolicy):
         self._rng = np.random.default_rng((env.episode.seed, self.seed))
         return super().decide(env, instruction)
 
-    def act(self, observation: Observation) -> NDArray[np.floating[Any]]:
+    def act(self, observation: Observation) -> NDArray[np.floating[Any]]:  # noqa: ARG002
         """Return the next waypoint (1, 7), perhaps disturbed; `last` is the undisturbed one."""
         while True:
             staged = next(self._chunks, None)

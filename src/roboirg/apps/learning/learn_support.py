@@ -1,0 +1,34 @@
+"""What all that is learned needs: PyTorch, and fingerprints of files."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from roboirg.core.errors import InvalidValueError
+from roboirg.core.extras import extra_needed
+from roboirg.util.short_hash import short_hash
+
+
+def check_learn_support() -> None:
+    """Check early that PyTorch is there."""
+    with extra_needed("What is learned needs PyTorch", "learn"):
+        import torch  # noqa: F401 - an extra, and slow to import
+
+
+def file_version(path: Path, kind: str) -> str:
+    """Return a fingerprint of a file that was learned.
+
+    Args:
+        path: the file.
+        kind: what it is: ``listener`` or ``policy``.
+
+    Raises:
+        InvalidValueError: it cannot be read.
+    """
+    try:
+        return short_hash(path.read_bytes())
+    except OSError as error:
+        raise InvalidValueError(
+            f"The trained {kind} {str(path)!r} cannot be read ({error.strerror}); make one with: "
+            f"roboirg learn {kind} --out PATH."
+        ) from error

@@ -1,0 +1,292 @@
+"""Train a policy: recordings, a detector, a body that acts, and a reader of words."""
+
+from __future__ import annotations
+
+import random
+from collections.abc import Iterator, Sequence
+from functools import partial
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import cv2
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from pydantic import NonNegativeInt, PositiveInt
+from torch.nn import functional
+
+from roboirg.apps.learning.listener.listener_net import (
+    ListenerInput,
+    ListenerNet,
+    Vocabulary,
+    make_vocabulary,
+)
+from roboirg.apps.learning.listener.reader_training import Lesson, lesson_of, said, train_reader
+from roboirg.apps.learning.policy.body_training import train_body
+from roboirg.apps.learning.policy.moves import common_moves, decisions_of
+from roboirg.apps.learning.policy.policy_model import (
+    FIRST_LOOKS,
+    WORDLESS,
+    PolicyModel,
+    seen_things,
+)
+from roboirg.apps.learning.policy.recording import (
+    RecordedEpisode,
+    load_recording,
+    record_episode,
+    save_recording,
+)
+from roboirg.apps.learning.policy.sight import Sight, SightNoise, labeled_looks, points_of, sight_of
+from roboirg.apps.learning.policy.task_net import TaskNet
+from roboirg.apps.learning.policy.thing_detector import (
+    LabeledPicture,
+    ThingDetector,
+    detector_loss,
+)
+from roboirg.apps.learning.policy.tracks import LookTokens
+from roboirg.apps.learning.policy.waypoint_expert import Disturbance
+from roboirg.apps.learning.trainer import Progress, Trainer, batch_count, batches
+from roboirg.core.episode import Episode
+from roboirg.core.errors import InvalidValueError, MotionPlanningError
+from roboirg.core.word_pools import PoolName
+from roboirg.language import LANGUAGE_VERSION
+from roboirg.tasks.splits.splits import get_episode
+from roboirg.util.parallel_map import parallel_map
+
+RECORDED_SPLIT = "random"
+PICTURE_EVERY = 6
+"""Looks from one picture to the next in episodes that are drawn."""
+DETECTOR_BATCH, DETECTOR_RATE = 16, 8e-3
+TASK_EPOCHS, TASK_RATE = 6, 5e-3
+FORGOTTEN_WORDS = 0.1
+"""Share of the words that the task must be named without."""
+
+
+class PolicyPlan(NamedTuple):
+    """How a policy is trained.
+
+    Attributes:
+        tasks: names of tasks.
+        settings: names of settings whose instructions it hears; none for a policy without words.
+        words: the pool of words.
+        memory: what it remembers; a name of `MEMORIES`.
+        scenes: random scenes of each task in which the disturbed expert is recorded.
+        drawn: those of them of which pictures are drawn, for the detector.
+        goals: goals of each scene that the reader of words hears by place.
+        detector_epochs: passes over all pictures.
+        body_epochs: passes over all episodes.
+        reader_epochs: passes over all instructions.
+        seed: of initial weights, noise and order.
+    """
+
+    tasks: tuple[str, ...]
+    settings: tuple[str, ...] = ("explicit",)
+    words: PoolName = "train"
+    memory: str = "recurrent"
+    scenes: PositiveInt = 300
+    drawn: PositiveInt = 50
+    goals: PositiveInt = 4
+    detector_epochs: PositiveInt = 4
+    body_epochs: PositiveInt = 20
+    reader_epochs: PositiveInt = 12
+    seed: NonNegativeInt = 0
+
+
+class Recorded(NamedTuple):
+    """A recorded episode with the words' view of it."""
+
+    episode: Episode
+    recording: RecordedEpisode
+
+
+def train_policy(plan: PolicyPlan, folder: Path, workers: int, progress: Progress) -> PolicyModel:
+    """Return a policy that has learned from the disturbed expert in random scenes.
+
+    What is recorded and learned stays in the folder, and is used again by the same plan, and as
+    far as it fits by others.
+
+    Args:
+        plan: how.
+        folder: for recordings, and for what is learned on the way.
+        workers: processes that record; 0 uses this one.
+        progress: called with a kind of work, what is done of it, and all of it.
+
+    Raises:
+        InvalidValueError: no episode of a task could be recorded.
+    """
+    recorded = record_all(plan, folder, workers, progress)
+    sight = sight_of(one.recording for one in recorded)
+    detector = _detector(plan, recorded, sight, folder, progress)
+    lessons, vocabulary = _lessons(plan, recorded, sight)
+    decisions = [decisions_of(one.recording) for one in recorded]
+    moves = common_moves(decisions)
+    body = train_body(plan, recorded, decisions, moves, sight, vocabulary, folder, progress)
+    task_net, reader = _train_words(plan, lessons, vocabulary, progress)
+    about: dict[str, Any] = {
+        **plan._asdict(),
+        "tasks": list(plan.tasks),
+        "settings": list(plan.settings),
+        "words": plan.words if plan.settings else WORDLESS,
+        "language_version": LANGUAGE_VERSION,
+        "episodes": len(recorded),
+    }
+    return PolicyModel(
+        sight, detector, vocabulary, task_net, reader, _corners(recorded), moves, plan.memory,
+        body, about,
+    )  # fmt: skip
+
+
+def record_all(plan: PolicyPlan, folder: Path, workers: int, progress: Progress) -> list[Recorded]:
+    """Record what is missing, and return the episodes in which the expert succeeded.
+
+    Raises:
+        InvalidValueError: it succeeded in none of a task.
+    """
+    place = folder / "recordings"
+    place.mkdir(parents=True, exist_ok=True)
+    jobs = [(task, number) for number in range(plan.scenes) for task in plan.tasks]
+    missing = [job for job in jobs if not _path(place, *job).exists()]
+    record = partial(_record, place, plan.drawn)
+    for done, _ in enumerate(parallel_map(record, missing, workers), 1):
+        progress("recordings", len(jobs) - len(missing) + done, len(jobs))
+    found = []
+    for task, number in jobs:
+        recording = load_recording(_path(place, task, number))
+        if recording.status == "success":
+            found.append(Recorded(get_episode(task, RECORDED_SPLIT, number), recording))
+    for task in plan.tasks:
+        if not any(one.episode.task == task for one in found):
+            raise InvalidValueError(
+                f"The expert succeeded in none of {plan.scenes} scenes of {task}; record more."
+            )
+    return found
+
+
+def _path(folder: Path, task: str, number: int) -> Path:
+    return folder / f"{task}-{number:05d}.npz"
+
+
+def _record(folder: Path, drawn: int, job: tuple[str, int]) -> None:
+    """Record an episode; one whose disturbance leaves the arm's reach becomes a failure."""
+    task, number = job
+    every = PICTURE_EVERY if number < drawn else 0
+    episode = get_episode(task, RECORDED_SPLIT, number)
+    try:
+        recorded = record_episode(episode, 1, Disturbance(), every)
+    except MotionPlanningError:
+        recorded = record_episode(episode, 1, None, every)
+    save_recording(recorded, _path(folder, task, number))
+
+
+def _detector(
+    plan: PolicyPlan, recorded: Sequence[Recorded], sight: Sight, folder: Path, progress: Progress
+) -> ThingDetector:
+    """Return the folder's detector if it is of the same plan, or train it."""
+    path = folder / "detector.pt"
+    made_of = [list(sight.classes), list(plan.tasks), plan.drawn, plan.detector_epochs]
+    detector = ThingDetector(len(sight.classes))
+    if path.exists():
+        kept = torch.load(path, weights_only=True)
+        if kept["made_of"] == made_of:
+            detector.load_state_dict(kept["net"])
+            detector.eval()
+            return detector
+    torch.manual_seed(plan.seed)
+    detector = ThingDetector(len(sight.classes))
+    views = [view for one in recorded for view in labeled_pictures(one.recording, sight)]
+    rng = random.Random(plan.seed)
+    trainer = Trainer[LabeledPicture](
+        detector,
+        partial(detector_loss, detector),
+        DETECTOR_RATE,
+        plan.detector_epochs * batch_count(views, DETECTOR_BATCH),
+    )
+    for epoch in range(plan.detector_epochs):
+        trainer.run(batches(views, rng, DETECTOR_BATCH))
+        progress("detector", epoch + 1, plan.detector_epochs)
+    detector.eval()
+    torch.save({"made_of": made_of, "net": detector.state_dict()}, path)
+    return detector
+
+
+def labeled_pictures(recorded: RecordedEpisode, sight: Sight) -> Iterator[LabeledPicture]:
+    """Yield the pictures of an episode with what the simulator says is in them."""
+    numbers = {name: number for number, name in enumerate(sight.classes)}
+    kinds = np.array([numbers.get(name, -1) for name in recorded.classes], np.int64)
+    for look, png in recorded.pictures.items():
+        shown = recorded.visible[look] & (kinds >= 0)
+        things = recorded.things[look, shown].astype(np.float64)
+        angles = 4.0 * things[:, 3]
+        turns = np.stack([np.cos(angles), np.sin(angles)], 1).astype(np.float32)
+        bgr = cv2.imdecode(np.frombuffer(png, np.uint8), cv2.IMREAD_COLOR)
+        picture = np.asarray(cv2.cvtColor(np.asarray(bgr), cv2.COLOR_BGR2RGB), np.uint8)
+        yield LabeledPicture(picture, kinds[shown], points_of(things[:, :3]), turns)
+
+
+def _corners(recorded: Sequence[Recorded]) -> NDArray[np.float64]:
+    """Return x and y (4, 2), m, of the corners of the area where things stand at first."""
+    places = np.concatenate(
+        [one.recording.things[0, one.recording.visible[0], :2] for one in recorded]
+    )
+    low, high = places.min(axis=0), places.max(axis=0)
+    corners = [(x, y) for x in (low[0], high[0]) for y in (low[1], high[1])]
+    return np.array(corners, np.float64)
+
+
+def _lessons(
+    plan: PolicyPlan, recorded: Sequence[Recorded], sight: Sight
+) -> tuple[list[Lesson], Vocabulary]:
+    """Return the instructions that the reader hears, and what it can name."""
+    rng, corners = np.random.default_rng(plan.seed), _corners(recorded)
+    seen = {
+        one.episode.key: seen_things(first_looks(one.recording, sight, rng), corners, sight.classes)
+        for one in recorded
+    }
+    episodes = [one.episode for one in recorded]
+    told = [
+        (episode, instruction.text)
+        for episode, instruction in said(episodes, plan.settings, plan.words, plan.goals, plan.seed)
+    ] or [(episode, "") for episode in episodes]
+    vocabulary = make_vocabulary((text for _, text in told), sight.classes, plan.tasks)
+    lessons = [
+        lesson_of(ListenerInput(episode.task, text, seen[episode.key]), episode)
+        for episode, text in told
+    ]
+    return lessons, vocabulary
+
+
+def first_looks(
+    recorded: RecordedEpisode, sight: Sight, rng: np.random.Generator
+) -> list[LookTokens]:
+    """Return what the reader of words sees of an episode."""
+    wanted = FIRST_LOOKS if recorded.is_video[0] else FIRST_LOOKS[:1]
+    looks = enumerate(labeled_looks(recorded, sight, SightNoise(), rng))
+    return [tokens for look, (tokens, _) in looks if look in wanted]
+
+
+def _train_words(
+    plan: PolicyPlan, lessons: Sequence[Lesson], vocabulary: Vocabulary, progress: Progress
+) -> tuple[TaskNet, ListenerNet]:
+    """Return what names the task, and what reads the goal."""
+    torch.manual_seed(plan.seed)
+    rng = random.Random(plan.seed)
+    task_net = TaskNet(vocabulary)
+    numbers = {task: number for number, task in enumerate(plan.tasks)}
+
+    def task_loss(batch: Sequence[Lesson]) -> torch.Tensor:
+        texts = [_thinned(one.given.text, rng) for one in batch]
+        wanted = torch.tensor([numbers[one.given.task] for one in batch])
+        scores = task_net(texts, [one.given.seen for one in batch])
+        return functional.cross_entropy(scores, wanted)
+
+    trainer = Trainer[Lesson](task_net, task_loss, TASK_RATE, TASK_EPOCHS * batch_count(lessons))
+    for epoch in range(TASK_EPOCHS):
+        trainer.run(batches(lessons, rng))
+        progress("tasks", epoch + 1, TASK_EPOCHS)
+    task_net.eval()
+    return task_net, train_reader(lessons, vocabulary, plan.reader_epochs, plan.seed, progress)
+
+
+def _thinned(text: str, rng: random.Random) -> str:
+    """Return a text without some of its words."""
+    return " ".join(word for word in text.split() if rng.random() >= FORGOTTEN_WORDS)
