@@ -17,7 +17,7 @@ APPLICATIONS = sorted(path.parent.name for path in (layout.PACKAGE / "apps").glo
 
 KINDS_OF = {
     "demonstrations": {"recorded"},
-    "learning": {"learned"},
+    "learning": {"learned", "trained"},
     "people": {"people"},
 }
 

@@ -1,4 +1,4 @@
-"""Commands of the listener that learns: ``roboirg learn``."""
+"""Commands of what learns: ``roboirg learn``."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from roboirg.cli.options import PlanWords, check_output_file, spread
+from roboirg.cli.options import PlanWords, Tasks, Workers, check_output_file, spread
 from roboirg.core.errors import InvalidValueError
 from roboirg.core.plain_text import counted
 
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 # Heavy modules are imported inside the commands, so that --help is fast.
 
-learn_app = typer.Typer(no_args_is_help=True, help="Train a listener, and let it answer.")
+learn_app = typer.Typer(no_args_is_help=True, help="Train a listener or a policy.")
 
 
 class TrainingWords(PlanWords):
@@ -113,6 +113,64 @@ def learned_answers(
     items, learned = read_items(data), load_model(model)
     write_answers(out, answers_of(learned, items, data))
     typer.echo(f"{counted(len(items), 'answer')}: {out}")
+
+
+class PolicyWords(PlanWords):
+    """A plan with words, and what is rare in the training of a policy."""
+
+    section = "training"
+    own = ("scenes", "drawn", "goals", "detector_epochs", "body_epochs", "reader_epochs", "seed")
+
+
+NO_POLICY_WORDS = PolicyWords()
+
+
+@learn_app.command("policy")
+@spread
+def learn_policy(
+    out: Annotated[
+        Path, typer.Option(help="Folder for the policy and for what it is learned from.")
+    ],
+    tasks: Tasks = "all",
+    settings: Annotated[
+        str, typer.Option(help="Settings that it hears, separated by commas, or none.")
+    ] = "explicit",
+    memory: Annotated[
+        str, typer.Option(help="What it remembers: none, frames or recurrent.")
+    ] = "recurrent",
+    words: PolicyWords = NO_POLICY_WORDS,
+    workers: Workers = None,
+) -> None:
+    """Train a policy that acts on pictures and words: records the expert, then learns.
+
+    What is there already is used again. A plan may have, under `training`: scenes, drawn, goals,
+    detector_epochs, body_epochs, reader_epochs, seed.
+
+    Example: roboirg learn policy --tasks PickXtimes --out learned
+    """
+    from roboirg.apps.learning.learn_support import check_learn_support
+    from roboirg.cli.names import known_name, known_settings, known_tasks
+    from roboirg.util.processor import worker_count
+
+    check_learn_support()
+    from roboirg.apps.learning.policy.memories import MEMORIES
+    from roboirg.apps.learning.policy.policy_model import save_policy
+    from roboirg.apps.learning.policy.policy_training import PolicyPlan, train_policy
+    from roboirg.core.word_pools import POOLS
+
+    plan = PolicyPlan(
+        known_tasks(tasks),
+        () if settings == "none" else known_settings(settings),
+        words=known_name("pool of words", words.wordings_file or "train", POOLS),
+        memory=known_name("memory", memory, MEMORIES),
+        **words.choices(PolicyPlan),
+    )
+    out.mkdir(parents=True, exist_ok=True)
+    path = out / f"{plan.name}.pt"
+    check_output_file(path)
+    save_policy(train_policy(plan, out, worker_count(workers), _print_tenths()), path)
+    typer.echo(f"{path}, {path.stat().st_size / 2**20:.1f} MiB")
+    typer.echo(f"Play it with: roboirg run --policy trained:{path} --tasks {tasks} --out runs")
 
 
 def _plan(words: TrainingWords, without: str) -> TrainingPlan:

@@ -10,9 +10,13 @@ from roboirg.util.short_hash import short_hash
 
 
 def check_learn_support() -> None:
-    """Check early that PyTorch is there."""
+    """Check early that PyTorch is there, and let it use one thread.
+
+    Networks this small are slower on two as soon as anything else runs.
+    """
     with extra_needed("What is learned needs PyTorch", "learn"):
-        import torch  # noqa: F401 - an extra, and slow to import
+        import torch
+    torch.set_num_threads(1)
 
 
 def file_version(path: Path, kind: str) -> str:

@@ -124,7 +124,11 @@ def needs_host(spec: str) -> bool:
     """
     if declares_privilege(spec):
         return False
-    return is_foreign(spec) or (is_url(spec) and spec.partition("://")[0] in CHECKPOINTS)
+    if is_url(spec):
+        return spec.partition("://")[0] in CHECKPOINTS
+    name, colon, _ = spec.partition(":")
+    kind = policy_specs.find_kind(name) if colon else None
+    return is_foreign(spec) or (kind is not None and kind.has_weights)
 
 
 def is_privileged(spec: str) -> bool:

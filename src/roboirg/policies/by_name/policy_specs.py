@@ -49,10 +49,12 @@ class PolicyKind(NamedTuple):
         name: what stands before the colon.
         read: returns what makes the policies of a spec. It is called with the whole spec, with what
             stands between the colon and the question mark, and with the options behind that.
+        has_weights: whether its policies are trained networks, which get a process of their own.
     """
 
     name: str
     read: Callable[[str, str, Mapping[str, str]], PolicyMaker]
+    has_weights: bool = False
 
 
 class PolicyFactory:

@@ -35,11 +35,8 @@ class LearnedPolicy:
 
     def __init__(self, path: Path, seed: int = 0) -> None:
         check_learn_support()
-        import torch
-
         from roboirg.apps.learning.policy.policy_model import load_policy
 
-        torch.set_num_threads(1)  # two are slower as soon as anything else runs
         self.seed, self.version = seed, file_version(path, "policy")
         self._model = load_policy(path)
         self._seen: SeenEpisode | None = None

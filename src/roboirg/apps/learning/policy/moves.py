@@ -17,8 +17,8 @@ Z_GRID = 0.0025
 """Meters to which heights are rounded."""
 XY_GRID = 0.1
 """Meters to which a way in the plane from the tool's place is rounded."""
-RAREST = 5
-"""Kinds of waypoints that are made less often are not learned."""
+RAREST = 0.0005
+"""Share of all waypoints; kinds that are rarer are not learned."""
 
 
 class Move(NamedTuple):
@@ -80,7 +80,7 @@ def decisions_of(recorded: RecordedEpisode) -> list[Decision]:
 def common_moves(decisions: Iterable[Sequence[Decision]]) -> tuple[Move, ...]:
     """Return the kinds of waypoints that occur often enough, the commonest first."""
     counts = Counter(one.move for own in decisions for one in own)
-    return tuple(move for move, count in counts.most_common() if count >= RAREST)
+    return tuple(move for move, count in counts.most_common() if count >= RAREST * counts.total())
 
 
 def waypoint(

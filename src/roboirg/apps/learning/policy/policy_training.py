@@ -54,6 +54,8 @@ from roboirg.tasks.splits.splits import get_episode
 from roboirg.util.parallel_map import parallel_map
 
 RECORDED_SPLIT = "random"
+MANY = 3
+"""Settings from which on their names are not listed."""
 PICTURE_EVERY = 6
 """Looks from one picture to the next in episodes that are drawn."""
 DETECTOR_BATCH, DETECTOR_RATE = 16, 8e-3
@@ -90,6 +92,13 @@ class PolicyPlan(NamedTuple):
     body_epochs: PositiveInt = 20
     reader_epochs: PositiveInt = 12
     seed: NonNegativeInt = 0
+
+    @property
+    def name(self) -> str:
+        """What tells it from others in the same folder: memory, words and seed."""
+        heard = "-".join(self.settings) or WORDLESS
+        heard = "all" if len(self.settings) > MANY else heard
+        return f"{self.memory}-{heard}-{self.seed}"
 
 
 class Recorded(NamedTuple):
@@ -153,13 +162,19 @@ def record_all(plan: PolicyPlan, folder: Path, workers: int, progress: Progress)
     for task, number in jobs:
         recording = load_recording(_path(place, task, number))
         if recording.status == "success":
-            found.append(Recorded(get_episode(task, RECORDED_SPLIT, number), recording))
+            found.append(Recorded(find_episode(recording.key), recording))
     for task in plan.tasks:
         if not any(one.episode.task == task for one in found):
             raise InvalidValueError(
                 f"The expert succeeded in none of {plan.scenes} scenes of {task}; record more."
             )
     return found
+
+
+def find_episode(key: str) -> Episode:
+    """Return the episode of a key, such as ``PickXtimes/random/3``."""
+    task, split, number = key.split("/")
+    return get_episode(task, split, int(number))
 
 
 def _path(folder: Path, task: str, number: int) -> Path:

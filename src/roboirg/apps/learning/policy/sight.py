@@ -9,11 +9,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from roboirg.apps.learning.policy.recording import RecordedEpisode
+from roboirg.apps.learning.policy.thing_detector import COLUMNS, ROWS
 from roboirg.apps.learning.policy.tracks import LookTokens
 from roboirg.simulation.rendering.viewpoint import FOCAL_LENGTH, SIZE, front_camera_matrix
 
 NEAR_TOOL = 0.07
 """Meters in the plane from the tool within which the hand may hide a thing."""
+
+
+HIDDEN_LOOKS = 5
+"""Looks for which a thing that is lost stays lost."""
 
 
 class SightNoise(NamedTuple):
@@ -84,8 +89,12 @@ def labeled_looks(
     away = np.hypot(*np.moveaxis(positions[..., :2] - recorded.tool[:, None, :2], -1, 0))
     lost = np.where(away < NEAR_TOOL, noise.lost_near_tool, noise.lost)
     points = points_of(positions)
-    found = recorded.visible & (rng.random(lost.shape) >= lost) & (kinds >= 0)
-    found &= ((points >= 0) & (points < SIZE)).all(axis=-1)
+    # What hides a thing does so for a while.
+    blocks = -(-len(lost) // HIDDEN_LOOKS)
+    drawn = rng.random((blocks, lost.shape[1])).repeat(HIDDEN_LOOKS, axis=0)[: len(lost)]
+    found = recorded.visible & (drawn >= lost) & (kinds >= 0)
+    low, high = np.array([0, ROWS[0]]), np.array([COLUMNS, ROWS[1]])
+    found &= ((points >= low) & (points < high)).all(axis=-1)
     points += rng.normal(0.0, noise.pixels, points.shape)
     shape = points.shape[:2]
     every = np.broadcast_to(np.maximum(kinds, 0), shape).ravel()

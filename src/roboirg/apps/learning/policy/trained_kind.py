@@ -19,4 +19,4 @@ def _trained(spec: str, name: str, options: Mapping[str, str]) -> PolicyMaker:
     return lambda seed: LearnedPolicy(Path(name), seed)
 
 
-KIND = PolicyKind("trained", _trained)
+KIND = PolicyKind("trained", _trained, has_weights=True)

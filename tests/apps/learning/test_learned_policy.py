@@ -1,0 +1,131 @@
+"""The policy that learns to act: what it is recorded from, its file, its command, and its play."""
+
+import json
+
+import numpy as np
+import pytest
+from plan_files import plan_file
+from typer.testing import CliRunner
+
+from roboirg.apps.learning.policy.moves import decisions_of
+from roboirg.apps.learning.policy.recording import load_recording, record_episode, save_recording
+from roboirg.apps.learning.policy.waypoint_expert import Disturbance, WaypointExpert
+from roboirg.core.errors import InvalidValueError, MissingDependencyError
+from roboirg.envs.factory import make
+from roboirg.evaluation.records.store import read_records
+from roboirg.main import app
+from roboirg.policies import play
+from roboirg.policies.by_name.loading import is_privileged, make_policy, needs_host
+from roboirg.tasks.splits.splits import get_episode
+
+
+def test_without_pytorch_one_sentence_says_what_to_do(monkeypatch, tmp_path):
+    monkeypatch.setitem(__import__("sys").modules, "torch", None)
+    with pytest.raises(MissingDependencyError, match=r"\[learn\]"):
+        make_policy(f"trained:{tmp_path / 'none.pt'}", 0)
+
+
+@pytest.mark.parametrize(
+    ("spec", "words"), [("trained:", "names no file"), ("trained:a.pt?speed=2", "no option of")]
+)
+def test_wrong_names_are_one_sentence(spec, words):
+    with pytest.raises(InvalidValueError, match=words):
+        make_policy(spec, 0)
+
+
+@pytest.mark.sim
+@pytest.mark.parametrize("task", ["PickXtimes", "ButtonUnmask"])
+def test_undisturbed_waypoints_solve_an_episode(task):
+    env = make(get_episode(task, "train", 0), actions="waypoint", cameras=())
+    assert play(env, WaypointExpert())["status"] == "success"
+
+
+@pytest.fixture(scope="module")
+def recorded():
+    return record_episode(get_episode("ButtonUnmask", "random", 0), 1, Disturbance())
+
+
+@pytest.mark.sim
+def test_labels_are_the_expert_s_own_while_the_way_is_disturbed(recorded):
+    assert recorded.status == "success"
+    episode = get_episode("ButtonUnmask", "random", 0)
+    for decision in decisions_of(recorded):
+        if decision.move.at_thing:
+            at = recorded.things[decision.look, decision.thing, :2]
+            action = recorded.actions[recorded.looks.tolist().index(decision.look)]
+            assert np.linalg.norm(action[:2] - at) < 0.02
+    grasped = [one.thing for one in decisions_of(recorded) if one.move.turn == "align"]
+    goal = episode.goal.texts("colors")
+    inside = {item.inside for item in episode.scene.objects if item.color in goal}
+    assert {recorded.names[thing] for thing in grasped} == inside
+    assert recorded.status == "success"
+    plain = record_episode(episode, 1, None)
+    assert not np.array_equal(plain.tool[: len(recorded.tool)], recorded.tool[: len(plain.tool)])
+
+
+@pytest.mark.sim
+def test_covered_cubes_are_not_to_be_seen(recorded):
+    classes = np.array(recorded.classes)
+    cubes = np.char.startswith(classes, "cube")
+    assert recorded.visible[0, cubes].all()
+    assert not recorded.visible[0, classes == "container"].any()
+    covered = int(np.flatnonzero(recorded.steps >= 40)[0])
+    assert not recorded.visible[covered, cubes].any()
+    assert recorded.visible[covered, classes == "container"].all()
+
+
+@pytest.mark.sim
+def test_a_recording_is_read_as_it_was_written(recorded, tmp_path):
+    path = tmp_path / "one.npz"
+    save_recording(recorded, path)
+    for name, value in load_recording(path)._asdict().items():
+        np.testing.assert_equal(value, getattr(recorded, name), err_msg=name)
+    path.write_bytes(path.read_bytes()[:100])
+    with pytest.raises(InvalidValueError, match="delete it to make it again"):
+        load_recording(path)
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """A policy that has hardly learned, made by the command."""
+    pytest.importorskip("torch")
+    folder = tmp_path_factory.mktemp("policy")
+    few = {"scenes": 3, "drawn": 2, "detector_epochs": 1, "body_epochs": 2, "reader_epochs": 1}
+    plan = plan_file(training=few)
+    call = ["learn", "policy", "--tasks", "ButtonUnmask", "--out", str(folder), "--plan", plan]
+    done = CliRunner().invoke(app, [*call, "--workers", "0"])
+    assert done.exit_code == 0, done.output
+    return folder, call
+
+
+@pytest.mark.sim
+@pytest.mark.slow
+def test_the_command_makes_a_policy_that_plays_by_pictures_alone(folder, tmp_path):
+    path = folder[0] / "recurrent-explicit-0.pt"
+    spec = f"trained:{path}"
+    policy = make_policy(spec, 0)
+    assert not is_privileged(spec)
+    assert needs_host(spec)
+    assert not hasattr(policy, "attach")
+    out = tmp_path / "runs"
+    call = ["run", "--policy", spec, "--tasks", "ButtonUnmask", "--settings", "explicit,direct"]
+    done = CliRunner().invoke(app, [*call, "--episodes", "1", "--out", str(out)])
+    assert done.exit_code == 0, done.output
+    played = read_records(next(out.rglob("records.jsonl")).parent)
+    assert len(played) == 2
+    assert not any(record.error for record in played)
+    assert all(record.policy_metadata["trained"]["memory"] == "recurrent" for record in played)
+    curve = json.loads((folder[0] / "body-recurrent-0.json").read_text())
+    assert [one["epoch"] for one in curve] == [1, 2]
+
+
+@pytest.mark.sim
+@pytest.mark.slow
+def test_recordings_and_the_detector_are_used_again(folder):
+    place, call = folder
+    kept = [*(place / "recordings").iterdir(), place / "detector.pt"]
+    before = {path: path.stat().st_mtime_ns for path in kept}
+    done = CliRunner().invoke(app, [*call, "--memory", "none", "--settings", "none"])
+    assert done.exit_code == 0, done.output
+    assert (place / "none-none-0.pt").exists()
+    assert {path: path.stat().st_mtime_ns for path in kept} == before
