@@ -1,13 +1,4 @@
-"""What control arms show: each figure compares two rates over the same scenes.
-
-| figure | first | second |
-| --- | --- | --- |
-| language use | told and other goal both followed | the same goal pursued in both |
-| words' worth | success when told | success in silence |
-| order's worth | success when told | success with the words scrambled |
-| paraphrases | all of them succeed | their mean success |
-| repeat | success when told | success with another policy seed |
-"""
+"""What control arms show: each figure compares two rates over the same scenes."""
 
 from __future__ import annotations
 
@@ -57,12 +48,14 @@ class ArmContrast(NamedTuple):
         name: of the figure.
         first: what the first rate counts, in a word or two.
         second: what the second rate counts.
+        meaning: of both, in a clause.
         sides: returns what a trial counts in each; None if it lacks an arm.
     """
 
     name: str
     first: str
     second: str
+    meaning: str
     sides: Callable[[Trial, Arms], Sides | None]
 
 
@@ -205,9 +198,32 @@ def _paraphrases(trial: Trial, arms: Arms) -> Sides | None:
 
 
 CONTRASTS = (
-    ArmContrast(LANGUAGE_USE, "both followed", "same done", _language_use),
-    ArmContrast(WORDS_WORTH, TOLD, SILENT, _against(SILENT, SILENT_EMPTY)),
-    ArmContrast("order's worth", TOLD, SCRAMBLED, _against(SCRAMBLED)),
-    ArmContrast("paraphrases", "all", "mean", _paraphrases),
-    ArmContrast("repeat", TOLD, AGAIN, _against(AGAIN)),
+    ArmContrast(
+        LANGUAGE_USE,
+        "both followed",
+        "same done",
+        "scenes in which the told goal and another one were both reached when stated, against "
+        "those in which the same goal was pursued whichever was stated",
+        _language_use,
+    ),
+    ArmContrast(
+        WORDS_WORTH,
+        TOLD,
+        SILENT,
+        "success when told, against silence",
+        _against(SILENT, SILENT_EMPTY),
+    ),
+    ArmContrast(
+        "order's worth",
+        TOLD,
+        SCRAMBLED,
+        "success when told, against scrambled words",
+        _against(SCRAMBLED),
+    ),
+    ArmContrast(
+        "paraphrases", "all", "mean", "all of them succeed, against their mean", _paraphrases
+    ),
+    ArmContrast(
+        "repeat", TOLD, AGAIN, "success when told, against another policy seed", _against(AGAIN)
+    ),
 )

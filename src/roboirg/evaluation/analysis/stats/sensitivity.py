@@ -33,7 +33,7 @@ from roboirg.tasks import every_task
 Direction = Literal["higher", "lower", "open"]
 """Of the first side against the second; open if the corrected test does not decide."""
 
-Unit = Literal["trial", "episode", "task"]
+Unit = Literal["rollout", "episode", "task"]
 Weighting = Literal["task", "suite", "difficulty"]
 """What weighs the same in a mean."""
 
@@ -72,6 +72,11 @@ class AnalysisChoice:
     unit: Unit = "episode"
     weights: Weighting = "task"
 
+    @property
+    def label(self) -> str:
+        """Group and name."""
+        return f"{self.group} {self.name}".strip()
+
 
 @dataclass(frozen=True)
 class Robustness:
@@ -80,11 +85,13 @@ class Robustness:
     Attributes:
         label: of the contrast.
         verdict: as everywhere.
+        pairs: episodes that both sides have.
         others: the verdict under each other choice, by choice.
     """
 
     label: str
     verdict: Direction
+    pairs: int
     others: Mapping[AnalysisChoice, Direction]
 
     @property
@@ -97,7 +104,7 @@ class Robustness:
         """Whether the verdict holds in all analyses, in words."""
         if not self.exceptions:
             return f"holds in all {len(self.others)} other analyses"
-        listed = ", ".join(" ".join(filter(None, (one.group, one.name))) for one in self.exceptions)
+        listed = ", ".join(one.label for one in self.exceptions)
         return f"does not hold in {len(self.exceptions)} of {len(self.others)}: {listed}"
 
 
@@ -113,36 +120,83 @@ def try_choices(contrasts: Sequence[Contrast]) -> tuple[Robustness, ...]:
         Robustness(
             contrast.label,
             usual[index],
+            sum(1 for _ in _units(contrast.first, contrast.second, "episode")),
             {choice: found[index] for choice, found in zip(choices, others, strict=True)},
         )
         for index, contrast in enumerate(contrasts)
     )
 
 
+class Offer(NamedTuple):
+    """Choices that can change something only if results differ in one way.
+
+    Attributes:
+        choices: what may be chosen.
+        differs: whether the results do.
+        reason: why the choices change nothing otherwise.
+    """
+
+    choices: Sequence[AnalysisChoice]
+    differs: bool
+    reason: str
+
+
 def choices_for(contrasts: Sequence[Contrast]) -> tuple[AnalysisChoice, ...]:
     """Return the choices other than the usual one that can change anything."""
+    return tuple(choice for one in offers_for(contrasts) if one.differs for choice in one.choices)
+
+
+def offers_for(contrasts: Sequence[Contrast]) -> tuple[Offer, ...]:
+    """Return all choices that an analyst of these contrasts has; none without results."""
     results = [one for each in contrasts for side in (each.first, each.second) for one in side]
+    if not results:
+        return ()
     tasks = list(dict.fromkeys(one.task for one in results))
     seeds = sorted({one.policy_seed for one in results})
     processors = Counter(one.processor for one in results)
-    found: list[AnalysisChoice] = []
-    if any(one.outcome == "error" for one in results):
-        found.append(AnalysisChoice("errors as failures", keep=_errors_as_failures))
-    if len(seeds) > 1:
-        found += [AnalysisChoice("seed", str(seed), keep=_only_seed(seed)) for seed in seeds]
-        found.append(AnalysisChoice("unit", "trial", unit="trial"))
-    if len(tasks) > 1:
-        found.append(AnalysisChoice("unit", "task", unit="task"))
-        if len({_suite(task) for task in tasks}) > 1:
-            found.append(AnalysisChoice("equal weights of", "suites", weights="suite"))
-    if len({one.difficulty for one in results}) > 1:
-        found.append(AnalysisChoice("equal weights of", "difficulties", weights="difficulty"))
-    if len(tasks) > 1:
-        found += [AnalysisChoice("without", task, keep=_without_task(task)) for task in tasks]
-    if len(processors) > 1:
-        usual = processors.most_common(1)[0][0]
-        found.append(AnalysisChoice("one processor", keep=_only_processor(usual)))
-    return tuple(found)
+    has_errors = any(one.outcome == "error" for one in results)
+    suites, difficulties = {_suite(task) for task in tasks}, {one.difficulty for one in results}
+    return (
+        Offer(
+            [AnalysisChoice("errors as failures", keep=_errors_as_failures)],
+            has_errors,
+            "no rollout ended in an error",
+        ),
+        Offer(
+            [
+                *(AnalysisChoice("seed", str(one), keep=_only_seed(one)) for one in seeds),
+                AnalysisChoice("unit", "rollout", unit="rollout"),
+            ],
+            len(seeds) > 1,
+            "all have one policy seed",
+        ),
+        Offer(
+            [
+                AnalysisChoice("unit", "task", unit="task"),
+                *(AnalysisChoice("without", one, keep=_without_task(one)) for one in tasks),
+            ],
+            len(tasks) > 1,
+            "all are of one task",
+        ),
+        Offer(
+            [AnalysisChoice("equal weights of", "suites", weights="suite")],
+            len(suites) > 1,
+            "all are of one suite",
+        ),
+        Offer(
+            [AnalysisChoice("equal weights of", "difficulties", weights="difficulty")],
+            len(difficulties) > 1,
+            "all are of one difficulty",
+        ),
+        Offer(
+            [
+                AnalysisChoice("one processor", keep=_only_processor(name))
+                for name, _ in processors.most_common(1)
+            ],
+            len(processors) > 1,
+            "all were simulated on one kind of processor",
+        ),
+    )
 
 
 def _errors_as_failures(results: Results) -> Results:
@@ -214,13 +268,13 @@ def _tested(contrast: Contrast, choice: AnalysisChoice) -> tuple[float, float] |
 
 
 def _units(first: Results, second: Results, unit: Unit) -> Iterator[_Unit]:
-    """Yield what the sides differ by in each trial, or else in each episode, that both have."""
+    """Yield what the sides differ by in each rollout, or else in each episode, that both have."""
     ours, theirs = _verdicts(first), _verdicts(second)
     difficulties = {(one.task, one.episode): one.difficulty for one in (*first, *second)}
     for where in sorted(ours.keys() & theirs.keys()):
         here, there = ours[where], theirs[where]
         shared = here.keys() & there.keys()
-        if unit == "trial" and shared:
+        if unit == "rollout" and shared:
             pairs = [([here[seed]], [there[seed]]) for seed in sorted(shared)]
         else:
             pairs = [
