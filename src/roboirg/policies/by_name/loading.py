@@ -116,6 +116,20 @@ def planner_alone(spec: str) -> str | None:
     return f"{kind}:{name}?{urlencode({**options, HANDS: ELSEWHERE})}"
 
 
+def with_scripted_hands(spec: str) -> str | None:
+    """Return the spec of one of our planners with the scripted hands instead of any others.
+
+    None for planners of the user's own, and for policies without a planner.
+    """
+    kind, _, rest = undeclared(spec).partition(":")
+    name, _, query = rest.partition("?")
+    if kind not in (policy_specs.SYSTEM, policy_specs.PLANNER) or ":" in name:
+        return None
+    if kind == policy_specs.SYSTEM and find_system(name, {}).planner is None:
+        return None
+    return f"{kind}:{name}?{urlencode({**parse_query(spec, query), HANDS: SCRIPTED})}"
+
+
 def needs_host(spec: str) -> bool:
     """Return whether a policy gets a process of its own.
 
