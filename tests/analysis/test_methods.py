@@ -144,13 +144,13 @@ def test_texts_and_templates_are_counted(tmp_path: Path) -> None:
     found = sections(tmp_path, *played)
     told = {record(episode, setting="direct").command for episode in range(4)}
     counts = found["Instructions"]
+    direct = {record(episode, setting="direct").instruction for episode in range(4)}
     assert counts["explicit, arm told"].startswith(f"{len(told)} distinct texts, from ")
     assert counts["direct, arm silent"] == "1 distinct text, from no template"
-    trained = found["Use of the words in training"][
-        "texts that training on our splits can have had"
-    ]
-    assert "1 from no template" in trained
-    assert "from templates that are in none of the splits train and val" in trained
+    (label,) = set(found["Use of the words in training"]) - {"mine"}
+    seen = found["Use of the words in training"][label]
+    assert f"{len(told) + len(direct)} texts: no, from templates" in seen
+    assert "1 text: not reported" in seen
 
 
 def test_each_other_analysis_has_a_verdict_or_a_reason(tmp_path: Path) -> None:
@@ -162,8 +162,8 @@ def test_each_other_analysis_has_a_verdict_or_a_reason(tmp_path: Path) -> None:
     ]
     found = sections(tmp_path, *played)["Sensitivity to analysis choices"]
     assert found["mine, direct less explicit"] == (
-        "no clear difference, from 3 pairs of scenes, which allow no p below 0.25; in other "
-        "analyses: no clear difference with seed 0, seed 1, equal weights of "
+        "no clear difference, from 3 pairs of scenes, which allow no p below 0.25 before the "
+        "correction; in other analyses: no clear difference with seed 0, seed 1, equal weights of "
         "difficulties; clearly lower with unit rollout"
     )
     without = found["mine, analyses without effect"]

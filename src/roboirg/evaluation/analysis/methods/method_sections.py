@@ -24,6 +24,7 @@ from roboirg.evaluation.analysis.methods.method_statistics import (
 )
 from roboirg.evaluation.analysis.methods.method_text import Sections
 from roboirg.evaluation.analysis.methods.played_facts import (
+    NO_NETWORK,
     NOT_REPORTED,
     Column,
     Items,
@@ -42,9 +43,9 @@ from roboirg.tasks import every_task
 from roboirg.util.media import CONTROL_RATE
 
 _POOL_NOTES: Mapping[str | None, str] = {
-    "test": "from templates that are in none of the splits train and val",
-    "train": "from the templates of the splits train and val",
-    None: f"from no template: {NOT_REPORTED}",
+    "test": "no, from templates that are not in these splits",
+    "train": "yes, from the templates of these splits",
+    None: f"{NOT_REPORTED}, from no template",
 }
 
 Played = Mapping[str, PlayedFacts]
@@ -150,7 +151,9 @@ def _observations(results: Sequence[Summary], played: Played) -> Items:
             name,
             f"cameras: {cameras}{size}",
             f"depth: {facts.need('depth')}",
-            f"frames of the video before its turn: {facts.need('demonstration_frames')}",
+            f"frames of the video before its turn, each a state and these cameras' pictures: "
+            f"{facts.need('demonstration_frames')}",
+            f"reads the simulator's state: {'yes' if facts.is_privileged else 'no'}",
             facts.labeled("preprocessing"),
         )
 
@@ -180,6 +183,7 @@ def _said(played: Played) -> list[tuple[Column, SaidTexts]]:
         for column, said in facts.said.items():
             found[column].texts.update(said.texts)
             found[column].commands.update(said.commands)
+            found[column].wordings.update(said.wordings)
     return sorted(found.items(), key=lambda one: (options_sort_key(one[0].options), one[0].arm))
 
 
@@ -196,8 +200,9 @@ def _counts(said: SaidTexts) -> str:
         if pool in pools
     )
     return (
-        f"{texts}, from {counted(len(said.commands), 'template')} of commands; the pool has "
-        f"{there} for {counted(len(tasks), 'task')}"
+        f"{texts}, from {len(said.commands)} of the {there} templates of commands in the pool for "
+        f"{counted(len(tasks), 'task')}, and {len(said.wordings)} other drawn choices (sentences "
+        "before the command, referring expressions and other parts)"
     )
 
 
@@ -209,8 +214,10 @@ def _reading(facts: PlayedFacts) -> Iterator[str]:
     yield f"sent: {lowered.get(facts.need('lowers_prompt'), NOT_REPORTED)}"
     yield facts.labeled("text_normalization")
     limit, found = facts.need("prompt_tokens"), facts.verdicts
-    if limit in ("none", NOT_REPORTED):
-        yield f"texts cut before its model: {NOT_REPORTED}, as it declares no limit of tokens"
+    if facts.know("dtype") == NO_NETWORK:
+        yield f"texts cut at a limit of tokens: {NO_NETWORK}"
+    elif limit in ("none", NOT_REPORTED):
+        yield f"texts cut at a limit of tokens: {NOT_REPORTED}, as it declares no limit"
     else:
         unsure = found.total() - found["heard"] - found["cut"]
         yield f"texts cut at its limit of {limit} tokens: {found['cut']} of {found.total()}"
@@ -222,5 +229,5 @@ def _training(played: Played) -> Items:
         yield name, facts.labeled("trained_on")
     texts = set().union(*(said.texts for _, said in _said(played)))
     pools = Counter(_POOL_NOTES[pool] for _, pool in texts)
-    listed = (f"{pools[note]} {note}" for note in sorted(pools))
-    yield item("texts that training on our splits can have had", *listed)
+    listed = (f"{counted(pools[note], 'text')}: {note}" for note in sorted(pools))
+    yield item("whether texts can occur in training on the splits train and val", *listed)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import Counter, defaultdict
 from collections.abc import Iterator, Mapping, Sequence
 
+from roboirg.core.arms import TOLD
 from roboirg.core.episode import SPLITS
 from roboirg.core.plain_text import counted
 from roboirg.evaluation.analysis.methods.played_facts import (
@@ -15,6 +16,7 @@ from roboirg.evaluation.analysis.methods.played_facts import (
     distinct,
     item,
 )
+from roboirg.evaluation.analysis.stats.arm_figures import MEANING
 from roboirg.evaluation.analysis.stats.cells import PolicyRun
 from roboirg.evaluation.analysis.stats.chance import chance_level
 from roboirg.evaluation.analysis.stats.intervals import ALPHA, DRAWS
@@ -40,6 +42,7 @@ SceneName = tuple[str, str, int]
 """Task, split and number."""
 
 _NO_REASON = f"reason for this selection: {NOT_REPORTED}"
+_GUESS = "expected of a guess among the goals that fit the last utterance alone"
 _VERDICTS: Mapping[Direction, str] = {
     "open": "no clear difference",
     "lower": "clearly lower",
@@ -69,11 +72,13 @@ def screening_items(jobs: Sequence[Job]) -> Items:
     yield item("screening when the split was made", *_rejections(scenes))
     for column, own in columns.items():
         usable = {one for one in scenes if _has_setting(one[0], column.options.setting)}
+        is_told = column.arm == TOLD
+        missing = "the setting cannot express them" if is_told else "there is no such goal or text"
         yield item(
             column.label,
             f"{len(own)} of {len(scenes)} scenes",
             f"left out, as their tasks do not have the setting: {len(scenes - usable)}",
-            f"as it cannot express them in this arm: {len(usable - own)}",
+            f"as {missing}: {len(usable - own)}",
         )
 
 
@@ -119,9 +124,10 @@ def statistics_items(data: RunData) -> Items:
         "means over all tasks",
         "for each policy, its contrasts of arms",
     )
-    contrasts = dict.fromkeys(one.contrast for one in figures_of(data))
-    listed = [f"{one.name} ({one.meaning})" for one in contrasts] or ["none, without control arms"]
-    yield item("contrasts of arms, paired and tested alike", *listed)
+    yield (
+        "contrasts of arms, where played; paired and tested alike",
+        MEANING.rstrip(".") if figures_of(data) else "none, without control arms",
+    )
 
 
 def sensitivity_items(data: RunData) -> Items:
@@ -148,7 +154,8 @@ def _robustness(found: Robustness) -> str:
     others = "; ".join(f"{verdict} with {', '.join(of)}" for verdict, of in by_verdict.items())
     return (
         f"{_VERDICTS[found.verdict]}, from {counted(found.pairs, 'pair')} of scenes, which allow "
-        f"no p below {0.5 ** (found.pairs - 1):.2g}; in other analyses: {others or 'none applies'}"
+        f"no p below {0.5 ** (found.pairs - 1):.2g} before the correction; in other analyses: "
+        f"{others or 'none applies'}"
     )
 
 
@@ -160,7 +167,7 @@ def control_items(data: RunData, jobs: Sequence[Job]) -> Items:
     for options in sorted(by_options, key=options_sort_key):
         level = chance_level(by_options[options])
         text = NOT_REPORTED if level is None else f"{100 * float(level):.1f} %"
-        yield f"chance in {options_label(options)}", f"{text}, by a guess that fits the command"
+        yield f"chance in {options_label(options)}", f"{text}, {_GUESS}"
     told = data.told()
     controls = [one for one in told.names if one.is_privileged]
     listed = "; ".join(f"{told.names[one]}: {_rates(told, one)}" for one in controls)
@@ -176,8 +183,8 @@ def control_items(data: RunData, jobs: Sequence[Job]) -> Items:
         )
     is_resolved = any(one.form == "resolved" for one in jobs)
     yield (
-        "control without references: their referents are named instead",
-        "played as form resolved" if is_resolved else "not played",
+        "control without references: form resolved, which names their referents instead",
+        "played" if is_resolved else "not played",
     )
 
 
@@ -195,7 +202,7 @@ def error_items(
 ) -> Items:
     """Yield seeds, repeated rollouts, errors, and what is missing."""
     seeds = {one.policy_seed for one in results}
-    yield "policy seeds", f"{len(seeds)}, numbered {distinct(seeds)}; mixed with the scene's seed"
+    yield "policy seeds", f"{len(seeds)} (number {distinct(seeds)}), mixed with the scene's seed"
     again = sum(one.repeated for one in played.values())
     yield "rollouts begun again after a fault", f"{again} of {len(results)}"
     kinds = Counter(one.error for one in results if one.outcome == "error")

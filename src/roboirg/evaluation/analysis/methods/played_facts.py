@@ -57,10 +57,12 @@ class SaidTexts:
     Attributes:
         texts: each with the pool of its words; None for words from elsewhere.
         commands: the templates of their commands, with the task.
+        wordings: other sentences, parts and referring expressions that were drawn.
     """
 
     texts: set[tuple[str, str | None]] = field(default_factory=set)
     commands: set[tuple[str, str]] = field(default_factory=set)
+    wordings: set[str] = field(default_factory=set)
 
     def add(self, record: Record) -> None:
         """Take in the text of a record."""
@@ -68,8 +70,10 @@ class SaidTexts:
         is_ours = metadata.get("wordings") in (None, *POOLS) and record.arm not in SILENT_TEXTS
         text = " ".join(one.text for one in record.instruction)
         self.texts.add((text, metadata.get("pool") if is_ours else None))
-        drawn = [one for one in metadata.get("templates", ()) if one.startswith("command-")]
-        self.commands |= {(record.task, one) for one in drawn if is_ours}
+        drawn = set(metadata.get("templates", ()) if is_ours else ())
+        commands = {one for one in drawn if one.startswith("command-")}
+        self.commands |= {(record.task, one) for one in commands}
+        self.wordings |= drawn - commands
 
 
 @dataclass
@@ -81,6 +85,7 @@ class PlayedFacts:
         declared: distinct values in its metadata, by key of `DECLARABLE`.
         inference: distinct values of what its process computes with, by key of `DECLARABLE`.
         is_remote: whether a server computes its actions.
+        is_privileged: whether it reads the simulator's state.
         steps: control steps in all.
         calls: how often it was asked for actions.
         said: what was said to it.
@@ -92,6 +97,7 @@ class PlayedFacts:
     declared: dict[str, set[str]] = field(default_factory=lambda: defaultdict(set))
     inference: dict[str, set[str]] = field(default_factory=lambda: defaultdict(set))
     is_remote: bool = False
+    is_privileged: bool = False
     steps: int = 0
     calls: int = 0
     said: dict[Column, SaidTexts] = field(default_factory=lambda: defaultdict(SaidTexts))
@@ -110,6 +116,7 @@ class PlayedFacts:
             values = found.python, found.libraries, found.dtypes, found.devices
             for key, one in zip(("python", "libraries", "dtype", "device"), values, strict=True):
                 self.inference[key].add(_words(one))
+        self.is_privileged |= record.privileged
         self.steps += record.steps
         self.calls += record.calls
         self.said[Column(record.column, record.arm)].add(record)

@@ -48,14 +48,12 @@ class ArmContrast(NamedTuple):
         name: of the figure.
         first: what the first rate counts, in a word or two.
         second: what the second rate counts.
-        meaning: of both, in a clause.
         sides: returns what a trial counts in each; None if it lacks an arm.
     """
 
     name: str
     first: str
     second: str
-    meaning: str
     sides: Callable[[Trial, Arms], Sides | None]
 
 
@@ -198,32 +196,16 @@ def _paraphrases(trial: Trial, arms: Arms) -> Sides | None:
 
 
 CONTRASTS = (
-    ArmContrast(
-        LANGUAGE_USE,
-        "both followed",
-        "same done",
-        "scenes in which the told goal and another one were both reached when stated, against "
-        "those in which the same goal was pursued whichever was stated",
-        _language_use,
-    ),
-    ArmContrast(
-        WORDS_WORTH,
-        TOLD,
-        SILENT,
-        "success when told, against silence",
-        _against(SILENT, SILENT_EMPTY),
-    ),
-    ArmContrast(
-        "order's worth",
-        TOLD,
-        SCRAMBLED,
-        "success when told, against scrambled words",
-        _against(SCRAMBLED),
-    ),
-    ArmContrast(
-        "paraphrases", "all", "mean", "all of them succeed, against their mean", _paraphrases
-    ),
-    ArmContrast(
-        "repeat", TOLD, AGAIN, "success when told, against another policy seed", _against(AGAIN)
-    ),
+    ArmContrast(LANGUAGE_USE, "both followed", "same done", _language_use),
+    ArmContrast(WORDS_WORTH, TOLD, SILENT, _against(SILENT, SILENT_EMPTY)),
+    ArmContrast("order's worth", TOLD, SCRAMBLED, _against(SCRAMBLED)),
+    ArmContrast("paraphrases", "all", "mean", _paraphrases),
+    ArmContrast("repeat", TOLD, AGAIN, _against(AGAIN)),
 )
+MEANING = (
+    "Language use: first the scenes in which the told goal and another one were both reached when "
+    "stated; second those in which the same goal was pursued whichever was stated. Words' worth "
+    "and order's worth: success when told, against silence and against scrambled words. "
+    "Paraphrases: all of them succeed, against their mean. Repeat: another policy seed."
+)
+"""The two rates of each contrast."""

@@ -147,55 +147,23 @@ def choices_for(contrasts: Sequence[Contrast]) -> tuple[AnalysisChoice, ...]:
 
 
 def offers_for(contrasts: Sequence[Contrast]) -> tuple[Offer, ...]:
-    """Return all choices that an analyst of these contrasts has; none without results."""
+    """Return all choices that an analyst of these contrasts has."""
     results = [one for each in contrasts for side in (each.first, each.second) for one in side]
-    if not results:
-        return ()
     tasks = list(dict.fromkeys(one.task for one in results))
-    seeds = sorted({one.policy_seed for one in results})
-    processors = Counter(one.processor for one in results)
-    has_errors = any(one.outcome == "error" for one in results)
     suites, difficulties = {_suite(task) for task in tasks}, {one.difficulty for one in results}
+    seeds = sorted({one.policy_seed for one in results})
+    processors = Counter(one.processor for one in results).most_common()
+    has_errors = any(one.outcome == "error" for one in results)
+    by_seed = [AnalysisChoice("seed", str(one), keep=_only_seed(one)) for one in seeds]
+    without = [AnalysisChoice("without", one, keep=_without_task(one)) for one in tasks]
+    usual = [AnalysisChoice("one processor", keep=_only_processor(one)) for one, _ in processors]
     return (
-        Offer(
-            [AnalysisChoice("errors as failures", keep=_errors_as_failures)],
-            has_errors,
-            "no rollout ended in an error",
-        ),
-        Offer(
-            [
-                *(AnalysisChoice("seed", str(one), keep=_only_seed(one)) for one in seeds),
-                AnalysisChoice("unit", "rollout", unit="rollout"),
-            ],
-            len(seeds) > 1,
-            "all have one policy seed",
-        ),
-        Offer(
-            [
-                AnalysisChoice("unit", "task", unit="task"),
-                *(AnalysisChoice("without", one, keep=_without_task(one)) for one in tasks),
-            ],
-            len(tasks) > 1,
-            "all are of one task",
-        ),
-        Offer(
-            [AnalysisChoice("equal weights of", "suites", weights="suite")],
-            len(suites) > 1,
-            "all are of one suite",
-        ),
-        Offer(
-            [AnalysisChoice("equal weights of", "difficulties", weights="difficulty")],
-            len(difficulties) > 1,
-            "all are of one difficulty",
-        ),
-        Offer(
-            [
-                AnalysisChoice("one processor", keep=_only_processor(name))
-                for name, _ in processors.most_common(1)
-            ],
-            len(processors) > 1,
-            "all were simulated on one kind of processor",
-        ),
+        Offer([_ERRORS_FAIL], has_errors, "no rollout ended in an error"),
+        Offer([*by_seed, _BY_ROLLOUT], len(seeds) > 1, "one policy seed"),
+        Offer([_BY_TASK, *without], len(tasks) > 1, "one task"),
+        Offer([_EQUAL_SUITES], len(suites) > 1, "one suite"),
+        Offer([_EQUAL_DIFFICULTIES], len(difficulties) > 1, "one difficulty"),
+        Offer(usual[:1], len(processors) > 1, "one kind of processor simulated all"),
     )
 
 
@@ -204,6 +172,13 @@ def _errors_as_failures(results: Results) -> Results:
         msgspec.structs.replace(one, outcome="failure") if one.outcome == "error" else one
         for one in results
     ]
+
+
+_ERRORS_FAIL = AnalysisChoice("errors as failures", keep=_errors_as_failures)
+_BY_ROLLOUT = AnalysisChoice("unit", "rollout", unit="rollout")
+_BY_TASK = AnalysisChoice("unit", "task", unit="task")
+_EQUAL_SUITES = AnalysisChoice("equal weights of", "suites", weights="suite")
+_EQUAL_DIFFICULTIES = AnalysisChoice("equal weights of", "difficulties", weights="difficulty")
 
 
 def _only_seed(seed: int) -> Callable[[Results], Results]:

@@ -9,7 +9,7 @@ import numpy as np
 
 from roboirg.core.errors import InvalidValueError
 from roboirg.evaluation.analysis.stats.arm_figures import (
-    CONTRASTS,
+    MEANING,
     WORDS_WORTH,
     ArmFigure,
     arm_figures,
@@ -28,7 +28,7 @@ COLUMNS = tuple(
 )
 _NOTE = (
     "Each figure compares two rates on the same scenes, as means over tasks, in percent with 95 % "
-    f"intervals. {'. '.join(f'{one.name.capitalize()}: {one.meaning}' for one in CONTRASTS)}. "
+    f"intervals. {MEANING} "
     "Chance is the success in silence of a random goal of the scene. Differences are in points; "
     "p-values are corrected over all rows of the policy. Scenes without an arm are in none of its "
     "figures."
