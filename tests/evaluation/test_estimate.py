@@ -119,16 +119,19 @@ def test_what_models_will_be_asked_is_counted_and_measured(tmp_path: Path) -> No
     assert known["often"] == found["often"]
 
 
-def test_a_planner_over_own_hands_is_counted_without_loading_them(tmp_path: Path) -> None:
+def test_a_planner_over_other_hands_is_counted_without_loading_them(tmp_path: Path) -> None:
     spec = "planner:qwen?model=x&base_url=http://localhost:1/v1"
     plan = make_plan([f"ours={spec}"], tasks="PickXtimes", settings="explicit", episodes="2")
     (ours,) = model_costs(plan.jobs(), plan.jobs(), tmp_path)
     assert not list(unknown_costs(plan.jobs()))
-    own = [replace(one, policy="own", spec=f"{spec}&hands=not_there:Hands") for one in plan.jobs()]
-    (found,) = model_costs(own, own, tmp_path)
-    assert found.sizes == ours.sizes
-    (sentence,) = unknown_costs(own)
-    assert sentence.startswith("own: how long its hands take is not known")
+    jobs = [
+        replace(job, policy=hands, spec=f"{spec}&hands={hands}")
+        for hands in ("not_there:Hands", "mme-vla://localhost:1")
+        for job in plan.jobs()
+    ]
+    assert [one.sizes for one in model_costs(jobs, jobs, tmp_path)] == [ours.sizes] * 2
+    hands = [sentence.split(": how long its hands")[0] for sentence in unknown_costs(jobs)]
+    assert hands == ["not_there:Hands", "mme-vla://localhost:1"]
 
 
 def test_calls_of_an_own_planner_are_not_known_and_a_sentence_says_why(tmp_path: Path) -> None:

@@ -13,12 +13,14 @@ from roboirg.evaluation.play.job_instruction import PreparedJob
 from roboirg.evaluation.records.record import Job
 from roboirg.evaluation.run.world_speed import has_video
 from roboirg.policies.by_name.loading import (
+    hands_of,
     is_foreign,
     make_policy,
     undeclared,
     with_scripted_hands,
 )
 from roboirg.policies.by_name.policy_specs import PLANNER
+from roboirg.policies.by_name.systems import SCRIPTED
 from roboirg.policies.contract.policy_urls import is_url
 from roboirg.policies.planners.hierarchical_policy import MOST_REFUSALS
 from roboirg.policies.planners.rehearsal import (
@@ -92,16 +94,14 @@ def model_costs(todo: Iterable[Job], jobs: Iterable[Job], folder: Path) -> tuple
 def unknown_costs(jobs: Iterable[Job]) -> Iterator[str]:
     """Yield a sentence for each planner whose calls depend on what is not known before it plays."""
     for name, spec in dict.fromkeys((job.policy, job.policy_spec) for job in jobs):
-        if not is_foreign(spec):
-            continue
-        if _asker(spec) is not None:
+        if hands_of(spec) not in (None, SCRIPTED) and _asker(spec) is not None:
             yield (
                 f"{name}: how long its hands take is not known before they play, so calls are "
                 f"counted as with the scripted hands, {SUBGOAL_STEPS} control steps for a subgoal "
                 f"in chunks of {CHUNK}; before each chunk there are at most 2, or "
                 f"{2 * MOST_REFUSALS} if the hands refuse its subgoals."
             )
-        elif undeclared(spec).startswith(f"{PLANNER}:"):
+        elif undeclared(spec).startswith(f"{PLANNER}:") and hands_of(spec) is None:
             yield (
                 f"{name}: calls of models are not known, because the planner's code is your own; "
                 "its plan() is called before each chunk of the hands."
@@ -132,12 +132,13 @@ def _measured(jobs: Iterable[Job], folder: Path) -> dict[str, CallSizes]:
 def _asker(spec: str) -> VLMPlanner | VLMListener | None:
     """Return what asks a model for a policy; None if nothing does, or it is foreign code.
 
-    Foreign hands are not made: nothing of a rehearsal depends on them.
+    Hands are not made: nothing of a rehearsal depends on them.
     """
-    ours = with_scripted_hands(spec) if is_foreign(spec) else spec
-    if ours is None or is_url(ours):
+    if hands_of(spec) is not None:
+        spec = with_scripted_hands(spec)
+    if is_url(spec) or is_foreign(spec):
         return None
-    policy = make_policy(ours, 0)
+    policy = make_policy(spec, 0)
     asker = getattr(policy, "planner", policy)
     return asker if isinstance(asker, VLMPlanner | VLMListener) else None
 

@@ -116,18 +116,25 @@ def planner_alone(spec: str) -> str | None:
     return f"{kind}:{name}?{urlencode({**options, HANDS: ELSEWHERE})}"
 
 
-def with_scripted_hands(spec: str) -> str | None:
-    """Return the spec of one of our planners with the scripted hands instead of any others.
+def hands_of(spec: str) -> str | None:
+    """Return the spec of the policy that follows one of our planners; None without such a planner.
 
-    None for planners of the user's own, and for policies without a planner.
+    The scripted hands are `SCRIPTED`.
     """
     kind, _, rest = undeclared(spec).partition(":")
     name, _, query = rest.partition("?")
-    if kind not in (policy_specs.SYSTEM, policy_specs.PLANNER) or ":" in name:
-        return None
-    if kind == policy_specs.SYSTEM and find_system(name, {}).planner is None:
-        return None
-    return f"{kind}:{name}?{urlencode({**parse_query(spec, query), HANDS: SCRIPTED})}"
+    if kind == policy_specs.SYSTEM:
+        system = find_system(name, parse_query(spec, query))
+        return None if system.planner is None else system.policy
+    if kind == policy_specs.PLANNER and ":" not in name:
+        return parse_query(spec, query).get(HANDS, SCRIPTED)
+    return None
+
+
+def with_scripted_hands(spec: str) -> str:
+    """Return the spec of one of our planners with the scripted hands instead of any others."""
+    head, _, query = undeclared(spec).partition("?")
+    return f"{head}?{urlencode({**parse_query(spec, query), HANDS: SCRIPTED})}"
 
 
 def needs_host(spec: str) -> bool:
