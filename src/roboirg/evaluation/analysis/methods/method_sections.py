@@ -26,10 +26,10 @@ from roboirg.evaluation.analysis.methods.method_text import Sections
 from roboirg.evaluation.analysis.methods.played_facts import (
     NO_NETWORK,
     NOT_REPORTED,
-    Column,
     Items,
     PlayedFacts,
     SaidTexts,
+    TextColumn,
     distinct,
     item,
     read_facts,
@@ -176,9 +176,9 @@ def _instructions(results: Sequence[Summary], played: Played) -> Items:
         yield item(name, *_reading(facts))
 
 
-def _said(played: Played) -> list[tuple[Column, SaidTexts]]:
+def _said(played: Played) -> list[tuple[TextColumn, SaidTexts]]:
     """Return what was said to any policy, by column in order."""
-    found: dict[Column, SaidTexts] = defaultdict(SaidTexts)
+    found: dict[TextColumn, SaidTexts] = defaultdict(SaidTexts)
     for facts in played.values():
         for column, said in facts.said.items():
             found[column].texts.update(said.texts)

@@ -10,9 +10,9 @@ from roboirg.core.episode import SPLITS
 from roboirg.core.plain_text import counted
 from roboirg.evaluation.analysis.methods.played_facts import (
     NOT_REPORTED,
-    Column,
     Items,
     PlayedFacts,
+    TextColumn,
     distinct,
     item,
 )
@@ -52,9 +52,9 @@ _VERDICTS: Mapping[Direction, str] = {
 
 def screening_items(jobs: Sequence[Job]) -> Items:
     """Yield which scenes were selected, and what was left out."""
-    columns: dict[Column, set[SceneName]] = defaultdict(set)
+    columns: dict[TextColumn, set[SceneName]] = defaultdict(set)
     for one in jobs:
-        columns[Column(one.column, one.arm)].add((one.task, one.split, one.episode))
+        columns[TextColumn(one.column, one.arm)].add((one.task, one.split, one.episode))
     scenes = set().union(*columns.values())
     tasks = list(dict.fromkeys(one.task for one in jobs))
     absent = [name for name in all_tasks() if name not in tasks]
@@ -85,7 +85,7 @@ def screening_items(jobs: Sequence[Job]) -> Items:
 def _rejections(scenes: set[SceneName]) -> Iterator[str]:
     published = {one for one in scenes if is_published(*one)}
     if published:
-        yield f"{len(published)} scenes are RoboMME's published ones, 0 of which were rejected"
+        yield f"{counted(len(published), 'scene')} published by RoboMME, none of which was rejected"
     shipped = {one for one in scenes - published if one[0] in shipped_splits() and one[1] in SPLITS}
     if shipped:
         rejected = sum(
@@ -93,11 +93,11 @@ def _rejections(scenes: set[SceneName]) -> Iterator[str]:
             for task, split, number in shipped
         )
         yield (
-            f"{len(shipped)} scenes were sampled, {rejected} candidates for them rejected: no room "
-            "for an object, a setting that cannot express them, or not solved by the oracle"
+            f"{counted(len(shipped), 'scene')} sampled, after {rejected} rejected: no room for an "
+            "object, a setting that cannot express it, or not solved by the oracle"
         )
     if others := len(scenes - published - shipped):
-        yield f"{others} scenes were sampled, candidates rejected: {NOT_REPORTED}"
+        yield f"{counted(others, 'scene')} sampled, how many were rejected: {NOT_REPORTED}"
 
 
 def _has_setting(task: str, setting: str) -> bool:

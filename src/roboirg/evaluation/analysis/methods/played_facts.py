@@ -38,7 +38,7 @@ Items = Iterator[tuple[str, str]]
 """What an item is about, and what is known of it."""
 
 
-class Column(NamedTuple):
+class TextColumn(NamedTuple):
     """Instructions that are counted together."""
 
     options: InstructionOptions
@@ -100,7 +100,7 @@ class PlayedFacts:
     is_privileged: bool = False
     steps: int = 0
     calls: int = 0
-    said: dict[Column, SaidTexts] = field(default_factory=lambda: defaultdict(SaidTexts))
+    said: dict[TextColumn, SaidTexts] = field(default_factory=lambda: defaultdict(SaidTexts))
     verdicts: Counter[str] = field(default_factory=Counter)
     repeated: int = 0
 
@@ -119,7 +119,7 @@ class PlayedFacts:
         self.is_privileged |= record.privileged
         self.steps += record.steps
         self.calls += record.calls
-        self.said[Column(record.column, record.arm)].add(record)
+        self.said[TextColumn(record.column, record.arm)].add(record)
         self.verdicts[record.prompt_verdict] += 1
         self.repeated += record.attempt > 1
 
