@@ -166,7 +166,7 @@ def test_each_other_analysis_has_a_verdict_or_a_reason(tmp_path: Path) -> None:
         "correction; in other analyses: no clear difference with seed 0, seed 1, equal weights of "
         "difficulties; clearly lower with unit rollout"
     )
-    without = found["mine, analyses without effect"]
+    without = found["mine, other analyses that change nothing here"]
     for choice in ("errors as failures", "unit task", "equal weights of suites", "one processor"):
         assert choice in without
     assert "seed 0" not in without

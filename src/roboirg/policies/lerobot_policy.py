@@ -258,10 +258,14 @@ def load(place: str, device: str) -> LoadedCheckpoint:
 
 def _describe(config: Any, before: Sequence[str], after: Sequence[str]) -> dict[str, Any]:  # noqa: ANN401
     """Return a checkpoint's metadata, from its configuration and the steps of its processors."""
+    inputs = [
+        f"{name} {getattr(one, 'shape', '')}".strip()
+        for name, one in (config.input_features or {}).items()
+    ]
     found: dict[str, Any] = {
-        "preprocessing": "pictures scaled to [0, 1], then the checkpoint's own steps, saved with "
-        f"it in training: {', '.join(before) or 'none'}; on its actions: "
-        f"{', '.join(after) or 'none'}"
+        "preprocessing": f"inputs {', '.join(inputs)}; pictures scaled to [0, 1], as in LeRobot's "
+        "data sets; then the checkpoint's own steps, saved with it in training: "
+        f"{', '.join(before) or 'none'}; on its actions: {', '.join(after) or 'none'}"
     }
     tokenizers = [name for name in before if "tokenizer" in name]
     if tokenizers:

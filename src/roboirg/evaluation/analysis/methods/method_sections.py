@@ -120,7 +120,9 @@ def _horizon(results: Sequence[Summary], played: Played) -> Items:
 def _action_space(name: str) -> str:
     if name == NOT_REPORTED or ";" in name:
         return name
-    return f"{name} ({find_action_space(name).describe})"
+    space = find_action_space(name)
+    steps = "one control step each" if not space.takes_many_steps else "of many control steps each"
+    return f"{name} ({space.describe}), {steps}"
 
 
 def _precision(results: Sequence[Summary], played: Played) -> Items:

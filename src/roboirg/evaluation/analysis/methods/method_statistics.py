@@ -60,12 +60,13 @@ def screening_items(jobs: Sequence[Job]) -> Items:
     absent = [name for name in all_tasks() if name not in tasks]
     reason = (f"not played: {', '.join(absent)}", _NO_REASON) if absent else ("all there are",)
     yield item("tasks", ", ".join(tasks), *reason)
-    splits, numbers = {split for _, split, _ in scenes}, [number for *_, number in scenes]
+    splits, numbers = {split for _, split, _ in scenes}, sorted({number for *_, number in scenes})
+    span = f"{numbers[0]} to {numbers[-1]}" if len(numbers) > 1 else numbers[0]
     whole = len(tasks) * sum(SIZES[split] for split in SPLITS if split in splits)
     is_whole = splits <= {*SPLITS} and len(scenes) == whole
     yield item(
         "scenes",
-        f"{len(scenes)} of the split {distinct(splits)}, numbers {min(numbers)} to {max(numbers)}",
+        f"{len(scenes)} of the split {distinct(splits)}, numbered {span}",
         "all there are" if is_whole else _NO_REASON,
         "none was left out for its result",
     )
@@ -142,7 +143,7 @@ def sensitivity_items(data: RunData) -> Items:
             yield f"{name}, {found.label} less explicit", _robustness(found)
         offers = [one for one in offers_for(contrasts) if not one.differs]
         listed = (f"{', '.join(of.label for of in one.choices)} ({one.reason})" for one in offers)
-        yield item(f"{name}, analyses without effect", *listed)
+        yield item(f"{name}, other analyses that change nothing here", *listed)
     if figures_of(data):
         yield "contrasts of arms", f"other analyses: {NOT_REPORTED}"
 
@@ -202,7 +203,11 @@ def error_items(
 ) -> Items:
     """Yield seeds, repeated rollouts, errors, and what is missing."""
     seeds = {one.policy_seed for one in results}
-    yield "policy seeds", f"{len(seeds)} (number {distinct(seeds)}), mixed with the scene's seed"
+    yield item(
+        "policy seeds",
+        f"{counted(len(seeds), 'seed')}, numbered {distinct(seeds)}",
+        "the seed that a policy gets is made from this number and the scene",
+    )
     again = sum(one.repeated for one in played.values())
     yield "rollouts begun again after a fault", f"{again} of {len(results)}"
     kinds = Counter(one.error for one in results if one.outcome == "error")

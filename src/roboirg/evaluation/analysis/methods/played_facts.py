@@ -113,7 +113,8 @@ class PlayedFacts:
             for key in DECLARABLE.keys() & table.keys():
                 self.declared[key].add(_words(table[key]))
         if (found := record.inference) is not None:
-            values = found.python, found.libraries, found.dtypes, found.devices
+            dtypes = [f"{one} (parameters)" for one in found.dtypes]
+            values = found.python, found.libraries, dtypes, found.devices
             for key, one in zip(("python", "libraries", "dtype", "device"), values, strict=True):
                 self.inference[key].add(_words(one))
         self.is_privileged |= record.privileged
