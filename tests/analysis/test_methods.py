@@ -146,7 +146,7 @@ def test_texts_and_templates_are_counted(tmp_path: Path) -> None:
     counts = found["Instructions"]
     direct = {record(episode, setting="direct").instruction for episode in range(4)}
     assert counts["explicit, arm told"].startswith(f"{len(told)} distinct texts, from ")
-    assert counts["direct, arm silent"] == "1 distinct text, from no template"
+    assert counts["direct, arm silent"] == "1 distinct text, fixed"
     (label,) = set(found["Use of the words in training"]) - {"mine"}
     seen = found["Use of the words in training"][label]
     assert f"{len(told) + len(direct)} texts: no, from templates" in seen

@@ -6,7 +6,7 @@ played; `method_statistics` has how scenes were selected and results were analyz
 
 from __future__ import annotations
 
-from collections import Counter, defaultdict
+from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 
@@ -38,6 +38,7 @@ from roboirg.evaluation.analysis.stats.option_labels import options_sort_key
 from roboirg.evaluation.analysis.stats.run_data import RunData
 from roboirg.evaluation.records.record import Job, Record, Summary
 from roboirg.evaluation.records.store import iterate_records, read_results
+from roboirg.language.arms import SILENT_TEXTS
 from roboirg.language.settings import all_settings
 from roboirg.tasks import every_task
 from roboirg.util.media import CONTROL_RATE
@@ -45,11 +46,12 @@ from roboirg.util.media import CONTROL_RATE
 _POOL_NOTES: Mapping[str | None, str] = {
     "test": "no, from templates that are not in these splits",
     "train": "yes, from the templates of these splits",
-    None: f"{NOT_REPORTED}, from no template",
+    None: f"{NOT_REPORTED}, fixed or from a file",
 }
 
 Played = Mapping[str, PlayedFacts]
 """The facts of each policy, by its name."""
+Said = Mapping[TextColumn, SaidTexts]
 
 
 def make_sections(folder: Path, planned: Sequence[Job]) -> Sections:
@@ -64,15 +66,15 @@ def make_sections(folder: Path, planned: Sequence[Job]) -> Sections:
     """
     results = read_results(folder)
     data = RunData.of([(str(folder), results)], planned)
-    played = read_facts(_newest(folder, results))
+    played, said = read_facts(_newest(folder, results))
     jobs = planned or [one.identity for one in results]
     return {
         "Terms": dict(_terms(jobs)),
         "Horizon and control rate": dict(_horizon(results, played)),
         "Precision of inference": dict(_precision(results, played)),
         "Observations": dict(_observations(results, played)),
-        "Instructions": dict(_instructions(results, played)),
-        "Use of the words in training": dict(_training(played)),
+        "Instructions": dict(_instructions(results, played, said)),
+        "Use of the words in training": dict(_training(played, said)),
         "Screening of scenes": dict(screening_items(jobs)),
         "Statistics": dict(statistics_items(data)),
         "Sensitivity to analysis choices": dict(sensitivity_items(data)),
@@ -160,7 +162,7 @@ def _observations(results: Sequence[Summary], played: Played) -> Items:
         )
 
 
-def _instructions(results: Sequence[Summary], played: Played) -> Items:
+def _instructions(results: Sequence[Summary], played: Played, said: Said) -> Items:
     versions = distinct(one.language_version for one in results)
     for wordings in sorted({one.options.wordings for one in results}, key=str):
         label = "words" if wordings is None else f"words of {wordings}"
@@ -172,27 +174,16 @@ def _instructions(results: Sequence[Summary], played: Played) -> Items:
             yield label, "commands of a file"
     used = distinct(one.options.delivery for one in results)
     yield "delivery", f"{used} ({OPTION_HELP['delivery'].rstrip('.')})"
-    for column, said in _said(played):
-        yield column.label, _counts(said)
+    for column in sorted(said, key=lambda one: (options_sort_key(one.options), one.arm)):
+        yield column.label, _counts(said[column], is_fixed=column.arm in SILENT_TEXTS)
     for name, facts in played.items():
         yield item(name, *_reading(facts))
 
 
-def _said(played: Played) -> list[tuple[TextColumn, SaidTexts]]:
-    """Return what was said to any policy, by column in order."""
-    found: dict[TextColumn, SaidTexts] = defaultdict(SaidTexts)
-    for facts in played.values():
-        for column, said in facts.said.items():
-            found[column].texts.update(said.texts)
-            found[column].commands.update(said.commands)
-            found[column].wordings.update(said.wordings)
-    return sorted(found.items(), key=lambda one: (options_sort_key(one[0].options), one[0].arm))
-
-
-def _counts(said: SaidTexts) -> str:
+def _counts(said: SaidTexts, *, is_fixed: bool) -> str:
     texts = counted(len(said.texts), "distinct text")
     if not said.commands:
-        return f"{texts}, from no template"
+        return f"{texts}, " + ("fixed" if is_fixed else f"templates: {NOT_REPORTED}")
     pools = {pool for _, pool in said.texts}
     tasks = {task for task, _ in said.commands} & every_task().keys()
     there = sum(
@@ -226,10 +217,10 @@ def _reading(facts: PlayedFacts) -> Iterator[str]:
         yield f"unknown without its tokenizer: {unsure}"
 
 
-def _training(played: Played) -> Items:
+def _training(played: Played, said: Said) -> Items:
     for name, facts in played.items():
         yield name, facts.labeled("trained_on")
-    texts = set().union(*(said.texts for _, said in _said(played)))
+    texts = set().union(*(one.texts for one in said.values()))
     pools = Counter(_POOL_NOTES[pool] for _, pool in texts)
     listed = (f"{counted(pools[note], 'text')}: {note}" for note in sorted(pools))
     yield item("whether texts can occur in training on the splits train and val", *listed)

@@ -88,7 +88,6 @@ class PlayedFacts:
         is_privileged: whether it reads the simulator's state.
         steps: control steps in all.
         calls: how often it was asked for actions.
-        said: what was said to it.
         verdicts: rollouts by whether all that was said reached its language model.
         repeated: rollouts that were begun more than once.
     """
@@ -100,7 +99,6 @@ class PlayedFacts:
     is_privileged: bool = False
     steps: int = 0
     calls: int = 0
-    said: dict[TextColumn, SaidTexts] = field(default_factory=lambda: defaultdict(SaidTexts))
     verdicts: Counter[str] = field(default_factory=Counter)
     repeated: int = 0
 
@@ -120,7 +118,6 @@ class PlayedFacts:
         self.is_privileged |= record.privileged
         self.steps += record.steps
         self.calls += record.calls
-        self.said[TextColumn(record.column, record.arm)].add(record)
         self.verdicts[record.prompt_verdict] += 1
         self.repeated += record.attempt > 1
 
@@ -158,12 +155,16 @@ def item(label: str, *parts: str) -> tuple[str, str]:
     return label, "; ".join(parts)
 
 
-def read_facts(records: Iterable[Record]) -> Mapping[str, PlayedFacts]:
-    """Return what records say, by policy in the order of their first record."""
-    found: dict[str, PlayedFacts] = {}
+def read_facts(
+    records: Iterable[Record],
+) -> tuple[Mapping[str, PlayedFacts], Mapping[TextColumn, SaidTexts]]:
+    """Return how each policy played, in the order of their first records, and what was said."""
+    played: dict[str, PlayedFacts] = {}
+    said: defaultdict[TextColumn, SaidTexts] = defaultdict(SaidTexts)
     for record in records:
-        found.setdefault(record.policy, PlayedFacts()).add(record)
-    return found
+        played.setdefault(record.policy, PlayedFacts()).add(record)
+        said[TextColumn(record.column, record.arm)].add(record)
+    return played, said
 
 
 def _tables(metadata: Mapping[str, Any]) -> Iterator[Mapping[str, Any]]:

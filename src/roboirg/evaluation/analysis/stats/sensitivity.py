@@ -224,22 +224,18 @@ def _tested(contrast: Contrast, choice: AnalysisChoice) -> tuple[float, float] |
     units = list(_units(choice.keep(contrast.first), choice.keep(contrast.second), choice.unit))
     if not units:
         return None
-    if choice.weights == "task" and choice.unit != "task":
-        # As everywhere: the mean weighs tasks equally, the test sums over units.
-        scale = int(np.lcm.reduce([one.difference.denominator for one in units]))
-        whole = np.array([int(one.difference * scale) for one in units])
-        return _mean(units, _weights(units, "task")), sign_flip_test(whole)
     weights = _weights(units, choice.weights)
+    values = np.array([float(one.difference) for one in units]) * weights
+    mean = float(values.sum())
+    mean = 0.0 if abs(mean) < _NOTHING else mean
     if choice.unit == "task":
-        values = [
-            sum(float(one.difference) * weight for one, weight in group)
-            for group in _by_task(units, weights).values()
-        ]
-    else:
-        values = [
-            float(one.difference) * weight for one, weight in zip(units, weights, strict=True)
-        ]
-    return _mean(units, weights), swap_test(np.array(values))
+        _, of_task = np.unique([one.task for one in units], return_inverse=True)
+        return mean, swap_test(np.bincount(of_task, values).astype(np.float64))
+    if choice.weights != "task":
+        return mean, swap_test(values)
+    # As everywhere: the mean weighs tasks equally, the test sums over units.
+    scale = int(np.lcm.reduce([one.difference.denominator for one in units]))
+    return mean, sign_flip_test(np.array([int(one.difference * scale) for one in units]))
 
 
 def _units(first: Results, second: Results, unit: Unit) -> Iterator[_Unit]:
@@ -280,21 +276,6 @@ def _weights(units: Sequence[_Unit], weighting: Weighting) -> list[float]:
     groups = {task: _suite(task) if weighting == "suite" else "" for task in sizes}
     members = Counter(groups.values())
     return [1 / (len(members) * members[groups[one.task]] * sizes[one.task]) for one in units]
-
-
-def _mean(units: Sequence[_Unit], weights: Sequence[float]) -> float:
-    pairs = zip(units, weights, strict=True)
-    value = sum(float(one.difference) * weight for one, weight in pairs)
-    return 0.0 if abs(value) < _NOTHING else value
-
-
-def _by_task(
-    units: Sequence[_Unit], weights: Sequence[float]
-) -> dict[str, list[tuple[_Unit, float]]]:
-    groups: dict[str, list[tuple[_Unit, float]]] = defaultdict(list)
-    for one, weight in zip(units, weights, strict=True):
-        groups[one.task].append((one, weight))
-    return groups
 
 
 def swap_test(values: NDArray[np.float64]) -> float:
