@@ -11,7 +11,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 
 from roboirg.core.actions import find_action_space
-from roboirg.core.arms import ARMS, PARAPHRASE, paraphrase_number
+from roboirg.core.arms import ARMS, PARAPHRASE, SILENT_TEXTS, paraphrase_number
 from roboirg.core.instruction_options import OPTION_HELP
 from roboirg.core.plain_text import counted
 from roboirg.core.word_pools import POOLS, pool_of
@@ -38,7 +38,6 @@ from roboirg.evaluation.analysis.stats.option_labels import options_sort_key
 from roboirg.evaluation.analysis.stats.run_data import RunData
 from roboirg.evaluation.records.record import Job, Record, Summary
 from roboirg.evaluation.records.store import iterate_records, read_results
-from roboirg.language.arms import SILENT_TEXTS
 from roboirg.language.settings import all_settings
 from roboirg.tasks import every_task
 from roboirg.util.media import CONTROL_RATE

@@ -113,7 +113,7 @@ def statistics_items(data: RunData) -> Items:
     test = "McNemar's exact test" if seeds == 1 else "the exact sign-flip test over scenes"
     yield "unit", "the scene; its rollouts with several policy seeds are one cluster"
     yield "averages", "means over tasks, each with the same weight"
-    yield "intervals", f"95 %; {single} the bootstrap over scenes ({DRAWS} resamples)"
+    yield "intervals", f"95 %; {single} the bootstrap over each task's scenes ({DRAWS} resamples)"
     yield item(
         "differences to explicit",
         f"paired by scene, {test}, two-sided",

@@ -7,12 +7,12 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
+from roboirg.core.arms import SILENT_TEXTS
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.core.word_pools import POOLS
 from roboirg.evaluation.analysis.stats.option_labels import options_label
 from roboirg.evaluation.policy_calls import SERVER
 from roboirg.evaluation.records.record import Record
-from roboirg.language.arms import SILENT_TEXTS
 
 NOT_REPORTED = "not reported"
 NO_NETWORK = "none, as it has no network"
