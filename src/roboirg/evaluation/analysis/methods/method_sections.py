@@ -50,7 +50,7 @@ _POOL_NOTES: Mapping[str | None, str] = {
 
 Played = Mapping[str, PlayedFacts]
 """The facts of each policy, by its name."""
-Said = Mapping[TextColumn, SaidTexts]
+ColumnTexts = Mapping[TextColumn, SaidTexts]
 
 
 def make_sections(folder: Path, planned: Sequence[Job]) -> Sections:
@@ -161,7 +161,7 @@ def _observations(results: Sequence[Summary], played: Played) -> Items:
         )
 
 
-def _instructions(results: Sequence[Summary], played: Played, said: Said) -> Items:
+def _instructions(results: Sequence[Summary], played: Played, said: ColumnTexts) -> Items:
     versions = distinct(one.language_version for one in results)
     for wordings in sorted({one.options.wordings for one in results}, key=str):
         label = "words" if wordings is None else f"words of {wordings}"
@@ -216,7 +216,7 @@ def _reading(facts: PlayedFacts) -> Iterator[str]:
         yield f"unknown without its tokenizer: {unsure}"
 
 
-def _training(played: Played, said: Said) -> Items:
+def _training(played: Played, said: ColumnTexts) -> Items:
     for name, facts in played.items():
         yield name, facts.labeled("trained_on")
     texts = set().union(*(one.texts for one in said.values()))
