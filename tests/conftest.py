@@ -7,6 +7,7 @@ import os
 import shutil
 import signal
 import subprocess
+import sys
 import tempfile
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, ExitStack, contextmanager
@@ -21,6 +22,11 @@ settings.register_profile(
     "roboirg", deadline=None, derandomize=True, suppress_health_check=[HealthCheck.too_slow]
 )
 settings.load_profile("roboirg")
+
+# What a session compiles is kept, even where the environment asks for no bytecode: its two workers and
+# the hundreds of processes that tests start would all compile the same modules.
+os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
+sys.dont_write_bytecode = False
 
 # One thread draws, as in the worker processes of a run: several workers test side by side.
 os.environ.setdefault("LP_NUM_THREADS", "1")
