@@ -23,8 +23,8 @@ settings.register_profile(
 )
 settings.load_profile("roboirg")
 
-# What a session compiles is kept, even where the environment asks for no bytecode: its two workers and
-# the hundreds of processes that tests start would all compile the same modules.
+# What a session compiles is kept, even where the environment asks for no bytecode: both workers
+# and the hundreds of processes that tests start would compile the same modules.
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 sys.dont_write_bytecode = False
 

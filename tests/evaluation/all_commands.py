@@ -14,7 +14,6 @@ from roboirg.evaluation.records.record import Job
 from roboirg.evaluation.records.store import RecordStore
 from roboirg.main import app
 
-
 WORDS = {
     "bench": "--rounds 1",
     "run": "--policy random --tasks PickXtimes --episodes 1 --workers 0 --settings explicit"
@@ -45,8 +44,8 @@ WORDS = {
     "records import": "--help",
     "learn listener": "--help",
     "learn answers": "--help",
-    "listen plan": "{folder}/listeners --people 1 --tasks StopCube --episodes 1 --plan {no_practice}"
-    " --settings explicit",
+    "listen plan": "{folder}/listeners --people 1 --tasks StopCube --episodes 1"
+    " --plan {no_practice} --settings explicit",
     "listen serve": "--help",
     "listen results": "--help",
     "drive": "--help",
@@ -99,7 +98,7 @@ def make_run(folder):
 
 
 def words_of(folder, run):
-    """Return `WORDS` for files in a folder and a run; a plan file is written where one is wanted."""
+    """Return `WORDS` for files in a folder and a run; the plan files are written."""
     paths = {
         "folder": folder,
         "run": run,
