@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import itertools
-import os
 import random
-import signal
 import sqlite3
 import subprocess
 import sys
@@ -163,7 +161,7 @@ def test_waiting_times_of_services(headers: dict[str, str], seconds: float | Non
 
 CHILD = textwrap.dedent(
     """
-    import os, sys
+    import os, signal, sys
     from pathlib import Path
     from roboirg.policies.vlm.model_content import ChatTurn
     from roboirg.policies.vlm.models import ModelOptions, ModelQuery, make_model
@@ -185,12 +183,13 @@ CHILD = textwrap.dedent(
                 reply = model.answer(ModelQuery("system", (ChatTurn("user", (words,)),)))
                 print(reply.text, flush=True)
 
-    for line in sys.stdin:
+    for line in iter(sys.stdin.readline, ""):
         process = os.fork()
         if not process:
-            print(os.getpid(), flush=True)
             play(line.strip())
             os._exit(0)
+        if sys.stdin.readline() == "kill\\n":
+            os.kill(process, signal.SIGKILL)
         os.waitpid(process, 0)
         print("ended", flush=True)
     """
@@ -215,15 +214,17 @@ class Child:
             text=True,
         )
 
-    def begin(self, episode: str) -> int:
-        """Begin an episode and return its process."""
-        self.main.stdin.write(f"{episode}\n")
+    def write(self, line: str) -> None:
+        """Write the name of an episode to begin; then `kill`, or `wait` for its end."""
+        self.main.stdin.write(f"{line}\n")
         self.main.stdin.flush()
-        return int(self.main.stdout.readline())
 
     def replies(self) -> Iterator[str]:
         """Yield the replies that the episode's process gets until it ends."""
-        return map(str.strip, iter(self.main.stdout.readline, "ended\n"))
+        for line in iter(self.main.stdout.readline, ""):
+            if line == "ended\n":
+                return
+            yield line.strip()
 
     def end(self) -> int:
         self.main.communicate()
@@ -240,12 +241,14 @@ def test_no_answered_call_is_made_again_after_a_kill(tmp_path: Path, kills: int)
         answered: dict[str, int] = {}
         for episode in range(kills // 2):
             for _ in range(2):
-                process, replies = child.begin(f"e{episode}"), child.replies()
+                child.write(f"e{episode}")
+                replies = child.replies()
                 for name in itertools.islice(replies, rng.randrange(1, CALLS)):
                     answered.setdefault(name, requests()[name])
-                os.kill(process, signal.SIGKILL)
-                assert len(list(replies)) < CALLS  # said before the kill
-            child.begin(f"e{episode}")
+                child.write("kill")
+                list(replies)  # what it said before it died
+            child.write(f"e{episode}")
+            child.write("wait")
             assert list(child.replies()) == [f"e{episode} {number}" for number in range(CALLS)]
         assert child.end() == 0
         found = requests()
@@ -260,7 +263,8 @@ def test_processes_keep_one_limit_together(tmp_path: Path) -> None:
     with fake_vlm(name_of) as server:
         both = [Child(server, tmp_path, per_minute) for _ in range(2)]
         for one, name in zip(both, ("a", "b"), strict=True):
-            one.begin(name)
+            one.write(name)
+            one.write("wait")
         assert [one.end() for one in both] == [0, 0]
         assert len(server.requests) == 2 * CALLS
     with sqlite3.connect(tmp_path / REPLIES_FILE) as database:
