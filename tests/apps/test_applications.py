@@ -73,7 +73,9 @@ def everything(tmp_path_factory: pytest.TempPathFactory) -> tuple[dict[str, list
 
 def test_every_kind_of_policy_and_every_application_is_there(everything):
     commands, kinds = everything
-    assert kinds == set(entry_names("roboirg.policy_kinds")) == {"learned", "people", "recorded"}
+    assert kinds == set(entry_names("roboirg.policy_kinds")) == {
+        "learned", "people", "recorded", "trained",
+    }  # fmt: skip
     assert len(APPLICATIONS) >= 10
     assert {
         "run",

@@ -6,7 +6,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from roboirg.apps.learning.policy.moves import RAREST, Decision, Move, common_moves, waypoint
+from roboirg.apps.learning.policy.moves import RAREST, ExpertDecision, Move, common_moves, waypoint
 from roboirg.apps.learning.policy.sight import Sight, points_of
 from roboirg.apps.learning.policy.tracks import MOST_TRACKS, LookTokens, Tracks
 
@@ -95,6 +95,7 @@ def test_a_move_from_the_tool_keeps_its_angle():
 
 def test_rare_moves_are_not_learned():
     usual, rare = (Move(True, 0.0, 0.0, z, "align", 0.0) for z in (0.1, 0.2))
-    enough = round(1 / RAREST)
-    assert common_moves([[Decision(0, usual, 0)] * 3 * enough, [Decision(0, rare, 0)]]) == (usual,)
-    assert common_moves([[Decision(0, usual, 0)] * 3, [Decision(0, rare, 0)]]) == (usual, rare)
+    often = [ExpertDecision(0, usual, 0)] * round(3 / RAREST)
+    once = [ExpertDecision(0, rare, 0)]
+    assert common_moves([often, once]) == (usual,)
+    assert common_moves([often[:3], once]) == (usual, rare)

@@ -155,14 +155,15 @@ def learn_policy(
     check_learn_support()
     from roboirg.apps.learning.policy.memories import MEMORIES
     from roboirg.apps.learning.policy.policy_model import save_policy
-    from roboirg.apps.learning.policy.policy_training import PolicyPlan, train_policy
+    from roboirg.apps.learning.policy.policy_plan import PolicyPlan
+    from roboirg.apps.learning.policy.policy_training import train_policy
     from roboirg.core.word_pools import POOLS
 
     plan = PolicyPlan(
         known_tasks(tasks),
         () if settings == "none" else known_settings(settings),
         words=known_name("pool of words", words.wordings_file or "train", POOLS),
-        memory=known_name("memory", memory, MEMORIES),
+        memory=known_name("memory", memory, tuple(MEMORIES)),
         **words.choices(PolicyPlan),
     )
     out.mkdir(parents=True, exist_ok=True)

@@ -10,8 +10,8 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
-from roboirg.apps.learning.detector_net import DetectorNet
 from roboirg.apps.learning.labeled_views import LATER_STEP
+from roboirg.apps.learning.listener.detector_net import DetectorNet
 from roboirg.apps.learning.listener.listener_net import ListenerInput, ListenerNet, Vocabulary
 from roboirg.apps.learning.listener.object_relations import (
     ObjectsInView,

@@ -10,8 +10,8 @@ import numpy as np
 import torch
 from pydantic import NonNegativeInt, PositiveInt
 
-from roboirg.apps.learning.detector_net import SIZE, DetectorNet, detector_loss
 from roboirg.apps.learning.labeled_views import LabeledView, look
+from roboirg.apps.learning.listener.detector_net import SIZE, DetectorNet, detector_loss
 from roboirg.apps.learning.listener.learned_model import LearnedModel, Without, hide
 from roboirg.apps.learning.listener.listener_net import (
     ListenerInput,

@@ -6,7 +6,7 @@ import json
 import random
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import torch
@@ -15,15 +15,13 @@ from torch.nn import functional
 
 from roboirg.apps.learning.listener.listener_net import Vocabulary
 from roboirg.apps.learning.policy.body_net import CLOSED, BodyNet, EpisodeBatch
-from roboirg.apps.learning.policy.moves import Decision, Move
+from roboirg.apps.learning.policy.moves import ExpertDecision, Move
 from roboirg.apps.learning.policy.policy_data import EpisodeNumbers, to_batch, to_numbers
 from roboirg.apps.learning.policy.policy_model import goal_numbers, make_body
+from roboirg.apps.learning.policy.policy_plan import PolicyPlan, Recorded
 from roboirg.apps.learning.policy.sight import Sight, SightNoise
 from roboirg.apps.learning.trainer import Progress, Trainer, batch_count, even_batches
 from roboirg.policies.vlm.goal_schema import goal_schema
-
-if TYPE_CHECKING:
-    from roboirg.apps.learning.policy.policy_training import PolicyPlan, Recorded
 
 RATE = 2e-3
 BATCH = 16
@@ -52,7 +50,7 @@ class BodyScore(NamedTuple):
 def train_body(
     plan: PolicyPlan,
     recorded: Sequence[Recorded],
-    decisions: Sequence[Sequence[Decision]],
+    decisions: Sequence[Sequence[ExpertDecision]],
     moves: Sequence[Move],
     sight: Sight,
     vocabulary: Vocabulary,

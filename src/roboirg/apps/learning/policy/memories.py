@@ -52,7 +52,7 @@ class Remembered(NamedTuple):
     can_choose: Tensor
 
 
-class Memory(nn.Module, ABC):
+class LookMemory(nn.Module, ABC):
     """Remembers looks."""
 
     @abstractmethod
@@ -71,7 +71,7 @@ def at_looks(values: Tensor, decisions: Tensor) -> Tensor:
     return values[rows, decisions]
 
 
-class NoMemory(Memory):
+class NoMemory(LookMemory):
     """Remembers nothing: only what is seen now can be chosen."""
 
     def forward(self, looks: Looks, decisions: Tensor) -> Remembered:
@@ -80,7 +80,7 @@ class NoMemory(Memory):
         return Remembered(torch.zeros_like(things), torch.zeros_like(whole), seen)
 
 
-class FrameMemory(Memory):
+class FrameMemory(LookMemory):
     """Attends to looks evenly spaced over all that was seen."""
 
     frames = 8
@@ -113,7 +113,7 @@ class FrameMemory(Memory):
         return Remembered(found[:, :, 1:], found[:, :, 0], at_looks(looks.seen, decisions))
 
 
-class RecurrentMemory(Memory):
+class RecurrentMemory(LookMemory):
     """A recurrent state for each thing, and one for the whole; things see who is near them."""
 
     def __init__(self) -> None:
@@ -157,8 +157,8 @@ class RecurrentMemory(Memory):
         itself = torch.eye(far.shape[-1], dtype=torch.bool)
         closed = ~before[:, :, None, :] | itself
         # A thing that is alone sees nothing: an extra place holds zeros.
-        nobody = far.new_full((*far.shape[:-1], 1), -3.0)
-        scores = torch.cat([(-far).masked_fill(closed, -math.inf), nobody], -1)
+        alone = far.new_full((*far.shape[:-1], 1), -3.0)
+        scores = torch.cat([(-far).masked_fill(closed, -math.inf), alone], -1)
         return scores.softmax(-1)[..., :-1]
 
     def _summary(self, things: Tensor, known: Tensor) -> tuple[Tensor, Tensor]:
@@ -168,7 +168,7 @@ class RecurrentMemory(Memory):
         return mean, most
 
 
-MEMORIES: Mapping[str, type[Memory]] = {
+MEMORIES: Mapping[str, type[LookMemory]] = {
     "none": NoMemory,
     "frames": FrameMemory,
     "recurrent": RecurrentMemory,

@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from roboirg.apps.learning.policy.recording import RecordedEpisode
+from roboirg.apps.learning.policy.recording import ExpertRecording
 from roboirg.apps.learning.policy.waypoint_expert import LEAVE
 
 Z_GRID = 0.0025
@@ -41,7 +41,7 @@ class Move(NamedTuple):
     gripper: float
 
 
-class Decision(NamedTuple):
+class ExpertDecision(NamedTuple):
     """A decision to learn.
 
     Attributes:
@@ -55,9 +55,9 @@ class Decision(NamedTuple):
     thing: int
 
 
-def decisions_of(recorded: RecordedEpisode) -> list[Decision]:
+def decisions_of(recorded: ExpertRecording) -> list[ExpertDecision]:
     """Return the decisions of an episode; opening or closing belongs to the move before it."""
-    found: list[Decision] = []
+    found: list[ExpertDecision] = []
     for look, action, anchor, turn in zip(
         recorded.looks, recorded.actions, recorded.anchors, recorded.turns, strict=True
     ):
@@ -73,11 +73,11 @@ def decisions_of(recorded: RecordedEpisode) -> list[Decision]:
         move = Move(
             at_thing, _round(x, XY_GRID), _round(y, XY_GRID), _round(z, Z_GRID), turn, gripper
         )
-        found.append(Decision(int(look), move, int(anchor)))
+        found.append(ExpertDecision(int(look), move, int(anchor)))
     return found
 
 
-def common_moves(decisions: Iterable[Sequence[Decision]]) -> tuple[Move, ...]:
+def common_moves(decisions: Iterable[Sequence[ExpertDecision]]) -> tuple[Move, ...]:
     """Return the kinds of waypoints that occur often enough, the commonest first."""
     counts = Counter(one.move for own in decisions for one in own)
     return tuple(move for move, count in counts.most_common() if count >= RAREST * counts.total())

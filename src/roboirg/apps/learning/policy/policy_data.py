@@ -11,8 +11,8 @@ import torch
 from numpy.typing import NDArray
 
 from roboirg.apps.learning.policy.body_net import TOOL_NUMBERS, EpisodeBatch
-from roboirg.apps.learning.policy.moves import Decision, Move
-from roboirg.apps.learning.policy.recording import LOOK_EVERY, RecordedEpisode
+from roboirg.apps.learning.policy.moves import ExpertDecision, Move
+from roboirg.apps.learning.policy.recording import LOOK_EVERY, ExpertRecording
 from roboirg.apps.learning.policy.sight import Sight, SightNoise, labeled_looks
 from roboirg.apps.learning.policy.tracks import LookTokens, Tracks
 
@@ -63,7 +63,7 @@ class LookHistory:
 
         Args:
             look: the things.
-            tool: (7,) pose and opening; see `RecordedEpisode`.
+            tool: (7,) pose and opening; see `ExpertRecording`.
             is_video: whether it is one of the video.
             step: control steps since the start of the video or of the policy's turn.
         """
@@ -101,8 +101,8 @@ def _tool_numbers(
 
 
 def to_numbers(
-    recorded: RecordedEpisode,
-    decisions: Sequence[Decision],
+    recorded: ExpertRecording,
+    decisions: Sequence[ExpertDecision],
     goal: NDArray[np.float32],
     sight: Sight,
     moves: Mapping[Move, int],

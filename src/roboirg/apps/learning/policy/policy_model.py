@@ -21,6 +21,7 @@ from roboirg.apps.learning.listener.object_relations import ObjectsInView, rank
 from roboirg.apps.learning.policy.body_net import BodyNet
 from roboirg.apps.learning.policy.moves import Move, waypoint
 from roboirg.apps.learning.policy.policy_data import EpisodeNumbers, LookHistory, to_batch
+from roboirg.apps.learning.policy.policy_plan import WORDLESS
 from roboirg.apps.learning.policy.sight import Sight
 from roboirg.apps.learning.policy.task_net import TaskNet
 from roboirg.apps.learning.policy.thing_detector import ThingDetector
@@ -31,8 +32,6 @@ from roboirg.policies.vlm.goal_schema import goal_schema
 FORMAT = "roboirg-policy-1"
 FIRST_LOOKS = (0, 5)
 """Looks at which the reader of words sees a video, two seconds apart; else it sees the first."""
-WORDLESS = "none"
-"""Words of a policy that was trained without any."""
 HOME = (math.pi, 0.0, 0.0)
 """Roll, pitch and yaw of the tool at the beginning, rad."""
 _BATCH = 32

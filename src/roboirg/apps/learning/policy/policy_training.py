@@ -6,13 +6,12 @@ import random
 from collections.abc import Iterator, Sequence
 from functools import partial
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import cv2
 import numpy as np
 import torch
 from numpy.typing import NDArray
-from pydantic import NonNegativeInt, PositiveInt
 from torch.nn import functional
 
 from roboirg.apps.learning.listener.listener_net import (
@@ -26,12 +25,12 @@ from roboirg.apps.learning.policy.body_training import train_body
 from roboirg.apps.learning.policy.moves import common_moves, decisions_of
 from roboirg.apps.learning.policy.policy_model import (
     FIRST_LOOKS,
-    WORDLESS,
     PolicyModel,
     seen_things,
 )
+from roboirg.apps.learning.policy.policy_plan import WORDLESS, PolicyPlan, Recorded
 from roboirg.apps.learning.policy.recording import (
-    RecordedEpisode,
+    ExpertRecording,
     load_recording,
     record_episode,
     save_recording,
@@ -48,64 +47,17 @@ from roboirg.apps.learning.policy.waypoint_expert import Disturbance
 from roboirg.apps.learning.trainer import Progress, Trainer, batch_count, batches
 from roboirg.core.episode import Episode
 from roboirg.core.errors import InvalidValueError, MotionPlanningError
-from roboirg.core.word_pools import PoolName
 from roboirg.language import LANGUAGE_VERSION
 from roboirg.tasks.splits.splits import get_episode
 from roboirg.util.parallel_map import parallel_map
 
 RECORDED_SPLIT = "random"
-MANY = 3
-"""Settings from which on their names are not listed."""
 PICTURE_EVERY = 6
 """Looks from one picture to the next in episodes that are drawn."""
 DETECTOR_BATCH, DETECTOR_RATE = 16, 8e-3
 TASK_EPOCHS, TASK_RATE = 6, 5e-3
 FORGOTTEN_WORDS = 0.1
 """Share of the words that the task must be named without."""
-
-
-class PolicyPlan(NamedTuple):
-    """How a policy is trained.
-
-    Attributes:
-        tasks: names of tasks.
-        settings: names of settings whose instructions it hears; none for a policy without words.
-        words: the pool of words.
-        memory: what it remembers; a name of `MEMORIES`.
-        scenes: random scenes of each task in which the disturbed expert is recorded.
-        drawn: those of them of which pictures are drawn, for the detector.
-        goals: goals of each scene that the reader of words hears by place.
-        detector_epochs: passes over all pictures.
-        body_epochs: passes over all episodes.
-        reader_epochs: passes over all instructions.
-        seed: of initial weights, noise and order.
-    """
-
-    tasks: tuple[str, ...]
-    settings: tuple[str, ...] = ("explicit",)
-    words: PoolName = "train"
-    memory: str = "recurrent"
-    scenes: PositiveInt = 300
-    drawn: PositiveInt = 50
-    goals: PositiveInt = 4
-    detector_epochs: PositiveInt = 4
-    body_epochs: PositiveInt = 20
-    reader_epochs: PositiveInt = 12
-    seed: NonNegativeInt = 0
-
-    @property
-    def name(self) -> str:
-        """What tells it from others in the same folder: memory, words and seed."""
-        heard = "-".join(self.settings) or WORDLESS
-        heard = "all" if len(self.settings) > MANY else heard
-        return f"{self.memory}-{heard}-{self.seed}"
-
-
-class Recorded(NamedTuple):
-    """A recorded episode with the words' view of it."""
-
-    episode: Episode
-    recording: RecordedEpisode
 
 
 def train_policy(plan: PolicyPlan, folder: Path, workers: int, progress: Progress) -> PolicyModel:
@@ -224,7 +176,7 @@ def _detector(
     return detector
 
 
-def labeled_pictures(recorded: RecordedEpisode, sight: Sight) -> Iterator[LabeledPicture]:
+def labeled_pictures(recorded: ExpertRecording, sight: Sight) -> Iterator[LabeledPicture]:
     """Yield the pictures of an episode with what the simulator says is in them."""
     numbers = {name: number for number, name in enumerate(sight.classes)}
     kinds = np.array([numbers.get(name, -1) for name in recorded.classes], np.int64)
@@ -271,7 +223,7 @@ def _lessons(
 
 
 def first_looks(
-    recorded: RecordedEpisode, sight: Sight, rng: np.random.Generator
+    recorded: ExpertRecording, sight: Sight, rng: np.random.Generator
 ) -> list[LookTokens]:
     """Return what the reader of words sees of an episode."""
     wanted = FIRST_LOOKS if recorded.is_video[0] else FIRST_LOOKS[:1]

@@ -38,7 +38,7 @@ ON_TABLE = 0.07
 """Height of a container's origin below which it stands on the table, m."""
 
 
-class RecordedEpisode(NamedTuple):
+class ExpertRecording(NamedTuple):
     """What was to be seen in an episode, and what the expert decided.
 
     Attributes:
@@ -76,7 +76,7 @@ class RecordedEpisode(NamedTuple):
 
 def record_episode(
     episode: Episode, seed: int, disturbance: Disturbance | None, picture_every: int = 0
-) -> RecordedEpisode:
+) -> ExpertRecording:
     """Let the disturbed expert play an episode, and return what was to be seen.
 
     Args:
@@ -93,12 +93,12 @@ def record_episode(
     )
     env.draws = False
     try:
-        return _Recorder(env, WaypointExpert(seed, disturbance), picture_every).record()
+        return _LookRecorder(env, WaypointExpert(seed, disturbance), picture_every).record()
     finally:
         env.close()
 
 
-class _Recorder(EpisodeLoop):
+class _LookRecorder(EpisodeLoop):
     """Plays one episode and notes looks and decisions."""
 
     def __init__(self, env: RoboIRGEnv, policy: WaypointExpert, picture_every: int) -> None:
@@ -110,14 +110,14 @@ class _Recorder(EpisodeLoop):
         self._video_steps = self._steps = 0
         self._has_begun = False
 
-    def record(self) -> RecordedEpisode:
+    def record(self) -> ExpertRecording:
         self.env.set_frame_hook(self._after_step)
         info = self.play()
         objects = self.env.episode.scene.objects
         names = tuple(item.name for item in objects)
         things, visible, tool, is_video, steps = zip(*self._rows, strict=True)
         decided = [one for _, one in self._decisions]
-        return RecordedEpisode(
+        return ExpertRecording(
             self.env.episode.key,
             names,
             tuple(map(class_of, objects)),
@@ -214,7 +214,7 @@ def _png(picture: NDArray[np.uint8]) -> bytes:
     return bytes(data)
 
 
-def save_recording(recorded: RecordedEpisode, path: Path) -> None:
+def save_recording(recorded: ExpertRecording, path: Path) -> None:
     """Write a recording, whole or not at all."""
     fields = recorded._asdict()
     pictures = fields.pop("pictures")
@@ -224,7 +224,7 @@ def save_recording(recorded: RecordedEpisode, path: Path) -> None:
         np.savez(file, allow_pickle=False, **arrays)
 
 
-def load_recording(path: Path) -> RecordedEpisode:
+def load_recording(path: Path) -> ExpertRecording:
     """Return a recording.
 
     Raises:
@@ -240,7 +240,7 @@ def load_recording(path: Path) -> RecordedEpisode:
         }
         texts = {name: tuple(found[name].tolist()) for name in ("names", "classes", "turns")}
         words = {name: str(found[name]) for name in ("key", "status")}
-        return RecordedEpisode(**{**found, **texts, **words}, pictures=pictures)
+        return ExpertRecording(**{**found, **texts, **words}, pictures=pictures)
     except (OSError, ValueError, KeyError, TypeError, zipfile.BadZipFile) as error:
         raise InvalidValueError(
             f"The recording {str(path)!r} cannot be read ({error}); delete it to make it again."

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from roboirg.apps.learning.policy.recording import RecordedEpisode
+from roboirg.apps.learning.policy.recording import ExpertRecording
 from roboirg.apps.learning.policy.thing_detector import COLUMNS, ROWS
 from roboirg.apps.learning.policy.tracks import LookTokens
 from roboirg.simulation.rendering.viewpoint import FOCAL_LENGTH, SIZE, front_camera_matrix
@@ -68,7 +68,7 @@ def points_of(positions: NDArray[np.floating]) -> NDArray[np.float64]:
     return flat
 
 
-def sight_of(recorded: Iterable[RecordedEpisode]) -> Sight:
+def sight_of(recorded: Iterable[ExpertRecording]) -> Sight:
     """Return the classes of things that episodes show, each with its height when first seen."""
     found: dict[str, list[float]] = {}
     for one in recorded:
@@ -80,7 +80,7 @@ def sight_of(recorded: Iterable[RecordedEpisode]) -> Sight:
 
 
 def labeled_looks(
-    recorded: RecordedEpisode, sight: Sight, noise: SightNoise, rng: np.random.Generator
+    recorded: ExpertRecording, sight: Sight, noise: SightNoise, rng: np.random.Generator
 ) -> Iterator[tuple[LookTokens, NDArray[np.intp]]]:
     """Yield what a detector might find at each look, and the numbers of the objects found."""
     numbers = {name: number for number, name in enumerate(sight.classes)}

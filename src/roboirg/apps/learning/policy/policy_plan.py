@@ -1,0 +1,60 @@
+"""How a policy is trained, and an episode that it learns from."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from pydantic import NonNegativeInt, PositiveInt
+
+from roboirg.apps.learning.policy.recording import ExpertRecording
+from roboirg.core.episode import Episode
+from roboirg.core.word_pools import PoolName
+
+WORDLESS = "none"
+"""Words of a policy that is trained without any."""
+MANY = 3
+"""Settings from which on their names are not listed."""
+
+
+class PolicyPlan(NamedTuple):
+    """How a policy is trained.
+
+    Attributes:
+        tasks: names of tasks.
+        settings: names of settings whose instructions it hears; none for a policy without words.
+        words: the pool of words.
+        memory: what it remembers; a name of `MEMORIES`.
+        scenes: random scenes of each task in which the disturbed expert is recorded.
+        drawn: those of them of which pictures are drawn, for the detector.
+        goals: goals of each scene that the reader of words hears by place.
+        detector_epochs: passes over all pictures.
+        body_epochs: passes over all episodes.
+        reader_epochs: passes over all instructions.
+        seed: of initial weights, noise and order.
+    """
+
+    tasks: tuple[str, ...]
+    settings: tuple[str, ...] = ("explicit",)
+    words: PoolName = "train"
+    memory: str = "recurrent"
+    scenes: PositiveInt = 300
+    drawn: PositiveInt = 50
+    goals: PositiveInt = 4
+    detector_epochs: PositiveInt = 4
+    body_epochs: PositiveInt = 20
+    reader_epochs: PositiveInt = 12
+    seed: NonNegativeInt = 0
+
+    @property
+    def name(self) -> str:
+        """What tells it from others in the same folder: memory, words and seed."""
+        heard = "-".join(self.settings) or WORDLESS
+        heard = "all" if len(self.settings) > MANY else heard
+        return f"{self.memory}-{heard}-{self.seed}"
+
+
+class Recorded(NamedTuple):
+    """A recorded episode with the words' view of it."""
+
+    episode: Episode
+    recording: ExpertRecording
