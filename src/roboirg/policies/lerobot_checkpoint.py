@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -17,6 +17,8 @@ _CONFIG = "config.json"
 _FILES = (_CONFIG, "model.safetensors", "policy_preprocessor.json", "policy_postprocessor.json")
 _TRAINED = ("pretrained_model", "last/pretrained_model", "checkpoints/last/pretrained_model")
 """Where lerobot-train puts a checkpoint, seen from the folders around it."""
+_AXES = 3
+"""Of a picture's shape: colors, height, width."""
 _HUB_ID = re.compile(r"\w[\w.-]*/\w[\w.-]*")
 
 
@@ -66,14 +68,12 @@ def read_facts(place: str) -> CheckpointFacts:
     )
 
 
-def picture_sizes(
-    place: str, shapes: Mapping[str, Sequence[int] | None]
-) -> dict[str, tuple[int, int] | None]:
+def picture_sizes(place: str, shapes: Mapping[str, object]) -> dict[str, tuple[int, int] | None]:
     """Return height and width of the pictures that a checkpoint takes, by camera.
 
     Args:
         place: of the checkpoint.
-        shapes: of its inputs by name; None for one that is not known.
+        shapes: of its inputs by name.
 
     Raises:
         InvalidValueError: one of them does not exist here.
@@ -87,9 +87,17 @@ def picture_sizes(
     found: dict[str, tuple[int, int] | None] = {}
     for name, camera in names.items():
         if name in shapes:
-            _, height, width = shapes[name] or (None, None, None)
-            found[camera] = (height, width) if height and width else None
+            found[camera] = _picture_size(shapes[name])
     return found
+
+
+def _picture_size(shape: object) -> tuple[int, int] | None:
+    """Return height and width of a picture's shape (3, height, width), or None."""
+    if not isinstance(shape, list | tuple) or len(shape) != _AXES:
+        return None
+    _, height, width = shape
+    is_size = all(isinstance(one, int) and one > 0 for one in (height, width))
+    return (height, width) if is_size else None
 
 
 def _local_config(place: str) -> Path | None:

@@ -7,7 +7,6 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from roboirg.apps.demonstrations.feature_stats import (
-    PICTURE_PIXELS,
     QUANTILES,
     gather_vectors,
     picture_stats,
