@@ -130,11 +130,15 @@ class ExportPlan:
             raise InvalidValueError(
                 f"size is {self.size}; it must be an even number from {SMALLEST} to {SIZE}."
             )
-        if not is_whole and (self.format == "robomme-hdf5" or self.names == "openpi"):
-            raise InvalidValueError(
-                f"cameras is {', '.join(self.cameras)} and size {self.size}; RoboMME's format and "
-                f"openpi's names hold both cameras in {SIZE} pixels."
-            )
+        for kind, is_refused in (
+            ("RoboMME's format has", self.format == "robomme-hdf5"),
+            ("openpi's names are for", self.names == "openpi"),
+        ):
+            if is_refused and not is_whole:
+                raise InvalidValueError(
+                    f"cameras is {', '.join(self.cameras)} and size {self.size}; {kind} both "
+                    f"cameras in {SIZE} pixels."
+                )
 
     def _check_hdf5(self) -> None:
         if self.pictures != "png":
