@@ -116,10 +116,6 @@ class LeRobotPolicy:
     Args:
         url: path or hub id, and options.
         seed: unused; each episode has its own.
-
-    Raises:
-        InvalidValueError: the path is none of a checkpoint, or it needs an input that does not
-            exist.
     """
 
     demonstration_frames: ClassVar[str] = "none"
@@ -234,9 +230,9 @@ class LeRobotPolicy:
         }
         for camera, size in sizes.items():
             pictures = np.stack([_fit(one[f"{camera}_rgb"], size) for one in observations])  # type: ignore[literal-required]
-            batch[PICTURE.format(camera)] = (
-                torch.from_numpy(pictures).permute(0, 3, 1, 2).float() / _MAX_BRIGHTNESS
-            )
+            # In LeRobot's layout of memory, on which a model's rounding depends.
+            channels_first = torch.from_numpy(pictures).permute(0, 3, 1, 2).contiguous()
+            batch[PICTURE.format(camera)] = channels_first.float() / _MAX_BRIGHTNESS
         return {
             key: value if key == "task" else value.to(self.options.device)
             for key, value in batch.items()
@@ -328,11 +324,7 @@ def _load(place: str, device: str, execute: int | None) -> LoadedCheckpoint:
 
 
 def _set_steps(place: str, config: Any, execute: int | None) -> None:  # noqa: ANN401
-    """Let a configuration execute another number of actions, without ensembling.
-
-    Raises:
-        InvalidValueError: it has no such setting, or its chunks are shorter.
-    """
+    """Let a configuration execute another number of actions, without ensembling."""
     if execute is None:
         return
     longest = getattr(config, "chunk_size", None)

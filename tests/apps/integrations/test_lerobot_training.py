@@ -11,9 +11,10 @@ import numpy as np
 import pytest
 
 pytest.importorskip("lerobot", reason="LeRobot is not installed here; run `make integrations`")
+pytest.importorskip("lerobot_env_roboirg", reason="the plugin is not installed here")
 pytest.importorskip("accelerate", reason="lerobot[training] is not installed here")
 
-import torchvision_operators  # noqa: F401 - before LeRobot
+import torch
 from lerobot.configs.policies import PreTrainedConfig
 from lerobot.envs.factory import make_env_pre_post_processors
 from lerobot.policies.factory import get_policy_class, make_pre_post_processors
@@ -39,7 +40,6 @@ SMALL = {
     "vqbet": "--policy.n_vqvae_training_steps=2 --policy.gpt_n_layer=1 --policy.gpt_n_head=4 "
     "--policy.gpt_input_dim=64 --policy.gpt_output_dim=64 --policy.gpt_hidden_dim=64",
 }
-PLUGIN = "--env.discover_packages_path=roboirg.apps.integrations.lerobot"
 
 
 @pytest.fixture(scope="module")
@@ -49,7 +49,7 @@ def folder(tmp_path_factory):
     values = {
         "--tasks PickXtimes": f"--tasks {TASK}",
         "--episodes 100": "--episodes 2",
-        "--env.task=PickXtimes": f"--env.task={TASK} --env.episode_length={STEPS} {PLUGIN}",
+        "--env.task=PickXtimes": f"--env.task={TASK} --env.episode_length={STEPS}",
         "--episodes 50": f"--episodes 2 --max-steps {STEPS}",
         "--eval.n_episodes=50": "--eval.n_episodes=2",
         "--policy.device=cuda": "--policy.device=cpu",
@@ -92,7 +92,8 @@ def our_actions(place, episode):
     """Return the actions that lerobot:// executes in an episode, and how many at a time."""
     policy = make_policy(f"lerobot://{place}", 0)
     rows, act = [], policy.act
-    env = make(TASK, episode=episode, cameras=("front",), max_steps=STEPS)
+    options = {"cameras": ("front",), "demonstration_frames": "none", "max_steps": STEPS}
+    env = make(TASK, episode=episode, **options)
     policy.act = lambda seen: rows.append(act(seen)) or rows[-1]
     play(env, policy)
     env.close()
@@ -126,8 +127,6 @@ def test_actions_are_those_of_lerobot_s_loop(folder, kind, at_a_time, monkeypatc
 
 def draw_the_same(kind, monkeypatch):
     """Let a type of policies draw the same noise in each of its answers."""
-    import torch
-
     answer = kind.predict_action_chunk
 
     def predict_action_chunk(self, *args, **options):

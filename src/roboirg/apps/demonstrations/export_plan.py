@@ -123,22 +123,18 @@ class ExportPlan:
 
     def _check_pictures(self) -> None:
         check_cameras(self.cameras)
-        is_whole = (set(self.cameras), self.size) == (set(CAMERAS), SIZE)
         if not self.cameras:
             raise InvalidValueError("cameras is empty; without pictures, ask for --pictures none.")
         if self.size % 2 or not SMALLEST <= self.size <= SIZE:
             raise InvalidValueError(
                 f"size is {self.size}; it must be an even number from {SMALLEST} to {SIZE}."
             )
-        for kind, is_refused in (
-            ("RoboMME's format has", self.format == "robomme-hdf5"),
-            ("openpi's names are for", self.names == "openpi"),
-        ):
-            if is_refused and not is_whole:
-                raise InvalidValueError(
-                    f"cameras is {', '.join(self.cameras)} and size {self.size}; {kind} both "
-                    f"cameras in {SIZE} pixels."
-                )
+        is_whole = (set(self.cameras), self.size) == (set(CAMERAS), SIZE)
+        if not is_whole and (self.format == "robomme-hdf5" or self.names == "openpi"):
+            raise InvalidValueError(
+                f"cameras is {', '.join(self.cameras)} and size {self.size}; RoboMME's format and "
+                f"openpi's names have both cameras in {SIZE} pixels."
+            )
 
     def _check_hdf5(self) -> None:
         if self.pictures != "png":
