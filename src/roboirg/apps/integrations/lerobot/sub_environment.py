@@ -159,7 +159,8 @@ class LeRobotSubEnvironment(gymnasium.Env[dict[str, Any], NDArray[np.floating[An
 
     def _make_space(self) -> spaces.Dict:
         shape = (self._size, self._size, 3)
-        pictures = {camera: spaces.Box(0, 255, shape, np.uint8) for camera in self._env.cameras}
+        picture: spaces.Space[Any] = spaces.Box(0, 255, shape, np.uint8)
+        pictures = dict.fromkeys(self._env.cameras, picture)
         fields: dict[str, spaces.Space[Any]] = {
             "pixels": spaces.Dict(pictures),
             "agent_pos": spaces.Box(-np.inf, np.inf, (STATE_SIZE,), np.float32),
