@@ -27,7 +27,9 @@ from roboirg.evaluation.records.store import RecordStore
 from roboirg.main import app, main
 
 ROOT = Path(__file__).parent.parent
-ELSEWHERE = {"integrations.md": "tests/apps/integrations, by `make integrations`"}
+ELSEWHERE = dict.fromkeys(
+    ("integrations.md", "training.md"), "tests/apps/integrations, by `make integrations`"
+)
 """Pages whose blocks other tests run."""
 PAGES = [
     page

@@ -1,10 +1,15 @@
-"""The adapter for LeRobot, in front of a stand-in for the model and its loading."""
+"""The adapter for LeRobot, in front of stand-ins for models and their loading."""
 
 import sys
+from collections import deque
+from itertools import cycle
 from types import ModuleType, SimpleNamespace
 
 import numpy as np
 import pytest
+from checkpoint_folders import write_checkpoint
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
 from wire_episode import INSTRUCTION, moment, video
 
 from roboirg.core.errors import InvalidValueError, MissingDependencyError, UnknownNameError
@@ -13,12 +18,17 @@ from roboirg.policies import Policy, load_policy_class, make_policy
 from roboirg.policies.by_name.loading import policy_version
 from roboirg.policies.lerobot_policy import load
 
+STATE = "observation.state"
+FRONT = "observation.images.front"
+WRIST = "observation.images.wrist"
 
-def test_a_url_is_checked_without_loading():
+
+def test_a_url_is_checked_without_loading(tmp_path):
     load_policy_class("lerobot://lerobot/some-checkpoint?device=cpu&execute=8")
-    policy = make_policy("lerobot://./outputs/last?version=step-3", 0)
+    folder = write_checkpoint(tmp_path / "last")
+    policy = make_policy(f"lerobot://{folder}?version=step-3", 0)
     assert isinstance(policy, Policy)
-    assert (policy.version, policy.place) == ("step-3", "./outputs/last")
+    assert (policy.version, policy.place) == ("step-3", str(folder))
     assert policy_version("lerobot://x/y") == "unknown"
     with pytest.raises(UnknownNameError, match=r"Did you mean 'device'\?"):
         load_policy_class("lerobot://x/y?devise=cpu")
@@ -43,19 +53,31 @@ def step(name, **modes):
     return SimpleNamespace(_registry_name=name, get_config=lambda: {"norm_map": modes})
 
 
-@pytest.fixture
-def checkpoint(monkeypatch):
-    """A package `lerobot` with a model that adds up what it sees."""
-    torch = pytest.importorskip("torch")
+def make_model(torch, config):
+    """Return a model whose actions are sums of what it remembers, acting as LeRobot's do."""
+
+    class Averages:
+        """Averages what earlier chunks planned for a step."""
+
+        def reset(self):
+            self.plans = None
+
+        def update(self, rows):
+            plans = [] if self.plans is None else self.plans
+            self.plans = [one[:, 1:] for one in plans if one.shape[1] > 1] + [rows]
+            return torch.stack([one[:, 0] for one in self.plans]).mean(dim=0)
 
     class Model(torch.nn.Module):
         def __init__(self):
             super().__init__()
             self.weight = torch.nn.Parameter(torch.zeros(1, dtype=torch.bfloat16))
-            self.batches, self.resets = [], 0
+            self.batches, self.resets, self.asked = [], 0, 0
+            self.averages = Averages()
 
         def reset(self):
             self.resets += 1
+            self.averages.reset()
+            self._queues = {STATE: deque(maxlen=config.n_obs_steps), "action": deque()}
 
         def to(self, device):
             return self
@@ -65,14 +87,39 @@ def checkpoint(monkeypatch):
 
         def predict_action_chunk(self, batch, noise=None):
             self.batches.append(batch)
-            if noise is None:
-                noise = torch.rand(len(batch["task"]), 6, 1)
-            return batch["observation.state"][:, None].repeat(1, 6, 1) + noise[:, :6, :1]
+            self.asked += 1
+            seen = torch.stack([*self._queues[STATE]] or [batch[STATE]]).cumsum(0)[-1]
+            rows = seen[:, None].repeat(1, 6, 1) + torch.arange(6)[:, None]
+            if noise is not None:
+                return rows + noise[:, :6, :1]
+            return rows + (torch.rand(len(batch["task"]), 6, 1) if config.is_noisy else 0)
 
+        def select_action(self, batch):
+            seen = self._queues[STATE]
+            seen.append(batch[STATE])
+            while len(seen) < config.n_obs_steps:
+                seen.append(batch[STATE])
+            if config.temporal_ensemble_coeff is not None:
+                return self.averages.update(self.predict_action_chunk(batch))
+            if not self._queues["action"]:
+                rows = self.predict_action_chunk(batch)[:, : config.n_action_steps]
+                self._queues["action"].extend(rows.transpose(0, 1))
+            return self._queues["action"].popleft()
+
+    return Model()
+
+
+@pytest.fixture
+def checkpoint(monkeypatch):
+    """A package `lerobot` with a model of our own."""
+    torch = pytest.importorskip("torch")
+    config = SimpleNamespace(
+        type="act", n_obs_steps=1, n_action_steps=6, chunk_size=6, temporal_ensemble_coeff=None,
+        is_noisy=False, input_features=dict.fromkeys((STATE, FRONT, WRIST)),
+    )  # fmt: skip
+    model = make_model(torch, config)
     before = Processor(lambda batch: batch, step("tokenizer_processor"))
     after = Processor(lambda row: row * 2, step("unnormalizer_processor", ACTION="MEAN_STD"))
-    model = Model()
-    config = SimpleNamespace(type="act", input_features={"observation.state": None})
     modules = {
         name: ModuleType(name) for name in ("lerobot", "lerobot.configs", "lerobot.policies")
     }
@@ -90,9 +137,16 @@ def checkpoint(monkeypatch):
     load.cache_clear()
 
 
-def test_a_checkpoint_is_fed_its_own_names(checkpoint):
-    policy = make_policy("lerobot://x/y?execute=4", 5)
+def begun(seed=0, options=""):
+    """Return a policy whose episode has begun."""
+    policy = make_policy(f"lerobot://x/y{options}", seed)
     policy.reset(INSTRUCTION, video(0))
+    return policy
+
+
+def test_a_checkpoint_is_fed_its_own_names(checkpoint):
+    checkpoint.config.is_noisy = True
+    policy = begun(5, "?execute=4")
     first = policy.act(moment(1))
     assert first.shape == (4, 8)
     facts = inference_facts(policy)
@@ -102,19 +156,84 @@ def test_a_checkpoint_is_fed_its_own_names(checkpoint):
     assert policy.metadata["text_normalization"] == "tokenizer_processor"
     batch = checkpoint.model.batches[0]
     assert batch["task"] == [INSTRUCTION]
-    picture = batch["observation.images.front"]
-    assert picture.shape == (1, 3, 8, 8)
-    assert np.allclose(picture[0].permute(1, 2, 0).numpy() * 255, moment(1)["front_rgb"])
-    assert set(batch) == {
-        "task",
-        "observation.state",
-        "observation.images.front",
-        "observation.images.wrist",
-    }
-    again = make_policy("lerobot://x/y?execute=4", 5)
-    again.reset(INSTRUCTION, video(0))
-    assert np.array_equal(again.act(moment(1)), first)
-    assert checkpoint.model.resets == 2
+    assert batch[FRONT].shape == (1, 3, 8, 8)
+    shown = batch[FRONT][0].permute(1, 2, 0).numpy() * 255
+    assert np.allclose(shown, moment(1)["front_rgb"])
+    assert set(batch) == {"task", STATE, FRONT, WRIST}
+    assert np.array_equal(begun(5, "?execute=4").act(moment(1)), first)
+    assert not np.array_equal(begun(6, "?execute=4").act(moment(1)), first)
+    assert checkpoint.model.resets == 3
+
+
+def test_pictures_have_the_checkpoint_s_size(checkpoint):
+    sized = SimpleNamespace(shape=(3, 4, 4))
+    checkpoint.config.input_features = {STATE: None, FRONT: sized}
+    begun().act(moment(1))
+    batch = checkpoint.model.batches[0]
+    assert set(batch) == {"task", STATE, FRONT}
+    means = moment(1)["front_rgb"].reshape(4, 2, 4, 2, 3).mean(axis=(1, 3))
+    shown = batch[FRONT][0].permute(1, 2, 0).numpy() * 255
+    assert np.allclose(shown, means, atol=0.51)
+    checkpoint.config.input_features = {FRONT: SimpleNamespace(shape=(3, 4, 6))}
+    load.cache_clear()
+    begun().act(moment(1))
+    assert checkpoint.model.batches[1][FRONT].shape == (1, 3, 8, 8)  # what is no square stays
+
+
+def looped(model, length):
+    """Return the actions of LeRobot's loop: one for each observation, (length, 8)."""
+    model.reset()
+    torch = sys.modules["torch"]
+    rows = []
+    for number in range(length):
+        seen = moment(number)
+        state = np.append(seen["joint_positions"], seen["gripper"][0]).astype(np.float32)
+        batch = {STATE: torch.from_numpy(state)[None], "task": [INSTRUCTION]}
+        rows.append(model.select_action(batch)[0].numpy() * 2)
+    return np.stack(rows)
+
+
+@settings(max_examples=40, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(
+    kind=st.sampled_from(["act", "diffusion", "vqbet", "somebody_s_plugin"]),
+    remembered=st.integers(1, 5),
+    steps=st.integers(1, 6),
+    ensembles=st.booleans(),
+)
+def test_actions_are_those_of_lerobot_s_own_loop(checkpoint, kind, remembered, steps, ensembles):
+    config, model = checkpoint.config, checkpoint.model
+    config.type, config.n_obs_steps = kind, remembered
+    config.n_action_steps = 1 if ensembles else steps
+    config.temporal_ensemble_coeff = 0.01 if ensembles else None
+    load.cache_clear()
+    expected = looped(model, 24)
+    # Two episodes take turns, the second a step late: neither sees anything of the other.
+    episodes, played = [begun(), begun()], [[], []]
+    model.asked = 0
+    for number in cycle((0, 1)):
+        if len(played[number]) < len(expected):
+            rows = episodes[number].act(moment(len(played[number])))
+            played[number] += list(rows)
+        elif min(map(len, played)) >= len(expected):
+            break
+    for rows in played:
+        assert np.allclose(np.stack(rows)[: len(expected)], expected, atol=1e-6)
+    assert model.asked <= 2 * -(-len(expected) // config.n_action_steps)
+    if kind != "somebody_s_plugin" and not ensembles:
+        assert len(begun().act(moment(0))) == max(1, steps - remembered + 1)
+
+
+def test_an_option_executes_more_or_fewer_actions(checkpoint):
+    checkpoint.config.n_action_steps = 2
+    assert len(begun().act(moment(1))) == 2
+    assert len(begun(options="?execute=5").act(moment(1))) == 5
+    checkpoint.config.temporal_ensemble_coeff = 0.01
+    assert len(begun(options="?execute=3").act(moment(1))) == 3
+    with pytest.raises(InvalidValueError, match=r"execute is 7; 'x/y' plans 6 actions, so it can"):
+        begun(options="?execute=7")
+    del checkpoint.config.n_action_steps
+    with pytest.raises(InvalidValueError, match=r"execute is 4, but how many .* leave it out"):
+        begun(options="?execute=4")
 
 
 @pytest.mark.parametrize(("kind", "reads"), [("act", "no, "), ("groot", "")])
@@ -127,49 +246,45 @@ def test_a_checkpoint_without_a_tokenizer_may_have_one_inside(checkpoint, kind, 
 
 
 def test_rows_of_a_batch_depend_on_their_own_episode(checkpoint):
-    checkpoint.config.chunk_size, checkpoint.config.max_action_dim = 6, 32
-    episodes = [make_policy("lerobot://x/y?batch=4", seed) for seed in range(5)]
-    for one in episodes:
-        one.reset(INSTRUCTION, video(0))
+    checkpoint.config.max_action_dim = 32
+    episodes = [begun(seed, "?batch=4") for seed in range(5)]
     moments = [moment(number) for number in range(5)]
     together = episodes[0].act_together(episodes, moments)
     assert [len(batch["task"]) for batch in checkpoint.model.batches] == [4, 4]  # always as many
-    again = [make_policy("lerobot://x/y?batch=4", seed) for seed in range(5)]
+    again = [begun(seed, "?batch=4") for seed in range(5)]
     for one, now, expected in zip(again, moments, together, strict=True):
-        one.reset(INSTRUCTION, video(0))
         assert np.array_equal(one.act(now), expected)
     assert not np.array_equal(again[0].act(moments[0]), together[0])  # other noise in each call
 
 
-def test_checkpoints_that_draw_their_own_noise_are_asked_one_by_one(checkpoint):
-    checkpoint.config.type = "diffusion"
-    episodes = [make_policy("lerobot://x/y?batch=4", seed) for seed in range(3)]
-    for one in episodes:
-        one.reset(INSTRUCTION, video(0))
+def test_a_batch_executes_what_the_checkpoint_says(checkpoint):
+    checkpoint.config.n_action_steps = 3
+    episodes = [begun(seed, "?batch=4") for seed in range(2)]
+    chunks = episodes[0].act_together(episodes, [moment(1)] * 2)
+    assert [chunk.shape for chunk in chunks] == [(3, 8)] * 2
+
+
+@pytest.mark.parametrize("changes", [{"type": "diffusion"}, {"temporal_ensemble_coeff": 0.01}])
+def test_checkpoints_that_remember_are_asked_one_by_one(checkpoint, changes):
+    vars(checkpoint.config).update(changes, is_noisy=True)
+    episodes = [begun(seed, "?batch=4") for seed in range(3)]
     together = episodes[0].act_together(episodes, [moment(1)] * 3)
     assert [len(batch["task"]) for batch in checkpoint.model.batches] == [1, 1, 1]
-    alone = make_policy("lerobot://x/y?batch=4", 2)
-    alone.reset(INSTRUCTION, video(0))
-    assert np.array_equal(alone.act(moment(1)), together[2])
+    assert np.array_equal(begun(2, "?batch=4").act(moment(1)), together[2])
 
 
-def test_episodes_do_not_share_what_a_model_remembers(checkpoint):
-    model = checkpoint.model
-    model.reset = lambda: setattr(model, "queue", [])
+def test_what_cannot_be_loaded_is_one_sentence(checkpoint, monkeypatch):
+    def fail(place):
+        raise OSError("no such\nrepository")
 
-    def predict(batch):
-        model.queue.append(1)
-        return batch["observation.state"][:, None] * 0 + len(model.queue)
-
-    model.predict_action_chunk = predict
-    first, second = (make_policy("lerobot://x/y", seed) for seed in range(2))
-    first.reset(INSTRUCTION, video(0))
-    second.reset(INSTRUCTION, video(0))
-    counts = [one.act(moment(1))[0, 0] for one in (first, second, first, first, second)]
-    assert counts == [2, 2, 4, 6, 4]  # the stand-in doubles
+    configs = sys.modules["lerobot.configs.policies"]
+    monkeypatch.setattr(configs.PreTrainedConfig, "from_pretrained", fail)
+    said = r"^The checkpoint 'x/y' cannot be loaded: OSError: no such repository$"
+    with pytest.raises(InvalidValueError, match=said):
+        begun()
 
 
 def test_a_checkpoint_that_wants_another_camera_is_told(checkpoint):
     checkpoint.config.input_features = {"observation.images.laptop": None}
     with pytest.raises(InvalidValueError, match=r"needs 'observation\.images\.laptop'"):
-        make_policy("lerobot://x/y", 0).reset(INSTRUCTION, video(0))
+        begun()

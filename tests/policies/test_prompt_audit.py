@@ -1,12 +1,12 @@
 """What of an instruction reaches a model that reads a limited number of tokens."""
 
-import json
 import subprocess
 import sys
 from importlib import resources
 from itertools import accumulate
 
 import pytest
+from checkpoint_folders import write_checkpoint
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -253,12 +253,12 @@ def test_the_systems_of_the_paper_have_limits():
 
 
 def test_a_lerobot_checkpoint_says_its_limit_itself(tmp_path):
-    (tmp_path / "config.json").write_text(json.dumps({"tokenizer_max_length": 48}))
+    write_checkpoint(tmp_path, tokenizer_max_length=48)
     assert LeRobotPolicy(f"lerobot://{tmp_path}").prompt_tokens == 48
     assert prompt_limit_of(f"lerobot://{tmp_path}?prompt_tokens=9").tokens == 9
     assert prompt_limit_of("lerobot://nobody/nothing") is None
-    for content in ("{", "[]", "{}", '{"tokenizer_max_length": "many"}'):
-        (tmp_path / "config.json").write_text(content)
+    for limit in ("many", None, 0, [48]):
+        write_checkpoint(tmp_path, tokenizer_max_length=limit)
         assert LeRobotPolicy(f"lerobot://{tmp_path}").prompt_tokens is None
 
 

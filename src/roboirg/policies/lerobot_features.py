@@ -58,8 +58,8 @@ class LeRobotFeatures(UrlOptions):
         return (gripper - self.gripper_closed) / (self.gripper_open - self.gripper_closed)
 
 
-def center_square(picture: NDArray[Any], *, smooth: bool = True) -> NDArray[Any]:
-    """Crop a picture to its central square and scale it to 256 x 256 pixels."""
+def scaled_square(picture: NDArray[Any], size: int = SIZE, *, smooth: bool = True) -> NDArray[Any]:
+    """Crop a picture to its central square and scale it to `size` x `size` pixels."""
     import cv2
 
     height, width = picture.shape[:2]
@@ -67,4 +67,4 @@ def center_square(picture: NDArray[Any], *, smooth: bool = True) -> NDArray[Any]
     top, left = (height - side) // 2, (width - side) // 2
     square = picture[top : top + side, left : left + side]
     method = cv2.INTER_AREA if smooth else cv2.INTER_NEAREST
-    return np.asarray(cv2.resize(square, (SIZE, SIZE), interpolation=method))
+    return np.asarray(cv2.resize(square, (size, size), interpolation=method))

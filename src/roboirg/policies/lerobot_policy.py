@@ -4,16 +4,18 @@ A checkpoint declares its inputs. Its names are those of LeRobot's data sets of 
 ``observation.images.front``, ``observation.images.wrist``, ``observation.state`` (seven joints and
 the first finger) and the text ``task``. Its actions are absolute joint targets and the gripper, +1
 open to -1 closed.
+
+One episode at a time, a checkpoint is asked as ``lerobot-eval`` asks it, by ``select_action``, so
+that its own settings count: steps of a chunk, temporal ensembling, observations that it remembers.
 """
 
 from __future__ import annotations
 
+import copy
 import functools
 import inspect
-import json
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
@@ -21,18 +23,22 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from roboirg.core.errors import InvalidValueError, MissingDependencyError
-from roboirg.core.observations import CAMERAS, Demonstration, Observation
+from roboirg.core.observations import Demonstration, Observation
 from roboirg.policies.contract.policy_urls import UrlOptions, read_options, split_url
+from roboirg.policies.lerobot_checkpoint import PICTURE, STATE, picture_sizes, read_facts
+from roboirg.policies.lerobot_features import scaled_square
 
-PICTURE = "observation.images.{}"
-STATE = "observation.state"
 _MAX_BRIGHTNESS = 255.0
 _BATCH = 8
+_MAX_WORDS = 300
 _NOISELESS = frozenset({"act"})
 """Types of checkpoints that draw no noise when they act."""
 _WORDLESS = frozenset({"act", "diffusion", "tdmpc", "vqbet"})
 """Types of checkpoints that have no input for text."""
-_CONFIG = "config.json"
+_QUEUED = frozenset({
+    "act", "diffusion", "multi_task_dit", "pi0", "pi05", "pi0_fast", "smolvla", "vqbet",
+})  # fmt: skip
+"""Types that keep a chunk in a queue, and forget all but the last `n_obs_steps` observations."""
 
 
 class LeRobotPolicyOptions(UrlOptions):
@@ -41,7 +47,8 @@ class LeRobotPolicyOptions(UrlOptions):
     Attributes:
         device: of PyTorch.
         batch: episodes that the checkpoint is asked about at once; None for 1 on the CPU, else 8.
-        execute: actions of a chunk that are executed; None for all.
+        execute: actions of a chunk that are executed, without ensembling; None for what the
+            checkpoint says.
         version: of the checkpoint, for the records.
         prompt_tokens: that the model reads of a prompt; None for what the checkpoint says.
         prompt_added: most tokens of a state that share this budget.
@@ -64,16 +71,22 @@ class LoadedCheckpoint(NamedTuple):
         model: LeRobot's policy.
         before: turns a batch into the model's inputs.
         after: turns the model's outputs into actions.
+        sizes: height and width of its pictures by camera; None where it says none.
         noise: shape of the noise that the model takes for each episode; None if it takes none.
         is_noiseless: whether it is known to draw none either.
+        steps: actions of a chunk that are executed; None for all.
+        remembered: observations that an answer depends on; None if that is not known.
         metadata: how its inputs and outputs are processed, for records.
     """
 
     model: Any
     before: Callable[[dict[str, Any]], dict[str, Any]]
     after: Callable[[Any], Any]
+    sizes: Mapping[str, tuple[int, int] | None]
     noise: tuple[int, int] | None = None
     is_noiseless: bool = False
+    steps: int | None = None
+    remembered: int | None = None
     metadata: Mapping[str, Any] = {}
 
 
@@ -108,7 +121,6 @@ class LeRobotPolicy:
         seed: unused; each episode has its own.
     """
 
-    cameras: ClassVar[tuple[str, ...]] = CAMERAS
     demonstration_frames: ClassVar[str] = "none"
 
     def __init__(self, url: str, seed: int = 0) -> None:
@@ -116,7 +128,9 @@ class LeRobotPolicy:
         parts = split_url(url)
         self.options = read_options(parts, LeRobotPolicyOptions)
         self.place = parts.place
-        self.prompt_tokens = self.options.prompt_tokens or read_prompt_tokens(parts.place)
+        facts = read_facts(parts.place)
+        self.cameras = tuple(facts.sizes)
+        self.prompt_tokens = self.options.prompt_tokens or facts.prompt_tokens
         self.prompt_added, self.tokenizer = self.options.prompt_added, self.options.tokenizer
         self.metadata: Mapping[str, Any] = {}
         self.model: Any = None  # records name its number types and devices
@@ -135,13 +149,16 @@ class LeRobotPolicy:
         """Load the checkpoint and begin an episode.
 
         Raises:
-            MissingDependencyError: LeRobot or PyTorch is not installed.
-            InvalidValueError: the checkpoint needs an input that does not exist.
+            MissingDependencyError: LeRobot, PyTorch or what the checkpoint needs is not installed.
+            InvalidValueError: the checkpoint cannot be loaded.
         """
-        loaded = load(self.place, self.options.device)
+        loaded = self._loaded()
         model, self.metadata = loaded.model, loaded.metadata
         self.model = model
         before = dict(vars(model))
+        for name, one in before.items():
+            if callable(getattr(one, "reset", None)):  # such as what ensembles actions over time
+                setattr(model, name, copy.copy(one))
         model.reset()
         # What the reset replaced, such as a queue of actions, belongs to the episode.
         own = {name: one for name, one in vars(model).items() if before.get(name) is not one}
@@ -153,13 +170,16 @@ class LeRobotPolicy:
         """Return the checkpoint's next actions, (n, 8) for each episode."""
         import torch
 
-        size = self._rows(load(self.place, self.options.device))
+        size = self._rows(self._loaded())
         chunks: list[NDArray[np.floating[Any]]] = []
         with torch.inference_mode():
             for start in range(0, len(states), size):
                 stop = start + size
                 chunks += self._ask(states[start:stop], observations[start:stop], size)
         return chunks
+
+    def _loaded(self) -> LoadedCheckpoint:
+        return load(self.place, self.options.device, self.options.execute)
 
     def _rows(self, loaded: LoadedCheckpoint) -> int:
         """Return how many episodes the model is asked about at once."""
@@ -173,33 +193,38 @@ class LeRobotPolicy:
         """Ask the model about at most `size` episodes; the last one fills up the batch."""
         import torch
 
-        loaded, count = load(self.place, self.options.device), len(states)
+        loaded, count = self._loaded(), len(states)
         missing = size - count
         seeds = [state.next_seed() for state in states]
-        batch = loaded.before(self._batch([*observations, *[observations[-1]] * missing]))
-        options = {}
-        if loaded.noise is None or size == 1:
-            torch.manual_seed(seeds[0])
+        torch.manual_seed(seeds[0])
+        seen = [*observations, *[observations[-1]] * missing]
+        batch = loaded.before(self._batch(loaded.sizes, seen))
+        if size == 1:
+            rows = _select(loaded, states[0], batch)
         else:
-            noise = [
-                torch.randn(loaded.noise, generator=torch.Generator().manual_seed(seed))
-                for seed in [*seeds, *[seeds[-1]] * missing]
-            ]
-            options["noise"] = torch.stack(noise).to(self.options.device)
-        model = loaded.model
-        # Asked about several episodes at once, the model remembers none of them.
-        memory = states[0].memory if size == 1 else {}
-        vars(model).update(memory)
-        try:
-            rows = model.predict_action_chunk(batch, **options)
-        except NotImplementedError:  # a policy without chunks
-            rows = model.select_action(batch)[:, None]
-        memory.update({name: vars(model)[name] for name in memory})
+            rows = self._predict(loaded, [*seeds, *[seeds[-1]] * missing], batch)
         rows = torch.stack([loaded.after(rows[:, i]) for i in range(rows.shape[1])], dim=1)
         actions: NDArray[np.float64] = rows[:count].cpu().numpy().astype(np.float64)
-        return list(actions[:, : self.options.execute])
+        return list(actions)
 
-    def _batch(self, observations: Sequence[Observation]) -> dict[str, Any]:
+    def _predict(
+        self, loaded: LoadedCheckpoint, seeds: Sequence[int], batch: dict[str, Any]
+    ) -> Any:  # noqa: ANN401 - a tensor
+        """Return the chunks of several episodes, of which the model remembers nothing."""
+        import torch
+
+        options = {}
+        if loaded.noise is not None:
+            noise = [
+                torch.randn(loaded.noise, generator=torch.Generator().manual_seed(seed))
+                for seed in seeds
+            ]
+            options["noise"] = torch.stack(noise).to(self.options.device)
+        return loaded.model.predict_action_chunk(batch, **options)[:, : loaded.steps]
+
+    def _batch(
+        self, sizes: Mapping[str, tuple[int, int] | None], observations: Sequence[Observation]
+    ) -> dict[str, Any]:
         """Return observations in LeRobot's form: pictures (n, 3, H, W) in [0, 1]."""
         import torch
 
@@ -208,35 +233,83 @@ class LeRobotPolicy:
             STATE: torch.from_numpy(np.stack(states).astype(np.float32)),
             "task": [one["instruction"] for one in observations],
         }
-        for camera in CAMERAS:
-            pictures = np.stack([one[f"{camera}_rgb"] for one in observations])  # type: ignore[literal-required]
-            batch[PICTURE.format(camera)] = (
-                torch.from_numpy(pictures).permute(0, 3, 1, 2).float() / _MAX_BRIGHTNESS
-            )
+        for camera, size in sizes.items():
+            pictures = np.stack([_fit(one[f"{camera}_rgb"], size) for one in observations])  # type: ignore[literal-required]
+            # In LeRobot's layout of memory, on which a model's rounding depends.
+            channels_first = torch.from_numpy(pictures).permute(0, 3, 1, 2).contiguous()
+            batch[PICTURE.format(camera)] = channels_first.float() / _MAX_BRIGHTNESS
         return {
             key: value if key == "task" else value.to(self.options.device)
             for key, value in batch.items()
         }
 
 
+def _select(loaded: LoadedCheckpoint, state: CheckpointEpisode, batch: dict[str, Any]) -> Any:  # noqa: ANN401
+    """Return the actions of one episode that no observation can change any more, (1, n, size)."""
+    import torch
+
+    model = loaded.model
+    vars(model).update(state.memory)
+    rows = [model.select_action(batch)]
+    if loaded.remembered is not None:
+        # The last ones wait for the observations that the next answer depends on.
+        settled = _queue_length(model) - (loaded.remembered - 1)
+        rows += [model.select_action(batch) for _ in range(settled)]
+    state.memory.update({name: vars(model)[name] for name in state.memory})
+    return torch.stack(rows, dim=1)
+
+
+def _queue_length(model: Any) -> int:  # noqa: ANN401
+    """Return how many actions a model has decided on and not yet returned."""
+    queues = getattr(model, "_queues", None) or {}
+    return len(queues.get("action", getattr(model, "_action_queue", ())))
+
+
+def _fit(picture: NDArray[np.uint8], size: tuple[int, int] | None) -> NDArray[np.uint8]:
+    """Return a picture in the size that a checkpoint says; as it is, if that is no square."""
+    if size is None or size[0] != size[1] or size == picture.shape[:2]:
+        return picture
+    return scaled_square(picture, size[0])
+
+
 @functools.cache
-def load(place: str, device: str) -> LoadedCheckpoint:
+def load(place: str, device: str, execute: int | None = None) -> LoadedCheckpoint:
     """Load a checkpoint, once per process.
 
+    Args:
+        place: folder, or id of the Hub.
+        device: of PyTorch.
+        execute: actions of a chunk that are executed; None for what the checkpoint says.
+
     Raises:
-        MissingDependencyError: LeRobot or PyTorch is not installed.
-        InvalidValueError: the checkpoint needs an input that does not exist.
+        MissingDependencyError: LeRobot, PyTorch or what the checkpoint needs is not installed.
+        InvalidValueError: the checkpoint cannot be loaded, or needs an input that does not exist.
     """
     try:
-        from lerobot.configs.policies import PreTrainedConfig
-        from lerobot.policies.factory import get_policy_class, make_pre_post_processors
+        return _load(place, device, execute)
     except ImportError as error:
         raise MissingDependencyError(
             f"lerobot:// needs LeRobot with PyTorch; run pip install lerobot ({error})."
         ) from error
+    except (OSError, ValueError) as error:
+        if isinstance(error, InvalidValueError):
+            raise
+        words = " ".join(f"{type(error).__name__}: {error}".split())
+        raise InvalidValueError(
+            f"The checkpoint {place!r} cannot be loaded: {words[:_MAX_WORDS]}"
+        ) from error
+
+
+def _load(place: str, device: str, execute: int | None) -> LoadedCheckpoint:
+    from lerobot.configs.policies import PreTrainedConfig
+    from lerobot.policies.factory import get_policy_class, make_pre_post_processors
+
     config = PreTrainedConfig.from_pretrained(place)
     config.device = device
-    _check_features(place, config.input_features or {})
+    features = config.input_features or {}
+    shapes = {name: getattr(one, "shape", None) for name, one in features.items()}
+    sizes = picture_sizes(place, shapes)
+    _set_steps(place, config, execute)
     model = get_policy_class(config.type).from_pretrained(place, config=config)
     before, after = make_pre_post_processors(
         config,
@@ -246,14 +319,35 @@ def load(place: str, device: str) -> LoadedCheckpoint:
     takes = inspect.signature(model.predict_action_chunk).parameters
     shape = getattr(config, "chunk_size", None), getattr(config, "max_action_dim", None)
     noise = (int(shape[0]), int(shape[1])) if "noise" in takes and None not in shape else None  # type: ignore[arg-type]
+    is_single = getattr(config, "temporal_ensemble_coeff", None) is not None
     return LoadedCheckpoint(
-        model.to(device).eval(),
-        before,
-        after,
-        noise,
-        config.type in _NOISELESS,
-        _describe(config, _step_names(before), _step_names(after)),
-    )
+        model.to(device).eval(), before, after, sizes, noise,
+        is_noiseless=config.type in _NOISELESS and not is_single,
+        steps=getattr(config, "n_action_steps", None),
+        remembered=config.n_obs_steps if config.type in _QUEUED else None,
+        metadata=_describe(config, _step_names(before), _step_names(after)),
+    )  # fmt: skip
+
+
+def _set_steps(place: str, config: Any, execute: int | None) -> None:  # noqa: ANN401
+    """Let a configuration execute another number of actions, without ensembling."""
+    if execute is None:
+        return
+    longest = getattr(config, "chunk_size", None)
+    if longest is None:
+        longest = getattr(config, "horizon", 0) - config.n_obs_steps + 1
+    if not hasattr(config, "n_action_steps"):
+        raise InvalidValueError(
+            f"execute is {execute}, but how many actions {place!r} executes is part of its "
+            f"training (type {config.type!r}); leave it out."
+        )
+    if execute > longest:
+        raise InvalidValueError(
+            f"execute is {execute}; {place!r} plans {longest} actions, so it can be 1 to {longest}."
+        )
+    config.n_action_steps = execute
+    if hasattr(config, "temporal_ensemble_coeff"):
+        config.temporal_ensemble_coeff = None
 
 
 def _describe(config: Any, before: Sequence[str], after: Sequence[str]) -> dict[str, Any]:  # noqa: ANN401
@@ -285,34 +379,3 @@ def _step_names(processor: object) -> list[str]:
         name = getattr(step, "_registry_name", type(step).__name__)
         found.append(f"{name} ({listed})" if listed else name)
     return found
-
-
-def read_prompt_tokens(place: str) -> int | None:
-    """Return the limit in a checkpoint's configuration.
-
-    None if it has none, or if it is not on this computer: nothing is downloaded.
-    """
-    path: Path | str | None = Path(place) / _CONFIG
-    if not Path(place).is_dir():
-        try:
-            from huggingface_hub import try_to_load_from_cache
-
-            path = try_to_load_from_cache(place, _CONFIG)
-        except (ImportError, ValueError):  # not installed, or no name of a repository
-            return None
-    try:
-        config = json.loads(Path(path).read_text(encoding="utf-8"))  # type: ignore[arg-type]
-        limit = config.get("tokenizer_max_length")
-    except (OSError, ValueError, TypeError, AttributeError):  # loading it says more
-        return None
-    return limit if isinstance(limit, int) and limit > 0 else None
-
-
-def _check_features(place: str, features: dict[str, Any]) -> None:
-    """Raise if the checkpoint needs an input that does not exist."""
-    known = [STATE, *(PICTURE.format(camera) for camera in CAMERAS)]
-    for name in features:
-        if name.startswith("observation.") and name not in known:
-            raise InvalidValueError(
-                f"The checkpoint {place!r} needs {name!r}; there are {', '.join(known)}."
-            )

@@ -92,7 +92,7 @@ def record(
                 picture_error=tracks.finish(),
             )
             arrays = arrays_of(episode, rows, video_length, has_depth=spec.depth)
-            counts = {f"{one}_histogram": tracks.histograms[one] for one in CAMERAS}
+            counts = {f"{one}_histogram": tracks.histograms[one] for one in spec.cameras}
             file.finish(facts, arrays | counts)
         if only_successes and status != "success":
             _keep_facts(part, facts)

@@ -4,10 +4,13 @@ import sys
 
 import pytest
 from plan_files import plan_file
+from pyarrow import parquet
 
 from roboirg import main as cli
 from roboirg.apps.demonstrations import dataset_replay
 from roboirg.apps.demonstrations.dataset_replay import ReplayResult
+from roboirg.language import instruct
+from roboirg.tasks.splits.splits import get_episode
 
 
 def within(**choices):
@@ -64,8 +67,40 @@ def test_an_export_tells_its_progress_and_its_end(roboirg, tmp_path, synthetic):
 
 
 @pytest.mark.parametrize(
+    ("more", "pool", "warns"),
+    [
+        (("--split", "train"), "train", False),
+        (("--split", "random"), "train", False),
+        (("--split", "test"), "train", False),
+        (("--split", "random", "--plan", plan_file(wordings="test")), "test", True),
+        (("--split", "train", "--plan", plan_file(wordings="test")), "test", True),
+    ],
+)
+def test_recordings_speak_the_words_for_training(roboirg, tmp_path, synthetic, more, pool, warns):
+    root = tmp_path / "data"
+    words = ("--tasks", "PickXtimes", "--episodes", "1", "--settings", "all", "--workers", "0")
+    code, _, err = roboirg("export", "demonstrations", *words, *more, "--out", root)
+    assert code == 0
+    assert ("words held out for tests" in err) == warns
+    table = parquet.read_table(root / "meta/demonstrations.parquet").to_pylist()
+    for row in table:
+        episode = get_episode(row["task"], row["split"], row["episode"])
+        assert row["text"] == instruct(episode, row["setting"], wordings=pool).text
+    assert f"wordings of the pool {pool!r}" in (root / "README.md").read_text()
+
+
+def test_a_plan_names_cameras_and_their_size(roboirg, tmp_path):
+    more = within(cameras=["front"], size=96)
+    words = ("export", "demonstrations", *FEW, *more, "--dry-run", "--out", tmp_path / "data")
+    assert "2,032 frames and 14.9 MB" in roboirg(*words)[2]
+
+
+@pytest.mark.parametrize(
     ("words", "message"),
     [
+        (within(cameras=["top"]), "There is no camera 'top'"),
+        (within(cameras="front"), "demonstrations.cameras is 'front': "),
+        (within(size=255), "size is 255; it must be an even number from 16 to 256"),
         (("--format", "lerobot-v2"), "There is no format 'lerobot-v2'; known: lerobot-v3,"),
         (("--pictures", "jpeg"), "There is no way to store pictures 'jpeg'"),
         (within(video="first"), "demonstrations.video is 'first': Input should be 'none', 'pref"),

@@ -116,6 +116,13 @@ def test_kept_trajectories_serve_other_formats(tmp_path, synthetic, make_plan, m
     assert summary.episodes == 4
 
 
+def test_kept_trajectories_of_other_pictures_are_not_taken(tmp_path, synthetic, make_plan):
+    kept = tmp_path / "kept"
+    for number, plan in enumerate((make_plan(), make_plan(size=64), make_plan(cameras=("front",)))):
+        summary = export_run.run_export(plan, tmp_path / str(number), 0, quiet, kept)
+        assert summary.recorded == 6
+
+
 def test_failures_are_exported_only_on_request(export):
     successes = list(read_dataset(export("successes")))
     everything = list(read_dataset(export("all", outcomes="all")))
@@ -177,6 +184,17 @@ def test_plans_that_make_no_sense_are_refused(make_plan):
         make_plan(language_columns=True, format="lerobot-v2.1")
     with pytest.raises(InvalidValueError, match="holds lossless pictures"):
         make_plan(format="robomme-hdf5", pictures="lossy-video")
+    with pytest.raises(InvalidValueError, match="size is 95; it must be an even number from 16"):
+        make_plan(size=95)
+    with pytest.raises(InvalidValueError, match="size is 8; it must be an even number from 16"):
+        make_plan(size=8)
+    with pytest.raises(InvalidValueError, match="cameras is empty; without pictures, ask for"):
+        make_plan(cameras=())
+    with pytest.raises(UnknownNameError, match=r"Did you mean 'wrist'\?"):
+        make_plan(cameras=("wrists",))
+    for other in ({"format": "robomme-hdf5"}, {"names": "openpi"}):
+        with pytest.raises(InvalidValueError, match=r"cameras is front and size 256; .* both cam"):
+            make_plan(cameras=("front",), **other)
 
 
 def test_the_card_tells_counts_and_measured_errors(export):
@@ -185,6 +203,8 @@ def test_the_card_tells_counts_and_measured_errors(export):
     assert "4 success, 2 failure" in card
     assert "front: mean error" in card
     assert "lerobot-train" in card
+    assert "--dataset.video_backend=pyav" in card
+    assert "--policy.pretrained_backbone_weights=null" in card
     text = (export("v21", format="lerobot-v2.1", names="openpi") / "README.md").read_text()
     config = text.split("```python\n")[1].split("```")[0]
     compile(config, "config", "exec")
@@ -199,6 +219,8 @@ def test_the_estimate_counts_words_once_for_pictures(make_plan):
     assert one.size < two.size < 1.1 * one.size
     apart = estimate_size(make_plan(format="lerobot-v2.1"))
     assert apart.size > 1.8 * one.size
+    small = estimate_size(make_plan(settings=("explicit",), cameras=("front",), size=128))
+    assert 0.1 < small.size / one.size < 0.13
     assert get_episode("PickXtimes", "train", 0).task in make_plan().tasks
 
 

@@ -13,9 +13,11 @@ from pyarrow import parquet
 
 from roboirg.apps.demonstrations.dataset_reading import read_dataset
 from roboirg.language import instruct
+from roboirg.policies.lerobot_features import scaled_square
 from roboirg.tasks.splits.splits import get_episode
 
 CAMERAS = ("front", "wrist")
+WRIST = "observation.images.wrist"
 
 
 def read_json(path):
@@ -82,6 +84,30 @@ def test_every_frame_of_version_3_is_as_recorded(export):
     # Two tasks and settings; episode 1 of each task fails.
     assert info["total_episodes"] == len(facts) == 8
     assert set(info["features"]) == set(frame)
+
+
+@pytest.mark.parametrize("version", ["lerobot-v3", "lerobot-v2.1"])
+@pytest.mark.parametrize("pictures", ["png", "lossless-video"])
+def test_one_camera_in_small_pictures(export, version, pictures):
+    root = export(
+        cameras=("wrist",), size=96, pictures=pictures, format=version, settings=("explicit",)
+    )
+    info, stats = read_json(root / "meta/info.json"), read_json(root / "meta/stats.json")
+    shown = [name for name in info["features"] if "images" in name]
+    assert shown == [name for name in stats if "images" in name] == [WRIST]
+    assert info["features"][WRIST]["shape"] == [96, 96, 3]
+    assert stats[WRIST]["count"] == stats["action"]["count"] == [4 * synthetic.STEPS]
+    seed = get_episode("PickXtimes", "train", 0).seed
+    whole = synthetic.picture("wrist", seed, 3)
+    expected = scaled_square(whole, 96)
+    if pictures == "png":
+        path = min((root / "data").rglob("*.parquet"))
+        found = decoded(parquet.read_table(path)[WRIST].to_pylist()[3])
+    else:
+        found = frames_of(min(root.rglob("*.mp4")))[3]
+    assert np.array_equal(found, expected)
+    assert np.abs(whole.mean(axis=(0, 1)) - expected.mean(axis=(0, 1))).max() < 1
+    assert "Cameras: wrist; 96 × 96 pixels." in (root / "README.md").read_text()
 
 
 def test_statistics_are_those_of_the_frames(export):

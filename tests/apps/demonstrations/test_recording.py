@@ -15,6 +15,7 @@ from roboirg.apps.demonstrations.trajectory_recorder import RecordingSpec, recor
 from roboirg.envs.factory import make
 from roboirg.policies import make_policy, play
 from roboirg.policies.builtin.oracle_policy import VariedOraclePolicy
+from roboirg.policies.lerobot_features import scaled_square
 from roboirg.tasks.splits.splits import get_episode
 
 pytestmark = pytest.mark.sim
@@ -58,6 +59,22 @@ def test_pictures_are_the_simulators_bit_for_bit_and_actions_replay(tmp_path):
     assert recorded.grounded_online_subgoals[-1] == env.subgoal
     # The tool follows its targets with a delay, but ends where the last ones are.
     assert np.abs(recorded.pose_actions[-1, :3] - recorded.end_effector[-1, :3]).max() < 0.03
+
+
+def test_small_pictures_are_the_simulators_scaled(tmp_path):
+    path, episode = tmp_path / "one.zip", get_episode("StopCube", "train", 0)
+    spec = RecordingSpec(cameras=("wrist",), size=64)
+    assert record_trajectory(episode, make_policy("oracle", 0), path, spec).status == "success"
+    recorded, env = load_trajectory(path), make(episode)
+    with zipfile.ZipFile(path) as archive:
+        names = {name for name in archive.namelist() if name.endswith(".png")}
+        assert {name.partition("/")[0] for name in names} == {"wrist"}
+        seen, _ = env.reset()
+        for row in range(0, 30, 10):
+            found = PictureFile(archive).picture("wrist", row)
+            assert np.array_equal(found, scaled_square(seen["wrist_rgb"], 64))
+            seen, *_ = env.step_chunk(recorded.actions[row + 1 : row + 11])
+    env.close()
 
 
 def test_an_export_without_pictures_replays_exactly(tmp_path, make_plan):

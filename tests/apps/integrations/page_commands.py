@@ -1,4 +1,4 @@
-"""The commands of docs/integrations.md, run as they stand there but for named values."""
+"""The commands of a page, run as they stand there but for named values."""
 
 import importlib.metadata
 import os
@@ -9,34 +9,42 @@ from pathlib import Path
 
 HERE = Path(__file__).parent
 ROOT = HERE.parents[2]
-PAGE = (ROOT / "docs" / "integrations.md").read_text()
+PAGE = "integrations.md"
 
 
-def blocks(section, language):
-    """Return the contents of a section's blocks of code."""
-    text = PAGE.split(f"\n## {section}\n")[1].split("\n## ")[0]
+def blocks(section, language, page=PAGE):
+    """Return the contents of a section's blocks of code, or of all if it is None."""
+    text = (ROOT / "docs" / page).read_text()
+    if section is not None:
+        text = text.split(f"\n## {section}\n")[1].split("\n## ")[0]
     return re.findall(rf"```{language}\n(.*?)```", text, flags=re.DOTALL)
 
 
 def replaced(text, values):
     """Return a text with other values; each must be there."""
     for old, new in values.items():
-        assert old in text, f"docs/integrations.md does not say {old!r}"
+        assert old in text, f"the page does not say {old!r}"
         text = text.replace(old, str(new))
     return text
 
 
-def run_page(section, folder, values, **variables):
+def run_page(section, folder, values, page=PAGE, **variables):
     """Run what a section says after the installation; return what it printed.
 
     Args:
-        section: its heading.
+        section: its heading; None for the whole page, whose YAML is written to the file that its
+            first line names.
         folder: where the commands run; `integrations` of this repository is there, too.
         values: what is said on the page, and what to say instead.
+        page: its name.
         **variables: of the environment.
     """
-    (script,) = [block for block in blocks(section, "sh") if "pip install" in block]
-    commands = [line for line in _joined(script) if not is_installation(line)]
+    scripts = blocks(section, "sh", page)
+    if section is not None:
+        (scripts,) = [[one] for one in scripts if "pip install" in one]
+    commands = [line for line in _joined("".join(scripts)) if not is_installation(line)]
+    for content in blocks(section, "yaml", page) if section is None else ():
+        (folder / content.partition("\n")[0].lstrip("# ")).write_text(content)
     (folder / "integrations").symlink_to(ROOT / "integrations")
     environment = os.environ | variables
     for name, first in (("PATH", Path(sys.executable).parent), ("PYTHONPATH", HERE)):
@@ -54,9 +62,10 @@ def is_installation(line):
     return line.startswith(("pip install", "python3")) and ("venv" in line or "pip" in line)
 
 
-def check_versions(section):
+def check_versions(section, page=PAGE):
     """Fail unless the versions that the page pins are those that are installed."""
-    pinned = re.findall(r"([\w-]+)==([\w.]+)", "".join(blocks(section, "sh")))
+    scripts = "".join(blocks(section, "sh", page))
+    pinned = re.findall(r"([\w-]+)(?:\[[\w,-]+\])?==([\w.]+)", scripts)
     assert pinned
     for name, version in pinned:
         assert importlib.metadata.version(name) == version, name

@@ -17,7 +17,7 @@ from roboirg.apps.real.study.study_plan import make_study
 from roboirg.apps.real.study.study_run import Study, select_scorer
 from roboirg.apps.real.study.trial_log import TrialLog
 from roboirg.core.errors import InvalidValueError, UnknownNameError
-from roboirg.policies.lerobot_features import center_square
+from roboirg.policies.lerobot_features import scaled_square
 
 WATCHING, STILL = "faulty_policies:Watcher", "faulty_policies:Still"
 # A busy machine is slow: what is tested here is not how quick it is.
@@ -126,9 +126,9 @@ def test_a_policy_by_url_is_refused_for_what_its_options_need(tmp_path):
 def test_pictures_are_cut_to_the_middle():
     picture = np.zeros((480, 640, 3), np.uint8)
     picture[:, 80:560] = 200
-    assert (center_square(picture) == 200).all()
+    assert (scaled_square(picture) == 200).all()
     depth = np.full((480, 640), 1234, np.uint16)
-    assert (center_square(depth, smooth=False) == 1234).all()
+    assert (scaled_square(depth, smooth=False) == 1234).all()
 
 
 def test_the_twin_takes_real_time_as_an_option():

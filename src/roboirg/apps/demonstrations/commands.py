@@ -28,11 +28,16 @@ class ExportWords(PlanWords):
 
     section = "demonstrations"
     own = (
-        "video", "names", "extra_actions", "variations", "policy", "outcomes", "language_columns",
+        "cameras", "size", "video", "names", "extra_actions", "variations", "policy", "outcomes",
+        "language_columns",
     )  # fmt: skip
 
 
 NO_WORDS = ExportWords()
+_TEST_WORDS = (
+    "roboirg: These demonstrations speak the words held out for tests; a policy that is trained on "
+    "them is tested in words that it knows."
+)
 
 
 @spread
@@ -62,12 +67,12 @@ def export_demonstrations(
 ) -> None:
     """Export demonstrations for training, recorded once per episode, in the words of every setting.
 
-    A plan may have, under `demonstrations`: video, names, extra_actions, variations, policy,
-    outcomes, language_columns.
+    A plan may have, under `demonstrations`: cameras, size, video, names, extra_actions, variations,
+    policy, outcomes, language_columns. Words are those for training unless it has `wordings: test`.
 
     Example: roboirg export demonstrations --tasks PickXtimes --out data
     """
-    from roboirg.apps.demonstrations.export_plan import ExportPlan
+    from roboirg.apps.demonstrations.export_plan import ExportPlan, training_words
     from roboirg.apps.demonstrations.export_run import run_export
     from roboirg.apps.demonstrations.size_estimate import size_text
     from roboirg.cli.names import known_settings
@@ -89,11 +94,13 @@ def export_demonstrations(
         episodes=parse_episodes(episodes, split, names_of_tasks),
         settings=known_settings(settings),
         forms=words.forms(),
-        options=words.options(),
+        options=training_words(split, words.options()),
         format=cast("Any", format),
         pictures=cast("Any", pictures),
         **chosen,
     ).validated()
+    if plan.options.wordings == "test":
+        typer.echo(_TEST_WORDS, err=True)
     _print_estimate(plan)
     if dry_run:
         return

@@ -128,7 +128,9 @@ def _content_lines(plan: ExportPlan, facts: Sequence[TrajectoryFacts]) -> Iterat
         yield "Frames of the videos are left out."
     if plan.pictures == "none":
         yield "There are no pictures."
-    elif plan.pictures == "png":
+        return
+    yield f"Cameras: {', '.join(plan.cameras)}; {plan.size} × {plan.size} pixels."
+    if plan.pictures == "png":
         yield "Pictures are stored without loss, as PNG."
     elif plan.pictures == "lossless-video":
         yield "Pictures are stored without loss, as H.264 in RGB; every one was compared."

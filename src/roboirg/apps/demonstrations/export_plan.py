@@ -15,11 +15,14 @@ from roboirg.apps.demonstrations.trajectory_recorder import RecordingSpec
 from roboirg.core.episode import ENVIRONMENT_VERSION, Episode
 from roboirg.core.errors import InvalidValueError, UnknownNameError
 from roboirg.core.instruction_options import InstructionOptions
+from roboirg.core.observations import CAMERAS, check_cameras
+from roboirg.core.word_pools import pool_of
 from roboirg.language import FORMS, LANGUAGE_VERSION
 from roboirg.language.generator import instruct_with
 from roboirg.language.instruction_row import row
 from roboirg.language.settings import all_settings
 from roboirg.language.variants import instructions
+from roboirg.policies.lerobot_features import SIZE
 from roboirg.tasks.splits.splits import get_episode
 from roboirg.util.short_hash import short_hash
 
@@ -36,6 +39,8 @@ EXTRA_ACTIONS: tuple[ExtraAction, ...] = get_args(ExtraAction)
 PICTURE_CODINGS: tuple[PictureCoding, ...] = get_args(PictureCoding)
 OUTCOMES: tuple[Outcomes, ...] = get_args(Outcomes)
 ORACLE = "oracle"
+SMALLEST = 16
+"""Width and height of the smallest pictures that are exported, pixels."""
 TELEOPERATED = "teleoperation"
 """The policy of trajectories that people recorded on a robot."""
 
@@ -53,6 +58,8 @@ class ExportPlan:
         options: all other options of the words.
         format: of the data set.
         pictures: how they are stored.
+        cameras: whose pictures are stored.
+        size: width and height of the pictures, pixels.
         video: frames of the video: left out, before the policy's frames, or a data set apart.
         names: of the features: LeRobot's or openpi's.
         extra_actions: further descriptions of each action.
@@ -70,6 +77,8 @@ class ExportPlan:
     options: InstructionOptions = InstructionOptions()  # noqa: RUF009 - immutable
     format: FormatName = "lerobot-v3"
     pictures: PictureCoding = "png"
+    cameras: tuple[str, ...] = CAMERAS
+    size: int = SIZE
     video: VideoTreatment = "none"
     names: KeyNames = "lerobot"
     extra_actions: tuple[ExtraAction, ...] = ()
@@ -107,9 +116,25 @@ class ExportPlan:
             raise InvalidValueError(
                 f"Language columns belong to the format 'lerobot-v3'; this is {self.format!r}."
             )
+        self._check_pictures()
         if self.format == "robomme-hdf5":
             self._check_hdf5()
         return self
+
+    def _check_pictures(self) -> None:
+        check_cameras(self.cameras)
+        if not self.cameras:
+            raise InvalidValueError("cameras is empty; without pictures, ask for --pictures none.")
+        if self.size % 2 or not SMALLEST <= self.size <= SIZE:
+            raise InvalidValueError(
+                f"size is {self.size}; it must be an even number from {SMALLEST} to {SIZE}."
+            )
+        is_whole = (set(self.cameras), self.size) == (set(CAMERAS), SIZE)
+        if not is_whole and (self.format == "robomme-hdf5" or self.names == "openpi"):
+            raise InvalidValueError(
+                f"cameras is {', '.join(self.cameras)} and size {self.size}; RoboMME's format and "
+                f"openpi's names have both cameras in {SIZE} pixels."
+            )
 
     def _check_hdf5(self) -> None:
         if self.pictures != "png":
@@ -136,7 +161,9 @@ class ExportPlan:
         """What the trajectories must hold."""
         is_video_apart = self.video == "sidecar" and self.pictures != "png"
         has_depth = self.format == "robomme-hdf5"
-        return RecordingSpec(self.pictures, self.video != "none", is_video_apart, has_depth)
+        return RecordingSpec(
+            self.pictures, self.video != "none", is_video_apart, has_depth, self.cameras, self.size
+        )
 
     def fingerprint(self) -> str:
         """Return a hash of everything that determines the data set."""
@@ -193,12 +220,21 @@ class RecordingJob(NamedTuple):
         spec: list[str] = [self.spec.coding]
         spec += ["video"] * self.spec.video + ["apart"] * self.spec.is_video_apart
         spec += ["depth"] * self.spec.depth
+        spec += self.spec.cameras * (self.spec.cameras != CAMERAS)
+        spec += [str(self.spec.size)] * (self.spec.size != SIZE)
         name = f"{self.task}-{self.split}-{self.number:05d}-{self.variation:03d}{said}"
         return f"{name}-{'-'.join(spec)}{SUFFIX}"
 
     def path(self, folder: Path) -> Path:
         """Return the path of the trajectory's file."""
         return folder / self.file_name
+
+
+def training_words(split: str, options: InstructionOptions) -> InstructionOptions:
+    """Return options with words of the pool for training, unless they name their words."""
+    if options.wordings is None and pool_of(split) != "train":
+        return replace(options, wordings="train")
+    return options
 
 
 def plan_episodes(plan: ExportPlan) -> Iterator[Episode]:

@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 QUANTILES: Mapping[str, float] = {"q01": 0.01, "q10": 0.1, "q50": 0.5, "q90": 0.9, "q99": 0.99}
-PICTURE_PIXELS = 256 * 256
 _MAX_VALUE = 255.0
 
 FeatureStats = dict[str, list[Any]]
@@ -37,11 +36,12 @@ def vector_stats(values: NDArray[Any]) -> FeatureStats:
     return stats | {"count": [len(numbers)]}
 
 
-def picture_stats(counts: NDArray[np.int64]) -> FeatureStats:
+def picture_stats(counts: NDArray[np.int64], pixels: int) -> FeatureStats:
     """Return the statistics of all pixels of a camera, exactly, from the counts of their values.
 
     Args:
         counts: (3, 256) how often each value occurs in each channel.
+        pixels: of a picture.
 
     Returns:
         Nested lists (3, 1, 1) in 0 to 1, and `count`, a list with the number of pictures.
@@ -50,7 +50,7 @@ def picture_stats(counts: NDArray[np.int64]) -> FeatureStats:
     stats: FeatureStats = {
         name: [[[channel[name] / _MAX_VALUE]] for channel in channels] for name in channels[0]
     }
-    return stats | {"count": [int(counts[0].sum()) // PICTURE_PIXELS]}
+    return stats | {"count": [int(counts[0].sum()) // pixels]}
 
 
 def _channel_stats(counts: NDArray[np.int64]) -> dict[str, float]:

@@ -16,7 +16,6 @@ from roboirg.apps.demonstrations.feature_stats import FeatureStats, gather_vecto
 from roboirg.apps.demonstrations.picture_coding import FRAME_RATE, video_format
 from roboirg.apps.demonstrations.trajectory import PictureFile, Trajectory, TrajectoryFacts
 from roboirg.apps.demonstrations.trajectory_recorder import video_name
-from roboirg.core.observations import CAMERAS
 
 JOINTS = [f"joint_{number}" for number in range(1, 8)]
 _POSE = ["x", "y", "z", "roll", "pitch", "yaw", "gripper"]
@@ -34,7 +33,6 @@ _KEYS: Mapping[str, Mapping[str, str]] = {
         "action": "actions",
     },
 }
-_SIZE = 256
 
 
 class PlacedText(NamedTuple):
@@ -78,7 +76,7 @@ class FrameColumns:
     @property
     def cameras(self) -> tuple[str, ...]:
         """Cameras whose pictures are stored."""
-        return () if self.plan.pictures == "none" else CAMERAS
+        return () if self.plan.pictures == "none" else self.plan.cameras
 
     def rows(self, facts: TrajectoryFacts) -> range:
         """Return the rows of a trajectory that are frames; the next row has a frame's action."""
@@ -116,7 +114,7 @@ class FrameColumns:
     def _picture_feature(self) -> dict[str, Any]:
         feature: dict[str, Any] = {
             "dtype": "video" if self.has_videos else "image",
-            "shape": [_SIZE, _SIZE, 3],
+            "shape": [self.plan.size, self.plan.size, 3],
             "names": ["height", "width", "channel"],
         }
         if self.has_videos:
@@ -124,8 +122,8 @@ class FrameColumns:
                 "video.fps": FRAME_RATE,
                 "video.codec": "h264",
                 "video.pix_fmt": video_format(self.plan.pictures),
-                "video.height": _SIZE,
-                "video.width": _SIZE,
+                "video.height": self.plan.size,
+                "video.width": self.plan.size,
                 "video.channels": 3,
                 "video.is_depth_map": False,
                 "is_depth_map": False,
@@ -201,7 +199,7 @@ class FrameColumns:
         counts: Mapping[str, NDArray[np.int64]],
     ) -> dict[str, FeatureStats]:
         """Return the statistics of all columns but texts."""
-        found = {name: picture_stats(one) for name, one in counts.items()}
+        found = {name: picture_stats(one, self.plan.size**2) for name, one in counts.items()}
         return found | {name: gather_vectors(parts) for name, parts in numbers.items()}
 
 

@@ -6,6 +6,8 @@ from collections.abc import Mapping
 from typing import NamedTuple
 
 from roboirg.apps.demonstrations.export_plan import ExportPlan, recording_jobs
+from roboirg.core.observations import CAMERAS
+from roboirg.policies.lerobot_features import SIZE
 
 _LENGTHS: Mapping[str, tuple[int, int]] = {
     "PickXtimes": (508, 0),
@@ -24,7 +26,7 @@ _LENGTHS: Mapping[str, tuple[int, int]] = {
 tasks of twelve of them. Single episodes differ: StopCube's have 89 to 540 steps."""
 _OTHER_TASK = (314, 212)
 _FRAME_BYTES = {"png": 205_000, "lossless-video": 67_000, "lossy-video": 8_800, "none": 0}
-"""Bytes of both pictures of a frame."""
+"""Bytes of both pictures of a frame, 256 pixels wide."""
 _HDF5_FRAME_BYTES = 257_000
 """Bytes of a time step with pictures and depth, both compressed."""
 _ROW_BYTES = 150
@@ -59,8 +61,10 @@ def estimate_size(plan: ExportPlan) -> SizeEstimate:
         # Version 2.1 has a file for each episode; the others store pictures once.
         pictures += length * (len(said) if plan.format == "lerobot-v2.1" else 1)
     own = _HDF5_FRAME_BYTES if plan.format == "robomme-hdf5" else _FRAME_BYTES[plan.pictures]
+    share = len(plan.cameras) / len(CAMERAS) * (plan.size / SIZE) ** 2
     episodes = sum(len(said) for _, said in jobs)
-    return SizeEstimate(len(jobs), episodes, frames, pictures * own + frames * _ROW_BYTES)
+    size = int(pictures * own * share) + frames * _ROW_BYTES
+    return SizeEstimate(len(jobs), episodes, frames, size)
 
 
 def size_text(size: int) -> str:

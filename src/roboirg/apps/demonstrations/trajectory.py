@@ -146,7 +146,8 @@ def load_trajectory(path: Path) -> Trajectory:
             }
     except (OSError, zipfile.BadZipFile, ValueError, KeyError) as error:
         raise InvalidValueError(f"The trajectory {str(path)!r} cannot be read: {error}.") from error
-    histograms = {one: arrays.pop(f"{one}_histogram") for one in CAMERAS}
+    counted = [one for one in CAMERAS if f"{one}_histogram" in arrays]
+    histograms = {one: arrays.pop(f"{one}_histogram") for one in counted}
     matrices = [name for name in arrays if name.endswith(("_extrinsic", "_intrinsic"))]
     calibration = {name: arrays.pop(name) for name in matrices}
     return Trajectory(path, facts, histograms=histograms, calibration=calibration, **arrays)
@@ -223,7 +224,7 @@ class PictureFile:
         return self._archive.read(picture_name(track, row))
 
     def picture(self, camera: str, row: int) -> NDArray[np.uint8]:
-        """Return a row's picture, RGB, (256, 256, 3)."""
+        """Return a row's picture, RGB, (size, size, 3)."""
         return decode_png(self.encoded(camera, row))
 
     def depth(self, camera: str, row: int) -> NDArray[np.int16]:

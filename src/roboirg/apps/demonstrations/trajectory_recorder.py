@@ -34,6 +34,7 @@ from roboirg.envs.factory import make
 from roboirg.policies.contract.base import Policy
 from roboirg.policies.contract.play import EpisodeLoop
 from roboirg.policies.contract.policy_needs import PolicyNeeds
+from roboirg.policies.lerobot_features import SIZE, scaled_square
 from roboirg.util.atomic_write import replacing
 
 if TYPE_CHECKING:
@@ -48,12 +49,16 @@ class RecordingSpec(NamedTuple):
         video: whether the pictures of the video are stored.
         is_video_apart: whether a stored MP4 holds the video and the policy's part in two files.
         depth: whether depth and calibration are stored.
+        cameras: whose pictures are stored.
+        size: width and height of the pictures, pixels.
     """
 
     coding: PictureCoding = "png"
     video: bool = False
     is_video_apart: bool = False
     depth: bool = False
+    cameras: tuple[str, ...] = CAMERAS
+    size: int = SIZE
 
 
 @dataclass
@@ -67,26 +72,29 @@ class _Rows:
 
 
 class PictureTracks:
-    """Encodes the pictures of both cameras in the order of rows."""
+    """Encodes the pictures of the cameras in the order of rows."""
 
     def __init__(self, file: TrajectoryFile, spec: RecordingSpec) -> None:
         self._file, self._spec = file, spec
         self._rows = 0
         self._encoders: dict[tuple[str, str], VideoEncoder] = {}
-        self.histograms = {camera: np.zeros((2, 3, 256), np.int64) for camera in CAMERAS}
+        self.histograms = {camera: np.zeros((2, 3, 256), np.int64) for camera in spec.cameras}
         self._uncounted: tuple[Mapping[str, Any], int] | None = None
 
     def add(self, pictures: Mapping[str, Any], *, is_video: bool) -> None:
         """Add the pictures of a row: ``front_rgb`` and so on."""
         if self._spec.coding == "none":
             return
+        small = {
+            camera: scaled_square(pictures[f"{camera}_rgb"], self._spec.size)
+            for camera in self._spec.cameras
+        }
         self._count_last()
-        self._uncounted = pictures, int(not is_video)
+        self._uncounted = small, int(not is_video)
         part = ""
         if self._spec.is_video_apart:
             part = "demonstration" if is_video else "policy"
-        for camera in CAMERAS:
-            picture = pictures[f"{camera}_rgb"]
+        for camera, picture in small.items():
             if self._spec.coding == "png":
                 self._file.add_file(picture_name(camera, self._rows), encode_png(picture))
             else:
@@ -106,8 +114,8 @@ class PictureTracks:
         """
         if self._uncounted is not None:
             pictures, part = self._uncounted
-            for camera in CAMERAS:
-                self.histograms[camera][part] += count_values(pictures[f"{camera}_rgb"])
+            for camera, picture in pictures.items():
+                self.histograms[camera][part] += count_values(picture)
 
     def finish(self) -> dict[str, dict[str, float]]:
         """Store the videos; returns the errors of lossy ones by name."""
@@ -164,7 +172,7 @@ def record_trajectory(
     env = make(
         episode,
         **asdict(said),
-        cameras=CAMERAS if is_drawn or policy_name != "oracle" else (),
+        cameras=CAMERAS if policy_name != "oracle" else spec.cameras if is_drawn else (),
         depth=spec.depth,
         calibration=spec.depth,
         grounded=is_drawn,
@@ -228,7 +236,7 @@ class _Recorder(EpisodeLoop):
         self._video_session = env.session
         cameras = env.session.world.cameras
         pictures: dict[str, Any] = {
-            f"{name}_rgb": picture for name, picture in cameras.pictures(CAMERAS).items()
+            f"{name}_rgb": picture for name, picture in cameras.pictures(self._spec.cameras).items()
         }
         if self._spec.depth:
             pictures |= {f"{name}_depth": cameras.depth(name) for name in CAMERAS}

@@ -32,7 +32,6 @@ from roboirg.apps.demonstrations.frame_columns import FrameColumns
 from roboirg.apps.demonstrations.parquet_tables import write_frames, write_rows
 from roboirg.apps.demonstrations.picture_coding import FRAME_RATE
 from roboirg.apps.demonstrations.trajectory import PictureFile, load_trajectory
-from roboirg.core.observations import CAMERAS
 from roboirg.util.atomic_write import write_atomically
 
 __all__ = ["finish", "make_parts", "write_part"]
@@ -60,7 +59,7 @@ def write_part(part: DatasetPart) -> None:
 
 def _write_videos(part: DatasetPart, episode_index: int) -> None:
     with zipfile.ZipFile(part.episodes[0].path) as archive:
-        for camera in CAMERAS:
+        for camera in part.columns.cameras:
             key = part.columns.keys[camera]
             path = part.root / _VIDEO.format(video_key=key, **_place(episode_index))
             path.parent.mkdir(parents=True, exist_ok=True)
@@ -121,7 +120,7 @@ def _info(columns: FrameColumns, parts: Sequence[DatasetPart], texts: int) -> di
         "total_episodes": count,
         "total_frames": frames,
         "total_tasks": texts,
-        "total_videos": count * len(CAMERAS) if columns.has_videos else 0,
+        "total_videos": count * len(columns.cameras) if columns.has_videos else 0,
         "total_chunks": (count - 1) // CHUNK_SIZE + 1,
         "chunks_size": CHUNK_SIZE,
         "fps": FRAME_RATE,

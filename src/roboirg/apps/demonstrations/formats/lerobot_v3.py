@@ -36,7 +36,6 @@ from roboirg.apps.demonstrations.parquet_tables import (
 )
 from roboirg.apps.demonstrations.picture_coding import FRAME_RATE
 from roboirg.apps.demonstrations.trajectory import PictureFile, Trajectory, load_trajectory
-from roboirg.core.observations import CAMERAS
 from roboirg.util.atomic_write import write_atomically
 
 INFO = "meta/info.json"
@@ -63,7 +62,7 @@ def write_part(part: DatasetPart) -> None:
     chunk, file = part.place
     if columns.has_videos:
         with zipfile.ZipFile(trajectory.path) as archive:
-            for camera in CAMERAS:
+            for camera in columns.cameras:
                 path = video_path(part.root, columns.keys[camera], chunk, file)
                 path.parent.mkdir(parents=True, exist_ok=True)
                 write_atomically(path, PictureFile(archive).video(columns.video(camera)))
@@ -181,7 +180,7 @@ def _episode_entry(part: DatasetPart, placed: PlacedText, length: int) -> dict[s
         "dataset_from_index": placed.first_index,
         "dataset_to_index": placed.first_index + length,
     }
-    for camera in CAMERAS if part.columns.has_videos else ():
+    for camera in part.columns.cameras if part.columns.has_videos else ():
         key = f"videos/{part.columns.keys[camera]}"
         entry[f"{key}/chunk_index"], entry[f"{key}/file_index"] = chunk, file
         entry[f"{key}/from_timestamp"] = 0.0

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from roboirg.apps.demonstrations.export_plan import ExportPlan
+from roboirg.core.observations import CAMERAS
 
 
 class TrainingRecipe(NamedTuple):
@@ -26,7 +27,8 @@ HORIZON = 20
 
 _LEROBOT = """\
 ```sh
-lerobot-train --dataset.repo_id=local/roboirg --dataset.root={root} \\
+pip install 'lerobot[training]'   # for Diffusion Policy 'lerobot[training,diffusion]'
+lerobot-train --dataset.repo_id=local/roboirg --dataset.root={root}{backend} \\
     --policy.type=act --policy.push_to_hub=false --policy.device=cuda \\
     --policy.pretrained_backbone_weights=null --dataset.use_imagenet_stats=false \\
     --batch_size=64 --steps=20000 --wandb.enable=false --output_dir=outputs/act
@@ -34,9 +36,12 @@ roboirg run --policy 'act=lerobot://outputs/act/checkpoints/last/pretrained_mode
     --tasks {task} --out runs/act
 ```
 
-ACT and Diffusion Policy of LeRobot do not read the instruction: train them on one task at a time.
-The weights of ACT's ResNet are not downloaded with `null`.
+The same line with `--policy.type=diffusion` trains Diffusion Policy, and with `--policy.type=vqbet`
+VQ-BeT, which takes one camera. None of the three reads the instruction: train them on one task at a
+time. With `null`, they begin without the weights of ImageNet, and nothing is downloaded.
 """
+_PYAV = " --dataset.video_backend=pyav"
+"""Of a data set with videos; LeRobot's usual decoder, torchcodec, needs FFmpeg on the system."""
 
 _LEROBOT_ON_ROBOT = """\
 ```sh
@@ -117,8 +122,10 @@ python roboirg_config.py scripts/train.py pi05_roboirg --exp-name first
 ```
 
 The configuration follows the shape of openpi's own; it has not been run here, because openpi needs
-a GPU and packages from git. GR00T reads `meta/modality.json`; it needs videos, so export with
-`--pictures lossless-video` or `lossy-video`.
+a GPU and packages from git. """
+_GROOT = """\
+GR00T reads `meta/modality.json`; it needs videos, so export with `--pictures lossless-video` or
+`lossy-video`.
 """
 
 _MME_VLA = """\
@@ -152,11 +159,15 @@ def training_text(plan: ExportPlan, root: Path) -> str:
     if plan.format == "robomme-hdf5":
         return _MME_VLA.format(root=place, recipe=recipe)
     if plan.format == "lerobot-v2.1":
+        if set(plan.cameras) < set(CAMERAS):
+            return _GROOT
         keys = FrameColumns(plan).keys
-        return _OPENPI.format(parent=place.parent, recipe=recipe, horizon=HORIZON, **keys)
+        text = _OPENPI.format(parent=place.parent, recipe=recipe, horizon=HORIZON, **keys)
+        return text + _GROOT
     if plan.is_teleoperated:
         return _LEROBOT_ON_ROBOT.format(root=place, recipe=recipe, horizon=HORIZON)
-    text = _LEROBOT.format(root=place, task=plan.tasks[0])
+    backend = _PYAV if FrameColumns(plan).has_videos else ""
+    text = _LEROBOT.format(root=place, task=plan.tasks[0], backend=backend)
     if plan.names == "openpi":
         keys = FrameColumns(plan).keys
         renamed = {

@@ -34,7 +34,7 @@ from roboirg.core.errors import InvalidValueError
 from roboirg.core.kinematics import end_effector_pose
 from roboirg.core.observations import CAMERAS
 from roboirg.language.settings import EXPLICIT
-from roboirg.policies.lerobot_features import FINGER_RANGE, center_square
+from roboirg.policies.lerobot_features import FINGER_RANGE, scaled_square
 from roboirg.util.atomic_write import replacing
 from roboirg.util.short_hash import short_hash
 
@@ -102,7 +102,7 @@ def _convert(
         tracks = PictureTracks(file, job.spec)
         streams = [dataset.pictures(index, getattr(dataset.names, one)) for one in CAMERAS]
         for front, wrist in zip(*streams, strict=True):
-            seen = {"front_rgb": center_square(front), "wrist_rgb": center_square(wrist)}
+            seen = {"front_rgb": scaled_square(front), "wrist_rgb": scaled_square(wrist)}
             tracks.add(seen, is_video=False)
         arrays = _arrays(dataset, index)
         arrays |= {f"{one}_histogram": counts for one, counts in tracks.histograms.items()}

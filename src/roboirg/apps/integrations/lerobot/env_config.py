@@ -21,8 +21,7 @@ from roboirg.core.instruction_options import (
 )
 from roboirg.core.observations import CAMERAS
 from roboirg.envs.env_settings import MAX_STEPS
-
-_PICTURE = (256, 256, 3)
+from roboirg.policies.lerobot_features import SIZE
 
 
 @EnvConfig.register_subclass("roboirg")
@@ -34,6 +33,7 @@ class RoboIRGEnvConfig(EnvConfig):  # type: ignore[misc] # LeRobot has no types
         task: names of tasks, separated by commas; each becomes a group of results, called
             ``task-setting-split``.
         cameras: likewise of cameras.
+        size: width and height of the pictures, pixels.
         video: none, stream or key, as in `LeRobotSubEnvironment`.
         video_frames: frames of the video in the key.
         episode_length: control steps that a policy has.
@@ -47,6 +47,7 @@ class RoboIRGEnvConfig(EnvConfig):  # type: ignore[misc] # LeRobot has no types
     split: str = "test"
     actions: str = "joint_angle"
     cameras: str = ",".join(CAMERAS)
+    size: int = SIZE
     distractor: str = DEFAULT_DISTRACTOR
     frame: str = DEFAULT_FRAME
     delivery: str = DEFAULT_DELIVERY
@@ -67,7 +68,7 @@ class RoboIRGEnvConfig(EnvConfig):  # type: ignore[misc] # LeRobot has no types
         }
         self.features_map |= {"action": "action", "agent_pos": "observation.state"}
         for camera in _split(self.cameras):
-            picture = PolicyFeature(type=FeatureType.VISUAL, shape=_PICTURE)
+            picture = PolicyFeature(type=FeatureType.VISUAL, shape=(self.size, self.size, 3))
             self.features[f"pixels/{camera}"] = picture
             self.features_map[f"pixels/{camera}"] = f"observation.images.{camera}"
 
@@ -76,7 +77,7 @@ class RoboIRGEnvConfig(EnvConfig):  # type: ignore[misc] # LeRobot has no types
         """Keyword arguments of `LeRobotSubEnvironment`."""
         names = (
             "setting", "form", "split", "actions", "distractor", "frame", "delivery", "meshes",
-            "video", "video_frames",
+            "size", "video", "video_frames",
         )  # fmt: skip
         chosen = {name: getattr(self, name) for name in names}
         return {**chosen, "cameras": _split(self.cameras), "max_steps": self.episode_length}

@@ -16,6 +16,7 @@ from roboirg.core.observations import CAMERAS, proprioception
 from roboirg.envs.env_options import EnvOptions
 from roboirg.envs.env_settings import MAX_STEPS
 from roboirg.envs.factory import make
+from roboirg.policies.lerobot_features import SIZE, scaled_square
 
 VideoDelivery = Literal["none", "stream", "key"]
 VIDEO_DELIVERIES: tuple[VideoDelivery, ...] = ("none", "stream", "key")
@@ -32,7 +33,7 @@ _Transition = tuple[dict[str, Any], float, bool, bool, dict[str, Any]]
 class LeRobotSubEnvironment(gymnasium.Env[dict[str, Any], NDArray[np.floating[Any]]]):
     """Episodes of one task, chosen by seeds: ``seed % n`` of the n in the split.
 
-    Observation: `pixels`, uint8 (256, 256, 3) for each camera; `agent_pos` float32 (8,), seven
+    Observation: `pixels`, uint8 (size, size, 3) for each camera; `agent_pos` float32 (8,), seven
     joints (rad) and the first finger (m). The instruction is `task_description`, which is what was
     said last. Info: `is_success`, and `is_video_demo` while the video is played. Nothing shows
     setting, episode or goal.
@@ -48,6 +49,7 @@ class LeRobotSubEnvironment(gymnasium.Env[dict[str, Any], NDArray[np.floating[An
             `video_frames` frames of the first camera, evenly spaced, and `demonstration_steps`
             their number, 0 without a video.
         video_frames: frames in the key.
+        size: width and height of the pictures, pixels.
         **options: the other keyword arguments of `roboirg.make`.
 
     Raises:
@@ -68,6 +70,7 @@ class LeRobotSubEnvironment(gymnasium.Env[dict[str, Any], NDArray[np.floating[An
         *,
         video: str = "none",
         video_frames: int = 16,
+        size: int = SIZE,
         **options: Unpack[EnvOptions],
     ) -> None:
         if video not in VIDEO_DELIVERIES:
@@ -76,7 +79,9 @@ class LeRobotSubEnvironment(gymnasium.Env[dict[str, Any], NDArray[np.floating[An
             raise InvalidValueError(f"video_frames is {video_frames!r}; it must be 1 or more.")
         if not options.get("cameras", CAMERAS):
             raise InvalidValueError("cameras is empty; LeRobot needs at least one picture.")
-        self._video, self._frames = video, video_frames
+        if not isinstance(size, int) or not 1 <= size <= SIZE:
+            raise InvalidValueError(f"size is {size!r}; it must be a number from 1 to {SIZE}.")
+        self._video, self._frames, self._size = video, video_frames, size
         usual: EnvOptions = {
             "demonstration_frames": "none" if video == "none" else "all",
             "episode": None,
@@ -153,15 +158,14 @@ class LeRobotSubEnvironment(gymnasium.Env[dict[str, Any], NDArray[np.floating[An
         self._env.close()
 
     def _make_space(self) -> spaces.Dict:
-        pictures = {
-            camera: self._env.observation_space[f"{camera}_rgb"] for camera in self._env.cameras
-        }
+        shape = (self._size, self._size, 3)
+        picture: spaces.Space[Any] = spaces.Box(0, 255, shape, np.uint8)
+        pictures = dict.fromkeys(self._env.cameras, picture)
         fields: dict[str, spaces.Space[Any]] = {
             "pixels": spaces.Dict(pictures),
             "agent_pos": spaces.Box(-np.inf, np.inf, (STATE_SIZE,), np.float32),
         }
         if self._video == "key":
-            shape = next(iter(pictures.values())).shape or ()
             fields["demonstration"] = spaces.Box(0, 255, (self._frames, *shape), np.uint8)
             fields["demonstration_steps"] = spaces.Box(0, LONGEST_VIDEO, (1,), np.int64)
         return spaces.Dict(fields)
@@ -170,7 +174,9 @@ class LeRobotSubEnvironment(gymnasium.Env[dict[str, Any], NDArray[np.floating[An
         """Return an observation in LeRobot's form: of the video while it is played."""
         if self._next_frame < self._length:
             seen = {key: array[self._next_frame] for key, array in self._shown.items()}
-        pixels = {camera: seen[f"{camera}_rgb"] for camera in self._env.cameras}
+        pixels = {
+            camera: scaled_square(seen[f"{camera}_rgb"], self._size) for camera in self._env.cameras
+        }
         self._picture = next(iter(pixels.values()))
         state = proprioception(seen["joint_positions"], seen["gripper"])
         return {"pixels": pixels, "agent_pos": state, **self._extra}
@@ -184,7 +190,8 @@ class LeRobotSubEnvironment(gymnasium.Env[dict[str, Any], NDArray[np.floating[An
         frames = np.zeros(shape, np.uint8)
         if self._length:
             picked = np.linspace(0, self._length - 1, self._frames).round().astype(int)
-            frames[:] = demonstration[f"{self._env.cameras[0]}_rgb"][picked]
+            shown = demonstration[f"{self._env.cameras[0]}_rgb"][picked]
+            frames[:] = [scaled_square(one, self._size) for one in shown]
         return {
             "demonstration": frames,
             "demonstration_steps": np.array([self._length], np.int64),

@@ -31,7 +31,7 @@ from roboirg.core.kinematics import end_effector_pose
 from roboirg.evaluation.records.record import Job
 from roboirg.policies.contract.option_checking import check_options
 from roboirg.policies.contract.policy_urls import parse_query
-from roboirg.policies.lerobot_features import FINGER_RANGE, LeRobotFeatures, center_square
+from roboirg.policies.lerobot_features import FINGER_RANGE, LeRobotFeatures, scaled_square
 
 PREFIX = "lerobot:"
 FIRST_OBSERVATION_TIMEOUT_S = 10.0
@@ -107,12 +107,12 @@ class LeRobotArm:
         opening = options.opening(float(raw[options.gripper]))
         fields: dict[str, Any] = {}
         for camera in self._cameras:
-            fields[f"{camera}_rgb"] = center_square(
+            fields[f"{camera}_rgb"] = scaled_square(
                 np.asarray(raw[getattr(options, camera)], np.uint8)
             )
         if options.depth and "front" in self._cameras:
             depth = np.asarray(raw[options.depth]).reshape(*np.shape(raw[options.depth])[:2])
-            fields["front_depth"] = center_square(depth, smooth=False)[..., None].astype(np.int16)
+            fields["front_depth"] = scaled_square(depth, smooth=False)[..., None].astype(np.int16)
         fields["joint_positions"] = joints.astype(np.float32)
         fields["gripper"] = np.full(2, opening * FINGER_RANGE, np.float32)
         fields["end_effector"] = end_effector_pose(joints)

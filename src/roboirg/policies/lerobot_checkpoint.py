@@ -1,0 +1,136 @@
+"""What a checkpoint of LeRobot says of itself, read from its files without LeRobot."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from roboirg.core.errors import InvalidValueError
+from roboirg.core.observations import CAMERAS
+
+PICTURE = "observation.images.{}"
+STATE = "observation.state"
+_CONFIG = "config.json"
+_FILES = (_CONFIG, "model.safetensors", "policy_preprocessor.json", "policy_postprocessor.json")
+_TRAINED = ("pretrained_model", "last/pretrained_model", "checkpoints/last/pretrained_model")
+"""Where lerobot-train puts a checkpoint, seen from the folders around it."""
+_AXES = 3
+"""Of a picture's shape: colors, height, width."""
+_HUB_ID = re.compile(r"\w[\w.-]*/\w[\w.-]*")
+
+
+class CheckpointFacts(NamedTuple):
+    """What a checkpoint takes.
+
+    Attributes:
+        sizes: height and width of its pictures by camera, pixels; None where it says none.
+        prompt_tokens: that it reads of a prompt; None if it says none.
+    """
+
+    sizes: Mapping[str, tuple[int, int] | None]
+    prompt_tokens: int | None = None
+
+
+UNKNOWN = CheckpointFacts(dict.fromkeys(CAMERAS))
+"""Of a checkpoint that is not on this computer."""
+
+
+def read_facts(place: str) -> CheckpointFacts:
+    """Return what a checkpoint takes; of one that is not on this computer, `UNKNOWN`.
+
+    Args:
+        place: a folder, or the id of a repository of the Hub; nothing is downloaded.
+
+    Raises:
+        InvalidValueError: there is no such folder, it holds no checkpoint, or the checkpoint needs
+            an input that does not exist.
+    """
+    path = _local_config(place)
+    if path is None:
+        return UNKNOWN
+    try:
+        config = json.loads(path.read_text(encoding="utf-8"))
+        shapes = {name: one.get("shape") for name, one in (config["input_features"] or {}).items()}
+        is_policy = isinstance(config["type"], str)
+    except (OSError, ValueError, TypeError, KeyError, AttributeError):
+        is_policy = False
+    if not is_policy:
+        raise InvalidValueError(
+            f"{str(path)!r} describes no policy of LeRobot: it must be JSON with `type` and "
+            "`input_features`."
+        )
+    limit = config.get("tokenizer_max_length")
+    return CheckpointFacts(
+        picture_sizes(place, shapes), limit if isinstance(limit, int) and limit > 0 else None
+    )
+
+
+def picture_sizes(place: str, shapes: Mapping[str, object]) -> dict[str, tuple[int, int] | None]:
+    """Return height and width of the pictures that a checkpoint takes, by camera.
+
+    Args:
+        place: of the checkpoint.
+        shapes: of its inputs by name.
+
+    Raises:
+        InvalidValueError: one of them does not exist here.
+    """
+    names = {PICTURE.format(camera): camera for camera in CAMERAS}
+    for name in shapes:
+        if name.startswith("observation.") and name not in (STATE, *names):
+            raise InvalidValueError(
+                f"The checkpoint {place!r} needs {name!r}; there are {', '.join((STATE, *names))}."
+            )
+    found: dict[str, tuple[int, int] | None] = {}
+    for name, camera in names.items():
+        if name in shapes:
+            found[camera] = _picture_size(shapes[name])
+    return found
+
+
+def _picture_size(shape: object) -> tuple[int, int] | None:
+    """Return height and width of a picture's shape (3, height, width), or None."""
+    if not isinstance(shape, list | tuple) or len(shape) != _AXES:
+        return None
+    _, height, width = shape
+    is_size = all(isinstance(one, int) and one > 0 for one in (height, width))
+    return (height, width) if is_size else None
+
+
+def _local_config(place: str) -> Path | None:
+    """Return the configuration of a checkpoint; None if it is not on this computer."""
+    folder = Path(place)
+    if folder.is_dir():
+        _check_folder(folder)
+        return folder / _CONFIG
+    is_id = _HUB_ID.fullmatch(place) is not None
+    if folder.exists() or not is_id or folder.parent.is_dir():
+        raise InvalidValueError(
+            f"There is no folder {place!r}; lerobot:// takes the folder of a checkpoint, such as "
+            "outputs/act/checkpoints/last/pretrained_model, or an id of the Hub, OWNER/NAME."
+        )
+    try:
+        from huggingface_hub import try_to_load_from_cache
+
+        cached: Any = try_to_load_from_cache(place, _CONFIG)
+    except (ImportError, ValueError):  # not installed, or no name of a repository
+        return None
+    return Path(cached) if isinstance(cached, str) else None
+
+
+def _check_folder(folder: Path) -> None:
+    """Raise unless a folder holds a whole checkpoint."""
+    missing = [name for name in _FILES if not (folder / name).is_file()]
+    if not missing:
+        return
+    nearer = [folder / one for one in _TRAINED if (folder / one / _CONFIG).is_file()]
+    if nearer:
+        hint = f"name {str(nearer[0])!r}."
+    elif (folder / "meta" / "info.json").is_file():
+        hint = "it is a data set, from which lerobot-train makes a checkpoint."
+    else:
+        hint = f"a checkpoint of LeRobot holds {', '.join(_FILES)}."
+    raise InvalidValueError(f"The folder {str(folder)!r} has no {missing[0]}; {hint}")
