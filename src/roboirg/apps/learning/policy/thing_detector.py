@@ -19,7 +19,7 @@ COLUMNS = 256
 GRID = ((ROWS[1] - ROWS[0]) // CELL, COLUMNS // CELL)
 CHANNELS = (16, 24, 40, 40)
 MOST_THINGS = 24
-LEAST_SCORE = 0.4
+LEAST_SCORE = 0.75
 PRESENT_WEIGHT = 30.0
 """Of a cell with a thing in the loss: most have none."""
 

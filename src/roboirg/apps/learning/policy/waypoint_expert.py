@@ -40,6 +40,7 @@ class Disturbance(NamedTuple):
         turn: of that about the vertical, rad.
         low: probability that a grasp or placement is moved, far enough to miss at times.
         miss: standard deviation of that in x and y, m.
+        stall: probability that a move is not made, but the tool stays where it is once.
     """
 
     free: float = 0.5
@@ -48,6 +49,7 @@ class Disturbance(NamedTuple):
     turn: float = 0.2
     low: float = 0.12
     miss: float = 0.025
+    stall: float = 0.06
 
 
 class ExpertWaypoint(NamedTuple):
@@ -83,6 +85,7 @@ class WaypointExpert(OraclePolicy):
         self.last: ExpertWaypoint | None = None
         self._gripper = OPEN
         self._primitives: _WaypointPrimitives | None = None
+        self._stalled: ExpertWaypoint | None = None
 
     def make_primitives(self, env: RoboIRGEnv) -> MotionPrimitives:
         """Return the expert that executes the stages, without the retry in a narrow grip."""
@@ -91,24 +94,28 @@ class WaypointExpert(OraclePolicy):
 
     def decide(self, env: RoboIRGEnv, instruction: str) -> Goal:
         """Return the episode's goal; the instruction is ignored."""
-        self._gripper = OPEN
+        self._gripper, self._stalled = OPEN, None
         self._rng = np.random.default_rng((env.episode.seed, self.seed))
         return super().decide(env, instruction)
 
     def act(self, observation: Observation) -> NDArray[np.floating[Any]]:  # noqa: ARG002
         """Return the next waypoint (1, 7), perhaps disturbed; `last` is the undisturbed one."""
-        while True:
-            staged = next(self._chunks, None)
-            if staged is None:
-                action = self._here(LEAVE)
-                self.last = ExpertWaypoint(action, None, "keep")
-                return action[None]
-            self.stage, chunk = staged
+        decided = self._stalled or self._next()
+        self._stalled = None
+        self.last = decided
+        how = self._disturbance
+        if how is not None and decided.action[-1] == LEAVE and self._rng.random() < how.stall:
+            self._stalled = decided
+            return self._here(LEAVE)[None]
+        return self._disturb(decided.action)[None]
+
+    def _next(self) -> ExpertWaypoint:
+        """Return the next decision; after the last one the tool stays where it is."""
+        for self.stage, chunk in self._chunks:
             decided = self._waypoint(chunk)
             if decided is not None:
-                break
-        self.last = decided
-        return self._disturb(decided.action)[None]
+                return decided
+        return ExpertWaypoint(self._here(LEAVE), None, "keep")
 
     def _waypoint(self, chunk: JointTrajectory) -> ExpertWaypoint | None:
         """Return the waypoint of a trajectory; None if it moves neither tool nor gripper."""
