@@ -147,26 +147,26 @@ COMMANDS = Commands(
                 "down and press the button."
             ),
             Wording(
-                "Move {color} from your right to your left target {repeats}, put "
-                "it down and press the button."
+                "Move {color} from your right to your left target {repeats}, then "
+                "put it down and press the button."
             ),
             Wording(
                 "Bring {color} from your right to your left target {repeats}, "
-                "set it down and press the button."
+                "then set it down and press the button."
             ),
         ),
         test=(
             Wording(
                 "Carry {color} from your right to your left target "
-                "{repeats}, lay it down and push the button."
+                "{repeats}, then set it down and push the button."
             ),
             Wording(
                 "Grab {color}, swing it from your right to your left target {repeats}, "
-                "lower it and push the button."
+                "put it down and press the button."
             ),
             Wording(
                 "Swing {color} from your right to your left target {repeats}, "
-                "put it down and push the button."
+                "then put it down and push the button."
             ),
         ),
     ),

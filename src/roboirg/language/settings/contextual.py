@@ -70,8 +70,8 @@ def discourse(
 
 
 def reinforcement(request: InstructionRequest) -> UtteranceSpec:
-    """Return one more remark on one of the referents."""
-    slot_type, goal_values = request.sampler.pick("reinforced", [*slot_types_in(request)])
+    """Return one more remark on the last one of the referents."""
+    *_, (slot_type, goal_values) = slot_types_in(request)
     template = request.pick(f"{slot_type.name} reinforcement", slot_type.reinforcements)
     pointing = slot_type.pointing(request, goal_values)
     remark = fill(template, {"ref": pointing}, plural=slot_type.plural(request, goal_values))

@@ -21,10 +21,10 @@ Pointer = tuple[str, Expression]
 """Words that point back, and their class."""
 FORMER: tuple[Pointer, ...] = (("the former", "former"), ("the latter", "latter"))
 RANKS: tuple[Pointer, ...] = (
-    ("the first of them", "first"), ("the second of them", "second"),
-    ("the third of them", "third"),
+    ("the first one I mentioned", "first"), ("the second one I mentioned", "second"),
+    ("the third one I mentioned", "third"),
 )  # fmt: skip
-"""With *of them*: "the third from your right" would be a place."""
+"""With *I mentioned*: "the third from your right" would be a place."""
 LISTS: Mapping[int, tuple[Pointer, ...]] = {2: FORMER, 3: RANKS}
 """For two or three introduced things, in their order."""
 
@@ -32,7 +32,7 @@ LISTS: Mapping[int, tuple[Pointer, ...]] = {2: FORMER, 3: RANKS}
 def singles(noun: str) -> tuple[Pointer, ...]:
     """Return the words for the only thing that was introduced; the natural ones come up more."""
     own: tuple[Pointer, ...] = (("it", "it"), (f"that {noun}", "that"))
-    return (*own, *own, ("the one I mentioned earlier", "one"))
+    return (*own, *own, ("the one I mentioned", "one"))
 
 
 class ColorReference(NamedTuple):
