@@ -76,18 +76,24 @@ COMMANDS = replace(
                     "Press both buttons, lift {colors.0}, set it down, and lift {colors.1}.",
                     2,
                 ),
-                Wording("Press both buttons, lift {colors.0}, put it back, then lift {colors.1}.", 2),
+                Wording(
+                    "Press both buttons, lift {colors.0}, put it back, then lift {colors.1}.", 2
+                ),
             ),
             test=(
                 Wording("Push both buttons, then raise {colors.0}."),
                 Wording("Push both buttons and pick up {colors.0}."),
                 Wording("Start by pushing both buttons, then raise {colors.0}."),
-                Wording("Push both buttons, raise {colors.0}, put it back, then raise {colors.1}.", 2),
+                Wording(
+                    "Push both buttons, raise {colors.0}, put it back, then raise {colors.1}.", 2
+                ),
                 Wording(
                     "Push both buttons, pick up {colors.0}, put it back and pick up {colors.1}.",
                     2,
                 ),
-                Wording("Push both buttons, raise {colors.0}, set it back, and raise {colors.1}.", 2),
+                Wording(
+                    "Push both buttons, raise {colors.0}, set it back, and raise {colors.1}.", 2
+                ),
             ),
         )
     ),

@@ -55,12 +55,12 @@ COMMANDS = Commands(
     wordings=Pools(
         train=(
             Wording("Think back to the video and put {color} on {relation}."),
-            Wording("You have seen the video: take {color} and put it on {relation}."),
+            Wording("You have seen the video, so put {color} on {relation}."),
             Wording("Going by the video, place {color} on {relation}."),
         ),
         test=(
             Wording("Going by what you saw, set {color} on {relation}."),
-            Wording("Keep the video in mind, grab {color} and place it on {relation}."),
+            Wording("Keep the video in mind and place {color} on {relation}."),
             Wording("You watched the video, so set {color} on {relation}."),
         ),
     ),

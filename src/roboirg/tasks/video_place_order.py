@@ -58,12 +58,12 @@ COMMANDS = Commands(
     wordings=Pools(
         train=(
             Wording("Think back to the video and put {color} on {placement}."),
-            Wording("You have seen the video: take {color} and put it on {placement}."),
+            Wording("You have seen the video, so put {color} on {placement}."),
             Wording("Going by the video, place {color} on {placement}."),
         ),
         test=(
             Wording("Going by what you saw, set {color} on {placement}."),
-            Wording("Keep the video in mind, grab {color} and place it on {placement}."),
+            Wording("Keep the video in mind and place {color} on {placement}."),
             Wording("You watched the video, so set {color} on {placement}."),
         ),
     ),

@@ -110,7 +110,7 @@ def _exclude_by_place(request: InstructionRequest) -> Derived:
 def _standing(request: InstructionRequest, words: templates.Comparative) -> str:
     """Return the comparison, with its time where things change places."""
     if any(isinstance(motion, Swap) for motion in request.episode.scene.motions):
-        return f"that was {words.words} at first"
+        return f"that started {words.words}"
     return words.words
 
 

@@ -42,9 +42,7 @@ def _exclude(request: InstructionRequest) -> Derived:
     return Derived(sentences(context), described(request, things), {"patterns": patterns})
 
 
-def _introduction(
-    request: InstructionRequest, colors: tuple[str, ...], *, shared: bool
-) -> Phrase:
+def _introduction(request: InstructionRequest, colors: tuple[str, ...], *, shared: bool) -> Phrase:
     known = derivations.SHARED_INTRODUCTIONS if shared else derivations.EXCLUDED_INTRODUCTIONS
     template = request.pick("pair introduction", known)
     words = " and ".join(colors)

@@ -54,8 +54,10 @@ def draw_pair(request: InstructionRequest, locate: Locate | None = None) -> Pair
     bits = draw_balanced(request, "rival order")
     kind, text, fill = _remark(request, points_at_meant=bits.second)
     pointers: tuple[templates.Pointers, ...] = (templates.RANKS,)
-    if slot in COLOR_SLOTS and kind in ("alone", "set aside"):  # next to another they are too long
-        pointers = (templates.RANKS, templates.RANKS, *templates.MENTIONED.of(request.pool))
+    if slot in COLOR_SLOTS:
+        pointers = (templates.ORDER if locate else templates.RANKS,) * 2
+        if kind in ("alone", "set aside"):  # next to another they are too long
+            pointers += templates.MENTIONED.of(request.pool)
     return PairDraw(
         pair,
         bits.first,

@@ -120,18 +120,14 @@ def _introduce(request: InstructionRequest, goal_values: tuple[GoalValue, ...]) 
 def _pointing(request: InstructionRequest, goal_values: tuple[GoalValue, ...]) -> Phrase:
     introduced = draw_reference(request, goal_values).introduced
     if len(introduced) == 1:
-        words = f"that {request.task.commands.colored}"
-        return anaphor(words, "that", goal_values[0].slot, goal_values[0].value)
-    return those(request, goal_values, introduced)
+        return anaphor("it", "it", goal_values[0].slot, goal_values[0].value)
+    return them(goal_values, introduced)
 
 
-def those(
-    request: InstructionRequest, goal_values: tuple[GoalValue, ...], introduced: tuple[str, ...]
-) -> Phrase:
+def them(goal_values: tuple[GoalValue, ...], introduced: tuple[str, ...]) -> Phrase:
     """Return a plural that refers to the things of all introduced colors."""
     slot = goal_values[0].slot if len(introduced) == len(goal_values) else REFERENCE
-    words = f"those {plural(request.task.commands.colored)}"
-    return anaphor(words, "them", slot, " and ".join(introduced))
+    return anaphor("them", "them", slot, " and ".join(introduced))
 
 
 def competing(request: InstructionRequest, goal_values: tuple[GoalValue, ...]) -> list[Phrase]:

@@ -59,7 +59,9 @@ EXCLUSIONS = Pools(
     train=(
         Exclusion("{thing}[|s] that [is|are] {excluded}", "neither of those", "neither {colors}"),
         Exclusion("{thing}[|s] that [is|are] {excluded}", "neither of them", "neither {colors}"),
-        Exclusion("{thing}[|s] that [is|are] {excluded}", "neither of those two", "neither {colors}"),
+        Exclusion(
+            "{thing}[|s] that [is|are] {excluded}", "neither of those two", "neither {colors}"
+        ),
         Exclusion(
             "{thing}[|s] that [is|are] {excluded}", "neither of those colors", "neither {colors}"
         ),
@@ -75,12 +77,18 @@ EXCLUSIONS = Pools(
 """For two colors."""
 SINGLE_EXCLUSIONS = Pools(
     train=(
-        Exclusion("{thing}[|s] of {excluded}", "a different color", "a color different from {colors}"),
+        Exclusion(
+            "{thing}[|s] of {excluded}", "a different color", "a color different from {colors}"
+        ),
         Exclusion("{thing}[|s] of {excluded}", "another color", "a color other than {colors}"),
     ),
     test=(
-        Exclusion("{thing}[|s] in {excluded}", "a different color", "a color different from {colors}"),
-        Exclusion("{thing}[|s] in {excluded}", "some other color", "some color other than {colors}"),
+        Exclusion(
+            "{thing}[|s] in {excluded}", "a different color", "a color different from {colors}"
+        ),
+        Exclusion(
+            "{thing}[|s] in {excluded}", "some other color", "some color other than {colors}"
+        ),
     ),
 )
 COMPLEMENT = "the {thing} in {other}"

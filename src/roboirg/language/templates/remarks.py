@@ -67,7 +67,7 @@ NEUTRAL_DISTRACTORS = Pools(
         NeutralRemark("Sorry, the radio is loud.", "the radio"),
         NeutralRemark("Oh, I dropped my pen.", "my pen"),
         NeutralRemark("Sorry, the printer is noisy.", "the printer"),
-        NeutralRemark("Sorry, somebody called me."),
+        NeutralRemark("Sorry, Grandma called."),
         NeutralRemark("Sorry, the dog is barking.", "the dog"),
         NeutralRemark("Oh, it is late already."),
         NeutralRemark("Sorry, this chair squeaks.", "this chair"),
