@@ -48,7 +48,8 @@ _SET_ASIDE = Phrases({
 _AND_ONE = Phrases({"now and the one that started": r"(?: now)? and the one (?:that started )?"})
 _REMAINING = Phrases({
     "I want the one that is left":
-        r"\bthe (?:(?:one|cube|container) that is left|(?:other|remaining) (?:one|cube|container))\b",
+        r"\bthe (?:one|cube|container) that is left\b",
+    "I want the remaining one": r"\bthe (?:other|remaining) (?:one|cube|container)\b",
 })  # fmt: skip
 _NEITHER = Phrases({
     "the cube that is neither closest to you nor closest to the button":

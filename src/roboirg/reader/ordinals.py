@@ -75,7 +75,7 @@ _POINTER = Phrases({
     "during the visit I mentioned": rf"\bthe {_NOUN} i\b",
 })  # fmt: skip
 _OTHER = Phrases({
-    "during the other visit": rf"\bthe other {_NOUN}\b",
+    "during the other visit": rf"\bthe (?:other|remaining) {_NOUN}\b",
     "during the other of the two visits":
         rf"\bthe other (?:one )?of (?:the two|those|these|them) {_NOUN}s?\b",
     "during the visit that is left": rf"\bthe {_NOUN} that is left\b",

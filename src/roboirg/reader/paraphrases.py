@@ -109,7 +109,7 @@ _RULES = Rewrites(
     r"away:: \b(furthest|farthest) away\b(?! from)=>\1 from you",
     r"most:: \bmost (?:on|to) (?:your|the) (?=left|right)=>farthest to your",
     r"favorite:: \b(VERB) my favorite(?: one| cube)?(?= on\b| in\b| over\b| and\b| [.]|$)=>\1 it",
-    r"remaining:: \bthe remaining (?=cube|one)=>the other",
+    r"remaining:: \bthe remaining (?=cube|one|box|tape)=>the other",
     r"containers them:: START((?:first )?CUBEMAYAND(?:first )?CUBEMAY)AND"
     r"(?:you )?(?:lift|pick up) (?:the )?containers?(?: over them)?(?: in that order)?STOP"
     r"=>lift the container over \1",

@@ -97,8 +97,8 @@ COMMANDS = replace(
             ),
         )
     ),
-    by_place="the container over the cube that is {place} now",
-    things_at="the cube that is {place} now",
+    by_place="the container over the cube {place} now",
+    things_at="the cube {place} now",
 )
 
 TASK = Task(

@@ -147,18 +147,18 @@ COMMANDS = Commands(
                 "down and press the button."
             ),
             Wording(
-                "Move {color} from your right to your left target {repeats}, then "
-                "put it down and press the button."
+                "Move {color} from your right to your left target {repeats}, put "
+                "it down and press the button."
             ),
             Wording(
                 "Bring {color} from your right to your left target {repeats}, "
-                "then set it down and press the button."
+                "set it down and press the button."
             ),
         ),
         test=(
             Wording(
                 "Carry {color} from your right to your left target "
-                "{repeats}, then set it down and push the button."
+                "{repeats}, set it down and push the button."
             ),
             Wording(
                 "Grab {color}, swing it from your right to your left target {repeats}, "
@@ -166,7 +166,7 @@ COMMANDS = Commands(
             ),
             Wording(
                 "Swing {color} from your right to your left target {repeats}, "
-                "then put it down and push the button."
+                "put it down and push the button."
             ),
         ),
     ),

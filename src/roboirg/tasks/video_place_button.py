@@ -55,7 +55,7 @@ COMMANDS = Commands(
     wordings=Pools(
         train=(
             Wording("Think back to the video and put {color} on {relation}."),
-            Wording("You have seen the video, so put {color} on {relation}."),
+            Wording("You saw the video, so put {color} on {relation}."),
             Wording("Going by the video, place {color} on {relation}."),
         ),
         test=(

@@ -58,7 +58,7 @@ COMMANDS = Commands(
     wordings=Pools(
         train=(
             Wording("Think back to the video and put {color} on {placement}."),
-            Wording("You have seen the video, so put {color} on {placement}."),
+            Wording("You saw the video, so put {color} on {placement}."),
             Wording("Going by the video, place {color} on {placement}."),
         ),
         test=(

@@ -35,7 +35,7 @@ COMMANDS = replace(
             train=(
                 Wording("Think back to the video and lift {colors.0}."),
                 Wording("Going by the video, lift {colors.0}."),
-                Wording("You have seen the video, so lift {colors.0}."),
+                Wording("You saw the video, so lift {colors.0}."),
                 Wording("Lift {colors.0}, set it down, then lift {colors.1}.", 2),
                 Wording("Lift {colors.0}, put it down, and then lift {colors.1}.", 2),
                 Wording("First lift {colors.0}, put it down, then lift {colors.1}.", 2),

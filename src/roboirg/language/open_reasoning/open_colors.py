@@ -84,7 +84,7 @@ def _exclude_by_place(request: InstructionRequest) -> Derived:
     assert found is not None  # noqa: S101 - `_allows_place`
     excluded, left = found
     possible = _comparatives(request, left)
-    if any("left" in one.text for one in request.task.commands.wordings.everything):
+    if request.task.commands.names_sides:
         # "Further to your left from your right" is hard to hear.
         possible = [one for one in possible if one.axis == 0] or possible
     chosen = request.sampler.pick("comparative", possible)

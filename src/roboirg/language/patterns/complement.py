@@ -74,7 +74,7 @@ def _fields(request: InstructionRequest, pair: ValuePair, order: tuple[int, int]
     if meant.slot == "counts":
         (shade,) = request.color_values
         # The plural fits any number.
-        return amount.amounts([(*words, *plain(" of the "), *amount.cubes(shade, 2))])
+        return amount.amounts([(*words, *plain(" of "), *amount.cubes(shade, 2))])
     if kind == "number":
         return {meant.field: request.around(meant.field, words)}
     return wrapped(request, meant, words)

@@ -55,7 +55,7 @@ def draw_pair(request: InstructionRequest, locate: Locate | None = None) -> Pair
     kind, text, fill = _remark(request, points_at_meant=bits.second)
     pointers: tuple[templates.Pointers, ...] = (templates.RANKS,)
     if slot in COLOR_SLOTS:
-        pointers = (templates.ORDER if locate else templates.RANKS,) * 2
+        pointers = (templates.ORDER if locate else templates.RANKS, templates.ORDER)
         if kind in ("alone", "set aside"):  # next to another they are too long
             pointers += templates.MENTIONED.of(request.pool)
     return PairDraw(

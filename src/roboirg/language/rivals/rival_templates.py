@@ -124,7 +124,7 @@ MOMENT_PAIRS = Pools(
         "Think of the moments {things}.",
         "We talked about the moments {things}.",
         "I am thinking of the moments {things}.",
-        "I watched the moments {things}.",
+        "My kids liked the moments {things}.",
     ),
     test=(
         "I considered the moments {things}.",
@@ -246,7 +246,7 @@ CHOICES: dict[ReferenceKind, tuple[Pools[str], Pools[str]]] = {
     "correction": (
         Pools(
             train=("Sorry, I mean {yes}, not {no}.", "Actually, I want {yes}, not {no}."),
-            test=("In the end, I chose {yes} over {no}.", "I finally chose {yes} over {no}."),
+            test=("I now prefer {yes} to {no}.", "I finally chose {yes} over {no}."),
         ),
         Pools(
             train=("I mean {no} - no, {yes}.", "Let's use {no} - no, {yes}."),
@@ -260,7 +260,7 @@ A *no* that takes back is in training alone, *from X to Y* and *X over Y* are fo
 """
 
 CLAUSES = Pools(
-    train=("I mean", "I want", "I would like", "I need"),
-    test=("I chose", "I picked", "I went with", "I have chosen"),
+    train=("I mean", "I want", "I prefer", "I need"),
+    test=("I chose", "I picked", "I have chosen", "I have picked"),
 )
 """Follow the noun in the command: *the cube I mean*."""

@@ -79,7 +79,7 @@ def _reduced(request: InstructionRequest, goal_values: tuple[GoalValue, ...]) ->
         ((words, expression),) = _color_reference(request, goal_values).pointers
         ((shade, _),) = matched
         thing = anaphor(
-            f"of {words.replace(' one I mentioned', ' color')}", expression, shade.slot, shade.value
+            f"of {words.replace(' one', ' color')}", expression, shade.slot, shade.value
         )
         return _described(request, goal_values, [thing])
     pointers = THEM if len(matched) == 1 else color.LISTS[len(matched)]

@@ -21,10 +21,8 @@ Pointer = tuple[str, Expression]
 """Words that point back, and their class."""
 FORMER: tuple[Pointer, ...] = (("the former", "former"), ("the latter", "latter"))
 RANKS: tuple[Pointer, ...] = (
-    ("the first one I mentioned", "first"), ("the second one I mentioned", "second"),
-    ("the third one I mentioned", "third"),
+    ("the first one", "first"), ("the second one", "second"), ("the third one", "third"),
 )  # fmt: skip
-"""With *I mentioned*: "the third from your right" would be a place."""
 LISTS: Mapping[int, tuple[Pointer, ...]] = {2: FORMER, 3: RANKS}
 """For two or three introduced things, in their order."""
 
@@ -60,14 +58,23 @@ def draw_reference(
         if len(colors) == 1:
             single = single or singles(request.task.commands.colored)
             return ColorReference(colors, (request.sampler.pick("color anaphor", single),))
-        return ColorReference(colors, LISTS[len(colors)])
+        return ColorReference(colors, _pointers(request, len(colors)))
     size = request.sampler.pick("list length", sizes)
     others = [color for color in request.scene_colors if color not in colors]
     left = next(request.sampler.cycle("listed colors", list(itertools.permutations(others))))
     members = [*colors, *left[: size - len(colors)]]
     order = request.sampler.pick("list order", list(itertools.permutations(range(size))))
     introduced = tuple(members[at] for at in order)
-    return ColorReference(introduced, tuple(LISTS[size][introduced.index(one)] for one in colors))
+    pointers = _pointers(request, size)
+    return ColorReference(introduced, tuple(pointers[introduced.index(one)] for one in colors))
+
+
+def _pointers(request: InstructionRequest, size: int) -> tuple[Pointer, ...]:
+    """Return the words for two or three listed things."""
+    if size == len(RANKS) and request.task.commands.names_sides:
+        # "The third one from your right" would be a place.
+        return tuple((words.replace("one", "of them"), expression) for words, expression in RANKS)
+    return LISTS[size]
 
 
 def introduce_colors(

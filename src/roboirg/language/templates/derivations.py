@@ -103,18 +103,18 @@ TAKEN_REMARKS = Pools(
 OTHERS = {
     "color": Pools(
         train=("the other {noun}", "the other one"),
-        test=("the other of the two {nouns}", "the other of those {nouns}"),
+        test=("the other of the two {nouns}", "the remaining {noun}"),
     ),
     "amount": Pools(train=("of the other {noun}",), test=("of the others",)),
     "number": Pools(train=("the other number of times",), test=("the other number of times",)),
     "count": Pools(train=("the other number",), test=("the other number",)),
     "visit": Pools(
         train=("the other {noun}",),
-        test=("the other of those {nouns}",),
+        test=("the remaining {noun}",),
     ),
     "placement": Pools(
         train=("the other {noun}",),
-        test=("the other of those {nouns}",),
+        test=("the remaining {noun}",),
     ),
 }
 """The value that is left, by kind of words."""

@@ -131,13 +131,13 @@ MOMENT_INTRODUCTIONS = Pools(
     train=(
         "Think of what happened {moment}.",
         "The video shows a placement {moment}.",
-        "I am thinking of the moment {moment}.",
+        "Think of the moment {moment}.",
         "I watched closely {moment}.",
     ),
     test=(
         "Remember the moment {moment}.",
         "The moment {moment} is important.",
-        "In the video I paid attention {moment}.",
+        "I watched what happened {moment}.",
         "What happened {moment} matters.",
     ),
 )
