@@ -23,7 +23,7 @@ _WHEN = f"(?:(?:that )?{_FIRST}(?:is |was )?(?:now )?)?"
 _HAS = f"that {_FIRST}(?:now )?(?:has|had)"
 _IN_A_ROW = Phrases({
     "the cube in the middle from left to right":
-        rf"the {_NOUN} {_WHEN}(?:comes )?in the middle(?: now)?(?: , counted)? from "
+        rf"the {_NOUN} {_WHEN}(?:comes )?(?:in the middle|as the middle one)(?: now)? from "
         r"(?P<way>left to right|near to far)\b",
     "the middle cube from left to right":
         r"the middle (?P<cube>cube|container)(?: now)? from "

@@ -88,7 +88,6 @@ _SAME = Phrases({
         r"\b(?:my (?:\w+ )?|the (?:right|correct|chosen|selected|preferred|desired|agreed|final) )"
         r"number of\b",
     "the number of times I mentioned": r"\bthe number of times(?= i\b)",
-    "the number of red cubes I want": rf"\bthe number of(?= {COLOR} {THINGS} i\b)",
 })  # fmt: skip
 _REMAINING = Phrases({
     "the other number of times": r"\bthe other number\b(?: of times)?",

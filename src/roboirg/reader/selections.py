@@ -23,14 +23,14 @@ _POINTER = Phrases({
     "I want the former.": r"\bthe (?P<rank>former|latter)\b(?: one)?",
     "I want the first color I mentioned.":
         rf"\bthe (?P<ordinal>first|second|last) (?:ones?|\w+){_SAID}\b",
-    "I want the second one.": rf"\bthe (?P<bare>first|second) ones?\b(?!{_SAID}\b| from\b)",
+    "I want the second one.": rf"\bthe (?P<bare>first|second|1st|2nd) ones?\b(?!{_SAID}\b| from\b)",
     "I want the one I mentioned first.":
-        rf"\bthe (?:ones?|\w+){_SAID} (?P<time>first|earlier|second|last|later)\b",
+        rf"\bthe (?:ones?|\w+){_SAID} (?P<time>first|earlier|second|1st|2nd|last|later)\b",
     "I want the other one.":
         r"\bthe (?P<other>other)(?: (?:ones?|cubes?|box|tape|container|place|number|visit"
         r"|placement|moment))?\b",
 })  # fmt: skip
-_FIRST = ("former", "first", "earlier")
+_FIRST = ("former", "first", "1st", "earlier")
 _ACCEPTED = Phrases(
     {
         "Why not": "why not",
@@ -68,7 +68,8 @@ _REJECTED = Phrases(
 )  # fmt: skip
 """Ways to set a pointer aside by the words before it, unless they accept it."""
 _REJECTED_AFTER = Phrases({
-    ", no, the latter": "^(?:[,;] )?no [,;]",
+    ", no, the latter": "^(?:[,;] )?(?:no|sorry) [,;]",
+    "the former, or rather": "^(?:[,;] )?or rather$",
     "is out of the question": r"^(?:is|are|was) (?:definitely )?(?:out|not|off)\b",
     "less than the latter": "^less than",
 })  # fmt: skip

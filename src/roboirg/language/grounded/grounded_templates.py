@@ -30,8 +30,8 @@ STOOD = Standing(started="that started ")
 MIDDLE = Pools(
     train=("the middle {noun}{now} from {way}", "the {noun} {started}in the middle from {way}"),
     test=(
-        "the {noun} that comes in the middle{now}, counted from {way}",
-        "the {noun} {started}in the middle, counted from {way}",
+        "the {noun} that comes in the middle{now} from {way}",
+        "the {noun} {started}as the middle one from {way}",
     ),
 )
 """In the middle of a row: for what stands there, and for what stood there."""

@@ -93,8 +93,8 @@ COMBINATIONS: Mapping[str, Pools[str]] = {
 }
 """The first step of a calculation."""
 NUMBERS = Pools(
-    train=("those numbers", "these numbers", "the numbers", "the two numbers"),
-    test=("them", "these", "the two", "these two"),
+    train=("those numbers", "these numbers", "the numbers", "those"),
+    test=("them", "these", "the values", "these values"),
 )
 CALCULATIONS = Pools(
     train=("{steps}.", "Now {steps}.", "Let's {steps}.", "First {steps}."),

@@ -177,12 +177,14 @@ def _chosen_fields(request: InstructionRequest, draw: PairDraw) -> Fields:
 
 
 def _counted(request: InstructionRequest, draw: PairDraw) -> Fields:
-    """Return ``the number of red cubes I want``; resolved, ``two red cubes``."""
+    """Return ``the right number of red cubes``; resolved, ``two red cubes``."""
     meant, (color,) = draw.pair.meant, request.color_values
-    if request.resolved:
-        number = antecedent(cardinal(meant.number), meant.slot, meant.value)
-        return amount.amounts([amount.amount(number, amount.cubes(color, meant.number))])
-    clause = request.pick("rival clause", templates.CLAUSES)
-    number = anaphor("the number of", "choice", meant.slot, meant.value)
+    words = request.pick("rival number", templates.NUMBERS_OF)
+    number = (
+        antecedent(cardinal(meant.number), meant.slot, meant.value)
+        if request.resolved
+        else anaphor(words, "choice", meant.slot, meant.value)
+    )
     # The plural fits any number that is not named.
-    return amount.amounts([(*amount.amount(number, amount.cubes(color, 2)), *plain(f" {clause}"))])
+    count = meant.number if request.resolved else 2
+    return amount.amounts([amount.amount(number, amount.cubes(color, count))])

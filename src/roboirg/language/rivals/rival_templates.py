@@ -69,7 +69,7 @@ PLACE_PAIRS = Pools(
         "I found {things}.",
         "I was talking about {things}.",
         "I have noticed {things}.",
-        "I had {things} in mind.",
+        "I have in mind {things}.",
         "I was pointing at {things}.",
         "{things} stand out.",
         "{things} look nice.",
@@ -115,7 +115,7 @@ ELEMENT_PAIRS = Pools(
         "{things} are possible.",
         "Think of {things}.",
         "Grandpa mentioned {things}.",
-        "I had {things} in mind.",
+        "I have in mind {things}.",
     ),
 )
 """For visits and placements."""
@@ -130,7 +130,7 @@ MOMENT_PAIRS = Pools(
         "I considered the moments {things}.",
         "The moments {things} are possible.",
         "Remember the moments {things}.",
-        "I had the moments {things} in mind.",
+        "I have in mind the moments {things}.",
     ),
 )
 PAIR_REINFORCEMENTS = Pools(
@@ -245,18 +245,21 @@ CHOICES: dict[ReferenceKind, tuple[Pools[str], Pools[str]]] = {
     ),
     "correction": (
         Pools(
-            train=("Sorry, I mean {yes}, not {no}.", "Actually, I want {yes}, not {no}."),
+            train=(
+                "Sorry, I mean {yes} instead of {no}.",
+                "Actually, I want {yes} instead of {no}.",
+            ),
             test=("I now prefer {yes} to {no}.", "I finally chose {yes} over {no}."),
         ),
         Pools(
-            train=("I mean {no} - no, {yes}.", "Let's use {no} - no, {yes}."),
+            train=("I mean {no} - sorry, {yes}.", "Let's use {no} - or rather {yes}."),
             test=("I switched from {no} to {yes}.", "I considered {no} and then chose {yes}."),
         ),
     ),
 }
 """Remarks with both fields: those with the meant value first, and those with it last.
 
-A *no* that takes back is in training alone, *from X to Y* and *X over Y* are for tests.
+*Sorry* and *or rather* are in training alone, *from X to Y* and *X over Y* are for tests.
 """
 
 CLAUSES = Pools(
@@ -264,3 +267,18 @@ CLAUSES = Pools(
     test=("I chose", "I picked", "I have chosen", "I have picked"),
 )
 """Follow the noun in the command: *the cube I mean*."""
+NUMBERS_OF = Pools(
+    train=(
+        "the right number of",
+        "the agreed number of",
+        "the desired number of",
+        "my number of",
+    ),
+    test=(
+        "the chosen number of",
+        "the correct number of",
+        "the final number of",
+        "the selected number of",
+    ),
+)
+"""For a number of cubes: *the right number of red cubes*."""
