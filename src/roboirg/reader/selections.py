@@ -22,7 +22,7 @@ _SAID = r"(?: that)? i (?:just )?(?:mentioned|named|said|listed)"
 _POINTER = Phrases({
     "I want the former.": r"\bthe (?P<rank>former|latter)\b(?: one)?",
     "I want the first color I mentioned.":
-        rf"\bthe (?P<ordinal>first|second|last) (?:ones?|\w+){_SAID}\b",
+        rf"\bthe (?P<ordinal>first|second|1st|2nd|last) (?:ones?|\w+){_SAID}\b",
     "I want the second one.": rf"\bthe (?P<bare>first|second|1st|2nd) ones?\b(?!{_SAID}\b| from\b)",
     "I want the one I mentioned first.":
         rf"\bthe (?:ones?|\w+){_SAID} (?P<time>first|earlier|second|1st|2nd|last|later)\b",
@@ -69,7 +69,7 @@ _REJECTED = Phrases(
 """Ways to set a pointer aside by the words before it, unless they accept it."""
 _REJECTED_AFTER = Phrases({
     ", no, the latter": "^(?:[,;] )?(?:no|sorry) [,;]",
-    "the former, or rather": "^(?:[,;] )?or rather$",
+    "or rather": "^(?:[,;] )?or rather$",
     "is out of the question": r"^(?:is|are|was) (?:definitely )?(?:out|not|off)\b",
     "less than the latter": "^less than",
 })  # fmt: skip
