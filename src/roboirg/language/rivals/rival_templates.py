@@ -246,7 +246,7 @@ CHOICES: dict[ReferenceKind, tuple[Pools[str], Pools[str]]] = {
     "correction": (
         Pools(
             train=(
-                "Sorry, I mean {yes} instead of {no}.",
+                "I actually mean {yes} instead of {no}.",
                 "Actually, I want {yes} instead of {no}.",
             ),
             test=("I now prefer {yes} to {no}.", "I finally chose {yes} over {no}."),

@@ -188,7 +188,7 @@ PLACE_INTRODUCTIONS = Pools(
         "I decided on {things}.",
         "I was pointing at {things}.",
         "I have decided on {things}.",
-        "My choice [is|are] {things}.",
+        "My choice[|s] [is|are] {things}.",
         "I am looking for {things}.",
         "I settled on {things}.",
         "I asked about {things}.",

@@ -89,7 +89,7 @@ NEUTRAL_DISTRACTORS = Pools(
         NeutralRemark("Ah, Mom called."),
         NeutralRemark("Ah, the soup is ready.", "the soup"),
         NeutralRemark("Ah, a cat meowed.", "a cat"),
-        NeutralRemark("Hm, I sneezed."),
+        NeutralRemark("Hm, Ella called."),
         NeutralRemark("Ah, the clock is slow.", "the clock"),
         NeutralRemark("Ah, my pencil fell.", "my pencil"),
         NeutralRemark("Hm, the fridge is empty.", "the fridge"),
@@ -169,16 +169,16 @@ COMPETING_MOMENT_DISTRACTORS = Pools(
 CUES = Pools(
     train=(
         "Now, please help.",
-        "So, to work.",
+        "Here is the job.",
         "Okay, please help.",
         "So, please help.",
-        "Anyway, to work.",
+        "Anyway, please help.",
     ),
     test=(
         "Anyway, here goes.",
         "Well, here goes.",
-        "Now to my plan.",
-        "Well, to business.",
+        "Now to my request.",
+        "Okay, here goes.",
         "Now, my request.",
     ),
 )
