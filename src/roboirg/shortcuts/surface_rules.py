@@ -89,7 +89,7 @@ def take_unnamed(words: SlotWords) -> list[Candidates]:
 def take_by_cues(words: SlotWords) -> list[Candidates]:
     """Choose among four rules by key words of the command and of what points at one of two values.
 
-    *The former*, *the third of them* in the command: the values at those places. *Other* or *left*
+    *The former*, *the third one* in the command: the values at those places. *Other* or *left*
     after a value that is named again: of the values, the first one that is not that. After a
     pointer, such as *former* or *latter*, the value at its place, and then the other one.
     *Other*, *different*, *not* or *neighbor*: the value that is not named, then the one that is

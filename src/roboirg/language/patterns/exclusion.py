@@ -56,7 +56,7 @@ def _excluding(request: InstructionRequest, target: GoalValue, colors: tuple[str
     excluded = (
         antecedent(resolved.format(colors=" nor ".join(colors)), REFERENCE, " and ".join(colors))
         if request.resolved
-        else anaphor(words, "pair" if len(colors) > 1 else "other", REFERENCE, " and ".join(colors))
+        else anaphor(words, "pair" if len(colors) > 1 else "that", REFERENCE, " and ".join(colors))
     )
     article = "" if request.values_of("amount") else "the "
     return _thing(request, target, f"{article}{frame}", {"excluded": excluded})

@@ -121,11 +121,14 @@ def _pointed(
     if request.wordings is None and stands_last:
         # "That one over there": the noun is that of the introduction.
         noun = stands_last["noun"]
-        words = request.sampler.pick("noun there", (noun, "one", f"{noun} over", "one over"))
+        words = request.sampler.pick(
+            "noun there",
+            (f"the {noun}", "that one", f"that {noun} over", "the one over"),
+        )
         place = (
             antecedent(f"the {noun} {landmark.phrase}", *_of(color))
             if request.resolved
-            else anaphor(f"that {words} there", expression, *_of(color))
+            else anaphor(f"{words} there", expression, *_of(color))
         )
         template = stands_last["before"] + "{place}"
     return request.by_place(color, place, plural=request.count_of(color) > 1, template=template)

@@ -30,7 +30,7 @@ LISTS: Mapping[int, tuple[Pointer, ...]] = {2: FORMER, 3: RANKS}
 def singles(noun: str) -> tuple[Pointer, ...]:
     """Return the words for the only thing that was introduced; the natural ones come up more."""
     own: tuple[Pointer, ...] = (("it", "it"), (f"that {noun}", "that"))
-    return (*own, *own, ("the one I mentioned", "one"))
+    return (*own, *own, ("the one I mentioned earlier", "one"))
 
 
 class ColorReference(NamedTuple):

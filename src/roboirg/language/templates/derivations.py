@@ -60,35 +60,27 @@ EXCLUSIONS = Pools(
         Exclusion("{thing}[|s] that [is|are] {excluded}", "neither of those", "neither {colors}"),
         Exclusion("{thing}[|s] that [is|are] {excluded}", "neither of them", "neither {colors}"),
         Exclusion(
-            "{thing}[|s] that [is|are] {excluded}", "neither of those two", "neither {colors}"
-        ),
-        Exclusion(
             "{thing}[|s] that [is|are] {excluded}", "neither of those colors", "neither {colors}"
         ),
+        Exclusion("{thing}[|s] whose color is {excluded}", "not in that pair", "neither {colors}"),
     ),
     test=(
         Exclusion("{thing}[|s] that [is|are] {excluded}", "neither of these", "neither {colors}"),
         Exclusion("{thing}[|s] that [is|are] {excluded}", "neither of the two", "neither {colors}"),
-        Exclusion(
-            "{thing}[|s] that [is|are] {excluded}", "neither of these colors", "neither {colors}"
-        ),
+        Exclusion("{thing}[|s] in a color {excluded}", "not in that pair", "neither {colors}"),
     ),
 )
 """For two colors."""
+_DIFFERENT = ("different from that", "different from {colors}")
+_OTHER_THAN = ("other than that", "other than {colors}")
 SINGLE_EXCLUSIONS = Pools(
     train=(
-        Exclusion(
-            "{thing}[|s] of {excluded}", "a different color", "a color different from {colors}"
-        ),
-        Exclusion("{thing}[|s] of {excluded}", "another color", "a color other than {colors}"),
+        Exclusion("{thing}[|s] whose color is {excluded}", *_DIFFERENT),
+        Exclusion("{thing}[|s] of a color {excluded}", *_OTHER_THAN),
     ),
     test=(
-        Exclusion(
-            "{thing}[|s] in {excluded}", "a different color", "a color different from {colors}"
-        ),
-        Exclusion(
-            "{thing}[|s] in {excluded}", "some other color", "some color other than {colors}"
-        ),
+        Exclusion("{thing}[|s] in a color {excluded}", *_DIFFERENT),
+        Exclusion("{thing}[|s] in a color {excluded}", *_OTHER_THAN),
     ),
 )
 COMPLEMENT = "the {thing} in {other}"
