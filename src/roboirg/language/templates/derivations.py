@@ -67,7 +67,9 @@ EXCLUSIONS = Pools(
     test=(
         Exclusion("{thing}[|s] that [is|are] {excluded}", "neither of these", "neither {colors}"),
         Exclusion("{thing}[|s] that [is|are] {excluded}", "neither of the two", "neither {colors}"),
-        Exclusion("{thing}[|s] in a color {excluded}", "not in that pair", "neither {colors}"),
+        Exclusion(
+            "{thing}[|s] with a color that is {excluded}", "not in that pair", "neither {colors}"
+        ),
     ),
 )
 """For two colors."""
