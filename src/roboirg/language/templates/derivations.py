@@ -29,9 +29,9 @@ SHARED_INTRODUCTIONS = Pools(
     ),
     test=(
         "My friends like {colors}.",
-        "Mom paints with {colors}.",
-        "I thought about {colors}.",
-        "The twins want {colors}.",
+        "Mom likes {colors}.",
+        "Tom wants {colors}.",
+        "My kids want {colors}.",
     ),
 )
 """For two colors of which one is handled, too: dislikes would contradict that."""
@@ -68,7 +68,7 @@ EXCLUSIONS = Pools(
         Exclusion("{thing}[|s] that [is|are] {excluded}", "neither of these", "neither {colors}"),
         Exclusion("{thing}[|s] that [is|are] {excluded}", "neither of the two", "neither {colors}"),
         Exclusion(
-            "{thing}[|s] with a color that is {excluded}", "not in that pair", "neither {colors}"
+            "{thing}[|s] in a color {excluded}", "not in that pair", "that is neither {colors}"
         ),
     ),
 )
