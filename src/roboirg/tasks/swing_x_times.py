@@ -143,7 +143,7 @@ COMMANDS = Commands(
     wordings=Pools(
         train=(
             Wording(
-                "Swing {color} from your right to your left target {repeats}, then put it "
+                "Swing {color} from your right to your left target {repeats}, put it "
                 "down and press the button."
             ),
             Wording(

@@ -25,7 +25,7 @@ COMMANDS = unmask.hidden_commands(
         train=(
             Wording("Think back to the video and lift {colors.0}."),
             Wording("Going by the video, lift {colors.0}."),
-            Wording("You saw the video, so lift {colors.0}."),
+            Wording("Remember the video and lift {colors.0}."),
             Wording("First lift {colors.0}, put it down, then lift {colors.1}.", 2),
             Wording("Lift {colors.0}, put it down, then lift {colors.1}.", 2),
             Wording("Lift {colors.0}, set it down, and lift {colors.1}.", 2),

@@ -35,7 +35,7 @@ COMMANDS = replace(
             train=(
                 Wording("Think back to the video and lift {colors.0}."),
                 Wording("Going by the video, lift {colors.0}."),
-                Wording("You saw the video, so lift {colors.0}."),
+                Wording("Remember the video and lift {colors.0}."),
                 Wording("Lift {colors.0}, set it down, then lift {colors.1}.", 2),
                 Wording("Lift {colors.0}, put it down, and then lift {colors.1}.", 2),
                 Wording("First lift {colors.0}, put it down, then lift {colors.1}.", 2),
@@ -43,7 +43,7 @@ COMMANDS = replace(
             test=(
                 Wording("Keep the video in mind and raise {colors.0}."),
                 Wording("Going by what you saw, raise {colors.0}."),
-                Wording("You saw the video, so pick up {colors.0}."),
+                Wording("Consider the video and pick up {colors.0}."),
                 Wording("Raise {colors.0}, put it back, then raise {colors.1}.", 2),
                 Wording("Pick up {colors.0}, put it back, then pick up {colors.1}.", 2),
                 Wording("First raise {colors.0}, set it back, then raise {colors.1}.", 2),

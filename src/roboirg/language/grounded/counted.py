@@ -76,8 +76,8 @@ def _beside(request: InstructionRequest, number: GoalValue, axis: str, color: st
         return None
     noun = "cube" if alike else f"{color} cube"
     said = templates.BESIDE.of(request.pool)[added]
-    words, counted = (one.format(cube=noun, side=templates.SIDES[axis, sign]) for one in said)
-    return Clue("counts", words, short=counted)
+    words, short = (one.format(cube=noun, side=templates.SIDES[axis, sign]) for one in said)
+    return Clue("counts", words, short=short)
 
 
 def _at_last(request: InstructionRequest, item: SceneObject) -> SceneObject:

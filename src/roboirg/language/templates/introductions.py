@@ -15,7 +15,7 @@ COLOR_INTRODUCTIONS = Pools(
     ),
     test=(
         "My favorite[|s] [is|are] {things}.",
-        "I am fond of {things}.",
+        "I enjoy {things}.",
         "{things} caught my eye.",
         "My son likes {things}.",
         "Look at {things}.",
@@ -24,18 +24,18 @@ COLOR_INTRODUCTIONS = Pools(
 )
 NUMBER_INTRODUCTIONS = Pools(
     train=(
-        "Yesterday we practiced {times}.",
+        "Yesterday we tried {times}.",
         "My sister did this {times}.",
         "You did this {times}.",
         "Dad tried this {times}.",
         "We did this {times}.",
     ),
     test=(
-        "We rehearsed this {times}.",
+        "We tested this {times}.",
         "My brother did this {times}.",
         "You tried this {times}.",
         "Mom tried this {times}.",
-        "My friend managed this {times}.",
+        "Tom did this {times}.",
     ),
 )
 AMOUNT_INTRODUCTIONS = Pools(
