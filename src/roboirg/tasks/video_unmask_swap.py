@@ -43,7 +43,7 @@ COMMANDS = replace(
             test=(
                 Wording("Keep the video in mind and raise {colors.0}."),
                 Wording("Going by what you saw, raise {colors.0}."),
-                Wording("Consider the video and pick up {colors.0}."),
+                Wording("Watch the video and pick up {colors.0}."),
                 Wording("Raise {colors.0}, put it back, then raise {colors.1}.", 2),
                 Wording("Pick up {colors.0}, put it back, then pick up {colors.1}.", 2),
                 Wording("First raise {colors.0}, set it back, then raise {colors.1}.", 2),
