@@ -213,7 +213,7 @@ def _number(words: Sentence, place: int, *, ordinals: bool, counts: bool) -> int
     differences = COMPARISONS | STEPS if ordinals else COMPARISONS
     before = words[place - 1] if place else ""
     is_pronoun = (
-        before in POINTING
+        (before in POINTING and following[:1] != ("times",))  # "we tried this three times"
         or ordinal_of(before) is not None
         or (not counts and following[:1] == ("of",) and not PRONOUNS.isdisjoint(following))
     )

@@ -24,7 +24,7 @@ ONLY_ORDINAL = frozenset({"before", "after", "following", "preceding"})
 TOTALS = frozenset({"total", "sum", "together"})
 DIFFERENCES = frozenset({"difference", "gap"})
 """Made of two named numbers. A rule takes one step: it does not go on to *one fewer than that*."""
-REST = frozenset({"other", "others", "left"})
+REST = frozenset({"other", "others", "left", "remaining"})
 """Words for what remains when one of two is taken."""
 PAIR = 2
 _REACH = 2
