@@ -3,7 +3,7 @@
 PYTHON := .venv/bin/python
 
 .DEFAULT_GOAL := help
-.PHONY: help setup test test-slow test-all integrations lint docs demo card clean
+.PHONY: help setup test test-slow test-all every-test integrations lint docs demo card clean
 
 help: ## list the targets
 	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):.*## /  make \1\t/' | expand -t 21
@@ -17,8 +17,9 @@ lint: setup ## ruff and mypy
 	$(PYTHON) -m mypy
 
 # Two workers: every one that renders takes a core and 0.5 GiB. What the tests of a file make for
-# all of them is made once. scripts/test_costs.py reads the report.
-PYTEST = $(PYTHON) -m pytest -n 2 --dist loadfile --junitxml build/$@.xml
+# all of them is made once. tests/conftest.py has the order of the files; scripts/test_costs.py
+# reads the report.
+PYTEST = $(PYTHON) -m pytest -n 2 --dist loadfile --no-loadscope-reorder --junitxml build/$@.xml
 
 test: lint ## lint, then every test but the slow ones
 	$(PYTEST) -m "not slow"
@@ -26,7 +27,9 @@ test: lint ## lint, then every test but the slow ones
 test-slow: setup ## the slow tests alone
 	$(PYTEST) -m slow
 
-test-all: lint ## lint, then every test
+test-all: lint every-test ## lint, then every test; both at once with --jobs 2
+
+every-test: setup
 	$(PYTEST)
 
 integrations: ## the plug-ins in the real LeRobot, vla-eval and Inspect, in environments of their own

@@ -1,12 +1,15 @@
-"""Shared by all tests: Hypothesis's profile, a cache that starts empty, Ctrl-C, a browser."""
+"""Shared by all tests: Hypothesis's profile, caches that start empty, Ctrl-C, a browser."""
 
 from __future__ import annotations
 
+import functools
 import gc
+import importlib.metadata
 import os
 import shutil
 import signal
 import subprocess
+import sys
 import tempfile
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, ExitStack, contextmanager
@@ -22,12 +25,28 @@ settings.register_profile(
 )
 settings.load_profile("roboirg")
 
+# What a session compiles is kept, even where the environment asks for no bytecode: both workers
+# and the hundreds of processes that tests start would compile the same modules.
+os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
+sys.dont_write_bytecode = False
+
 # One thread draws, as in the worker processes of a run: several workers test side by side.
 os.environ.setdefault("LP_NUM_THREADS", "1")
 
 # A shell starts background jobs with SIGINT ignored, which programs under test would inherit.
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
+
+_read_entry_points = importlib.metadata.entry_points
+
+
+@functools.cache
+def _entry_points_on(path: tuple[str, ...], **wanted: str) -> importlib.metadata.EntryPoints:
+    return _read_entry_points(**wanted)
+
+
+# A look at every installed package takes 10 ms, and each name that no policy has causes one.
+importlib.metadata.entry_points = lambda **wanted: _entry_points_on(tuple(sys.path), **wanted)
 
 MARKERS = ("slow", "sim", "browser")
 """Those by which scripts/test_costs.py groups tests."""
@@ -50,8 +69,14 @@ def pytest_configure(config: pytest.Config) -> None:
         config.add_cleanup(folder.cleanup)
 
 
+@pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Note the markers of each test in the JUnit XML."""
+    """Note the markers of each test in the JUnit XML; bring files with slow tests to the front.
+
+    These take the longest. One that began last would leave all workers but its own without work.
+    """
+    slow = {item.path for item in items if item.get_closest_marker("slow")}
+    items.sort(key=lambda item: item.path not in slow)
     for item in items:
         found = [name for name in MARKERS if item.get_closest_marker(name) is not None]
         item.user_properties.append(("markers", " ".join(found)))

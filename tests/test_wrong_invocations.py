@@ -66,15 +66,12 @@ RIGHT = {
 """Words for commands whose work needs what is not there: files, or a library."""
 
 
-def right_words(name):
-    return RIGHT.get(name) or words_of("out", "run")[name]
-
-
 def one_of_each_kind():
     """Return a case of every kind, and at least one of every command: its name, and the words."""
     cases = {}
+    right_words = words_of("out", "run") | RIGHT
     for name, command in all_commands().items():
-        for kind, words in wrong_words(command, right_words(name)):
+        for kind, words in wrong_words(command, right_words[name]):
             cases.setdefault(kind, {}).setdefault(name, words)
     tried, chosen = Counter(), []
     for kind in sorted(cases, key=lambda kind: len(cases[kind])):

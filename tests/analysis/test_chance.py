@@ -110,8 +110,8 @@ def test_floors_are_what_the_shortcut_listeners_come_to(rule: str, task: str, se
         episode=dataclasses.replace(episode, goal=get_task(task).goals(episode.scene)[-1]),
         instruction=instruction,
     )
-    again = [make_policy(rule, seed).decide(elsewhere, instruction.text) for seed in range(300)]
-    assert again == goals, "the goal made a difference"
+    again = [make_policy(rule, seed).decide(elsewhere, instruction.text) for seed in range(50)]
+    assert again == goals[:50], "the goal made a difference"
 
 
 @pytest.mark.parametrize("variant", all_variants(), ids="-".join)

@@ -17,13 +17,16 @@ from roboirg.core.errors import UnknownNameError
 from roboirg.core.inference_facts import InferenceFacts, inference_facts
 from roboirg.evaluation.analysis.methods.method_sections import make_sections
 from roboirg.evaluation.analysis.methods.method_text import FORMATS, write_methods
-from roboirg.evaluation.analysis.methods.played_facts import NOT_REPORTED
+from roboirg.evaluation.analysis.methods.played_facts import NO_NETWORK, NOT_REPORTED
 from roboirg.evaluation.play.rollout_result import RolloutResult, make_record
 from roboirg.evaluation.records.record import Record
 from roboirg.evaluation.records.store import RecordStore
 from roboirg.main import app
+from roboirg.policies.by_name.loading import load_policy_class
+from roboirg.policies.by_name.policy_classes import BUILTIN
 
 ITEMS = {
+    "Terms",
     "Horizon and control rate",
     "Precision of inference",
     "Observations",
@@ -41,7 +44,10 @@ ITEMS = {
 def record(episode: int, outcome: str = "success", **fields) -> Record:
     setting = fields.pop("setting", "explicit")
     changes = {name: fields.pop(name) for name in ("steps", "attempt", "calls") if name in fields}
-    job = job_of(policy="mine", task="PickXtimes", split="test", episode=episode, setting=setting)
+    told = {name: fields.pop(name) for name in ("arm", "policy_seed") if name in fields}
+    job = job_of(
+        policy="mine", task="PickXtimes", split="test", episode=episode, setting=setting, **told
+    )
     result = RolloutResult(outcome, cause=None if outcome == "success" else "why", **fields)  # type: ignore[arg-type]
     made = make_record(job, result, started_at=f"{episode}{setting}{outcome}")
     return msgspec.structs.replace(made, **changes)
@@ -81,15 +87,15 @@ def test_what_a_policy_declares_and_its_process_reports_is_there(tmp_path: Path)
         record(0, steps=30, calls=3, **known),
         record(1, outcome="failure", steps=10, calls=1, attempt=2, **known),
     )
-    assert "action space ee_pose" in found["Horizon and control rate"]["mine"]
-    assert "per call, mean: 10.0" in found["Horizon and control rate"]["mine"]
+    assert "actions: ee_pose (" in found["Horizon and control rate"]["mine"]
+    assert "10.0 on average" in found["Horizon and control rate"]["mine"]
     for word in ("bfloat16", "cuda:0", "torch 2.9", "3.12.1"):
         assert word in found["Precision of inference"]["mine"]
     assert "cameras: front" in found["Observations"]["mine"]
     assert "resized to 224" in found["Observations"]["mine"]
-    assert "sent in lower case" in found["Instructions"]["mine"]
+    assert "sent: in lower case" in found["Instructions"]["mine"]
     assert found["Use of the words in training"]["mine"].endswith("explicit")
-    again = found["Seeds, retries and errors"]["episodes that were begun more than once"]
+    again = found["Seeds, retries and errors"]["rollouts begun again after a fault"]
     assert again == "1 of 2"
 
 
@@ -99,7 +105,7 @@ def test_a_server_speaks_for_its_own_process(tmp_path: Path) -> None:
     server = {"server": "openpi://host:8000", "dtype": "float16"}
     found = sections(tmp_path, record(0, inference=mine, policy_metadata=server))
     text = found["Precision of inference"]["mine"]
-    assert "computed by a server" in text
+    assert "computed in the process of its server" in text
     assert "number type of inference: float16" in text
     assert f"versions of libraries: {NOT_REPORTED}" in text
     assert "3.11" not in text
@@ -107,7 +113,63 @@ def test_a_server_speaks_for_its_own_process(tmp_path: Path) -> None:
 
 def test_an_episode_that_was_played_again_counts_once(tmp_path: Path) -> None:
     found = sections(tmp_path, record(0, "error", error="policy"), record(0))
-    assert found["Seeds, retries and errors"]["errors, in no rate"] == "none (of 1 results)"
+    errors = found["Seeds, retries and errors"]
+    assert errors["rollouts that ended in an error, which are in no rate"] == "0 of 1"
+
+
+@pytest.mark.parametrize("name", BUILTIN)
+def test_built_in_policies_have_no_network(tmp_path: Path, name: str) -> None:
+    """What a network would have is none, which differs from what is not reported."""
+    metadata = dict(load_policy_class(name).metadata)
+    found = sections(tmp_path, record(0, policy_metadata=metadata))
+    for title in ("Precision of inference", "Use of the words in training"):
+        assert NO_NETWORK in found[title]["mine"]
+    assert NO_NETWORK in found["Observations"]["mine"]
+    assert "reads the text: " in found["Instructions"]["mine"]
+    assert f"reads the text: {NOT_REPORTED}" not in found["Instructions"]["mine"]
+
+
+def test_the_policy_behind_a_planner_does_not_speak_for_the_planner(tmp_path: Path) -> None:
+    metadata = {"planner": {"model": "large"}, "policy": {"network": "none", "dtype": "float16"}}
+    found = sections(tmp_path, record(0, policy_metadata=metadata))
+    assert "number type of inference: float16" in found["Precision of inference"]["mine"]
+    assert f"device of inference: {NOT_REPORTED}" in found["Precision of inference"]["mine"]
+
+
+def test_texts_and_templates_are_counted(tmp_path: Path) -> None:
+    jobs = [(arm, setting) for arm in ("told", "silent") for setting in ("explicit", "direct")]
+    played = [
+        record(episode, arm=arm, setting=setting) for arm, setting in jobs for episode in range(4)
+    ]
+    found = sections(tmp_path, *played)
+    told = {record(episode, setting="direct").command for episode in range(4)}
+    counts = found["Instructions"]
+    direct = {record(episode, setting="direct").instruction for episode in range(4)}
+    assert counts["explicit, arm told"].startswith(f"{len(told)} distinct texts, from ")
+    assert counts["direct, arm silent"] == "1 distinct text, fixed"
+    (label,) = set(found["Use of the words in training"]) - {"mine"}
+    seen = found["Use of the words in training"][label]
+    assert f"{len(told) + len(direct)} texts: no, from templates" in seen
+    assert "1 text: not reported" in seen
+
+
+def test_each_other_analysis_has_a_verdict_or_a_reason(tmp_path: Path) -> None:
+    played = [
+        record(episode, outcome, setting=setting, policy_seed=seed)
+        for setting, outcome in (("explicit", "success"), ("direct", "failure"))
+        for seed in (0, 1)
+        for episode in range(3)
+    ]
+    found = sections(tmp_path, *played)["Sensitivity to analysis choices"]
+    assert found["mine, direct less explicit"] == (
+        "no clear difference, from 3 pairs of scenes, which allow no p below 0.25 before the "
+        "correction; in other analyses: no clear difference with seed 0, seed 1, equal weights of "
+        "difficulties; clearly lower with unit rollout"
+    )
+    without = found["mine, other analyses that change nothing here"]
+    for choice in ("errors as failures", "unit task", "equal weights of suites", "one processor"):
+        assert choice in without
+    assert "seed 0" not in without
 
 
 @pytest.mark.parametrize("name", FORMATS)

@@ -83,13 +83,13 @@ def test_errors_decide_if_they_count_as_failures(result) -> None:
     assert (choice.group, found.others[choice]) == ("errors as failures", "lower")
 
 
-def test_each_seed_alone_and_trials_as_units(result) -> None:
+def test_each_seed_alone_and_rollouts_as_units(result) -> None:
     results = []
     for seed, outcomes in enumerate(("0" * 8 + "1" * 2, "1" * 10, "1" * 10)):
         results += play(result, "1" * 10, policy_seed=seed)
         results += play(result, outcomes, policy_seed=seed, setting="direct")
     (found,) = gaps(results)
-    assert {"seed 0", "seed 1", "seed 2", "unit trial"} == {
+    assert {"seed 0", "seed 1", "seed 2", "unit rollout"} == {
         f"{one.group} {one.name}" for one in found.others
     }
     assert found.verdict == "lower"

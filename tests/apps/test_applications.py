@@ -52,8 +52,7 @@ print(json.dumps([{name: sorted(own) for name, own in commands.items()}, sorted(
 
 def without(application: str | None, folder: Path) -> dict[str, str]:
     """Return the variables of a process that imports a copy of the package."""
-    leave_out = shutil.ignore_patterns("__pycache__")
-    shutil.copytree(layout.PACKAGE, folder / "roboirg", ignore=leave_out)
+    shutil.copytree(layout.PACKAGE, folder / "roboirg")
     if application is not None:
         shutil.rmtree(folder / "roboirg" / "apps" / application)
     return {**os.environ, "PYTHONPATH": str(folder)}

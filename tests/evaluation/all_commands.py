@@ -1,5 +1,7 @@
 """All commands, with words for each with which it does its work."""
 
+from functools import cache
+
 import typer.main
 from msgspec.structs import replace
 from plan_files import plan_file
@@ -12,7 +14,56 @@ from roboirg.evaluation.records.record import Job
 from roboirg.evaluation.records.store import RecordStore
 from roboirg.main import app
 
+WORDS = {
+    "bench": "--rounds 1",
+    "run": "--policy random --tasks PickXtimes --episodes 1 --workers 0 --settings explicit"
+    " --out {folder}/out",
+    "records merge": "{run} --out {folder}/merged",
+    "report": "{run}",
+    "tables": "{run}",
+    "figures": "{run} --out {folder}/figures",
+    "compare": "{run}:random {run}:oracle",
+    "serve": "random",
+    "check-policy": "random",
+    "doctor": "",
+    "fetch-models": "--help",
+    "tasks": "",
+    "show": "PickXtimes 0 --out {folder}/sheet.png",
+    "language stats": "--tasks PickXtimes --split val",
+    "language validate": "--tasks PickXtimes --split val",
+    "language shortcuts": "--tasks StopCube --settings direct --learned",
+    "export instructions": "--tasks PickXtimes --split val --out {folder}/words.jsonl",
+    "export episodes": "--tasks PickXtimes --split val --out {folder}/episodes.jsonl",
+    "records export": "{run} --out {folder}/records.parquet",
+    "export demonstrations": "--tasks StopCube --episodes 1 --pictures none --settings explicit"
+    " --workers 0 --out {folder}/moves",
+    "export grounding": "--tasks StopCube --plan {one_episode} --settings explicit"
+    " --out {folder}/questions",
+    "replay": "--help",
+    "score grounding": "--help",
+    "records import": "--help",
+    "learn listener": "--help",
+    "learn answers": "--help",
+    "listen plan": "{folder}/listeners --people 1 --tasks StopCube --episodes 1"
+    " --plan {no_practice} --settings explicit",
+    "listen serve": "--help",
+    "listen results": "--help",
+    "drive": "--help",
+    "leaderboard repeat": "{run} --out {folder}/again",
+    "leaderboard pack": "{run} --out {folder}/packed.zip",
+    "leaderboard verify": "--help",
+    "leaderboard board": "{folder}",
+    "real plan": "--policy random --tasks PutInBox --trials 1 --demonstrations 1"
+    " --out {folder}/study",
+    "export recordings": "{folder}/study {folder}",
+    "real run": "{folder}/study",
+    "real score": "{folder}/study",
+    "language import-robomme": "--help",
+}
+"""Words for each command with which it does its work where all is installed; see `words_of`."""
 
+
+@cache
 def all_commands():
     """Return the commands by their words."""
 
@@ -47,117 +98,13 @@ def make_run(folder):
 
 
 def words_of(folder, run):
-    """Return words for each command with which it does its work where all is installed."""
+    """Return `WORDS` for files in a folder and a run; the plan files are written."""
+    paths = {
+        "folder": folder,
+        "run": run,
+        "one_episode": plan_file(episodes=1),
+        "no_practice": plan_file(listening={"practice": 0, "checks": 0}),
+    }
     return {
-        "bench": ["--rounds", "1"],
-        "run": [
-            "--policy",
-            "random",
-            "--tasks",
-            "PickXtimes",
-            "--episodes",
-            "1",
-            "--workers",
-            "0",
-            "--settings",
-            "explicit",
-            "--out",
-            f"{folder}/out",
-        ],
-        "records merge": [run, "--out", f"{folder}/merged"],
-        "report": [run],
-        "tables": [run],
-        "figures": [run, "--out", f"{folder}/figures"],
-        "compare": [f"{run}:random", f"{run}:oracle"],
-        "serve": ["random"],
-        "check-policy": ["random"],
-        "doctor": [],
-        "fetch-models": ["--help"],
-        "tasks": [],
-        "show": ["PickXtimes", "0", "--out", f"{folder}/sheet.png"],
-        "language stats": ["--tasks", "PickXtimes", "--split", "val"],
-        "language validate": ["--tasks", "PickXtimes", "--split", "val"],
-        "language shortcuts": ["--tasks", "StopCube", "--settings", "direct", "--learned"],
-        "export instructions": [
-            "--tasks",
-            "PickXtimes",
-            "--split",
-            "val",
-            "--out",
-            f"{folder}/words.jsonl",
-        ],
-        "export episodes": [
-            "--tasks",
-            "PickXtimes",
-            "--split",
-            "val",
-            "--out",
-            f"{folder}/episodes.jsonl",
-        ],
-        "records export": [run, "--out", f"{folder}/records.parquet"],
-        "export demonstrations": [
-            "--tasks",
-            "StopCube",
-            "--episodes",
-            "1",
-            "--pictures",
-            "none",
-            "--settings",
-            "explicit",
-            "--workers",
-            "0",
-            "--out",
-            f"{folder}/moves",
-        ],
-        "export grounding": [
-            "--tasks",
-            "StopCube",
-            "--plan",
-            plan_file(episodes=1),
-            "--settings",
-            "explicit",
-            "--out",
-            f"{folder}/questions",
-        ],
-        "replay": ["--help"],
-        "score grounding": ["--help"],
-        "records import": ["--help"],
-        "learn listener": ["--help"],
-        "learn answers": ["--help"],
-        "listen plan": [
-            f"{folder}/listeners",
-            "--people",
-            "1",
-            "--tasks",
-            "StopCube",
-            "--episodes",
-            "1",
-            "--plan",
-            plan_file(listening={"practice": 0, "checks": 0}),
-            "--settings",
-            "explicit",
-        ],
-        "listen serve": ["--help"],
-        "listen results": ["--help"],
-        "drive": ["--help"],
-        "leaderboard repeat": [run, "--out", f"{folder}/again"],
-        "leaderboard pack": [run, "--out", f"{folder}/packed.zip"],
-        "leaderboard verify": ["--help"],
-        "leaderboard board": [folder],
-        "real plan": [
-            "--policy",
-            "random",
-            "--tasks",
-            "PutInBox",
-            "--trials",
-            "1",
-            "--demonstrations",
-            "1",
-            "--out",
-            f"{folder}/study",
-        ],
-        "export recordings": [f"{folder}/study", folder],
-        "real run": [f"{folder}/study"],
-        "real score": [f"{folder}/study"],
-        "language import-robomme": ["--help"],
+        name: [word.format_map(paths) for word in words.split()] for name, words in WORDS.items()
     }

@@ -10,7 +10,7 @@ from roboirg.evaluation.episode_errors import EpisodeError
 from roboirg.evaluation.plan.plan_maker import make_plan
 from roboirg.evaluation.records.store import RecordStore, read_index
 from roboirg.evaluation.run import world_speed
-from roboirg.evaluation.run.cost_estimate import model_costs
+from roboirg.evaluation.run.cost_estimate import model_costs, unknown_costs
 from roboirg.evaluation.run.estimate import ORACLE_STEPS, cell_sizes, estimate, estimate_text
 from roboirg.evaluation.run.world_speed import ASSUMED, WorldSpeed, has_video, measure_world
 from roboirg.policies.vlm.models import ModelReply
@@ -117,3 +117,26 @@ def test_what_models_will_be_asked_is_counted_and_measured(tmp_path: Path) -> No
     assert known["plans"].sizes == (tokens.calls, 1000 * tokens.calls, 50 * tokens.calls)
     assert [one.measured for one in known.values()] == [2, 0, 0]
     assert known["often"] == found["often"]
+
+
+def test_a_planner_over_other_hands_is_counted_without_loading_them(tmp_path: Path) -> None:
+    spec = "planner:qwen?model=x&base_url=http://localhost:1/v1"
+    plan = make_plan([f"ours={spec}"], tasks="PickXtimes", settings="explicit", episodes="2")
+    (ours,) = model_costs(plan.jobs(), plan.jobs(), tmp_path)
+    assert not list(unknown_costs(plan.jobs()))
+    jobs = [
+        replace(job, policy=hands, spec=f"{spec}&hands={hands}")
+        for hands in ("not_there:Hands", "mme-vla://localhost:1")
+        for job in plan.jobs()
+    ]
+    assert [one.sizes for one in model_costs(jobs, jobs, tmp_path)] == [ours.sizes] * 2
+    hands = [sentence.split(": how long its hands")[0] for sentence in unknown_costs(jobs)]
+    assert hands == ["not_there:Hands", "mme-vla://localhost:1"]
+
+
+def test_calls_of_an_own_planner_are_not_known_and_a_sentence_says_why(tmp_path: Path) -> None:
+    plan = make_plan(["random"], tasks="PickXtimes", settings="explicit", episodes="2")
+    specs = ("planner:not_there:Planner", "privileged:planner:not_there:Other", "not_there:Policy")
+    own = [replace(one, policy=spec, spec=spec) for spec in specs for one in plan.jobs()]
+    assert not model_costs(own, own, tmp_path)
+    assert [sentence.split(": calls")[0] for sentence in unknown_costs(own)] == list(specs[:2])

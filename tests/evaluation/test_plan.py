@@ -91,12 +91,10 @@ def test_tasks_beside_the_benchmark_are_asked_for_by_name_or_suite() -> None:
 
 
 def test_all_settings_are_those_that_each_episode_can_be_told_in() -> None:
-    plan = make_plan(["random"], episodes="6")
+    jobs = make_plan(["random"], episodes="6").jobs()
     for task in all_tasks():
         for episode in range(6):
-            played = [
-                job.setting for job in plan.jobs() if (job.task, job.episode) == (task, episode)
-            ]
+            played = [job.setting for job in jobs if (job.task, job.episode) == (task, episode)]
             possible = expressible(get_episode(task, "test", episode))
             told, *implicit = [one for one in possible if one in plain_settings()]
             assert played == [*implicit, told]  # explicit comes last

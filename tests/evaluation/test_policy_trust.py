@@ -44,9 +44,9 @@ def _fakes_can_be_imported(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def play(folder: Path, names: tuple[str, ...], **options: Any) -> dict[str, list[Record]]:
-    """Play three episodes of each policy, and an honest one between and after them."""
+    """Play two episodes of each policy, and an honest one between and after them."""
     specs = [spec for name in names for spec in (hostile_policies.SPEC(name), f"{name}+1={HONEST}")]
-    plan = paper_plan("Dice", 3).model_copy(update={"policies": tuple(specs), **options})
+    plan = paper_plan("Dice", 2).model_copy(update={"policies": tuple(specs), **options})
     folder.mkdir()
     run_plan(plan, folder, paper_runner(plan, folder), LocalProcesses(2))
     found: dict[str, list[Record]] = {}
@@ -62,12 +62,12 @@ def test_what_a_policy_breaks_is_its_own(
     monkeypatch.chdir(tmp_path)
     names = (*hostile_policies.SPOILED, *hostile_policies.HARMLESS)
     found = play(tmp_path / "run", names)
-    plan = paper_plan("Dice", 3, policy_process="shared")
+    plan = paper_plan("Dice", 2, policy_process="shared")
     alone = InProcess().run(deque(plan.jobs()), paper_runner(plan, tmp_path))
     expected = {record.episode: record.outcome for record in alone}
     for name in names:
         records = found[hostile_policies.SPEC(name)]
-        assert len(records) == len(found[f"{name}+1"]) == 3
+        assert len(records) == len(found[f"{name}+1"]) == 2
         for record in records:
             if name in hostile_policies.SPOILED:
                 assert record.error == "policy", (name, record.cause)
@@ -335,7 +335,7 @@ def test_in_a_worker_an_interrupt_is_the_policys(tmp_path: Path) -> None:
 
 def test_records_of_honest_policies_are_the_same_beside_any_cheat(tmp_path: Path) -> None:
     beside = play(tmp_path / "beside", ("Leaker",))["Leaker+1"]
-    plan = paper_plan("Dice", 3)
+    plan = paper_plan("Dice", 2)
     alone = InProcess().run(deque(plan.jobs()), paper_runner(plan, tmp_path))
     changed = {"policy": "", "policy_version": ""}
     assert sorted((comparable(one) | changed for one in beside), key=str) == sorted(

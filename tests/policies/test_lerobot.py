@@ -31,6 +31,18 @@ def test_without_lerobot_one_sentence_says_so(monkeypatch):
         load("x/y", "cpu")
 
 
+class Processor:
+    def __init__(self, change, *steps):
+        self.change, self.steps = change, steps
+
+    def __call__(self, value):
+        return self.change(value)
+
+
+def step(name, **modes):
+    return SimpleNamespace(_registry_name=name, get_config=lambda: {"norm_map": modes})
+
+
 @pytest.fixture
 def checkpoint(monkeypatch):
     """A package `lerobot` with a model that adds up what it sees."""
@@ -57,6 +69,8 @@ def checkpoint(monkeypatch):
                 noise = torch.rand(len(batch["task"]), 6, 1)
             return batch["observation.state"][:, None].repeat(1, 6, 1) + noise[:, :6, :1]
 
+    before = Processor(lambda batch: batch, step("tokenizer_processor"))
+    after = Processor(lambda row: row * 2, step("unnormalizer_processor", ACTION="MEAN_STD"))
     model = Model()
     config = SimpleNamespace(type="act", input_features={"observation.state": None})
     modules = {
@@ -67,12 +81,12 @@ def checkpoint(monkeypatch):
     )
     modules["lerobot.policies.factory"] = SimpleNamespace(
         get_policy_class=lambda kind: SimpleNamespace(from_pretrained=lambda p, config: model),
-        make_pre_post_processors=lambda *a, **k: (lambda batch: batch, lambda row: row * 2),
+        make_pre_post_processors=lambda *a, **k: (before, after),
     )
     for name, module in modules.items():
         monkeypatch.setitem(sys.modules, name, module)
     load.cache_clear()
-    yield SimpleNamespace(model=model, config=config)
+    yield SimpleNamespace(model=model, config=config, before=before)
     load.cache_clear()
 
 
@@ -83,7 +97,9 @@ def test_a_checkpoint_is_fed_its_own_names(checkpoint):
     assert first.shape == (4, 8)
     facts = inference_facts(policy)
     assert (facts.dtypes, facts.devices) == (("bfloat16",), ("cpu",))
-    assert policy.metadata["preprocessing"] == "the checkpoint's own processors"
+    for name in ("tokenizer_processor", "unnormalizer_processor (ACTION MEAN_STD)"):
+        assert name in policy.metadata["preprocessing"]
+    assert policy.metadata["text_normalization"] == "tokenizer_processor"
     batch = checkpoint.model.batches[0]
     assert batch["task"] == [INSTRUCTION]
     picture = batch["observation.images.front"]
@@ -99,6 +115,15 @@ def test_a_checkpoint_is_fed_its_own_names(checkpoint):
     again.reset(INSTRUCTION, video(0))
     assert np.array_equal(again.act(moment(1)), first)
     assert checkpoint.model.resets == 2
+
+
+@pytest.mark.parametrize(("kind", "reads"), [("act", "no, "), ("groot", "")])
+def test_a_checkpoint_without_a_tokenizer_may_have_one_inside(checkpoint, kind, reads):
+    checkpoint.config.type, checkpoint.before.steps = kind, ()
+    policy = make_policy("lerobot://x/y", 0)
+    policy.reset(INSTRUCTION, video(0))
+    assert policy.metadata.get("reads_text", "").startswith(reads)
+    assert ("reads_text" in policy.metadata) == bool(reads)
 
 
 def test_rows_of_a_batch_depend_on_their_own_episode(checkpoint):

@@ -240,3 +240,12 @@ def test_a_protocol_travels_over_any_transport(scheme, monkeypatch):
     assert client.metadata == {"server": "localhost:1", "local": True}
     assert client.act(moment(2, history=())).shape == (16, 8)
     client.close()
+
+
+def test_a_server_sends_what_the_class_of_its_policy_declares():
+    with served("random", "openpi") as url:
+        client = make_policy(url, 0)
+        client.reset("Push the button.", {})
+        assert client.metadata["network"] == "none"
+        assert client.metadata["policy"] == "random"
+        client.close()

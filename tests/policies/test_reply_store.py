@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import random
 import sqlite3
 import subprocess
@@ -9,6 +10,7 @@ import sys
 import textwrap
 import time
 from collections import Counter
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -159,23 +161,37 @@ def test_waiting_times_of_services(headers: dict[str, str], seconds: float | Non
 
 CHILD = textwrap.dedent(
     """
-    import sys
+    import os, signal, sys
     from pathlib import Path
     from roboirg.policies.vlm.model_content import ChatTurn
     from roboirg.policies.vlm.models import ModelOptions, ModelQuery, make_model
     from roboirg.policies.vlm.models.reply_store import ReplySettings, use_replies
     from roboirg.policies.vlm.models.paid_model import PaidModel
 
-    url, folder, episode, calls, per_minute = sys.argv[1:]
+    url, folder, calls, per_minute = sys.argv[1:]
     options = ModelOptions(
         model="fake", base_url=url, requests_per_minute=float(per_minute) or None
     )
-    model = PaidModel(make_model(options), options)
-    with use_replies(ReplySettings(Path(folder)), episode):
-        for number in range(int(calls)):
-            words = f"<{episode} {number}"
-            reply = model.answer(ModelQuery("system", (ChatTurn("user", (words,)),)))
-            print(reply.text, flush=True)
+
+    make_model(options)  # loads what it needs, for all episodes
+
+    def play(episode):
+        model = PaidModel(make_model(options), options)
+        with use_replies(ReplySettings(Path(folder)), episode):
+            for number in range(int(calls)):
+                words = f"<{episode} {number}"
+                reply = model.answer(ModelQuery("system", (ChatTurn("user", (words,)),)))
+                print(reply.text, flush=True)
+
+    for line in iter(sys.stdin.readline, ""):
+        process = os.fork()
+        if not process:
+            play(line.strip())
+            os._exit(0)
+        if sys.stdin.readline() == "kill\\n":
+            os.kill(process, signal.SIGKILL)
+        os.waitpid(process, 0)
+        print("ended", flush=True)
     """
 )
 CALLS = 8
@@ -186,21 +202,33 @@ def name_of(body: dict) -> str:
     return words_of(body).rpartition("<")[2]
 
 
-def start_child(server, folder: Path, episode: str, per_minute: float = 0.0):
-    return subprocess.Popen(
-        [
-            sys.executable,
-            "-c",
-            CHILD,
-            f"{server.url}/v1",
-            str(folder),
-            episode,
-            str(CALLS),
-            str(per_minute),
-        ],
-        stdout=subprocess.PIPE,
-        text=True,
-    )
+class Child:
+    """Plays episodes, each in a process of its own, forked from one that has loaded everything."""
+
+    def __init__(self, server, folder: Path, per_minute: float = 0.0) -> None:
+        words = [f"{server.url}/v1", str(folder), str(CALLS), str(per_minute)]
+        self.main = subprocess.Popen(
+            [sys.executable, "-c", CHILD, *words],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            text=True,
+        )
+
+    def write(self, line: str) -> None:
+        """Write the name of an episode to begin; then `kill`, or `wait` for its end."""
+        self.main.stdin.write(f"{line}\n")
+        self.main.stdin.flush()
+
+    def replies(self) -> Iterator[str]:
+        """Yield the replies that the episode's process gets until it ends."""
+        for line in iter(self.main.stdout.readline, ""):
+            if line == "ended\n":
+                return
+            yield line.strip()
+
+    def end(self) -> int:
+        self.main.communicate()
+        return self.main.returncode
 
 
 @pytest.mark.parametrize("kills", [4, pytest.param(50, marks=pytest.mark.slow)])
@@ -208,20 +236,21 @@ def test_no_answered_call_is_made_again_after_a_kill(tmp_path: Path, kills: int)
     """Each episode is killed twice after a random number of replies, and then finished."""
     rng = random.Random(0)
     with fake_vlm(name_of) as server:
+        child = Child(server, tmp_path)
         requests = lambda: Counter(map(name_of, server.requests))  # noqa: E731
         answered: dict[str, int] = {}
         for episode in range(kills // 2):
             for _ in range(2):
-                process = start_child(server, tmp_path, f"e{episode}")
-                assert process.stdout is not None
-                for _ in range(rng.randrange(1, CALLS)):
-                    name = process.stdout.readline().strip()
+                child.write(f"e{episode}")
+                replies = child.replies()
+                for name in itertools.islice(replies, rng.randrange(1, CALLS)):
                     answered.setdefault(name, requests()[name])
-                process.kill()
-                process.wait()
-                process.stdout.close()
-            said, _ = start_child(server, tmp_path, f"e{episode}").communicate()
-            assert said.split("\n")[:-1] == [f"e{episode} {number}" for number in range(CALLS)]
+                child.write("kill")
+                list(replies)  # what it said before it died
+            child.write(f"e{episode}")
+            child.write("wait")
+            assert list(child.replies()) == [f"e{episode} {number}" for number in range(CALLS)]
+        assert child.end() == 0
         found = requests()
         assert {name: found[name] for name in answered} == answered
         # What was under way when a process was killed may have been asked again, once for a kill.
@@ -232,10 +261,11 @@ def test_processes_keep_one_limit_together(tmp_path: Path) -> None:
     """No turn is given twice: the next one is as many gaps away as there were requests."""
     per_minute, started = 1200.0, time.time()
     with fake_vlm(name_of) as server:
-        both = [start_child(server, tmp_path, name, per_minute) for name in ("a", "b")]
-        for one in both:
-            one.communicate()
-            assert one.returncode == 0
+        both = [Child(server, tmp_path, per_minute) for _ in range(2)]
+        for one, name in zip(both, ("a", "b"), strict=True):
+            one.write(name)
+            one.write("wait")
+        assert [one.end() for one in both] == [0, 0]
         assert len(server.requests) == 2 * CALLS
     with sqlite3.connect(tmp_path / REPLIES_FILE) as database:
         ((next_at,),) = database.execute("SELECT next_at FROM services")

@@ -305,7 +305,7 @@ def _print_model_costs(
     """Print what models are expected to be asked, and what that costs."""
     from rich.table import Table
 
-    from roboirg.evaluation.run.cost_estimate import model_costs
+    from roboirg.evaluation.run.cost_estimate import model_costs, unknown_costs
     from roboirg.util.console_width import widen
 
     table = Table(title="what models will be asked, about", title_justify="left")
@@ -329,6 +329,8 @@ def _print_model_costs(
     if table.row_count:
         widen(console, table)
         console.print(table)
+    for sentence in unknown_costs(todo):
+        console.print(sentence, highlight=False)
 
 
 def _print_prompt_shares(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping
 
 from roboirg.core.errors import InvalidValueError, UnknownNameError
 
@@ -14,8 +15,17 @@ SCRAMBLED = "scrambled"
 PARAPHRASE = "paraphrase"
 AGAIN = "again"
 
-ARMS = (TOLD, OTHER_GOAL, SILENT, SILENT_EMPTY, SCRAMBLED, PARAPHRASE, AGAIN)
-"""The kinds of arms. Paraphrases are numbered: ``paraphrase-1`` is the first one."""
+SILENT_TEXTS = {SILENT: "Please do your task.", SILENT_EMPTY: ""}
+ARMS: Mapping[str, str] = {
+    TOLD: "the scene's own goal in the words of the setting",
+    OTHER_GOAL: "another goal of the same scene, stated in the same setting, and judged by it",
+    SILENT: f"'{SILENT_TEXTS[SILENT]}' instead of all words",
+    SILENT_EMPTY: "no words at all",
+    SCRAMBLED: "the content words in random order",
+    PARAPHRASE: "another text of the same goal, in the same setting and pool of words",
+    AGAIN: "the same words, with another policy seed",
+}
+"""The kinds of arms, and what is said. Paraphrases are numbered, from ``paraphrase-1``."""
 
 PARAPHRASES = 2
 """How many of them ``paraphrase`` alone stands for."""

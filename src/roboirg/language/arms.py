@@ -13,8 +13,7 @@ import numpy as np
 from roboirg.core.arms import (
     OTHER_GOAL,
     SCRAMBLED,
-    SILENT,
-    SILENT_EMPTY,
+    SILENT_TEXTS,
     TOLD,
     check_arm,
     paraphrase_number,
@@ -26,8 +25,6 @@ from roboirg.language.generator import instruct_with
 from roboirg.language.instruction import Instruction, Utterance
 from roboirg.tasks import with_goal
 from roboirg.tasks.other_goals import draw_other_goal
-
-SILENT_TEXTS = {SILENT: "Please do your task.", SILENT_EMPTY: ""}
 
 FUNCTION_WORDS = (
     "a an and are as at be been but by can could for from had has have i if in into is it its let "

@@ -11,7 +11,7 @@ from __future__ import annotations
 import functools
 import inspect
 import json
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, ClassVar, NamedTuple
@@ -30,8 +30,9 @@ _MAX_BRIGHTNESS = 255.0
 _BATCH = 8
 _NOISELESS = frozenset({"act"})
 """Types of checkpoints that draw no noise when they act."""
+_WORDLESS = frozenset({"act", "diffusion", "tdmpc", "vqbet"})
+"""Types of checkpoints that have no input for text."""
 _CONFIG = "config.json"
-_PROCESSORS = "the checkpoint's own processors"
 
 
 class LeRobotPolicyOptions(UrlOptions):
@@ -65,6 +66,7 @@ class LoadedCheckpoint(NamedTuple):
         after: turns the model's outputs into actions.
         noise: shape of the noise that the model takes for each episode; None if it takes none.
         is_noiseless: whether it is known to draw none either.
+        metadata: how its inputs and outputs are processed, for records.
     """
 
     model: Any
@@ -72,6 +74,7 @@ class LoadedCheckpoint(NamedTuple):
     after: Callable[[Any], Any]
     noise: tuple[int, int] | None = None
     is_noiseless: bool = False
+    metadata: Mapping[str, Any] = {}
 
 
 @dataclass
@@ -115,7 +118,7 @@ class LeRobotPolicy:
         self.place = parts.place
         self.prompt_tokens = self.options.prompt_tokens or read_prompt_tokens(parts.place)
         self.prompt_added, self.tokenizer = self.options.prompt_added, self.options.tokenizer
-        self.metadata = {"preprocessing": _PROCESSORS, "text_normalization": _PROCESSORS}
+        self.metadata: Mapping[str, Any] = {}
         self.model: Any = None  # records name its number types and devices
 
     @property
@@ -135,7 +138,9 @@ class LeRobotPolicy:
             MissingDependencyError: LeRobot or PyTorch is not installed.
             InvalidValueError: the checkpoint needs an input that does not exist.
         """
-        model = self.model = load(self.place, self.options.device).model
+        loaded = load(self.place, self.options.device)
+        model, self.metadata = loaded.model, loaded.metadata
+        self.model = model
         before = dict(vars(model))
         model.reset()
         # What the reset replaced, such as a queue of actions, belongs to the episode.
@@ -242,8 +247,44 @@ def load(place: str, device: str) -> LoadedCheckpoint:
     shape = getattr(config, "chunk_size", None), getattr(config, "max_action_dim", None)
     noise = (int(shape[0]), int(shape[1])) if "noise" in takes and None not in shape else None  # type: ignore[arg-type]
     return LoadedCheckpoint(
-        model.to(device).eval(), before, after, noise, config.type in _NOISELESS
+        model.to(device).eval(),
+        before,
+        after,
+        noise,
+        config.type in _NOISELESS,
+        _describe(config, _step_names(before), _step_names(after)),
     )
+
+
+def _describe(config: Any, before: Sequence[str], after: Sequence[str]) -> dict[str, Any]:  # noqa: ANN401
+    """Return a checkpoint's metadata, from its configuration and the steps of its processors."""
+    inputs = [
+        f"{name} {getattr(one, 'shape', '')}".strip()
+        for name, one in (config.input_features or {}).items()
+    ]
+    found: dict[str, Any] = {
+        "preprocessing": f"inputs {', '.join(inputs)}; pictures scaled to [0, 1], as in LeRobot's "
+        "data sets; then the checkpoint's own steps, saved with it in training: "
+        f"{', '.join(before) or 'none'}; on its actions: {', '.join(after) or 'none'}"
+    }
+    tokenizers = [name for name in before if "tokenizer" in name]
+    if tokenizers:
+        found |= {"reads_text": "yes", "text_normalization": ", ".join(tokenizers)}
+    elif config.type in _WORDLESS:
+        found["reads_text"] = f"no, a policy of type {config.type} has no input for text"
+    chunk = getattr(config, "chunk_size", None)
+    return found if chunk is None else {**found, "chunk": chunk}
+
+
+def _step_names(processor: object) -> list[str]:
+    """Return the names of a processor's steps; normalizers with what they normalize, and how."""
+    found = []
+    for step in getattr(processor, "steps", ()):
+        modes = step.get_config().get("norm_map", {})
+        listed = ", ".join(f"{kind} {mode}" for kind, mode in modes.items())
+        name = getattr(step, "_registry_name", type(step).__name__)
+        found.append(f"{name} ({listed})" if listed else name)
+    return found
 
 
 def read_prompt_tokens(place: str) -> int | None:

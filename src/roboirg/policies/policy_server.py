@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import NamedTuple
 
 from roboirg.core.errors import InvalidValueError, UnknownNameError
@@ -64,7 +65,7 @@ def open_server(
         raise InvalidValueError(f"{protocol}:// is for clients only: no policy is served with it.")
     if not 0 <= options.port <= _MAX_PORT:
         raise InvalidValueError(f"The port is {options.port}; it must be 0 to {_MAX_PORT}.")
-    load_policy_class(spec)
+    declared = getattr(load_policy_class(spec), "metadata", {})
     if is_privileged(spec):
         raise InvalidValueError(
             f"Policy {spec!r} is privileged: it reads the simulator in its own process, so it "
@@ -77,6 +78,7 @@ def open_server(
     found = protocols[protocol]
     process = inference_facts(None)
     metadata = {
+        **(declared if isinstance(declared, Mapping) else {}),  # a property is of an object
         "policy": spec,
         "version": policy_version(spec),
         "protocol": protocol,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import functools
 from collections import defaultdict
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
@@ -12,9 +12,24 @@ from roboirg.core.episode import Stage
 from roboirg.evaluation.play.job_instruction import PreparedJob
 from roboirg.evaluation.records.record import Job
 from roboirg.evaluation.run.world_speed import has_video
-from roboirg.policies.by_name.loading import is_foreign, make_policy
+from roboirg.policies.by_name.loading import (
+    hands_of,
+    is_foreign,
+    make_policy,
+    undeclared,
+    with_scripted_hands,
+)
+from roboirg.policies.by_name.policy_specs import PLANNER
+from roboirg.policies.by_name.systems import SCRIPTED
 from roboirg.policies.contract.policy_urls import is_url
-from roboirg.policies.planners.rehearsal import CallSizes, rehearse, rehearse_listener
+from roboirg.policies.planners.hierarchical_policy import MOST_REFUSALS
+from roboirg.policies.planners.rehearsal import (
+    CHUNK,
+    SUBGOAL_STEPS,
+    CallSizes,
+    rehearse,
+    rehearse_listener,
+)
 from roboirg.policies.planners.vlm_planner import VLMPlanner
 from roboirg.policies.vlm.models import ModelOptions, ModelReply
 from roboirg.policies.vlm.models.paid_model import cost_of
@@ -76,6 +91,23 @@ def model_costs(todo: Iterable[Job], jobs: Iterable[Job], folder: Path) -> tuple
     )
 
 
+def unknown_costs(jobs: Iterable[Job]) -> Iterator[str]:
+    """Yield a sentence for each planner whose calls depend on what is not known before it plays."""
+    for name, spec in dict.fromkeys((job.policy, job.policy_spec) for job in jobs):
+        if hands_of(spec) not in (None, SCRIPTED) and _asker(spec) is not None:
+            yield (
+                f"{name}: how long its hands take is not known before they play, so calls are "
+                f"counted as with the scripted hands, {SUBGOAL_STEPS} control steps for a subgoal "
+                f"in chunks of {CHUNK}; before each chunk there are at most 2, or "
+                f"{2 * MOST_REFUSALS} if the hands refuse its subgoals."
+            )
+        elif undeclared(spec).startswith(f"{PLANNER}:") and hands_of(spec) is None:
+            yield (
+                f"{name}: calls of models are not known, because the planner's code is your own; "
+                "its plan() is called before each chunk of the hands."
+            )
+
+
 def _model_cost(
     key: tuple[str, str], counted: CallSizes, measured: CallSizes, model: ModelOptions
 ) -> ModelCost:
@@ -98,7 +130,12 @@ def _measured(jobs: Iterable[Job], folder: Path) -> dict[str, CallSizes]:
 
 @functools.cache
 def _asker(spec: str) -> VLMPlanner | VLMListener | None:
-    """Return what asks a model for a policy; None if nothing does, or it is foreign code."""
+    """Return what asks a model for a policy; None if nothing does, or it is foreign code.
+
+    Hands are not made: nothing of a rehearsal depends on them.
+    """
+    if hands_of(spec) is not None:
+        spec = with_scripted_hands(spec)
     if is_url(spec) or is_foreign(spec):
         return None
     policy = make_policy(spec, 0)

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import zlib
-from typing import TYPE_CHECKING
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
 from roboirg.core.episode import Episode, Goal
-from roboirg.policies.builtin.scripted import ScriptedPolicy
+from roboirg.policies.builtin.scripted import READING, ScriptedPolicy
 from roboirg.shortcuts.command_chance import fitting_goals
 
 if TYPE_CHECKING:
@@ -32,6 +33,8 @@ class ListenerPolicy(ScriptedPolicy):
     instruction in turns it remembers every utterance.
     """
 
+    metadata: ClassVar[Mapping[str, str]] = READING
+
     def decide(self, env: RoboIRGEnv, instruction: str) -> Goal:
         """Return a goal that fits the instruction."""
         episode = env.episode
@@ -45,6 +48,8 @@ class ForgetfulPolicy(ListenerPolicy):
 
     Its success rate is the chance level of a setting: the share that needs no context.
     """
+
+    metadata: ClassVar[Mapping[str, str]] = {**READING, "reads_text": "only the last utterance"}
 
     def decide(self, env: RoboIRGEnv, instruction: str) -> Goal:  # noqa: ARG002
         """Return a goal that fits the final command alone."""

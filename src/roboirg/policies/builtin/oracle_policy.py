@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
 from roboirg.core.episode import Goal
-from roboirg.policies.builtin.scripted import ScriptedPolicy
+from roboirg.policies.builtin.scripted import WORDLESS, ScriptedPolicy
 
 if TYPE_CHECKING:
     from roboirg.envs.environment import RoboIRGEnv
@@ -18,6 +19,7 @@ class OraclePolicy(ScriptedPolicy):
     """Executes the true goal: the upper bound, and the proof that an episode can be solved."""
 
     listens: ClassVar[bool] = False
+    metadata: ClassVar[Mapping[str, str]] = WORDLESS
 
     def decide(self, env: RoboIRGEnv, instruction: str) -> Goal:  # noqa: ARG002
         """Return the episode's goal; the instruction is ignored."""

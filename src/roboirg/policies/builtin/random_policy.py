@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import zlib
+from collections.abc import Mapping
 from typing import Any, ClassVar
 
 import numpy as np
@@ -20,6 +21,10 @@ class RandomPolicy:
     """Moves toward random joint positions, and opens and closes the gripper."""
 
     cameras: ClassVar[tuple[str, ...]] = ()
+    metadata: ClassVar[Mapping[str, str]] = {
+        "network": "none",
+        "reads_text": "no, the text only seeds its random choices",
+    }
 
     def __init__(self, seed: int = 0) -> None:
         self.seed = seed

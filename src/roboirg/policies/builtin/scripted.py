@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
@@ -28,6 +28,15 @@ LISTENING_STEPS = 5
 """Control steps at rest between two observations while the command has not been heard."""
 MAX_RETRIES = 3
 """Retries of failed primitives per episode."""
+
+WORDLESS: Mapping[str, str] = {"network": "none", "reads_text": "no"}
+"""Metadata of policies without networks that ignore what is said."""
+READING: Mapping[str, str] = {
+    "network": "none",
+    "reads_text": "yes",
+    "text_normalization": "lower case, split into words and punctuation",
+}
+"""Metadata of those that read it with `roboirg.reader`."""
 
 
 class ScriptedPolicy(ABC):

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, ClassVar
 
 from roboirg.core.episode import Goal
 from roboirg.policies.builtin.listeners import choice_generator
-from roboirg.policies.builtin.scripted import ScriptedPolicy
+from roboirg.policies.builtin.scripted import READING, ScriptedPolicy
 from roboirg.shortcuts import draw_goal, guess_goal
 
 if TYPE_CHECKING:
@@ -21,6 +22,7 @@ class ShortcutPolicy(ScriptedPolicy):
 
     rule: ClassVar[str]
     """Name of a rule in `roboirg.shortcuts.SURFACE_RULES`."""
+    metadata: ClassVar[Mapping[str, str]] = READING
 
     def decide(self, env: RoboIRGEnv, instruction: str) -> Goal | None:
         """Return the goal of the rule; what the rule leaves open is drawn at random."""

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, ClassVar
 
 from roboirg.core.episode import Goal
-from roboirg.policies.builtin.scripted import ScriptedPolicy
+from roboirg.policies.builtin.scripted import WORDLESS, ScriptedPolicy
 from roboirg.tasks import get_task
 from roboirg.tasks.splits.splits import get_episode, split_size
 
@@ -20,6 +21,7 @@ class HabitPolicy(ScriptedPolicy):
     """
 
     listens: ClassVar[bool] = False
+    metadata: ClassVar[Mapping[str, str]] = WORDLESS
 
     def decide(self, env: RoboIRGEnv, instruction: str) -> Goal:  # noqa: ARG002
         """Return the scene's own goal."""
@@ -33,6 +35,7 @@ class PreviousGoalPolicy(ScriptedPolicy):
     """
 
     listens: ClassVar[bool] = False
+    metadata: ClassVar[Mapping[str, str]] = WORDLESS
 
     def decide(self, env: RoboIRGEnv, instruction: str) -> Goal | None:  # noqa: ARG002
         """Return the goal of the split's episode before this one, of the last before the first."""

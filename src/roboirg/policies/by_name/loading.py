@@ -116,6 +116,27 @@ def planner_alone(spec: str) -> str | None:
     return f"{kind}:{name}?{urlencode({**options, HANDS: ELSEWHERE})}"
 
 
+def hands_of(spec: str) -> str | None:
+    """Return the spec of the policy that follows one of our planners; None without such a planner.
+
+    The scripted hands are `SCRIPTED`.
+    """
+    kind, _, rest = undeclared(spec).partition(":")
+    name, _, query = rest.partition("?")
+    if kind == policy_specs.SYSTEM:
+        system = find_system(name, parse_query(spec, query))
+        return None if system.planner is None else system.policy
+    if kind == policy_specs.PLANNER and ":" not in name:
+        return parse_query(spec, query).get(HANDS, SCRIPTED)
+    return None
+
+
+def with_scripted_hands(spec: str) -> str:
+    """Return the spec of one of our planners with the scripted hands instead of any others."""
+    head, _, query = undeclared(spec).partition("?")
+    return f"{head}?{urlencode({**parse_query(spec, query), HANDS: SCRIPTED})}"
+
+
 def needs_host(spec: str) -> bool:
     """Return whether a policy gets a process of its own.
 

@@ -3,47 +3,42 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 
-from roboirg.evaluation.analysis.methods.method_sections import Section
 from roboirg.evaluation.analysis.tables.rendering.latex import escaped as latex_escaped
 from roboirg.evaluation.analysis.tables.rendering.markdown import escaped as markdown_escaped
 
+Sections = Mapping[str, Mapping[str, str]]
+"""By heading, what is known of each item."""
 
-def write_methods(sections: Sequence[Section], name: str) -> str:
+
+def write_methods(sections: Sections, name: str) -> str:
     """Return the sections in one of `FORMATS`."""
     return FORMATS[name](sections)
 
 
-def _markdown(sections: Sequence[Section]) -> str:
+def _markdown(sections: Sections) -> str:
     lines = ["# Methods"]
-    for section in sections:
-        lines += ["", f"## {section.title}", ""]
-        lines += [
-            f"- **{markdown_escaped(one.label)}**: {markdown_escaped(one.text)}"
-            for one in section.facts
-        ]
+    for title, facts in sections.items():
+        lines += ["", f"## {title}", ""]
+        lines += [f"- **{markdown_escaped(one)}**: {markdown_escaped(facts[one])}" for one in facts]
     return "\n".join(lines) + "\n"
 
 
-def _latex(sections: Sequence[Section]) -> str:
+def _latex(sections: Sections) -> str:
     lines = [r"\section{Methods}"]
-    for section in sections:
-        lines += [rf"\subsection{{{latex_escaped(section.title)}}}", r"\begin{description}"]
-        lines += [
-            rf"\item[{{{latex_escaped(one.label)}}}] {latex_escaped(one.text)}"
-            for one in section.facts
-        ]
+    for title, facts in sections.items():
+        lines += [rf"\subsection{{{latex_escaped(title)}}}", r"\begin{description}"]
+        lines += [rf"\item[{{{latex_escaped(one)}}}] {latex_escaped(facts[one])}" for one in facts]
         lines += [r"\end{description}"]
     return "\n".join(lines) + "\n"
 
 
-def _json(sections: Sequence[Section]) -> str:
-    content = {one.title: {fact.label: fact.text for fact in one.facts} for one in sections}
-    return json.dumps(content, ensure_ascii=False, indent=2) + "\n"
+def _json(sections: Sections) -> str:
+    return json.dumps(sections, ensure_ascii=False, indent=2) + "\n"
 
 
-FORMATS: Mapping[str, Callable[[Sequence[Section]], str]] = {
+FORMATS: Mapping[str, Callable[[Sections], str]] = {
     "markdown": _markdown,
     "latex": _latex,
     "json": _json,

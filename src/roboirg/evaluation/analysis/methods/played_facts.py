@@ -5,23 +5,75 @@ from __future__ import annotations
 from collections import Counter, defaultdict
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, NamedTuple
 
+from roboirg.core.arms import SILENT_TEXTS
+from roboirg.core.instruction_options import InstructionOptions
+from roboirg.core.word_pools import POOLS
+from roboirg.evaluation.analysis.stats.option_labels import options_label
 from roboirg.evaluation.policy_calls import SERVER
 from roboirg.evaluation.records.record import Record
 
 NOT_REPORTED = "not reported"
+NO_NETWORK = "none, as it has no network"
 
 DECLARABLE = {
-    "trained_on": "words it was trained on",
-    "preprocessing": "preprocessing of observations, relative to training",
+    "network": "network",
+    "chunk": "actions that its model predicts at once",
     "dtype": "number type of inference",
     "device": "device of inference",
     "libraries": "versions of libraries",
-    "python": "Python",
+    "python": "version of Python",
+    "preprocessing": "preprocessing of observations, relative to training",
+    "reads_text": "reads the text",
     "text_normalization": "what it does to the text",
+    "trained_on": "words that it was trained on",
 }
 """Keys of a policy's ``metadata`` that methods sections read, and what they stand for."""
+
+_OF_NETWORKS = ("chunk", "dtype", "device", "preprocessing", "text_normalization", "trained_on")
+"""Those that do not exist without a network."""
+
+Items = Iterator[tuple[str, str]]
+"""What an item is about, and what is known of it."""
+
+
+class TextColumn(NamedTuple):
+    """Instructions that are counted together."""
+
+    options: InstructionOptions
+    arm: str
+
+    @property
+    def label(self) -> str:
+        """Setting and arm in words."""
+        return f"{options_label(self.options)}, arm {self.arm}"
+
+
+@dataclass
+class SaidTexts:
+    """The distinct texts of a column.
+
+    Attributes:
+        texts: each with the pool of its words; None for words from elsewhere.
+        commands: the templates of their commands, with the task.
+        wordings: other sentences, parts and referring expressions that were drawn.
+    """
+
+    texts: set[tuple[str, str | None]] = field(default_factory=set)
+    commands: set[tuple[str, str]] = field(default_factory=set)
+    wordings: set[str] = field(default_factory=set)
+
+    def add(self, record: Record) -> None:
+        """Take in the text of a record."""
+        metadata = record.metadata
+        is_ours = metadata.get("wordings") in (None, *POOLS) and record.arm not in SILENT_TEXTS
+        text = " ".join(one.text for one in record.instruction)
+        self.texts.add((text, metadata.get("pool") if is_ours else None))
+        drawn = set(metadata.get("templates", ()) if is_ours else ())
+        commands = {one for one in drawn if one.startswith("command-")}
+        self.commands |= {(record.task, one) for one in commands}
+        self.wordings |= drawn - commands
 
 
 @dataclass
@@ -31,43 +83,43 @@ class PlayedFacts:
     Attributes:
         needs: distinct values of what the policy declares that it needs, by name.
         declared: distinct values in its metadata, by key of `DECLARABLE`.
-        inference: distinct values of what its process computes with, by field.
+        inference: distinct values of what its process computes with, by key of `DECLARABLE`.
         is_remote: whether a server computes its actions.
+        is_privileged: whether it reads the simulator's state.
         steps: control steps in all.
         calls: how often it was asked for actions.
-        texts: by setting, the distinct instructions.
-        attempts: records by the number of their attempt.
+        verdicts: rollouts by whether all that was said reached its language model.
+        repeated: rollouts that were begun more than once.
     """
 
     needs: dict[str, set[str]] = field(default_factory=lambda: defaultdict(set))
     declared: dict[str, set[str]] = field(default_factory=lambda: defaultdict(set))
     inference: dict[str, set[str]] = field(default_factory=lambda: defaultdict(set))
     is_remote: bool = False
+    is_privileged: bool = False
     steps: int = 0
     calls: int = 0
-    texts: dict[str, set[str]] = field(default_factory=lambda: defaultdict(set))
-    attempts: Counter[int] = field(default_factory=Counter)
+    verdicts: Counter[str] = field(default_factory=Counter)
+    repeated: int = 0
 
     def add(self, record: Record) -> None:
         """Take in one record."""
-        metadata = record.policy_metadata
         for name, value in record.needs.items():
             self.needs[name].add(_words(value))
-        for table in _tables(metadata):
+        for table in _tables(record.policy_metadata):
             self.is_remote |= SERVER in table
-            for key in DECLARABLE:
-                if key in table:
-                    self.declared[key].add(_words(table[key]))
-        if record.inference is not None:
-            found = record.inference
-            self.inference["python"].add(found.python)
-            self.inference["libraries"].add(_words(found.libraries))
-            self.inference["dtypes"].add(_words(found.dtypes))
-            self.inference["devices"].add(_words(found.devices))
+            for key in DECLARABLE.keys() & table.keys():
+                self.declared[key].add(_words(table[key]))
+        if (found := record.inference) is not None:
+            dtypes = [f"{one} (parameters)" for one in found.dtypes]
+            values = found.python, found.libraries, dtypes, found.devices
+            for key, one in zip(("python", "libraries", "dtype", "device"), values, strict=True):
+                self.inference[key].add(_words(one))
+        self.is_privileged |= record.privileged
         self.steps += record.steps
         self.calls += record.calls
-        self.texts[record.setting].add(" ".join(one.text for one in record.instruction))
-        self.attempts[record.attempt] += 1
+        self.verdicts[record.prompt_verdict] += 1
+        self.repeated += record.attempt > 1
 
     def need(self, name: str) -> str:
         """Return a declared need in words; in records from before needs were kept it is unknown."""
@@ -75,34 +127,59 @@ class PlayedFacts:
             return NOT_REPORTED
         return "; ".join(sorted(one or "none" for one in self.needs.get(name, ("none",))))
 
-    def said(self, key: str) -> str:
-        """Return what the policy declares under a key of `DECLARABLE`."""
-        return _listed(self.declared.get(key, ()))
+    def know(self, key: str) -> str:
+        """Return what is known under a key of `DECLARABLE`.
 
-    def measured(self, name: str) -> str:
-        """Return what the policy's process reported; a server's process was not asked."""
-        return NOT_REPORTED if self.is_remote else _listed(self.inference.get(name, ()))
+        That is what the policy declares, or else what its process reported; the process of a server
+        was not asked.
+        """
+        measured = () if self.is_remote else self.inference.get(key, ())
+        known = _listed(self.declared.get(key, ())) or _listed(measured)
+        if not known and key in _OF_NETWORKS and self.declared["network"] == {"none"}:
+            return NO_NETWORK
+        return known or NOT_REPORTED
+
+    def labeled(self, key: str) -> str:
+        """Return the same after what the key stands for."""
+        return f"{DECLARABLE[key]}: {self.know(key)}"
 
 
-def read_facts(records: Iterable[Record]) -> Mapping[str, PlayedFacts]:
-    """Return what records say, by policy in the order of their first record."""
-    found: dict[str, PlayedFacts] = {}
+def distinct(values: Iterable[object]) -> str:
+    """Return the distinct values in order; None among them is not reported."""
+    found = sorted({str(one) for one in values if one is not None})
+    return ", ".join(found) or NOT_REPORTED
+
+
+def item(label: str, *parts: str) -> tuple[str, str]:
+    """Return an item of several parts."""
+    return label, "; ".join(parts)
+
+
+def read_facts(
+    records: Iterable[Record],
+) -> tuple[Mapping[str, PlayedFacts], Mapping[TextColumn, SaidTexts]]:
+    """Return how each policy played, in the order of their first records, and what was said."""
+    played: dict[str, PlayedFacts] = {}
+    said: defaultdict[TextColumn, SaidTexts] = defaultdict(SaidTexts)
     for record in records:
-        found.setdefault(record.policy, PlayedFacts()).add(record)
-    return found
+        played.setdefault(record.policy, PlayedFacts()).add(record)
+        said[TextColumn(record.column, record.arm)].add(record)
+    return played, said
 
 
 def _tables(metadata: Mapping[str, Any]) -> Iterator[Mapping[str, Any]]:
-    """Yield a policy's metadata, and those of the policy behind a planner."""
+    """Yield a policy's metadata, and those of the policy behind a planner.
+
+    What a planner has for a network is not known from the policy behind it.
+    """
     yield metadata
     behind = metadata.get("policy")
     if isinstance(behind, Mapping):
-        yield behind
+        yield {key: value for key, value in behind.items() if key != "network"}
 
 
 def _listed(values: Iterable[str]) -> str:
-    found = sorted(one for one in values if one)
-    return "; ".join(found) or NOT_REPORTED
+    return "; ".join(sorted(one for one in values if one))
 
 
 def _words(value: object) -> str:

@@ -1,13 +1,4 @@
-"""What control arms show: each figure compares two rates over the same scenes.
-
-| figure | first | second |
-| --- | --- | --- |
-| language use | told and other goal both followed | the same goal pursued in both |
-| words' worth | success when told | success in silence |
-| order's worth | success when told | success with the words scrambled |
-| paraphrases | all of them succeed | their mean success |
-| repeat | success when told | success with another policy seed |
-"""
+"""What control arms show: each figure compares two rates over the same scenes."""
 
 from __future__ import annotations
 
@@ -211,3 +202,10 @@ CONTRASTS = (
     ArmContrast("paraphrases", "all", "mean", _paraphrases),
     ArmContrast("repeat", TOLD, AGAIN, _against(AGAIN)),
 )
+MEANING = (
+    "Language use: first the scenes in which the told goal and another one were both reached when "
+    "stated; second those in which the same goal was pursued whichever was stated. Words' worth "
+    "and order's worth: success when told, against silence and against scrambled words. "
+    "Paraphrases: all of them succeed, against their mean. Repeat: another policy seed."
+)
+"""The two rates of each contrast."""

@@ -33,7 +33,7 @@ from roboirg.tasks import every_task
 Direction = Literal["higher", "lower", "open"]
 """Of the first side against the second; open if the corrected test does not decide."""
 
-Unit = Literal["trial", "episode", "task"]
+Unit = Literal["rollout", "episode", "task"]
 Weighting = Literal["task", "suite", "difficulty"]
 """What weighs the same in a mean."""
 
@@ -72,6 +72,11 @@ class AnalysisChoice:
     unit: Unit = "episode"
     weights: Weighting = "task"
 
+    @property
+    def label(self) -> str:
+        """Group and name."""
+        return f"{self.group} {self.name}".strip()
+
 
 @dataclass(frozen=True)
 class Robustness:
@@ -80,11 +85,13 @@ class Robustness:
     Attributes:
         label: of the contrast.
         verdict: as everywhere.
+        pairs: episodes that both sides have.
         others: the verdict under each other choice, by choice.
     """
 
     label: str
     verdict: Direction
+    pairs: int
     others: Mapping[AnalysisChoice, Direction]
 
     @property
@@ -97,7 +104,7 @@ class Robustness:
         """Whether the verdict holds in all analyses, in words."""
         if not self.exceptions:
             return f"holds in all {len(self.others)} other analyses"
-        listed = ", ".join(" ".join(filter(None, (one.group, one.name))) for one in self.exceptions)
+        listed = ", ".join(one.label for one in self.exceptions)
         return f"does not hold in {len(self.exceptions)} of {len(self.others)}: {listed}"
 
 
@@ -113,36 +120,51 @@ def try_choices(contrasts: Sequence[Contrast]) -> tuple[Robustness, ...]:
         Robustness(
             contrast.label,
             usual[index],
+            sum(1 for _ in _units(contrast.first, contrast.second, "episode")),
             {choice: found[index] for choice, found in zip(choices, others, strict=True)},
         )
         for index, contrast in enumerate(contrasts)
     )
 
 
+class Offer(NamedTuple):
+    """Choices that can change something only if results differ in one way.
+
+    Attributes:
+        choices: what may be chosen.
+        differs: whether the results do.
+        reason: why the choices change nothing otherwise.
+    """
+
+    choices: Sequence[AnalysisChoice]
+    differs: bool
+    reason: str
+
+
 def choices_for(contrasts: Sequence[Contrast]) -> tuple[AnalysisChoice, ...]:
     """Return the choices other than the usual one that can change anything."""
+    return tuple(choice for one in offers_for(contrasts) if one.differs for choice in one.choices)
+
+
+def offers_for(contrasts: Sequence[Contrast]) -> tuple[Offer, ...]:
+    """Return all choices that an analyst of these contrasts has."""
     results = [one for each in contrasts for side in (each.first, each.second) for one in side]
     tasks = list(dict.fromkeys(one.task for one in results))
+    suites, difficulties = {_suite(task) for task in tasks}, {one.difficulty for one in results}
     seeds = sorted({one.policy_seed for one in results})
-    processors = Counter(one.processor for one in results)
-    found: list[AnalysisChoice] = []
-    if any(one.outcome == "error" for one in results):
-        found.append(AnalysisChoice("errors as failures", keep=_errors_as_failures))
-    if len(seeds) > 1:
-        found += [AnalysisChoice("seed", str(seed), keep=_only_seed(seed)) for seed in seeds]
-        found.append(AnalysisChoice("unit", "trial", unit="trial"))
-    if len(tasks) > 1:
-        found.append(AnalysisChoice("unit", "task", unit="task"))
-        if len({_suite(task) for task in tasks}) > 1:
-            found.append(AnalysisChoice("equal weights of", "suites", weights="suite"))
-    if len({one.difficulty for one in results}) > 1:
-        found.append(AnalysisChoice("equal weights of", "difficulties", weights="difficulty"))
-    if len(tasks) > 1:
-        found += [AnalysisChoice("without", task, keep=_without_task(task)) for task in tasks]
-    if len(processors) > 1:
-        usual = processors.most_common(1)[0][0]
-        found.append(AnalysisChoice("one processor", keep=_only_processor(usual)))
-    return tuple(found)
+    processors = Counter(one.processor for one in results).most_common()
+    has_errors = any(one.outcome == "error" for one in results)
+    by_seed = [AnalysisChoice("seed", str(one), keep=_only_seed(one)) for one in seeds]
+    without = [AnalysisChoice("without", one, keep=_without_task(one)) for one in tasks]
+    usual = [AnalysisChoice("one processor", keep=_only_processor(one)) for one, _ in processors]
+    return (
+        Offer([_ERRORS_FAIL], has_errors, "no rollout ended in an error"),
+        Offer([*by_seed, _BY_ROLLOUT], len(seeds) > 1, "one policy seed"),
+        Offer([_BY_TASK, *without], len(tasks) > 1, "one task"),
+        Offer([_EQUAL_SUITES], len(suites) > 1, "one suite"),
+        Offer([_EQUAL_DIFFICULTIES], len(difficulties) > 1, "one difficulty"),
+        Offer(usual[:1], len(processors) > 1, "one kind of processor simulated all"),
+    )
 
 
 def _errors_as_failures(results: Results) -> Results:
@@ -150,6 +172,13 @@ def _errors_as_failures(results: Results) -> Results:
         msgspec.structs.replace(one, outcome="failure") if one.outcome == "error" else one
         for one in results
     ]
+
+
+_ERRORS_FAIL = AnalysisChoice("errors as failures", keep=_errors_as_failures)
+_BY_ROLLOUT = AnalysisChoice("unit", "rollout", unit="rollout")
+_BY_TASK = AnalysisChoice("unit", "task", unit="task")
+_EQUAL_SUITES = AnalysisChoice("equal weights of", "suites", weights="suite")
+_EQUAL_DIFFICULTIES = AnalysisChoice("equal weights of", "difficulties", weights="difficulty")
 
 
 def _only_seed(seed: int) -> Callable[[Results], Results]:
@@ -195,32 +224,28 @@ def _tested(contrast: Contrast, choice: AnalysisChoice) -> tuple[float, float] |
     units = list(_units(choice.keep(contrast.first), choice.keep(contrast.second), choice.unit))
     if not units:
         return None
-    if choice.weights == "task" and choice.unit != "task":
-        # As everywhere: the mean weighs tasks equally, the test sums over units.
-        scale = int(np.lcm.reduce([one.difference.denominator for one in units]))
-        whole = np.array([int(one.difference * scale) for one in units])
-        return _mean(units, _weights(units, "task")), sign_flip_test(whole)
     weights = _weights(units, choice.weights)
+    values = np.array([float(one.difference) for one in units]) * weights
+    mean = float(values.sum())
+    mean = 0.0 if abs(mean) < _NOTHING else mean
     if choice.unit == "task":
-        values = [
-            sum(float(one.difference) * weight for one, weight in group)
-            for group in _by_task(units, weights).values()
-        ]
-    else:
-        values = [
-            float(one.difference) * weight for one, weight in zip(units, weights, strict=True)
-        ]
-    return _mean(units, weights), swap_test(np.array(values))
+        _, of_task = np.unique([one.task for one in units], return_inverse=True)
+        return mean, swap_test(np.bincount(of_task, values).astype(np.float64))
+    if choice.weights != "task":
+        return mean, swap_test(values)
+    # As everywhere: the mean weighs tasks equally, the test sums over units.
+    scale = int(np.lcm.reduce([one.difference.denominator for one in units]))
+    return mean, sign_flip_test(np.array([int(one.difference * scale) for one in units]))
 
 
 def _units(first: Results, second: Results, unit: Unit) -> Iterator[_Unit]:
-    """Yield what the sides differ by in each trial, or else in each episode, that both have."""
+    """Yield what the sides differ by in each rollout, or else in each episode, that both have."""
     ours, theirs = _verdicts(first), _verdicts(second)
     difficulties = {(one.task, one.episode): one.difficulty for one in (*first, *second)}
     for where in sorted(ours.keys() & theirs.keys()):
         here, there = ours[where], theirs[where]
         shared = here.keys() & there.keys()
-        if unit == "trial" and shared:
+        if unit == "rollout" and shared:
             pairs = [([here[seed]], [there[seed]]) for seed in sorted(shared)]
         else:
             pairs = [
@@ -251,21 +276,6 @@ def _weights(units: Sequence[_Unit], weighting: Weighting) -> list[float]:
     groups = {task: _suite(task) if weighting == "suite" else "" for task in sizes}
     members = Counter(groups.values())
     return [1 / (len(members) * members[groups[one.task]] * sizes[one.task]) for one in units]
-
-
-def _mean(units: Sequence[_Unit], weights: Sequence[float]) -> float:
-    pairs = zip(units, weights, strict=True)
-    value = sum(float(one.difference) * weight for one, weight in pairs)
-    return 0.0 if abs(value) < _NOTHING else value
-
-
-def _by_task(
-    units: Sequence[_Unit], weights: Sequence[float]
-) -> dict[str, list[tuple[_Unit, float]]]:
-    groups: dict[str, list[tuple[_Unit, float]]] = defaultdict(list)
-    for one, weight in zip(units, weights, strict=True):
-        groups[one.task].append((one, weight))
-    return groups
 
 
 def swap_test(values: NDArray[np.float64]) -> float:

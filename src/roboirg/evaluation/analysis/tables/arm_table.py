@@ -9,6 +9,7 @@ import numpy as np
 
 from roboirg.core.errors import InvalidValueError
 from roboirg.evaluation.analysis.stats.arm_figures import (
+    MEANING,
     WORDS_WORTH,
     ArmFigure,
     arm_figures,
@@ -27,10 +28,7 @@ COLUMNS = tuple(
 )
 _NOTE = (
     "Each figure compares two rates on the same scenes, as means over tasks, in percent with 95 % "
-    "intervals. Language use: first the scenes in which the told goal and another one were both "
-    "reached when stated; second those in which the same goal was pursued whichever was stated. "
-    "Words' worth and order's worth: success when told, against silence and against scrambled "
-    "words. Paraphrases: all of them succeed, against their mean. Repeat: another policy seed. "
+    f"intervals. {MEANING} "
     "Chance is the success in silence of a random goal of the scene. Differences are in points; "
     "p-values are corrected over all rows of the policy. Scenes without an arm are in none of its "
     "figures."

@@ -20,8 +20,8 @@ _NOTE = (
     "Whether success is lower or higher than in explicit on the same episodes (open: the test does "
     "not decide), as tested everywhere, and what becomes of that under each other choice: same, or "
     "the other verdict with the choices that lead to it. Within a column, p-values are corrected "
-    "over all rows of the policy. An episode is a scene, so that trials and tasks are the other "
-    "units."
+    "over all rows of the policy. An episode is a scene, so that rollouts and tasks are the "
+    "other units."
 )
 
 

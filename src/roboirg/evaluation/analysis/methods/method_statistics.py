@@ -1,0 +1,220 @@
+"""The items of a methods section on how scenes were selected and results were analyzed."""
+
+from __future__ import annotations
+
+from collections import Counter, defaultdict
+from collections.abc import Iterator, Mapping, Sequence
+
+from roboirg.core.arms import TOLD
+from roboirg.core.episode import SPLITS
+from roboirg.core.plain_text import counted
+from roboirg.evaluation.analysis.methods.played_facts import (
+    NOT_REPORTED,
+    Items,
+    PlayedFacts,
+    TextColumn,
+    distinct,
+    item,
+)
+from roboirg.evaluation.analysis.stats.arm_figures import MEANING
+from roboirg.evaluation.analysis.stats.cells import PolicyRun
+from roboirg.evaluation.analysis.stats.chance import chance_level
+from roboirg.evaluation.analysis.stats.intervals import ALPHA, DRAWS
+from roboirg.evaluation.analysis.stats.option_labels import options_label, options_sort_key
+from roboirg.evaluation.analysis.stats.rates import p_text, points
+from roboirg.evaluation.analysis.stats.run_data import RunData
+from roboirg.evaluation.analysis.stats.run_summary import ALL, ScopeKey
+from roboirg.evaluation.analysis.stats.sensitivity import (
+    Direction,
+    Robustness,
+    gap_contrasts,
+    offers_for,
+    try_choices,
+)
+from roboirg.evaluation.analysis.tables.arm_table import figures_of
+from roboirg.evaluation.records.record import Job, Summary
+from roboirg.language import settings_of
+from roboirg.tasks import all_tasks, every_task
+from roboirg.tasks.splits.published_episodes import is_published
+from roboirg.tasks.splits.splits import SIZES, shipped_splits
+
+SceneName = tuple[str, str, int]
+"""Task, split and number."""
+
+_NO_REASON = f"reason for this selection: {NOT_REPORTED}"
+_GUESS = "expected of a guess among the goals that fit the last utterance alone"
+_VERDICTS: Mapping[Direction, str] = {
+    "open": "no clear difference",
+    "lower": "clearly lower",
+    "higher": "clearly higher",
+}
+
+
+def screening_items(jobs: Sequence[Job]) -> Items:
+    """Yield which scenes were selected, and what was left out."""
+    columns: dict[TextColumn, set[SceneName]] = defaultdict(set)
+    for one in jobs:
+        columns[TextColumn(one.column, one.arm)].add((one.task, one.split, one.episode))
+    scenes = set().union(*columns.values())
+    tasks = list(dict.fromkeys(one.task for one in jobs))
+    absent = [name for name in all_tasks() if name not in tasks]
+    reason = (f"not played: {', '.join(absent)}", _NO_REASON) if absent else ("all there are",)
+    yield item("tasks", ", ".join(tasks), *reason)
+    splits, numbers = {split for _, split, _ in scenes}, sorted({number for *_, number in scenes})
+    span = f"{numbers[0]} to {numbers[-1]}" if len(numbers) > 1 else numbers[0]
+    whole = len(tasks) * sum(SIZES[split] for split in SPLITS if split in splits)
+    is_whole = splits <= {*SPLITS} and len(scenes) == whole
+    yield item(
+        "scenes",
+        f"{len(scenes)} of the split {distinct(splits)}, numbered {span}",
+        "all there are" if is_whole else _NO_REASON,
+        "none was left out for its result",
+    )
+    yield item("screening when the split was made", *_rejections(scenes))
+    for column, own in columns.items():
+        usable = {one for one in scenes if _has_setting(one[0], column.options.setting)}
+        is_told = column.arm == TOLD
+        missing = "the setting cannot express them" if is_told else "there is no such goal or text"
+        yield item(
+            column.label,
+            f"{len(own)} of {len(scenes)} scenes",
+            f"left out, as their tasks do not have the setting: {len(scenes - usable)}",
+            f"as {missing}: {len(usable - own)}",
+        )
+
+
+def _rejections(scenes: set[SceneName]) -> Iterator[str]:
+    published = {one for one in scenes if is_published(*one)}
+    if published:
+        yield f"{counted(len(published), 'scene')} published by RoboMME, none of which was rejected"
+    shipped = {one for one in scenes - published if one[0] in shipped_splits() and one[1] in SPLITS}
+    if shipped:
+        rejected = sum(
+            shipped_splits()[task].passed_over.get(f"{split}/{number}", 0)
+            for task, split, number in shipped
+        )
+        yield (
+            f"{counted(len(shipped), 'scene')} sampled, after {rejected} rejected: no room for an "
+            "object, a setting that cannot express it, or not solved by the oracle"
+        )
+    if others := len(scenes - published - shipped):
+        yield f"{counted(others, 'scene')} sampled, how many were rejected: {NOT_REPORTED}"
+
+
+def _has_setting(task: str, setting: str) -> bool:
+    found = every_task().get(task)
+    return found is None or setting in settings_of(found)
+
+
+def statistics_items(data: RunData) -> Items:
+    """Yield how rates and differences are analyzed."""
+    seeds = len({one.policy_seed for _, one in data.results})
+    single = "Wilson's score for a task, for means over tasks" if seeds == 1 else "for all rates"
+    test = "McNemar's exact test" if seeds == 1 else "the exact sign-flip test over scenes"
+    yield "unit", "the scene; its rollouts with several policy seeds are one cluster"
+    yield "averages", "means over tasks, each with the same weight"
+    yield "intervals", f"95 %; {single} the bootstrap over each task's scenes ({DRAWS} resamples)"
+    yield item(
+        "differences to explicit",
+        f"paired by scene, {test}, two-sided",
+        f"clear if p ≤ {ALPHA} after the correction, and then lower or higher by the sign",
+    )
+    yield item(
+        "multiplicity, by Holm's correction over families",
+        "for each policy and arm, its differences in single tasks, those in suites, and those in "
+        "means over all tasks",
+        "for each policy, its contrasts of arms",
+    )
+    yield (
+        "contrasts of arms, where played; paired and tested alike",
+        MEANING.rstrip(".") if figures_of(data) else "none, without control arms",
+    )
+
+
+def sensitivity_items(data: RunData) -> Items:
+    """Yield each verdict on a difference to explicit, and what other analyses make of it."""
+    told = data.told()
+    for policy_run, name in told.names.items():
+        contrasts = gap_contrasts([one for owner, one in told.results if owner == policy_run])
+        if not contrasts:
+            yield name, f"{NOT_REPORTED}, as explicit and another setting are needed"
+            continue
+        for found in try_choices(contrasts):
+            yield f"{name}, {found.label} less explicit", _robustness(found)
+        offers = [one for one in offers_for(contrasts) if not one.differs]
+        listed = (f"{', '.join(of.label for of in one.choices)} ({one.reason})" for one in offers)
+        yield item(f"{name}, other analyses that change nothing here", *listed)
+    if figures_of(data):
+        yield "contrasts of arms", f"other analyses: {NOT_REPORTED}"
+
+
+def _robustness(found: Robustness) -> str:
+    by_verdict: dict[str, list[str]] = defaultdict(list)
+    for choice, verdict in found.others.items():
+        by_verdict[_VERDICTS[verdict]].append(choice.label)
+    others = "; ".join(f"{verdict} with {', '.join(of)}" for verdict, of in by_verdict.items())
+    return (
+        f"{_VERDICTS[found.verdict]}, from {counted(found.pairs, 'pair')} of scenes, which allow "
+        f"no p below {0.5 ** (found.pairs - 1):.2g} before the correction; in other analyses: "
+        f"{others or 'none applies'}"
+    )
+
+
+def control_items(data: RunData, jobs: Sequence[Job]) -> Items:
+    """Yield chance levels, positive controls, and what the control arms show."""
+    by_options = defaultdict(list)
+    for job in jobs:
+        by_options[job.column].append(job)
+    for options in sorted(by_options, key=options_sort_key):
+        level = chance_level(by_options[options])
+        text = NOT_REPORTED if level is None else f"{100 * float(level):.1f} %"
+        yield f"chance in {options_label(options)}", f"{text}, {_GUESS}"
+    told = data.told()
+    controls = [one for one in told.names if one.is_privileged]
+    listed = "; ".join(f"{told.names[one]}: {_rates(told, one)}" for one in controls)
+    yield "positive control: policies that read the simulator's state", listed or "none played"
+    for one in figures_of(data):
+        sides = zip(one.contrast[1:3], one.rates, strict=True)
+        rates = ", ".join(f"{side} {100 * rate:.1f} %" for side, rate in sides)
+        yield item(
+            f"{told.names[one.policy_run]}, {options_label(one.options)}, {one.contrast.name}",
+            rates,
+            f"difference {points(one.gap.value, 1)} points, corrected {p_text(one.p_holm)}",
+            counted(one.gap.episodes, "scene"),
+        )
+    is_resolved = any(one.form == "resolved" for one in jobs)
+    yield (
+        "control without references: form resolved, which names their referents instead",
+        "played" if is_resolved else "not played",
+    )
+
+
+def _rates(data: RunData, policy_run: PolicyRun) -> str:
+    found = []
+    for options in sorted({key.options for key in data.cells}, key=options_sort_key):
+        row = data.summaries.get(ScopeKey(policy_run, ALL, options))
+        if row is not None and row.rate is not None:
+            found.append(f"{options_label(options)} {100 * float(row.rate):.1f} %")
+    return ", ".join(found)
+
+
+def error_items(
+    results: Sequence[Summary], data: RunData, played: Mapping[str, PlayedFacts]
+) -> Items:
+    """Yield seeds, repeated rollouts, errors, and what is missing."""
+    seeds = {one.policy_seed for one in results}
+    yield item(
+        "policy seeds",
+        f"{counted(len(seeds), 'seed')}, numbered {distinct(seeds)}",
+        "the seed that a policy gets is made from this number and the scene",
+    )
+    again = sum(one.repeated for one in played.values())
+    yield "rollouts begun again after a fault", f"{again} of {len(results)}"
+    kinds = Counter(one.error for one in results if one.outcome == "error")
+    listed = ", ".join(f"{kind} {count}" for kind, count in kinds.items())
+    by_kind = f" ({listed})" if listed else ""
+    yield (
+        "rollouts that ended in an error, which are in no rate",
+        f"{kinds.total()} of {len(results)}{by_kind}",
+    )
+    yield "rollouts planned and not played", f"{sum(one.missing for one in data.cells.values())}"
