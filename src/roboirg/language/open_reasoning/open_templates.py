@@ -97,7 +97,7 @@ NUMBERS = Pools(
     test=("them", "these", "the values", "these values"),
 )
 CALCULATIONS = Pools(
-    train=("{steps}.", "Now {steps}.", "Let's {steps}.", "First {steps}."),
+    train=("{steps}.", "Now {steps}.", "Let's {steps}.", "Please {steps}."),
     test=(
         "My number is {steps}.",
         "The number is {steps}.",
