@@ -106,7 +106,10 @@ def one(records: tuple[Record, ...], task: str, setting: str, says: str | None =
     return next(
         r for r in records
         if (r.task, r.setting) == (task, setting)
-        and (says is None or any(mention.expression == says for mention in r.mentions))
+        and (says is None or any(
+            mention.expression == says and mention.utterance == max(m.utterance for m in r.mentions)
+            for mention in r.mentions
+        ))
     )  # fmt: skip
 
 

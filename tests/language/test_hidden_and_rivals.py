@@ -56,7 +56,10 @@ def test_a_recency_rival_is_the_thing_of_the_last_remark_where_the_command_says_
                 episode = get_episode(task.name, "test", index)
                 said = instruct(episode, "contextual", distractors=number)
                 last = [one.text for one in said.utterances if one.stage == "distractor"][-1]
-                says_it = any(one.expression == "it" for one in said.mentions)
+                command = len(said.utterances) - 1
+                says_it = any(
+                    (one.expression, one.utterance) == ("it", command) for one in said.mentions
+                )
                 rival = said.metadata["recency_rival"]
                 assert rival == (things[last] if says_it else None)
                 seen.add((says_it, rival is not None))

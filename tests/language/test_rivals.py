@@ -35,7 +35,7 @@ CELLS = [
     for setting in SETTINGS
     if setting in settings_of(get_task(name))
 ]
-POINTERS = {"former": 0, "first": 0, "earlier": 0, "latter": 1, "last": 1, "later": 1}
+POINTERS = {"former": 0, "first": 0, "latter": 1, "second": 1, "last": 1}
 
 
 def told(task, setting, split="test", count=40, **options):

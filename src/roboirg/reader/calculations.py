@@ -25,7 +25,7 @@ _AFTER = (
 _TAKE = "(?:(?:take|use|find|work out) )?"
 _BOTH = (
     rf"(?:(?P<left>{NUMBER}) and (?P<right>{NUMBER})"
-    r"|(?:them|those|these|the|both)(?: two)?(?: (?:numbers|figures|cards|dice))?)"
+    r"|(?:them|those|these|the|both)(?: two)?(?: (?:numbers|figures|values|cards|dice))?)"
 )
 _OF_BOTH = rf"(?: (?:of|between) {_BOTH})?"
 Combine = Callable[[int, int], int]

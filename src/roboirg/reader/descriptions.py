@@ -33,7 +33,7 @@ CHOSEN = Phrases({
     "the cube I want":
         r"\b(?:the|my) (?P<noun>cubes?|box|container|tapes?|ones?|color|place|spot) i "
         r"(?:mean|meant|want|wanted|need|asked for|favor|chose|choose|prefer|preferred|decided on"
-        r"|settled on|picked|selected|opted for)\b",
+        r"|settled on|picked|selected|opted for|would like|have chosen|have picked)\b",
 })  # fmt: skip
 _OTHERS = Phrases({
     "the other one":

@@ -13,7 +13,7 @@ from typing import NamedTuple
 from roboirg.core.episode import Goal, Scene
 from roboirg.reader.observed_numbers import observed_amount, observed_times
 from roboirg.reader.observed_placements import observed_placement
-from roboirg.reader.observed_things import observed_thing
+from roboirg.reader.observed_things import observed_thing, with_remaining
 from roboirg.reader.phrases import Phrases
 from roboirg.reader.tokens import COLOR, Sentence
 
@@ -43,8 +43,8 @@ def observe(sentences: tuple[Sentence, ...], scene: Scene, goals: Sequence[Goal]
     )
     read: list[Sentence] = []
     complaints: list[str] = []
-    for sentence in sentences:
-        text = " ".join(sentence)
+    for sentence in with_remaining([" ".join(words) for words in sentences]):
+        text = sentence
         for find in finders:
             for start, end, meaning in sorted(find(text, scene), reverse=True):
                 if meaning is None:

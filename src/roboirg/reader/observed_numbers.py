@@ -13,11 +13,16 @@ from roboirg.reader.tokens import COLOR, NUMBER, number_of
 Span = tuple[int, int, str | None]
 _TIE = 0.01
 _SIDE = "(?P<side>farther to your (?:left|right)|closer to you|farther from you)"
+_COUNT = "(?:(?:first |now )?(?:count|note|think|look|see) )?"
 _SWAPS = Phrases({
     "once for every time that cubes changed places":
         r"once for every time that cubes changed places\b",
     "as many times as there were swaps in the video":
         r"as many times as there were swaps in the video\b",
+    "count how often cubes changed places in the video":
+        rf"{_COUNT}how often cubes changed places in the video\b",
+    "note how many swaps there were in the video":
+        rf"{_COUNT}how many swaps there were in the video\b",
 })  # fmt: skip
 _BESIDE = Phrases({
     "once for every red cube now closer to you than the cube in the video":
@@ -26,6 +31,10 @@ _BESIDE = Phrases({
         rf"(?:(?P<color>{COLOR}) )?cubes? now {_SIDE} "
         r"than (?:the cube in the video|the lifted one|it is)\b"
         r"(?P<more>(?: ,)? and once more\b)?",
+    "count the red cubes that are now closer to you than the cube from the video , and add one":
+        rf"{_COUNT}(?:the|how many) (?:(?P<shade>{COLOR}) )?cubes (?:that )?are now "
+        rf"{_SIDE.replace('side', 'way')} than (?:the cube from the video|the lifted one)\b"
+        r"(?P<plus>(?: ,)? (?:and add|plus) one\b)?",
 })  # fmt: skip
 _ALL_BUT = Phrases({
     "all but three of the red cubes":
@@ -53,10 +62,10 @@ def observed_times(text: str, scene: Scene) -> Iterator[Span]:
         cubes = [
             item
             for item in last.of_kind("cube")
-            if item != reference and found["color"] in (None, item.color)
+            if item != reference and (found["color"] or found["shade"]) in (None, item.color)
         ]
-        count = _count(cubes, reference, found["side"])
-        if count is not None and (found["itself"] or found["more"]):
+        count = _count(cubes, reference, found["side"] or found["way"])
+        if count is not None and (found["itself"] or found["more"] or found["plus"]):
             count += 1
         yield (*found.span(), _number(count, "times"))
 

@@ -14,7 +14,7 @@ Span = tuple[int, int, str | None]
 _TIE = 0.01
 _FROM_THE_END = Phrases({
     "the last placement but one":
-        rf"the (?:(?P<rank>{ORDINAL}) to )?(?:last|final) placement(?P<but> but one)?\b",
+        rf"the (?:(?P<rank>{ORDINAL}|next) to )?(?:last|final) placement(?P<but> but one)?\b",
 })  # fmt: skip
 _BEFORE_PRESS = Phrases({
     "the placement right before the button press":
@@ -22,7 +22,8 @@ _BEFORE_PRESS = Phrases({
 })  # fmt: skip
 _AT = Phrases({
     "the placement that was made closest to you":
-        "the placement (?:that was made )?(?P<place>farthest (?:to your (?:left|right)|from you)"
+        "the placement (?:(?:that was )?made )?"
+        "(?P<place>farthest (?:to your (?:left|right)|from you)"
         r"|closest to (?:you|the button))\b",
 })  # fmt: skip
 _MOVED = Phrases({
@@ -56,7 +57,7 @@ def _placements(
 ) -> Iterator[tuple[int, int, list[int]]]:
     """Yield the words for placements, with the positions in the series of those that they fit."""
     for found in _FROM_THE_END.finditer(text):
-        rank = 2 if found["but"] else ordinal_of(found["rank"] or "first") or 1
+        rank = 2 if found["but"] else ordinal_of(found["rank"] or "first") or 2
         yield (*found.span(), [len(shown) - rank])
     for found in _BEFORE_PRESS.finditer(text):
         yield (*found.span(), [pressed - 1])

@@ -18,12 +18,16 @@ _TIE = 0.01
 """Meters; the same words may mean things that differ by less."""
 
 _NOUN = "(?P<noun>cube|container)"
-_FIRST = "(?P<when>initially |at first |)"
+_FIRST = "(?P<when>initially |at first |started |)"
 _WHEN = f"(?:(?:that )?{_FIRST}(?:is |was )?(?:now )?)?"
 _HAS = f"that {_FIRST}(?:now )?(?:has|had)"
 _IN_A_ROW = Phrases({
     "the cube in the middle from left to right":
-        rf"the {_NOUN} {_WHEN}in the middle from (?P<way>left to right|near to far)\b",
+        rf"the {_NOUN} {_WHEN}(?:comes )?(?:in the middle|as the middle one)(?: now)? from "
+        r"(?P<way>left to right|near to far)\b",
+    "the middle cube from left to right":
+        r"the middle (?P<cube>cube|container)(?: now)? from "
+        r"(?P<row>left to right|near to far)\b",
 })  # fmt: skip
 _AS_MANY = Phrases({
     "the container that initially had as many containers in front of it as behind it":
@@ -32,7 +36,20 @@ _AS_MANY = Phrases({
 })  # fmt: skip
 _NEAREST = Phrases({
     "the cube nearest to the one closest to you":
-        rf"the {_NOUN} {_WHEN}(?P<second>(?:second|2nd) )?nearest to the one ",
+        rf"the {_NOUN} {_WHEN}(?P<second>(?:second|2nd) )?(?:nearest|right next)"
+        r"(?P<late> at first)? to the one ",
+    "the nearest neighbor of the cube closest to you":
+        r"the (?P<next>(?:second|2nd) )?nearest neighbor of the (?P<cube>cube|container) ",
+})  # fmt: skip
+_NOW = Phrases({"closest to you now": r" now\b"})
+_SET_ASIDE = Phrases({
+    "Forget the cube that started": rf"^(?:ignore|forget) the {_NOUN} (?P<when>that started |)",
+})  # fmt: skip
+_AND_ONE = Phrases({"now and the one that started": r"(?: now)? and the one (?:that started )?"})
+_REMAINING = Phrases({
+    "I want the one that is left":
+        r"\bthe (?:one|cube|container) that is left\b",
+    "I want the remaining one": r"\bthe (?:other|remaining) (?:one|cube|container)\b",
 })  # fmt: skip
 _NEITHER = Phrases({
     "the cube that is neither closest to you nor closest to the button":
@@ -51,9 +68,37 @@ _MOVES = Phrases({
 })  # fmt: skip
 _CARRIED = Phrases({
     "the cube that was moved in the video":
-        "the cube that (?:was moved in the video|the video is about"
-        r"|the robot (?:held|carried)(?: in the video)?)\b",
+        "the cube (?:from the video|that was carried in the video|that the video showed)"
+        "|the cube that (?:was moved in the video|the video is about"
+        r"|the robot (?:held|carried)(?: in the video)?)",
 })  # fmt: skip
+
+
+def with_remaining(sentences: Sequence[str]) -> list[str]:
+    """Return the sentences with *forget two things. I want the one that is left* in one."""
+    found: list[str] = []
+    for text in sentences:
+        aside = _SET_ASIDE.search(found[-1]) if found else None
+        remaining = _REMAINING.search(text)
+        if aside is not None and remaining is not None:
+            places = _two_places(found[-1], aside.end())
+            if places is not None:
+                when = aside["when"] or "that is "
+                meant = f"the {aside['noun']} {when}neither {places[0]} nor {places[1]}"
+                found[-1] = f"{text[: remaining.start()]}{meant}{text[remaining.end() :]}"
+                continue
+        found.append(text)
+    return found
+
+
+def _two_places(text: str, start: int) -> tuple[str, str] | None:
+    """Return the words for the places of two things."""
+    first = _place(text, start)
+    joint = _AND_ONE.match(text, first[1]) if first else None
+    second = _place(text, joint.end()) if joint else None
+    if first is None or joint is None or second is None:
+        return None
+    return text[start : first[1]], text[joint.end() : second[1]]
 
 
 def observed_thing(text: str, scene: Scene) -> Iterator[Span]:
@@ -71,12 +116,12 @@ def observed_thing(text: str, scene: Scene) -> Iterator[Span]:
 def _middles(text: str, scene: Scene) -> Iterator[Span]:
     for phrases in (_IN_A_ROW, _AS_MANY):
         for found in phrases.finditer(text):
-            axis = 1 if "left" in found["way"] else 0
+            words = found.groupdict()
+            noun, way = words.get("cube") or found["noun"], words.get("row") or found["way"]
             middles: list[SceneObject] = []
-            for at_time in _scenes(scene, found["noun"], found["when"]):
-                things = present(at_time, found["noun"])
-                middles += _middle(things, axis)
-            yield (*found.span(), _named(middles, scene, found["noun"]))
+            for at_time in _scenes(scene, noun, found["when"]):
+                middles += _middle(present(at_time, noun), 1 if "left" in way else 0)
+            yield (*found.span(), _named(middles, scene, noun))
 
 
 def _middle(things: Sequence[SceneObject], axis: int) -> list[SceneObject]:
@@ -95,13 +140,15 @@ def _neighbors(text: str, scene: Scene) -> Iterator[Span]:
         read = _place(text, found.end())
         if read is None:
             continue
-        place, end = read
+        (place, end), noun = read, found["noun"] or found["cube"]
+        rank = 2 if found["second"] or found["next"] else 1
         nearest: list[SceneObject] = []
-        for at_time in _scenes(scene, found["noun"], found["when"]):
-            for anchor in _at(place, at_time, found["noun"]):
-                others = [item for item in present(at_time, found["noun"]) if item != anchor]
-                nearest += _ranked(others, _distance(anchor), 2 if found["second"] else 1)
-        yield found.start(), end, _named(nearest, scene, found["noun"])
+        for at_time in _scenes(scene, noun, found["when"] or found["late"]):
+            for anchor in _at(place, at_time, noun):
+                others = [item for item in present(at_time, noun) if item != anchor]
+                nearest += _ranked(others, _distance(anchor), rank)
+        now = _NOW.match(text, end)
+        yield found.start(), now.end() if now else end, _named(nearest, scene, noun)
 
 
 def _left_over(text: str, scene: Scene, start: Phrases, joint: Phrases) -> Iterator[Span]:

@@ -18,6 +18,11 @@ _ELEMENT = Phrases({
     "during visit number 3":
         rf"\b{_NOUN} (?:number |no )?(?P<number>{NUMBER})\b(?! (?:after|before|visits|placements))",
 })  # fmt: skip
+_PAIR = Phrases({
+    "the second and third visits":
+        rf"\b(?P<first>{ORDINAL}) and (?:the )?(?P<second>{ORDINAL}) {_NOUN}s\b",
+})  # fmt: skip
+"""The noun goes with both."""
 _ACTS = (
     "reache[sd]|arrive[sd]|passe[sd]|stop(?:s|ped)|move[sd]|goes|went|enter(?:s|ed)|return(?:s|ed)"
 )
@@ -70,7 +75,7 @@ _POINTER = Phrases({
     "during the visit I mentioned": rf"\bthe {_NOUN} i\b",
 })  # fmt: skip
 _OTHER = Phrases({
-    "during the other visit": rf"\bthe other {_NOUN}\b",
+    "during the other visit": rf"\bthe (?:other|remaining) {_NOUN}\b",
     "during the other of the two visits":
         rf"\bthe other (?:one )?of (?:the two|those|these|them) {_NOUN}s?\b",
     "during the visit that is left": rf"\bthe {_NOUN} that is left\b",
@@ -129,6 +134,9 @@ class OrdinalExpression(NamedTuple):
 
 def named_positions(text: str) -> tuple[int, ...]:
     """Return the elements of a series that a sentence names by number, in order."""
+    pair = _PAIR.search(text)
+    if pair is not None:
+        return tuple(ordinal_of(pair[part]) or 0 for part in ("first", "second"))
     numbers = (_number(found) for found in _ELEMENT.finditer(text))
     return tuple(one for one in numbers if isinstance(one, int))
 

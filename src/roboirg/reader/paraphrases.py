@@ -67,9 +67,10 @@ _RULES = Rewrites(
     # Values taken back
     r"or:: \b(VALUE) or (VALUE)((?: \w+){0,3}?)(?: ,)?(?: but)? not (?:the )?\1\b=>\2\3",
     r"or:: \b(VALUE) or (VALUE)((?: \w+){0,3}?)(?: ,)?(?: but)? not (?:the )?\2\b=>\1\3",
-    r"no mean sorry actually wait:: \bCOLOR(?: cubes?| ones?| container)*REPAIR(COLOR)\b=>\1",
+    r"no mean sorry actually wait:: (?<!not mean the )\bCOLOR(?: cubes?| ones?| container)*REPAIR"
+    r"(COLOR)\b=>\1",
     r"no mean sorry actually wait:: \bTIMESREPAIR(TIMES)\b=>\1",
-    r"no mean sorry actually wait:: \bRANK(?: \w+)??REPAIR(RANK)\b=>\1",
+    r"no mean sorry actually wait:: (?<!not mean the )\bRANK(?: \w+)??REPAIR(RANK)\b=>\1",
     r"no mean sorry actually wait:: \b(?:before|after)REPAIR(before|after)\b=>\1",
     r"but:: \bnot (?:on |at )?(?:the )?RANK(?: \w+)? ,? ?but (?:on |at )?(?:the )?(RANK)\b=>\1",
     # Sights
@@ -108,7 +109,7 @@ _RULES = Rewrites(
     r"away:: \b(furthest|farthest) away\b(?! from)=>\1 from you",
     r"most:: \bmost (?:on|to) (?:your|the) (?=left|right)=>farthest to your",
     r"favorite:: \b(VERB) my favorite(?: one| cube)?(?= on\b| in\b| over\b| and\b| [.]|$)=>\1 it",
-    r"remaining:: \bthe remaining (?=cube|one)=>the other",
+    r"remaining:: \bthe remaining (?=cube|one|box|tape)=>the other",
     r"containers them:: START((?:first )?CUBEMAYAND(?:first )?CUBEMAY)AND"
     r"(?:you )?(?:lift|pick up) (?:the )?containers?(?: over them)?(?: in that order)?STOP"
     r"=>lift the container over \1",

@@ -22,14 +22,15 @@ _SAID = r"(?: that)? i (?:just )?(?:mentioned|named|said|listed)"
 _POINTER = Phrases({
     "I want the former.": r"\bthe (?P<rank>former|latter)\b(?: one)?",
     "I want the first color I mentioned.":
-        rf"\bthe (?P<ordinal>first|second|last) (?:ones?|\w+){_SAID}\b",
+        rf"\bthe (?P<ordinal>first|second|1st|2nd|last) (?:ones?|\w+){_SAID}\b",
+    "I want the second one.": rf"\bthe (?P<bare>first|second|1st|2nd) ones?\b(?!{_SAID}\b| from\b)",
     "I want the one I mentioned first.":
-        rf"\bthe (?:ones?|\w+){_SAID} (?P<time>first|earlier|second|last|later)\b",
+        rf"\bthe (?:ones?|\w+){_SAID} (?P<time>first|earlier|second|1st|2nd|last|later)\b",
     "I want the other one.":
         r"\bthe (?P<other>other)(?: (?:ones?|cubes?|box|tape|container|place|number|visit"
         r"|placement|moment))?\b",
 })  # fmt: skip
-_FIRST = ("former", "first", "earlier")
+_FIRST = ("former", "first", "1st", "earlier")
 _ACCEPTED = Phrases(
     {
         "Why not": "why not",
@@ -45,12 +46,14 @@ _ACCEPTED = Phrases(
 """Ways to accept a pointer by the words before it."""
 _REJECTED = Phrases(
     {
-        "I do not want": r"\bnot(?: (?:do|mean|want|choose|like|need|prefer))?",
+        "I do not want": r"\bnot(?: (?:do|mean|want|choose|pick|like|need|prefer))?",
         "You may leave out": r"\b(?:leave|left|rule|ruled) out",
         "Set": r"\bset",
         "Forget about": r"\b(?:forget|never mind|skip|ignore)(?: about)?",
         "I gave up": r"\b(?:gave|give|passed) up",
     "I am done with": r"\bdone with",
+    "I decided against": r"\bagainst",
+    "I considered": r"\bconsidered",
     "I meant the former when I said": r"\bi said",
         "I want the latter instead of": r"\b(?:instead of|rather than)",
         "I swapped": r"\b(?:swapped|swap|exchanged)",
@@ -65,7 +68,8 @@ _REJECTED = Phrases(
 )  # fmt: skip
 """Ways to set a pointer aside by the words before it, unless they accept it."""
 _REJECTED_AFTER = Phrases({
-    ", no, the latter": "^(?:[,;] )?no [,;]",
+    ", no, the latter": "^(?:[,;] )?(?:no|sorry) [,;]",
+    "or rather": "^(?:[,;] )?or rather$",
     "is out of the question": r"^(?:is|are|was) (?:definitely )?(?:out|not|off)\b",
     "less than the latter": "^less than",
 })  # fmt: skip
@@ -103,7 +107,7 @@ def read_selection(words: Sentence) -> int | None:
 
 def _index(pointer: re.Match[str]) -> int | None:
     """Return 0 or 1; None for *the other*."""
-    word = pointer["rank"] or pointer["ordinal"] or pointer["time"]
+    word = pointer["rank"] or pointer["ordinal"] or pointer["bare"] or pointer["time"]
     return None if word is None else 0 if word in _FIRST else 1
 
 

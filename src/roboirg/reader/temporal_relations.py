@@ -64,6 +64,7 @@ _SUBJECT = r"(?:(?:any|every|some)\w+|all|they|it|things|the \w+|the swaps|any o
 _AT_FIRST = Phrases({
     "the container that stood there before anything moved":
         rf"\b(?:before|until) {_SUBJECT} (?:\w+ )?{_MOVED}\b",
+    "the container that started there": r"\b(?:that|which) (?:had )?started(?: out)?\b",
     "the container that stood there before moving": rf"\bbefore (?:the )?(?:\w+ )?{_MOVED}\b",
     "the container that stood there at the start":
         r"\b(?:originally|initially|to begin with|at first|at the (?:start|beginning|outset)"

@@ -65,7 +65,7 @@ _PRONOUNS = word_set(
 _VERB_FORMS = word_set(
     "trade asked decided settled selected opted favor favorite own special prefers skip give gave "
     "choice left pick "
-    "combined named mentioned spoke others new distinct alternative separate "
+    "combined remaining named mentioned spoke others new distinct alternative separate "
     "is are was were be been am do does did done has had have stops stopped hides hid hidden "
     "covers covered picked lifted raised placed moved moves pressed presses swapped changed "
     "exchanged shuffled started began stands stood happened showed shown saw seen went goes go "

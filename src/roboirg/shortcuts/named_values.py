@@ -39,10 +39,14 @@ ALL_PARTS = (("exactly", "those"), ("of", "each"))
 """Words of a command for all things that the context introduces."""
 REFERENCES = word_set("than as half twice double before after neighbor following preceding")
 """Before a number they say that the one meant is another, which follows from it."""
-POINTERS = {"former": 0, "first": 0, "earlier": 0, "latter": 1, "last": 1, "later": 1}
+POINTERS = {
+    "former": 0, "first": 0, "earlier": 0, "latter": 1, "second": 1, "last": 1, "later": 1,
+}  # fmt: skip
 """Words that point at the first or the second of two values."""
 OPPOSITES = word_set("other not no")
 """In the sentence of a pointer they say that it is about the value that is not meant."""
+ONE = word_set("one ones")
+"""After an ordinal: *the second one* is no number, and no element of a series."""
 SAYING = word_set("mentioned named")
 """Next to *first*, *last*, *earlier* and *later* they say that these are no ordinals or places."""
 
@@ -53,6 +57,7 @@ _SAME = (
     ("the other number", "the number left"),
 )
 """Words whose parts would mislead a rule, each with words that say the same."""
+_AFTER_RANK = ONE | {"of"}
 _REACH = 5
 """Words before a value that may exclude it: *not the one right before*."""
 _NUMBER_REACH = 3
@@ -121,7 +126,10 @@ def pointed_value(text: str) -> int | None:
     """
     for words in reversed(_sentences(text)[:-1]):
         pointers = [word for word in words if word in POINTERS]
-        ranks = not {"former", "latter"}.isdisjoint(pointers)
+        ranks = not {"former", "latter"}.isdisjoint(pointers) or any(
+            before in ("first", "second") and word in ONE
+            for before, word in itertools.pairwise(words)
+        )
         if pointers and (ranks or not SAYING.isdisjoint(words)):
             return abs(POINTERS[pointers[-1]] - (not OPPOSITES.isdisjoint(words)))
     return None
@@ -164,7 +172,7 @@ def command_ranks(text: str) -> tuple[int, ...]:
         rank = ordinal_of(word)
         if word in ("former", "latter"):
             found.append(POINTERS[word])
-        elif rank is not None and before == "the" and after in ("of", "color", "place"):
+        elif rank is not None and before == "the" and after in ("of", "color", "place", "one"):
             found.append(rank - 1)
     return tuple(found)
 
@@ -183,7 +191,11 @@ def _values(words: Sentence, slot: str, vocabulary: SlotVocabulary) -> Iterator[
         number = _number(words, place, ordinals=ordinals, counts=slot == "counts")
         if number is not None:
             yield place, number
-        elif ordinals and ordinal_of(word) is not None and "of" not in words[place + 1 : place + 2]:
+        elif (
+            ordinals
+            and ordinal_of(word) is not None
+            and _AFTER_RANK.isdisjoint(words[place + 1 : place + 2])
+        ):
             yield place, int(ordinal_of(word) or 0)
 
 
@@ -199,8 +211,11 @@ def _number(words: Sentence, place: int, *, ordinals: bool, counts: bool) -> int
         )
         return None if multiplies else ADVERBS[word]
     differences = COMPARISONS | STEPS if ordinals else COMPARISONS
-    is_pronoun = (place and words[place - 1] in POINTING) or (
-        not counts and following[:1] == ("of",) and not PRONOUNS.isdisjoint(following)
+    before = words[place - 1] if place else ""
+    is_pronoun = (
+        (before in POINTING and following[:1] != ("times",))  # "we tried this three times"
+        or ordinal_of(before) is not None
+        or (not counts and following[:1] == ("of",) and not PRONOUNS.isdisjoint(following))
     )
     if is_pronoun or not differences.isdisjoint(following):
         return None

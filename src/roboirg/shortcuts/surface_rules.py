@@ -24,7 +24,7 @@ ONLY_ORDINAL = frozenset({"before", "after", "following", "preceding"})
 TOTALS = frozenset({"total", "sum", "together"})
 DIFFERENCES = frozenset({"difference", "gap"})
 """Made of two named numbers. A rule takes one step: it does not go on to *one fewer than that*."""
-REST = frozenset({"other", "others", "left"})
+REST = frozenset({"other", "others", "left", "remaining"})
 """Words for what remains when one of two is taken."""
 PAIR = 2
 _REACH = 2
@@ -89,7 +89,7 @@ def take_unnamed(words: SlotWords) -> list[Candidates]:
 def take_by_cues(words: SlotWords) -> list[Candidates]:
     """Choose among four rules by key words of the command and of what points at one of two values.
 
-    *The former*, *the third of them* in the command: the values at those places. *Other* or *left*
+    *The former*, *the third one* in the command: the values at those places. *Other* or *left*
     after a value that is named again: of the values, the first one that is not that. After a
     pointer, such as *former* or *latter*, the value at its place, and then the other one.
     *Other*, *different*, *not* or *neighbor*: the value that is not named, then the one that is

@@ -39,15 +39,15 @@ COMMANDS = unmask.seen_commands(
             Wording("First press the button, then lift {colors.0}."),
             Wording("Press the button, lift {colors.0}, put it down, then lift {colors.1}.", 2),
             Wording("Press the button, lift {colors.0}, set it down, and lift {colors.1}.", 2),
-            Wording("Press the button, lift {colors.0}, lower it, then lift {colors.1}.", 2),
+            Wording("Press the button, lift {colors.0}, put it back, then lift {colors.1}.", 2),
         ),
         test=(
             Wording("Push the button, then raise {colors.0}."),
             Wording("Push the button and pick up {colors.0}."),
             Wording("Start by pushing the button, then raise {colors.0}."),
-            Wording("Push the button, raise {colors.0}, put it back, raise {colors.1}.", 2),
-            Wording("Push the button, pick up {colors.0}, lower it, pick up {colors.1}.", 2),
-            Wording("Push the button, raise {colors.0}, lay it down, raise {colors.1}.", 2),
+            Wording("Push the button, raise {colors.0}, put it back, then raise {colors.1}.", 2),
+            Wording("Push the button, pick up {colors.0}, put it back and pick up {colors.1}.", 2),
+            Wording("Push the button, raise {colors.0}, set it back, and raise {colors.1}.", 2),
         ),
     )
 )

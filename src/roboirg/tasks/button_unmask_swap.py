@@ -76,23 +76,29 @@ COMMANDS = replace(
                     "Press both buttons, lift {colors.0}, set it down, and lift {colors.1}.",
                     2,
                 ),
-                Wording("Press both buttons, lift {colors.0}, lower it, then lift {colors.1}.", 2),
+                Wording(
+                    "Press both buttons, lift {colors.0}, put it back, then lift {colors.1}.", 2
+                ),
             ),
             test=(
                 Wording("Push both buttons, then raise {colors.0}."),
                 Wording("Push both buttons and pick up {colors.0}."),
                 Wording("Start by pushing both buttons, then raise {colors.0}."),
-                Wording("Push both buttons, raise {colors.0}, put it back, raise {colors.1}.", 2),
                 Wording(
-                    "Push both buttons, pick up {colors.0}, lower it, pick up {colors.1}.",
+                    "Push both buttons, raise {colors.0}, put it back, then raise {colors.1}.", 2
+                ),
+                Wording(
+                    "Push both buttons, pick up {colors.0}, put it back and pick up {colors.1}.",
                     2,
                 ),
-                Wording("Push both buttons, raise {colors.0}, lay it down, raise {colors.1}.", 2),
+                Wording(
+                    "Push both buttons, raise {colors.0}, set it back, and raise {colors.1}.", 2
+                ),
             ),
         )
     ),
-    by_place="the container over the cube now {place}",
-    things_at="the cube now {place}",
+    by_place="the container over the cube {place} now",
+    things_at="the cube {place} now",
 )
 
 TASK = Task(

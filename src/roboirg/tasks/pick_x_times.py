@@ -95,12 +95,12 @@ COMMANDS = Commands(
         train=(
             Wording("Put {color} on the target {repeats}, then press the button."),
             Wording("Take {color} and place it on the target {repeats}, then press the button."),
-            Wording("Place {color} on the target, doing so {repeats}, and press the button."),
+            Wording("Place {color} on the target {repeats} and press the button."),
         ),
         test=(
             Wording("Set {color} on the target {repeats}, then push the button."),
             Wording("Grab {color}, set it down on the target {repeats}, then press the button."),
-            Wording("Lay {color} on the target, doing so {repeats}, and push the button."),
+            Wording("Lay {color} on the target {repeats} and push the button."),
         ),
     ),
 )

@@ -143,7 +143,7 @@ COMMANDS = Commands(
     wordings=Pools(
         train=(
             Wording(
-                "Swing {color} from your right to your left target {repeats}, then put it "
+                "Swing {color} from your right to your left target {repeats}, put it "
                 "down and press the button."
             ),
             Wording(
@@ -158,11 +158,11 @@ COMMANDS = Commands(
         test=(
             Wording(
                 "Carry {color} from your right to your left target "
-                "{repeats}, lay it down and push the button."
+                "{repeats}, set it down and push the button."
             ),
             Wording(
                 "Grab {color}, swing it from your right to your left target {repeats}, "
-                "lower it and push the button."
+                "put it down and press the button."
             ),
             Wording(
                 "Swing {color} from your right to your left target {repeats}, "

@@ -59,6 +59,11 @@ class Commands:
     pointed: ObjectKind = "cube"
     things_at: str = "the cube {place}"
 
+    @property
+    def names_sides(self) -> bool:
+        """Whether some wording says left and right; a rank before it would sound like a place."""
+        return any("left" in wording.text for wording in self.wordings.everything)
+
 
 @dataclass(frozen=True, slots=True)
 class Task:

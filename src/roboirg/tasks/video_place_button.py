@@ -54,14 +54,14 @@ def stages(scene: Scene, goal: Goal) -> tuple[Stage, ...]:
 COMMANDS = Commands(
     wordings=Pools(
         train=(
-            Wording("Put {color} on {relation} in the video."),
-            Wording("Take {color} and put it on {relation} in the video."),
+            Wording("Think back to the video and put {color} on {relation}."),
+            Wording("You saw the video, so put {color} on {relation}."),
             Wording("Going by the video, place {color} on {relation}."),
         ),
         test=(
-            Wording("Set {color} on {relation} in the video."),
-            Wording("Grab {color} and place it on {relation} in the video."),
-            Wording("Remember the video, and put {color} on {relation}."),
+            Wording("Going by what you saw, set {color} on {relation}."),
+            Wording("Keep the video in mind and place {color} on {relation}."),
+            Wording("You watched the video, so set {color} on {relation}."),
         ),
     ),
 )

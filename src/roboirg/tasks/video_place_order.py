@@ -57,14 +57,14 @@ def stages(scene: Scene, goal: Goal) -> tuple[Stage, ...]:
 COMMANDS = Commands(
     wordings=Pools(
         train=(
-            Wording("Put {color} on {placement} in the video."),
-            Wording("Take {color} and put it on {placement} in the video."),
+            Wording("Think back to the video and put {color} on {placement}."),
+            Wording("You saw the video, so put {color} on {placement}."),
             Wording("Going by the video, place {color} on {placement}."),
         ),
         test=(
-            Wording("Set {color} on {placement} in the video."),
-            Wording("Grab {color} and place it on {placement} in the video."),
-            Wording("Remember the video, and put {color} on {placement}."),
+            Wording("Going by what you saw, set {color} on {placement}."),
+            Wording("Keep the video in mind and place {color} on {placement}."),
+            Wording("You watched the video, so set {color} on {placement}."),
         ),
     ),
 )

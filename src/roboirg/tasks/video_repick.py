@@ -197,12 +197,12 @@ COMMANDS = Commands(
                 "the button."
             ),
             Wording(
-                "Take the cube that the robot held in the video, raise it and put it back "
+                "Take the cube held in the video, raise it and put it back "
                 "{repeats}, then push the button."
             ),
             Wording(
-                "The video showed a cube being lifted: raise it and lower it {repeats}, then push "
-                "the button."
+                "Raise the cube lifted in the video and put it back {repeats}, then push the "
+                "button."
             ),
         ),
     ),

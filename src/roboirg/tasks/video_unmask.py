@@ -25,7 +25,7 @@ COMMANDS = unmask.hidden_commands(
         train=(
             Wording("Think back to the video and lift {colors.0}."),
             Wording("Going by the video, lift {colors.0}."),
-            Wording("Remember the video, then lift {colors.0}."),
+            Wording("Remember the video and lift {colors.0}."),
             Wording("First lift {colors.0}, put it down, then lift {colors.1}.", 2),
             Wording("Lift {colors.0}, put it down, then lift {colors.1}.", 2),
             Wording("Lift {colors.0}, set it down, and lift {colors.1}.", 2),
@@ -35,8 +35,8 @@ COMMANDS = unmask.hidden_commands(
             Wording("Going by what you saw, raise {colors.0}."),
             Wording("Pick up {colors.0}."),
             Wording("First raise {colors.0}, put it back, then raise {colors.1}.", 2),
-            Wording("Pick up {colors.0}, lay it down, and pick up {colors.1}.", 2),
-            Wording("Raise {colors.0}, lower it, and raise {colors.1}.", 2),
+            Wording("Pick up {colors.0}, put it back, and pick up {colors.1}.", 2),
+            Wording("Raise {colors.0}, set it back, and raise {colors.1}.", 2),
         ),
     )
 )

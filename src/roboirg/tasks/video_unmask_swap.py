@@ -33,25 +33,25 @@ COMMANDS = replace(
     unmask.hidden_commands(
         Pools(
             train=(
-                Wording("Think of all that moved in the video and lift {colors.0}."),
-                Wording("Going by the whole video, lift {colors.0}."),
-                Wording("Remember all that the video showed, then lift {colors.0}."),
+                Wording("Think back to the video and lift {colors.0}."),
+                Wording("Going by the video, lift {colors.0}."),
+                Wording("Remember the video and lift {colors.0}."),
                 Wording("Lift {colors.0}, set it down, then lift {colors.1}.", 2),
                 Wording("Lift {colors.0}, put it down, and then lift {colors.1}.", 2),
                 Wording("First lift {colors.0}, put it down, then lift {colors.1}.", 2),
             ),
             test=(
-                Wording("Keep the whole video in mind and raise {colors.0}."),
-                Wording("With the whole video in mind, raise {colors.0}."),
-                Wording("Going by all you saw, pick up {colors.0}."),
+                Wording("Keep the video in mind and raise {colors.0}."),
+                Wording("Going by what you saw, raise {colors.0}."),
+                Wording("Watch the video and pick up {colors.0}."),
                 Wording("Raise {colors.0}, put it back, then raise {colors.1}.", 2),
-                Wording("Pick up {colors.0}, lay it down, then pick up {colors.1}.", 2),
-                Wording("First raise {colors.0}, lower it, then raise {colors.1}.", 2),
+                Wording("Pick up {colors.0}, put it back, then pick up {colors.1}.", 2),
+                Wording("First raise {colors.0}, set it back, then raise {colors.1}.", 2),
             ),
         )
     ),
-    by_place="the container that was {place} at first",
-    things_at="the container that was {place} at first",
+    by_place="the container that started {place}",
+    things_at="the container that started {place}",
 )
 
 TASK = Task(

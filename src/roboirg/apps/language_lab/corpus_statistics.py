@@ -81,8 +81,8 @@ PAPER_PHRASES: Mapping[str, tuple[tuple[str, str], ...]] = {
     ),
     "contextual": (("the one I mentioned earlier", "the one i mentioned earlier"),),
     "spatial": (
-        ("the cube there", "the cube (?:now |over )?there"),
-        ("the one there", "the one (?:over )?there"),
+        ("the cube there", "(?:the|that) cube (?:over )?there"),
+        ("the one there", "(?:the|that) one (?:over )?there"),
     ),
 }  # fmt: skip
 """Phrases that the paper quotes or lists, by setting, each with its pattern in our commands."""

@@ -17,12 +17,16 @@ class Clue(NamedTuple):
         kind: what has to be seen.
         words: for the thing, the number or the placement.
         after: words that follow *of the red cubes*, for a number of cubes.
+        said: the sentence or sentences of the introduction with ``{which}``; empty for any.
+        short: the words for ``{which}`` there.
         of_handled: whether the words stand for the thing to handle, not for its cube.
     """
 
     kind: ClueKind
     words: str
     after: str = ""
+    said: str = ""
+    short: str = ""
     of_handled: bool = False
 
 

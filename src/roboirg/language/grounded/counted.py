@@ -54,7 +54,8 @@ def _swaps(request: InstructionRequest, number: GoalValue) -> Clue | None:
     kept, of = KEPT_SWAPS.get(swaps, (0, 1))
     if swaps != number.number or request.sampler.pick("kept swaps", range(of)) >= kept:
         return None
-    return Clue("events", request.pick("swap words", templates.SWAPS))
+    said = request.pick("swap words", templates.SWAPS)
+    return Clue("events", said.words, short=said.counted)
 
 
 def _beside(request: InstructionRequest, number: GoalValue, axis: str, color: str) -> Clue | None:
@@ -74,8 +75,9 @@ def _beside(request: InstructionRequest, number: GoalValue, axis: str, color: st
     if counted is None or counted + added != number.number:
         return None
     noun = "cube" if alike else f"{color} cube"
-    words = templates.BESIDE.of(request.pool)[added]
-    return Clue("counts", words.format(cube=noun, side=templates.SIDES[axis, sign]))
+    said = templates.BESIDE.of(request.pool)[added]
+    words, short = (one.format(cube=noun, side=templates.SIDES[axis, sign]) for one in said)
+    return Clue("counts", words, short=short)
 
 
 def _at_last(request: InstructionRequest, item: SceneObject) -> SceneObject:

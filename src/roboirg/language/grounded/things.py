@@ -25,8 +25,8 @@ FEW = 3
 """Things of which two are set aside."""
 _ANCHORS = (LandmarkClass.EXTREME, LandmarkClass.FIXTURE)
 """Of the two things that are set aside."""
-_LINKS = (*_ANCHORS, LandmarkClass.RANK, LandmarkClass.CORNER)
-"""Of the thing whose neighbor is meant."""
+_LINKS = (_ANCHORS, (LandmarkClass.CORNER,), (LandmarkClass.RANK,))
+"""Of the thing whose neighbor is meant: the later ones only where there is nothing simpler."""
 
 
 def thing_clues(request: InstructionRequest, color: GoalValue) -> list[Clue]:
@@ -65,7 +65,7 @@ def _anchors(
 
 def _standing(request: InstructionRequest) -> templates.Standing:
     words = request.task.commands.things_at
-    if words.endswith("at first"):
+    if "started" in words:
         return templates.STOOD
     return templates.STANDS_NOW if "now" in words else templates.STANDS
 
@@ -76,32 +76,34 @@ def _places(
     """Return the words that single out one of the targets, from what stands around it."""
     thing, pool = request.task.commands.pointed, request.pool
     things = candidates_in(scene, thing)
-    fields = {**_standing(request)._asdict(), "noun": thing.removeprefix("hidden_")}
-    found = _middles(things, targets, pool, fields)
-    for rank, anchors in enumerate((_anchors(scene, thing, _LINKS), _anchors(scene, thing))):
-        # The second nearest one is only said where there is nothing simpler.
-        if rank and (found or len(things) <= FEW):
+    standing = _standing(request)
+    fields = {**standing._asdict(), "noun": thing.removeprefix("hidden_")}
+    form = int(bool(standing.started))
+    found = _middles(things, targets, templates.MIDDLE.of(pool)[form], fields)
+    for rank, kinds in (*((0, kinds) for kinds in _LINKS), (1, _ANCHORS)):
+        anchors = _anchors(scene, thing, kinds)
+        # What is harder to hear is only said where there is nothing simpler.
+        if any(one.kind == "bridging" for one in found) or (rank and (found or len(things) <= FEW)):
             break
+        words = templates.NEIGHBORS[rank].of(pool)[form]
         for anchor, other in anchors:
             others = [item for item in things if item is not other]
             if nearness(other).select(others, rank) in targets:
-                wordings = templates.NEIGHBORS[rank].of(pool)
-                found += [Clue("bridging", one.format(anchor=anchor, **fields)) for one in wordings]
+                found.append(Clue("bridging", words.format(anchor=anchor, **fields)))
     return found + _left_over(things, targets, _anchors(scene, thing), pool, fields)
 
 
 def _middles(
     things: Sequence[SceneObject],
     targets: Sequence[SceneObject],
-    pool: PoolName,
+    words: str,
     fields: Mapping[str, str],
 ) -> list[Clue]:
     found: list[Clue] = []
     for axis in AXES:
         middle = Ranking(directed(axis, 1)).select(things, len(things) // 2)
         if len(things) % 2 and len(things) > 1 and middle in targets:
-            wordings = templates.MIDDLES[axis].of(pool)
-            found += [Clue("betweenness", one.format(**fields)) for one in wordings]
+            found.append(Clue("betweenness", words.format(way=templates.WAYS[axis], **fields)))
     return found
 
 
@@ -114,13 +116,15 @@ def _left_over(
 ) -> list[Clue]:
     """Return the words for one of three things, without the two others."""
     found: list[Clue] = []
+    (words,), (short,) = templates.LEFT_OVER.of(pool), templates.LEFT.of(pool)
+    is_now = fields["started"] or ("that is now " if fields["now"] else "that is ")
     for (first, one), (second, other) in itertools.combinations(anchors, 2):
         left = [item for item in things if item not in (one, other)]
         if len(things) == FEW and len(left) == 1 and left[0] in targets and _differ(first, second):
-            wordings = templates.LEFT_OVER.of(pool)
+            places = {**fields, "first": first, "second": second, "started_or_is": is_now}
             found += [
-                Clue("sets", words.format(first=first, second=second, **fields))
-                for words in wordings
+                Clue("sets", words.format(**places), said=said.format(**places), short=short)
+                for said in templates.LEFT_OVER_SAID.of(pool)
             ]
     return found
 

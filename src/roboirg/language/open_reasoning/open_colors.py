@@ -84,7 +84,7 @@ def _exclude_by_place(request: InstructionRequest) -> Derived:
     assert found is not None  # noqa: S101 - `_allows_place`
     excluded, left = found
     possible = _comparatives(request, left)
-    if any("left" in one.text for one in request.task.commands.wordings.everything):
+    if request.task.commands.names_sides:
         # "Further to your left from your right" is hard to hear.
         possible = [one for one in possible if one.axis == 0] or possible
     chosen = request.sampler.pick("comparative", possible)
@@ -110,7 +110,7 @@ def _exclude_by_place(request: InstructionRequest) -> Derived:
 def _standing(request: InstructionRequest, words: templates.Comparative) -> str:
     """Return the comparison, with its time where things change places."""
     if any(isinstance(motion, Swap) for motion in request.episode.scene.motions):
-        return f"that was {words.words} at first"
+        return f"that started {words.words}"
     return words.words
 
 

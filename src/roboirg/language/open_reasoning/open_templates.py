@@ -17,19 +17,19 @@ EXCLUDED_COLORS = Pools(
         "I am tired of {color}.",
         "{color} is dull.",
         "I have too much {color}.",
-        "{color} hurts my eyes.",
+        "I do not like {color}.",
         "My sister hates {color}.",
         "We never use {color}.",
         "{color} is not for me.",
-        "Enough of {color}.",
-        "{color} makes me sad.",
+        "We have had enough of {color}.",
+        "{color} looks ugly.",
     ),
     test=(
         "{color} bores me.",
-        "I avoid {color}.",
+        "I do not care for {color}.",
         "{color} is out of fashion.",
         "I never wear {color}.",
-        "{color} does not suit me.",
+        "{color} looks boring.",
         "I cannot stand {color}.",
         "{color} reminds me of school.",
         "My brother hates {color}.",
@@ -43,12 +43,12 @@ ANOTHER_COLOR = Pools(
 )
 """Next to one excluded color, where two of them are left but only one is there."""
 REMAINING = Pools(
-    train=("Look at {others}.", "Consider {others}.", "Think of {others}.", "I mean {others}."),
+    train=("Look at {others}.", "I like {others}.", "Think of {others}.", "Let's use {others}."),
     test=(
         "That leaves {others}.",
-        "I like {others}.",
+        "I prefer {others}.",
         "{others} are fine.",
-        "Only {others} will do.",
+        "{others} are better.",
     ),
 )
 """Names the two things that are left, of which the command compares where they stand."""
@@ -86,7 +86,7 @@ COMPARATIVES = Pools(
 COMBINATIONS: Mapping[str, Pools[str]] = {
     "total": Pools(train=("add {numbers} up",), test=("the sum of {numbers}",)),
     "difference": Pools(
-        train=("take the difference between {numbers}",), test=("the gap between {numbers}",)
+        train=("take the difference between {numbers}",), test=("the difference between {numbers}",)
     ),
     "larger": Pools(train=("take the larger of {numbers}",), test=("the higher of {numbers}",)),
     "smaller": Pools(train=("take the smaller of {numbers}",), test=("the lower of {numbers}",)),
@@ -94,15 +94,15 @@ COMBINATIONS: Mapping[str, Pools[str]] = {
 """The first step of a calculation."""
 NUMBERS = Pools(
     train=("those numbers", "these numbers", "the numbers", "those"),
-    test=("them", "these", "the figures", "those figures"),
+    test=("them", "these", "the values", "these values"),
 )
 CALCULATIONS = Pools(
     train=("{steps}.", "Now {steps}.", "Let's {steps}.", "Please {steps}."),
     test=(
         "My number is {steps}.",
-        "I am thinking of {steps}.",
+        "The number is {steps}.",
         "The number I want is {steps}.",
-        "I mean {steps}.",
+        "I want {steps}.",
     ),
 )
 """Before the command, which asks for *that many*."""
@@ -155,21 +155,21 @@ PREFERENCES = (
     Pools(
         train=(
             "{who} likes the moment {yes} more than the one {no}.",
-            "{who} would not miss the moment {yes} for the one {no}.",
+            "{who} would not trade the moment {yes} for the one {no}.",
         ),
         test=(
             "{who} finds the moment {yes} better than the one {no}.",
-            "{who} would not give up the moment {yes} for the one {no}.",
+            "{who} would not swap the moment {yes} for the one {no}.",
         ),
     ),
     Pools(
         train=(
             "{who} likes the moment {no} less than the one {yes}.",
-            "{who} would skip the moment {no} for the one {yes}.",
+            "{who} would trade the moment {no} for the one {yes}.",
         ),
         test=(
             "{who} finds the moment {no} worse than the one {yes}.",
-            "{who} would give up the moment {no} for the one {yes}.",
+            "{who} would swap the moment {no} for the one {yes}.",
         ),
     ),
 )

@@ -7,7 +7,12 @@ from roboirg.language.number_words import cardinal, ordinal, plural
 from roboirg.language.patterns.pattern import Derived, Pattern
 from roboirg.language.phrases import Phrase, anaphor, antecedent, fill, plain, sentences
 from roboirg.language.request import GoalValue, InstructionRequest
-from roboirg.language.rivals.pair_words import INTRODUCTIONS, pair_noun, value_name
+from roboirg.language.rivals.pair_words import (
+    INTRODUCTIONS,
+    introduced_names,
+    pair_noun,
+    value_name,
+)
 from roboirg.language.rivals.value_pair import ValuePair, possible_pairs
 from roboirg.language.slot_types import Fields, amount, described
 from roboirg.language.slot_types.ordinal import wrapped
@@ -31,12 +36,13 @@ def _complement(request: InstructionRequest) -> Derived:
     """Derive a value as the other one of two: ``the cube other than that``."""
     pair = _drawn(request)
     order = request.sampler.pick("complement order", ((0, 1), (1, 0)))
+    values = (pair[order[0]], pair[order[1]])
     named = [
-        antecedent(value_name(request, pair, value), REFERENCE, value.value)
-        for value in (pair[order[0]], pair[order[1]])
+        antecedent(name, REFERENCE, value.value)
+        for name, value in zip(introduced_names(request, pair, values), values, strict=True)
     ]
     template = request.pick("complement introduction", INTRODUCTIONS[pair.word_kind])
-    single = antecedent(value_name(request, pair, pair.rival), REFERENCE, pair.rival.value)
+    single = antecedent(_single(request, pair), REFERENCE, pair.rival.value)
     remark = request.pick("taken", derivations.TAKEN_REMARKS)
     context = sentences(
         [
@@ -52,6 +58,12 @@ def _complement(request: InstructionRequest) -> Derived:
     return Derived(context, _fields(request, pair, order), notes)
 
 
+def _single(request: InstructionRequest, pair: ValuePair) -> str:
+    """Return the words for the one that is taken: ``the red one``."""
+    one = {"color": "one", "amount": "ones"}.get(pair.word_kind)
+    return f"the {pair.rival.value} {one}" if one else value_name(request, pair, pair.rival)
+
+
 def _fields(request: InstructionRequest, pair: ValuePair, order: tuple[int, int]) -> Fields:
     meant, kind = pair.meant, pair.word_kind
     words = _resolved(request, pair, order) if request.resolved else _pointing(request, pair)
@@ -62,7 +74,7 @@ def _fields(request: InstructionRequest, pair: ValuePair, order: tuple[int, int]
     if meant.slot == "counts":
         (shade,) = request.color_values
         # The plural fits any number.
-        return amount.amounts([(*words, *plain(" of the "), *amount.cubes(shade, 2))])
+        return amount.amounts([(*words, *plain(" of "), *amount.cubes(shade, 2))])
     if kind == "number":
         return {meant.field: request.around(meant.field, words)}
     return wrapped(request, meant, words)

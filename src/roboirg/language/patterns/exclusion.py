@@ -29,7 +29,7 @@ def _exclude(request: InstructionRequest) -> Derived:
     """Derive a color as the one that is left, and a second one as the other of two excluded."""
     target, *rest = request.color_values
     colors = excluded_colors(request)
-    context = [_introduction(request, colors)]
+    context = [_introduction(request, colors, shared=bool(rest))]
     things = [_excluding(request, target, colors)]
     patterns = ["color exclusion"]
     counted = bool(request.values_of("amount"))
@@ -42,8 +42,9 @@ def _exclude(request: InstructionRequest) -> Derived:
     return Derived(sentences(context), described(request, things), {"patterns": patterns})
 
 
-def _introduction(request: InstructionRequest, colors: tuple[str, ...]) -> Phrase:
-    template = request.pick("pair introduction", derivations.EXCLUDED_INTRODUCTIONS)
+def _introduction(request: InstructionRequest, colors: tuple[str, ...], *, shared: bool) -> Phrase:
+    known = derivations.SHARED_INTRODUCTIONS if shared else derivations.EXCLUDED_INTRODUCTIONS
+    template = request.pick("pair introduction", known)
     words = " and ".join(colors)
     return fill(template, {"colors": antecedent(words, REFERENCE, words)}, plural=len(colors) > 1)
 

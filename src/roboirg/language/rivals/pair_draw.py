@@ -53,9 +53,13 @@ def draw_pair(request: InstructionRequest, locate: Locate | None = None) -> Pair
     pair = balanced_rival(request, pairs, locate)
     bits = draw_balanced(request, "rival order")
     kind, text, fill = _remark(request, points_at_meant=bits.second)
+    if slot not in COLOR_SLOTS:
+        fill = "both"  # "The former, not the other number" is hard to hear
     pointers: tuple[templates.Pointers, ...] = (templates.RANKS,)
-    if slot in COLOR_SLOTS and kind in ("alone", "set aside"):  # next to another they are too long
-        pointers = (templates.RANKS, templates.RANKS, *templates.MENTIONED.of(request.pool))
+    if slot in COLOR_SLOTS:
+        pointers = (templates.ORDER if locate else templates.RANKS, templates.ORDER)
+        if kind in ("alone", "set aside"):  # next to another they are too long
+            pointers += templates.MENTIONED.of(request.pool)
     return PairDraw(
         pair,
         bits.first,

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 
 from roboirg.core.word_pools import Pools
 from roboirg.language.instruction import REFERENCE, Expression
-from roboirg.language.number_words import cardinal, ordinal
+from roboirg.language.number_words import cardinal, ordinal, plural
 from roboirg.language.phrases import Phrase, anaphor, antecedent, fill, plain, sentences
 from roboirg.language.request import GoalValue, InstructionRequest, UtteranceSpec
 from roboirg.language.rivals import rival_templates as templates
@@ -27,12 +27,12 @@ INTRODUCTIONS: Mapping[str, Pools[str]] = {
     "placement": templates.ELEMENT_PAIRS,
     "relation": templates.MOMENT_PAIRS,
 }
-_POINTER_CLASSES: tuple[Expression, ...] = ("former", "latter", "first", "last")
+_POINTER_CLASSES: tuple[Expression, ...] = ("former", "latter", "first", "second", "last")
 
 
 def pair_introduction(request: InstructionRequest, draw: PairDraw) -> UtteranceSpec:
     """Return a sentence that names both values on equal terms."""
-    names = [_introduced(request, draw, value) for value in draw.introduced]
+    names = introduced_names(request, draw.pair, draw.introduced)
     first, second = (
         antecedent(name, value.slot, value.value)
         for name, value in zip(names, draw.introduced, strict=True)
@@ -143,13 +143,18 @@ def _pointer(draw: PairDraw, value: GoalValue, thing: str, *, points: bool) -> P
     return anaphor(words, found, value.slot, value.value)
 
 
-def _introduced(request: InstructionRequest, draw: PairDraw, value: GoalValue) -> str:
-    """Return the words of the introduction, where the second value has the noun for both."""
-    if draw.pair.word_kind in ("color", "amount") and value is draw.introduced[0]:
-        return f"the {value.color}"
-    if draw.pair.word_kind != "relation":
-        return value_name(request, draw.pair, value)
-    return MOMENTS[str(value.value)] if value is draw.introduced[1] else f"right {value.value}"
+def introduced_names(
+    request: InstructionRequest, pair: ValuePair, values: Sequence[GoalValue]
+) -> tuple[str, str]:
+    """Return ``the red`` and ``green cubes``: the second one of two has the noun for both."""
+    first, second = values
+    kind = pair.word_kind
+    if kind == "number":
+        return cardinal(first.number), cardinal(second.number)
+    if kind == "relation":
+        return f"right {first.value}", MOMENTS[str(second.value)]
+    short = [one.color if kind in ("color", "amount") else ordinal(one.number) for one in values]
+    return f"the {short[0]}", f"{short[1]} {plural(pair_noun(request, pair).removesuffix('s'))}"
 
 
 def _chosen_fields(request: InstructionRequest, draw: PairDraw) -> Fields:

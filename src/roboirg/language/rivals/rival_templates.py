@@ -21,17 +21,17 @@ THING_PAIRS = Pools(
         "My kids love {things}.",
         "We have {things}.",
         "Ben brought {things}.",
-        "You can see {things}.",
+        "I am thinking of {things}.",
         "Dad bought {things}.",
         "Grandma likes {things}.",
         "My sister has {things}.",
         "Mom bought {things}.",
-        "Everyone can see {things}.",
+        "My kids painted {things}.",
         "{things} look good.",
         "{things} were presents.",
     ),
     test=(
-        "I noticed {things}.",
+        "I thought about {things}.",
         "Dad made {things}.",
         "I spotted {things}.",
         "{things} caught my eye.",
@@ -40,9 +40,39 @@ THING_PAIRS = Pools(
         "Our guests liked {things}.",
         "I bought {things}.",
         "Mom gave me {things}.",
-        "This is about {things}.",
+        "My niece likes {things}.",
         "Uncle Tom found {things}.",
-        "Consider {things}.",
+        "I considered {things}.",
+    ),
+)
+PLACE_PAIRS = Pools(
+    train=(
+        "I see {things}.",
+        "Look at {things}.",
+        "I am looking at {things}.",
+        "We can see {things}.",
+        "We talked about {things}.",
+        "I was looking at {things}.",
+        "Have a look at {things}.",
+        "I am thinking of {things}.",
+        "I was thinking of {things}.",
+        "I like {things}.",
+        "I have my eye on {things}.",
+        "{things} caught my eye.",
+    ),
+    test=(
+        "I spotted {things}.",
+        "I noticed {things}.",
+        "I considered {things}.",
+        "I thought about {things}.",
+        "I can see {things}.",
+        "I found {things}.",
+        "I was talking about {things}.",
+        "I have noticed {things}.",
+        "I have in mind {things}.",
+        "I was pointing at {things}.",
+        "{things} stand out.",
+        "{things} look nice.",
     ),
 )
 NUMBER_PAIRS = Pools(
@@ -74,38 +104,38 @@ ELEMENT_PAIRS = Pools(
     train=(
         "I like {things}.",
         "We talked about {things}.",
-        "{things} are special.",
+        "{things} seem good.",
         "My kids picked {things}.",
         "I am thinking of {things}.",
-        "Ann wrote down {things}.",
+        "Ann suggested {things}.",
     ),
     test=(
-        "I noted {things}.",
-        "I care about {things}.",
-        "{things} matter to me.",
+        "I considered {things}.",
+        "Tom asked about {things}.",
+        "{things} are possible.",
         "Think of {things}.",
         "Grandpa mentioned {things}.",
-        "This is about {things}.",
+        "I have in mind {things}.",
     ),
 )
 """For visits and placements."""
 MOMENT_PAIRS = Pools(
     train=(
-        "I liked the moments {things}.",
+        "Think of the moments {things}.",
         "We talked about the moments {things}.",
-        "I remember the moments {things}.",
-        "My kids loved the moments {things}.",
+        "I am thinking of the moments {things}.",
+        "My kids liked the moments {things}.",
     ),
     test=(
-        "I enjoyed the moments {things}.",
-        "The moments {things} were special.",
-        "I keep thinking of the moments {things}.",
-        "This is about the moments {things}.",
+        "I considered the moments {things}.",
+        "The moments {things} are possible.",
+        "Remember the moments {things}.",
+        "I have in mind the moments {things}.",
     ),
 )
 PAIR_REINFORCEMENTS = Pools(
-    train=("I like {ref}.", "{ref} are great.", "I enjoy {ref}.", "{ref} are useful."),
-    test=("{ref} are fine.", "I love {ref}.", "{ref} look good.", "I remember {ref}."),
+    train=("{ref} would work.", "{ref} are fine.", "I like {ref}.", "{ref} sound good."),
+    test=("{ref} would do.", "I could use {ref}.", "{ref} seem fine.", "{ref} are good."),
 )
 """One more remark about both values; short, as two remarks and a command come with it."""
 
@@ -128,6 +158,8 @@ class Pointers(NamedTuple):
 
 RANKS = Pointers("the former", "the latter", "the former", "the latter")
 """For every kind of value; both pools have them, as there are no other such words."""
+ORDER = Pointers("the first one", "the second one", "the first ones", "the second ones")
+"""For things, which have no ordinals of their own; after long phrases they are easier to hear."""
 MENTIONED = Pools(
     train=(
         Pointers(
@@ -166,84 +198,87 @@ SINGLED = Pools(
     train=(
         "I mean {yes}.",
         "I would like {yes}.",
-        "I would not skip {yes}.",
-        "I would not refuse {yes}.",
+        "I want {yes}.",
+        "Let's use {yes}.",
     ),
     test=(
         "I have chosen {yes}.",
         "I will go with {yes}.",
-        "I would not mind {yes}.",
-        "I would not pass up {yes}.",
+        "I decided on {yes}.",
+        "My choice is {yes}.",
     ),
 )
 SET_ASIDE = Pools(
     train=(
         "Let's leave out {no}.",
         "I am done with {no}.",
-        "I do not mean {no}.",
-        "I do not want {no}.",
+        "Let's skip {no}.",
+        "Forget about {no}.",
     ),
     test=(
-        "Forget about {no}.",
+        "I can do without {no}.",
         "I have ruled out {no}.",
-        "I do not need {no}.",
-        "I did not choose {no}.",
+        "I decided against {no}.",
+        "Never mind {no}.",
     ),
 )
 CHOICES: dict[ReferenceKind, tuple[Pools[str], Pools[str]]] = {
     "preference": (
         Pools(
             train=("I prefer {yes} to {no}.", "I like {yes} better than {no}."),
-            test=("I chose {yes} over {no}.", "I picked {yes} rather than {no}."),
+            test=("I chose {yes} over {no}.", "I picked {yes} instead of {no}."),
         ),
         Pools(
-            train=("Instead of {no}, I want {yes}.", "I would leave out {no} and choose {yes}."),
-            test=("I passed up {no} for {yes}.", "Rather than {no}, I picked {yes}."),
+            train=("Instead of {no}, I want {yes}.", "Let's leave out {no} and use {yes}."),
+            test=("I considered {no} but chose {yes}.", "Rather than {no}, I picked {yes}."),
         ),
     ),
     "contrast": (
         Pools(
-            train=("I mean {yes}, not {no}.", "I want {yes} and not {no}."),
-            test=("It is {yes} that I want, not {no}.", "I want {yes}, definitely not {no}."),
+            train=("I mean {yes}, not {no}.", "I want {yes}, not {no}."),
+            test=("I chose {yes} and not {no}.", "I picked {yes} and did not pick {no}."),
         ),
         Pools(
-            train=("I do not mean {no} but {yes}.", "I do not want {no} but {yes}."),
-            test=("I do not want {no}, I want {yes}.", "Definitely not {no}, I want {yes}."),
+            train=("I do not mean {no}, I mean {yes}.", "I do not want {no}, I want {yes}."),
+            test=("It is not {no}, it is {yes}.", "Not {no}, I chose {yes}."),
         ),
     ),
     "correction": (
         Pools(
-            train=("I now want {yes}, no longer {no}.", "I now mean {yes}, no longer {no}."),
-            test=("I now want {yes} instead of {no}.", "I switched to {yes} from {no}."),
+            train=(
+                "I actually mean {yes} instead of {no}.",
+                "Actually, I want {yes} instead of {no}.",
+            ),
+            test=("I now prefer {yes} to {no}.", "I finally chose {yes} over {no}."),
         ),
         Pools(
-            train=("I mean {no} - no, {yes}.", "Let's take {no} - no, {yes}."),
-            test=("I switched from {no} to {yes}.", "I gave up {no} for {yes}."),
+            train=("I mean {no} - sorry, {yes}.", "Let's use {no} - or rather {yes}."),
+            test=("I switched from {no} to {yes}.", "I considered {no} and then chose {yes}."),
         ),
     ),
 }
 """Remarks with both fields: those with the meant value first, and those with it last.
 
-*Not X but Y* and a *no* that takes back are in training alone; the others are for tests.
+*Sorry* and *or rather* are in training alone, *from X to Y* and *X over Y* are for tests.
 """
 
 CLAUSES = Pools(
-    train=("I mean", "I want", "I asked for", "I need"),
-    test=("I chose", "I prefer", "I picked", "I selected"),
+    train=("I mean", "I want", "I prefer", "I need"),
+    test=("I chose", "I picked", "I have chosen", "I have picked"),
 )
 """Follow the noun in the command: *the cube I mean*."""
 NUMBERS_OF = Pools(
     train=(
         "the right number of",
-        "the chosen number of",
-        "the desired number of",
         "the agreed number of",
+        "the desired number of",
+        "my number of",
     ),
     test=(
+        "the chosen number of",
         "the correct number of",
-        "the selected number of",
-        "the preferred number of",
         "the final number of",
+        "the selected number of",
     ),
 )
 """For a number of cubes: *the right number of red cubes*."""

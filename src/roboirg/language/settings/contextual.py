@@ -47,8 +47,8 @@ def discourse(
     """Return the requested stages.
 
     `introduce` says the first stage, `reinforce` one more remark on what was introduced, and
-    `command` the last stage; a distractor has at most the number `longest` of words, and a
-    cue fewer.
+    `command` the last stage; distractor and cue have at most the number `longest` of
+    words.
     """
     stages = request.options.stages
     utterances = [introduce(request)]
@@ -57,7 +57,7 @@ def discourse(
     distracting = distractors(request, distractor, longest) if DISTRACTOR in stages else ()
     utterances += [UtteranceSpec("distractor", phrase) for phrase, _ in distracting]
     if CUE in stages:
-        cues = [one for one in remarks.CUES.of(request.pool) if _length(one) < longest]
+        cues = [one for one in remarks.CUES.of(request.pool) if _length(one) <= longest]
         cue = request.sampler.pick("cue", cues)
         utterances.append(UtteranceSpec("cue", plain(cue)))
     utterances.append(command(request))
@@ -70,8 +70,8 @@ def discourse(
 
 
 def reinforcement(request: InstructionRequest) -> UtteranceSpec:
-    """Return one more remark on one of the referents."""
-    slot_type, goal_values = request.sampler.pick("reinforced", [*slot_types_in(request)])
+    """Return one more remark on the last one of the referents."""
+    *_, (slot_type, goal_values) = slot_types_in(request)
     template = request.pick(f"{slot_type.name} reinforcement", slot_type.reinforcements)
     pointing = slot_type.pointing(request, goal_values)
     remark = fill(template, {"ref": pointing}, plural=slot_type.plural(request, goal_values))

@@ -15,8 +15,8 @@ from roboirg.language.rivals import (
 from roboirg.language.settings import contextual
 from roboirg.language.settings.setting import Setting
 
-LONGEST = 4
-"""Words of a distractor, and one more than those of a cue; the command has a remark before it."""
+LONGEST = 3
+"""Words of a distractor and of a cue; the command has a remark before it."""
 
 
 def say(request: InstructionRequest) -> InstructionSpec:

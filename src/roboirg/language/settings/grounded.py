@@ -18,7 +18,7 @@ from roboirg.language.grounded import (
     thing_clues,
 )
 from roboirg.language.grounded.grounded_templates import (
-    NUMBER_INTRODUCTIONS,
+    COUNTED,
     PLACEMENT_INTRODUCTIONS,
 )
 from roboirg.language.phrases import (
@@ -127,7 +127,10 @@ _SOUGHT = {
 
 
 def _introduced(request: InstructionRequest, colors: Clues) -> Phrase:
-    """Return a sentence that describes the things."""
+    """Return a sentence that describes the things, or two about the only one."""
+    (value, clue), *others = colors.items()
+    if clue.said and not others:
+        return fill(clue.said, {"which": antecedent(clue.short, value.slot, value.value)})
     things = [antecedent(clue.words, value.slot, value.value) for value, clue in colors.items()]
     template = request.pick("place introduction", introductions.PLACE_INTRODUCTIONS)
     return fill(template, {"things": listed(things)}, plural=len(things) > 1)
@@ -156,12 +159,12 @@ def _pointed(request: InstructionRequest, colors: Clues) -> list[Phrase]:
 
 
 def _repeats(request: InstructionRequest, value: GoalValue, clue: Clue) -> tuple[Phrase, Fields]:
-    said = antecedent(clue.words, value.slot, value.value)
-    template = request.pick("number introduction", NUMBER_INTRODUCTIONS)
+    template = request.pick("number introduction", COUNTED)
     words = request.pick("same number", number.SAME_NUMBER)
-    return fill(template, {"times": said}), {
-        value.field: said if request.resolved else anaphor(words, "that", value.slot, value.value)
-    }
+    said = fill(template, {"times": antecedent(clue.short, value.slot, value.value)})
+    named = antecedent(clue.words, value.slot, value.value)
+    pointing = anaphor(words, "that", value.slot, value.value)
+    return said, {value.field: named if request.resolved else pointing}
 
 
 def _counts(request: InstructionRequest, value: GoalValue, clue: Clue) -> tuple[Phrase, Fields]:

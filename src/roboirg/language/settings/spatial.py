@@ -24,11 +24,11 @@ POINTING: Mapping[int, tuple[Pointer, ...]] = {
     2: (("the former", "former"), ("the latter", "latter")),
     3: (("the first", "first"), ("the second", "second"), ("the third", "third")),
 }
-_STANDS_ALONE = re.compile(r"the (?P<noun>\w+) \{place\}")
+_STANDS_LAST = re.compile(r"(?P<before>.*)the (?P<noun>\w+) \{place\}")
 """Words for a thing at a place, with nothing in between or after it."""
 PAIR = 2
 _NOUN = re.compile(r"^the \w+")
-_TIME = re.compile(r" (?:now|at first)\b")
+_TIME = re.compile(r" now\b")
 """Said of the first of two things, it goes for both."""
 NO_LANDMARK = "no landmark singles out a target"
 LONGEST = {1: 12, 2: 6, 3: 5}
@@ -117,17 +117,20 @@ def _pointed(
     else:
         place = anaphor(words, expression, *_of(color))
     template = None
-    stands_alone = _STANDS_ALONE.fullmatch(request.task.commands.by_place)
-    if request.wordings is None and stands_alone:
-        # "The one over there": the noun is that of the introduction.
-        noun = stands_alone["noun"]
-        words = request.sampler.pick("noun there", (noun, "one", f"{noun} over", "one over"))
+    stands_last = _STANDS_LAST.fullmatch(request.task.commands.by_place)
+    if request.wordings is None and stands_last:
+        # "That one over there": the noun is that of the introduction.
+        noun = stands_last["noun"]
+        words = request.sampler.pick(
+            "noun there",
+            (f"the {noun}", "that one", f"that {noun} over", "the one over"),
+        )
         place = (
             antecedent(f"the {noun} {landmark.phrase}", *_of(color))
             if request.resolved
-            else anaphor(f"the {words} there", expression, *_of(color))
+            else anaphor(f"{words} there", expression, *_of(color))
         )
-        template = "{place}"
+        template = stands_last["before"] + "{place}"
     return request.by_place(color, place, plural=request.count_of(color) > 1, template=template)
 
 

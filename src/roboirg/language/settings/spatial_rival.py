@@ -2,23 +2,20 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 
-from roboirg.core.word_pools import Pools
 from roboirg.language.landmarks import Landmark
 from roboirg.language.phrases import sentences
 from roboirg.language.request import GoalValue, InstructionRequest, InstructionSpec, UtteranceSpec
 from roboirg.language.rivals import draw_pair, pair_notes, pair_refusal
 from roboirg.language.rivals.pair_words import choosing_remark, chosen, the_other
-from roboirg.language.rivals.rival_templates import THING_PAIRS
+from roboirg.language.rivals.rival_templates import PLACE_PAIRS, RANKS
 from roboirg.language.settings import spatial
 from roboirg.language.settings.setting import Setting
 from roboirg.language.slot_types import described, stated
-from roboirg.language.templates.introductions import PLACE_INTRODUCTIONS
 
-INTRODUCTIONS = Pools(
-    *((*places, *pairs) for places, pairs in zip(PLACE_INTRODUCTIONS, THING_PAIRS, strict=True))
-)
+_ORDINAL = re.compile(r"\b(?:second|third|fourth)\b")
 PLACES = 2
 """Places that the introduction names: the meant one and its rival."""
 
@@ -39,6 +36,8 @@ def say(request: InstructionRequest) -> InstructionSpec:
     draw = draw_pair(request, _usable)
     meant, rival = draw.pair
     places = {value.field: _drawn(request, value) for value in draw.pair}
+    if any(_ORDINAL.search(place.phrase) for place in places.values()):
+        draw = draw._replace(pointers=RANKS)  # not "the second one" after "second from your left"
     thing = request.task.commands.pointed.removeprefix("hidden_")
     remark = choosing_remark(
         request, draw, lambda value: f"the {thing} {places[value.field].phrase}", thing
@@ -53,7 +52,7 @@ def say(request: InstructionRequest) -> InstructionSpec:
     command = request.command(stated(request) | described(request, things))
     shown = [places[value.field] for value in draw.introduced]
     utterances = (
-        spatial.introduction(request, draw.introduced, shown, INTRODUCTIONS),
+        spatial.introduction(request, draw.introduced, shown, PLACE_PAIRS),
         UtteranceSpec("command", sentences([remark, command])),
     )
     notes = {**spatial.landmark_notes(request, shown), **pair_notes(draw)}

@@ -79,7 +79,7 @@ def _reduced(request: InstructionRequest, goal_values: tuple[GoalValue, ...]) ->
         ((words, expression),) = _color_reference(request, goal_values).pointers
         ((shade, _),) = matched
         thing = anaphor(
-            f"of {words.replace(' of them', ' color')}", expression, shade.slot, shade.value
+            f"of {words.replace(' one', ' color')}", expression, shade.slot, shade.value
         )
         return _described(request, goal_values, [thing])
     pointers = THEM if len(matched) == 1 else color.LISTS[len(matched)]
@@ -152,7 +152,7 @@ def _pointing(request: InstructionRequest, goal_values: tuple[GoalValue, ...]) -
     introduced = tuple(shade.color for shade in shades)
     if _counts_said(request, goal_values):
         introduced = _color_reference(request, goal_values).introduced
-    return color.those(request, shades, introduced)
+    return color.them(shades, introduced)
 
 
 def _competing(request: InstructionRequest, goal_values: tuple[GoalValue, ...]) -> list[Phrase]:

@@ -21,10 +21,8 @@ Pointer = tuple[str, Expression]
 """Words that point back, and their class."""
 FORMER: tuple[Pointer, ...] = (("the former", "former"), ("the latter", "latter"))
 RANKS: tuple[Pointer, ...] = (
-    ("the first of them", "first"), ("the second of them", "second"),
-    ("the third of them", "third"),
+    ("the first one", "first"), ("the second one", "second"), ("the third one", "third"),
 )  # fmt: skip
-"""With *of them*: "the third from your right" would be a place."""
 LISTS: Mapping[int, tuple[Pointer, ...]] = {2: FORMER, 3: RANKS}
 """For two or three introduced things, in their order."""
 
@@ -60,14 +58,23 @@ def draw_reference(
         if len(colors) == 1:
             single = single or singles(request.task.commands.colored)
             return ColorReference(colors, (request.sampler.pick("color anaphor", single),))
-        return ColorReference(colors, LISTS[len(colors)])
+        return ColorReference(colors, _pointers(request, len(colors)))
     size = request.sampler.pick("list length", sizes)
     others = [color for color in request.scene_colors if color not in colors]
     left = next(request.sampler.cycle("listed colors", list(itertools.permutations(others))))
     members = [*colors, *left[: size - len(colors)]]
     order = request.sampler.pick("list order", list(itertools.permutations(range(size))))
     introduced = tuple(members[at] for at in order)
-    return ColorReference(introduced, tuple(LISTS[size][introduced.index(one)] for one in colors))
+    pointers = _pointers(request, size)
+    return ColorReference(introduced, tuple(pointers[introduced.index(one)] for one in colors))
+
+
+def _pointers(request: InstructionRequest, size: int) -> tuple[Pointer, ...]:
+    """Return the words for two or three listed things."""
+    if size == len(RANKS) and request.task.commands.names_sides:
+        # "The third one from your right" would be a place.
+        return tuple((words.replace("one", "of them"), expression) for words, expression in RANKS)
+    return LISTS[size]
 
 
 def introduce_colors(
@@ -120,18 +127,14 @@ def _introduce(request: InstructionRequest, goal_values: tuple[GoalValue, ...]) 
 def _pointing(request: InstructionRequest, goal_values: tuple[GoalValue, ...]) -> Phrase:
     introduced = draw_reference(request, goal_values).introduced
     if len(introduced) == 1:
-        words = f"that {request.task.commands.colored}"
-        return anaphor(words, "that", goal_values[0].slot, goal_values[0].value)
-    return those(request, goal_values, introduced)
+        return anaphor("it", "it", goal_values[0].slot, goal_values[0].value)
+    return them(goal_values, introduced)
 
 
-def those(
-    request: InstructionRequest, goal_values: tuple[GoalValue, ...], introduced: tuple[str, ...]
-) -> Phrase:
+def them(goal_values: tuple[GoalValue, ...], introduced: tuple[str, ...]) -> Phrase:
     """Return a plural that refers to the things of all introduced colors."""
     slot = goal_values[0].slot if len(introduced) == len(goal_values) else REFERENCE
-    words = f"those {plural(request.task.commands.colored)}"
-    return anaphor(words, "them", slot, " and ".join(introduced))
+    return anaphor("them", "them", slot, " and ".join(introduced))
 
 
 def competing(request: InstructionRequest, goal_values: tuple[GoalValue, ...]) -> list[Phrase]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from roboirg.core.motions import Shuttle
+from roboirg.language.instruction import REFERENCE
 from roboirg.language.number_words import ordinal
 from roboirg.language.phrases import Phrase, anaphor, antecedent, fill
 from roboirg.language.request import GoalValue, InstructionRequest
@@ -12,6 +13,10 @@ from roboirg.language.templates import introductions, remarks
 INTRODUCTIONS = {
     "visit": introductions.VISIT_INTRODUCTIONS,
     "placement": introductions.PLACEMENT_INTRODUCTIONS,
+}
+REFERENCE_INTRODUCTIONS = {
+    "visit": introductions.REFERENCE_VISIT_INTRODUCTIONS,
+    "placement": introductions.REFERENCE_PLACEMENT_INTRODUCTIONS,
 }
 WRAPPED = {"visit": "during {which}", "placement": "the target of {which}"}
 """The command's field around the words for the element of the series."""
@@ -67,9 +72,8 @@ def introduce_position(
     request: InstructionRequest, goal_value: GoalValue, slot: str, position: int
 ) -> Phrase:
     """Return a sentence that names an element of the series."""
-    template = request.pick(
-        f"{goal_value.slot_type} introduction", INTRODUCTIONS[goal_value.slot_type]
-    )
+    known = REFERENCE_INTRODUCTIONS if slot == REFERENCE else INTRODUCTIONS
+    template = request.pick(f"{goal_value.slot_type} introduction", known[goal_value.slot_type])
     words = f"{INTRODUCED_OWNERS[goal_value.slot_type]} {ordinal(position)} {goal_value.slot_type}"
     which = antecedent(words, slot, position)
     return fill(template, {"which": which})

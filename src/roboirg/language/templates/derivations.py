@@ -9,20 +9,35 @@ from roboirg.core.word_pools import Pools
 EXCLUDED_INTRODUCTIONS = Pools(
     train=(
         "I am tired of {colors}.",
-        "I dislike {colors}.",
-        "Enough of {colors}.",
+        "I do not like {colors}.",
+        "We have had enough of {colors}.",
         "We never use {colors}.",
     ),
     test=(
         "{colors} [bores|bore] me.",
-        "I avoid {colors}.",
+        "I do not care for {colors}.",
         "I never wear {colors}.",
         "I cannot stand {colors}.",
     ),
 )
+SHARED_INTRODUCTIONS = Pools(
+    train=(
+        "We talked about {colors}.",
+        "My kids like {colors}.",
+        "Ben and Ann like {colors}.",
+        "Everyone wants {colors}.",
+    ),
+    test=(
+        "My friends like {colors}.",
+        "Mom likes {colors}.",
+        "Tom wants {colors}.",
+        "My kids want {colors}.",
+    ),
+)
+"""For two colors of which one is handled, too: dislikes would contradict that."""
 SINGLED_INTRODUCTIONS = Pools(
-    train=("My sister took {single}.", "{single} is taken.", "I have enough {single}."),
-    test=("Dad chose {single}.", "{single} is already taken.", "My friend took {single}."),
+    train=("My sister took {single}.", "Dad picked {single}.", "Grandma got {single}."),
+    test=("My son chose {single}.", "My aunt took {single}.", "My friend got {single}."),
 )
 
 
@@ -44,14 +59,16 @@ EXCLUSIONS = Pools(
     train=(
         Exclusion("{thing}[|s] that [is|are] {excluded}", "neither of those", "neither {colors}"),
         Exclusion("{thing}[|s] that [is|are] {excluded}", "neither of them", "neither {colors}"),
-        Exclusion("{thing}[|s] whose color is {excluded}", "neither of those", "neither {colors}"),
+        Exclusion(
+            "{thing}[|s] that [is|are] {excluded}", "neither of those colors", "neither {colors}"
+        ),
         Exclusion("{thing}[|s] whose color is {excluded}", "not in that pair", "neither {colors}"),
     ),
     test=(
         Exclusion("{thing}[|s] that [is|are] {excluded}", "neither of these", "neither {colors}"),
         Exclusion("{thing}[|s] that [is|are] {excluded}", "neither of the two", "neither {colors}"),
         Exclusion(
-            "{thing}[|s] with a color that is {excluded}", "not in that pair", "neither {colors}"
+            "{thing}[|s] in a color {excluded}", "not in that pair", "that is neither {colors}"
         ),
     ),
 )
@@ -60,20 +77,12 @@ _DIFFERENT = ("different from that", "different from {colors}")
 _OTHER_THAN = ("other than that", "other than {colors}")
 SINGLE_EXCLUSIONS = Pools(
     train=(
-        Exclusion(
-            "{thing}[|s] whose color is {excluded}",
-            "different from that",
-            "different from {colors}",
-        ),
-        Exclusion(
-            "{thing}[|s] that [is|are] any color {excluded}",
-            "other than that",
-            "other than {colors}",
-        ),
+        Exclusion("{thing}[|s] whose color is {excluded}", *_DIFFERENT),
+        Exclusion("{thing}[|s] of a color {excluded}", *_OTHER_THAN),
     ),
     test=(
-        Exclusion("{thing}[|s] in a color that is {excluded}", *_DIFFERENT),
-        Exclusion("{thing}[|s] in any color {excluded}", *_OTHER_THAN),
+        Exclusion("{thing}[|s] in a color {excluded}", *_DIFFERENT),
+        Exclusion("{thing}[|s] in a color {excluded}", *_OTHER_THAN),
     ),
 )
 COMPLEMENT = "the {thing} in {other}"
@@ -87,19 +96,19 @@ TAKEN_REMARKS = Pools(
 """Said of the one of two values that is not meant."""
 OTHERS = {
     "color": Pools(
-        train=("the other {noun}", "the other one of those {nouns}"),
-        test=("the other of the two {nouns}", "the other one of the two {nouns}"),
+        train=("the other {noun}", "the other one"),
+        test=("the other of the two {nouns}", "the remaining {noun}"),
     ),
     "amount": Pools(train=("of the other {noun}",), test=("of the others",)),
     "number": Pools(train=("the other number of times",), test=("the other number of times",)),
     "count": Pools(train=("the other number",), test=("the other number",)),
     "visit": Pools(
         train=("the other {noun}",),
-        test=("the other of those {nouns}",),
+        test=("the remaining {noun}",),
     ),
     "placement": Pools(
         train=("the other {noun}",),
-        test=("the other of those {nouns}",),
+        test=("the remaining {noun}",),
     ),
 }
 """The value that is left, by kind of words."""
@@ -119,24 +128,24 @@ TWO_MOMENTS_INTRODUCTIONS = Pools(
     train=(
         "Of the moments {pair}, my sister prefers {single}.",
         "Between the moments {pair}, Dad chose {single}.",
-        "Of what happened {pair}, my brother liked {single}.",
+        "Of the moments {pair}, my brother liked {single} better.",
     ),
     test=(
-        "Of the parts {pair}, my uncle would choose {single}.",
-        "Between the parts {pair}, my sister chose {single}.",
-        "Given the moments {pair}, Mom picked {single}.",
+        "Of the times {pair}, my uncle would choose {single}.",
+        "Between the times {pair}, my sister chose {single}.",
+        "Of the placements {pair}, Mom picked {single}.",
     ),
 )
 NEIGHBOR_INTRODUCTIONS = Pools(
     train=(
-        "I liked the placement {moment}.",
-        "The placement {moment} was neat.",
-        "I remember the placement {moment}.",
+        "Think of the placement {moment}.",
+        "My sister liked the placement {moment}.",
+        "I am thinking of the placement {moment}.",
     ),
     test=(
-        "I enjoyed the placement {moment}.",
-        "The placement {moment} impressed me.",
-        "I keep thinking of the placement {moment}.",
+        "Remember the placement {moment}.",
+        "My brother liked the placement {moment}.",
+        "You saw the placement {moment}.",
     ),
 )
 MOMENT_COMPLEMENT = "at the other moment"
