@@ -165,7 +165,7 @@ def test_referring_expressions_take_the_place_of_the_phrases():
 
 
 POINTED = (
-    r"(?:it|the former|the latter|the \w+ of them|that cube"
+    r"(?:it|the former|the latter|the \w+ of them|the \w+ one|that cube"
     r"|the one I mentioned earlier|the .*cube.*)"
 )
 """Words for a thing, as a regular expression."""
