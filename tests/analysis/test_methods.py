@@ -105,7 +105,7 @@ def test_a_server_speaks_for_its_own_process(tmp_path: Path) -> None:
     server = {"server": "openpi://host:8000", "dtype": "float16"}
     found = sections(tmp_path, record(0, inference=mine, policy_metadata=server))
     text = found["Precision of inference"]["mine"]
-    assert "computed in the process of its server" in text
+    assert "computed by its server" in text
     assert "number type of inference: float16" in text
     assert f"versions of libraries: {NOT_REPORTED}" in text
     assert "3.11" not in text
@@ -149,7 +149,7 @@ def test_texts_and_templates_are_counted(tmp_path: Path) -> None:
     assert counts["direct, arm silent"] == "1 distinct text, fixed"
     (label,) = set(found["Use of the words in training"]) - {"mine"}
     seen = found["Use of the words in training"][label]
-    assert f"{len(told) + len(direct)} texts: no, from templates" in seen
+    assert f"{len(told) + len(direct)} texts: cannot occur, as their templates" in seen
     assert "1 text: not reported" in seen
 
 
@@ -162,9 +162,9 @@ def test_each_other_analysis_has_a_verdict_or_a_reason(tmp_path: Path) -> None:
     ]
     found = sections(tmp_path, *played)["Sensitivity to analysis choices"]
     assert found["mine, direct less explicit"] == (
-        "no clear difference, from 3 pairs of scenes, which allow no p below 0.25 before the "
-        "correction; in other analyses: no clear difference with seed 0, seed 1, equal weights of "
-        "difficulties; clearly lower with unit rollout"
+        "no clear difference; 3 scenes played in both settings, whose smallest possible p is 0.25, "
+        "too large to be clear; in other analyses: no clear difference with seed 0, seed 1, equal "
+        "weights of difficulties; clearly lower with unit rollout"
     )
     without = found["mine, other analyses that change nothing here"]
     for choice in ("errors as failures", "unit task", "equal weights of suites", "one processor"):

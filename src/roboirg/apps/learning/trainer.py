@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import random
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from typing import Generic, TypeVar
+from typing import Any, Generic, TypeVar
 
 import torch
 from torch import nn
@@ -59,8 +59,8 @@ class Trainer(Generic[One]):
         losses = []
         for batch in batches:
             self._optimizer.zero_grad()
-            loss = self._loss_of(batch)
-            loss.backward()  # type: ignore[no-untyped-call]
+            loss: Any = self._loss_of(batch)
+            loss.backward()
             losses.append(float(loss.detach()))
             nn.utils.clip_grad_norm_(self._net.parameters(), 1.0)
             self._optimizer.step()

@@ -74,7 +74,8 @@ class LearnedPolicy:
         self._look(self._seen, observation)
         if self._goal is None:
             self._goal = self._seen.understand(" ".join(self._heard))
-        return self._seen.decide(self._goal, _tool(observation))[None]
+        chosen = self._seen.decide(self._goal, _tool(observation))
+        return np.asarray(chosen, np.float64)[None]
 
     def _look(self, seen: SeenEpisode, observation: Observation) -> None:
         """See what happened since the last action, and what there is now."""

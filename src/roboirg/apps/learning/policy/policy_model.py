@@ -218,7 +218,12 @@ def _read(content: Mapping[str, Any]) -> PolicyModel:
     detector, reader = ThingDetector(len(sight.classes)), ListenerNet(vocabulary)
     task_net = TaskNet(vocabulary)
     body = make_body(sight, vocabulary, moves, content["memory"])
-    nets = {"detector": detector, "task_net": task_net, "reader": reader, "body": body}
+    nets: dict[str, Any] = {
+        "detector": detector,
+        "task_net": task_net,
+        "reader": reader,
+        "body": body,
+    }
     for name, net in nets.items():
         net.load_state_dict(content[name])
         net.eval()

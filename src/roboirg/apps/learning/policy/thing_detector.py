@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import torch
@@ -20,6 +20,8 @@ GRID = ((ROWS[1] - ROWS[0]) // CELL, COLUMNS // CELL)
 CHANNELS = (16, 24, 40, 40)
 MOST_THINGS = 24
 LEAST_SCORE = 0.75
+RARE = -4.0
+"""Logit of a class in a cell before anything is learned."""
 PRESENT_WEIGHT = 30.0
 """Of a cell with a thing in the loss: most have none."""
 
@@ -66,7 +68,8 @@ class ThingDetector(nn.Module):
         )
         self.scores = nn.Conv2d(fourth, classes, 1)
         self.details = nn.Conv2d(fourth, 4, 1)
-        nn.init.constant_(self.scores.bias, -4.0)  # type: ignore[arg-type]
+        bias: Any = self.scores.bias
+        nn.init.constant_(bias, RARE)
 
     def forward(self, pictures: Tensor) -> tuple[Tensor, Tensor]:
         """Return logits (n, classes, *GRID), and offsets in cells and angles (n, 4, *GRID).

@@ -111,7 +111,8 @@ class WaypointExpert(OraclePolicy):
 
     def _next(self) -> ExpertWaypoint:
         """Return the next decision; after the last one the tool stays where it is."""
-        for self.stage, chunk in self._chunks:
+        for stage, chunk in self._chunks:
+            self.stage = stage
             decided = self._waypoint(chunk)
             if decided is not None:
                 return decided

@@ -43,9 +43,9 @@ from roboirg.tasks import every_task
 from roboirg.util.media import CONTROL_RATE
 
 _POOL_NOTES: Mapping[str | None, str] = {
-    "test": "no, from templates that are not in these splits",
-    "train": "yes, from the templates of these splits",
-    None: f"{NOT_REPORTED}, fixed or from a file",
+    "test": "cannot occur, as their templates are held out of these splits",
+    "train": "can occur, as their templates are those of these splits",
+    None: f"{NOT_REPORTED}, as they are fixed or from a file",
 }
 
 Played = Mapping[str, PlayedFacts]
@@ -113,8 +113,8 @@ def _horizon(results: Sequence[Summary], played: Played) -> Items:
             name,
             f"actions: {_action_space(facts.need('actions'))}",
             facts.labeled("chunk"),
-            f"executed per call: all that it returns until the rollout ends, {mean} on average",
-            f"observations between two calls: {between}",
+            f"executed per call: the whole chunk, or to the rollout's end; {mean} on average",
+            f"observations within a chunk: {between}",
         )
 
 
@@ -128,12 +128,13 @@ def _action_space(name: str) -> str:
 
 def _precision(results: Sequence[Summary], played: Played) -> Items:
     for name, facts in played.items():
-        process = "the process of its server" if facts.is_remote else "its own process"
+        place = "by its server" if facts.is_remote else "on the machine of the simulation"
         keys = ("dtype", "device", "libraries", "python")
-        yield item(name, f"computed in {process}, as follows", *map(facts.labeled, keys))
+        yield item(name, f"computed {place}", *map(facts.labeled, keys))
     yield item(
         "simulation",
-        f"roboirg {distinct(one.package_version for one in results)}, which calls the policies",
+        f"package roboirg {distinct(one.package_version for one in results)}, which calls the "
+        "policies",
         f"processor: {distinct(one.processor for one in results)}",
     )
 
@@ -141,9 +142,10 @@ def _precision(results: Sequence[Summary], played: Played) -> Items:
 def _observations(results: Sequence[Summary], played: Played) -> Items:
     blind = all(facts.need("cameras") == "none" for facts in played.values())
     devices = distinct(one.render_device for one in results)
+    version = distinct(one.environment_version for one in results)
     yield item(
         "source",
-        f"simulated, environment version {distinct(one.environment_version for one in results)}",
+        f"simulated by roboirg in SAPIEN, environment version {version}",
         f"{distinct(one.meshes for one in results)} meshes",
         "not rendered, as no policy has a camera" if blind else f"rendered on {devices}",
     )
@@ -168,11 +170,13 @@ def _instructions(results: Sequence[Summary], played: Played, said: ColumnTexts)
         splits = sorted({one.split for one in results if one.options.wordings == wordings})
         pools = [f"{pool_of(one, wordings)} pool for the split {one}" for one in splits]
         if wordings in (None, *POOLS):
-            yield item(label, f"templates of roboirg, version {versions}", *pools)
+            wording = "written out by roboirg export instructions"
+            yield item(label, f"template set {versions}, {wording}", *pools)
         else:
             yield label, "commands of a file"
-    used = distinct(one.options.delivery for one in results)
-    yield "delivery", f"{used} ({OPTION_HELP['delivery'].rstrip('.')})"
+    used = {one.options.delivery for one in results}
+    ways = OPTION_HELP["delivery"].rstrip(".").split("; ")
+    yield item("delivery", *(way for way in ways if way.partition(":")[0] in used))
     for column in sorted(said, key=lambda one: (options_sort_key(one.options), one.arm)):
         yield column.label, _counts(said[column], is_fixed=column.arm in SILENT_TEXTS)
     for name, facts in played.items():
@@ -193,8 +197,8 @@ def _counts(said: SaidTexts, *, is_fixed: bool) -> str:
     )
     return (
         f"{texts}, from {len(said.commands)} of the {there} templates of commands in the pool for "
-        f"{counted(len(tasks), 'task')}, and {len(said.wordings)} other drawn choices (sentences "
-        "before the command, referring expressions and other parts)"
+        f"{counted(len(tasks), 'task')}; {len(said.wordings)} distinct choices outside the command "
+        "(sentences before it, referring expressions and other parts)"
     )
 
 
@@ -222,4 +226,4 @@ def _training(played: Played, said: ColumnTexts) -> Items:
     texts = set().union(*(one.texts for one in said.values()))
     pools = Counter(_POOL_NOTES[pool] for _, pool in texts)
     listed = (f"{counted(pools[note], 'text')}: {note}" for note in sorted(pools))
-    yield item("whether texts can occur in training on the splits train and val", *listed)
+    yield item("texts in training on the splits train and val", *listed)

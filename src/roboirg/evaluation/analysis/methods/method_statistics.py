@@ -20,7 +20,11 @@ from roboirg.evaluation.analysis.stats.arm_figures import MEANING
 from roboirg.evaluation.analysis.stats.cells import PolicyRun
 from roboirg.evaluation.analysis.stats.chance import chance_level
 from roboirg.evaluation.analysis.stats.intervals import ALPHA, DRAWS
-from roboirg.evaluation.analysis.stats.option_labels import options_label, options_sort_key
+from roboirg.evaluation.analysis.stats.option_labels import (
+    REFERENCE,
+    options_label,
+    options_sort_key,
+)
 from roboirg.evaluation.analysis.stats.rates import p_text, points
 from roboirg.evaluation.analysis.stats.run_data import RunData
 from roboirg.evaluation.analysis.stats.run_summary import ALL, ScopeKey
@@ -66,7 +70,8 @@ def screening_items(jobs: Sequence[Job]) -> Items:
     is_whole = splits <= {*SPLITS} and len(scenes) == whole
     yield item(
         "scenes",
-        f"{len(scenes)} of the split {distinct(splits)}, numbered {span}",
+        f"{len(scenes)} of {whole or 'any number'} of these tasks in the split {distinct(splits)}, "
+        f"numbered {span} in each task",
         "all there are" if is_whole else _NO_REASON,
         "none was left out for its result",
     )
@@ -86,7 +91,10 @@ def screening_items(jobs: Sequence[Job]) -> Items:
 def _rejections(scenes: set[SceneName]) -> Iterator[str]:
     published = {one for one in scenes if is_published(*one)}
     if published:
-        yield f"{counted(len(published), 'scene')} published by RoboMME, none of which was rejected"
+        yield (
+            f"{counted(len(published), 'scene')} published by RoboMME, taken as they are: none was "
+            f"rejected here; criteria of their selection: {NOT_REPORTED}"
+        )
     shipped = {one for one in scenes - published if one[0] in shipped_splits() and one[1] in SPLITS}
     if shipped:
         rejected = sum(
@@ -117,14 +125,9 @@ def statistics_items(data: RunData) -> Items:
     yield item(
         "differences to explicit",
         f"paired by scene, {test}, two-sided",
-        f"clear if p ≤ {ALPHA} after the correction, and then lower or higher by the sign",
+        f"clear if p ≤ {ALPHA} after the correction; its sign is the direction",
     )
-    yield item(
-        "multiplicity, by Holm's correction over families",
-        "for each policy and arm, its differences in single tasks, those in suites, and those in "
-        "means over all tasks",
-        "for each policy, its contrasts of arms",
-    )
+    yield item("multiplicity, by Holm's correction over families", *_families(data))
     yield (
         "contrasts of arms, where played; paired and tested alike",
         MEANING.rstrip(".") if figures_of(data) else "none, without control arms",
@@ -148,15 +151,31 @@ def sensitivity_items(data: RunData) -> Items:
         yield "contrasts of arms", f"other analyses: {NOT_REPORTED}"
 
 
+def _families(data: RunData) -> Iterator[str]:
+    """Yield the families of tests of each policy in the arm told, with their sizes."""
+    told = data.told()
+    for policy_run, name in told.names.items():
+        own = [one for owner, one in told.results if owner == policy_run]
+        columns = {one.column for one in own if one.column != REFERENCE}
+        tasks = {(one.task, one.column) for one in own} - {(one.task, REFERENCE) for one in own}
+        suites = {(every_task()[task].suite, of) for task, of in tasks if task in every_task()}
+        sizes = f"single tasks ({len(tasks)}), suites ({len(suites)}), all tasks ({len(columns)})"
+        yield f"{name}: its differences to explicit in {sizes}"
+    if count := len(list(figures_of(data))):
+        yield f"contrasts of arms ({count} in all), a family for each policy"
+
+
 def _robustness(found: Robustness) -> str:
     by_verdict: dict[str, list[str]] = defaultdict(list)
     for choice, verdict in found.others.items():
         by_verdict[_VERDICTS[verdict]].append(choice.label)
     others = "; ".join(f"{verdict} with {', '.join(of)}" for verdict, of in by_verdict.items())
+    least = 0.5 ** (found.pairs - 1)
+    power = ", too large to be clear" if least > ALPHA else ""
     return (
-        f"{_VERDICTS[found.verdict]}, from {counted(found.pairs, 'pair')} of scenes, which allow "
-        f"no p below {0.5 ** (found.pairs - 1):.2g} before the correction; in other analyses: "
-        f"{others or 'none applies'}"
+        f"{_VERDICTS[found.verdict]}; {counted(found.pairs, 'scene')} played in both settings, "
+        f"whose smallest possible p is {least:.3g}{power}; in other analyses: "
+        f"{others or 'none differs from this one'}"
     )
 
 
@@ -184,7 +203,7 @@ def control_items(data: RunData, jobs: Sequence[Job]) -> Items:
         )
     is_resolved = any(one.form == "resolved" for one in jobs)
     yield (
-        "control without references: form resolved, which names their referents instead",
+        "control with references replaced by names (form resolved)",
         "played" if is_resolved else "not played",
     )
 

@@ -15,7 +15,7 @@ from roboirg.evaluation.policy_calls import SERVER
 from roboirg.evaluation.records.record import Record
 
 NOT_REPORTED = "not reported"
-NO_NETWORK = "none, as it has no network"
+NO_NETWORK = "not applicable, as there is no neural network"
 
 DECLARABLE = {
     "network": "network",
