@@ -61,6 +61,7 @@ RIGHT = {
     "listen results": ["nowhere"],
     "drive": ["PickXtimes", "0", "--port", "99999"],
     "learn listener": ["--out", "out"],
+    "learn policy": ["--out", "out"],
     "learn answers": ["nowhere", "--data", "nowhere", "--out", "out"],
 }
 """Words for commands whose work needs what is not there: files, or a library."""

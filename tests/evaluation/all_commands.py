@@ -44,6 +44,7 @@ WORDS = {
     "records import": "--help",
     "learn listener": "--help",
     "learn answers": "--help",
+    "learn policy": "--help",
     "listen plan": "{folder}/listeners --people 1 --tasks StopCube --episodes 1"
     " --plan {no_practice} --settings explicit",
     "listen serve": "--help",

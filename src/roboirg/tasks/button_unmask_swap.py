@@ -88,7 +88,7 @@ COMMANDS = replace(
                     "Push both buttons, raise {colors.0}, put it back, then raise {colors.1}.", 2
                 ),
                 Wording(
-                    "Push both buttons, pick up {colors.0}, put it back and pick up {colors.1}.",
+                    "Push both buttons, raise {colors.0}, put it back and raise {colors.1}.",
                     2,
                 ),
                 Wording(

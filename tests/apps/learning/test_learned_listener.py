@@ -150,12 +150,10 @@ def test_it_learns_and_its_file_is_the_same_listener(trained):
 
 
 def test_by_place_other_goals_of_a_scene_are_told_too(torch):
-    from roboirg.apps.learning.listener import listener_training
+    from roboirg.apps.learning.listener.reader_training import said
 
     episode = get_episode("ButtonUnmask", "train", 3)
-    plan = plan_of(tasks=(episode.task,), settings=("explicit", "spatial"), goals=3)
-    scenes = listener_training.SeenEpisodes((episode,), {}, (), None, None)
-    told = list(listener_training._instructions(scenes, plan))
+    told = list(said([episode], ("explicit", "spatial"), "train", 3, 0))
     by_place = [one.goal for one, words in told if words.setting == "spatial"]
     assert [one.goal for one, words in told if words.setting == "explicit"] == [episode.goal]
     assert by_place[0] == episode.goal

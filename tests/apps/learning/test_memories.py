@@ -7,6 +7,7 @@ torch = pytest.importorskip("torch")
 
 from roboirg.apps.learning.policy.body_net import TOOL_NUMBERS, BodyNet, EpisodeBatch  # noqa: E402
 from roboirg.apps.learning.policy.memories import MEMORIES  # noqa: E402
+from roboirg.apps.learning.policy.policy_plan import MEMORY_NAMES  # noqa: E402
 
 CLASSES, PARTS, THINGS, LOOKS = 3, 4, 5, 12
 AT_THINGS = (True, False, True)
@@ -109,3 +110,7 @@ def test_only_memory_chooses_what_is_out_of_sight(memory):
     _, things = body(batch._replace(seen=seen))
     can = bool((things[0, 1, :, 2] > -1e3).all())
     assert can == (memory == "recurrent")
+
+
+def test_every_memory_can_be_named():
+    assert sorted(MEMORIES) == sorted(MEMORY_NAMES)

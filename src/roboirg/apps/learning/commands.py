@@ -149,23 +149,22 @@ def learn_policy(
     Example: roboirg learn policy --tasks PickXtimes --out learned
     """
     from roboirg.apps.learning.learn_support import check_learn_support
+    from roboirg.apps.learning.policy.policy_plan import MEMORY_NAMES, PolicyPlan
     from roboirg.cli.names import known_name, known_settings, known_tasks
-    from roboirg.util.processor import worker_count
-
-    check_learn_support()
-    from roboirg.apps.learning.policy.memories import MEMORIES
-    from roboirg.apps.learning.policy.policy_model import save_policy
-    from roboirg.apps.learning.policy.policy_plan import PolicyPlan
-    from roboirg.apps.learning.policy.policy_training import train_policy
     from roboirg.core.word_pools import POOLS
+    from roboirg.util.processor import worker_count
 
     plan = PolicyPlan(
         known_tasks(tasks),
         () if settings == "none" else known_settings(settings),
         words=known_name("pool of words", words.wordings_file or "train", POOLS),
-        memory=known_name("memory", memory, tuple(MEMORIES)),
+        memory=known_name("memory", memory, MEMORY_NAMES),
         **words.choices(PolicyPlan),
     )
+    check_learn_support()
+    from roboirg.apps.learning.policy.policy_model import save_policy
+    from roboirg.apps.learning.policy.policy_training import train_policy
+
     out.mkdir(parents=True, exist_ok=True)
     path = out / f"{plan.name}.pt"
     check_output_file(path)

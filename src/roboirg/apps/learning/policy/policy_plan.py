@@ -10,6 +10,8 @@ from roboirg.apps.learning.policy.recording import ExpertRecording
 from roboirg.core.episode import Episode
 from roboirg.core.word_pools import PoolName
 
+MEMORY_NAMES = ("none", "frames", "recurrent")
+"""The kinds of memory."""
 WORDLESS = "none"
 """Words of a policy that is trained without any."""
 MANY = 3
