@@ -76,9 +76,7 @@ COMMANDS = replace(
                     "Press both buttons, lift {colors.0}, set it down, and lift {colors.1}.",
                     2,
                 ),
-                Wording(
-                    "Press both buttons, lift {colors.0}, put it back, then lift {colors.1}.", 2
-                ),
+                Wording("Press both buttons, lift {colors.0}, put it back and lift {colors.1}.", 2),
             ),
             test=(
                 Wording("Push both buttons, then raise {colors.0}."),
