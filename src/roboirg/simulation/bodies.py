@@ -75,6 +75,11 @@ class Body:
         """Position of the object's origin, world frame, m."""
         return Point(*(float(value) for value in self.entity.pose.p))
 
+    @property
+    def yaw(self) -> float:
+        """Rotation about the vertical, rad."""
+        return math.atan2(*self.entity.pose.to_transformation_matrix()[1::-1, 0])
+
     def put(self, position: Point) -> None:
         """Teleport the object, upright and at rest, with its own yaw."""
         self.set_pose(_pose(self.item, position))

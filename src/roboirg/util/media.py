@@ -12,6 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from roboirg.core.errors import InvalidValueError
 from roboirg.core.extras import extra_needed
 from roboirg.util.text_overlay import draw_text
 
@@ -100,6 +101,20 @@ def encode_png(picture: Picture) -> bytes:
     frame = av.VideoFrame.from_ndarray(np.ascontiguousarray(picture.pixels), format="rgb24")
     frame.pts = 0
     return b"".join(bytes(packet) for packet in (*codec.encode(frame), *codec.encode(None)))
+
+
+def decode_png(content: bytes) -> Pixels:
+    """Return the picture of a PNG, RGB (height, width, 3).
+
+    Raises:
+        InvalidValueError: it is damaged.
+    """
+    import cv2
+
+    found = cv2.imdecode(np.frombuffer(content, np.uint8), cv2.IMREAD_COLOR)
+    if found is None:
+        raise InvalidValueError("A picture of the data set is damaged.")
+    return np.asarray(cv2.cvtColor(found, cv2.COLOR_BGR2RGB), dtype=np.uint8)
 
 
 def encode_jpeg(pixels: Pixels) -> bytes:

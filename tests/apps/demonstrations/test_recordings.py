@@ -10,11 +10,11 @@ import teleop_recordings as recorded
 from pyarrow import parquet
 
 from roboirg import main as cli
-from roboirg.apps.demonstrations.picture_coding import decode_png
 from roboirg.core.kinematics import end_effector_pose
 from roboirg.language import instruct
 from roboirg.tasks.splits.splits import get_episode
 from roboirg.util import processor
+from roboirg.util.media import decode_png
 
 
 @pytest.fixture

@@ -12,7 +12,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from roboirg.core.errors import InvalidValueError, RoboIRGError
+from roboirg.core.errors import RoboIRGError
 
 Picture = NDArray[np.uint8]
 PictureCoding = Literal["png", "lossless-video", "lossy-video", "none"]
@@ -41,14 +41,6 @@ _MAX_VALUE = 255.0
 def encode_png(picture: Picture) -> bytes:
     """Return a picture, RGB (height, width, 3), as PNG."""
     return _png(np.asarray(cv2.cvtColor(picture, cv2.COLOR_RGB2BGR)))
-
-
-def decode_png(content: bytes) -> Picture:
-    """Return the picture of a PNG, RGB (height, width, 3)."""
-    found = cv2.imdecode(np.frombuffer(content, np.uint8), cv2.IMREAD_COLOR)
-    if found is None:
-        raise InvalidValueError("A picture of the data set is damaged.")
-    return np.asarray(cv2.cvtColor(found, cv2.COLOR_BGR2RGB), dtype=np.uint8)
 
 
 def encode_depth(depth: NDArray[np.int16]) -> bytes:

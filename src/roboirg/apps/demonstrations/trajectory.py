@@ -18,10 +18,11 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from roboirg.apps.demonstrations.picture_coding import PictureCoding, decode_png
+from roboirg.apps.demonstrations.picture_coding import PictureCoding
 from roboirg.core.errors import InvalidValueError
 from roboirg.core.observations import CAMERAS
 from roboirg.util.atomic_write import replacing
+from roboirg.util.media import decode_png
 
 TRAJECTORY_VERSION = 1
 """Increases with any change of what a file holds."""

@@ -61,7 +61,7 @@ def _fingers(x: float, y: float, side: NDArray[np.float64]) -> list[Rectangle]:
 def _footprints(body: Body) -> Iterator[Footprint]:
     """Yield the areas near the table that an object blocks."""
     x, y, _ = body.position
-    yaw = math.atan2(*body.entity.pose.to_transformation_matrix()[1::-1, 0])
+    yaw = body.yaw
     match body.item.kind:
         case "cube":
             yield Rectangle(x, y, object_sizes.CUBE_HALF, object_sizes.CUBE_HALF, yaw)

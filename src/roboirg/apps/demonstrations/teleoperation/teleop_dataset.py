@@ -12,11 +12,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from roboirg.apps.demonstrations.parquet_tables import read_rows
-from roboirg.apps.demonstrations.picture_coding import Picture, decode_png
+from roboirg.apps.demonstrations.picture_coding import Picture
 from roboirg.core.errors import InvalidValueError
 from roboirg.policies.contract.option_checking import check_options
 from roboirg.policies.contract.policy_urls import parse_query
 from roboirg.policies.lerobot_features import LeRobotFeatures
+from roboirg.util.media import decode_png
 from roboirg.util.parquet_support import check_parquet_support
 
 STATE, ACTION, PICTURES = "observation.state", "action", "observation.images."

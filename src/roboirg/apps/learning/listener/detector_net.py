@@ -35,10 +35,10 @@ class DetectorNet(nn.Module):
         super().__init__()
         first, second, third, fourth = CHANNELS
         self.features = nn.Sequential(
-            *_block(3, first, size=5, stride=2),
-            *_block(first, second, stride=2),
-            *_block(second, third, stride=2),
-            *_block(third, fourth),
+            *block(3, first, size=5, stride=2),
+            *block(first, second, stride=2),
+            *block(second, third, stride=2),
+            *block(third, fourth),
         )
         self.kinds = nn.Conv2d(fourth, classes + 1, 1)
         self.offsets = nn.Conv2d(fourth, 2, 1)
@@ -73,8 +73,14 @@ class DetectorNet(nn.Module):
         return found
 
 
-def _block(inputs: int, outputs: int, size: int = 3, stride: int = 1) -> tuple[nn.Module, ...]:
-    convolution = nn.Conv2d(inputs, outputs, size, stride=stride, padding=size // 2, bias=False)
+def block(
+    inputs: int, outputs: int, size: int = 3, stride: int = 1, dilation: int = 1
+) -> tuple[nn.Module, ...]:
+    """Return a convolution that keeps the size up to its stride, normalized and rectified."""
+    padding = dilation * (size // 2)
+    convolution = nn.Conv2d(
+        inputs, outputs, size, stride=stride, padding=padding, dilation=dilation, bias=False
+    )
     return convolution, nn.BatchNorm2d(outputs), nn.ReLU()
 
 

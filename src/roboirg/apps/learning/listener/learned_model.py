@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, Literal, NamedTuple, get_args
 
@@ -19,6 +19,7 @@ from roboirg.apps.learning.listener.object_relations import (
     nothing_of,
     relate,
 )
+from roboirg.apps.learning.trained_file import load_trained, save_trained
 from roboirg.core.episode import Goal
 from roboirg.core.errors import InvalidValueError
 from roboirg.policies.vlm.goal_schema import goal_schema
@@ -124,10 +125,7 @@ def save_model(model: LearnedModel, path: Path) -> None:
         "without": model.without,
         "about": model.about,
     }
-    try:
-        torch.save(content, path)
-    except (OSError, RuntimeError) as error:
-        raise InvalidValueError(f"Cannot write {path}: {error}.") from error
+    save_trained(content, path)
 
 
 def load_model(path: Path) -> LearnedModel:
@@ -136,19 +134,15 @@ def load_model(path: Path) -> LearnedModel:
     Raises:
         InvalidValueError: the file is none.
     """
-    try:
-        content = torch.load(path, weights_only=True, map_location="cpu")
-        if content.get("format") != FORMAT:
-            raise InvalidValueError(f"its format is {content.get('format')!r}, not {FORMAT!r}")
-        held = {name: tuple(value) for name, value in content["vocabulary"].items()}
-        vocabulary = Vocabulary(**held)
-        plane = TablePlane(**{name: one.numpy() for name, one in content["plane"].items()})
-        detector, reader = DetectorNet(len(vocabulary.classes)), ListenerNet(vocabulary)
-        detector.load_state_dict(content["detector"])
-        reader.load_state_dict(content["reader"])
-    except Exception as error:
-        reason = str(error).splitlines()[0] if str(error) else type(error).__name__
-        raise InvalidValueError(f"{str(path)!r} is no trained listener ({reason}).") from error
+    return load_trained(path, "listener", FORMAT, _read)
+
+
+def _read(content: Mapping[str, Any]) -> LearnedModel:
+    vocabulary = Vocabulary(**{name: tuple(own) for name, own in content["vocabulary"].items()})
+    plane = TablePlane(**{name: one.numpy() for name, one in content["plane"].items()})
+    detector, reader = DetectorNet(len(vocabulary.classes)), ListenerNet(vocabulary)
+    detector.load_state_dict(content["detector"])
+    reader.load_state_dict(content["reader"])
     detector.eval()
     reader.eval()
     return LearnedModel(vocabulary, detector, plane, reader, content["without"], content["about"])

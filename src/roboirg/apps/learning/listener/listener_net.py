@@ -146,13 +146,13 @@ class ListenerNet(nn.Module):
             places[number, :count] = torch.from_numpy(one.seen.positions) / METERS
             relations[number, :count] = torch.from_numpy(one.seen.relations)
         there = torch.arange(shape[1]) < torch.tensor(counts)[:, None]
-        encoded = self.kinds(kinds) + self.views(views) + self.places(_waves(places))
+        encoded = self.kinds(kinds) + self.views(views) + self.places(waves(places, WAVES))
         return encoded + self.relations(relations), there
 
 
-def _waves(places: Tensor) -> Tensor:
-    """Return places (..., 2) with sines and cosines of rising frequency."""
-    scales = math.pi * 2.0 ** torch.arange(WAVES)
+def waves(places: Tensor, count: int) -> Tensor:
+    """Return places (..., 2) with sines and cosines of `count` rising frequencies."""
+    scales = math.pi * 2.0 ** torch.arange(count)
     angles = (places[..., None] * scales).flatten(-2)
     return torch.cat([places, angles.sin(), angles.cos()], -1)
 

@@ -85,9 +85,14 @@ def fit_plane(places: NDArray[np.floating], positions: NDArray[np.floating]) -> 
         shared = [-column * positions[:, axis] for column in columns]
         rows.append(np.column_stack([*(own + other if axis == 0 else other + own), *shared]))
     found = np.linalg.lstsq(np.vstack(rows), positions.T.reshape(-1), rcond=None)[0]
+    return TablePlane(np.append(found, 1.0).reshape(3, 3), corners_of(positions))
+
+
+def corners_of(positions: NDArray[np.floating]) -> Points:
+    """Return the corners (4, 2) of the area in which positions (n, 2) lie."""
     low, high = positions.min(axis=0), positions.max(axis=0)
     corners = [(x, y) for x in (low[0], high[0]) for y in (low[1], high[1])]
-    return TablePlane(np.append(found, 1.0).reshape(3, 3), np.array(corners, np.float64))
+    return np.array(corners, np.float64)
 
 
 def relation_count(classes: int) -> int:

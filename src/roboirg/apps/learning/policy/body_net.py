@@ -9,11 +9,11 @@ from typing import NamedTuple
 import torch
 from torch import Tensor, nn
 
+from roboirg.apps.learning.listener.listener_net import METERS, waves
 from roboirg.apps.learning.policy.memories import HEADS, MEMORIES, WIDTH, Looks, at_looks
 
 LAYERS = 2
 WAVES = 5
-METERS = 0.5
 CLOSED = -1e4
 """Score of a thing that cannot be chosen."""
 TOOL_NUMBERS = 9
@@ -106,16 +106,9 @@ class BodyNet(nn.Module):
         apart = torch.cat(
             [away, away.norm(dim=-1, keepdim=True), tool[..., 2:3].expand_as(away[..., :1])], -1
         )
-        numbers = torch.cat([_waves(batch.places / METERS), batch.turns, apart * 5.0], -1)
+        numbers = torch.cat([waves(batch.places / METERS, WAVES), batch.turns, apart * 5.0], -1)
         things = self.kinds(batch.classes) + self.spot(numbers)
         things = torch.where(batch.seen[..., None], things, things + self.unseen)
         return Looks(
             things, self.tool(batch.tool) + goal, batch.places, batch.seen, batch.known, batch.there
         )
-
-
-def _waves(places: Tensor) -> Tensor:
-    """Return places (..., 2) with sines and cosines of rising frequency."""
-    scales = math.pi * 2.0 ** torch.arange(WAVES)
-    angles = (places[..., None] * scales).flatten(-2)
-    return torch.cat([places, angles.sin(), angles.cos()], -1)

@@ -57,7 +57,7 @@ def train_body(
     folder: Path,
     progress: Progress,
 ) -> BodyNet:
-    """Return a body that has learned from recordings; continues where it was interrupted."""
+    """Return a body that has learned from recordings, and write how it learned."""
     torch.manual_seed(plan.seed)
     rng, noise_rng = random.Random(plan.seed), np.random.default_rng(plan.seed)
     body = make_body(sight, vocabulary, moves, plan.memory)

@@ -26,7 +26,7 @@ from roboirg.apps.learning.policy.sight import Sight
 from roboirg.apps.learning.policy.task_net import TaskNet
 from roboirg.apps.learning.policy.thing_detector import ThingDetector
 from roboirg.apps.learning.policy.tracks import LookTokens
-from roboirg.core.errors import InvalidValueError
+from roboirg.apps.learning.trained_file import load_trained, save_trained
 from roboirg.policies.vlm.goal_schema import goal_schema
 
 FORMAT = "roboirg-policy-1"
@@ -187,10 +187,7 @@ def save_policy(model: PolicyModel, path: Path) -> None:
         "reader": model.reader.state_dict(),
         "body": model.body.state_dict(),
     }
-    try:
-        torch.save(content, path)
-    except (OSError, RuntimeError) as error:
-        raise InvalidValueError(f"Cannot write {path}: {error}.") from error
+    save_trained(content, path)
 
 
 def load_policy(path: Path) -> PolicyModel:
@@ -199,16 +196,7 @@ def load_policy(path: Path) -> PolicyModel:
     Raises:
         InvalidValueError: the file is none.
     """
-    try:
-        content = torch.load(path, weights_only=True, map_location="cpu")
-        if content.get("format") != FORMAT:
-            raise InvalidValueError(f"its format is {content.get('format')!r}, not {FORMAT!r}")
-        return _read(content)
-    except Exception as error:
-        reason = str(error).splitlines()[0] if str(error) else type(error).__name__
-        raise InvalidValueError(
-            f"{str(path)!r} is no trained policy ({reason}); make one with: roboirg learn policy."
-        ) from error
+    return load_trained(path, "policy", FORMAT, _read)
 
 
 def _read(content: Mapping[str, Any]) -> PolicyModel:

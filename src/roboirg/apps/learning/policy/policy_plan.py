@@ -49,9 +49,9 @@ class PolicyPlan(NamedTuple):
 
     @property
     def name(self) -> str:
-        """What tells it from others in the same folder: memory, words and seed."""
-        heard = "-".join(self.settings) or WORDLESS
-        heard = "all" if len(self.settings) > MANY else heard
+        """What distinguishes it from others in the same folder: memory, words and seed."""
+        few = "-".join(self.settings) or WORDLESS
+        heard = "all" if len(self.settings) > MANY else few
         return f"{self.memory}-{heard}-{self.seed}"
 
 

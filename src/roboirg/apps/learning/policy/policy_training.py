@@ -8,7 +8,6 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-import cv2
 import numpy as np
 import torch
 from numpy.typing import NDArray
@@ -20,6 +19,7 @@ from roboirg.apps.learning.listener.listener_net import (
     Vocabulary,
     make_vocabulary,
 )
+from roboirg.apps.learning.listener.object_relations import corners_of
 from roboirg.apps.learning.listener.reader_training import Lesson, lesson_of, said, train_reader
 from roboirg.apps.learning.policy.body_training import train_body
 from roboirg.apps.learning.policy.moves import common_moves, decisions_of
@@ -35,7 +35,14 @@ from roboirg.apps.learning.policy.recording import (
     record_episode,
     save_recording,
 )
-from roboirg.apps.learning.policy.sight import Sight, SightNoise, labeled_looks, points_of, sight_of
+from roboirg.apps.learning.policy.sight import (
+    Sight,
+    SightNoise,
+    labeled_looks,
+    points_of,
+    sight_of,
+    turns_of,
+)
 from roboirg.apps.learning.policy.task_net import TaskNet
 from roboirg.apps.learning.policy.thing_detector import (
     LabeledPicture,
@@ -49,6 +56,7 @@ from roboirg.core.episode import Episode
 from roboirg.core.errors import InvalidValueError, MotionPlanningError
 from roboirg.language import LANGUAGE_VERSION
 from roboirg.tasks.splits.splits import get_episode
+from roboirg.util.media import decode_png
 from roboirg.util.parallel_map import parallel_map
 
 RECORDED_SPLIT = "random"
@@ -78,7 +86,8 @@ def train_policy(plan: PolicyPlan, folder: Path, workers: int, progress: Progres
     recorded = record_all(plan, folder, workers, progress)
     sight = sight_of(one.recording for one in recorded)
     detector = _detector(plan, recorded, sight, folder, progress)
-    lessons, vocabulary = _lessons(plan, recorded, sight)
+    corners = _corners(recorded)
+    lessons, vocabulary = _lessons(plan, recorded, sight, corners)
     decisions = [decisions_of(one.recording) for one in recorded]
     moves = common_moves(decisions)
     body = train_body(plan, recorded, decisions, moves, sight, vocabulary, folder, progress)
@@ -92,7 +101,7 @@ def train_policy(plan: PolicyPlan, folder: Path, workers: int, progress: Progres
         "episodes": len(recorded),
     }
     return PolicyModel(
-        sight, detector, vocabulary, task_net, reader, _corners(recorded), moves, plan.memory,
+        sight, detector, vocabulary, task_net, reader, corners, moves, plan.memory,
         body, about,
     )  # fmt: skip
 
@@ -134,7 +143,7 @@ def _path(folder: Path, task: str, number: int) -> Path:
 
 
 def _record(folder: Path, drawn: int, job: tuple[str, int]) -> None:
-    """Record an episode; one whose disturbance leaves the arm's reach becomes a failure."""
+    """Record an episode, undisturbed if a disturbance leads where the arm cannot go on."""
     task, number = job
     every = PICTURE_EVERY if number < drawn else 0
     episode = get_episode(task, RECORDED_SPLIT, number)
@@ -178,33 +187,25 @@ def _detector(
 
 def labeled_pictures(recorded: ExpertRecording, sight: Sight) -> Iterator[LabeledPicture]:
     """Yield the pictures of an episode with what the simulator says is in them."""
-    numbers = {name: number for number, name in enumerate(sight.classes)}
-    kinds = np.array([numbers.get(name, -1) for name in recorded.classes], np.int64)
+    kinds = sight.kinds(recorded.classes)
     for look, png in recorded.pictures.items():
         shown = recorded.visible[look] & (kinds >= 0)
         things = recorded.things[look, shown].astype(np.float64)
-        angles = 4.0 * things[:, 3]
-        turns = np.stack([np.cos(angles), np.sin(angles)], 1).astype(np.float32)
-        bgr = cv2.imdecode(np.frombuffer(png, np.uint8), cv2.IMREAD_COLOR)
-        picture = np.asarray(cv2.cvtColor(np.asarray(bgr), cv2.COLOR_BGR2RGB), np.uint8)
-        yield LabeledPicture(picture, kinds[shown], points_of(things[:, :3]), turns)
+        points, turns = points_of(things[:, :3]), turns_of(things[:, 3])
+        yield LabeledPicture(decode_png(png), kinds[shown], points, turns)
 
 
 def _corners(recorded: Sequence[Recorded]) -> NDArray[np.float64]:
-    """Return x and y (4, 2), m, of the corners of the area where things stand at first."""
-    places = np.concatenate(
-        [one.recording.things[0, one.recording.visible[0], :2] for one in recorded]
-    )
-    low, high = places.min(axis=0), places.max(axis=0)
-    corners = [(x, y) for x in (low[0], high[0]) for y in (low[1], high[1])]
-    return np.array(corners, np.float64)
+    """Return the corners of the area where things stand at first, as `corners_of` does."""
+    first = [one.recording.things[0, one.recording.visible[0], :2] for one in recorded]
+    return corners_of(np.concatenate(first))
 
 
 def _lessons(
-    plan: PolicyPlan, recorded: Sequence[Recorded], sight: Sight
+    plan: PolicyPlan, recorded: Sequence[Recorded], sight: Sight, corners: NDArray[np.float64]
 ) -> tuple[list[Lesson], Vocabulary]:
     """Return the instructions that the reader hears, and what it can name."""
-    rng, corners = np.random.default_rng(plan.seed), _corners(recorded)
+    rng = np.random.default_rng(plan.seed)
     seen = {
         one.episode.key: seen_things(first_looks(one.recording, sight, rng), corners, sight.classes)
         for one in recorded

@@ -7,7 +7,6 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-import cv2
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -26,6 +25,7 @@ from roboirg.policies.contract.play import EpisodeLoop
 from roboirg.simulation.bodies import Body
 from roboirg.simulation.proprioception import euler_angles
 from roboirg.util.atomic_write import replacing
+from roboirg.util.media import Picture, encode_png
 
 if TYPE_CHECKING:
     from roboirg.simulation.world import World
@@ -34,6 +34,8 @@ LOOK_EVERY = 8
 """Control steps between two looks, in the video and in the policy's own time."""
 COVER = 0.03
 """Meters in the plane within which a container on the table hides a cube."""
+_PICTURE = "picture_"
+"""Before the number of a look, in the names of a file."""
 ON_TABLE = 0.07
 """Height of a container's origin below which it stands on the table, m."""
 
@@ -111,7 +113,7 @@ class _LookRecorder(EpisodeLoop):
         self._has_begun = False
 
     def record(self) -> ExpertRecording:
-        self.env.set_frame_hook(self._after_step)
+        self.env.set_frame_hook(self._after_step, draws=self._picture_every > 0)
         info = self.play()
         objects = self.env.episode.scene.objects
         names = tuple(item.name for item in objects)
@@ -163,13 +165,13 @@ class _LookRecorder(EpisodeLoop):
         world = self.env.session.world
         number = len(self._rows)
         bodies = [world.bodies[item.name] for item in self.env.episode.scene.objects]
-        things = [(*body.position, yaw_of(body)) for body in bodies]
+        things = [(*body.position, body.yaw) for body in bodies]
         visible = visible_of(world, bodies)
         if self._picture_every and number % self._picture_every == 0:
             segments = world.cameras.segmentation(FRONT)
             shown = [int((segments == body.segment).sum()) >= MIN_PIXELS for body in bodies]
             visible = [one and in_view for one, in_view in zip(visible, shown, strict=True)]
-            self._pictures[number] = _png(world.picture(FRONT))
+            self._pictures[number] = encode_png(Picture(world.picture(FRONT)))
         steps = self._video_steps if is_video else self._steps
         self._rows.append((things, visible, _tool_of(world), is_video, steps))
 
@@ -178,12 +180,6 @@ def _tool_of(world: World) -> tuple[float, ...]:
     """Return the tool's pose and the opening of a finger; angles are from -pi to pi."""
     robot = world.robot
     return (*robot.tool_pose.p, *euler_angles(robot.tool_pose), float(robot.finger_positions[0]))
-
-
-def yaw_of(body: Body) -> float:
-    """Return the angle of an object about the vertical, rad."""
-    matrix = body.entity.pose.to_transformation_matrix()
-    return float(np.arctan2(matrix[1, 0], matrix[0, 0]))
 
 
 def visible_of(world: World, bodies: Sequence[Body]) -> list[bool]:
@@ -205,13 +201,6 @@ def visible_of(world: World, bodies: Sequence[Body]) -> list[bool]:
         )
         found.append(is_there and not is_hidden)
     return found
-
-
-def _png(picture: NDArray[np.uint8]) -> bytes:
-    done, data = cv2.imencode(".png", cv2.cvtColor(picture, cv2.COLOR_RGB2BGR))
-    if not done:
-        raise RuntimeError("OpenCV cannot encode a PNG.")
-    return bytes(data)
 
 
 def save_recording(recorded: ExpertRecording, path: Path) -> None:
@@ -245,6 +234,3 @@ def load_recording(path: Path) -> ExpertRecording:
         raise InvalidValueError(
             f"The recording {str(path)!r} cannot be read ({error}); delete it to make it again."
         ) from error
-
-
-_PICTURE = "picture_"

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -48,6 +48,11 @@ class Sight(NamedTuple):
     classes: tuple[str, ...]
     heights: NDArray[np.float64]
 
+    def kinds(self, names: Sequence[str]) -> NDArray[np.int64]:
+        """Return the numbers of classes; -1 for one that is not known."""
+        numbers = {name: number for number, name in enumerate(self.classes)}
+        return np.array([numbers.get(name, -1) for name in names], np.int64)
+
     def places(
         self, classes: NDArray[np.int64], points: NDArray[np.floating]
     ) -> NDArray[np.float32]:
@@ -68,6 +73,11 @@ def points_of(positions: NDArray[np.floating]) -> NDArray[np.float64]:
     return flat
 
 
+def turns_of(angles: NDArray[np.floating]) -> NDArray[np.float32]:
+    """Return cosine and sine (..., 2) of four times angles, rad, which a square has four of."""
+    return np.stack([np.cos(4.0 * angles), np.sin(4.0 * angles)], -1).astype(np.float32)
+
+
 def sight_of(recorded: Iterable[ExpertRecording]) -> Sight:
     """Return the classes of things that episodes show, each with its height when first seen."""
     found: dict[str, list[float]] = {}
@@ -83,8 +93,7 @@ def labeled_looks(
     recorded: ExpertRecording, sight: Sight, noise: SightNoise, rng: np.random.Generator
 ) -> Iterator[tuple[LookTokens, NDArray[np.intp]]]:
     """Yield what a detector might find at each look, and the numbers of the objects found."""
-    numbers = {name: number for number, name in enumerate(sight.classes)}
-    kinds = np.array([numbers.get(name, -1) for name in recorded.classes], np.int64)
+    kinds = sight.kinds(recorded.classes)
     positions = recorded.things[..., :3].astype(np.float64)
     away = np.hypot(*np.moveaxis(positions[..., :2] - recorded.tool[:, None, :2], -1, 0))
     lost = np.where(away < NEAR_TOOL, noise.lost_near_tool, noise.lost)
@@ -99,8 +108,7 @@ def labeled_looks(
     shape = points.shape[:2]
     every = np.broadcast_to(np.maximum(kinds, 0), shape).ravel()
     places = sight.places(every, points.reshape(-1, 2)).reshape(*shape, 2)
-    angles = 4.0 * (recorded.things[..., 3] + rng.normal(0.0, noise.turn, shape))
-    turns = np.stack([np.cos(angles), np.sin(angles)], -1).astype(np.float32)
+    turns = turns_of(recorded.things[..., 3] + rng.normal(0.0, noise.turn, shape))
     for look, shown in enumerate(found):
         objects = np.flatnonzero(shown)
         yield LookTokens(kinds[objects], places[look, objects], turns[look, objects]), objects

@@ -11,6 +11,8 @@ from numpy.typing import NDArray
 from torch import Tensor, nn
 from torch.nn import functional
 
+from roboirg.apps.learning.listener.detector_net import block
+
 CELL = 4
 """Pixels of a cell of the grid in which things are found."""
 ROWS = (32, 160)
@@ -61,10 +63,10 @@ class ThingDetector(nn.Module):
         super().__init__()
         first, second, third, fourth = CHANNELS
         self.features = nn.Sequential(
-            *_block(3, first, size=5, stride=2),
-            *_block(first, second, stride=2),
-            *_block(second, third),
-            *_block(third, fourth, dilation=2),
+            *block(3, first, size=5, stride=2),
+            *block(first, second, stride=2),
+            *block(second, third),
+            *block(third, fourth, dilation=2),
         )
         self.scores = nn.Conv2d(fourth, classes, 1)
         self.details = nn.Conv2d(fourth, 4, 1)
@@ -97,16 +99,6 @@ class ThingDetector(nn.Module):
             points = (np.stack([columns, rows], 1) + shift[:, :2]) * CELL + (0, ROWS[0])
             found.append(FoundThings(kinds.numpy(), points, shift[:, 2:].astype(np.float32)))
         return found
-
-
-def _block(
-    inputs: int, outputs: int, size: int = 3, stride: int = 1, dilation: int = 1
-) -> tuple[nn.Module, ...]:
-    padding = dilation * (size // 2)
-    convolution = nn.Conv2d(
-        inputs, outputs, size, stride=stride, padding=padding, dilation=dilation, bias=False
-    )
-    return convolution, nn.BatchNorm2d(outputs), nn.ReLU()
 
 
 def detector_loss(net: ThingDetector, views: Sequence[LabeledPicture]) -> Tensor:

@@ -28,6 +28,11 @@ ON_THING = 0.012
 """Meters in the plane within which a waypoint is at an object; some stay short of it."""
 FREE_HEIGHT = 0.09
 """Tool height above which a disturbed waypoint touches nothing, m."""
+UP = 0.05
+"""Meters by which a move rises to be one straight up."""
+ASIDE = 0.06
+"""Meters aside within which it still is."""
+_TURNS = {"pick_cube": "align", "pick_container": "align", "press": "home", "hover": "home"}
 
 
 class Disturbance(NamedTuple):
@@ -174,13 +179,6 @@ class WaypointExpert(OraclePolicy):
         elif rng.random() < how.low:
             moved[:2] += rng.normal(0.0, how.miss, 2)
         return moved
-
-
-UP = 0.05
-"""Meters by which a move rises to be one straight up."""
-ASIDE = 0.06
-"""Meters aside within which it still is."""
-_TURNS = {"pick_cube": "align", "pick_container": "align", "press": "home", "hover": "home"}
 
 
 class _WaypointPrimitives(MotionPrimitives):

@@ -1,0 +1,51 @@
+"""Files of what was learned: plain tensors and data, of which nothing is executed."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any, TypeVar
+
+import torch
+
+from roboirg.core.errors import InvalidValueError
+
+Trained = TypeVar("Trained")
+
+
+def save_trained(content: Mapping[str, Any], path: Path) -> None:
+    """Write what was learned.
+
+    Raises:
+        InvalidValueError: the file cannot be written.
+    """
+    try:
+        torch.save(dict(content), path)
+    except (OSError, RuntimeError) as error:
+        raise InvalidValueError(f"Cannot write {path}: {error}.") from error
+
+
+def load_trained(
+    path: Path, kind: str, file_format: str, read: Callable[[Mapping[str, Any]], Trained]
+) -> Trained:
+    """Return what was learned.
+
+    Args:
+        path: the file.
+        kind: what it is: ``listener`` or ``policy``.
+        file_format: that the file must name as its ``format``.
+        read: makes the result of the file's content.
+
+    Raises:
+        InvalidValueError: the file is none of that kind.
+    """
+    try:
+        content = torch.load(path, weights_only=True, map_location="cpu")
+        if content.get("format") != file_format:
+            raise InvalidValueError(f"its format is {content.get('format')!r}, not {file_format!r}")
+        return read(content)
+    except Exception as error:
+        reason = str(error).splitlines()[0] if str(error) else type(error).__name__
+        raise InvalidValueError(
+            f"{str(path)!r} is no trained {kind} ({reason}); make one with: roboirg learn {kind}."
+        ) from error
