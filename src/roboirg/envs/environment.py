@@ -119,7 +119,7 @@ class RoboIRGEnv(gymnasium.Env[dict[str, Any], NDArray[np.floating[Any]]]):
         self.action_space = spaces.Box(self._space.low, self._space.high, dtype=np.float64)
         self._state: EpisodeState | None = None
         self._frame_hook: FrameHook | None = None
-        self._hook_period, self._hook_draws = 1, False
+        self._hook_period = 1
 
     @property
     def session(self) -> EpisodeSession:
@@ -286,13 +286,12 @@ class RoboIRGEnv(gymnasium.Env[dict[str, Any], NDArray[np.floating[Any]]]):
         world = self.session.world
         return objects_at(world.bodies, world.cameras, point) if self._renders else None
 
-    def set_frame_hook(self, hook: FrameHook, every: int = 1, *, draws: bool = True) -> None:
+    def set_frame_hook(self, hook: FrameHook, every: int = 1) -> None:
         """Call ``hook(env, is_demonstration)`` after every n-th control step and at the end.
 
-        Also makes pictures available if observations hold none, unless the hook draws none. Takes
-        effect at the next reset.
+        Also makes pictures available if observations hold none. Takes effect at the next reset.
         """
-        self._frame_hook, self._hook_period, self._hook_draws = hook, every, draws
+        self._frame_hook, self._hook_period = hook, every
 
     def close(self) -> None:
         """Release the current episode."""
@@ -301,7 +300,7 @@ class RoboIRGEnv(gymnasium.Env[dict[str, Any], NDArray[np.floating[Any]]]):
     @property
     def _renders(self) -> bool:
         drawn = bool(self.cameras) or self.grounded or self.render_mode is not None
-        return drawn or self._hook_draws
+        return drawn or self._frame_hook is not None
 
     @property
     def _current(self) -> EpisodeState:

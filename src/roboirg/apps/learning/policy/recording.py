@@ -113,7 +113,7 @@ class _LookRecorder(EpisodeLoop):
         self._has_begun = False
 
     def record(self) -> ExpertRecording:
-        self.env.set_frame_hook(self._after_step, draws=self._picture_every > 0)
+        self.env.set_frame_hook(self._after_step)
         info = self.play()
         objects = self.env.episode.scene.objects
         names = tuple(item.name for item in objects)
