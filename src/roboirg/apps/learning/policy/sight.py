@@ -9,10 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from roboirg.apps.learning.policy.recording import ExpertRecording
-from roboirg.apps.learning.policy.thing_detector import COLUMNS, ROWS
 from roboirg.apps.learning.policy.tracks import LookTokens
 from roboirg.simulation.rendering.viewpoint import FOCAL_LENGTH, SIZE, front_camera_matrix
 
+ROWS = (32, 160)
+"""First and last row + 1 of the part of the picture that shows the table."""
+COLUMNS = SIZE
 NEAR_TOOL = 0.07
 """Meters in the plane from the tool within which the hand may hide a thing."""
 

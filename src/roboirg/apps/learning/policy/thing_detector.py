@@ -12,12 +12,10 @@ from torch import Tensor, nn
 from torch.nn import functional
 
 from roboirg.apps.learning.listener.detector_net import block
+from roboirg.apps.learning.policy.sight import COLUMNS, ROWS
 
 CELL = 4
 """Pixels of a cell of the grid in which things are found."""
-ROWS = (32, 160)
-"""First and last row + 1 of the part of the picture that shows the table."""
-COLUMNS = 256
 GRID = ((ROWS[1] - ROWS[0]) // CELL, COLUMNS // CELL)
 CHANNELS = (16, 24, 40, 40)
 MOST_THINGS = 24
