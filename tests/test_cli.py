@@ -381,6 +381,30 @@ def test_ctrl_c_at_any_moment_is_one_sentence() -> None:
     assert stopped in ends
 
 
+INTERRUPTED_CLASS = """
+import os, signal
+from roboirg import __main__, main
+class Field:
+    def __set_name__(self, owner, name):
+        os.kill(os.getpid(), signal.SIGINT)
+        for _ in range(1000):
+            pass
+def run():
+    class Owner:
+        field = Field()
+main.main = run
+__main__.main()
+"""
+
+
+def test_ctrl_c_within_a_class_definition_is_one_sentence() -> None:
+    # Python 3.11 makes a RuntimeError of it, as happened while a library was imported.
+    ended = subprocess.run(
+        [sys.executable, "-c", INTERRUPTED_CLASS], capture_output=True, text=True, check=False
+    )
+    assert (ended.returncode, ended.stderr) == (130, "roboirg: stopped.\n")
+
+
 def test_what_is_typed_goes_before_what_the_plan_says(
     roboirg, tmp_path: Path, canned: type[CannedPlayer]
 ) -> None:

@@ -18,8 +18,11 @@ def main() -> None:
         if handled:
             signal.signal(signal.SIGINT, _interrupt)
         run()
-    except KeyboardInterrupt:
-        _stop()
+    except BaseException as error:
+        # Python 3.11 wraps what interrupts a class definition in a RuntimeError.
+        if isinstance(error, KeyboardInterrupt) or isinstance(error.__cause__, KeyboardInterrupt):
+            _stop()
+        raise
     finally:
         if handled:
             signal.signal(signal.SIGINT, _stop)
