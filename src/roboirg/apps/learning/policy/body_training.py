@@ -34,7 +34,7 @@ from roboirg.policies.vlm.goal_schema import goal_schema
 RATE = 2e-3
 BATCH = 16
 COUNT_WEIGHT = 0.5
-NEW_NOISE_EVERY = 5
+NEW_NOISE_EVERY = 2
 """Passes after which the noise of the detector is drawn anew."""
 HELD_BACK = 10
 """Every tenth episode is not learned from, but shows how learning goes."""
