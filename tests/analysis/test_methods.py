@@ -57,7 +57,7 @@ def sections(folder: Path, *records: Record) -> dict[str, dict[str, str]]:
     with RecordStore(folder) as store:
         for one in records:
             store.append(one)
-    return json.loads(write_methods(make_sections(folder, ()), "json"))
+    return json.loads(write_methods(make_sections(folder), "json"))
 
 
 def test_every_item_is_there_and_what_is_unknown_is_not_reported(tmp_path: Path) -> None:

@@ -53,7 +53,7 @@ def test_a_large_gap_holds_in_all(result) -> None:
         )
     ]
     (found,) = gaps(results)
-    assert (found.label, found.verdict) == ("direct", "lower")
+    assert (found.label, found.verdict) == ("direct less explicit", "lower")
     assert not found.exceptions
     assert found.sentence == "holds in all 8 other analyses"
 
@@ -69,7 +69,7 @@ def test_a_gap_of_one_task_goes_without_it(result) -> None:
     assert found.verdict == "lower"
     # Two tasks are too few units of their own, and without the first one nothing differs.
     assert exceptions(found) == {"unit task", "without PickXtimes"}
-    assert "does not hold in 2 of" in found.sentence
+    assert "does not hold in 2 of 3: unit task (open), " in found.sentence
 
 
 def test_errors_decide_if_they_count_as_failures(result) -> None:
@@ -157,9 +157,10 @@ def test_the_table_names_what_changes_a_verdict(result) -> None:
     table = make_sensitivity_table(RunData.of([("run", results)]))
     (row,) = table.rows
     words = dict(zip((one.name for one in table.columns), row.entries, strict=True))
-    assert words["gap"].word == "lower"
-    assert words["without"].word == "open (PickXtimes)"
-    assert words["unit"].word == "open (task)"
-    assert words["holds in"].word == "1 of 3"
+    assert row.name == "direct less explicit"
+    assert words["verdict"].word == "lower"
+    assert words["in other analyses"].word == (
+        "does not hold in 2 of 3: unit task (open), without PickXtimes (open)"
+    )
     with pytest.raises(InvalidValueError, match="explicit and another setting"):
         make_sensitivity_table(RunData.of([("run", play(result, "11"))]))

@@ -15,6 +15,7 @@ Word = Annotated[str, msgspec.Meta(max_length=100)]
 Words = Annotated[tuple[Word, ...], msgspec.Meta(max_length=20)]
 
 LIBRARIES = (
+    "roboirg",
     "numpy",
     "torch",
     "jax",

@@ -4,82 +4,39 @@ from __future__ import annotations
 
 from roboirg.core.errors import InvalidValueError
 from roboirg.evaluation.analysis.stats.run_data import RunData
-from roboirg.evaluation.analysis.stats.sensitivity import Robustness, gap_contrasts, try_choices
-from roboirg.evaluation.analysis.tables.table import (
-    NOT_APPLICABLE,
-    POLICY,
-    Column,
-    Entry,
-    Row,
-    Table,
-)
-
-SAME = "same"
+from roboirg.evaluation.analysis.stats.sensitivity import families_of, try_choices
+from roboirg.evaluation.analysis.tables.table import POLICY, Column, Entry, Row, Table
 
 _NOTE = (
-    "Whether success is lower or higher than in explicit on the same episodes (open: the test does "
-    "not decide), as tested everywhere, and what becomes of that under each other choice: same, or "
-    "the other verdict with the choices that lead to it. Within a column, p-values are corrected "
-    "over all rows of the policy. An episode is a scene, so that rollouts and tasks are the "
+    "Whether success is lower or higher than in explicit on the same episodes, or the first rate "
+    "of control arms than the second (open: the test does not decide), as tested everywhere, and "
+    "whether that holds under the other choices that can change it, with the verdict where it does "
+    "not. Within a choice, p-values are corrected over all differences to explicit of the policy, "
+    "or over all contrasts of its arms. An episode is a scene, so that rollouts and tasks are the "
     "other units."
 )
 
 
 def make_sensitivity_table(data: RunData) -> Table:
-    """Make the table of the gaps of all policies.
+    """Make the table of the gaps and the control arms of all policies.
 
     Raises:
-        InvalidValueError: no policy has a gap that another choice could change.
+        InvalidValueError: there is no verdict that another choice could change.
     """
-    tested = {
-        name: try_choices(
-            gap_contrasts([one for owner, one in data.results if owner == policy_run])
-        )
-        for policy_run, name in data.names.items()
-    }
-    groups = dict.fromkeys(
-        choice.group for found in tested.values() for one in found for choice in one.others
-    )
-    if not groups:
+    tested = [(of.policy, one) for of in families_of(data) for one in try_choices(of.contrasts)]
+    if not any(one.others for _, one in tested):
         raise InvalidValueError(
-            "No other choice can change the runs: they need explicit and another setting, in "
-            "several tasks or with several seeds."
+            "No other choice can change the runs: they need explicit and another setting, or "
+            "control arms, in several tasks or with several seeds."
         )
     return Table(
         key="sensitivity",
-        title="Gaps under other choices of the analysis",
-        heads=(POLICY, "setting"),
-        columns=(Column("gap"), *map(Column, groups), Column("holds in")),
+        title="Verdicts under other choices of the analysis",
+        heads=(POLICY, "contrast"),
+        columns=(Column("verdict"), Column("in other analyses")),
         rows=tuple(
-            Row(name, one.label, "ours", tuple(map(_entry, _words(one, tuple(groups)))))
-            for name, found in tested.items()
-            for one in found
+            Row(name, one.label, "ours", (Entry(word=one.verdict), Entry(word=one.sentence)))
+            for name, one in tested
         ),
         notes=(_NOTE,),
     )
-
-
-def _entry(word: str) -> Entry:
-    return Entry(word=word)
-
-
-def _words(found: Robustness, groups: tuple[str, ...]) -> list[str]:
-    kept = len(found.others) - len(found.exceptions)
-    return [
-        found.verdict,
-        *(_group_words(found, group) for group in groups),
-        f"{kept} of {len(found.others)}" if found.exceptions else "all",
-    ]
-
-
-def _group_words(found: Robustness, group: str) -> str:
-    """Return what the choices of a group change; a dash if there are none."""
-    own = [one for one in found.others if one.group == group]
-    if not own:
-        return NOT_APPLICABLE
-    changed: dict[str, list[str]] = {}
-    for one in own:
-        if one in found.exceptions:
-            changed.setdefault(found.others[one], []).append(one.name)
-    listed = (f"{verdict} ({', '.join(filter(None, names))})" for verdict, names in changed.items())
-    return "; ".join(listed).replace(" ()", "") or SAME
