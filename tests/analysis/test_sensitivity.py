@@ -13,8 +13,8 @@ from roboirg.core.errors import InvalidValueError
 from roboirg.evaluation.analysis.stats.paired_tests import sign_flip_test
 from roboirg.evaluation.analysis.stats.run_data import RunData
 from roboirg.evaluation.analysis.stats.sensitivity import (
-    choices_for,
     gap_contrasts,
+    offers_for,
     policy_contrasts,
     swap_test,
     try_choices,
@@ -110,13 +110,14 @@ def test_weights_decide_where_suites_are_uneven(result) -> None:
 
 def test_only_choices_that_can_change_anything_are_tried(result) -> None:
     one_task = [*play(result, "1111"), *play(result, "0000", setting="direct")]
-    assert choices_for(gap_contrasts(one_task)) == ()
+    assert not gaps(one_task)[0].others
+    assert all(not one.differs for one in offers_for(gap_contrasts(one_task)))
     mixed = play(result, "1111", processor="a") + play(
         result, "0000", setting="direct", processor="a"
     )
     other = play(result, "1111", task="BinFill", processor="b")
     other += play(result, "1111", task="BinFill", setting="direct", processor="b")
-    groups = [one.group for one in choices_for(gap_contrasts([*mixed, *other]))]
+    groups = [one.group for one in gaps([*mixed, *other])[0].others]
     assert "one processor" in groups
     assert "seed" not in groups
 

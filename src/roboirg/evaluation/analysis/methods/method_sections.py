@@ -199,7 +199,7 @@ def _observations(results: Sequence[Summary], played: Played) -> Items:
         kind = ", without pictures" if cameras == "none" != frames else ""
         yield item(
             name,
-            f"pictures that it gets: {cameras}{size}",
+            f"cameras given to it: {cameras}{size}",
             f"depth: {facts.need('depth')}",
             f"frames of the video before its turn: {frames}{kind}",
             f"reads the simulator's state: {'yes' if facts.is_privileged else 'no'}",

@@ -129,10 +129,11 @@ def statistics_items(data: RunData, families: Sequence[Family]) -> Items:
         f"paired by scene, {test}, two-sided",
         f"higher or lower, by the sign, if p ≤ {ALPHA} after the correction; else open",
     )
+    has_arms = any(one.kind == ARM_CONTRASTS and one.contrasts for one in families)
     yield item("multiplicity, by Holm's correction over families", *_sizes(data, families))
     yield (
         "contrasts of arms, where played; paired and tested alike",
-        MEANING.rstrip(".") if data.names != data.told().names else "none, without control arms",
+        MEANING.rstrip(".") if has_arms else "none, without control arms",
     )
 
 
@@ -144,7 +145,7 @@ def sensitivity_items(families: Sequence[Family]) -> Items:
             continue
         for found in try_choices(contrasts):
             least = 0.5 ** (found.pairs - 1)
-            power = f", too few to be anything but open: p cannot be below {least:.3g}"
+            power = f", too few for any verdict but open (p cannot be below {least:.3g})"
             yield item(
                 f"{policy}, {found.label}",
                 found.verdict,
@@ -167,9 +168,8 @@ def _sizes(data: RunData, families: Sequence[Family]) -> Iterator[str]:
     for policy_run, name in told.names.items():
         rows = [one for one in told.summaries.values() if one.policy_run == policy_run and one.gap]
         tasks, suites = (sum(bool(one.scope[place]) for one in rows) for place in (0, 1))
-        sizes = (
-            f"single tasks ({tasks}), suites ({suites}), all tasks ({len(rows) - tasks - suites})"
-        )
+        everywhere = len(rows) - tasks - suites
+        sizes = f"single tasks ({tasks}), suites ({suites}), all tasks ({everywhere})"
         yield f"{name}: its differences to explicit in {sizes}"
     for policy, kind, contrasts in families:
         if kind == ARM_CONTRASTS and contrasts:
@@ -190,7 +190,7 @@ def control_items(data: RunData, jobs: Sequence[Job]) -> Items:
     listed = "; ".join(f"{told.names[one]}: {_rates(told, one)}" for one in controls)
     if len(told.names) == 1:
         listed = f"none, as {next(iter(told.names.values()))} is the only policy"
-    yield "positive control: another policy, which reads the simulator's state", listed or "none"
+    yield "positive control, another policy that reads the simulator's state", listed or "none"
     for one in arm_figures(data):
         sides = zip(one.contrast[1:3], one.rates, strict=True)
         rates = ", ".join(f"{side} {100 * rate:.1f} %" for side, rate in sides)

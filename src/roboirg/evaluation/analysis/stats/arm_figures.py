@@ -125,7 +125,7 @@ def _figure(
             for side, more in zip(sides, contrast.sides(trials[trial]) or (), strict=False):
                 side.extend(more)
     cells = {
-        task: (_cell(task, sides[0], is_first=True), _cell(task, sides[1], is_first=False))
+        task: (_cell(task, sides[0]), _cell(task, sides[1]))
         for task in dict.fromkeys(one.task for one in sides[0])
     }
     gap = measure_gap([Pairs.of(*pair) for pair in cells.values()], rng)
@@ -138,17 +138,18 @@ def _figure(
     return ArmFigure(policy_run, options, contrast, sides, cells, intervals, gap, gap.p_value)
 
 
-def _cell(task: str, results: Sequence[Summary], *, is_first: bool) -> CellResults:
-    own = [one for one in results if one.task == task]
-    return CellResults({_trial(one, is_first=is_first): _won(one) for one in own})
-
-
-def _trial(one: Summary, *, is_first: bool) -> Trial:
-    """Return the trial; paraphrases stand as seeds of their own, of which the sides share none."""
-    seed, number = one.policy_seed, paraphrase_number(one.arm)
-    if number is not None:
-        seed = -1 - seed if is_first else seed * MOST_PARAPHRASES + number - 1
-    return Trial(one.episode, seed)
+def _cell(task: str, results: Sequence[Summary]) -> CellResults:
+    """Return the verdicts in a task; paraphrases stand as policy seeds of their own."""
+    return CellResults(
+        {
+            Trial(
+                one.episode,
+                one.policy_seed * (MOST_PARAPHRASES + 1) + (paraphrase_number(one.arm) or 0),
+            ): _won(one)
+            for one in results
+            if one.task == task
+        }
+    )
 
 
 def _corrected(found: Sequence[ArmFigure]) -> Sequence[ArmFigure]:
@@ -189,7 +190,8 @@ def _paraphrases(arms: Arms) -> Sides | None:
     found = [one for arm, one in sorted(arms.items()) if paraphrase_number(arm)]
     if len(found) < 2:  # noqa: PLR2004
         return None
-    return [_with_outcome(found[0], is_success=all(map(_won, found)))], found
+    every = all(map(_won, found))
+    return [_with_outcome(one, is_success=every) for one in found], found
 
 
 CONTRASTS = (

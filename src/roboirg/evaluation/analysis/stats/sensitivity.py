@@ -133,7 +133,7 @@ USUAL = AnalysisChoice("usual")
 
 def try_choices(contrasts: Sequence[Contrast]) -> tuple[Robustness, ...]:
     """Test the contrasts, which are read together, under all choices that apply to them."""
-    choices = choices_for(contrasts)
+    choices = [choice for one in offers_for(contrasts) if one.differs for choice in one.choices]
     usual = _directions(contrasts, USUAL)
     others = [_directions(contrasts, choice) for choice in choices]
     return tuple(
@@ -161,13 +161,8 @@ class Offer(NamedTuple):
     reason: str
 
 
-def choices_for(contrasts: Sequence[Contrast]) -> tuple[AnalysisChoice, ...]:
-    """Return the choices other than the usual one that can change anything."""
-    return tuple(choice for one in offers_for(contrasts) if one.differs for choice in one.choices)
-
-
 def offers_for(contrasts: Sequence[Contrast]) -> tuple[Offer, ...]:
-    """Return all choices that an analyst of these contrasts has."""
+    """Return all choices other than the usual one that an analyst of these contrasts has."""
     results = [one for each in contrasts for side in (each.first, each.second) for one in side]
     tasks = list(dict.fromkeys(one.task for one in results))
     suites, difficulties = {_suite(task) for task in tasks}, {one.difficulty for one in results}
