@@ -213,7 +213,7 @@ def test_limits_are_the_benchmarks_or_set_for_the_run(tmp_path: Path) -> None:
 
 def test_what_cannot_show_anything_is_named(tmp_path: Path) -> None:
     """A bootstrap over two scenes, and a policy as its own positive control."""
-    two = [record(episode, privileged=True) for episode in (0, 1)]
+    two = [msgspec.structs.replace(record(episode), privileged=True) for episode in (0, 1)]
     found = sections(tmp_path / "few", *two)
     assert "to mean anything: PickXtimes (2)" in found["Statistics"]["intervals"]
     assert found["Controls and floors"][CONTROL] == "none, as mine (privileged) is the only policy"

@@ -33,7 +33,7 @@ def gaps(results: list):
 
 
 def exceptions(found) -> set[str]:
-    return {f"{one.group} {one.name}".strip() for one in found.exceptions}
+    return {one.label for one in found.exceptions}
 
 
 def test_a_large_gap_holds_in_all(result) -> None:
@@ -80,7 +80,7 @@ def test_errors_decide_if_they_count_as_failures(result) -> None:
     (found,) = gaps(results)
     assert found.verdict == "open"
     (choice,) = found.exceptions
-    assert (choice.group, found.others[choice]) == ("errors as failures", "lower")
+    assert (choice.label, found.others[choice]) == ("errors as failures", "lower")
 
 
 def test_each_seed_alone_and_rollouts_as_units(result) -> None:
@@ -89,9 +89,7 @@ def test_each_seed_alone_and_rollouts_as_units(result) -> None:
         results += play(result, "1" * 10, policy_seed=seed)
         results += play(result, outcomes, policy_seed=seed, setting="direct")
     (found,) = gaps(results)
-    assert {"seed 0", "seed 1", "seed 2", "unit rollout"} == {
-        f"{one.group} {one.name}" for one in found.others
-    }
+    assert {"seed 0", "seed 1", "seed 2", "unit rollout"} == {one.label for one in found.others}
     assert found.verdict == "lower"
     assert exceptions(found) == {"seed 1", "seed 2"}
 
@@ -117,9 +115,9 @@ def test_only_choices_that_can_change_anything_are_tried(result) -> None:
     )
     other = play(result, "1111", task="BinFill", processor="b")
     other += play(result, "1111", task="BinFill", setting="direct", processor="b")
-    groups = [one.group for one in gaps([*mixed, *other])[0].others]
-    assert "one processor" in groups
-    assert "seed" not in groups
+    labels = [one.label for one in gaps([*mixed, *other])[0].others]
+    assert "one processor" in labels
+    assert "seed 0" not in labels
 
 
 def test_two_policies_are_compared_in_what_both_played(result) -> None:

@@ -96,34 +96,40 @@ class ArmFigure:
 def arm_figures(data: RunData) -> tuple[ArmFigure, ...]:
     """Return the figures for which the arms were played, by policy run and setting."""
     rng = np.random.default_rng(SEED)
-    trials: dict[tuple[PolicyRun, InstructionOptions], dict[str, dict[Trial, dict[str, Summary]]]]
-    trials = defaultdict(lambda: defaultdict(lambda: defaultdict(dict)))
+    columns: dict[tuple[PolicyRun, InstructionOptions], list[Summary]] = defaultdict(list)
     for run, one in data.results:
         if one.outcome != "error":
             told = run._replace(conditions=run.conditions._replace(arm=TOLD))
-            trial = Trial(one.episode, one.policy_seed)
-            trials[told, one.column][one.task][trial][one.arm] = one
-    found: dict[PolicyRun, list[ArmFigure]] = defaultdict(list)
-    for run, options in sorted(trials, key=lambda key: options_sort_key(key[1])):
-        tasks = {name: trials[run, options][name] for name in task_order(trials[run, options])}
-        made = (_figure(run, options, each, tasks, rng) for each in CONTRASTS)
+            columns[told, one.column].append(one)
+    found: dict[PolicyRun, list[ArmFigure]] = {run: [] for run, _ in columns}
+    for run, options in sorted(columns, key=lambda key: options_sort_key(key[1])):
+        trials = _by_trial(columns[run, options])
+        made = (_figure(run, options, each, trials, rng) for each in CONTRASTS)
         found[run] += filter(None, made)
-    runs = dict.fromkeys(run for run, _ in trials)
-    return tuple(one for run in runs for one in _corrected(found[run]))
+    return tuple(one for figures in found.values() for one in _corrected(figures))
+
+
+def _by_trial(results: Sequence[Summary]) -> list[Arms]:
+    """Group results by trial, in the order of the tasks."""
+    tasks = task_order({one.task for one in results})
+    found: dict[tuple[int, Trial], dict[str, Summary]] = defaultdict(dict)
+    for one in results:
+        trial = Trial(one.episode, one.policy_seed)
+        found[tasks.index(one.task), trial][one.arm] = one
+    return [found[key] for key in sorted(found)]
 
 
 def _figure(
     policy_run: PolicyRun,
     options: InstructionOptions,
     contrast: ArmContrast,
-    tasks: Mapping[str, Mapping[Trial, Arms]],
+    trials: Sequence[Arms],
     rng: np.random.Generator,
 ) -> ArmFigure | None:
     sides: tuple[list[Summary], list[Summary]] = [], []
-    for trials in tasks.values():
-        for trial in sorted(trials):
-            for side, more in zip(sides, contrast.sides(trials[trial]) or (), strict=False):
-                side.extend(more)
+    for arms in trials:
+        for side, more in zip(sides, contrast.sides(arms) or (), strict=False):
+            side.extend(more)
     cells = {
         task: (_cell(task, sides[0]), _cell(task, sides[1]))
         for task in dict.fromkeys(one.task for one in sides[0])

@@ -77,23 +77,16 @@ class AnalysisChoice:
     """One way to analyze.
 
     Attributes:
-        group: what is chosen.
-        name: the choice; empty if the group has one only.
+        label: what is chosen, in a word or two.
         keep: returns what counts of a side's results.
         unit: what the test swaps.
         weights: what weighs the same.
     """
 
-    group: str
-    name: str = ""
+    label: str
     keep: Callable[[Results], Results] = field(default=lambda results: results)
     unit: Unit = "episode"
     weights: Weighting = "task"
-
-    @property
-    def label(self) -> str:
-        """Group and name."""
-        return f"{self.group} {self.name}".strip()
 
 
 @dataclass(frozen=True)
@@ -169,8 +162,8 @@ def offers_for(contrasts: Sequence[Contrast]) -> tuple[Offer, ...]:
     seeds = sorted({one.policy_seed for one in results})
     processors = Counter(one.processor for one in results).most_common()
     has_errors = any(one.outcome == "error" for one in results)
-    by_seed = [AnalysisChoice("seed", str(one), keep=_only("policy_seed", one)) for one in seeds]
-    without = [AnalysisChoice("without", one, keep=_without_task(one)) for one in tasks]
+    by_seed = [AnalysisChoice(f"seed {one}", keep=_only("policy_seed", one)) for one in seeds]
+    without = [AnalysisChoice(f"without {one}", keep=_without_task(one)) for one in tasks]
     usual = [AnalysisChoice("one processor", keep=_only("processor", of)) for of, _ in processors]
     return (
         Offer([_ERRORS_FAIL], has_errors, "no error among what is compared"),
@@ -190,10 +183,10 @@ def _errors_as_failures(results: Results) -> Results:
 
 
 _ERRORS_FAIL = AnalysisChoice("errors as failures", keep=_errors_as_failures)
-_BY_ROLLOUT = AnalysisChoice("unit", "rollout", unit="rollout")
-_BY_TASK = AnalysisChoice("unit", "task", unit="task")
-_EQUAL_SUITES = AnalysisChoice("equal weights of", "suites", weights="suite")
-_EQUAL_DIFFICULTIES = AnalysisChoice("equal weights of", "difficulties", weights="difficulty")
+_BY_ROLLOUT = AnalysisChoice("unit rollout", unit="rollout")
+_BY_TASK = AnalysisChoice("unit task", unit="task")
+_EQUAL_SUITES = AnalysisChoice("equal weights of suites", weights="suite")
+_EQUAL_DIFFICULTIES = AnalysisChoice("equal weights of difficulties", weights="difficulty")
 
 
 def _only(name: str, value: object) -> Callable[[Results], Results]:
