@@ -19,7 +19,7 @@ from roboirg.evaluation.analysis.stats.sensitivity import (
     swap_test,
     try_choices,
 )
-from roboirg.evaluation.analysis.tables.sensitivity_table import make_sensitivity_table
+from roboirg.evaluation.analysis.tables.diagnostic_tables import make_sensitivity_table
 
 OUTCOMES = {"1": "success", "0": "failure", "!": "error"}
 

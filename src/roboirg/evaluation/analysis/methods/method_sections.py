@@ -214,8 +214,8 @@ def _instructions(results: Sequence[Summary], played: Played, said: ColumnTexts)
         splits = sorted({one.split for one in results if one.options.wordings == wordings})
         pools = [f"{pool_of(one, wordings)} pool for the split {one}" for one in splits]
         if wordings in (None, *POOLS):
-            wording = "written out by roboirg export instructions"
-            yield item(label, f"English; template set {versions}, {wording}", *pools)
+            listed = f"template set {versions}, written out by roboirg export instructions"
+            yield item(label, "English", listed, *pools)
         else:
             yield label, "commands of a file"
     used = {one.options.delivery for one in results}
@@ -231,13 +231,10 @@ def _counts(said: SaidTexts, *, is_fixed: bool) -> str:
     texts = counted(len(said.texts), "distinct text")
     if not said.commands:
         return f"{texts}, " + ("fixed" if is_fixed else f"templates: {NOT_REPORTED}")
-    pools = {pool for _, pool in said.texts}
+    pools = {pool for _, pool in said.texts} & {*POOLS}
     tasks = {task for task, _ in said.commands} & every_task().keys()
     there = sum(
-        len(every_task()[task].commands.wordings.of(pool))
-        for task in tasks
-        for pool in POOLS
-        if pool in pools
+        len(every_task()[task].commands.wordings.of(pool)) for task in tasks for pool in pools
     )
     return (
         f"{texts}; command templates: {len(said.commands)} of the {there} in the pool for "

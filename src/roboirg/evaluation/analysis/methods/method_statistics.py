@@ -64,8 +64,8 @@ def screening_items(jobs: Sequence[Job]) -> Items:
     is_whole = splits <= {*SPLITS} and len(scenes) == whole
     yield item(
         "scenes",
-        f"{len(scenes)} of {whole or 'any number'} of these tasks in the split {distinct(splits)}, "
-        f"numbered {span} in each task",
+        f"{len(scenes)} of the {whole or 'unlimited'} that these tasks have in the split "
+        f"{distinct(splits)}, numbered {span} in each task",
         "all there are" if is_whole else _NO_REASON,
         "none was left out for its result",
     )
@@ -76,7 +76,7 @@ def screening_items(jobs: Sequence[Job]) -> Items:
         missing = "the setting cannot express them" if is_told else "there is no such goal or text"
         yield item(
             column.label,
-            f"{len(own)} of {len(scenes)} scenes planned",
+            f"{len(own)} of {counted(len(scenes), 'scene')} planned",
             f"left out, as their tasks do not have the setting: {len(scenes - usable)}",
             f"as {missing}: {len(usable - own)}",
         )
@@ -129,11 +129,15 @@ def statistics_items(data: RunData, families: Sequence[Family]) -> Items:
         f"paired by scene, {test}, two-sided",
         f"higher or lower, by the sign, if p ≤ {ALPHA} after the correction; else open",
     )
-    has_arms = any(one.kind == ARM_CONTRASTS and one.contrasts for one in families)
-    yield item("multiplicity, by Holm's correction over families", *_sizes(data, families))
+    arms = [
+        f"{policy}: its {kind} ({len(contrasts)})"
+        for policy, kind, contrasts in families
+        if kind == ARM_CONTRASTS and contrasts
+    ]
+    yield item("multiplicity, by Holm's correction over families", *_sizes(data.told()), *arms)
     yield (
         "contrasts of arms, where played; paired and tested alike",
-        MEANING.rstrip(".") if has_arms else "none, without control arms",
+        MEANING.rstrip(".") if arms else "none, without control arms",
     )
 
 
@@ -162,18 +166,14 @@ def sensitivity_items(families: Sequence[Family]) -> Items:
         )
 
 
-def _sizes(data: RunData, families: Sequence[Family]) -> Iterator[str]:
-    """Yield the families of tests of each policy in the arm told, with their sizes."""
-    told = data.told()
+def _sizes(told: RunData) -> Iterator[str]:
+    """Yield the sizes of each policy's families of differences to explicit."""
     for policy_run, name in told.names.items():
         rows = [one for one in told.summaries.values() if one.policy_run == policy_run and one.gap]
         tasks, suites = (sum(bool(one.scope[place]) for one in rows) for place in (0, 1))
         everywhere = len(rows) - tasks - suites
         sizes = f"single tasks ({tasks}), suites ({suites}), all tasks ({everywhere})"
         yield f"{name}: its differences to explicit in {sizes}"
-    for policy, kind, contrasts in families:
-        if kind == ARM_CONTRASTS and contrasts:
-            yield f"{policy}: its {kind} ({len(contrasts)})"
 
 
 def control_items(data: RunData, jobs: Sequence[Job]) -> Items:

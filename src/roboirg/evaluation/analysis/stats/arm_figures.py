@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -40,7 +40,6 @@ Arms = Mapping[str, Summary]
 """The results of one trial by arm."""
 Sides = tuple[Sequence[Summary], Sequence[Summary]]
 """What counts in the first and in the second rate, as results whose outcome is that."""
-SideCells = tuple[CellResults, CellResults]
 
 
 class ArmContrast(NamedTuple):
@@ -67,8 +66,8 @@ class ArmFigure:
         policy_run: as of the arm ``told``.
         options: of the instruction.
         contrast: which figure.
-        sides: the results of the first and of the second rate, task by task.
-        cells: the same by task.
+        sides: the results of the first and of the second rate.
+        cells: the same by task, in order.
         intervals: of the first and the second rate.
         gap: first less second.
         p_holm: its p-value after Holm's correction over all figures of the policy run.
@@ -78,7 +77,7 @@ class ArmFigure:
     options: InstructionOptions
     contrast: ArmContrast
     sides: Sides
-    cells: Mapping[str, SideCells]
+    cells: tuple[Mapping[str, CellResults], Mapping[str, CellResults]]
     intervals: tuple[Interval | None, Interval | None]
     gap: Gap
     p_holm: float
@@ -87,75 +86,61 @@ class ArmFigure:
     def rates(self) -> tuple[float, float]:
         """The first and the second rate, means over tasks."""
         first, second = (
-            np.mean([float(cell.rate or 0) for cell in side])
-            for side in zip(*self.cells.values(), strict=True)
+            float(np.mean([float(cell.rate or 0) for cell in side.values()])) for side in self.cells
         )
-        return float(first), float(second)
+        return first, second
 
 
 def arm_figures(data: RunData) -> tuple[ArmFigure, ...]:
     """Return the figures for which the arms were played, by policy run and setting."""
     rng = np.random.default_rng(SEED)
-    columns: dict[tuple[PolicyRun, InstructionOptions], list[Summary]] = defaultdict(list)
+    columns: dict[tuple[PolicyRun, InstructionOptions], dict[tuple[str, Trial], dict[str, Summary]]]
+    columns = defaultdict(lambda: defaultdict(dict))
     for run, one in data.results:
         if one.outcome != "error":
             told = run._replace(conditions=run.conditions._replace(arm=TOLD))
-            columns[told, one.column].append(one)
+            trial = Trial(one.episode, one.policy_seed)
+            columns[told, one.column][one.task, trial][one.arm] = one
     found: dict[PolicyRun, list[ArmFigure]] = {run: [] for run, _ in columns}
     for run, options in sorted(columns, key=lambda key: options_sort_key(key[1])):
-        trials = _by_trial(columns[run, options])
+        trials = columns[run, options].values()
         made = (_figure(run, options, each, trials, rng) for each in CONTRASTS)
         found[run] += filter(None, made)
     return tuple(one for figures in found.values() for one in _corrected(figures))
-
-
-def _by_trial(results: Sequence[Summary]) -> list[Arms]:
-    """Group results by trial, in the order of the tasks."""
-    tasks = task_order({one.task for one in results})
-    found: dict[tuple[int, Trial], dict[str, Summary]] = defaultdict(dict)
-    for one in results:
-        trial = Trial(one.episode, one.policy_seed)
-        found[tasks.index(one.task), trial][one.arm] = one
-    return [found[key] for key in sorted(found)]
 
 
 def _figure(
     policy_run: PolicyRun,
     options: InstructionOptions,
     contrast: ArmContrast,
-    trials: Sequence[Arms],
+    trials: Iterable[Arms],
     rng: np.random.Generator,
 ) -> ArmFigure | None:
     sides: tuple[list[Summary], list[Summary]] = [], []
     for arms in trials:
         for side, more in zip(sides, contrast.sides(arms) or (), strict=False):
             side.extend(more)
-    cells = {
-        task: (_cell(task, sides[0]), _cell(task, sides[1]))
-        for task in dict.fromkeys(one.task for one in sides[0])
-    }
-    gap = measure_gap([Pairs.of(*pair) for pair in cells.values()], rng)
+    tasks = task_order({one.task for one in sides[0]})
+    first, second = ({task: _cell(task, side) for task in tasks} for side in sides)
+    gap = measure_gap([Pairs.of(first[task], second[task]) for task in tasks], rng)
     if gap is None:
         return None
     intervals = (
-        clustered_interval([first for first, _ in cells.values()], rng),
-        clustered_interval([second for _, second in cells.values()], rng),
+        clustered_interval([*first.values()], rng),
+        clustered_interval([*second.values()], rng),
     )
+    cells = first, second
     return ArmFigure(policy_run, options, contrast, sides, cells, intervals, gap, gap.p_value)
 
 
 def _cell(task: str, results: Sequence[Summary]) -> CellResults:
     """Return the verdicts in a task; paraphrases stand as policy seeds of their own."""
-    return CellResults(
-        {
-            Trial(
-                one.episode,
-                one.policy_seed * (MOST_PARAPHRASES + 1) + (paraphrase_number(one.arm) or 0),
-            ): _won(one)
-            for one in results
-            if one.task == task
-        }
-    )
+    verdicts = {}
+    for one in results:
+        if one.task == task:
+            seed = one.policy_seed * (MOST_PARAPHRASES + 1) + (paraphrase_number(one.arm) or 0)
+            verdicts[Trial(one.episode, seed)] = _won(one)
+    return CellResults(verdicts)
 
 
 def _corrected(found: Sequence[ArmFigure]) -> Sequence[ArmFigure]:

@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.evaluation.analysis.stats.arm_figures import arm_figures
+from roboirg.evaluation.analysis.stats.cells import task_order
 from roboirg.evaluation.analysis.stats.intervals import ALPHA, SEED
 from roboirg.evaluation.analysis.stats.option_labels import (
     REFERENCE,
@@ -157,7 +158,7 @@ class Offer(NamedTuple):
 def offers_for(contrasts: Sequence[Contrast]) -> tuple[Offer, ...]:
     """Return all choices other than the usual one that an analyst of these contrasts has."""
     results = [one for each in contrasts for side in (each.first, each.second) for one in side]
-    tasks = list(dict.fromkeys(one.task for one in results))
+    tasks = task_order({one.task for one in results})
     suites, difficulties = {_suite(task) for task in tasks}, {one.difficulty for one in results}
     seeds = sorted({one.policy_seed for one in results})
     processors = Counter(one.processor for one in results).most_common()

@@ -76,17 +76,17 @@ def language_use_sentences(
     """
     rng = np.random.default_rng(SEED)
     ours, theirs = (
-        {one.options: one.cells for one in arm_figures(data) if one.contrast.name == LANGUAGE_USE}
+        {of.options: of.cells[0] for of in arm_figures(data) if of.contrast.name == LANGUAGE_USE}
         for data in (first, second)
     )
-    found: list[tuple[InstructionOptions, Gap]] = []
-    for options in (options for options in ours if options in theirs):
-        here, there = ours[options], theirs[options]
-        pairs = [Pairs.of(here[one][0], there[one][0]) for one in here if one in there]
+    gaps: dict[InstructionOptions, Gap] = {}
+    for options, here in ours.items():
+        there = theirs.get(options, {})
+        pairs = [Pairs.of(here[task], there[task]) for task in here if task in there]
         if (gap := measure_gap(pairs, rng)) is not None:
-            found.append((options, gap))
-    corrected = holm([gap.p_value for _, gap in found])
-    for (options, gap), p_value in zip(found, corrected, strict=True):
+            gaps[options] = gap
+    corrected = holm([gap.p_value for gap in gaps.values()])
+    for (options, gap), p_value in zip(gaps.items(), corrected, strict=True):
         ends = interval_text(gap)
         interval = "" if ends == NOT_APPLICABLE else f" (95 % interval {ends})"
         yield (
@@ -102,7 +102,7 @@ def _words(one: ArmFigure) -> Sequence[str]:
         split = one.policy_run.conditions.split
         chances = [
             np.mean([silent_chance(task, split, trial.episode) for trial in silent.verdicts])
-            for task, (_, silent) in one.cells.items()
+            for task, silent in one.cells[1].items()
         ]
         chance = f"{100 * float(cast('float', np.mean(chances))):.1f}"
     figures = (points(one.gap.value, 1), interval_text(one.gap), corrected_p_text(one.p_holm))
