@@ -97,7 +97,10 @@ def test_what_a_policy_declares_and_its_process_reports_is_there(tmp_path: Path)
     assert "10.0 control steps on average" in found["Horizon and control rate"]["mine"]
     for word in ("bfloat16", "cuda:0", "torch 2.9", "3.12.1"):
         assert word in found["Precision of inference"]["mine"]
-    assert "cameras given to it: front, each 256 × 256 pixels" in found["Observations"]["mine"]
+    assert (
+        "cameras given to it: front, each 256 × 256 pixels as rendered"
+        in found["Observations"]["mine"]
+    )
     assert "resized to 224" in found["Observations"]["mine"]
     assert "sent: in lower case" in found["Instructions"]["mine"]
     assert found["Use of the words in training"]["mine"].endswith("explicit")
@@ -172,8 +175,8 @@ def test_texts_and_templates_are_counted(tmp_path: Path) -> None:
     assert counts["direct, arm silent"] == "1 distinct text, fixed"
     (label,) = set(found["Use of the words in training"]) - {"mine"}
     seen = found["Use of the words in training"][label]
-    assert f"{len(told) + len(direct)} texts: none, as their templates are held out" in seen
-    assert "1 text: none, as only control arms have them" in seen
+    assert f"{len(told) + len(direct)} texts: none, because the templates are held out" in seen
+    assert "1 text: none, because such texts are for control arms only" in seen
 
 
 def test_each_other_analysis_has_a_verdict_or_a_reason(tmp_path: Path) -> None:

@@ -47,10 +47,10 @@ from roboirg.tasks import every_task
 from roboirg.util.media import CONTROL_RATE
 
 _POOL_NOTES: Mapping[str | None, str] = {
-    "test": "none, as their templates are held out",
-    "train": "possible, as these splits have the same templates",
-    FIXED: "none, as only control arms have them",
-    None: f"{NOT_REPORTED}, as their words are from a file",
+    "test": "none, because the templates are held out",
+    "train": "possible, because the templates are the same",
+    FIXED: "none, because such texts are for control arms only",
+    None: f"{NOT_REPORTED}, because the words are from a file",
 }
 
 Played = Mapping[str, PlayedFacts]
@@ -194,7 +194,7 @@ def _observations(results: Sequence[Summary], played: Played) -> Items:
     yield "state of the robot", "joint angles, fingers and pose of the hand in every observation"
     for name, facts in played.items():
         cameras = facts.need("cameras")
-        size = "" if cameras in ("none", NOT_REPORTED) else ", each 256 × 256 pixels"
+        size = "" if cameras in ("none", NOT_REPORTED) else ", each 256 × 256 pixels as rendered"
         frames = facts.need("demonstration_frames")
         kind = ", without pictures" if cameras == "none" != frames else ""
         yield item(

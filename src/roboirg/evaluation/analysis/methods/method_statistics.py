@@ -111,7 +111,7 @@ def _has_setting(task: str, setting: str) -> bool:
 def statistics_items(data: RunData, families: Sequence[Family]) -> Items:
     """Yield how rates and differences are analyzed."""
     seeds = len({one.policy_seed for _, one in data.results})
-    single = "Wilson's score for a task, for means over tasks" if seeds == 1 else "for all rates"
+    wilson = "Wilson's score for a rate in one task, else " if seeds == 1 else ""
     test = "McNemar's exact test" if seeds == 1 else "the exact sign-flip test over scenes"
     yield "unit", "the scene; its rollouts with several policy seeds are one cluster"
     yield "averages", "means over tasks, each with the same weight"
@@ -121,7 +121,8 @@ def statistics_items(data: RunData, families: Sequence[Family]) -> Items:
     few = [f"{task} ({len(own)})" for task, own in scenes.items() if len(own) <= _FEW_SCENES]
     yield item(
         "intervals",
-        f"95 %; {single} the bootstrap over each task's scenes ({DRAWS} resamples)",
+        f"95 %; {wilson}the bootstrap over each task's scenes ({DRAWS} resamples), paired for "
+        "differences",
         f"tasks with too few scenes for a bootstrap to mean anything: {', '.join(few) or 'none'}",
     )
     yield item(
