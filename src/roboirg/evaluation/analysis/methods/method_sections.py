@@ -191,7 +191,11 @@ def _observations(results: Sequence[Summary], played: Played) -> Items:
         f"{distinct(one.meshes for one in results)} meshes",
         "not rendered, as no policy has a camera" if blind else f"rendered on {devices}",
     )
-    yield "state of the robot", "joint angles, fingers and pose of the hand in every observation"
+    yield item(
+        "state of the robot, in each observation",
+        "joint angles, finger positions and end-effector pose",
+        "a server gets what its protocol sends",
+    )
     for name, facts in played.items():
         cameras = facts.need("cameras")
         size = "" if cameras in ("none", NOT_REPORTED) else ", each 256 × 256 pixels as rendered"
