@@ -235,7 +235,7 @@ def _counts(said: SaidTexts, *, is_fixed: bool) -> str:
     texts = counted(len(said.texts), "distinct text")
     if not said.commands:
         return f"{texts}, " + ("fixed" if is_fixed else f"templates: {NOT_REPORTED}")
-    pools = {pool for _, pool in said.texts} & {*POOLS}
+    pools = {*POOLS} & {pool for _, pool in said.texts}
     tasks = {task for task, _ in said.commands} & every_task().keys()
     there = sum(
         len(every_task()[task].commands.wordings.of(pool)) for task in tasks for pool in pools

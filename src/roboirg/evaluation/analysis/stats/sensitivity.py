@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import itertools
 from collections import Counter, defaultdict
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
 from typing import Literal, NamedTuple
@@ -250,7 +250,9 @@ def _units(first: Results, second: Results, unit: Unit) -> Iterator[_Unit]:
     for where in sorted(ours.keys() & theirs.keys()):
         here, there = ours[where], theirs[where]
         shared = here.keys() & there.keys()
-        each = [[seed] for seed in sorted(shared)] if unit == "rollout" and shared else [shared]
+        each: list[Collection[int]] = [shared]
+        if unit == "rollout" and shared:
+            each = [[seed] for seed in sorted(shared)]
         for seeds in each:
             difference = _rate(here, seeds or here) - _rate(there, seeds or there)
             yield _Unit(where[0], difficulties[where], difference)
