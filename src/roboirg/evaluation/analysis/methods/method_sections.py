@@ -140,9 +140,8 @@ def _horizon(results: Sequence[Summary], plan: Plan | None, played: Played) -> I
 
 
 def _limit(unit: str, values: Collection[float], default: float) -> str:
-    is_default = {*values} == {default}
     ours = "the benchmark's limit"
-    origin = ours if is_default else f"set for this run; {ours} is {default:g}"
+    origin = ours if {*values} == {default} else f"set for this run; {ours} is {default:g}"
     return f"{', '.join(f'{one:g}' for one in sorted(values))} {unit} ({origin})"
 
 
