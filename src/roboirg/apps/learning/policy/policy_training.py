@@ -50,6 +50,7 @@ from roboirg.apps.learning.policy.thing_detector import (
     LabeledPicture,
     ThingDetector,
     detector_loss,
+    varied,
 )
 from roboirg.apps.learning.policy.tracks import LookTokens
 from roboirg.apps.learning.policy.waypoint_expert import Disturbance
@@ -176,10 +177,10 @@ def _detector(
     torch.manual_seed(plan.seed)
     detector = ThingDetector(len(sight.classes))
     views = [view for one in recorded for view in labeled_pictures(one.recording, sight)]
-    rng = random.Random(plan.seed)
+    rng, variation = random.Random(plan.seed), np.random.default_rng(plan.seed)
     trainer = Trainer[LabeledPicture](
         detector,
-        partial(detector_loss, detector),
+        lambda batch: detector_loss(detector, [varied(one, variation) for one in batch]),
         DETECTOR_RATE,
         plan.detector_epochs * batch_count(views, DETECTOR_BATCH),
     )

@@ -13,9 +13,8 @@ from roboirg.core.actions import ARM_JOINTS, WAYPOINT
 from roboirg.core.episode import HANDLES_HELD, Goal, Primitive
 from roboirg.core.observations import Observation
 from roboirg.policies.builtin.oracle_policy import OraclePolicy
-from roboirg.simulation.controllers import GRIPPER_STEPS
 from roboirg.simulation.expert.primitives import MotionPrimitives
-from roboirg.simulation.physics_settings import CLOSED, OPEN
+from roboirg.simulation.physics_settings import CLOSED, GRIPPER_STEPS, OPEN
 
 if TYPE_CHECKING:
     from roboirg.envs.environment import RoboIRGEnv
