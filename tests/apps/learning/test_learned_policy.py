@@ -15,7 +15,7 @@ from roboirg.apps.learning.policy.recording import (
     record_episode,
     save_recording,
 )
-from roboirg.apps.learning.policy.sight import sight_of
+from roboirg.apps.learning.policy.sight import sight_of, turns_of
 from roboirg.apps.learning.policy.waypoint_expert import Disturbance, WaypointExpert
 from roboirg.core.errors import InvalidValueError, MissingDependencyError
 from roboirg.envs.factory import make
@@ -144,6 +144,22 @@ def test_an_interrupted_training_goes_on_where_it_was(recorded, tmp_path):
     curve = json.loads((tmp_path / "parts" / "body-recurrent-0.json").read_text())
     assert [one["epoch"] for one in curve] == [1, 2, 3, 4]
     assert (tmp_path / "parts" / "body-recurrent-0.png").exists()
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_moved_and_mirrored_pictures_keep_their_labels(seed):
+    pytest.importorskip("torch")
+    from roboirg.apps.learning.policy.thing_detector import LabeledPicture, varied
+
+    picture = np.zeros((256, 256, 3), np.uint8)
+    picture[100, 50] = 255
+    turns = turns_of(np.array([0.2]))
+    view = LabeledPicture(picture, np.array([0]), np.array([[50.0, 100.0]]), turns)
+    found = varied(view, np.random.default_rng(seed))
+    ((row, column),) = np.argwhere(found.picture[..., 0] == 255)
+    assert found.points.tolist() == [[column, row]]
+    is_mirrored = column > 128
+    assert np.allclose(found.turns, turns_of(np.array([-0.2 if is_mirrored else 0.2])))
 
 
 @pytest.mark.sim
