@@ -1,4 +1,4 @@
-"""An instruction as one row of plain JSON values; `docs/instruction-data.md` explains the columns."""
+"""An instruction as a row of plain JSON values; docs/instruction-data.md explains the columns."""
 
 from __future__ import annotations
 
