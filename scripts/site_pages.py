@@ -1,5 +1,7 @@
 """Hook of MkDocs: pages outside docs/ and the command line become pages of the site."""
 
+import contextlib
+import io
 import re
 from collections.abc import Iterator
 from pathlib import Path
@@ -44,8 +46,11 @@ def _help_of(command: Any, name: str) -> Iterator[str]:  # noqa: ANN401
         for below in sorted(command.commands):
             yield from _help_of(command.commands[below], f"{name} {below}")
         return
+    with contextlib.redirect_stdout(io.StringIO()):  # some parameters complete their words here
+        command.get_help(command.make_context(name, [], resilient_parsing=True))
     yield f"## {name}\n"
-    yield f"{_cell(command.help, newline=chr(10) * 2)}\n"
+    words = _cell(command.help, newline="\n\n")
+    yield re.sub(r"^Example: (.+)$", r"Example: `\1`", words, flags=re.MULTILINE) + "\n"
     yield "| argument or option | meaning | default |\n| --- | --- | --- |"
     for one in command.params:
         if one.name == "help" or getattr(one, "hidden", False):
@@ -62,6 +67,8 @@ def _default(parameter: Any) -> str:  # noqa: ANN401
     if isinstance(shown, str):
         return _cell(shown)
     value = None if callable(parameter.default) else parameter.default
+    if value is True:
+        return f"`{parameter.opts[0]}`"
     return "" if value in (None, False, (), []) else f"`{_cell(str(value))}`"
 
 
