@@ -20,6 +20,9 @@ from roboirg.policies import Policy
 ROOT = Path(__file__).parent.parent
 PAGES = sorted([*ROOT.glob("*.md"), *ROOT.glob("docs/*.md")])
 README = (ROOT / "README.md").read_text()
+MOST_WORDS = 1800
+GENERATED = ("language-card.md", "methods-sections.md")
+"""Pages that programs write, which are not read from beginning to end."""
 
 
 def python_blocks(text: str) -> list[str]:
@@ -66,6 +69,12 @@ def test_readme_s_policy_is_a_policy_in_fifteen_lines():
 def test_readme_s_environment_plays(capsys):
     exec(python_blocks(README)[-1], {})  # noqa: S102 - it is our own README
     assert capsys.readouterr().out.strip().endswith(".")
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+def test_a_page_is_read_in_one_go(page):
+    prose = re.sub(r"^ *```.*?^ *```", "", page.read_text(), flags=re.DOTALL | re.MULTILINE)
+    assert page.name in GENERATED or len(prose.split()) <= MOST_WORDS
 
 
 def test_the_citation_has_the_version():
