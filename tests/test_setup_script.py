@@ -144,7 +144,8 @@ def test_opencv_alone_needs_no_backports(apt_dir: Path) -> None:
 FAKES = """
 make_venv() {
     mkdir -p .venv/bin
-    for name in python roboirg; do printf '#!/bin/sh\n' >.venv/bin/$name; chmod +x .venv/bin/$name; done
+    printf '#!/bin/sh\n' | tee .venv/bin/python >.venv/bin/roboirg
+    chmod +x .venv/bin/*
 }
 install_python_packages() { say "installing [$1]"; }
 ensure_libraries() { :; }

@@ -18,8 +18,9 @@ from roboirg.core.motions import Away, Glow, Point, Shuttle, Swap, Vanish
 from roboirg.evaluation.analysis.figures.figure_style import DARK_STYLE, STYLE
 from roboirg.tasks.splits.splits import get_episode
 
-mpl = pytest.importorskip("matplotlib")
+pytest.importorskip("matplotlib")
 
+import matplotlib as mpl
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 
 SAID = [Said("explicit", "Lift it.", "#000000"), Said("direct", "I like it. " * 30, "#0072B2")]
