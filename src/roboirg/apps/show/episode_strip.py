@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 import textwrap
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,7 +30,7 @@ _WORD_LETTERS, _CAPTION_LETTERS = 122, 24
 _VIDEO = "#E69F00"
 _PALE = "#8a8a8a"
 _BLACK = "#000000"
-_SIDE = {"fontsize": 5.5, "color": "white"}
+_SIDE: Mapping[str, Any] = {"fontsize": 5.5, "color": "white"}
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,7 +80,7 @@ def draw_strip(title: str, said: Sequence[Said], moments: Sequence[StripMoment])
     height = head + rows * row
     figure = Figure(figsize=(PAGE_INCHES, height))
 
-    def write(x: float, y: float, text: str, **style: object) -> None:
+    def write(x: float, y: float, text: str, **style: Any) -> None:  # noqa: ANN401
         """Write below a point, in inches from the upper left corner."""
         figure.text(x / PAGE_INCHES, 1 - y / height, text, va="top", **style)
 

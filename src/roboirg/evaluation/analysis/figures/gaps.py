@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.core.plain_text import counted
@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 MOST_COLUMNS = 4
 ROW_INCHES, MARGIN_INCHES = 0.25, 0.6
 NAME_LETTERS = 26
-TASKS_STYLE = {"fontsize": 6.5, "fontweight": "normal", "color": GHOST}
+TASKS_STYLE: Mapping[str, Any] = {"fontsize": 6.5, "fontweight": "normal", "color": GHOST}
 TICK = 25
 """The scale ends at a multiple of this, percent."""
 
@@ -51,7 +51,7 @@ class Drop(NamedTuple):
     interval: Interval | None = None
 
 
-class Line(NamedTuple):
+class PolicyDrops(NamedTuple):
     """A policy with its drops by setting."""
 
     name: str
@@ -94,7 +94,7 @@ def draw_gaps(content: RunData, *, published: bool = False) -> Figure | None:
     return figure
 
 
-def _own(content: RunData, tasks: Mapping[str, Collection[str]]) -> list[Line]:
+def _own(content: RunData, tasks: Mapping[str, Collection[str]]) -> list[PolicyDrops]:
     """Return a line for each policy run."""
     # Explicit cells stay whole: a drop is paired with those of its own tasks.
     known = {**tasks, REFERENCE.setting: {key.task for key in content.cells}}
@@ -107,27 +107,28 @@ def _own(content: RunData, tasks: Mapping[str, Collection[str]]) -> list[Line]:
             if one is not None and one.rate is not None and one.gap is not None:
                 rate, gap = 100 * float(one.rate), one.gap
                 drops[setting] = Drop(rate - 100 * gap.value, rate, gap.interval)
-        lines.append(Line(content.name(policy_run), is_own=True, drops=drops))
+        lines.append(PolicyDrops(content.name(policy_run), is_own=True, drops=drops))
     return lines
 
 
-def _published(tasks: Mapping[str, Collection[str]]) -> list[Line]:
+def _published(tasks: Mapping[str, Collection[str]]) -> list[PolicyDrops]:
     """Return a line for each published policy, the best explicit one first."""
     rows = {(row.model, row.options.setting): row for row in published_rows("main")}
-    explicit = [row for row in published_rows("main") if row.options == REFERENCE]
+    references = [row for row in published_rows("main") if row.options == REFERENCE]
     lines = []
-    for reference in sorted(explicit, key=lambda row: -row.average):
+    for reference in sorted(references, key=lambda row: -row.average):
         drops = {}
         for setting, names in tasks.items():
             row = rows.get((reference.model, setting))
-            rates = reference.average_over(names), row and row.average_over(names)
-            if rates[0] is not None and rates[1] is not None:
-                drops[setting] = Drop(float(rates[0]), float(rates[1]))
-        lines.append(Line(f"{reference.model} (published)", is_own=False, drops=drops))
+            explicit = reference.average_over(names)
+            implicit = None if row is None else row.average_over(names)
+            if explicit is not None and implicit is not None:
+                drops[setting] = Drop(float(explicit), float(implicit))
+        lines.append(PolicyDrops(f"{reference.model} (published)", is_own=False, drops=drops))
     return lines
 
 
-def _draw_panel(axes: Axes, lines: Sequence[Line], setting: str) -> None:
+def _draw_panel(axes: Axes, lines: Sequence[PolicyDrops], setting: str) -> None:
     has_own = any(one.is_own for one in lines)
     for place, one in enumerate(lines):
         drop = one.drops.get(setting)
@@ -150,7 +151,7 @@ def _draw_panel(axes: Axes, lines: Sequence[Line], setting: str) -> None:
 def _add_legend(figure: Figure, has_intervals: bool) -> None:
     from matplotlib.lines import Line2D
 
-    gray = {"color": GHOST, "marker": "o", "linestyle": "none", "markersize": 4.8}
+    gray: dict[str, Any] = {"color": GHOST, "marker": "o", "linestyle": "none", "markersize": 4.8}
     handles = [Line2D([], [], **gray, markerfacecolor=paper()), Line2D([], [], **gray)]
     labels = ["success with explicit instructions, %", "with implicit ones; number: difference"]
     if has_intervals:
