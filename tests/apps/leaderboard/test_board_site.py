@@ -22,6 +22,7 @@ from roboirg.apps.leaderboard.board_page import read_packs, write_board
 from roboirg.apps.leaderboard.commands import add_commands
 from roboirg.apps.leaderboard.packing import pack_run
 from roboirg.apps.leaderboard.run_verification import Verification
+from roboirg.core.errors import InvalidValueError
 from roboirg.evaluation.plan.plan_file import named_plans
 
 pytest.importorskip("jinja2")
@@ -78,6 +79,7 @@ def test_a_page_shows_rates_floors_audit_verification_and_how_to_reproduce(site:
     assert "ranked yes" in words
     assert "unchecked: not checked" in words
     assert "StopCube" in words
+    assert "85.45" in words  # 16 of 110 are errors, which count as failures as on the board
     assert "prompt_tokens=N does" in words  # why there is no audit
     assert "roboirg leaderboard verify my whole #1.roboirg.zip --submission" in words
 
@@ -86,6 +88,12 @@ def test_a_page_of_a_run_that_is_not_ranked_gives_the_reason_as_text(site: Path)
     page = (site / "entries" / "part.html").read_text()
     assert "no: 1 record of no plan in the pack" in page
     assert "<b>p</b>" not in page
+
+
+def test_a_site_that_cannot_be_written_is_one_sentence(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("")
+    with pytest.raises(InvalidValueError, match="Cannot write to"):
+        write_board([], tmp_path / "file")
 
 
 def test_the_rules_name_every_plan(site: Path) -> None:

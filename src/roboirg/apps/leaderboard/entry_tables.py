@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
 
+from roboirg.apps.leaderboard.admission import with_failures
 from roboirg.apps.leaderboard.board_rows import PackedRun, board_rows
 from roboirg.core.errors import RoboIRGError
 from roboirg.core.plain_text import counted
@@ -53,10 +54,13 @@ def entry_facts(run: PackedRun) -> list[tuple[str, str]]:
 
 
 def entry_tables(run: PackedRun) -> list[tuple[str, Table | str]]:
-    """Return the tables of a run, each with its title; a sentence in place of one without rows."""
+    """Return the tables of a run, each with its title; a sentence in place of one without rows.
+
+    As on the board, errors count as failures.
+    """
     if not run.results:
         return []
-    data = RunData.of([(run.name, run.results)], run.planned)
+    data = RunData.of([(run.name, with_failures(run.results))], run.planned)
     makers: Mapping[str, Callable[[RunData], Table]] = {
         "Rates": lambda data: make_table("main", data.cells, floors=("chance",)),
         "Gaps": _gap_table,
