@@ -136,7 +136,7 @@ def learn_policy(
         str, typer.Option(help="Settings that it hears, separated by commas, or none.")
     ] = "explicit",
     memory: Annotated[
-        str, typer.Option(help="What it remembers: none, frames or recurrent.")
+        str, typer.Option(help="What it remembers: none, recurrent, ttt or framesamp.")
     ] = "recurrent",
     words: PolicyWords = NO_POLICY_WORDS,
     workers: Workers = None,

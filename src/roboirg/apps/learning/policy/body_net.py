@@ -3,16 +3,30 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import torch
 from torch import Tensor, nn
 
 from roboirg.apps.learning.listener.listener_net import METERS, waves
-from roboirg.apps.learning.policy.memories import HEADS, MEMORIES, WIDTH, Looks, at_looks
+from roboirg.apps.learning.policy.body_layers import LAYERS, WIDTH, Join, body_layers, run_layer
+from roboirg.apps.learning.policy.fast_weights import FastWeightMemory
+from roboirg.apps.learning.policy.frame_memory import EvenFrameMemory
+from roboirg.apps.learning.policy.memories import (
+    LookMemory,
+    Looks,
+    NoMemory,
+    RecurrentMemory,
+    at_looks,
+)
 
-LAYERS = 2
+MEMORIES: Mapping[str, type[LookMemory]] = {
+    "none": NoMemory,
+    "recurrent": RecurrentMemory,
+    "ttt": FastWeightMemory,
+    "framesamp": EvenFrameMemory,
+}
 WAVES = 5
 CLOSED = -1e4
 """Score of a thing that cannot be chosen."""
@@ -72,10 +86,7 @@ class BodyNet(nn.Module):
         self.unseen = nn.Parameter(torch.randn(WIDTH) * 0.02)
         self.goal = nn.Linear(parts, WIDTH)
         self.memory = MEMORIES[memory]()
-        layer = nn.TransformerEncoderLayer(
-            WIDTH, HEADS, 2 * WIDTH, dropout=0.0, batch_first=True, norm_first=True
-        )
-        self.encoder = nn.TransformerEncoder(layer, LAYERS, enable_nested_tensor=False)
+        self.encoder = body_layers()
         self.move = nn.Linear(WIDTH, len(at_things))
         self.query = nn.Embedding(len(at_things), WIDTH)
         self.key = nn.Linear(WIDTH, WIDTH)
@@ -91,8 +102,10 @@ class BodyNet(nn.Module):
         tokens = torch.cat([whole[:, :, None], things], 2).flatten(0, 1)
         closed = ~remembered.can_choose.flatten(0, 1)
         hidden = torch.cat([torch.zeros_like(closed[:, :1]), closed], 1)
-        encoded = self.encoder(tokens, src_key_padding_mask=hidden)
-        first, rest = encoded[:, 0], encoded[:, 1:]
+        joins = remembered.joins or [Join()] * LAYERS
+        for layer, join in zip(self.encoder.layers, joins, strict=True):
+            tokens = run_layer(layer, tokens, ~hidden, join)
+        first, rest = tokens[:, 0], tokens[:, 1:]
         moves = self.move(first)
         queries = self.query.weight[None] + self.mixed(first)[:, None]
         scores = queries @ self.key(rest).transpose(1, 2) / math.sqrt(WIDTH)
@@ -109,6 +122,5 @@ class BodyNet(nn.Module):
         numbers = torch.cat([waves(batch.places / METERS, WAVES), batch.turns, apart * 5.0], -1)
         things = self.kinds(batch.classes) + self.spot(numbers)
         things = torch.where(batch.seen[..., None], things, things + self.unseen)
-        return Looks(
-            things, self.tool(batch.tool) + goal, batch.places, batch.seen, batch.known, batch.there
-        )
+        own = self.tool(batch.tool)
+        return Looks(things, own + goal, own, batch.places, batch.seen, batch.known, batch.there)

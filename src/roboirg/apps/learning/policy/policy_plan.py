@@ -10,7 +10,7 @@ from roboirg.apps.learning.policy.recording import ExpertRecording
 from roboirg.core.episode import Episode
 from roboirg.core.word_pools import PoolName
 
-MEMORY_NAMES = ("none", "frames", "recurrent")
+MEMORY_NAMES = ("none", "recurrent", "ttt", "framesamp")
 """The kinds of memory."""
 WORDLESS = "none"
 """Words of a policy that is trained without any."""
@@ -25,7 +25,7 @@ class PolicyPlan(NamedTuple):
         tasks: names of tasks.
         settings: names of settings whose instructions it hears; none for a policy without words.
         words: the pool of words.
-        memory: what it remembers; a name of `MEMORIES`.
+        memory: what it remembers; a name of `MEMORY_NAMES`.
         scenes: random scenes of each task in which the disturbed expert is recorded.
         drawn: those of them of which pictures are drawn, for the detector.
         goals: goals of each scene that the reader of words hears by place.
