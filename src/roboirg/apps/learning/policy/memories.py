@@ -17,6 +17,9 @@ from torch import Tensor, nn
 
 from roboirg.apps.learning.policy.body_layers import WIDTH, Join
 
+TIME_WAVES, SLOWEST = 8, 100.0
+"""Sines and cosines of a look's number in frames, and looks in a radian of the slowest."""
+
 
 class Looks(NamedTuple):
     """The looks of a batch of episodes; B episodes, T looks, K things.
@@ -98,13 +101,18 @@ class FrameTokens(nn.Module):
     def __init__(self) -> None:
         super().__init__()
         self.mixed = nn.Linear(2 * WIDTH, WIDTH)
+        self.time = nn.Linear(2 * TIME_WAVES, WIDTH)
 
     def forward(self, looks: Looks) -> tuple[Tensor, Tensor]:
         """Return tokens (B, T, 1 + K, WIDTH), the robot's first, and which there are."""
         tool = looks.tool[:, :, None]
         tokens = torch.cat([tool, looks.things], 2)
         there = torch.cat([looks.there[..., None], looks.seen], 2)
-        return self.mixed(torch.cat([tokens, tool.expand_as(tokens)], -1)), there
+        turns = torch.arange(tokens.shape[1])[:, None] * SLOWEST ** -torch.linspace(
+            0, 1, TIME_WAVES
+        )
+        time = self.time(torch.cat([turns.sin(), turns.cos()], -1))[:, None]
+        return self.mixed(torch.cat([tokens, tool.expand_as(tokens)], -1)) + time, there
 
 
 def seen_now(looks: Looks, decisions: Tensor, joins: Sequence[Join] = ()) -> Remembered:

@@ -16,9 +16,6 @@ from roboirg.apps.learning.policy.recording import LOOK_EVERY, ExpertRecording
 from roboirg.apps.learning.policy.sight import Sight, SightNoise, labeled_looks
 from roboirg.apps.learning.policy.tracks import LookTokens, Tracks
 
-MINUTE = 1200.0
-"""Control steps."""
-
 
 class LookNumbers(NamedTuple):
     """The looks of an episode; T looks, K things; fields as in `EpisodeBatch`, without B."""
@@ -39,6 +36,7 @@ class EpisodeNumbers(NamedTuple):
     decisions: NDArray[np.int64]
     moves: NDArray[np.int64]
     things: NDArray[np.int64]
+    done: NDArray[np.int64]
 
 
 class LookHistory:
@@ -57,7 +55,7 @@ class LookHistory:
         return len(self._rows)
 
     def add(
-        self, look: LookTokens, tool: NDArray[np.floating[Any]], *, is_video: bool, step: int
+        self, look: LookTokens, tool: NDArray[np.floating[Any]], *, is_video: bool
     ) -> NDArray[np.int64]:
         """Add a look; returns the track of each of its things.
 
@@ -65,14 +63,13 @@ class LookHistory:
             look: the things.
             tool: (7,) pose and opening; see `ExpertRecording`.
             is_video: whether it is one of the video.
-            step: control steps since the start of the video or of the policy's turn.
         """
         mine = self.tracks.update(look)
         now = self.tracks
         self._rows.append(
             (now.classes.copy(), now.places.copy(), now.turns.copy(), now.seen.copy())
         )
-        self._tools.append(_tool_numbers(tool, is_video=is_video, step=step))
+        self._tools.append(_tool_numbers(tool, is_video=is_video))
         return mine
 
     def numbers(self) -> LookNumbers:
@@ -88,13 +85,10 @@ class LookHistory:
         return LookNumbers(classes, places, turns, seen, known, np.stack(self._tools))
 
 
-def _tool_numbers(
-    tool: NDArray[np.floating[Any]], *, is_video: bool, step: int
-) -> NDArray[np.float32]:
+def _tool_numbers(tool: NDArray[np.floating[Any]], *, is_video: bool) -> NDArray[np.float32]:
     x, y, z, _, _, yaw, finger = tool
     turn = math.cos(2 * yaw), math.sin(2 * yaw)
-    time = step / MINUTE, math.log1p(step) / 7.0
-    found = np.array([x, y, z * 5.0, *turn, finger * 25.0, is_video, *time], np.float32)
+    found = np.array([x, y, z * 5.0, *turn, finger * 25.0, is_video], np.float32)
     if len(found) != TOOL_NUMBERS:
         raise RuntimeError(f"The tool has {len(found)} numbers, not {TOOL_NUMBERS}.")
     return found
@@ -129,8 +123,7 @@ def to_numbers(
     for look, (tokens, objects) in enumerate(labeled_looks(recorded, sight, noise, rng)):
         if look in merged and recorded.steps[look] % LOOK_EVERY:
             continue  # who opens or closes the gripper with the move before does not look here
-        is_video, step = bool(recorded.is_video[look]), int(recorded.steps[look])
-        mine = history.add(tokens, recorded.tool[look], is_video=is_video, step=step)
+        mine = history.add(tokens, recorded.tool[look], is_video=bool(recorded.is_video[look]))
         track_of.update(zip(objects.tolist(), mine.tolist(), strict=True))
         if look in due:
             times.append(len(history) - 1)
@@ -142,6 +135,7 @@ def to_numbers(
         np.array(times, np.int64),
         np.array([moves.get(one.move, -1) for one in own], np.int64),
         np.array(chosen, np.int64),
+        recorded.done[sorted(due)].astype(np.int64),
     )
 
 
@@ -160,6 +154,7 @@ def to_batch(episodes: Sequence[EpisodeNumbers]) -> EpisodeBatch:
         _pad([one.decisions for one in episodes], 0),
         _pad([one.moves for one in episodes], -1),
         _pad([one.things for one in episodes], -1),
+        _pad([one.done for one in episodes], -1),
     )
 
 

@@ -51,6 +51,7 @@ from roboirg.apps.learning.policy.thing_detector import (
 )
 from roboirg.apps.learning.policy.tracks import LookTokens
 from roboirg.apps.learning.policy.waypoint_expert import Disturbance
+from roboirg.apps.learning.trained_file import load_unfinished, save_unfinished
 from roboirg.apps.learning.trainer import Progress, Trainer, batch_count, batches
 from roboirg.core.episode import Episode
 from roboirg.core.errors import InvalidValueError, MotionPlanningError
@@ -161,12 +162,11 @@ def _detector(
     path = folder / "detector.pt"
     made_of = [list(sight.classes), list(plan.tasks), plan.drawn, plan.detector_epochs]
     detector = ThingDetector(len(sight.classes))
-    if path.exists():
-        kept = torch.load(path, weights_only=True)
-        if kept["made_of"] == made_of:
-            detector.load_state_dict(kept["net"])
-            detector.eval()
-            return detector
+    kept = load_unfinished(path, made_of)
+    if kept is not None:
+        detector.load_state_dict(kept["net"])
+        detector.eval()
+        return detector
     torch.manual_seed(plan.seed)
     detector = ThingDetector(len(sight.classes))
     views = [view for one in recorded for view in labeled_pictures(one.recording, sight)]
@@ -181,7 +181,7 @@ def _detector(
         trainer.run(batches(views, rng, DETECTOR_BATCH))
         progress("detector", epoch + 1, plan.detector_epochs)
     detector.eval()
-    torch.save({"made_of": made_of, "net": detector.state_dict()}, path)
+    save_unfinished({"net": detector.state_dict()}, made_of, path)
     return detector
 
 
