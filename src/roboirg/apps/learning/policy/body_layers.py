@@ -61,7 +61,8 @@ def run_layer(layer: Any, tokens: Tensor, seen: Tensor, join: Join) -> Tensor:  
 
 def split_heads(values: Tensor, heads: int = HEADS) -> Tensor:
     """Return values (n, L, heads * size) as (n, heads, L, size)."""
-    return values.unflatten(-1, (heads, -1)).transpose(1, 2)
+    parted: Tensor = values.reshape(*values.shape[:2], heads, -1).transpose(1, 2)
+    return parted
 
 
 def join_heads(values: Tensor) -> Tensor:

@@ -125,7 +125,7 @@ class FastWeightMemory(LookMemory):
     def _through_time(self, tokens: Tensor, there: Tensor) -> Tensor:
         """Return what the weights give at each look (B, T, m, WIDTH), after its own update."""
         batch, length, count, _ = tokens.shape
-        parts = self.projected(tokens).unflatten(-1, (3, FAST_HEADS, SIZE)).unbind(3)
+        parts = self.projected(tokens).reshape(batch, length, count, 3, FAST_HEADS, SIZE).unbind(3)
         queries, keys, values = (
             norm(part).transpose(2, 3) for norm, part in zip(self.norms, parts, strict=True)
         )  # each (B, T, heads, m, size)
@@ -199,4 +199,5 @@ def _size_of(values: Tensor) -> Tensor:
 def _clipped(change: Tensor) -> Tensor:
     """Return a change (…, rows, columns) whose norm is at most `MOST_CHANGE`."""
     norm = change.flatten(-2).norm(dim=-1)[..., None, None]
-    return change * (MOST_CHANGE / norm.clamp(min=MOST_CHANGE))
+    clipped: Tensor = change * (MOST_CHANGE / norm.clamp(min=MOST_CHANGE))
+    return clipped

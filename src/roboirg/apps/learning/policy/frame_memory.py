@@ -20,6 +20,7 @@ from roboirg.apps.learning.policy.memories import (
     Looks,
     Remembered,
     at_frames,
+    at_looks,
     seen_now,
 )
 
@@ -53,8 +54,23 @@ class EvenFrameMemory(LookMemory):
         return seen_now(looks, decisions, joins)
 
     def chosen(self, looks: Looks, decisions: Tensor) -> Tensor:  # noqa: ARG002
-        """Return the numbers of looks (B, D, frames) that are attended to."""
+        """Return the numbers of looks (B, D, frames) that are attended to; -1 for none."""
         return even_frames(decisions)
+
+
+class KeptFrameMemory(EvenFrameMemory):
+    """The same with looks that a planner keeps; it may point at what is out of sight."""
+
+    def forward(self, looks: Looks, decisions: Tensor) -> Remembered:
+        return (
+            super().forward(looks, decisions)._replace(can_choose=at_looks(looks.known, decisions))
+        )
+
+    def chosen(self, looks: Looks, decisions: Tensor) -> Tensor:  # noqa: ARG002
+        """Return the numbers of the looks that are kept (B, D, S); -1 for none."""
+        if looks.kept is None:
+            raise RuntimeError("KeptFrameMemory needs a planner's looks.")
+        return looks.kept
 
 
 class Modulation(nn.Module):
@@ -97,4 +113,5 @@ class ModulationJoin(Join):
             queries, self._keys, self._values, self._there
         )
         scale, shift = self._own.scale_shift(self._own.out(join_heads(found))).chunk(2, -1)
-        return normed * (1.0 + scale) + shift
+        after: Tensor = normed * (1.0 + scale) + shift
+        return after

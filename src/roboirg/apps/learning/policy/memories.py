@@ -32,6 +32,7 @@ class Looks(NamedTuple):
         seen: (B, T, K) whether the look shows the thing.
         known: (B, T, K) whether it was seen until then.
         there: (B, T) whether the episode has the look.
+        kept: (B, D, S) looks that a planner keeps at each decision, -1 for none.
     """
 
     things: Tensor
@@ -41,6 +42,7 @@ class Looks(NamedTuple):
     seen: Tensor
     known: Tensor
     there: Tensor
+    kept: Tensor | None = None
 
 
 class Remembered(NamedTuple):

@@ -11,10 +11,16 @@ import torch
 from numpy.typing import NDArray
 
 from roboirg.apps.learning.policy.body_net import TOOL_NUMBERS, EpisodeBatch
-from roboirg.apps.learning.policy.moves import ExpertDecision, Move
+from roboirg.apps.learning.policy.moves import ExpertDecision
+from roboirg.apps.learning.policy.planner_history import PlannedNumbers
 from roboirg.apps.learning.policy.recording import LOOK_EVERY, ExpertRecording
 from roboirg.apps.learning.policy.sight import Sight, SightNoise, labeled_looks
+from roboirg.apps.learning.policy.subgoal_net import PlannedBatch
+from roboirg.apps.learning.policy.subgoals import SubgoalDecision
 from roboirg.apps.learning.policy.tracks import LookTokens, Tracks
+
+Decision = ExpertDecision | SubgoalDecision
+"""What is learned at a look: of a body a waypoint, of a planner a subgoal."""
 
 
 class LookNumbers(NamedTuple):
@@ -37,6 +43,7 @@ class EpisodeNumbers(NamedTuple):
     moves: NDArray[np.int64]
     things: NDArray[np.int64]
     done: NDArray[np.int64]
+    planned: PlannedNumbers | None = None
 
 
 class LookHistory:
@@ -96,10 +103,10 @@ def _tool_numbers(tool: NDArray[np.floating[Any]], *, is_video: bool) -> NDArray
 
 def to_numbers(
     recorded: ExpertRecording,
-    decisions: Sequence[ExpertDecision],
+    decisions: Sequence[Decision],
     goal: NDArray[np.float32],
     sight: Sight,
-    moves: Mapping[Move, int],
+    moves: Mapping[Any, int],
     noise: SightNoise,
     rng: np.random.Generator,
 ) -> EpisodeNumbers:
@@ -110,7 +117,7 @@ def to_numbers(
         decisions: of the episode.
         goal: (parts,) 1 for each part of its goal.
         sight: of the camera.
-        moves: the number of each kind of waypoint.
+        moves: the number of each kind of waypoint, or of each form of subgoals.
         noise: of the detector.
         rng: draws the noise.
     """
@@ -155,7 +162,16 @@ def to_batch(episodes: Sequence[EpisodeNumbers]) -> EpisodeBatch:
         _pad([one.moves for one in episodes], -1),
         _pad([one.things for one in episodes], -1),
         _pad([one.done for one in episodes], -1),
+        _planned([one.planned for one in episodes if one.planned is not None]),
     )
+
+
+def _planned(episodes: Sequence[PlannedNumbers]) -> PlannedBatch | None:
+    if not episodes:
+        return None
+    context, kept, keys = zip(*episodes, strict=True)
+    # A decision that is there for padding sees the first look.
+    return PlannedBatch(_pad(context, 0), _pad(kept, 0), _pad(keys, -1))
 
 
 def _pad(arrays: Sequence[NDArray[Any]], fill: int) -> torch.Tensor:

@@ -10,8 +10,13 @@ from roboirg.apps.learning.policy.recording import ExpertRecording
 from roboirg.core.episode import Episode
 from roboirg.core.word_pools import PoolName
 
-MEMORY_NAMES = ("none", "recurrent", "ttt", "framesamp")
-"""The kinds of memory."""
+MEMORY_NAMES = ("none", "recurrent", "ttt", "framesamp", "subgoal", "keyframes")
+"""The kinds of memory; the last two are a planner's."""
+PLANNERS = ("subgoal", "keyframes")
+CHOOSES = "keyframes"
+"""The planner that chooses what it keeps."""
+HANDS = "hands"
+"""The body that follows the subgoals of a planner, and remembers nothing."""
 WORDLESS = "none"
 """Words of a policy that is trained without any."""
 MANY = 3
