@@ -5,8 +5,8 @@ import pytest
 
 torch = pytest.importorskip("torch")
 
+from roboirg.apps.learning.policy import body_net  # noqa: E402
 from roboirg.apps.learning.policy.body_net import (  # noqa: E402
-    MEMORIES,
     TOOL_NUMBERS,
     BodyNet,
     EpisodeBatch,
@@ -17,10 +17,15 @@ from roboirg.apps.learning.policy.fast_weights import (  # noqa: E402
     FastNorm,
 )
 from roboirg.apps.learning.policy.frame_memory import even_frames  # noqa: E402
-from roboirg.apps.learning.policy.policy_plan import MEMORY_NAMES  # noqa: E402
+from roboirg.apps.learning.policy.policy_plan import (  # noqa: E402
+    HANDS,
+    MEMORY_NAMES,
+    PLANNERS,
+)
 
 CLASSES, PARTS, THINGS, LOOKS = 3, 4, 5, 12
 AT_THINGS = (True, False, True)
+MEMORIES = sorted(set(body_net.MEMORIES) - {HANDS, *PLANNERS})
 REMEMBERS = sorted(set(MEMORIES) - {"none"})
 
 
@@ -61,7 +66,7 @@ def changed(batch, looks):
 
 
 def same(one, other):
-    return all(torch.allclose(a, b, atol=1e-5) for a, b in zip(one, other, strict=True))
+    return all(torch.allclose(a, b, atol=1e-5) for a, b in zip(one[:3], other[:3], strict=True))
 
 
 @pytest.mark.parametrize("memory", sorted(MEMORIES))
@@ -122,7 +127,7 @@ def test_only_memory_chooses_what_is_out_of_sight(memory):
 
 
 def test_every_memory_can_be_named():
-    assert sorted(MEMORIES) == sorted(MEMORY_NAMES)
+    assert set(body_net.MEMORIES) == {HANDS, *MEMORY_NAMES}
 
 
 def fast_numbers(seed, tokens=3, size=2):
@@ -187,10 +192,12 @@ def test_modulation_leaves_the_residual_alone():
     assert not missing
     assert all(name.startswith("memory.") for name in unexpected)
     different = modulated(batch), plain(batch)
-    assert not all(torch.equal(a, b) for a, b in zip(*different, strict=True))
+    assert not all(
+        torch.equal(a, b) for a, b in zip(different[0][:3], different[1][:3], strict=True)
+    )
     for layer in modulated.memory.layers:
         torch.nn.init.zeros_(layer.scale_shift.weight)
-    for one, other in zip(modulated(batch), plain(batch), strict=True):
+    for one, other in zip(modulated(batch)[:3], plain(batch)[:3], strict=True):
         assert torch.equal(one, other)
 
 
