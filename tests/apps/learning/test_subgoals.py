@@ -167,10 +167,10 @@ def policy_of(memory):
 
 @pytest.fixture(params=["subgoal", "keyframes"])
 def saved(request, tmp_path):
+    policy, path = policy_of(request.param), tmp_path / "policy.pt"
     from roboirg.apps.learning.policy.policy_model import save_policy
 
-    path = tmp_path / "policy.pt"
-    save_policy(policy_of(request.param), path)
+    save_policy(policy, path)
     return path
 
 
@@ -188,7 +188,6 @@ NO_VIDEO = {"joint_positions": np.zeros((0, 7))}
 
 @pytest.mark.sim
 def test_hands_follow_any_planner_and_name_their_own_subgoals_without_one(saved):
-    pytest.importorskip("torch")
     from roboirg.apps.learning.policy.trained_kind import make_learned
     from roboirg.policies.contract.base import SubgoalFollower
 
@@ -212,7 +211,6 @@ def test_hands_follow_any_planner_and_name_their_own_subgoals_without_one(saved)
 
 @pytest.mark.sim
 def test_a_learned_planner_leads_the_scripted_hands_and_others_lead_learned_ones(saved):
-    pytest.importorskip("torch")
     from roboirg.apps.learning.policy.subgoal_following import LearnedHands, LearnedPlanner
     from roboirg.core.errors import InvalidValueError
     from roboirg.policies.by_name.loading import is_privileged, make_policy, needs_host
@@ -234,9 +232,7 @@ def test_a_learned_planner_leads_the_scripted_hands_and_others_lead_learned_ones
 
 @pytest.mark.sim
 def test_hands_know_no_goal_and_planners_point_at_what_is_out_of_sight(saved):
-    pytest.importorskip("torch")
-    import torch
-
+    torch = pytest.importorskip("torch")
     from roboirg.apps.learning.policy.body_net import TOOL_NUMBERS
     from roboirg.apps.learning.policy.policy_data import EpisodeNumbers, LookNumbers, to_batch
     from roboirg.apps.learning.policy.policy_model import load_policy
