@@ -86,11 +86,12 @@ def test_recordings_yield_the_subgoal_that_is_due_with_a_point_from_its_beginnin
     assert [recorded.names[one.thing] for one in due] == [
         episode.stages[number].points_at for number in (0, 0, 1, 1, 1)
     ]
-    exact = recorded_subgoals(recorded, episode.stages, range(5), None)
+    done = [0, 0, 1, 1, 1]
+    exact = recorded_subgoals(recorded, episode.stages, done, None)
     assert exact[0] == exact[1] != exact[2] == exact[3] == exact[4]
     wanted = points_of(recorded.things[2, due[2].thing, :3].astype(float))
     assert np.abs(np.array(split_point(exact[2])[1])[::-1] - wanted).max() <= 0.5
-    moved = recorded_subgoals(recorded, episode.stages, range(5), np.random.default_rng(0))
+    moved = recorded_subgoals(recorded, episode.stages, done, np.random.default_rng(0))
     away = np.subtract(split_point(moved[2])[1], split_point(exact[2])[1])
     assert 0 < np.abs(away).max() <= FARTHEST + 1
 
@@ -136,6 +137,9 @@ def test_what_is_replayed_is_what_a_planner_that_is_right_would_be_given():
         if look in history.switches:
             history.choose([look])
     assert planned.keys[:, -1].tolist() == [1, 0, 1, 0, 1]
+    unasked = replayed(np.array([0, -1, 1]), np.array([1, 2, 6]), 0, 2, chooses=True)
+    assert (unasked.keys[1] == -1).all()
+    assert np.array_equal(unasked.context[2], planned.context[2])
     assert planned.keys[0, :-2].tolist() == [-1] * (RECENT - 2)
     assert [recent_looks(9)[place] for place in np.flatnonzero(planned.keys[3] == 1)] == [6]
 

@@ -39,7 +39,7 @@ from roboirg.policies.vlm.goal_schema import goal_schema
 RATE = 2e-3
 BATCH = 16
 COUNT_WEIGHT = 0.5
-NEW_NOISE_EVERY = 5
+NEW_NOISE_EVERY = 2
 """Passes after which the noise of the detector is drawn anew."""
 HELD_BACK = 10
 """Every tenth episode is not learned from, but shows how learning goes."""
@@ -71,7 +71,7 @@ def train_body(
         found = []
         for one, own, goal in zip(recorded, decisions, goals, strict=True):
             episode = to_numbers(one.recording, own, goal, sight, numbers, SightNoise(), rng)
-            found.append(with_planned(plan.memory, one, episode, own, len(moves), sight, rng))
+            found.append(with_planned(plan.memory, one, episode, len(moves), sight, rng))
         return found
 
     held_back = -(-len(recorded) // HELD_BACK)

@@ -26,11 +26,11 @@ class Looks(NamedTuple):
 
     Attributes:
         things: (B, T, K, WIDTH) embedded as they are at each look, or were when last seen.
-        whole: (B, T, WIDTH) the robot's own state, the time, and the goal.
+        whole: (B, T, WIDTH) the robot's own state, and the goal.
         tool: (B, T, WIDTH) the same without the goal.
         places: (B, T, K, 2) x and y on the table, m.
         seen: (B, T, K) whether the look shows the thing.
-        known: (B, T, K) whether it was seen until then.
+        known: (B, T, K) whether it was seen until then, often enough to be no mistake.
         there: (B, T) whether the episode has the look.
         kept: (B, D, S) looks that a planner keeps at each decision, -1 for none.
     """
@@ -120,8 +120,8 @@ class FrameTokens(nn.Module):
 def seen_now(looks: Looks, decisions: Tensor, joins: Sequence[Join] = ()) -> Remembered:
     """Return that only what is seen now can be chosen, and what a memory does in each layer."""
     things, whole = at_looks(looks.things, decisions), at_looks(looks.whole, decisions)
-    seen = at_looks(looks.seen, decisions)
-    return Remembered(torch.zeros_like(things), torch.zeros_like(whole), seen, joins)
+    can_choose = at_looks(looks.seen & looks.known, decisions)
+    return Remembered(torch.zeros_like(things), torch.zeros_like(whole), can_choose, joins)
 
 
 class NoMemory(LookMemory):

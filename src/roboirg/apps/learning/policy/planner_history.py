@@ -111,7 +111,7 @@ def replayed(
     """Return what a planner would be given that names what is due, and chooses where it changes.
 
     Args:
-        forms: (D,) the subgoal due at each decision.
+        forms: (D,) the subgoal due at each decision; -1 where nothing is named.
         looks: (D,) of the decisions.
         video: number of looks of the video.
         size: number of forms.
@@ -122,8 +122,10 @@ def replayed(
     for form, look in zip(forms.tolist(), looks.tolist(), strict=True):
         context.append(history.context(look))
         kept.append(history.kept(video, look))
-        history.name(form, look)
-        history.choose(one for one in history.switches[-1:] if one == look)
+        if form >= 0:
+            history.name(form, look)
+            history.choose(one for one in history.switches[-1:] if one == look)
         recent = np.array(recent_looks(look))
-        keys.append(np.where(recent < 0, -1, np.isin(recent, history.switches)))
+        is_asked = (recent >= 0) & (form >= 0)
+        keys.append(np.where(is_asked, np.isin(recent, history.switches), -1))
     return PlannedNumbers(np.stack(context), np.stack(kept), np.stack(keys))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import random
 from collections.abc import Iterator, Sequence
 from functools import partial
@@ -40,6 +41,7 @@ from roboirg.apps.learning.policy.recording import (
     load_recording,
     record_episode,
     save_recording,
+    unplanned,
 )
 from roboirg.apps.learning.policy.sight import (
     Sight,
@@ -161,14 +163,18 @@ def _path(folder: Path, task: str, number: int) -> Path:
 
 
 def _record(folder: Path, drawn: int, job: tuple[str, int]) -> None:
-    """Record an episode, undisturbed if a disturbance leads where the arm cannot go on."""
+    """Record an episode, undisturbed if a disturbance leads where the arm cannot go on.
+
+    Of a scene in which not even the video can be planned, only that is kept.
+    """
     task, number = job
     every = PICTURE_EVERY if number < drawn else 0
     episode = get_episode(task, RECORDED_SPLIT, number)
-    try:
-        recorded = record_episode(episode, 1, Disturbance(), every)
-    except MotionPlanningError:
-        recorded = record_episode(episode, 1, None, every)
+    recorded = unplanned(episode)
+    for disturbance in (Disturbance(), None):
+        with contextlib.suppress(MotionPlanningError):
+            recorded = record_episode(episode, 1, disturbance, every)
+            break
     save_recording(recorded, _path(folder, task, number))
 
 

@@ -102,6 +102,14 @@ def record_episode(
         env.close()
 
 
+def unplanned(episode: Episode) -> ExpertRecording:
+    """Return the recording of an episode that cannot be played: its key and status alone."""
+    nothing: NDArray[Any] = np.zeros(0)
+    return ExpertRecording(
+        episode.key, (), (), *(nothing,) * 9, turns=(), pictures={}, status="unplanned"
+    )
+
+
 class _LookRecorder(EpisodeLoop):
     """Plays one episode and notes looks and decisions."""
 

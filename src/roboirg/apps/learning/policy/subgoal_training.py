@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 from numpy.typing import NDArray
 
 from roboirg.apps.learning.policy.planner_history import asked_for, replayed
-from roboirg.apps.learning.policy.policy_data import Decision, EpisodeNumbers
+from roboirg.apps.learning.policy.policy_data import EpisodeNumbers
 from roboirg.apps.learning.policy.policy_plan import CHOOSES, HANDS, PLANNERS, Recorded
 from roboirg.apps.learning.policy.sight import Sight
 from roboirg.apps.learning.policy.subgoals import asked_numbers, recorded_subgoals
@@ -22,7 +20,6 @@ def with_planned(
     memory: str,
     one: Recorded,
     numbers: EpisodeNumbers,
-    decisions: Sequence[Decision],
     forms: int,
     sight: Sight,
     rng: np.random.Generator,
@@ -33,14 +30,13 @@ def with_planned(
         memory: a name of `MEMORIES`.
         one: the episode.
         numbers: the same for the network.
-        decisions: of the episode, in the order of `numbers`.
         forms: number of forms of subgoals, for a planner.
         sight: of the camera.
         rng: moves the points of subgoals.
     """
     if memory == HANDS:
-        looks = [decision.look for decision in decisions]
-        subgoals = recorded_subgoals(one.recording, one.episode.stages, looks, rng)
+        done = numbers.done.tolist()
+        subgoals = recorded_subgoals(one.recording, one.episode.stages, done, rng)
         # Hands know what they are asked for, and no goal.
         return numbers._replace(
             goal=np.zeros_like(numbers.goal),

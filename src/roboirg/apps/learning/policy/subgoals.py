@@ -60,14 +60,13 @@ def subgoals_due(
     recorded: ExpertRecording, stages: Sequence[Stage], looks: Sequence[int]
 ) -> list[SubgoalDecision]:
     """Return the subgoal that is due at each of some looks."""
-    return [
-        SubgoalDecision(
-            look,
-            SubgoalForm(stage.subgoal),
-            -1 if stage.points_at is None else recorded.names.index(stage.points_at),
-        )
-        for look, stage in zip(looks, stages_at(recorded, stages, looks), strict=True)
-    ]
+    found = []
+    for look in looks:
+        stage = stages[min(int(recorded.done[look]), len(stages) - 1)]
+        at = stage.points_at
+        thing = -1 if at is None else recorded.names.index(at)
+        found.append(SubgoalDecision(look, SubgoalForm(stage.subgoal), thing))
+    return found
 
 
 def forms_of(stages: Sequence[Sequence[Stage]]) -> tuple[SubgoalForm, ...]:
@@ -105,39 +104,29 @@ def _place(request: Request, sight: Sight) -> NDArray[np.float32] | None:
     return place
 
 
-def stages_at(
-    recorded: ExpertRecording, stages: Sequence[Stage], looks: Sequence[int]
-) -> list[Stage]:
-    """Return the stage that is due at each of some looks."""
-    return [stages[min(int(recorded.done[look]), len(stages) - 1)] for look in looks]
-
-
 def recorded_subgoals(
     recorded: ExpertRecording,
     stages: Sequence[Stage],
-    looks: Sequence[int],
+    done: Sequence[int],
     rng: np.random.Generator | None,
 ) -> list[str]:
-    """Return the subgoal at each of some looks, with a point that was taken when it began.
+    """Return the subgoal after each number of completed stages, with a point from its beginning.
 
     Args:
         recorded: the episode.
         stages: of its goal.
-        looks: in order.
+        done: numbers of completed stages.
         rng: moves the points; None leaves them where they are.
     """
-    found: list[str] = []
-    last: Stage | None = None
-    for look, stage in zip(looks, stages_at(recorded, stages, looks), strict=True):
-        if stage is last:
-            found.append(found[-1])
-            continue
-        last, point = stage, None
+    texts: dict[int, str] = {}
+    for index in {min(number, len(stages) - 1) for number in done}:
+        stage, point = stages[index], None
         if stage.points_at is not None:
-            spot = recorded.things[look, recorded.names.index(stage.points_at), :3]
+            began = int(np.flatnonzero(~recorded.is_video & (recorded.done >= index))[0])
+            spot = recorded.things[began, recorded.names.index(stage.points_at), :3]
             point = points_of(spot.astype(np.float64))
             if rng is not None:
                 most = FARTHEST / SPREAD
                 point += truncnorm.rvs(-most, most, scale=SPREAD, size=2, random_state=rng)
-        found.append(SubgoalForm(stage.subgoal).at(point))
-    return found
+        texts[index] = SubgoalForm(stage.subgoal).at(point)
+    return [texts[min(number, len(stages) - 1)] for number in done]
