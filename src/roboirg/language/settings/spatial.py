@@ -123,7 +123,7 @@ def _pointed(
         noun = stands_last["noun"]
         words = request.sampler.pick(
             "noun there",
-            (f"the {noun}", "that one", f"that {noun} over", "the one over"),
+            (f"that {noun}", "that one", f"that {noun} over", "the one over"),
         )
         place = (
             antecedent(f"the {noun} {landmark.phrase}", *_of(color))
