@@ -40,7 +40,7 @@ _LEAVE = r"(?:skip|let go|give up|gave up|leave out|left out|drop|trade|trade aw
 _OTHER = Phrases({
     "at the other of the two moments":
         r"(?<!\bcolor )(?<!\bthem )(?<!\btwo )\bother (?:one |moment )?"
-        r"(?:of|moment|time|point|than)\b"
+        r"(?:of|moment|target|time|point|than)\b"
         r"(?! (?:the two|those|these|them|of)? ?(?:cube|box|tape|color)(?:e?s)?\b)",
     "I named one moment; put it where it was at the other one.":
         r"\b(?:at|in|during) the other one\b",

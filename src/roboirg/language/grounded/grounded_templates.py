@@ -28,7 +28,10 @@ STANDS_NOW = Standing(now=" now")
 STOOD = Standing(started="that started ")
 
 MIDDLE = Pools(
-    train=("the {noun}{now} in the middle from {way}", "the {noun} {started}in the middle from {way}"),
+    train=(
+        "the {noun}{now} in the middle from {way}",
+        "the {noun} {started}in the middle from {way}",
+    ),
     test=(
         "the {noun} that is{now} in the middle from {way}",
         "the {noun} {started}as the middle one from {way}",
@@ -186,7 +189,7 @@ FROM_THE_END = (
 """The last placement, and the one before it."""
 BEFORE_PRESS = Pools(
     train=("the placement right before the button press",),
-    test=("the placement that the button press followed",),
+    test=("the placement made just before the button press",),
 )
 PLACEMENT_AT = Pools(train=("the placement {anchor}",), test=("the placement made {anchor}",))
 PLACEMENT_MOVED = {

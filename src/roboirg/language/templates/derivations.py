@@ -76,7 +76,9 @@ EXCLUSIONS = Pools(
 SINGLE_EXCLUSIONS = Pools(
     train=(
         Exclusion(
-            "{thing}[|s] whose color is {excluded}", "different from that", "different from {colors}"
+            "{thing}[|s] whose color is {excluded}",
+            "different from that",
+            "different from {colors}",
         ),
         Exclusion("{thing}[|s] of a {excluded}", "different color", "color other than {colors}"),
     ),
@@ -126,14 +128,14 @@ MOMENT_ANAPHORS = ("at that moment", "then")
 BOTH_MOMENTS = "right before and right after the button press"
 TWO_MOMENTS_INTRODUCTIONS = Pools(
     train=(
-        "Of the moments {pair}, my sister prefers {single}.",
-        "Between the moments {pair}, Dad chose {single}.",
-        "Of the moments {pair}, my brother liked {single} better.",
+        "Of the targets used {pair}, my sister prefers {single}.",
+        "Between the targets used {pair}, Dad chose {single}.",
+        "Of the targets used {pair}, my brother liked {single} better.",
     ),
     test=(
-        "Of the times {pair}, my uncle would choose {single}.",
-        "Between the times {pair}, my sister chose {single}.",
-        "Of the placements {pair}, Mom picked {single}.",
+        "My uncle looked at the targets used {pair} and chose {single}.",
+        "Tom compared the targets used {pair} and liked {single} better.",
+        "Mom considered the targets used {pair} and picked {single}.",
     ),
 )
 NEIGHBOR_INTRODUCTIONS = Pools(
@@ -148,8 +150,8 @@ NEIGHBOR_INTRODUCTIONS = Pools(
         "You saw the placement {moment}.",
     ),
 )
-MOMENT_COMPLEMENT = "at the other moment"
-RESOLVED_MOMENT_COMPLEMENT = "at the other moment, not {single}"
+MOMENT_COMPLEMENTS = {"the target": "the other target", "at the moment": "at the other moment"}
+"""By the words for a moment in the command."""
 NEIGHBOR = "the placement right before or after {single}"
 """Of two placements, each is the other's neighbor; *earlier* would give it away."""
 
