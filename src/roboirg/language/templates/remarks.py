@@ -168,11 +168,11 @@ COMPETING_MOMENT_DISTRACTORS = Pools(
 
 CUES = Pools(
     train=(
-        "Okay, let's start.",
-        "Anyway, let's start.",
-        "Right, let's go.",
-        "So, let's begin.",
-        "Anyway, let's begin.",
+        "Let's start.",
+        "Okay, ready?",
+        "Let's go.",
+        "Are you ready?",
+        "Let's begin.",
     ),
     test=(
         "Anyway, where were we?",
