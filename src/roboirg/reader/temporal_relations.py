@@ -30,7 +30,6 @@ _EITHER_SIDE = r"\b(?:just |right )?before or after\b"
 _NEIGHBOR = Phrases({
     "at the placement next to that": r"\b(?:neighbor\w*|adjacent|next to|beside)\b",
     "at the placement right before or after that": _EITHER_SIDE,
-    "at the placement closest in time to that": r"\b(?:closest|nearest) in time to\b",
 })  # fmt: skip
 NOT_THAT = r"\bnot (?:at |in )?(?:that|this|it|the one|the moment|when)\b(?! pair| on)"
 """A regular expression for ``not at that moment``."""
