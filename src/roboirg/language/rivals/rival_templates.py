@@ -263,7 +263,7 @@ CHOICES: dict[ReferenceKind, tuple[Pools[str], Pools[str]]] = {
 """
 
 CLAUSES = Pools(
-    train=("I mean", "I want", "I prefer", "I need"),
+    train=("I mean", "I want", "I need", "I would like"),
     test=("I chose", "I picked", "I asked for", "I selected"),
 )
 """Follow the noun in the command: *the cube I mean*."""
