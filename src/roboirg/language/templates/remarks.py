@@ -175,7 +175,7 @@ CUES = Pools(
         "Let's begin.",
     ),
     test=(
-        "Anyway, where were we?",
+        "Where were we?",
         "Well, your turn.",
         "Okay, over to you.",
         "Okay, back to work.",
