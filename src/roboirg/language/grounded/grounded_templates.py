@@ -1,7 +1,7 @@
 """Wordings of the grounded setting: what is counted, what happened, and where things stand.
 
-The pools differ in constructions: *the nearest neighbor of the cube closest to you* in one, *the
-cube right next to the one closest to you* in the other.
+The pools differ in constructions: *the cube nearest to the one closest to you* in one, *the cube
+right next to the one closest to you* in the other.
 """
 
 from __future__ import annotations
