@@ -3,7 +3,7 @@
 python scripts/measure_floors.py [--scenes 400]
 
 Writes the file of the installed version of the language, with the settings that count for the
-headline number, and the tables of docs/language.md. With --tables only the tables, from that file.
+headline number, and the tables of docs/floors.md. With --tables only the tables, from that file.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ from roboirg.shortcuts.shortcut_tables import (
 )
 from roboirg.tasks import all_tasks
 
-PAGE = Path(__file__).parent.parent / "docs" / "language.md"
+PAGE = Path(__file__).parent.parent / "docs" / "floors.md"
 TABLES = re.compile(r"(?<=<!-- floors -->\n\n).*?(?=\n\n<!-- end of floors -->)", re.DOTALL)
 SCENES = 400
 """Random scenes of each task that are tested."""

@@ -115,10 +115,10 @@ def _() -> str:
 def _() -> str:
     paper = {"pi0.5", "TTT-Expert", "FrameS-Modul", "GroundSG-QwenVL", "GroundSG-Gemini", "MemER"}
     same(set(all_systems()), paper | {"GroundSG-oracle"})
-    for page in ("README.md", "docs/policies.md", "docs/planners.md", "CHANGELOG.md"):
+    for page in ("README.md", "docs/policies.md", "docs/systems.md", "CHANGELOG.md"):
         if "seven systems" in read(page):
             raise AssertionError(f"{page} speaks of seven systems")
-    return says("docs/planners.md", "GroundSG with the oracle is RoboMME's.")
+    return says("docs/systems.md", "GroundSG with the oracle is RoboMME's.")
 
 
 @item("left-out", "five tasks of RoboMME are left out, because they have nothing to refer to")

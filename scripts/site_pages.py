@@ -1,12 +1,21 @@
-"""Hook of MkDocs: pages outside docs/ become pages of the site, with links that lead there."""
+"""Hook of MkDocs: pages outside docs/ and the command line become pages of the site."""
 
+import contextlib
+import io
 import re
+from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
+import typer.main
 from mkdocs.config.defaults import MkDocsConfig
 from mkdocs.structure.files import File, Files
 
+from roboirg.main import app
+
 ROOT = Path(__file__).parents[1]
+COMMAND_LINE = "command-line.md"
+"""A page made of the commands' own help."""
 PAGES = {
     "README.md": "index.md",
     "CONTRIBUTING.md": "contributing.md",
@@ -19,10 +28,53 @@ NOTEBOOK_LINK = re.compile(r'(href="(?!https?:)[^"#:]+)\.(?:md|ipynb)(?=["#])')
 
 
 def on_files(files: Files, config: MkDocsConfig) -> Files:
-    """Add the pages that lie outside docs/."""
+    """Add the pages that lie outside docs/, and that of the command line."""
+    files.append(File.generated(config, COMMAND_LINE, content="\n".join(command_lines())))
     for source, name in PAGES.items():
         files.append(File.generated(config, name, content=(ROOT / source).read_text()))
     return files
+
+
+def command_lines() -> Iterator[str]:
+    """Yield the lines of the reference of all commands, from their help."""
+    yield "# Command line\n\nThe help of each command, as `roboirg COMMAND --help` prints it.\n"
+    yield from _help_of(typer.main.get_command(app), "roboirg")
+
+
+def _help_of(command: Any, name: str) -> Iterator[str]:  # noqa: ANN401
+    if hasattr(command, "commands"):
+        for below in sorted(command.commands):
+            yield from _help_of(command.commands[below], f"{name} {below}")
+        return
+    with contextlib.redirect_stdout(io.StringIO()):  # some parameters complete their words here
+        command.get_help(command.make_context(name, [], resilient_parsing=True))
+    yield f"## {name}\n"
+    words = _cell(command.help, newline="\n\n")
+    yield re.sub(r"^Example: (.+)$", r"Example: `\1`", words, flags=re.MULTILINE) + "\n"
+    yield "| argument or option | meaning | default |\n| --- | --- | --- |"
+    for one in command.params:
+        if one.name == "help" or getattr(one, "hidden", False):
+            continue
+        names = [one.name.upper()] if one.param_type_name == "argument" else one.opts
+        marks = ", ".join(f"`{word}`" for word in (*names, *one.secondary_opts))
+        default = "required" if one.required else _default(one)
+        yield f"| {marks} | {_cell(one.help)} | {default} |"
+    yield ""
+
+
+def _default(parameter: Any) -> str:  # noqa: ANN401
+    shown = getattr(parameter, "show_default", None)
+    if isinstance(shown, str):
+        return _cell(shown)
+    value = None if callable(parameter.default) else parameter.default
+    if value is True:
+        return f"`{parameter.opts[0]}`"
+    return "" if value in (None, False, (), []) else f"`{_cell(str(value))}`"
+
+
+def _cell(text: str | None, newline: str = " ") -> str:
+    """Return a help text for Markdown, without Rich's marks."""
+    return re.sub(r"\s*\n\s*", newline, (text or "").strip()).replace("|", "\\|")
 
 
 def on_page_markdown(markdown: str, page: object, **_: object) -> str:

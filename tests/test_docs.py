@@ -1,7 +1,9 @@
 """The documents are true: links lead somewhere, dependencies are explained, README's code runs."""
 
+import csv
 import re
 import tomllib
+from collections import defaultdict
 from pathlib import Path
 
 import numpy as np
@@ -9,11 +11,15 @@ import pytest
 
 import roboirg
 from roboirg.core.actions import check_chunk
+from roboirg.evaluation.analysis.published import published_rows
 from roboirg.policies import Policy
 
 ROOT = Path(__file__).parent.parent
 PAGES = sorted([*ROOT.glob("*.md"), *ROOT.glob("docs/*.md")])
 README = (ROOT / "README.md").read_text()
+MOST_WORDS = 1800
+GENERATED = ("language-card.md", "methods-sections.md")
+"""Pages that programs write, which are not read from beginning to end."""
 
 
 def python_blocks(text: str) -> list[str]:
@@ -62,5 +68,60 @@ def test_readme_s_environment_plays(capsys):
     assert capsys.readouterr().out.strip().endswith(".")
 
 
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+def test_a_page_is_read_in_one_go(page):
+    prose = re.sub(r"^ *```.*?^ *```", "", page.read_text(), flags=re.DOTALL | re.MULTILINE)
+    assert page.name in GENERATED or len(prose.split()) <= MOST_WORDS
+
+
 def test_the_citation_has_the_version():
     assert f"\nversion: {roboirg.__version__}\n" in (ROOT / "CITATION.cff").read_text()
+
+
+def row_of(name: str, page: str = README) -> str:
+    return next(line for line in page.splitlines() if name in line and line.startswith("|"))
+
+
+def test_readme_repeats_the_published_averages():
+    averages = {
+        row.options.setting: row.average
+        for row in published_rows("main")
+        if row.model == "FrameS-Modul"
+    }
+    kept = {name: float(one / averages["explicit"]) for name, one in averages.items()}
+    assert f"succeeds in {averages['explicit']:.0f} %" in README
+    assert f"{averages['reasoning']:.0f} % is left with reasoning" in README
+    assert 0.6 < kept.pop("direct") < 0.7
+    assert all(share < 0.5 for name, share in kept.items() if name != "explicit")
+
+
+def test_what_came_since_the_paper_is_the_file_s():
+    rates = defaultdict(list)
+    with (ROOT / "docs" / "robomme-since.csv").open(encoding="utf-8") as file:
+        for one in csv.DictReader(file):
+            rates[one["system"].split()[0]].append(float(one["success_percent"]))
+    means = {system: np.mean(found) for system, found in rates.items()}
+    page = (ROOT / "docs" / "comparability.md").read_text()
+    assert f"| {means['GPT-6']:.1f} |" in row_of("GPT-6 Astra", page)
+    assert f"| {means['agentic']:.1f} " in row_of("memory agent", page)
+    assert f"reaches {means['GPT-6']:.0f} %" in README
+
+
+def test_readme_s_results_are_those_of_their_pages():
+    page = (ROOT / "docs" / "learned-listener.md").read_text()
+    for name, listener in (("all settings", "all settings"), ("explicit words", "explicit only")):
+        lines = page.split("**Held-out words**")[1].splitlines()
+        at = next(n for n, line in enumerate(lines) if line.startswith(f"| {listener} |"))
+        rates, ends = (line.split(" | ")[2:] for line in lines[at : at + 2])
+        cells = [
+            f"{rate} ({end.replace(' to ', '–')})" for rate, end in zip(rates, ends, strict=True)
+        ]
+        assert " | ".join(cell.replace(" |", "") for cell in cells) in row_of(f"{name} (goals")
+    statistics = (ROOT / "docs" / "statistics.md").read_text()
+    direct, reasoning, spatial = re.search(
+        r"direct and contextual ([\d.]+), reasoning ([\d.]+), spatial ([\d.]+)", statistics
+    ).groups()
+    assert f"100 | {direct} | {reasoning} | {direct} | {spatial} |" in row_of("`forgetful` hears")
+    surface = row_of("`surface`", (ROOT / "docs" / "grounding.md").read_text())
+    rule = [float(one) for one in row_of("surface rule").strip("| ").split(" | ")[1:]]
+    assert rule == [float(one) for one in surface.strip("| ").split(" | ")[1:]]

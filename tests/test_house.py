@@ -173,6 +173,34 @@ def test_no_prose_has_a_forbidden_phrase(phrase):
     check_empty(found)
 
 
+def forbidden_twins():
+    """Return what the glossary's table of one spelling forbids, with what to write."""
+    table = (ROOT / "docs" / "glossary.md").read_text("utf-8").split("| we write | not |\n")[1]
+    rows = [line.strip("| ").split(" | ") for line in table.split("\n\n")[0].splitlines()[1:]]
+    return [(twin, word) for word, twin in rows]
+
+
+def test_no_page_has_a_forbidden_twin():
+    pages = [*ROOT.glob("*.md"), *ROOT.glob("docs/*.md"), *ROOT.glob("docs/notebooks/*.ipynb")]
+    read = {page: page.read_text("utf-8") for page in pages if page.name != "glossary.md"}
+    twins = forbidden_twins()
+    assert len(twins) > 5
+    found = [
+        f"{page.relative_to(ROOT)}: {match[0]!r}; write {word!r}"
+        for twin, word in twins
+        for page, text in read.items()
+        for match in re.finditer(r"\b" + r"\s+".join(twin.split()) + r"s?\b", text)
+    ]
+    check_empty(found)
+
+
+@pytest.mark.parametrize("twin", ["data set", "time line"])
+def test_no_program_has_a_forbidden_twin(twin):
+    assert twin in dict(forbidden_twins())
+    pattern = re.compile(r"\b" + r"[\s#]+".join(twin.split()) + r"s?\b", re.IGNORECASE)
+    check_empty([path for path, text in texts() if path.suffix != ".md" and pattern.search(text)])
+
+
 def test_the_verb_of_a_count_agrees_with_it():
     found = [
         f"{path.relative_to(ROOT)}: {match[0]}"

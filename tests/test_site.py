@@ -7,6 +7,7 @@ from html.parser import HTMLParser
 from pathlib import Path
 from urllib.parse import unquote, urlsplit
 
+import count_commands
 import pytest
 
 import roboirg
@@ -61,7 +62,9 @@ def test_every_page_of_the_docs_is_on_the_site(site, pages):
     wanted = {one.relative_to(ROOT / "docs").with_suffix(".html") for one in
               (ROOT / "docs").rglob("*") if one.suffix in (".md", ".ipynb")}  # fmt: skip
     assert wanted < {page.relative_to(site) for page in pages}
-    assert len(pages) == len(wanted) + 4  # README, CONTRIBUTING, CHANGELOG, published results
+    assert (
+        len(pages) == len(wanted) + 5
+    )  # README, CONTRIBUTING, CHANGELOG, published results, command line
 
 
 def test_no_link_is_dead(pages):
@@ -99,3 +102,9 @@ def test_the_reference_has_the_public_names(pages):
         "roboirg.evaluation.records.record.Record",
     }
     assert wanted <= names
+
+
+def test_the_reference_has_every_command(pages):
+    names = set().union(*(found.names for found in pages.values()))
+    wanted = {f"roboirg {one.words}".strip() for one in count_commands.commands()[1:]}
+    assert {one.replace(" ", "-") for one in wanted} <= names

@@ -18,6 +18,8 @@ from roboirg.core.inference_facts import InferenceFacts, inference_facts
 from roboirg.evaluation.analysis.methods.method_sections import make_sections
 from roboirg.evaluation.analysis.methods.method_text import FORMATS, write_methods
 from roboirg.evaluation.analysis.methods.played_facts import NO_NETWORK, NOT_REPORTED
+from roboirg.evaluation.plan.plan import Plan
+from roboirg.evaluation.plan.stored_plans import write_plan
 from roboirg.evaluation.play.rollout_result import RolloutResult, make_record
 from roboirg.evaluation.records.record import Record
 from roboirg.evaluation.records.store import RecordStore
@@ -25,6 +27,10 @@ from roboirg.main import app
 from roboirg.policies.by_name.loading import load_policy_class
 from roboirg.policies.by_name.policy_classes import BUILTIN
 
+HORIZON = "Horizon and control rate"
+STEPS = "step limit of a rollout"
+SECONDS = "limits of wall-clock time, by the run's newest plan"
+CONTROL = "positive control, another policy that reads the simulator's state"
 ITEMS = {
     "Terms",
     "Horizon and control rate",
@@ -57,7 +63,7 @@ def sections(folder: Path, *records: Record) -> dict[str, dict[str, str]]:
     with RecordStore(folder) as store:
         for one in records:
             store.append(one)
-    return json.loads(write_methods(make_sections(folder, ()), "json"))
+    return json.loads(write_methods(make_sections(folder), "json"))
 
 
 def test_every_item_is_there_and_what_is_unknown_is_not_reported(tmp_path: Path) -> None:
@@ -88,10 +94,13 @@ def test_what_a_policy_declares_and_its_process_reports_is_there(tmp_path: Path)
         record(1, outcome="failure", steps=10, calls=1, attempt=2, **known),
     )
     assert "actions: ee_pose (" in found["Horizon and control rate"]["mine"]
-    assert "10.0 on average" in found["Horizon and control rate"]["mine"]
+    assert "10.0 control steps on average" in found["Horizon and control rate"]["mine"]
     for word in ("bfloat16", "cuda:0", "torch 2.9", "3.12.1"):
         assert word in found["Precision of inference"]["mine"]
-    assert "cameras: front" in found["Observations"]["mine"]
+    assert (
+        "cameras given to it: front, each 256 × 256 pixels as rendered"
+        in found["Observations"]["mine"]
+    )
     assert "resized to 224" in found["Observations"]["mine"]
     assert "sent: in lower case" in found["Instructions"]["mine"]
     assert found["Use of the words in training"]["mine"].endswith("explicit")
@@ -107,8 +116,25 @@ def test_a_server_speaks_for_its_own_process(tmp_path: Path) -> None:
     text = found["Precision of inference"]["mine"]
     assert "computed by its server" in text
     assert "number type of inference: float16" in text
-    assert f"versions of libraries: {NOT_REPORTED}" in text
+    assert f"versions of libraries: {NOT_REPORTED} by the server" in text
+    assert f"version: {NOT_REPORTED} by the server" in text
     assert "3.11" not in text
+    assert f"length of a chunk: {NOT_REPORTED} by the server" in found[HORIZON]["mine"]
+
+
+@pytest.mark.parametrize(
+    ("libraries", "version"),
+    [
+        ({"numpy": "2"}, f"that of roboirg ({NOT_REPORTED} by the server);"),
+        ({"roboirg": "0.1.0"}, "that of roboirg;"),
+    ],
+)
+def test_a_built_in_policy_has_the_version_of_its_package(
+    tmp_path: Path, libraries: dict[str, str], version: str
+) -> None:
+    server = {"server": "localhost:8000", "version": "built-in", "libraries": libraries}
+    found = sections(tmp_path, record(0, policy_metadata=server))
+    assert f"version: {version}" in found["Precision of inference"]["mine"]
 
 
 def test_an_episode_that_was_played_again_counts_once(tmp_path: Path) -> None:
@@ -145,12 +171,12 @@ def test_texts_and_templates_are_counted(tmp_path: Path) -> None:
     told = {record(episode, setting="direct").command for episode in range(4)}
     counts = found["Instructions"]
     direct = {record(episode, setting="direct").instruction for episode in range(4)}
-    assert counts["explicit, arm told"].startswith(f"{len(told)} distinct texts, from ")
+    assert counts["explicit, arm told"].startswith(f"{len(told)} distinct texts; command")
     assert counts["direct, arm silent"] == "1 distinct text, fixed"
     (label,) = set(found["Use of the words in training"]) - {"mine"}
     seen = found["Use of the words in training"][label]
-    assert f"{len(told) + len(direct)} texts: cannot occur, as their templates" in seen
-    assert "1 text: not reported" in seen
+    assert f"{len(told) + len(direct)} texts: none, because the templates are held out" in seen
+    assert "1 text: none, because such texts are for control arms only" in seen
 
 
 def test_each_other_analysis_has_a_verdict_or_a_reason(tmp_path: Path) -> None:
@@ -162,14 +188,42 @@ def test_each_other_analysis_has_a_verdict_or_a_reason(tmp_path: Path) -> None:
     ]
     found = sections(tmp_path, *played)["Sensitivity to analysis choices"]
     assert found["mine, direct less explicit"] == (
-        "no clear difference; 3 scenes played in both settings, whose smallest possible p is 0.25, "
-        "too large to be clear; in other analyses: no clear difference with seed 0, seed 1, equal "
-        "weights of difficulties; clearly lower with unit rollout"
+        "open; 3 paired scenes, too few for any verdict but open (p cannot be below 0.25); "
+        "does not hold in 1 of 4: unit rollout (lower)"
     )
-    without = found["mine, other analyses that change nothing here"]
+    tried, _, without = found["mine, other analyses of differences to explicit"].partition("; ")
+    assert tried == "tried: seed 0, seed 1, unit rollout, equal weights of difficulties"
     for choice in ("errors as failures", "unit task", "equal weights of suites", "one processor"):
         assert choice in without
-    assert "seed 0" not in without
+    assert found["mine, contrasts of arms"] == "none played"
+
+
+def test_limits_are_the_benchmarks_or_set_for_the_run(tmp_path: Path) -> None:
+    found = sections(tmp_path, record(0))["Horizon and control rate"]
+    assert "1300 control steps of the policy (the benchmark's limit)" in found[STEPS]
+    assert found[SECONDS].startswith(f"{NOT_REPORTED}; ")
+    fields = {"policies": ("mine",), "tasks": ("PickXtimes",), "episodes": (0,)}
+    write_plan(Plan(**fields, policy_timeout_s=30), tmp_path)
+    shorter = msgspec.structs.replace(record(1), max_steps=200)
+    found = sections(tmp_path, shorter)["Horizon and control rate"]
+    assert "200, 1300 control steps of the policy (set for this run; the" in found[STEPS]
+    assert (
+        "30 s per call of the policy (set for this run; the benchmark's limit is 600)"
+        in (found[SECONDS])
+    )
+    assert "7200 s per rollout (the benchmark's limit)" in found[SECONDS]
+
+
+def test_what_cannot_show_anything_is_named(tmp_path: Path) -> None:
+    """A bootstrap over two scenes, and a policy as its own positive control."""
+    two = [msgspec.structs.replace(record(episode), privileged=True) for episode in (0, 1)]
+    found = sections(tmp_path / "few", *two)
+    assert "to mean anything: PickXtimes (2)" in found["Statistics"]["intervals"]
+    assert found["Controls and floors"][CONTROL] == "none, as mine (privileged) is the only policy"
+    other = [msgspec.structs.replace(record(episode), policy="other") for episode in range(3)]
+    found = sections(tmp_path / "more", *two, *other)
+    assert found["Statistics"]["intervals"].endswith("to mean anything: none")
+    assert found["Controls and floors"][CONTROL] == "mine (privileged): explicit 100.0 %"
 
 
 @pytest.mark.parametrize("name", FORMATS)

@@ -13,13 +13,13 @@ from roboirg.core.errors import InvalidValueError
 from roboirg.evaluation.analysis.stats.paired_tests import sign_flip_test
 from roboirg.evaluation.analysis.stats.run_data import RunData
 from roboirg.evaluation.analysis.stats.sensitivity import (
-    choices_for,
     gap_contrasts,
+    offers_for,
     policy_contrasts,
     swap_test,
     try_choices,
 )
-from roboirg.evaluation.analysis.tables.sensitivity_table import make_sensitivity_table
+from roboirg.evaluation.analysis.tables.diagnostic_tables import make_sensitivity_table
 
 OUTCOMES = {"1": "success", "0": "failure", "!": "error"}
 
@@ -33,7 +33,7 @@ def gaps(results: list):
 
 
 def exceptions(found) -> set[str]:
-    return {f"{one.group} {one.name}".strip() for one in found.exceptions}
+    return {one.label for one in found.exceptions}
 
 
 def test_a_large_gap_holds_in_all(result) -> None:
@@ -53,7 +53,7 @@ def test_a_large_gap_holds_in_all(result) -> None:
         )
     ]
     (found,) = gaps(results)
-    assert (found.label, found.verdict) == ("direct", "lower")
+    assert (found.label, found.verdict) == ("direct less explicit", "lower")
     assert not found.exceptions
     assert found.sentence == "holds in all 8 other analyses"
 
@@ -69,7 +69,7 @@ def test_a_gap_of_one_task_goes_without_it(result) -> None:
     assert found.verdict == "lower"
     # Two tasks are too few units of their own, and without the first one nothing differs.
     assert exceptions(found) == {"unit task", "without PickXtimes"}
-    assert "does not hold in 2 of" in found.sentence
+    assert "does not hold in 2 of 3: unit task (open), " in found.sentence
 
 
 def test_errors_decide_if_they_count_as_failures(result) -> None:
@@ -80,7 +80,7 @@ def test_errors_decide_if_they_count_as_failures(result) -> None:
     (found,) = gaps(results)
     assert found.verdict == "open"
     (choice,) = found.exceptions
-    assert (choice.group, found.others[choice]) == ("errors as failures", "lower")
+    assert (choice.label, found.others[choice]) == ("errors as failures", "lower")
 
 
 def test_each_seed_alone_and_rollouts_as_units(result) -> None:
@@ -89,9 +89,7 @@ def test_each_seed_alone_and_rollouts_as_units(result) -> None:
         results += play(result, "1" * 10, policy_seed=seed)
         results += play(result, outcomes, policy_seed=seed, setting="direct")
     (found,) = gaps(results)
-    assert {"seed 0", "seed 1", "seed 2", "unit rollout"} == {
-        f"{one.group} {one.name}" for one in found.others
-    }
+    assert {"seed 0", "seed 1", "seed 2", "unit rollout"} == {one.label for one in found.others}
     assert found.verdict == "lower"
     assert exceptions(found) == {"seed 1", "seed 2"}
 
@@ -110,15 +108,16 @@ def test_weights_decide_where_suites_are_uneven(result) -> None:
 
 def test_only_choices_that_can_change_anything_are_tried(result) -> None:
     one_task = [*play(result, "1111"), *play(result, "0000", setting="direct")]
-    assert choices_for(gap_contrasts(one_task)) == ()
+    assert not gaps(one_task)[0].others
+    assert all(not one.differs for one in offers_for(gap_contrasts(one_task)))
     mixed = play(result, "1111", processor="a") + play(
         result, "0000", setting="direct", processor="a"
     )
     other = play(result, "1111", task="BinFill", processor="b")
     other += play(result, "1111", task="BinFill", setting="direct", processor="b")
-    groups = [one.group for one in choices_for(gap_contrasts([*mixed, *other]))]
-    assert "one processor" in groups
-    assert "seed" not in groups
+    labels = [one.label for one in gaps([*mixed, *other])[0].others]
+    assert "one processor" in labels
+    assert "seed 0" not in labels
 
 
 def test_two_policies_are_compared_in_what_both_played(result) -> None:
@@ -157,9 +156,10 @@ def test_the_table_names_what_changes_a_verdict(result) -> None:
     table = make_sensitivity_table(RunData.of([("run", results)]))
     (row,) = table.rows
     words = dict(zip((one.name for one in table.columns), row.entries, strict=True))
-    assert words["gap"].word == "lower"
-    assert words["without"].word == "open (PickXtimes)"
-    assert words["unit"].word == "open (task)"
-    assert words["holds in"].word == "1 of 3"
+    assert row.name == "direct less explicit"
+    assert words["verdict"].word == "lower"
+    assert words["in other analyses"].word == (
+        "does not hold in 2 of 3: unit task (open), without PickXtimes (open)"
+    )
     with pytest.raises(InvalidValueError, match="explicit and another setting"):
         make_sensitivity_table(RunData.of([("run", play(result, "11"))]))

@@ -15,9 +15,9 @@ pytestmark = pytest.mark.slow
 
 ROOT = Path(__file__).parents[2]
 RECIPES = {
-    "task": ("tasks.md", "Add a task"),
-    "setting": ("language.md", "Add a setting"),
-    "protocol": ("policies.md", "Add a protocol"),
+    "task": ("add-task.md", "Add a task"),
+    "setting": ("add-setting.md", "Add a setting"),
+    "protocol": ("add-protocol.md", "Add a protocol"),
 }
 PYPROJECT = """\
 [build-system]
@@ -61,7 +61,7 @@ for (task, setting), expected in test_golden.GOLDEN.items():
 def recipe(page: str, heading: str) -> str:
     """The first Python block of a section, as it stands in the docs."""
     text = (ROOT / "docs" / page).read_text()
-    section = re.search(rf"^##+ {heading}\n(.*?)(?=^##|\Z)", text, flags=re.DOTALL | re.MULTILINE)
+    section = re.search(rf"^#+ {heading}\n(.*?)(?=^##|\Z)", text, flags=re.DOTALL | re.MULTILINE)
     assert section, f"docs/{page} has no section {heading!r}"
     block = re.search(r"```python\n(.*?)```", section[1], flags=re.DOTALL)
     assert block, f"the section {heading!r} of docs/{page} has no Python block"

@@ -22,7 +22,7 @@ from roboirg.tasks import get_task
 from roboirg.tasks.splits.splits import SIZES, get_episode
 
 GROUNDED = tuple(task for task in TASKS if "grounded" in settings_of(get_task(task)))
-DOCS = Path(__file__).parents[2] / "docs/language.md"
+DOCS = Path(__file__).parents[2] / "docs/grounded.md"
 SCENES = 120
 DIFFICULTIES = ("easy", "medium", "hard")
 
@@ -37,7 +37,7 @@ def told(task):
 
 
 def table():
-    """The rows of the table of docs/language.md, by task and slot."""
+    """The rows of the table of docs/grounded.md, by task and slot."""
     text = DOCS.read_text().partition("| task | slot | easy / medium / hard |")[2]
     rows = (line.split(" | ") for line in text.split("\n\n")[0].splitlines()[2:])
     return {

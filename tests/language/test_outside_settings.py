@@ -157,9 +157,9 @@ def test_statistics_figure_and_export_have_the_setting(register, tmp_path):
 
 
 def recipe():
-    """The file that docs/language.md shows under "Add a setting"."""
-    page = (Path(__file__).parents[2] / "docs" / "language.md").read_text()
-    section = page[page.index("### Add a setting") :]
+    """The file that docs/add-setting.md shows under "Add a setting"."""
+    page = (Path(__file__).parents[2] / "docs" / "add-setting.md").read_text()
+    section = page[page.index("## Add a setting") :]
     return re.search(r"```python\n(.*?)```", section, re.DOTALL)[1]
 
 

@@ -115,7 +115,7 @@ def test_a_file_by_hand(tmp_path):
 
 
 def test_the_example_in_the_docs_is_read_and_valid():
-    page = (Path(__file__).parents[2] / "docs" / "language.md").read_text()
+    page = (Path(__file__).parents[2] / "docs" / "wording-files.md").read_text()
     (example,) = re.findall(r'```toml\n(name = "workshop".*?)```', page, re.DOTALL)
     identity = register_wordings(parse_wordings(example, "example"))
     for task in ("PickXtimes", "VideoUnmask"):

@@ -8,11 +8,12 @@ from types import SimpleNamespace
 import pytest
 
 from roboirg.core.episode import Goal
+from roboirg.core.errors import InvalidValueError
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.evaluation.analysis.stats.chance import silent_chance
 from roboirg.evaluation.analysis.stats.intervals import wilson_interval
 from roboirg.language import expressible
-from roboirg.language.arms import ArmWords, find_arm_refusal, say_arm
+from roboirg.language.arms import ArmWords, say_arm
 from roboirg.policies import make_policy
 from roboirg.policies.by_name.loading import is_privileged
 from roboirg.tasks import all_tasks, with_goal
@@ -37,9 +38,10 @@ def scenes(count: int = 50) -> tuple[Scene, ...]:
 @functools.cache
 def words(task: str, index: int, arm: str) -> ArmWords | None:
     episode, options = get_episode(task, "test", index), InstructionOptions(SETTING)
-    if find_arm_refusal(episode, options, arm) is not None:
+    try:
+        return say_arm(episode, options, arm)
+    except InvalidValueError:
         return None
-    return say_arm(episode, options, arm)
 
 
 def chosen(policy: str, said: ArmWords, seed: int = 0) -> Goal | None:

@@ -40,7 +40,7 @@ def test_folders_that_are_no_checkpoints_are_one_sentence_each(tmp_path, monkeyp
         "/none/of/it": "There is no folder '/none/of/it'",
         "outputs/act": f"has no config.json; name 'outputs/act/{last}'",
         f"outputs/act/{last}/config.json": "There is no folder",
-        "data": "has no config.json; it is a data set, from which lerobot-train makes",
+        "data": "has no config.json; it is a dataset, from which lerobot-train makes",
         "empty": "has no config.json; a checkpoint of LeRobot holds config.json, model.saf",
         "laptop": "needs 'observation.images.laptop'; there are observation.state, obs",
         "foreign": "describes no policy of LeRobot",

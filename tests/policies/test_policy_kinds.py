@@ -1,4 +1,4 @@
-"""Kinds of policies that other packages add: the recipe of docs/policies.md, as it stands."""
+"""Kinds of policies that other packages add: the recipe of docs/add-protocol.md, as it stands."""
 
 import re
 import sys
@@ -13,7 +13,7 @@ from roboirg.policies.builtin.random_policy import RandomPolicy
 from roboirg.policies.by_name import policy_specs
 from roboirg.policies.by_name.loading import is_foreign, needs_host
 
-PAGE = (Path(__file__).parents[2] / "docs" / "policies.md").read_text(encoding="utf-8")
+PAGE = (Path(__file__).parents[2] / "docs" / "add-protocol.md").read_text(encoding="utf-8")
 
 
 def fenced(language, word):

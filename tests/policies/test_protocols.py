@@ -29,7 +29,8 @@ from roboirg.policies.remote.endpoints import RemoteOptions
 from roboirg.policies.remote.protocols import all_protocols, protocols_by_scheme
 from roboirg.policies.remote.transport import Transport
 
-PAGE = (Path(__file__).parents[2] / "docs" / "policies.md").read_text()
+PAGE = (Path(__file__).parents[2] / "docs" / "servers.md").read_text()
+RECIPE = (Path(__file__).parents[2] / "docs" / "add-protocol.md").read_text()
 
 
 @contextmanager
@@ -55,7 +56,7 @@ def _fresh_registry():
 
 
 def fenced(language, word):
-    blocks = re.findall(rf"```{language}\n(.*?)```", PAGE, flags=re.DOTALL)
+    blocks = re.findall(rf"```{language}\n(.*?)```", RECIPE, flags=re.DOTALL)
     return next(block for block in blocks if word in block)
 
 

@@ -327,7 +327,7 @@ def test_a_place_tells_no_color_but_that_of_another_cube():
 
 def test_the_documentation_says_what_is_measured():
     """The rows of chance and of the rules, over the whole test split."""
-    page = (Path(__file__).parents[2] / "docs" / "language.md").read_text(encoding="utf-8")
+    page = (Path(__file__).parents[2] / "docs" / "floors.md").read_text(encoding="utf-8")
     table = page.split("| | direct | contextual | contextual, competing |")[1].split("\n\n")[0]
     competing = InstructionOptions(distractor="competing")
     tasks, columns = tuple(all_tasks()), ("direct", "contextual", "reasoning", "spatial")

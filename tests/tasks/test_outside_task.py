@@ -1,4 +1,4 @@
-"""The task of the recipe in docs/tasks.md: one file from outside, and it works everywhere."""
+"""The task of the recipe in docs/add-task.md: one file from outside, and it works everywhere."""
 
 import importlib.util
 import re
@@ -20,7 +20,7 @@ from roboirg.policies import make_policy, play
 from roboirg.tasks.splits import splits
 from roboirg.tasks.splits.splits import get_episode, make_episode
 
-PAGE = (Path(__file__).parents[2] / "docs" / "tasks.md").read_text()
+PAGE = (Path(__file__).parents[2] / "docs" / "add-task.md").read_text()
 NAME = "PlaceAndPress"
 
 

@@ -44,7 +44,7 @@ def export(
     run: Folder,
     out: Annotated[Path, typer.Option(help="Parquet file to write.")],
 ) -> None:
-    """Export the records of a run as a Parquet table (columns: see docs/running.md).
+    """Export the records of a run as a Parquet table (columns: see docs/record.md).
 
     Example: roboirg records export runs/first --out first.parquet
     """

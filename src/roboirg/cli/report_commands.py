@@ -84,13 +84,11 @@ def report(
 
 
 def _print_methods(folder: Path, name: str) -> None:
-    from roboirg.cli import run_commands
     from roboirg.evaluation.analysis.methods.method_sections import make_sections
     from roboirg.evaluation.analysis.methods.method_text import FORMATS, write_methods
 
     known_names("format of a methods section", name, tuple(FORMATS))
-    sections = make_sections(folder, run_commands.planned_jobs(folder))
-    typer.echo(write_methods(sections, name), nl=False)
+    typer.echo(write_methods(make_sections(folder), name), nl=False)
 
 
 def _serve(folder: Path, port: int, against: str | None) -> None:

@@ -64,7 +64,7 @@ class FactTraits:
         lasts: whether it never ceases to hold.
         undone_by_release: whether letting the object go takes the act back. Looking under a
             container cannot be taken back.
-        timeline: what a time line shows of it: nothing, its start, or start and end.
+        timeline: what a timeline shows of it: nothing, its start, or start and end.
         detect: finds the facts of this kind; None for the kinds of this package, which
             `roboirg.simulation.fact_detection` finds.
     """

@@ -6,6 +6,7 @@ import contextlib
 import importlib.metadata
 import platform
 import sys
+from collections import Counter
 from collections.abc import Iterator, Mapping
 from typing import Annotated, Any
 
@@ -15,6 +16,7 @@ Word = Annotated[str, msgspec.Meta(max_length=100)]
 Words = Annotated[tuple[Word, ...], msgspec.Meta(max_length=20)]
 
 LIBRARIES = (
+    "roboirg",
     "numpy",
     "torch",
     "jax",
@@ -56,22 +58,17 @@ def inference_facts(policy: object) -> InferenceFacts:
     known = getattr(policy, "inference", None)
     if isinstance(known, InferenceFacts):
         return known
-    dtypes: dict[str, int] = {}
-    devices: dict[str, int] = {}
+    dtypes: Counter[str] = Counter()
+    devices: Counter[str] = Counter()
     for parameter in _parameters(policy):
         for counts, value in ((dtypes, parameter.dtype), (devices, parameter.device)):
-            name = str(value).removeprefix("torch.")[:100]
-            counts[name] = counts.get(name, 0) + int(parameter.numel())
+            counts[str(value).removeprefix("torch.")[:100]] += int(parameter.numel())
     return InferenceFacts(
         python=platform.python_version(),
         libraries=_libraries(),
-        dtypes=_most_frequent(dtypes),
-        devices=_most_frequent(devices),
+        dtypes=tuple(name for name, _ in dtypes.most_common(20)),
+        devices=tuple(name for name, _ in devices.most_common(20)),
     )
-
-
-def _most_frequent(counts: Mapping[str, int]) -> tuple[str, ...]:
-    return tuple(sorted(counts, key=lambda name: (-counts[name], name))[:20])
 
 
 def _libraries() -> dict[str, str]:

@@ -162,7 +162,7 @@ class FetchedDemonstration(Mapping[str, NDArray[Any]]):
 
 
 def proprioception(joints: NDArray[Any], gripper: NDArray[Any]) -> NDArray[np.float32]:
-    """Return the state as openpi, MME-VLA and our LeRobot data sets define it.
+    """Return the state as openpi, MME-VLA and our LeRobot datasets define it.
 
     Args:
         joints: (..., 7) rad.

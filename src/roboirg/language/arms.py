@@ -90,15 +90,6 @@ def say_arm(episode: Episode, options: InstructionOptions, arm: str = TOLD) -> A
     return ArmWords(stated, told, None if stated is episode else episode)
 
 
-def find_arm_refusal(episode: Episode, options: InstructionOptions, arm: str) -> str | None:
-    """Return why an episode has no such arm in these words; None if it has."""
-    try:
-        say_arm(episode, options, arm)
-    except InvalidValueError as error:
-        return str(error)
-    return None
-
-
 def _paraphrase(
     episode: Episode, options: InstructionOptions, told: Instruction, number: int
 ) -> Instruction:

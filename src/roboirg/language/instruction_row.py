@@ -1,4 +1,4 @@
-"""An instruction as one row of plain JSON values; `docs/language.md` explains the columns."""
+"""An instruction as a row of plain JSON values; docs/instruction-data.md explains the columns."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ ExportRow = dict[str, Any]
 
 
 def row(episode: Episode, instruction: Instruction) -> ExportRow:
-    """Return an instruction as a row; `docs/language.md` explains the columns."""
+    """Return an instruction as a row; `docs/instruction-data.md` explains the columns."""
     metadata: Mapping[str, Any] = instruction.metadata
     return {
         "id": f"{episode.key}/{instruction.setting}/{instruction.form}",

@@ -130,7 +130,7 @@ def _check_folder(folder: Path) -> None:
     if nearer:
         hint = f"name {str(nearer[0])!r}."
     elif (folder / "meta" / "info.json").is_file():
-        hint = "it is a data set, from which lerobot-train makes a checkpoint."
+        hint = "it is a dataset, from which lerobot-train makes a checkpoint."
     else:
         hint = f"a checkpoint of LeRobot holds {', '.join(_FILES)}."
     raise InvalidValueError(f"The folder {str(folder)!r} has no {missing[0]}; {hint}")

@@ -1,4 +1,4 @@
-"""Names and units of what LeRobot stores of an arm: of a robot, and in the data sets it records."""
+"""Names and units of what LeRobot stores of an arm: of a robot, and in the datasets it records."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ FINGER_RANGE = 0.04
 
 
 class LeRobotFeatures(UrlOptions):
-    """Names and units, after ``?`` in the spec of a robot or a data set.
+    """Names and units, after ``?`` in the spec of a robot or a dataset.
 
     Attributes:
         joint: name of a joint's position in observations and actions; ``{}`` is 1 to 7.

@@ -1,6 +1,6 @@
 """lerobot://path-or-hub-id: policies trained with LeRobot, in this process.
 
-A checkpoint declares its inputs. Its names are those of LeRobot's data sets of this robot:
+A checkpoint declares its inputs. Its names are those of LeRobot's datasets of this robot:
 ``observation.images.front``, ``observation.images.wrist``, ``observation.state`` (seven joints and
 the first finger) and the text ``task``. Its actions are absolute joint targets and the gripper, +1
 open to -1 closed.
@@ -358,7 +358,7 @@ def _describe(config: Any, before: Sequence[str], after: Sequence[str]) -> dict[
     ]
     found: dict[str, Any] = {
         "preprocessing": f"inputs {', '.join(inputs)}; pictures scaled to [0, 1], as in LeRobot's "
-        "data sets; then the checkpoint's own steps, saved with it in training: "
+        "datasets; then the checkpoint's own steps, saved with it in training: "
         f"{', '.join(before) or 'none'}; on its actions: {', '.join(after) or 'none'}"
     }
     tokenizers = [name for name in before if "tokenizer" in name]

@@ -67,7 +67,7 @@ class Commands:
 
 @dataclass(frozen=True, slots=True)
 class Task:
-    """One task, of this package or another (docs/tasks.md, "Add a task").
+    """One task, of this package or another (docs/add-task.md).
 
     Attributes:
         name: as in RoboMME and the paper, for example ``"PickXtimes"``.

@@ -113,7 +113,7 @@ def decode_png(content: bytes) -> Pixels:
 
     found = cv2.imdecode(np.frombuffer(content, np.uint8), cv2.IMREAD_COLOR)
     if found is None:
-        raise InvalidValueError("A picture of the data set is damaged.")
+        raise InvalidValueError("A picture of the dataset is damaged.")
     return np.asarray(cv2.cvtColor(found, cv2.COLOR_BGR2RGB), dtype=np.uint8)
 
 

@@ -1,4 +1,4 @@
-"""Data sets in the layout that LeRobot 0.6 writes when it records an arm, small and synthetic."""
+"""Datasets in the layout that LeRobot 0.6 writes when it records an arm, small and synthetic."""
 
 import csv
 import json

@@ -175,4 +175,4 @@ def test_a_stopped_replay_goes_on_where_it_was(roboirg, export, monkeypatch, tmp
 def test_a_folder_without_a_data_set_cannot_be_replayed(roboirg, tmp_path):
     code, _, err = roboirg("replay", tmp_path)
     assert code == 2
-    assert "holds no data set" in err
+    assert "holds no dataset" in err

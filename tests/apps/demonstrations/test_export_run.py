@@ -49,7 +49,7 @@ def start(out):
 
 
 def check_never_broken(out):
-    """Check that what is there is a data set that can be read as a whole, or none at all."""
+    """Check that what is there is a dataset that can be read as a whole, or none at all."""
     for root in (out, out / export_run.VIDEO_DATASET):
         if not (root / "meta/info.json").exists():
             continue

@@ -34,7 +34,7 @@ def decoded(entry):
 
 
 def load_v3(root):
-    """Read a data set of version 3 as LeRobot does: by its own metadata."""
+    """Read a dataset of version 3 as LeRobot does: by its own metadata."""
     info = read_json(root / "meta/info.json")
     episodes = parquet.read_table(root / "meta/episodes/chunk-000/file-000.parquet").to_pylist()
     for row in episodes:

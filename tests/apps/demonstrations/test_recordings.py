@@ -29,7 +29,7 @@ def texts(rows):
 
 @pytest.fixture
 def export(tmp_path, monkeypatch, capsys):
-    """Call the command for the data set ``recorded`` with options in its spec and words behind."""
+    """Call the command for the dataset ``recorded`` with options in its spec and words behind."""
     monkeypatch.setattr(processor, "worker_count", lambda _: 0)  # processes start slowly
 
     def call(options="", *words, data="recorded"):
@@ -76,10 +76,10 @@ def test_a_number_that_is_missing_is_named(tmp_path, rows, texts, export):
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        ("", "There is no wrist camera 'wrist'; the data set has front, hand. Name it: "),
+        ("", "There is no wrist camera 'wrist'; the dataset has front, hand. Name it: "),
         ("?wrist=palm", "There is no wrist camera 'palm'"),
         ("?wrist=hand&joint=arm_{}", "observation.state has no arm_1, arm_2"),
-        ("?wrist=hand&hand=wrist", "no option of data set"),
+        ("?wrist=hand&hand=wrist", "no option of dataset"),
         ("?wrist", "options are written ?name=value"),
     ],
 )
@@ -228,7 +228,7 @@ def test_other_folders_are_refused_in_a_sentence(tmp_path, texts, export):
         info.write_text(info.read_text().replace("v3.0", "v2.1"))
         code, _, err = export(data=data)
         assert code == 2
-        assert "is no data set of LeRobot's format v3.0" in err
+        assert "is no dataset of LeRobot's format v3.0" in err
         assert message in err
     info.write_text(info.read_text().replace("v2.1", "v3.0"))
     (tmp_path / "study/demonstrations.csv").unlink()

@@ -135,5 +135,5 @@ def test_a_missing_camera_is_refused(study, rows, tmp_path, capsys):
     texts = [row["instruction"] for row in rows]
     root = record(tmp_path / "recorded", texts, cameras=("front",))
     assert call("export", "recordings", study, root, "--out", tmp_path / "data") == 2
-    assert "There is no wrist camera 'wrist'; the data set has front." in capsys.readouterr().err
+    assert "There is no wrist camera 'wrist'; the dataset has front." in capsys.readouterr().err
     assert not (tmp_path / "data").exists()

@@ -7,8 +7,15 @@ import pytest
 from plan_files import plan_file
 from typer.testing import CliRunner
 
-from roboirg.apps.learning.policy.moves import decisions_of
-from roboirg.apps.learning.policy.recording import load_recording, record_episode, save_recording
+from roboirg.apps.learning.policy.moves import common_moves, decisions_of
+from roboirg.apps.learning.policy.policy_plan import PolicyPlan, Recorded
+from roboirg.apps.learning.policy.recording import (
+    ExpertRecording,
+    load_recording,
+    record_episode,
+    save_recording,
+)
+from roboirg.apps.learning.policy.sight import sight_of, turns_of
 from roboirg.apps.learning.policy.waypoint_expert import Disturbance, WaypointExpert
 from roboirg.core.errors import InvalidValueError, MissingDependencyError
 from roboirg.envs.factory import make
@@ -61,6 +68,98 @@ def test_labels_are_the_expert_s_own_while_the_way_is_disturbed(recorded):
     assert recorded.status == "success"
     plain = record_episode(episode, 1, None)
     assert not np.array_equal(plain.tool[: len(recorded.tool)], recorded.tool[: len(plain.tool)])
+
+
+def made_up(actions, looks):
+    """Return a recording of these waypoints at one thing, at looks in which nothing moves."""
+    length = max(looks) + 1
+    times = np.arange(length)
+    return ExpertRecording(
+        key="made/up/0",
+        names=("cube",),
+        classes=("cube",),
+        things=np.zeros((length, 1, 4), np.float32),
+        visible=np.ones((length, 1), bool),
+        tool=np.zeros((length, 7), np.float32),
+        is_video=np.zeros(length, bool),
+        steps=times,
+        done=np.zeros_like(times),
+        looks=np.array(looks),
+        actions=np.array(actions, np.float32),
+        anchors=np.zeros(len(actions), int),
+        turns=("align",) * len(actions),
+        pictures={},
+        status="success",
+    )
+
+
+def test_a_move_that_was_not_made_has_the_label_of_the_one_that_was():
+    down, close = [0, 0, 0.02, 0, 0, 0, 0], [0, 0, 0.02, 0, 0, 0, -1]
+    above = [0, 0, 0.15, 0, 0, 0, 0]
+    found = decisions_of(made_up([above, down, down, close, above], [0, 1, 2, 3, 4]))
+    assert [one.look for one in found] == [0, 1, 2, 4]
+    assert [one.move.gripper for one in found] == [0, -1, -1, 0]
+
+
+@pytest.mark.sim
+def test_looks_count_the_stages_that_are_completed(recorded):
+    episode = get_episode("ButtonUnmask", "random", 0)
+    assert recorded.done[0] == 0
+    assert (np.diff(recorded.done) >= 0).all()
+    assert len(episode.stages) - 1 <= recorded.done[-1] <= len(episode.stages)
+
+
+@pytest.mark.sim
+def test_an_interrupted_training_goes_on_where_it_was(recorded, tmp_path):
+    torch = pytest.importorskip("torch")
+    from roboirg.apps.learning.listener.listener_net import make_vocabulary
+    from roboirg.apps.learning.policy.body_training import train_body
+
+    plan = PolicyPlan(("ButtonUnmask",), body_epochs=4)
+    episode = get_episode("ButtonUnmask", "random", 0)
+    sight, decisions = sight_of([recorded]), decisions_of(recorded)
+    vocabulary = make_vocabulary([""], sight.classes, plan.tasks)
+
+    def stop(work, done, total):
+        if done == 2:
+            raise KeyboardInterrupt
+
+    def train(name, progress):
+        folder = tmp_path / name
+        folder.mkdir(exist_ok=True)
+        learned = [Recorded(episode, recorded)] * 3
+        moves = common_moves([decisions])
+        return train_body(
+            plan, learned, [decisions] * 3, moves, sight, vocabulary, folder, progress
+        )
+
+    whole = train("whole", lambda *_: None)
+    with pytest.raises(KeyboardInterrupt):
+        train("parts", stop)
+    passes = []
+    parts = train("parts", lambda work, done, total: passes.append(done))
+    assert passes == [3, 4]
+    for name, value in whole.state_dict().items():
+        assert torch.equal(value, parts.state_dict()[name]), name
+    curve = json.loads((tmp_path / "parts" / "body-recurrent-0.json").read_text())
+    assert [one["epoch"] for one in curve] == [1, 2, 3, 4]
+    assert (tmp_path / "parts" / "body-recurrent-0.png").exists()
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_moved_and_mirrored_pictures_keep_their_labels(seed):
+    pytest.importorskip("torch")
+    from roboirg.apps.learning.policy.thing_detector import LabeledPicture, varied
+
+    picture = np.zeros((256, 256, 3), np.uint8)
+    picture[100, 50] = 255
+    turns = turns_of(np.array([0.2]))
+    view = LabeledPicture(picture, np.array([0]), np.array([[50.0, 100.0]]), turns)
+    found = varied(view, np.random.default_rng(seed))
+    ((row, column),) = np.argwhere(found.picture[..., 0] == 255)
+    assert found.points.tolist() == [[column, row]]
+    is_mirrored = column > 128
+    assert np.allclose(found.turns, turns_of(np.array([-0.2 if is_mirrored else 0.2])))
 
 
 @pytest.mark.sim

@@ -42,7 +42,7 @@ _TEST_WORDS = (
 
 @spread
 def export_demonstrations(
-    out: Annotated[Path, typer.Option(help="Folder of the data set.")],
+    out: Annotated[Path, typer.Option(help="Folder of the dataset.")],
     format: Annotated[  # noqa: A002
         str, typer.Option(help="lerobot-v3, lerobot-v2.1 or robomme-hdf5.")
     ] = "lerobot-v3",
@@ -124,7 +124,7 @@ def export_recordings(
         str, typer.Argument(help="Folder of LeRobot's recording; DIR?front=NAME names a feature.")
     ],
     out: Annotated[
-        Path | None, typer.Option(help="Folder of the new data set.  (only check)")
+        Path | None, typer.Option(help="Folder of the new dataset.  (only check)")
     ] = None,
     format: Annotated[  # noqa: A002
         str, typer.Option(help="lerobot-v3, lerobot-v2.1 or robomme-hdf5.")
@@ -196,7 +196,7 @@ def replay(
         typer.Option(help="File with a line for each result; what is in it is not replayed again."),
     ] = None,
 ) -> None:
-    """Execute the actions of a data set in the simulator, and compare states and verdicts.
+    """Execute the actions of a dataset in the simulator, and compare states and verdicts.
 
     Example: roboirg replay data
     """

@@ -1,4 +1,4 @@
-"""The data card: what a data set holds, and the lines that train from it."""
+"""The data card: what a dataset holds, and the lines that train from it."""
 
 from __future__ import annotations
 
@@ -26,13 +26,13 @@ _BINS = 12
 def card_text(
     plan: ExportPlan, parts: Sequence[DatasetPart], facts: Sequence[TrajectoryFacts], root: Path
 ) -> str:
-    """Return the card of a data set as Markdown, with the head that Hugging Face reads.
+    """Return the card of a dataset as Markdown, with the head that Hugging Face reads.
 
     Args:
         plan: what is exported.
-        parts: of the data set.
+        parts: of the dataset.
         facts: of all trajectories, those that are left out, too.
-        root: folder of the data set.
+        root: folder of the dataset.
     """
     lengths = list(_lengths(parts))
     rows = np.repeat([length for length, *_ in lengths], [count for *_, count in lengths])
@@ -123,7 +123,7 @@ def _content_lines(plan: ExportPlan, facts: Sequence[TrajectoryFacts]) -> Iterat
     if plan.video == "prefix":
         yield "Frames of the video come before the policy's, with `is_video_demo`."
     elif plan.video == "sidecar":
-        yield "Frames of the videos are in the data set `demonstration_videos` next to this one."
+        yield "Frames of the videos are in the dataset `demonstration_videos` next to this one."
     else:
         yield "Frames of the videos are left out."
     if plan.pictures == "none":

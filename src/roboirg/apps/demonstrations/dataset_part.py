@@ -1,4 +1,4 @@
-"""Parts of a data set, each written at once from recorded trajectories."""
+"""Parts of a dataset, each written at once from recorded trajectories."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ class RecordedEpisode(NamedTuple):
 
     Attributes:
         path: of the trajectory's file.
-        texts: with their places in the data set.
+        texts: with their places in the dataset.
     """
 
     path: Path
@@ -37,8 +37,8 @@ class DatasetPart:
     """What is written at once; a part that is complete is never written again.
 
     Attributes:
-        number: of the part in its data set.
-        root: folder of the data set.
+        number: of the part in its dataset.
+        root: folder of the dataset.
         columns: of its frames.
         episodes: of the part.
     """
@@ -65,13 +65,13 @@ class DatasetWriter(Protocol):
         *,
         is_video: bool = False,
     ) -> list[DatasetPart]:
-        """Return the parts of the data set, or of the videos' frames, in order."""
+        """Return the parts of the dataset, or of the videos' frames, in order."""
 
     def write_part(self, part: DatasetPart) -> None:
         """Write the frames of a part; runs in a worker process."""
 
     def finish(self, plan: ExportPlan, root: Path, parts: Sequence[DatasetPart]) -> None:
-        """Write what describes all parts; its last file makes the data set readable."""
+        """Write what describes all parts; its last file makes the dataset readable."""
 
 
 class RecordedTexts(NamedTuple):
@@ -120,7 +120,7 @@ def read_episodes(
 
 
 def episode_row(trajectory: Trajectory, placed: PlacedText, length: int) -> dict[str, Any]:
-    """Return the row of an episode in the table of facts next to the data set."""
+    """Return the row of an episode in the table of facts next to the dataset."""
     facts = trajectory.facts
     words = placed.words
     options = asdict(words.options) | {"stages": list(words.options.stages)}
@@ -155,4 +155,4 @@ def _trajectory_name(facts: TrajectoryFacts, options: Mapping[str, Any]) -> str:
 _OPTIONS = ("delivery",)
 """Options that a row of the instructions lacks."""
 EPISODE_TABLE = "meta/demonstrations.parquet"
-"""Path of the table of facts in a data set."""
+"""Path of the table of facts in a dataset."""

@@ -1,4 +1,4 @@
-"""Read the states and actions of a data set, whatever its format, without its pictures."""
+"""Read the states and actions of a dataset, whatever its format, without its pictures."""
 
 from __future__ import annotations
 
@@ -25,17 +25,17 @@ _JOINTS = 7
 
 @dataclass(frozen=True, eq=False)
 class ReplayableTrajectory:
-    """What a data set says of one trajectory.
+    """What a dataset says of one trajectory.
 
     Attributes:
         name: of the trajectory, for messages.
         task: name of the task.
         seed: of the scene.
-        split: of the episode; None if the data set does not say, as RoboMME's.
+        split: of the episode; None if the dataset does not say, as RoboMME's.
         index: of the episode in the split; None likewise.
         actions: (n, 8) that the policy executed.
         states: (n, 8) after each of the actions: joints (rad) and the first finger (m).
-        final_state: (9,) joints and both fingers at the end; None if the data set does not say.
+        final_state: (9,) joints and both fingers at the end; None if the dataset does not say.
         status: how it ended; RoboMME's are successes.
     """
 
@@ -51,13 +51,13 @@ class ReplayableTrajectory:
 
 
 def read_dataset(path: Path) -> Iterator[ReplayableTrajectory]:
-    """Yield every trajectory of a data set once, whatever the number of its instructions.
+    """Yield every trajectory of a dataset once, whatever the number of its instructions.
 
     Args:
         path: folder of an export, or of RoboMME's HDF5 files, or one of these files.
 
     Raises:
-        InvalidValueError: the path holds no data set that can be read.
+        InvalidValueError: the path holds no dataset that can be read.
         MissingDependencyError: a package is not installed.
     """
     if path.is_file() and _HDF5_NAME.fullmatch(path.name):
@@ -69,7 +69,7 @@ def read_dataset(path: Path) -> Iterator[ReplayableTrajectory]:
     files = _hdf5_files(path)
     if not files:
         raise InvalidValueError(
-            f"{str(path)!r} holds no data set: neither a complete export of ours nor RoboMME's "
+            f"{str(path)!r} holds no dataset: neither a complete export of ours nor RoboMME's "
             "files record_dataset_TASK.h5."
         )
     return _read_hdf5(files)

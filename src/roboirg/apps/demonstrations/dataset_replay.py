@@ -1,4 +1,4 @@
-"""Replay a data set: execute its actions in the simulator and compare states and verdicts."""
+"""Replay a dataset: execute its actions in the simulator and compare states and verdicts."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ class ReplayResult:
 
 
 def replay_dataset(path: Path, workers: int, log: Path | None = None) -> Iterator[ReplayResult]:
-    """Replay every trajectory of a data set, and yield the results as they come.
+    """Replay every trajectory of a dataset, and yield the results as they come.
 
     Args:
         path: see `read_dataset`.
@@ -62,8 +62,8 @@ def replay_dataset(path: Path, workers: int, log: Path | None = None) -> Iterato
         log: gets a line for each result; what is in it already is not replayed again.
 
     Raises:
-        InvalidValueError: the path holds no data set, or one of episodes that do not exist here;
-            or the log is of another data set, or no log.
+        InvalidValueError: the path holds no dataset, or one of episodes that do not exist here;
+            or the log is of another dataset, or no log.
         MissingDependencyError: a package is not installed.
     """
     trajectories = list(read_dataset(path))

@@ -56,17 +56,17 @@ class ExportPlan:
         settings: names.
         forms: implicit, resolved or both.
         options: all other options of the words.
-        format: of the data set.
+        format: of the dataset.
         pictures: how they are stored.
         cameras: whose pictures are stored.
         size: width and height of the pictures, pixels.
-        video: frames of the video: left out, before the policy's frames, or a data set apart.
+        video: frames of the video: left out, before the policy's frames, or a dataset apart.
         names: of the features: LeRobot's or openpi's.
         extra_actions: further descriptions of each action.
         variations: trajectories per episode; all but the first vary.
         policy: who moves the robot.
         outcomes: whether failures are exported too.
-        language_columns: whether the data set has LeRobot's language columns.
+        language_columns: whether the dataset has LeRobot's language columns.
     """
 
     tasks: tuple[str, ...]
@@ -166,7 +166,7 @@ class ExportPlan:
         )
 
     def fingerprint(self) -> str:
-        """Return a hash of everything that determines the data set."""
+        """Return a hash of everything that determines the dataset."""
         versions = [LANGUAGE_VERSION, ENVIRONMENT_VERSION, TRAJECTORY_VERSION]
         text = json.dumps([asdict(self), versions])
         return hashlib.sha256(text.encode()).hexdigest()
@@ -245,7 +245,7 @@ def plan_episodes(plan: ExportPlan) -> Iterator[Episode]:
 
 
 def recording_jobs(plan: ExportPlan) -> list[tuple[RecordingJob, tuple[TaskText, ...]]]:
-    """Return the trajectories of a plan in the order of the data set, with their instructions.
+    """Return the trajectories of a plan in the order of the dataset, with their instructions.
 
     Raises:
         InvalidValueError: no setting can express any of the episodes.

@@ -1,7 +1,7 @@
 """Run an export: record what is missing, write the parts, then what describes them.
 
 All work is resumable: trajectories and parts appear under their names only when they are complete,
-and what makes the data set readable is written last.
+and what makes the dataset readable is written last.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ from roboirg.util.parquet_support import check_parquet_support
 
 WORK_FOLDER = ".export"
 VIDEO_DATASET = "demonstration_videos"
-"""Folder of the data set of the videos' frames."""
+"""Folder of the dataset of the videos' frames."""
 EXPORT_FILE = "meta/export.json"
 """What was exported, with its fingerprint; written when everything else is complete."""
 
@@ -65,7 +65,7 @@ class TrajectorySource(NamedTuple):
     """Where the trajectories of an export come from.
 
     Attributes:
-        jobs: the trajectories with their instructions, in the order of the data set.
+        jobs: the trajectories with their instructions, in the order of the dataset.
         record: writes the file of one into a folder; can be pickled.
     """
 
@@ -79,8 +79,8 @@ class ExportSummary(NamedTuple):
     Attributes:
         recorded: trajectories recorded by this call.
         statuses: how many trajectories ended how.
-        episodes: in the data set.
-        size: of the data set, bytes.
+        episodes: in the dataset.
+        size: of the dataset, bytes.
     """
 
     recorded: int
@@ -108,7 +108,7 @@ def run_export(
 
     Args:
         plan: what to export.
-        out: folder of the data set, new or of the same plan.
+        out: folder of the dataset, new or of the same plan.
         workers: processes; 0 uses this one.
         report: called with the progress.
         trajectories: folder that keeps the recorded trajectories, for other formats and settings;
@@ -261,7 +261,7 @@ def _is_wanted(plan: ExportPlan, facts: TrajectoryFacts) -> bool:
 
 @dataclass(frozen=True)
 class _Dataset:
-    """One data set of an export: the main one, or that of the videos' frames."""
+    """One dataset of an export: the main one, or that of the videos' frames."""
 
     root: Path
     parts: Sequence[DatasetPart]
@@ -313,7 +313,7 @@ def _finish(
     datasets: Sequence[_Dataset],
     facts: Sequence[TrajectoryFacts],
 ) -> int:
-    """Write what describes the data sets, the main one last. Returns its number of episodes."""
+    """Write what describes the datasets, the main one last. Returns its number of episodes."""
     for dataset in datasets:
         card = data_card.card_text(plan, dataset.parts, facts, dataset.root)
         write_atomically(dataset.root / "README.md", card)

@@ -1,4 +1,4 @@
-"""Statistics of a data set's features, as LeRobot stores them, computed in one pass."""
+"""Statistics of a dataset's features, as LeRobot stores them, computed in one pass."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The columns of a data set's frames, for both versions of LeRobot's format."""
+"""The columns of a dataset's frames, for both versions of LeRobot's format."""
 
 from __future__ import annotations
 
@@ -36,11 +36,11 @@ _KEYS: Mapping[str, Mapping[str, str]] = {
 
 
 class PlacedText(NamedTuple):
-    """An instruction at its place in a data set.
+    """An instruction at its place in a dataset.
 
     Attributes:
         words: the instruction.
-        episode_index: of its episode in the data set.
+        episode_index: of its episode in the dataset.
         first_index: index of its first frame among all frames.
         task_index: of its text among all texts.
     """
@@ -53,11 +53,11 @@ class PlacedText(NamedTuple):
 
 @dataclass(frozen=True)
 class FrameColumns:
-    """Names and contents of the columns of one data set.
+    """Names and contents of the columns of one dataset.
 
     Args:
         plan: what is exported.
-        is_video_part: whether this is the data set of the videos' frames, and not the main one.
+        is_video_part: whether this is the dataset of the videos' frames, and not the main one.
     """
 
     plan: ExportPlan

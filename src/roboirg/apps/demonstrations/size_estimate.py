@@ -38,9 +38,9 @@ class SizeEstimate(NamedTuple):
 
     Attributes:
         trajectories: to record.
-        episodes: of the data set: instructions of all trajectories.
-        frames: of the data set.
-        size: of the data set, bytes; its working files need as much again while it is written,
+        episodes: of the dataset: instructions of all trajectories.
+        frames: of the dataset.
+        size: of the dataset, bytes; its working files need as much again while it is written,
             at most.
     """
 

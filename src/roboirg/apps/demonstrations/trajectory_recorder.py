@@ -110,7 +110,7 @@ class PictureTracks:
     def _count_last(self) -> None:
         """Count the values of the row before.
 
-        The last row of all is never counted: no action follows it, so data sets leave it out.
+        The last row of all is never counted: no action follows it, so datasets leave it out.
         """
         if self._uncounted is not None:
             pictures, part = self._uncounted
@@ -146,7 +146,7 @@ def record_trajectory(
 ) -> TrajectoryFacts:
     """Play an episode and write its trajectory; the file appears whole or not at all.
 
-    Actions are rounded to float32 before they are executed, so that a data set holds exactly what
+    Actions are rounded to float32 before they are executed, so that a dataset holds exactly what
     was executed.
 
     Args:

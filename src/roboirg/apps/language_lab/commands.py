@@ -49,7 +49,7 @@ def export_instructions(
     settings: Settings = "all",
     words: PlanWords = NO_PLAN,
 ) -> None:
-    """Export a row per episode, setting and form (columns: see docs/language.md).
+    """Export a row per episode, setting and form (columns: see docs/instruction-data.md).
 
     Example: roboirg export instructions --split val --out words.parquet
     """

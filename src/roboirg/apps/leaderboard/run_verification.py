@@ -22,7 +22,7 @@ from roboirg.evaluation.plan.stored_plans import kept_fingerprints, read_plans
 from roboirg.evaluation.records.record import Summary
 from roboirg.evaluation.records.record_codec import identity_key
 from roboirg.evaluation.records.store import StoredRun, read_summaries
-from roboirg.language.arms import find_arm_refusal
+from roboirg.language.arms import say_arm
 from roboirg.tasks.splits.private_splits import check_salt
 from roboirg.tasks.splits.splits import get_episode
 from roboirg.util.parallel_map import parallel_map
@@ -183,6 +183,7 @@ def _is_expressible(
 ) -> bool:
     """Return whether an episode exists and has words; what has none is named by its record."""
     try:
-        return find_arm_refusal(get_episode(task, split, episode), options, arm) is None
+        say_arm(get_episode(task, split, episode), options, arm)
     except RoboIRGError:
         return False
+    return True

@@ -9,6 +9,7 @@ from typing import Any, TypeVar
 import torch
 
 from roboirg.core.errors import InvalidValueError
+from roboirg.util.atomic_write import replacing
 
 Trained = TypeVar("Trained")
 
@@ -23,6 +24,25 @@ def save_trained(content: Mapping[str, Any], path: Path) -> None:
         torch.save(dict(content), path)
     except (OSError, RuntimeError) as error:
         raise InvalidValueError(f"Cannot write {path}: {error}.") from error
+
+
+def save_unfinished(content: Mapping[str, Any], made_of: object, path: Path) -> None:
+    """Write what was learned on the way, whole or not at all, with what it was made of."""
+    with replacing(path) as part:
+        torch.save({**content, "made_of": made_of}, part)
+
+
+def load_unfinished(path: Path, made_of: object) -> dict[str, Any] | None:
+    """Return what was learned on the way; None unless it was made of the same."""
+    try:
+        content: dict[str, Any] = torch.load(path, weights_only=True)
+    except FileNotFoundError:
+        return None
+    except Exception as error:
+        raise InvalidValueError(
+            f"{str(path)!r} cannot be read ({type(error).__name__}); delete it to learn it again."
+        ) from error
+    return content if content.get("made_of") == made_of else None
 
 
 def load_trained(

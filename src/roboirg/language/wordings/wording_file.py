@@ -1,6 +1,6 @@
 """Wording files: read them, and check them.
 
-`docs/language.md`, "Words from outside", explains the format.
+`docs/wording-files.md` explains the format.
 """
 
 from __future__ import annotations

@@ -71,7 +71,7 @@ def _place(episode_index: int) -> dict[str, int]:
 
 
 def finish(plan: ExportPlan, root: Path, parts: Sequence[DatasetPart]) -> None:
-    """Write the metadata; ``info.json``, without which nothing reads the data set, comes last."""
+    """Write the metadata; ``info.json``, without which nothing reads the dataset, comes last."""
     del plan
     columns = parts[0].columns
     episodes, stats, facts = [], [], []

@@ -97,7 +97,7 @@ def own_columns(
 
 
 def info_features(columns: FrameColumns) -> dict[str, dict[str, Any]]:
-    """Return the features of a data set of version 3."""
+    """Return the features of a dataset of version 3."""
     found = columns.features()
     if columns.plan.language_columns:
         found |= language_columns.LANGUAGE_FEATURES
@@ -105,7 +105,7 @@ def info_features(columns: FrameColumns) -> dict[str, dict[str, Any]]:
 
 
 def finish(plan: ExportPlan, root: Path, parts: Sequence[DatasetPart]) -> None:
-    """Write the metadata; ``info.json``, without which nothing reads the data set, comes last."""
+    """Write the metadata; ``info.json``, without which nothing reads the dataset, comes last."""
     del plan
     columns = parts[0].columns
     stats = _StatsCollector(columns)
@@ -263,7 +263,7 @@ def _info(
 
 
 def count_frames(columns: FrameColumns, last: RecordedEpisode) -> tuple[int, int]:
-    """Return the numbers of episodes and frames of a data set, given what comes last in it."""
+    """Return the numbers of episodes and frames of a dataset, given what comes last in it."""
     placed = last.texts[-1]
     length = len(columns.rows(load_trajectory(last.path).facts))
     return placed.episode_index + 1, placed.first_index + length

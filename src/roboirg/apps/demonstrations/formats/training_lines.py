@@ -1,4 +1,4 @@
-"""Ready lines for the trainers that read a data set."""
+"""Ready lines for the trainers that read a dataset."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ VQ-BeT, which takes one camera. None of the three reads the instruction: train t
 time. With `null`, they begin without the weights of ImageNet, and nothing is downloaded.
 """
 _PYAV = " --dataset.video_backend=pyav"
-"""Of a data set with videos; LeRobot's usual decoder, torchcodec, needs FFmpeg on the system."""
+"""Of a dataset with videos; LeRobot's usual decoder, torchcodec, needs FFmpeg on the system."""
 
 _LEROBOT_ON_ROBOT = """\
 ```sh
@@ -60,7 +60,7 @@ lines have not been run here: the weights and a GPU were not at hand.
 """
 
 _OPENPI = """\
-openpi reads this data set with the LeRobot that it pins. Save the following as
+openpi reads this dataset with the LeRobot that it pins. Save the following as
 `roboirg_config.py` next to openpi's `scripts/`, and start training through it:
 
 ```python
@@ -147,11 +147,11 @@ nothing here acts in these spaces. Recording ends with the success, so that no t
 
 
 def training_text(plan: ExportPlan, root: Path) -> str:
-    """Return what to do with a data set, as Markdown.
+    """Return what to do with a dataset, as Markdown.
 
     Args:
         plan: what is exported.
-        root: folder of the data set.
+        root: folder of the dataset.
     """
     from roboirg.apps.demonstrations.frame_columns import FrameColumns
 

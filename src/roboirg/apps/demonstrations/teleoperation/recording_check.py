@@ -1,4 +1,4 @@
-"""Whether a recorded data set is what the study planned: words, balance, cameras, rate, units."""
+"""Whether a recorded dataset is what the study planned: words, balance, cameras, rate, units."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ class CheckedRecording(NamedTuple):
     """What a check found.
 
     Attributes:
-        problems: sentences; none if the data set is as planned.
+        problems: sentences; none if the dataset is as planned.
         takes: the demonstration of each episode, in the order of the episodes.
         moved: how many were not recorded in the planned order.
     """
@@ -73,7 +73,7 @@ def read_takes(study: Path) -> tuple[PlannedTake, ...]:
 
 
 def check_recording(dataset: TeleopDataset, planned: Sequence[PlannedTake]) -> CheckedRecording:
-    """Compare a data set with the plan."""
+    """Compare a dataset with the plan."""
     takes = _matched(dataset.texts, planned)
     problems = [*_form_problems(dataset), *_word_problems(dataset.texts, planned)]
     problems = problems or list(_value_problems(dataset))
@@ -100,7 +100,7 @@ def _form_problems(dataset: TeleopDataset) -> Iterator[str]:
     for camera in CAMERAS:
         if (name := getattr(dataset.names, camera)) not in dataset.cameras:
             yield (
-                f"There is no {camera} camera {name!r}; the data set has "
+                f"There is no {camera} camera {name!r}; the dataset has "
                 f"{', '.join(dataset.cameras) or 'none'}. Name it: {root}?{camera}=NAME."
             )
     for feature in (STATE, ACTION):

@@ -1,4 +1,4 @@
-"""Convert a recorded data set into the trainers' formats, by way of our trajectories."""
+"""Convert a recorded dataset into the trainers' formats, by way of our trajectories."""
 
 from __future__ import annotations
 
@@ -47,12 +47,12 @@ def export_recording(
     workers: int,
     report: Report,
 ) -> ExportSummary:
-    """Write a checked data set in a trainer's format; see `run_export`.
+    """Write a checked dataset in a trainer's format; see `run_export`.
 
     Args:
         dataset: the recording.
         takes: the demonstration of each of its episodes.
-        out: folder of the new data set.
+        out: folder of the new dataset.
         data_format: one of `FORMATS`.
         workers: processes; 0 uses this one.
         report: called with the progress.

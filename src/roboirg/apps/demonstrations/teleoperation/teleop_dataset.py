@@ -1,4 +1,4 @@
-"""Read a data set of LeRobot 3.0 that was recorded on an arm, under the names that it has there."""
+"""Read a dataset of LeRobot 3.0 that was recorded on an arm, under the names that it has there."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ _VERSION = "v3.0"
 
 @dataclass(frozen=True)
 class TeleopDataset:
-    """A recorded data set; frames and pictures are read when they are asked for.
+    """A recorded dataset; frames and pictures are read when they are asked for.
 
     Attributes:
         root: its folder.
@@ -52,7 +52,7 @@ class TeleopDataset:
         return tuple(" / ".join(episode["tasks"]) for episode in self.episodes)
 
     def columns(self, feature: str) -> list[str]:
-        """Return the names of a vector's entries; empty if the data set has no such vector."""
+        """Return the names of a vector's entries; empty if the dataset has no such vector."""
         return list(self.info["features"].get(feature, {}).get("names") or [])
 
     def vectors(self, index: int, feature: str) -> NDArray[np.float64]:
@@ -115,18 +115,18 @@ class TeleopDataset:
 
 
 def open_teleop(spec: str) -> TeleopDataset:
-    """Open a data set.
+    """Open a dataset.
 
     Args:
         spec: its folder, with names that differ from the usual: ``DIR?front=top&degrees=true``.
 
     Raises:
-        InvalidValueError: the folder holds no data set of LeRobot 3.0, or an option is wrong.
+        InvalidValueError: the folder holds no dataset of LeRobot 3.0, or an option is wrong.
         MissingDependencyError: pyarrow is not installed.
     """
     check_parquet_support()
     folder, _, query = spec.partition("?")
-    names = check_options(LeRobotFeatures, parse_query(spec, query), f"data set {spec!r}")
+    names = check_options(LeRobotFeatures, parse_query(spec, query), f"dataset {spec!r}")
     root = Path(folder)
     try:
         info = json.loads((root / "meta/info.json").read_text(encoding="utf-8"))
@@ -138,5 +138,5 @@ def open_teleop(spec: str) -> TeleopDataset:
         return TeleopDataset(root, names, info, tuple(episodes))
     except (OSError, ValueError, KeyError) as error:
         raise InvalidValueError(
-            f"{folder!r} is no data set of LeRobot's format {_VERSION}: {error}."
+            f"{folder!r} is no dataset of LeRobot's format {_VERSION}: {error}."
         ) from error

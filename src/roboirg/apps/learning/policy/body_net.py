@@ -16,8 +16,10 @@ LAYERS = 2
 WAVES = 5
 CLOSED = -1e4
 """Score of a thing that cannot be chosen."""
-TOOL_NUMBERS = 9
-"""x, y, z, cosine and sine of its angle, a finger's opening, video or not, time, and its log."""
+TOOL_NUMBERS = 7
+"""x, y, z, cosine and sine of its angle, a finger's opening, video or not."""
+MOST_DONE = 24
+"""Stages that are told apart; more count as this many."""
 
 
 class EpisodeBatch(NamedTuple):
@@ -35,6 +37,7 @@ class EpisodeBatch(NamedTuple):
         decisions: (B, D) looks.
         moves: (B, D) kinds of waypoints; -1 where there is none.
         things: (B, D) tracks; -1 where none is chosen.
+        done: (B, D) completed stages; -1 where there is no decision.
     """
 
     classes: Tensor
@@ -48,6 +51,21 @@ class EpisodeBatch(NamedTuple):
     decisions: Tensor
     moves: Tensor
     things: Tensor
+    done: Tensor
+
+
+class BodyAnswer(NamedTuple):
+    """What a body says at B × D decisions.
+
+    Attributes:
+        moves: (B, D, M) logits of kinds of waypoints.
+        things: (B, D, M, K) logits of things for each kind.
+        done: (B, D, MOST_DONE + 1) logits of how many stages are completed; only learned from.
+    """
+
+    moves: Tensor
+    things: Tensor
+    done: Tensor
 
 
 class BodyNet(nn.Module):
@@ -77,12 +95,13 @@ class BodyNet(nn.Module):
         )
         self.encoder = nn.TransformerEncoder(layer, LAYERS, enable_nested_tensor=False)
         self.move = nn.Linear(WIDTH, len(at_things))
+        self.done = nn.Linear(WIDTH, MOST_DONE + 1)
         self.query = nn.Embedding(len(at_things), WIDTH)
         self.key = nn.Linear(WIDTH, WIDTH)
         self.mixed = nn.Linear(WIDTH, WIDTH)
 
-    def forward(self, batch: EpisodeBatch) -> tuple[Tensor, Tensor]:
-        """Return logits of kinds (B, D, M), and of things for each kind (B, D, M, K)."""
+    def forward(self, batch: EpisodeBatch) -> BodyAnswer:
+        """Return what is said at the decisions."""
         goal = self.goal(batch.goals)[:, None]
         looks = self._looks(batch, goal)
         remembered = self.memory(looks, batch.decisions)
@@ -93,12 +112,11 @@ class BodyNet(nn.Module):
         hidden = torch.cat([torch.zeros_like(closed[:, :1]), closed], 1)
         encoded = self.encoder(tokens, src_key_padding_mask=hidden)
         first, rest = encoded[:, 0], encoded[:, 1:]
-        moves = self.move(first)
         queries = self.query.weight[None] + self.mixed(first)[:, None]
         scores = queries @ self.key(rest).transpose(1, 2) / math.sqrt(WIDTH)
         scores = scores.masked_fill(closed[:, None], CLOSED)
-        shape = batch.decisions.shape
-        return moves.view(*shape, -1), scores.view(*shape, *scores.shape[1:])
+        every = self.move(first), scores, self.done(first)
+        return BodyAnswer(*(one.unflatten(0, batch.decisions.shape) for one in every))
 
     def _looks(self, batch: EpisodeBatch, goal: Tensor) -> Looks:
         tool = batch.tool[:, :, None]

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import json
+import math
 import random
 from collections.abc import Sequence
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any
 
 import numpy as np
 import torch
@@ -14,37 +14,30 @@ from torch import Tensor
 from torch.nn import functional
 
 from roboirg.apps.learning.listener.listener_net import Vocabulary
-from roboirg.apps.learning.policy.body_net import CLOSED, BodyNet, EpisodeBatch
+from roboirg.apps.learning.policy.body_net import (
+    CLOSED,
+    MOST_DONE,
+    BodyAnswer,
+    BodyNet,
+    EpisodeBatch,
+)
 from roboirg.apps.learning.policy.moves import ExpertDecision, Move
 from roboirg.apps.learning.policy.policy_data import EpisodeNumbers, to_batch, to_numbers
 from roboirg.apps.learning.policy.policy_model import goal_numbers, make_body
 from roboirg.apps.learning.policy.policy_plan import PolicyPlan, Recorded
 from roboirg.apps.learning.policy.sight import Sight, SightNoise
-from roboirg.apps.learning.trainer import Progress, Trainer, batch_count, even_batches
+from roboirg.apps.learning.policy.training_curve import BodyScore, save_curve
+from roboirg.apps.learning.trained_file import load_unfinished, save_unfinished
+from roboirg.apps.learning.trainer import Progress, Trainer, even_batches
 from roboirg.policies.vlm.goal_schema import goal_schema
 
 RATE = 2e-3
 BATCH = 16
-NEW_NOISE_EVERY = 5
+COUNT_WEIGHT = 0.5
+NEW_NOISE_EVERY = 2
 """Passes after which the noise of the detector is drawn anew."""
 HELD_BACK = 10
 """Every tenth episode is not learned from, but shows how learning goes."""
-
-
-class BodyScore(NamedTuple):
-    """How many decisions a body makes as the expert does.
-
-    Attributes:
-        epoch: passes so far.
-        loss: mean over batches of episodes that it learned from.
-        moves: share of right kinds of waypoints in episodes held back.
-        things: share of right things in them, given the kind.
-    """
-
-    epoch: int
-    loss: float
-    moves: float
-    things: float
 
 
 def train_body(
@@ -59,7 +52,6 @@ def train_body(
 ) -> BodyNet:
     """Return a body that has learned from recordings, and write how it learned."""
     torch.manual_seed(plan.seed)
-    rng, noise_rng = random.Random(plan.seed), np.random.default_rng(plan.seed)
     body = make_body(sight, vocabulary, moves, plan.memory)
     numbers = {move: number for number, move in enumerate(moves)}
     goals = [
@@ -69,32 +61,60 @@ def train_body(
         for one in recorded
     ]
 
-    def see() -> list[EpisodeNumbers]:
+    def see(times: int) -> list[EpisodeNumbers]:
+        rng = np.random.default_rng((plan.seed, times))
         return [
-            to_numbers(one.recording, own, goal, sight, numbers, SightNoise(), noise_rng)
+            to_numbers(one.recording, own, goal, sight, numbers, SightNoise(), rng)
             for one, own, goal in zip(recorded, decisions, goals, strict=True)
         ]
 
-    shown = see()
-    count = batch_count([one for number, one in enumerate(shown) if number % HELD_BACK], BATCH)
+    held_back = -(-len(recorded) // HELD_BACK)
+    count = math.ceil((len(recorded) - held_back) / BATCH)
     trainer = Trainer[EpisodeNumbers](
         body,
         lambda batch: body_loss(body, to_batch(batch)),
         RATE,
         plan.body_epochs * count,
     )
+    path = folder / f"body-{plan.memory}-{plan.seed}.pt"
+    made_of = _made_of(plan, recorded, moves, sight, vocabulary)
+    kept = load_unfinished(path, made_of)
     scores: list[BodyScore] = []
-    for epoch in range(plan.body_epochs):
-        if epoch and epoch % NEW_NOISE_EVERY == 0:
-            shown = see()
+    if kept is not None:
+        trainer.restore(kept)
+        scores = [BodyScore(*one) for one in kept["scores"]]
+    shown: list[EpisodeNumbers] = []
+    for epoch in range(len(scores), plan.body_epochs):
+        if not shown or epoch % NEW_NOISE_EVERY == 0:
+            shown = see(epoch // NEW_NOISE_EVERY)
         learned = [one for number, one in enumerate(shown) if number % HELD_BACK]
-        loss = trainer.run(even_batches(learned, rng, _length, BATCH))
+        order = random.Random(f"{plan.seed}/{epoch}")
+        loss = trainer.run(even_batches(learned, order, _length, BATCH))
         scores.append(BodyScore(epoch + 1, loss, *score(body, shown[::HELD_BACK])))
+        save_unfinished(
+            {**trainer.state(), "scores": [tuple(one) for one in scores]}, made_of, path
+        )
         progress("body", epoch + 1, plan.body_epochs)
     body.eval()
-    curve = folder / f"body-{plan.memory}-{plan.seed}.json"
-    curve.write_text(json.dumps([one._asdict() for one in scores]), encoding="utf-8")
+    save_curve(scores, path)
     return body
+
+
+def _made_of(
+    plan: PolicyPlan,
+    recorded: Sequence[Recorded],
+    moves: Sequence[Move],
+    sight: Sight,
+    vocabulary: Vocabulary,
+) -> list[Any]:
+    """Return what a body depends on; the words are not among it."""
+    return [
+        [one.episode.key for one in recorded],
+        [list(move) for move in moves],
+        list(sight.classes),
+        [list(vocabulary.tasks), list(vocabulary.parts)],
+        plan.body_epochs,
+    ]
 
 
 def _length(one: EpisodeNumbers) -> int:
@@ -102,11 +122,17 @@ def _length(one: EpisodeNumbers) -> int:
 
 
 def body_loss(body: BodyNet, batch: EpisodeBatch) -> Tensor:
-    """Return the loss of kinds of waypoints, and of things given the right kind."""
-    kinds, things = body(batch)
-    there = batch.moves >= 0
-    loss = functional.cross_entropy(kinds[there], batch.moves[there])
-    chosen, wanted = _chosen(things, batch)
+    """Return the loss of kinds of waypoints, of things given the right kind, and of the count.
+
+    The number of completed stages is not acted on, but at each decision it says what a memory
+    should have kept, which the moves show only where a count ends.
+    """
+    answer: BodyAnswer = body(batch)
+    there, decided = batch.moves >= 0, batch.done >= 0
+    loss = functional.cross_entropy(answer.moves[there], batch.moves[there])
+    done = batch.done[decided].clamp(max=MOST_DONE)
+    loss = loss + COUNT_WEIGHT * functional.cross_entropy(answer.done[decided], done)
+    chosen, wanted = _chosen(answer.things, batch)
     if len(wanted):
         loss = loss + functional.cross_entropy(chosen, wanted)
     return loss
@@ -124,20 +150,20 @@ def _chosen(things: Tensor, batch: EpisodeBatch) -> tuple[Tensor, Tensor]:
 
 
 @torch.no_grad()
-def score(body: BodyNet, episodes: Sequence[EpisodeNumbers]) -> tuple[float, float]:
-    """Return the shares of right kinds of waypoints and of right things."""
+def score(body: BodyNet, episodes: Sequence[EpisodeNumbers]) -> tuple[float, ...]:
+    """Return the shares of right kinds of waypoints, of right things and of right counts."""
     body.eval()
-    right = {"moves": [0, 0], "things": [0, 0]}
+    right = {"moves": [0, 0], "things": [0, 0], "done": [0, 0]}
     for start in range(0, len(episodes), BATCH):
         batch = to_batch(episodes[start : start + BATCH])
-        kinds, things = body(batch)
-        there = batch.moves >= 0
-        chosen, wanted = _chosen(things, batch)
+        answer: BodyAnswer = body(batch)
+        there, decided = batch.moves >= 0, batch.done >= 0
+        chosen, wanted = _chosen(answer.things, batch)
         for name, found, meant in (
-            ("moves", kinds[there].argmax(-1), batch.moves[there]),
+            ("moves", answer.moves[there].argmax(-1), batch.moves[there]),
             ("things", chosen.argmax(-1), wanted),
+            ("done", answer.done[decided].argmax(-1), batch.done[decided].clamp(max=MOST_DONE)),
         ):
             right[name][0] += int((found == meant).sum())
             right[name][1] += len(meant)
-    moves, those = (own / max(1, every) for own, every in right.values())
-    return moves, those
+    return tuple(own / max(1, every) for own, every in right.values())

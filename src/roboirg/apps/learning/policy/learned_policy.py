@@ -42,7 +42,6 @@ class LearnedPolicy:
         self._seen: SeenEpisode | None = None
         self._heard: list[str] = []
         self._goal: NDArray[np.float32] | None = None
-        self._steps = 0
 
     @property
     def metadata(self) -> dict[str, Any]:
@@ -53,14 +52,15 @@ class LearnedPolicy:
         """Begin an episode, and see the video."""
         from roboirg.apps.learning.policy.policy_model import SeenEpisode
 
-        self._heard, self._goal, self._steps = [instruction], None, 0
+        self._heard, self._goal = [instruction], None
         self._seen = SeenEpisode(self._model)
         length = len(demonstration["joint_positions"])
         if length:
-            times = list(range(0, length, LOOK_EVERY))
             poses, fingers = demonstration["end_effector"], demonstration["gripper"]
-            tools = [np.append(poses[time], fingers[time][0]) for time in times]
-            self._seen.look(list(demonstration["front_rgb"]), tools, times, is_video=True)
+            tools = [
+                np.append(poses[time], fingers[time][0]) for time in range(0, length, LOOK_EVERY)
+            ]
+            self._seen.look(list(demonstration["front_rgb"]), tools, is_video=True)
 
     def hear(self, text: str, step: int) -> None:  # noqa: ARG002
         """Hear another utterance; the goal is understood anew."""
@@ -80,15 +80,11 @@ class LearnedPolicy:
     def _look(self, seen: SeenEpisode, observation: Observation) -> None:
         """See what happened since the last action, and what there is now."""
         passed: Sequence[Observation] = observation.get("history", ())
-        times = [self._steps + LOOK_EVERY * (place + 1) for place in range(len(passed))]
-        self._steps = times[-1] if times else self._steps
         looks: list[Mapping[str, Any]] = [*passed]
         if not passed or not _same(passed[-1], observation):
-            # Between two looks the number of steps is not known.
             looks.append(observation)
-            times.append(self._steps + (LOOK_EVERY // 2 if self._steps or passed else 0))
         pictures = [one[f"{FRONT}_rgb"] for one in looks]
-        seen.look(pictures, [_tool(one) for one in looks], times, is_video=False)
+        seen.look(pictures, [_tool(one) for one in looks], is_video=False)
 
 
 def _tool(observation: Mapping[str, Any]) -> NDArray[np.float64]:

@@ -26,7 +26,7 @@ class Looks(NamedTuple):
         whole: (B, T, WIDTH) the robot's own state and the time.
         places: (B, T, K, 2) x and y on the table, m.
         seen: (B, T, K) whether the look shows the thing.
-        known: (B, T, K) whether it was seen until then.
+        known: (B, T, K) whether it was seen until then, often enough to be no mistake.
         there: (B, T) whether the episode has the look.
     """
 
@@ -76,8 +76,8 @@ class NoMemory(LookMemory):
 
     def forward(self, looks: Looks, decisions: Tensor) -> Remembered:
         things, whole = at_looks(looks.things, decisions), at_looks(looks.whole, decisions)
-        seen = at_looks(looks.seen, decisions)
-        return Remembered(torch.zeros_like(things), torch.zeros_like(whole), seen)
+        can_choose = at_looks(looks.seen & looks.known, decisions)
+        return Remembered(torch.zeros_like(things), torch.zeros_like(whole), can_choose)
 
 
 class FrameMemory(LookMemory):
@@ -110,7 +110,8 @@ class FrameMemory(LookMemory):
             key_padding_mask=hidden.flatten(1, 2), need_weights=False,
         )  # fmt: skip
         found = found.reshape(batch, many, count + 1, width)
-        return Remembered(found[:, :, 1:], found[:, :, 0], at_looks(looks.seen, decisions))
+        can_choose = at_looks(looks.seen & looks.known, decisions)
+        return Remembered(found[:, :, 1:], found[:, :, 0], can_choose)
 
 
 class RecurrentMemory(LookMemory):

@@ -65,7 +65,7 @@ def decisions_of(recorded: ExpertRecording) -> list[ExpertDecision]:
         gripper = float(action[-1])
         is_still = gripper != LEAVE
         if is_still and found and found[-1].move.gripper == LEAVE:
-            found[-1] = found[-1]._replace(move=found[-1].move._replace(gripper=gripper))
+            _end_with(found, gripper)
             continue
         at_thing = bool(anchor >= 0)
         if at_thing or is_still:
@@ -75,6 +75,16 @@ def decisions_of(recorded: ExpertRecording) -> list[ExpertDecision]:
         )
         found.append(ExpertDecision(int(look), move, int(anchor)))
     return found
+
+
+def _end_with(found: list[ExpertDecision], gripper: float) -> None:
+    """Let the last move open or close the gripper, and the same before it that were not made."""
+    last = found[-1]
+    for number in range(len(found) - 1, -1, -1):
+        one = found[number]
+        if (one.move, one.thing) != (last.move, last.thing):
+            break
+        found[number] = one._replace(move=one.move._replace(gripper=gripper))
 
 
 def common_moves(decisions: Iterable[Sequence[ExpertDecision]]) -> tuple[Move, ...]:

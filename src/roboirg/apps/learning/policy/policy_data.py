@@ -13,11 +13,11 @@ from numpy.typing import NDArray
 from roboirg.apps.learning.policy.body_net import TOOL_NUMBERS, EpisodeBatch
 from roboirg.apps.learning.policy.moves import ExpertDecision, Move
 from roboirg.apps.learning.policy.recording import LOOK_EVERY, ExpertRecording
-from roboirg.apps.learning.policy.sight import Sight, SightNoise, labeled_looks
+from roboirg.apps.learning.policy.sight import GHOST, Sight, SightNoise, labeled_looks
 from roboirg.apps.learning.policy.tracks import LookTokens, Tracks
 
-MINUTE = 1200.0
-"""Control steps."""
+COUNTED_LOOKS = 10
+"""Looks of an episode, besides those of decisions, at which a body learns what is completed."""
 
 
 class LookNumbers(NamedTuple):
@@ -39,6 +39,7 @@ class EpisodeNumbers(NamedTuple):
     decisions: NDArray[np.int64]
     moves: NDArray[np.int64]
     things: NDArray[np.int64]
+    done: NDArray[np.int64]
 
 
 class LookHistory:
@@ -57,7 +58,7 @@ class LookHistory:
         return len(self._rows)
 
     def add(
-        self, look: LookTokens, tool: NDArray[np.floating[Any]], *, is_video: bool, step: int
+        self, look: LookTokens, tool: NDArray[np.floating[Any]], *, is_video: bool
     ) -> NDArray[np.int64]:
         """Add a look; returns the track of each of its things.
 
@@ -65,14 +66,13 @@ class LookHistory:
             look: the things.
             tool: (7,) pose and opening; see `ExpertRecording`.
             is_video: whether it is one of the video.
-            step: control steps since the start of the video or of the policy's turn.
         """
         mine = self.tracks.update(look)
         now = self.tracks
         self._rows.append(
-            (now.classes.copy(), now.places.copy(), now.turns.copy(), now.seen.copy())
+            (now.classes.copy(), now.places.copy(), now.turns.copy(), now.seen.copy(), now.known)
         )
-        self._tools.append(_tool_numbers(tool, is_video=is_video, step=step))
+        self._tools.append(_tool_numbers(tool, is_video=is_video))
         return mine
 
     def numbers(self) -> LookNumbers:
@@ -81,20 +81,17 @@ class LookHistory:
         classes = np.zeros((length, count), np.int64)
         places, turns = (np.zeros((length, count, 2), np.float32) for _ in range(2))
         seen, known = (np.zeros((length, count), bool) for _ in range(2))
-        for look, (kinds, spots, angles, shown) in enumerate(self._rows):
+        for look, (kinds, spots, angles, shown, sure) in enumerate(self._rows):
             own = len(kinds)
             classes[look, :own], places[look, :own], turns[look, :own] = kinds, spots, angles
-            seen[look, :own], known[look, :own] = shown, True
+            seen[look, :own], known[look, :own] = shown, sure
         return LookNumbers(classes, places, turns, seen, known, np.stack(self._tools))
 
 
-def _tool_numbers(
-    tool: NDArray[np.floating[Any]], *, is_video: bool, step: int
-) -> NDArray[np.float32]:
+def _tool_numbers(tool: NDArray[np.floating[Any]], *, is_video: bool) -> NDArray[np.float32]:
     x, y, z, _, _, yaw, finger = tool
     turn = math.cos(2 * yaw), math.sin(2 * yaw)
-    time = step / MINUTE, math.log1p(step) / 7.0
-    found = np.array([x, y, z * 5.0, *turn, finger * 25.0, is_video, *time], np.float32)
+    found = np.array([x, y, z * 5.0, *turn, finger * 25.0, is_video], np.float32)
     if len(found) != TOOL_NUMBERS:
         raise RuntimeError(f"The tool has {len(found)} numbers, not {TOOL_NUMBERS}.")
     return found
@@ -113,7 +110,7 @@ def to_numbers(
 
     Args:
         recorded: the episode.
-        decisions: of the episode.
+        decisions: of the episode; some looks between them are added, which have no move.
         goal: (parts,) 1 for each part of its goal.
         sight: of the camera.
         moves: the number of each kind of waypoint.
@@ -123,26 +120,28 @@ def to_numbers(
     history = LookHistory()
     track_of: dict[int, int] = {}
     times: list[int] = []
-    chosen: list[int] = []
+    asked: list[tuple[int, int, int]] = []
     due = {one.look: one for one in decisions}
     merged = set(recorded.looks.tolist()) - due.keys()
+    acting = np.flatnonzero(~recorded.is_video)
+    counted = set(rng.choice(acting, min(COUNTED_LOOKS, len(acting)), replace=False).tolist())
     for look, (tokens, objects) in enumerate(labeled_looks(recorded, sight, noise, rng)):
         if look in merged and recorded.steps[look] % LOOK_EVERY:
             continue  # who opens or closes the gripper with the move before does not look here
-        is_video, step = bool(recorded.is_video[look]), int(recorded.steps[look])
-        mine = history.add(tokens, recorded.tool[look], is_video=is_video, step=step)
+        mine = history.add(tokens, recorded.tool[look], is_video=bool(recorded.is_video[look]))
         track_of.update(zip(objects.tolist(), mine.tolist(), strict=True))
+        track_of[GHOST] = -1
+        done = int(recorded.done[look])
         if look in due:
-            times.append(len(history) - 1)
-            chosen.append(track_of.get(due[look].thing, -1))
-    own = [due[look] for look in sorted(due)]
-    return EpisodeNumbers(
-        history.numbers(),
-        goal,
-        np.array(times, np.int64),
-        np.array([moves.get(one.move, -1) for one in own], np.int64),
-        np.array(chosen, np.int64),
-    )
+            one = due[look]
+            asked.append((moves.get(one.move, -1), track_of.get(one.thing, -1), done))
+        elif look in counted:
+            asked.append((-1, -1, done))
+        else:
+            continue
+        times.append(len(history) - 1)
+    numbers = np.array(asked, np.int64)
+    return EpisodeNumbers(history.numbers(), goal, np.array(times, np.int64), *numbers.T)
 
 
 def to_batch(episodes: Sequence[EpisodeNumbers]) -> EpisodeBatch:
@@ -160,6 +159,7 @@ def to_batch(episodes: Sequence[EpisodeNumbers]) -> EpisodeBatch:
         _pad([one.decisions for one in episodes], 0),
         _pad([one.moves for one in episodes], -1),
         _pad([one.things for one in episodes], -1),
+        _pad([one.done for one in episodes], -1),
     )
 
 

@@ -18,7 +18,7 @@ from roboirg.apps.learning.listener.listener_net import (
     parts_of,
 )
 from roboirg.apps.learning.listener.object_relations import ObjectsInView, rank
-from roboirg.apps.learning.policy.body_net import BodyNet
+from roboirg.apps.learning.policy.body_net import BodyAnswer, BodyNet
 from roboirg.apps.learning.policy.moves import Move, waypoint
 from roboirg.apps.learning.policy.policy_data import EpisodeNumbers, LookHistory, to_batch
 from roboirg.apps.learning.policy.policy_plan import WORDLESS
@@ -116,7 +116,6 @@ class SeenEpisode:
         self,
         pictures: Pictures,
         tools: Sequence[NDArray[np.floating[Any]]],
-        steps: Sequence[int],
         *,
         is_video: bool,
     ) -> None:
@@ -125,18 +124,17 @@ class SeenEpisode:
         Args:
             pictures: in the order of time.
             tools: (7,) the tool's pose and a finger's opening at each.
-            steps: control steps since the start of the video or of the policy's turn.
             is_video: whether they are of the video.
         """
         for start in range(0, len(pictures), _BATCH):
             part = slice(start, start + _BATCH)
             found = self._model.detector.find(pictures[part])
-            for things, tool, step in zip(found, tools[part], steps[part], strict=True):
+            for things, tool in zip(found, tools[part], strict=True):
                 places = self._model.sight.places(things.classes, things.points)
                 tokens = LookTokens(things.classes, places, things.turns)
                 if len(self._history) in (FIRST_LOOKS if is_video else FIRST_LOOKS[:1]):
                     self._first.append(tokens)
-                self._history.add(tokens, tool, is_video=is_video, step=step)
+                self._history.add(tokens, tool, is_video=is_video)
 
     def understand(self, text: str) -> NDArray[np.float32]:
         """Return the goal that an instruction means, as `PolicyModel.understand` does."""
@@ -153,12 +151,11 @@ class SeenEpisode:
             tool: (7,) of the last look.
         """
         nothing = np.array([-1])
-        numbers = EpisodeNumbers(
-            self._history.numbers(), goal, np.array([len(self._history) - 1]), nothing, nothing
-        )
-        kinds, things = self._model.body(to_batch([numbers]))
-        kind = int(kinds[0, 0].argmax())
-        thing = int(things[0, 0, kind].argmax())
+        now = np.array([len(self._history) - 1])
+        numbers = EpisodeNumbers(self._history.numbers(), goal, now, nothing, nothing, nothing)
+        answer: BodyAnswer = self._model.body(to_batch([numbers]))
+        kind = int(answer.moves[0, 0].argmax())
+        thing = int(answer.things[0, 0, kind].argmax())
         tracks = self._history.tracks
         move = self._model.moves[kind]
         if not move.at_thing or thing >= tracks.count:

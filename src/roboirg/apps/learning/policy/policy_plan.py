@@ -42,8 +42,8 @@ class PolicyPlan(NamedTuple):
     scenes: PositiveInt = 300
     drawn: PositiveInt = 50
     goals: PositiveInt = 4
-    detector_epochs: PositiveInt = 4
-    body_epochs: PositiveInt = 20
+    detector_epochs: PositiveInt = 12
+    body_epochs: PositiveInt = 24
     reader_epochs: PositiveInt = 12
     seed: NonNegativeInt = 0
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import random
 from collections.abc import Iterator, Sequence
 from functools import partial
@@ -34,6 +35,7 @@ from roboirg.apps.learning.policy.recording import (
     load_recording,
     record_episode,
     save_recording,
+    unplanned,
 )
 from roboirg.apps.learning.policy.sight import (
     Sight,
@@ -48,9 +50,11 @@ from roboirg.apps.learning.policy.thing_detector import (
     LabeledPicture,
     ThingDetector,
     detector_loss,
+    varied,
 )
 from roboirg.apps.learning.policy.tracks import LookTokens
 from roboirg.apps.learning.policy.waypoint_expert import Disturbance
+from roboirg.apps.learning.trained_file import load_unfinished, save_unfinished
 from roboirg.apps.learning.trainer import Progress, Trainer, batch_count, batches
 from roboirg.core.episode import Episode
 from roboirg.core.errors import InvalidValueError, MotionPlanningError
@@ -143,14 +147,18 @@ def _path(folder: Path, task: str, number: int) -> Path:
 
 
 def _record(folder: Path, drawn: int, job: tuple[str, int]) -> None:
-    """Record an episode, undisturbed if a disturbance leads where the arm cannot go on."""
+    """Record an episode, undisturbed if a disturbance leads where the arm cannot go on.
+
+    Of a scene in which not even the video can be planned, only that is kept.
+    """
     task, number = job
     every = PICTURE_EVERY if number < drawn else 0
     episode = get_episode(task, RECORDED_SPLIT, number)
-    try:
-        recorded = record_episode(episode, 1, Disturbance(), every)
-    except MotionPlanningError:
-        recorded = record_episode(episode, 1, None, every)
+    recorded = unplanned(episode)
+    for disturbance in (Disturbance(), None):
+        with contextlib.suppress(MotionPlanningError):
+            recorded = record_episode(episode, 1, disturbance, every)
+            break
     save_recording(recorded, _path(folder, task, number))
 
 
@@ -161,19 +169,18 @@ def _detector(
     path = folder / "detector.pt"
     made_of = [list(sight.classes), list(plan.tasks), plan.drawn, plan.detector_epochs]
     detector = ThingDetector(len(sight.classes))
-    if path.exists():
-        kept = torch.load(path, weights_only=True)
-        if kept["made_of"] == made_of:
-            detector.load_state_dict(kept["net"])
-            detector.eval()
-            return detector
+    kept = load_unfinished(path, made_of)
+    if kept is not None:
+        detector.load_state_dict(kept["net"])
+        detector.eval()
+        return detector
     torch.manual_seed(plan.seed)
     detector = ThingDetector(len(sight.classes))
     views = [view for one in recorded for view in labeled_pictures(one.recording, sight)]
-    rng = random.Random(plan.seed)
+    rng, variation = random.Random(plan.seed), np.random.default_rng(plan.seed)
     trainer = Trainer[LabeledPicture](
         detector,
-        partial(detector_loss, detector),
+        lambda batch: detector_loss(detector, [varied(one, variation) for one in batch]),
         DETECTOR_RATE,
         plan.detector_epochs * batch_count(views, DETECTOR_BATCH),
     )
@@ -181,7 +188,7 @@ def _detector(
         trainer.run(batches(views, rng, DETECTOR_BATCH))
         progress("detector", epoch + 1, plan.detector_epochs)
     detector.eval()
-    torch.save({"made_of": made_of, "net": detector.state_dict()}, path)
+    save_unfinished({"net": detector.state_dict()}, made_of, path)
     return detector
 
 

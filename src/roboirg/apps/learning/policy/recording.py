@@ -52,6 +52,7 @@ class ExpertRecording(NamedTuple):
         tool: (T, 7) end effector as in observations, and the opening of a finger, m.
         is_video: (T,) whether the look is one of the video.
         steps: (T,) control steps since the video's or the policy's start.
+        done: (T,) stages of the goal that are completed.
         looks: (D,) the look at which a decision is made.
         actions: (D, 7) the expert's undisturbed waypoints.
         anchors: (D,) number of the object at whose place a waypoint is; -1 for the tool's.
@@ -68,6 +69,7 @@ class ExpertRecording(NamedTuple):
     tool: NDArray[np.float32]
     is_video: NDArray[np.bool_]
     steps: NDArray[np.int32]
+    done: NDArray[np.int32]
     looks: NDArray[np.int32]
     actions: NDArray[np.float32]
     anchors: NDArray[np.int32]
@@ -100,6 +102,14 @@ def record_episode(
         env.close()
 
 
+def unplanned(episode: Episode) -> ExpertRecording:
+    """Return the recording of an episode that cannot be played: its key and status alone."""
+    nothing: NDArray[Any] = np.zeros(0)
+    return ExpertRecording(
+        episode.key, (), (), *(nothing,) * 9, turns=(), pictures={}, status="unplanned"
+    )
+
+
 class _LookRecorder(EpisodeLoop):
     """Plays one episode and notes looks and decisions."""
 
@@ -117,7 +127,7 @@ class _LookRecorder(EpisodeLoop):
         info = self.play()
         objects = self.env.episode.scene.objects
         names = tuple(item.name for item in objects)
-        things, visible, tool, is_video, steps = zip(*self._rows, strict=True)
+        things, visible, tool, is_video, steps, done = zip(*self._rows, strict=True)
         decided = [one for _, one in self._decisions]
         return ExpertRecording(
             self.env.episode.key,
@@ -128,6 +138,7 @@ class _LookRecorder(EpisodeLoop):
             np.array(tool, np.float32),
             np.array(is_video, bool),
             np.array(steps, np.int32),
+            np.array(done, np.int32),
             np.array([look for look, _ in self._decisions], np.int32),
             np.array([one.action for one in decided], np.float32).reshape(-1, 7),
             np.array([-1 if one.anchor is None else names.index(one.anchor) for one in decided]),
@@ -173,7 +184,8 @@ class _LookRecorder(EpisodeLoop):
             visible = [one and in_view for one, in_view in zip(visible, shown, strict=True)]
             self._pictures[number] = encode_png(Picture(world.picture(FRONT)))
         steps = self._video_steps if is_video else self._steps
-        self._rows.append((things, visible, _tool_of(world), is_video, steps))
+        done = max(0, self.env.session.judge.index - len(self.env.episode.demonstration))
+        self._rows.append((things, visible, _tool_of(world), is_video, steps, done))
 
 
 def _tool_of(world: World) -> tuple[float, ...]:

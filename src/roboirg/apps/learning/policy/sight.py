@@ -20,7 +20,9 @@ NEAR_TOOL = 0.07
 
 
 HIDDEN_LOOKS = 5
-"""Looks for which a thing that is lost stays lost."""
+"""Looks for which a thing that is lost stays lost, and what is not there is found."""
+GHOST = -1
+"""Number of the object where none is."""
 
 
 class SightNoise(NamedTuple):
@@ -29,14 +31,16 @@ class SightNoise(NamedTuple):
     Attributes:
         pixels: standard deviation of a place in the picture, pixels.
         turn: of the angle, rad.
-        lost: probability that a thing is not found.
+        lost: mean probability that a thing is not found; some things are lost more often.
         lost_near_tool: the same near the tool.
+        ghost: probability that something is found that is not there, where something else is.
     """
 
     pixels: float = 0.7
-    turn: float = 0.08
+    turn: float = 0.2
     lost: float = 0.02
     lost_near_tool: float = 0.15
+    ghost: float = 0.04
 
 
 class Sight(NamedTuple):
@@ -94,11 +98,16 @@ def sight_of(recorded: Iterable[ExpertRecording]) -> Sight:
 def labeled_looks(
     recorded: ExpertRecording, sight: Sight, noise: SightNoise, rng: np.random.Generator
 ) -> Iterator[tuple[LookTokens, NDArray[np.intp]]]:
-    """Yield what a detector might find at each look, and the numbers of the objects found."""
+    """Yield what a detector might find at each look, and the numbers of the objects found.
+
+    An object that is found by mistake has the number `GHOST`.
+    """
     kinds = sight.kinds(recorded.classes)
     positions = recorded.things[..., :3].astype(np.float64)
     away = np.hypot(*np.moveaxis(positions[..., :2] - recorded.tool[:, None, :2], -1, 0))
     lost = np.where(away < NEAR_TOOL, noise.lost_near_tool, noise.lost)
+    # A detector has trouble with the same thing again and again.
+    lost = lost * rng.exponential(1.0, lost.shape[1])
     points = points_of(positions)
     # What hides a thing does so for a while.
     blocks = -(-len(lost) // HIDDEN_LOOKS)
@@ -111,6 +120,14 @@ def labeled_looks(
     every = np.broadcast_to(np.maximum(kinds, 0), shape).ravel()
     places = sight.places(every, points.reshape(-1, 2)).reshape(*shape, 2)
     turns = turns_of(recorded.things[..., 3] + rng.normal(0.0, noise.turn, shape))
+    is_ghost = rng.random(blocks) < noise.ghost
+    ghosts = rng.integers(0, len(sight.classes), blocks)
+    hosts = rng.integers(0, shape[1], blocks)
     for look, shown in enumerate(found):
-        objects = np.flatnonzero(shown)
-        yield LookTokens(kinds[objects], places[look, objects], turns[look, objects]), objects
+        block = look // HIDDEN_LOOKS
+        objects = at = np.flatnonzero(shown)
+        own = kinds[at]
+        if is_ghost[block] and shown[hosts[block]]:
+            at, own = np.append(at, hosts[block]), np.append(own, ghosts[block])
+            objects = np.append(objects, GHOST)
+        yield LookTokens(own, places[look, at], turns[look, at]), objects

@@ -20,6 +20,8 @@ GRID = ((ROWS[1] - ROWS[0]) // CELL, COLUMNS // CELL)
 CHANNELS = (16, 24, 40, 40)
 MOST_THINGS = 24
 LEAST_SCORE = 0.75
+MOST_SHIFT = 20
+"""Pixels by which a picture is moved while a detector learns."""
 RARE = -4.0
 """Logit of a class in a cell before anything is learned."""
 PRESENT_WEIGHT = 30.0
@@ -97,6 +99,22 @@ class ThingDetector(nn.Module):
             points = (np.stack([columns, rows], 1) + shift[:, :2]) * CELL + (0, ROWS[0])
             found.append(FoundThings(kinds.numpy(), points, shift[:, 2:].astype(np.float32)))
         return found
+
+
+def varied(view: LabeledPicture, rng: np.random.Generator) -> LabeledPicture:
+    """Return a picture moved by some pixels, and mirrored half the time, with its labels.
+
+    A few scenes show each thing in a few places only, and a detector learns those by heart.
+    """
+    down, right = rng.integers(-MOST_SHIFT, MOST_SHIFT + 1, 2).tolist()
+    rows, columns = view.picture.shape[:2]
+    picture = view.picture[np.clip(np.arange(rows) - down, 0, rows - 1)]
+    picture = picture[:, np.clip(np.arange(columns) - right, 0, columns - 1)]
+    points, turns = view.points + np.array([right, down]), view.turns
+    if rng.random() < 0.5:  # noqa: PLR2004
+        picture, turns = picture[:, ::-1], turns * np.array([1.0, -1.0], np.float32)
+        points = np.array([columns - 1.0, 0.0]) + points * np.array([-1.0, 1.0])
+    return LabeledPicture(picture, view.classes, points, turns)
 
 
 def detector_loss(net: ThingDetector, views: Sequence[LabeledPicture]) -> Tensor:

@@ -11,6 +11,8 @@ from scipy.optimize import linear_sum_assignment
 MOST_TRACKS = 24
 GATE = 0.4
 """Meters from where a thing is expected at which it may be, at most: the hand moves fast."""
+ENOUGH = 3
+"""Looks in which a thing must be seen, once there were as many."""
 NEVER = 10.0
 """Meters that a thing of another class counts as."""
 
@@ -39,6 +41,8 @@ class Tracks:
         self._turns = np.zeros((MOST_TRACKS, 2), np.float32)
         self._speeds = np.zeros((MOST_TRACKS, 2), np.float32)
         self._seen = np.zeros(MOST_TRACKS, bool)
+        self._times = np.zeros(MOST_TRACKS, np.int64)
+        self._looks = 0
 
     @property
     def classes(self) -> NDArray[np.int64]:
@@ -60,6 +64,11 @@ class Tracks:
         """Whether the last look shows each (k,)."""
         return self._seen[: self.count]
 
+    @property
+    def known(self) -> NDArray[np.bool_]:
+        """Whether each was seen often enough to be no mistake of the detector (k,)."""
+        return self._times[: self.count] >= min(self._looks, ENOUGH)
+
     def update(self, look: LookTokens) -> NDArray[np.int64]:
         """Take in a look; returns the track of each of its things, -1 beyond the most tracks."""
         mine = self._assign(look)
@@ -75,6 +84,8 @@ class Tracks:
         kept = mine >= 0
         own = mine[kept]
         self._seen[:] = False
+        self._times[own] += 1
+        self._looks += 1
         self._seen[own], self._classes[own] = True, look.classes[kept]
         self._places[own], self._turns[own] = look.places[kept], look.turns[kept]
         return mine

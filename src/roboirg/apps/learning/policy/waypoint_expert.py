@@ -14,7 +14,7 @@ from roboirg.core.episode import HANDLES_HELD, Goal, Primitive
 from roboirg.core.observations import Observation
 from roboirg.policies.builtin.oracle_policy import OraclePolicy
 from roboirg.simulation.expert.primitives import MotionPrimitives
-from roboirg.simulation.physics_settings import CLOSED, OPEN
+from roboirg.simulation.physics_settings import CLOSED, GRIPPER_STEPS, OPEN
 
 if TYPE_CHECKING:
     from roboirg.envs.environment import RoboIRGEnv
@@ -24,6 +24,8 @@ LEAVE = 0.0
 """Gripper value of a waypoint that neither opens nor closes it."""
 STILL = 1e-4
 """Radians; a trajectory whose joints stay within this of their start moves only the gripper."""
+WAIT_STEPS = GRIPPER_STEPS + 1
+"""Control steps of a waypoint at which the gripper stays as it is, but is opened or closed."""
 ON_THING = 0.012
 """Meters in the plane within which a waypoint is at an object; some stay short of it."""
 FREE_HEIGHT = 0.09
@@ -91,6 +93,7 @@ class WaypointExpert(OraclePolicy):
         self._gripper = OPEN
         self._primitives: _WaypointPrimitives | None = None
         self._stalled: ExpertWaypoint | None = None
+        self._waits = 0
 
     def make_primitives(self, env: RoboIRGEnv) -> MotionPrimitives:
         """Return the expert that executes the stages, without the retry in a narrow grip."""
@@ -99,7 +102,7 @@ class WaypointExpert(OraclePolicy):
 
     def decide(self, env: RoboIRGEnv, instruction: str) -> Goal:
         """Return the episode's goal; the instruction is ignored."""
-        self._gripper, self._stalled = OPEN, None
+        self._gripper, self._stalled, self._waits = OPEN, None, 0
         self._rng = np.random.default_rng((env.episode.seed, self.seed))
         return super().decide(env, instruction)
 
@@ -116,15 +119,27 @@ class WaypointExpert(OraclePolicy):
 
     def _next(self) -> ExpertWaypoint:
         """Return the next decision; after the last one the tool stays where it is."""
+        if self._waits:
+            self._waits -= 1
+            return ExpertWaypoint(self._here(self._gripper), None, "keep")
         for stage, chunk in self._chunks:
             self.stage = stage
             decided = self._waypoint(chunk)
             if decided is not None:
                 return decided
+            if stage is not None and stage.primitive.steps:
+                # Time must pass while something is held until then.
+                least = int(stage.primitive.kind == "hold_until")
+                self._waits = max(round(len(chunk) / WAIT_STEPS), least)
+            if self._waits:
+                return self._next()
         return ExpertWaypoint(self._here(LEAVE), None, "keep")
 
     def _waypoint(self, chunk: JointTrajectory) -> ExpertWaypoint | None:
-        """Return the waypoint of a trajectory; None if it moves neither tool nor gripper."""
+        """Return the waypoint of a trajectory; None if it moves neither tool nor gripper.
+
+        Then the expert waits: a gripper that is closed again takes `WAIT_STEPS`.
+        """
         gripper = float(chunk[-1, ARM_JOINTS])
         if np.abs(chunk[:, :ARM_JOINTS] - chunk[0, :ARM_JOINTS]).max() < STILL:
             if gripper not in (OPEN, CLOSED) or gripper == self._gripper:

@@ -13,11 +13,10 @@ from roboirg.evaluation.analysis.figures.figure_style import (
     folded,
     new_figure,
 )
-from roboirg.evaluation.analysis.stats.arm_figures import ArmFigure
+from roboirg.evaluation.analysis.stats.arm_figures import ArmFigure, arm_figures
 from roboirg.evaluation.analysis.stats.option_labels import options_label
 from roboirg.evaluation.analysis.stats.rates import points
 from roboirg.evaluation.analysis.stats.run_data import RunData
-from roboirg.evaluation.analysis.tables.arm_table import figures_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -32,7 +31,7 @@ def draw_arms(content: RunData) -> Figure | None:
     """Draw a panel for each policy; return None without control arms."""
     panels: dict[str, list[ArmFigure]] = {}
     names = content.told().names
-    for one in figures_of(content):
+    for one in arm_figures(content):
         panels.setdefault(names[one.policy_run], []).append(one)
     if not panels:
         return None

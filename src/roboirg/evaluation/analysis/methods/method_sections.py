@@ -7,7 +7,7 @@ played; `method_statistics` has how scenes were selected and results were analyz
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 
 from roboirg.core.actions import find_action_space
@@ -24,6 +24,7 @@ from roboirg.evaluation.analysis.methods.method_statistics import (
 )
 from roboirg.evaluation.analysis.methods.method_text import Sections
 from roboirg.evaluation.analysis.methods.played_facts import (
+    FIXED,
     NO_NETWORK,
     NOT_REPORTED,
     Items,
@@ -36,16 +37,20 @@ from roboirg.evaluation.analysis.methods.played_facts import (
 )
 from roboirg.evaluation.analysis.stats.option_labels import options_sort_key
 from roboirg.evaluation.analysis.stats.run_data import RunData
-from roboirg.evaluation.records.record import Job, Record, Summary
+from roboirg.evaluation.analysis.stats.sensitivity import families_of
+from roboirg.evaluation.plan.plan import Plan
+from roboirg.evaluation.plan.stored_plans import read_plan
+from roboirg.evaluation.records.record import DEFAULT_MAX_STEPS, Job, Record, Summary
 from roboirg.evaluation.records.store import iterate_records, read_results
 from roboirg.language.settings import all_settings
 from roboirg.tasks import every_task
 from roboirg.util.media import CONTROL_RATE
 
 _POOL_NOTES: Mapping[str | None, str] = {
-    "test": "cannot occur, as their templates are held out of these splits",
-    "train": "can occur, as their templates are those of these splits",
-    None: f"{NOT_REPORTED}, as they are fixed or from a file",
+    "test": "none, because the templates are held out",
+    "train": "possible, because the templates are the same",
+    FIXED: "none, because such texts are for control arms only",
+    None: f"{NOT_REPORTED}, because the words are from a file",
 }
 
 Played = Mapping[str, PlayedFacts]
@@ -53,30 +58,28 @@ Played = Mapping[str, PlayedFacts]
 ColumnTexts = Mapping[TextColumn, SaidTexts]
 
 
-def make_sections(folder: Path, planned: Sequence[Job]) -> Sections:
-    """Return the methods section of a run.
-
-    Args:
-        folder: of the run.
-        planned: jobs of its plan.
+def make_sections(folder: Path) -> Sections:
+    """Return the methods section of the run in a folder.
 
     Raises:
         StoreError: the folder holds no run.
     """
-    results = read_results(folder)
+    results, plan = read_results(folder), read_plan(folder)
+    planned = plan.drawable_jobs() if plan else ()
     data = RunData.of([(str(folder), results)], planned)
     played, said = read_facts(_newest(folder, results))
+    families = [*families_of(data)]
     jobs = planned or [one.identity for one in results]
     return {
         "Terms": dict(_terms(jobs)),
-        "Horizon and control rate": dict(_horizon(results, played)),
+        "Horizon and control rate": dict(_horizon(results, plan, played)),
         "Precision of inference": dict(_precision(results, played)),
         "Observations": dict(_observations(results, played)),
         "Instructions": dict(_instructions(results, played, said)),
         "Use of the words in training": dict(_training(played, said)),
         "Screening of scenes": dict(screening_items(jobs)),
-        "Statistics": dict(statistics_items(data)),
-        "Sensitivity to analysis choices": dict(sensitivity_items(data)),
+        "Statistics": dict(statistics_items(data, families)),
+        "Sensitivity to analysis choices": dict(sensitivity_items(families)),
         "Controls and floors": dict(control_items(data, jobs)),
         "Seeds, retries and errors": dict(error_items(results, data, played)),
     }
@@ -98,13 +101,30 @@ def _terms(jobs: Sequence[Job]) -> Items:
         yield f"arm {arm}", ARMS[PARAPHRASE if paraphrase_number(arm) else arm]
 
 
-def _horizon(results: Sequence[Summary], played: Played) -> Items:
+def _horizon(results: Sequence[Summary], plan: Plan | None, played: Played) -> Items:
+    limits = {one.max_steps for one in results}
     yield item(
         "step limit of a rollout",
-        f"{distinct(one.max_steps for one in results)} control steps of the policy",
+        _limit("control steps of the policy", limits, DEFAULT_MAX_STEPS),
         "the video before its turn does not count",
+        "a rollout ends with its verdict, or at the limit as a failure",
     )
-    yield "control rate", f"{CONTROL_RATE} control steps a second"
+    fields = {"call of the policy": "policy_timeout_s", "rollout": "episode_timeout_s"}
+    waits = [
+        _limit(f"s per {what}", [getattr(plan, name)], Plan.model_fields[name].default)
+        for what, name in fields.items()
+        if plan
+    ]
+    yield item(
+        "limits of wall-clock time, by the run's newest plan",
+        *(waits or [NOT_REPORTED]),
+        "a rollout that exceeds one ends in an error",
+    )
+    yield item(
+        "control rate",
+        f"{CONTROL_RATE} control steps a second of simulated time",
+        "the simulation waits for the policy",
+    )
     for name, facts in played.items():
         mean = f"{facts.steps / facts.calls:.1f}" if facts.calls else NOT_REPORTED
         every = facts.need("observe_every")
@@ -113,9 +133,16 @@ def _horizon(results: Sequence[Summary], played: Played) -> Items:
             name,
             f"actions: {_action_space(facts.need('actions'))}",
             facts.labeled("chunk"),
-            f"executed per call: the whole chunk, or to the rollout's end; {mean} on average",
+            "executed per call: the whole chunk, or to the rollout's end; "
+            f"{mean} control steps on average",
             f"observations within a chunk: {between}",
         )
+
+
+def _limit(unit: str, values: Collection[float], default: float) -> str:
+    ours = "the benchmark's limit"
+    origin = ours if {*values} == {default} else f"set for this run; {ours} is {default:g}"
+    return f"{', '.join(f'{one:g}' for one in sorted(values))} {unit} ({origin})"
 
 
 def _action_space(name: str) -> str:
@@ -130,13 +157,27 @@ def _precision(results: Sequence[Summary], played: Played) -> Items:
     for name, facts in played.items():
         place = "by its server" if facts.is_remote else "on the machine of the simulation"
         keys = ("dtype", "device", "libraries", "python")
-        yield item(name, f"computed {place}", *map(facts.labeled, keys))
+        yield item(
+            name,
+            f"computed {place}",
+            f"version: {_version(facts)}",
+            *map(facts.labeled, keys),
+        )
     yield item(
         "simulation",
         f"package roboirg {distinct(one.package_version for one in results)}, which calls the "
         "policies",
+        f"version of SAPIEN: {NOT_REPORTED}",
         f"processor: {distinct(one.processor for one in results)}",
     )
+
+
+def _version(facts: PlayedFacts) -> str:
+    found = facts.know("version")
+    if found != "built-in":
+        return found
+    is_unknown = facts.is_remote and "roboirg" not in facts.know("libraries")
+    return "that of roboirg" + f" ({NOT_REPORTED} by the server)" * is_unknown
 
 
 def _observations(results: Sequence[Summary], played: Played) -> Items:
@@ -149,15 +190,21 @@ def _observations(results: Sequence[Summary], played: Played) -> Items:
         f"{distinct(one.meshes for one in results)} meshes",
         "not rendered, as no policy has a camera" if blind else f"rendered on {devices}",
     )
+    yield item(
+        "state of the robot, in each observation",
+        "joint angles, finger positions and end-effector pose",
+        "a server gets what its protocol sends",
+    )
     for name, facts in played.items():
         cameras = facts.need("cameras")
-        size = "" if cameras in ("none", NOT_REPORTED) else ", each 256 × 256 pixels"
+        size = "" if cameras in ("none", NOT_REPORTED) else ", each 256 × 256 pixels as rendered"
+        frames = facts.need("demonstration_frames")
+        kind = ", without pictures" if cameras == "none" != frames else ""
         yield item(
             name,
-            f"cameras: {cameras}{size}",
+            f"cameras given to it: {cameras}{size}",
             f"depth: {facts.need('depth')}",
-            f"frames of the video before its turn, each a state and these cameras' pictures: "
-            f"{facts.need('demonstration_frames')}",
+            f"frames of the video before its turn: {frames}{kind}",
             f"reads the simulator's state: {'yes' if facts.is_privileged else 'no'}",
             facts.labeled("preprocessing"),
         )
@@ -170,8 +217,8 @@ def _instructions(results: Sequence[Summary], played: Played, said: ColumnTexts)
         splits = sorted({one.split for one in results if one.options.wordings == wordings})
         pools = [f"{pool_of(one, wordings)} pool for the split {one}" for one in splits]
         if wordings in (None, *POOLS):
-            wording = "written out by roboirg export instructions"
-            yield item(label, f"template set {versions}, {wording}", *pools)
+            listed = f"template set {versions}, written out by roboirg export instructions"
+            yield item(label, "English", listed, *pools)
         else:
             yield label, "commands of a file"
     used = {one.options.delivery for one in results}
@@ -187,27 +234,25 @@ def _counts(said: SaidTexts, *, is_fixed: bool) -> str:
     texts = counted(len(said.texts), "distinct text")
     if not said.commands:
         return f"{texts}, " + ("fixed" if is_fixed else f"templates: {NOT_REPORTED}")
-    pools = {pool for _, pool in said.texts}
+    pools = {*POOLS} & {pool for _, pool in said.texts}
     tasks = {task for task, _ in said.commands} & every_task().keys()
     there = sum(
-        len(every_task()[task].commands.wordings.of(pool))
-        for task in tasks
-        for pool in POOLS
-        if pool in pools
+        len(every_task()[task].commands.wordings.of(pool)) for task in tasks for pool in pools
     )
     return (
-        f"{texts}, from {len(said.commands)} of the {there} templates of commands in the pool for "
-        f"{counted(len(tasks), 'task')}; {len(said.wordings)} distinct choices outside the command "
-        "(sentences before it, referring expressions and other parts)"
+        f"{texts}; command templates: {len(said.commands)} of the {there} in the pool for "
+        f"{counted(len(tasks), 'task')}; other wordings, such as those of earlier "
+        f"sentences and referring expressions: {len(said.wordings) or 'none'}"
     )
 
 
 def _reading(facts: PlayedFacts) -> Iterator[str]:
     yield facts.labeled("reads_text")
-    if facts.know("reads_text").split(",")[0] == "no":
-        return
     lowered = {"yes": "in lower case", "no": "as written"}
     yield f"sent: {lowered.get(facts.need('lowers_prompt'), NOT_REPORTED)}"
+    if facts.know("reads_text").split(",")[0] == "no":
+        yield "what it does to the text, and texts cut at a limit of tokens: not applicable"
+        return
     yield facts.labeled("text_normalization")
     limit, found = facts.need("prompt_tokens"), facts.verdicts
     if facts.know("dtype") == NO_NETWORK:
@@ -226,4 +271,4 @@ def _training(played: Played, said: ColumnTexts) -> Items:
     texts = set().union(*(one.texts for one in said.values()))
     pools = Counter(_POOL_NOTES[pool] for _, pool in texts)
     listed = (f"{counted(pools[note], 'text')}: {note}" for note in sorted(pools))
-    yield item("texts in training on the splits train and val", *listed)
+    yield item("occurrence of these texts in the splits for training, train and val", *listed)

@@ -16,12 +16,11 @@ from roboirg.evaluation.analysis.methods.played_facts import (
     distinct,
     item,
 )
-from roboirg.evaluation.analysis.stats.arm_figures import MEANING
+from roboirg.evaluation.analysis.stats.arm_figures import MEANING, arm_figures
 from roboirg.evaluation.analysis.stats.cells import PolicyRun
 from roboirg.evaluation.analysis.stats.chance import chance_level
 from roboirg.evaluation.analysis.stats.intervals import ALPHA, DRAWS
 from roboirg.evaluation.analysis.stats.option_labels import (
-    REFERENCE,
     options_label,
     options_sort_key,
 )
@@ -29,13 +28,11 @@ from roboirg.evaluation.analysis.stats.rates import p_text, points
 from roboirg.evaluation.analysis.stats.run_data import RunData
 from roboirg.evaluation.analysis.stats.run_summary import ALL, ScopeKey
 from roboirg.evaluation.analysis.stats.sensitivity import (
-    Direction,
-    Robustness,
-    gap_contrasts,
+    ARM_CONTRASTS,
+    Family,
     offers_for,
     try_choices,
 )
-from roboirg.evaluation.analysis.tables.arm_table import figures_of
 from roboirg.evaluation.records.record import Job, Summary
 from roboirg.language import settings_of
 from roboirg.tasks import all_tasks, every_task
@@ -47,11 +44,8 @@ SceneName = tuple[str, str, int]
 
 _NO_REASON = f"reason for this selection: {NOT_REPORTED}"
 _GUESS = "expected of a guess among the goals that fit the last utterance alone"
-_VERDICTS: Mapping[Direction, str] = {
-    "open": "no clear difference",
-    "lower": "clearly lower",
-    "higher": "clearly higher",
-}
+_FEW_SCENES = 2
+"""Of a task; over so few a bootstrap means nothing."""
 
 
 def screening_items(jobs: Sequence[Job]) -> Items:
@@ -70,8 +64,8 @@ def screening_items(jobs: Sequence[Job]) -> Items:
     is_whole = splits <= {*SPLITS} and len(scenes) == whole
     yield item(
         "scenes",
-        f"{len(scenes)} of {whole or 'any number'} of these tasks in the split {distinct(splits)}, "
-        f"numbered {span} in each task",
+        f"{len(scenes)} of the {whole or 'unlimited'} that these tasks have in the split "
+        f"{distinct(splits)}, numbered {span} in each task",
         "all there are" if is_whole else _NO_REASON,
         "none was left out for its result",
     )
@@ -82,7 +76,7 @@ def screening_items(jobs: Sequence[Job]) -> Items:
         missing = "the setting cannot express them" if is_told else "there is no such goal or text"
         yield item(
             column.label,
-            f"{len(own)} of {len(scenes)} scenes",
+            f"{len(own)} of {counted(len(scenes), 'scene')} planned",
             f"left out, as their tasks do not have the setting: {len(scenes - usable)}",
             f"as {missing}: {len(usable - own)}",
         )
@@ -92,8 +86,8 @@ def _rejections(scenes: set[SceneName]) -> Iterator[str]:
     published = {one for one in scenes if is_published(*one)}
     if published:
         yield (
-            f"{counted(len(published), 'scene')} published by RoboMME, taken as they are: none was "
-            f"rejected here; criteria of their selection: {NOT_REPORTED}"
+            f"{counted(len(published), 'scene')} published by RoboMME and used unchanged; rejected "
+            f"here: none; criteria of their selection: {NOT_REPORTED} by RoboMME"
         )
     shipped = {one for one in scenes - published if one[0] in shipped_splits() and one[1] in SPLITS}
     if shipped:
@@ -106,7 +100,7 @@ def _rejections(scenes: set[SceneName]) -> Iterator[str]:
             "object, a setting that cannot express it, or not solved by the oracle"
         )
     if others := len(scenes - published - shipped):
-        yield f"{counted(others, 'scene')} sampled, how many were rejected: {NOT_REPORTED}"
+        yield f"{counted(others, 'scene')} sampled; how many were rejected: {NOT_REPORTED}"
 
 
 def _has_setting(task: str, setting: str) -> bool:
@@ -114,69 +108,73 @@ def _has_setting(task: str, setting: str) -> bool:
     return found is None or setting in settings_of(found)
 
 
-def statistics_items(data: RunData) -> Items:
+def statistics_items(data: RunData, families: Sequence[Family]) -> Items:
     """Yield how rates and differences are analyzed."""
     seeds = len({one.policy_seed for _, one in data.results})
-    single = "Wilson's score for a task, for means over tasks" if seeds == 1 else "for all rates"
+    wilson = "Wilson's score for a rate in one task, else " if seeds == 1 else ""
     test = "McNemar's exact test" if seeds == 1 else "the exact sign-flip test over scenes"
     yield "unit", "the scene; its rollouts with several policy seeds are one cluster"
     yield "averages", "means over tasks, each with the same weight"
-    yield "intervals", f"95 %; {single} the bootstrap over each task's scenes ({DRAWS} resamples)"
+    scenes: defaultdict[str, set[int]] = defaultdict(set)
+    for _, one in data.results:
+        scenes[one.task].add(one.episode)
+    few = [f"{task} ({len(own)})" for task, own in scenes.items() if len(own) <= _FEW_SCENES]
+    yield item(
+        "intervals",
+        f"95 %; {wilson}the bootstrap over each task's scenes ({DRAWS} resamples), paired for "
+        "differences",
+        f"tasks with too few scenes for a bootstrap to mean anything: {', '.join(few) or 'none'}",
+    )
     yield item(
         "differences to explicit",
         f"paired by scene, {test}, two-sided",
-        f"clear if p ≤ {ALPHA} after the correction; its sign is the direction",
+        f"higher or lower, by the sign, if p ≤ {ALPHA} after the correction; else open",
     )
-    yield item("multiplicity, by Holm's correction over families", *_families(data))
+    arms = [
+        f"{policy}: its {kind} ({len(contrasts)})"
+        for policy, kind, contrasts in families
+        if kind == ARM_CONTRASTS and contrasts
+    ]
+    yield item("multiplicity, by Holm's correction over families", *_sizes(data.told()), *arms)
     yield (
         "contrasts of arms, where played; paired and tested alike",
-        MEANING.rstrip(".") if figures_of(data) else "none, without control arms",
+        MEANING.rstrip(".") if arms else "none, without control arms",
     )
 
 
-def sensitivity_items(data: RunData) -> Items:
-    """Yield each verdict on a difference to explicit, and what other analyses make of it."""
-    told = data.told()
-    for policy_run, name in told.names.items():
-        contrasts = gap_contrasts([one for owner, one in told.results if owner == policy_run])
+def sensitivity_items(families: Sequence[Family]) -> Items:
+    """Yield each verdict, and what other analyses make of it."""
+    for policy, kind, contrasts in families:
         if not contrasts:
-            yield name, f"{NOT_REPORTED}, as explicit and another setting are needed"
+            yield f"{policy}, {kind}", "none played"
             continue
         for found in try_choices(contrasts):
-            yield f"{name}, {found.label} less explicit", _robustness(found)
-        offers = [one for one in offers_for(contrasts) if not one.differs]
-        listed = (f"{', '.join(of.label for of in one.choices)} ({one.reason})" for one in offers)
-        yield item(f"{name}, other analyses that change nothing here", *listed)
-    if figures_of(data):
-        yield "contrasts of arms", f"other analyses: {NOT_REPORTED}"
+            least = 0.5 ** (found.pairs - 1)
+            power = f", too few for any verdict but open (p cannot be below {least:.3g})"
+            yield item(
+                f"{policy}, {found.label}",
+                found.verdict,
+                f"{counted(found.pairs, 'paired scene')}{power if least > ALPHA else ''}",
+                found.sentence,
+            )
+        listed = [(one, ", ".join(of.label for of in one.choices)) for one in offers_for(contrasts)]
+        tried = [text for one, text in listed if one.differs]
+        rest = [f"{text} ({one.reason})" for one, text in listed if not one.differs]
+        yield item(
+            f"{policy}, other analyses of {kind}",
+            f"tried: {', '.join(tried) or 'none'}",
+            f"not tried, as they change nothing here: {', '.join(rest) or 'none'}",
+        )
 
 
-def _families(data: RunData) -> Iterator[str]:
-    """Yield the families of tests of each policy in the arm told, with their sizes."""
-    told = data.told()
+def _sizes(told: RunData) -> Iterator[str]:
+    """Yield the sizes of each policy's families of differences to explicit."""
     for policy_run, name in told.names.items():
-        own = [one for owner, one in told.results if owner == policy_run]
-        columns = {one.column for one in own if one.column != REFERENCE}
-        tasks = {(one.task, one.column) for one in own} - {(one.task, REFERENCE) for one in own}
-        suites = {(every_task()[task].suite, of) for task, of in tasks if task in every_task()}
-        sizes = f"single tasks ({len(tasks)}), suites ({len(suites)}), all tasks ({len(columns)})"
+        rows = [one for one in told.summaries.values() if one.policy_run == policy_run and one.gap]
+        tasks, suites = (sum(bool(one.scope[place]) for one in rows) for place in (0, 1))
+        everywhere = len(rows) - tasks - suites
+        sizes = f"single tasks ({tasks}), suites ({suites}), all tasks ({everywhere})"
         yield f"{name}: its differences to explicit in {sizes}"
-    if count := len(list(figures_of(data))):
-        yield f"contrasts of arms ({count} in all), a family for each policy"
-
-
-def _robustness(found: Robustness) -> str:
-    by_verdict: dict[str, list[str]] = defaultdict(list)
-    for choice, verdict in found.others.items():
-        by_verdict[_VERDICTS[verdict]].append(choice.label)
-    others = "; ".join(f"{verdict} with {', '.join(of)}" for verdict, of in by_verdict.items())
-    least = 0.5 ** (found.pairs - 1)
-    power = ", too large to be clear" if least > ALPHA else ""
-    return (
-        f"{_VERDICTS[found.verdict]}; {counted(found.pairs, 'scene')} played in both settings, "
-        f"whose smallest possible p is {least:.3g}{power}; in other analyses: "
-        f"{others or 'none differs from this one'}"
-    )
 
 
 def control_items(data: RunData, jobs: Sequence[Job]) -> Items:
@@ -191,8 +189,10 @@ def control_items(data: RunData, jobs: Sequence[Job]) -> Items:
     told = data.told()
     controls = [one for one in told.names if one.is_privileged]
     listed = "; ".join(f"{told.names[one]}: {_rates(told, one)}" for one in controls)
-    yield "positive control: policies that read the simulator's state", listed or "none played"
-    for one in figures_of(data):
+    if len(told.names) == 1:
+        listed = f"none, as {next(iter(told.names.values()))} is the only policy"
+    yield "positive control, another policy that reads the simulator's state", listed or "none"
+    for one in arm_figures(data):
         sides = zip(one.contrast[1:3], one.rates, strict=True)
         rates = ", ".join(f"{side} {100 * rate:.1f} %" for side, rate in sides)
         yield item(

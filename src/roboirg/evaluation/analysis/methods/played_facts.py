@@ -19,7 +19,8 @@ NO_NETWORK = "not applicable, as there is no neural network"
 
 DECLARABLE = {
     "network": "network",
-    "chunk": "actions that its model predicts at once",
+    "version": "version",
+    "chunk": "nominal length of a chunk",
     "dtype": "number type of inference",
     "device": "device of inference",
     "libraries": "versions of libraries",
@@ -31,8 +32,11 @@ DECLARABLE = {
 }
 """Keys of a policy's ``metadata`` that methods sections read, and what they stand for."""
 
-_OF_NETWORKS = ("chunk", "dtype", "device", "preprocessing", "text_normalization", "trained_on")
+_OF_NETWORKS = ("dtype", "device", "preprocessing", "text_normalization", "trained_on")
 """Those that do not exist without a network."""
+
+FIXED = "fixed"
+"""Instead of a pool: a text that is the same in every scene."""
 
 Items = Iterator[tuple[str, str]]
 """What an item is about, and what is known of it."""
@@ -55,7 +59,7 @@ class SaidTexts:
     """The distinct texts of a column.
 
     Attributes:
-        texts: each with the pool of its words; None for words from elsewhere.
+        texts: each with the pool of its words, or `FIXED`; None for words from elsewhere.
         commands: the templates of their commands, with the task.
         wordings: other sentences, parts and referring expressions that were drawn.
     """
@@ -69,7 +73,8 @@ class SaidTexts:
         metadata = record.metadata
         is_ours = metadata.get("wordings") in (None, *POOLS) and record.arm not in SILENT_TEXTS
         text = " ".join(one.text for one in record.instruction)
-        self.texts.add((text, metadata.get("pool") if is_ours else None))
+        elsewhere = FIXED if record.arm in SILENT_TEXTS else None
+        self.texts.add((text, metadata.get("pool") if is_ours else elsewhere))
         drawn = set(metadata.get("templates", ()) if is_ours else ())
         commands = {one for one in drawn if one.startswith("command-")}
         self.commands |= {(record.task, one) for one in commands}
@@ -110,8 +115,9 @@ class PlayedFacts:
             self.is_remote |= SERVER in table
             for key in DECLARABLE.keys() & table.keys():
                 self.declared[key].add(_words(table[key]))
+        self.declared["version"] = {*self.declared["version"], record.policy_version} - {"unknown"}
         if (found := record.inference) is not None:
-            dtypes = [f"{one} (parameters)" for one in found.dtypes]
+            dtypes = [f"{one} (parameters; arithmetic: {NOT_REPORTED})" for one in found.dtypes]
             values = found.python, found.libraries, dtypes, found.devices
             for key, one in zip(("python", "libraries", "dtype", "device"), values, strict=True):
                 self.inference[key].add(_words(one))
@@ -130,14 +136,14 @@ class PlayedFacts:
     def know(self, key: str) -> str:
         """Return what is known under a key of `DECLARABLE`.
 
-        That is what the policy declares, or else what its process reported; the process of a server
-        was not asked.
+        That is what the policy or its server declares, or else what its process reported; the
+        process of a server was not asked.
         """
         measured = () if self.is_remote else self.inference.get(key, ())
         known = _listed(self.declared.get(key, ())) or _listed(measured)
         if not known and key in _OF_NETWORKS and self.declared["network"] == {"none"}:
             return NO_NETWORK
-        return known or NOT_REPORTED
+        return known or NOT_REPORTED + " by the server" * self.is_remote
 
     def labeled(self, key: str) -> str:
         """Return the same after what the key stands for."""

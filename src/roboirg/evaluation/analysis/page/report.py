@@ -15,10 +15,11 @@ from roboirg.evaluation.analysis.page.entries import EpisodeEntries, Run, make_e
 from roboirg.evaluation.analysis.page.episode_videos import EpisodeVideos
 from roboirg.evaluation.analysis.page.matrix import make_matrix
 from roboirg.evaluation.analysis.page.run_warnings import comparisons, facts_of, run_warnings
+from roboirg.evaluation.analysis.stats.arm_figures import arm_figures
 from roboirg.evaluation.analysis.stats.breakdowns import BREAKDOWNS, label_instructions
 from roboirg.evaluation.analysis.stats.cells import Cells, PolicyRun
 from roboirg.evaluation.analysis.stats.run_data import RunData
-from roboirg.evaluation.analysis.tables.arm_table import has_arms, make_arm_table
+from roboirg.evaluation.analysis.tables.arm_table import make_arm_table
 from roboirg.evaluation.analysis.tables.breakdown_table import make_breakdown_table
 from roboirg.evaluation.analysis.tables.table import Table
 from roboirg.evaluation.records.episode_log import logged_slugs
@@ -161,7 +162,7 @@ def _breakdown_tables(runs: Sequence[Run], entries: EpisodeEntries) -> list[Tabl
         for one in breakdowns
     ]
     data = RunData.of([(run.name, run.records) for run in runs])
-    arms = [make_arm_table(data)] if has_arms(data) else []
+    arms = [make_arm_table(data)] if arm_figures(data) else []
     return [*arms, *(table for table in tables if table.rows)]
 
 

@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
+import msgspec
 import numpy as np
 
 from roboirg.core.arms import (
@@ -27,18 +28,18 @@ from roboirg.evaluation.analysis.stats.cells import (
     clustered_interval,
     task_order,
 )
-from roboirg.evaluation.analysis.stats.intervals import Interval
+from roboirg.evaluation.analysis.stats.intervals import SEED, Interval
 from roboirg.evaluation.analysis.stats.option_labels import options_sort_key
 from roboirg.evaluation.analysis.stats.paired_tests import Gap, Pairs, holm, measure_gap
+from roboirg.evaluation.analysis.stats.run_data import RunData
 from roboirg.evaluation.records.record import Summary
 
 LANGUAGE_USE, WORDS_WORTH = "language use", "words' worth"
 
 Arms = Mapping[str, Summary]
-"""The verdicts of one trial by arm."""
-Sides = tuple[Mapping[Trial, bool], Mapping[Trial, bool]]
-"""What a trial counts in the first and in the second rate."""
-SideCells = tuple[CellResults, CellResults]
+"""The results of one trial by arm."""
+Sides = tuple[Sequence[Summary], Sequence[Summary]]
+"""What counts in the first and in the second rate, as results whose outcome is that."""
 
 
 class ArmContrast(NamedTuple):
@@ -54,7 +55,7 @@ class ArmContrast(NamedTuple):
     name: str
     first: str
     second: str
-    sides: Callable[[Trial, Arms], Sides | None]
+    sides: Callable[[Arms], Sides | None]
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,7 +66,8 @@ class ArmFigure:
         policy_run: as of the arm ``told``.
         options: of the instruction.
         contrast: which figure.
-        cells: by task, those of the first and of the second rate.
+        sides: the results of the first and of the second rate.
+        cells: the same by task, in order.
         intervals: of the first and the second rate.
         gap: first less second.
         p_holm: its p-value after Holm's correction over all figures of the policy run.
@@ -74,7 +76,8 @@ class ArmFigure:
     policy_run: PolicyRun
     options: InstructionOptions
     contrast: ArmContrast
-    cells: Mapping[str, SideCells]
+    sides: Sides
+    cells: tuple[Mapping[str, CellResults], Mapping[str, CellResults]]
     intervals: tuple[Interval | None, Interval | None]
     gap: Gap
     p_holm: float
@@ -83,80 +86,64 @@ class ArmFigure:
     def rates(self) -> tuple[float, float]:
         """The first and the second rate, means over tasks."""
         first, second = (
-            np.mean([float(cell.rate or 0) for cell in side])
-            for side in zip(*self.cells.values(), strict=True)
+            float(np.mean([float(cell.rate or 0) for cell in side.values()])) for side in self.cells
         )
-        return float(first), float(second)
+        return first, second
 
 
-def arm_figures(
-    results: Iterable[tuple[PolicyRun, Summary]], rng: np.random.Generator
-) -> tuple[ArmFigure, ...]:
+def arm_figures(data: RunData) -> tuple[ArmFigure, ...]:
     """Return the figures for which the arms were played, by policy run and setting."""
-    trials: dict[tuple[PolicyRun, InstructionOptions], dict[str, dict[Trial, dict[str, Summary]]]]
-    trials = defaultdict(lambda: defaultdict(lambda: defaultdict(dict)))
-    for run, one in results:
+    rng = np.random.default_rng(SEED)
+    columns: dict[tuple[PolicyRun, InstructionOptions], dict[tuple[str, Trial], dict[str, Summary]]]
+    columns = defaultdict(lambda: defaultdict(dict))
+    for run, one in data.results:
         if one.outcome != "error":
             told = run._replace(conditions=run.conditions._replace(arm=TOLD))
             trial = Trial(one.episode, one.policy_seed)
-            trials[told, one.column][one.task][trial][one.arm] = one
-    found: dict[PolicyRun, list[ArmFigure]] = defaultdict(list)
-    for run, options in sorted(trials, key=lambda key: options_sort_key(key[1])):
-        tasks = {name: trials[run, options][name] for name in task_order(trials[run, options])}
-        made = (_figure(run, options, each, tasks, rng) for each in CONTRASTS)
+            columns[told, one.column][one.task, trial][one.arm] = one
+    found: dict[PolicyRun, list[ArmFigure]] = {run: [] for run, _ in columns}
+    for run, options in sorted(columns, key=lambda key: options_sort_key(key[1])):
+        trials = columns[run, options].values()
+        made = (_figure(run, options, each, trials, rng) for each in CONTRASTS)
         found[run] += filter(None, made)
-    runs = dict.fromkeys(run for run, _ in trials)
-    return tuple(one for run in runs for one in _corrected(found[run]))
-
-
-def compare_language_use(
-    first: Iterable[ArmFigure], second: Iterable[ArmFigure], rng: np.random.Generator
-) -> Mapping[InstructionOptions, tuple[Gap, float]]:
-    """Return how the language use of two policies differs on the same episodes, by options.
-
-    Each gap comes with its p-value after Holm's correction over the options.
-    """
-    ours, theirs = (
-        {one.options: one.cells for one in side if one.contrast.name == LANGUAGE_USE}
-        for side in (first, second)
-    )
-    found: dict[InstructionOptions, Gap] = {}
-    for options in (options for options in ours if options in theirs):
-        here, there = ours[options], theirs[options]
-        pairs = [Pairs.of(here[one][0], there[one][0]) for one in here if one in there]
-        if (gap := measure_gap(pairs, rng)) is not None:
-            found[options] = gap
-    adjusted = holm([gap.p_value for gap in found.values()])
-    return dict(zip(found, zip(found.values(), adjusted, strict=True), strict=True))
+    return tuple(one for figures in found.values() for one in _corrected(figures))
 
 
 def _figure(
     policy_run: PolicyRun,
     options: InstructionOptions,
     contrast: ArmContrast,
-    tasks: Mapping[str, Mapping[Trial, Arms]],
+    trials: Iterable[Arms],
     rng: np.random.Generator,
 ) -> ArmFigure | None:
-    cells: dict[str, SideCells] = {}
-    for task, trials in tasks.items():
-        sides = [one for trial in sorted(trials) if (one := contrast.sides(trial, trials[trial]))]
-        if sides:
-            first, second = (
-                CellResults({trial: won for one in side for trial, won in one.items()})
-                for side in zip(*sides, strict=True)
-            )
-            cells[task] = first, second
-    gap = measure_gap([Pairs.of(*pair) for pair in cells.values()], rng)
+    sides: tuple[list[Summary], list[Summary]] = [], []
+    for arms in trials:
+        for side, more in zip(sides, contrast.sides(arms) or (), strict=False):
+            side.extend(more)
+    tasks = task_order({one.task for one in sides[0]})
+    first, second = ({task: _cell(task, side) for task in tasks} for side in sides)
+    gap = measure_gap([Pairs.of(first[task], second[task]) for task in tasks], rng)
     if gap is None:
         return None
     intervals = (
-        clustered_interval([first for first, _ in cells.values()], rng),
-        clustered_interval([second for _, second in cells.values()], rng),
+        clustered_interval([*first.values()], rng),
+        clustered_interval([*second.values()], rng),
     )
-    return ArmFigure(policy_run, options, contrast, cells, intervals, gap, gap.p_value)
+    cells = first, second
+    return ArmFigure(policy_run, options, contrast, sides, cells, intervals, gap, gap.p_value)
 
 
-def _corrected(found: Sequence[ArmFigure]) -> Iterable[ArmFigure]:
+def _cell(task: str, results: Sequence[Summary]) -> CellResults:
+    """Return the verdicts in a task; paraphrases stand as policy seeds of their own."""
+    verdicts = {}
+    for one in results:
+        if one.task == task:
+            seed = one.policy_seed * (MOST_PARAPHRASES + 1) + (paraphrase_number(one.arm) or 0)
+            verdicts[Trial(one.episode, seed)] = _won(one)
+    return CellResults(verdicts)
+
+
+def _corrected(found: Sequence[ArmFigure]) -> Sequence[ArmFigure]:
     adjusted = holm([one.gap.p_value for one in found])
     return [replace(one, p_holm=p_value) for one, p_value in zip(found, adjusted, strict=True)]
 
@@ -165,34 +152,37 @@ def _won(one: Summary) -> bool:
     return one.outcome == "success"
 
 
-def _against(*others: str) -> Callable[[Trial, Arms], Sides | None]:
-    def sides(trial: Trial, arms: Arms) -> Sides | None:
+def _with_outcome(one: Summary, *, is_success: bool) -> Summary:
+    return msgspec.structs.replace(one, outcome="success" if is_success else "failure")
+
+
+def _against(*others: str) -> Callable[[Arms], Sides | None]:
+    def sides(arms: Arms) -> Sides | None:
         other = next((arms[name] for name in others if name in arms), None)
-        if other is None or TOLD not in arms:
-            return None
-        return {trial: _won(arms[TOLD])}, {trial: _won(other)}
+        return None if other is None or TOLD not in arms else ([arms[TOLD]], [other])
 
     return sides
 
 
-def _language_use(trial: Trial, arms: Arms) -> Sides | None:
+def _language_use(arms: Arms) -> Sides | None:
     told, other = arms.get(TOLD), arms.get(OTHER_GOAL)
     if told is None or other is None or told.goals is None or other.goals is None:
         return None
     own_twice = _won(told) and other.goals.original == "success"
     # The world ends with the told verdict, so there the other goal can only be begun.
     other_twice = _won(other) and other.goals.stated in told.goals.agrees
-    return {trial: _won(told) and _won(other)}, {trial: own_twice or other_twice}
+    return (
+        [_with_outcome(told, is_success=_won(told) and _won(other))],
+        [_with_outcome(told, is_success=own_twice or other_twice)],
+    )
 
 
-def _paraphrases(trial: Trial, arms: Arms) -> Sides | None:
-    wins = [_won(one) for arm, one in sorted(arms.items()) if paraphrase_number(arm)]
-    if len(wins) < 2:  # noqa: PLR2004
+def _paraphrases(arms: Arms) -> Sides | None:
+    found = [one for arm, one in sorted(arms.items()) if paraphrase_number(arm)]
+    if len(found) < 2:  # noqa: PLR2004
         return None
-    # Paraphrases stand as seeds of their own, none of which the two sides share.
-    every = {Trial(trial.episode, -1 - trial.policy_seed): all(wins)}
-    first = trial.policy_seed * MOST_PARAPHRASES
-    return every, {Trial(trial.episode, first + place): won for place, won in enumerate(wins)}
+    every = all(map(_won, found))
+    return [_with_outcome(one, is_success=every) for one in found], found
 
 
 CONTRASTS = (

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import itertools
 from collections import Counter, defaultdict
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
 from typing import Literal, NamedTuple
@@ -20,6 +20,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from roboirg.core.instruction_options import InstructionOptions
+from roboirg.evaluation.analysis.stats.arm_figures import arm_figures
+from roboirg.evaluation.analysis.stats.cells import task_order
 from roboirg.evaluation.analysis.stats.intervals import ALPHA, SEED
 from roboirg.evaluation.analysis.stats.option_labels import (
     REFERENCE,
@@ -27,6 +29,7 @@ from roboirg.evaluation.analysis.stats.option_labels import (
     options_sort_key,
 )
 from roboirg.evaluation.analysis.stats.paired_tests import holm, sign_flip_test
+from roboirg.evaluation.analysis.stats.run_data import RunData
 from roboirg.evaluation.records.record import Summary
 from roboirg.tasks import every_task
 
@@ -43,6 +46,8 @@ _MOST_ENUMERATED = 14
 _NOTHING = 1e-12
 """Differences below this are rounding."""
 
+EXPLICIT_GAPS, ARM_CONTRASTS = "differences to explicit", "contrasts of arms"
+
 Results = Sequence[Summary]
 
 
@@ -54,28 +59,35 @@ class Contrast(NamedTuple):
     second: Results
 
 
+class Family(NamedTuple):
+    """Contrasts whose p-values are corrected together.
+
+    Attributes:
+        policy: label of the policy run.
+        kind: `EXPLICIT_GAPS` or `ARM_CONTRASTS`.
+        contrasts: in order; none if what they need was not played.
+    """
+
+    policy: str
+    kind: str
+    contrasts: tuple[Contrast, ...]
+
+
 @dataclass(frozen=True)
 class AnalysisChoice:
     """One way to analyze.
 
     Attributes:
-        group: what is chosen.
-        name: the choice; empty if the group has one only.
+        label: what is chosen, in a word or two.
         keep: returns what counts of a side's results.
         unit: what the test swaps.
         weights: what weighs the same.
     """
 
-    group: str
-    name: str = ""
+    label: str
     keep: Callable[[Results], Results] = field(default=lambda results: results)
     unit: Unit = "episode"
     weights: Weighting = "task"
-
-    @property
-    def label(self) -> str:
-        """Group and name."""
-        return f"{self.group} {self.name}".strip()
 
 
 @dataclass(frozen=True)
@@ -102,9 +114,11 @@ class Robustness:
     @property
     def sentence(self) -> str:
         """Whether the verdict holds in all analyses, in words."""
+        if not self.others:
+            return "no other analysis can change it"
         if not self.exceptions:
             return f"holds in all {len(self.others)} other analyses"
-        listed = ", ".join(one.label for one in self.exceptions)
+        listed = ", ".join(f"{one.label} ({self.others[one]})" for one in self.exceptions)
         return f"does not hold in {len(self.exceptions)} of {len(self.others)}: {listed}"
 
 
@@ -113,7 +127,7 @@ USUAL = AnalysisChoice("usual")
 
 def try_choices(contrasts: Sequence[Contrast]) -> tuple[Robustness, ...]:
     """Test the contrasts, which are read together, under all choices that apply to them."""
-    choices = choices_for(contrasts)
+    choices = [choice for one in offers_for(contrasts) if one.differs for choice in one.choices]
     usual = _directions(contrasts, USUAL)
     others = [_directions(contrasts, choice) for choice in choices]
     return tuple(
@@ -141,24 +155,19 @@ class Offer(NamedTuple):
     reason: str
 
 
-def choices_for(contrasts: Sequence[Contrast]) -> tuple[AnalysisChoice, ...]:
-    """Return the choices other than the usual one that can change anything."""
-    return tuple(choice for one in offers_for(contrasts) if one.differs for choice in one.choices)
-
-
 def offers_for(contrasts: Sequence[Contrast]) -> tuple[Offer, ...]:
-    """Return all choices that an analyst of these contrasts has."""
+    """Return all choices other than the usual one that an analyst of these contrasts has."""
     results = [one for each in contrasts for side in (each.first, each.second) for one in side]
-    tasks = list(dict.fromkeys(one.task for one in results))
+    tasks = task_order({one.task for one in results})
     suites, difficulties = {_suite(task) for task in tasks}, {one.difficulty for one in results}
     seeds = sorted({one.policy_seed for one in results})
     processors = Counter(one.processor for one in results).most_common()
     has_errors = any(one.outcome == "error" for one in results)
-    by_seed = [AnalysisChoice("seed", str(one), keep=_only_seed(one)) for one in seeds]
-    without = [AnalysisChoice("without", one, keep=_without_task(one)) for one in tasks]
-    usual = [AnalysisChoice("one processor", keep=_only_processor(one)) for one, _ in processors]
+    by_seed = [AnalysisChoice(f"seed {one}", keep=_only("policy_seed", one)) for one in seeds]
+    without = [AnalysisChoice(f"without {one}", keep=_without_task(one)) for one in tasks]
+    usual = [AnalysisChoice("one processor", keep=_only("processor", of)) for of, _ in processors]
     return (
-        Offer([_ERRORS_FAIL], has_errors, "no rollout ended in an error"),
+        Offer([_ERRORS_FAIL], has_errors, "no error among what is compared"),
         Offer([*by_seed, _BY_ROLLOUT], len(seeds) > 1, "one policy seed"),
         Offer([_BY_TASK, *without], len(tasks) > 1, "one task"),
         Offer([_EQUAL_SUITES], len(suites) > 1, "one suite"),
@@ -175,22 +184,18 @@ def _errors_as_failures(results: Results) -> Results:
 
 
 _ERRORS_FAIL = AnalysisChoice("errors as failures", keep=_errors_as_failures)
-_BY_ROLLOUT = AnalysisChoice("unit", "rollout", unit="rollout")
-_BY_TASK = AnalysisChoice("unit", "task", unit="task")
-_EQUAL_SUITES = AnalysisChoice("equal weights of", "suites", weights="suite")
-_EQUAL_DIFFICULTIES = AnalysisChoice("equal weights of", "difficulties", weights="difficulty")
+_BY_ROLLOUT = AnalysisChoice("unit rollout", unit="rollout")
+_BY_TASK = AnalysisChoice("unit task", unit="task")
+_EQUAL_SUITES = AnalysisChoice("equal weights of suites", weights="suite")
+_EQUAL_DIFFICULTIES = AnalysisChoice("equal weights of difficulties", weights="difficulty")
 
 
-def _only_seed(seed: int) -> Callable[[Results], Results]:
-    return lambda results: [one for one in results if one.policy_seed == seed]
+def _only(name: str, value: object) -> Callable[[Results], Results]:
+    return lambda results: [one for one in results if getattr(one, name) == value]
 
 
 def _without_task(task: str) -> Callable[[Results], Results]:
     return lambda results: [one for one in results if one.task != task]
-
-
-def _only_processor(name: str | None) -> Callable[[Results], Results]:
-    return lambda results: [one for one in results if one.processor == name]
 
 
 def _suite(task: str) -> str:
@@ -245,26 +250,27 @@ def _units(first: Results, second: Results, unit: Unit) -> Iterator[_Unit]:
     for where in sorted(ours.keys() & theirs.keys()):
         here, there = ours[where], theirs[where]
         shared = here.keys() & there.keys()
+        each: list[Collection[int]] = [shared]
         if unit == "rollout" and shared:
-            pairs = [([here[seed]], [there[seed]]) for seed in sorted(shared)]
-        else:
-            pairs = [
-                (
-                    [won for seed, won in here.items() if seed in shared or not shared],
-                    [won for seed, won in there.items() if seed in shared or not shared],
-                )
-            ]
-        for mine, other in pairs:
-            difference = Fraction(sum(mine), len(mine)) - Fraction(sum(other), len(other))
+            each = [[seed] for seed in sorted(shared)]
+        for seeds in each:
+            difference = _rate(here, seeds or here) - _rate(there, seeds or there)
             yield _Unit(where[0], difficulties[where], difference)
 
 
-def _verdicts(results: Results) -> dict[tuple[str, int], dict[int, bool]]:
-    found: dict[tuple[str, int], dict[int, bool]] = defaultdict(dict)
+def _verdicts(results: Results) -> dict[tuple[str, int], dict[int, list[bool]]]:
+    """Return the verdicts of each episode by policy seed; each paraphrase of a text has its own."""
+    found: dict[tuple[str, int], dict[int, list[bool]]]
+    found = defaultdict(lambda: defaultdict(list))
     for one in results:
         if one.outcome != "error":
-            found[one.task, one.episode][one.policy_seed] = one.outcome == "success"
+            found[one.task, one.episode][one.policy_seed].append(one.outcome == "success")
     return found
+
+
+def _rate(verdicts: Mapping[int, Sequence[bool]], seeds: Iterable[int]) -> Fraction:
+    every = [won for seed in seeds for won in verdicts[seed]]
+    return Fraction(sum(every), len(every))
 
 
 def _weights(units: Sequence[_Unit], weighting: Weighting) -> list[float]:
@@ -300,12 +306,26 @@ def swap_test(values: NDArray[np.float64]) -> float:
     return float((as_far.sum() + added) / (len(signs) + added))
 
 
+def families_of(data: RunData) -> Iterator[Family]:
+    """Yield for each policy the differences to explicit, then the contrasts of its control arms."""
+    told, figures = data.told(), arm_figures(data)
+    for policy_run, name in told.names.items():
+        own = [one for owner, one in told.results if owner == policy_run]
+        yield Family(name, EXPLICIT_GAPS, gap_contrasts(own))
+        arms = [
+            Contrast(f"{one.contrast.name}, {options_label(one.options)}", *one.sides)
+            for one in figures
+            if one.policy_run == policy_run
+        ]
+        yield Family(name, ARM_CONTRASTS, tuple(arms))
+
+
 def gap_contrasts(results: Results) -> tuple[Contrast, ...]:
     """Return the gaps to explicit of one policy run, one for each set of other options."""
     by_options = _by_options(results)
     explicit = by_options.pop(REFERENCE, [])
     return tuple(
-        Contrast(options_label(options), by_options[options], explicit)
+        Contrast(f"{options_label(options)} less explicit", by_options[options], explicit)
         for options in sorted(by_options, key=options_sort_key)
         if explicit
     )

@@ -8,16 +8,18 @@ from typing import cast
 import numpy as np
 
 from roboirg.core.errors import InvalidValueError
+from roboirg.core.instruction_options import InstructionOptions
 from roboirg.evaluation.analysis.stats.arm_figures import (
+    LANGUAGE_USE,
     MEANING,
     WORDS_WORTH,
     ArmFigure,
     arm_figures,
-    compare_language_use,
 )
 from roboirg.evaluation.analysis.stats.chance import silent_chance
 from roboirg.evaluation.analysis.stats.intervals import SEED, Interval
 from roboirg.evaluation.analysis.stats.option_labels import options_label
+from roboirg.evaluation.analysis.stats.paired_tests import Gap, Pairs, holm, measure_gap
 from roboirg.evaluation.analysis.stats.rates import p_text, points
 from roboirg.evaluation.analysis.stats.run_data import RunData
 from roboirg.evaluation.analysis.tables.breakdown_table import corrected_p_text, interval_text
@@ -41,7 +43,7 @@ def make_arm_table(data: RunData) -> Table:
     Raises:
         InvalidValueError: the runs have no control arms.
     """
-    found = figures_of(data)
+    found = arm_figures(data)
     if not found:
         raise InvalidValueError(
             "The runs have no control arms; play them with --arms told,other-goal,silent,scrambled."
@@ -65,24 +67,26 @@ def make_arm_table(data: RunData) -> Table:
     )
 
 
-def has_arms(data: RunData) -> bool:
-    """Return whether the runs have a control arm next to another."""
-    return bool(figures_of(data))
-
-
-def figures_of(data: RunData) -> tuple[ArmFigure, ...]:
-    """Return the figures of all policies of some runs."""
-    return arm_figures(data.results, np.random.default_rng(SEED))
-
-
 def language_use_sentences(
     first: RunData, second: RunData, names: tuple[str, str]
 ) -> Iterator[str]:
-    """Yield how the language use of two policies differs, a sentence for each setting."""
+    """Yield how the language use of two policies differs, a sentence for each setting.
+
+    P-values are corrected over the settings.
+    """
     rng = np.random.default_rng(SEED)
-    for options, (gap, p_value) in compare_language_use(
-        figures_of(first), figures_of(second), rng
-    ).items():
+    ours, theirs = (
+        {of.options: of.cells[0] for of in arm_figures(data) if of.contrast.name == LANGUAGE_USE}
+        for data in (first, second)
+    )
+    gaps: dict[InstructionOptions, Gap] = {}
+    for options, here in ours.items():
+        there = theirs.get(options, {})
+        pairs = [Pairs.of(here[task], there[task]) for task in here if task in there]
+        if (gap := measure_gap(pairs, rng)) is not None:
+            gaps[options] = gap
+    corrected = holm([gap.p_value for gap in gaps.values()])
+    for (options, gap), p_value in zip(gaps.items(), corrected, strict=True):
         ends = interval_text(gap)
         interval = "" if ends == NOT_APPLICABLE else f" (95 % interval {ends})"
         yield (
@@ -98,7 +102,7 @@ def _words(one: ArmFigure) -> Sequence[str]:
         split = one.policy_run.conditions.split
         chances = [
             np.mean([silent_chance(task, split, trial.episode) for trial in silent.verdicts])
-            for task, (_, silent) in one.cells.items()
+            for task, silent in one.cells[1].items()
         ]
         chance = f"{100 * float(cast('float', np.mean(chances))):.1f}"
     figures = (points(one.gap.value, 1), interval_text(one.gap), corrected_p_text(one.p_holm))

@@ -1,4 +1,4 @@
-"""Tables that the paper has no numbers for: of forms, of failures and of prompts that were cut."""
+"""Tables that the paper has no numbers for: forms, failures, verdicts by other analyses."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ from roboirg.evaluation.analysis.stats.paired_tests import Gap, holm
 from roboirg.evaluation.analysis.stats.rates import points
 from roboirg.evaluation.analysis.stats.run_data import RunData
 from roboirg.evaluation.analysis.stats.run_summary import ALL_TASKS
+from roboirg.evaluation.analysis.stats.sensitivity import families_of, try_choices
 from roboirg.evaluation.analysis.tables.arm_table import make_arm_table
 from roboirg.evaluation.analysis.tables.breakdown_table import (
     corrected_p_text,
     interval_text,
 )
 from roboirg.evaluation.analysis.tables.heard_table import make_heard_table
-from roboirg.evaluation.analysis.tables.sensitivity_table import make_sensitivity_table
 from roboirg.evaluation.analysis.tables.table import POLICY, Column, Entry, Row, Table
 from roboirg.judging.failure_attribution import EXECUTION, GROUNDING
 
@@ -35,6 +35,14 @@ _FAILURES_NOTE = (
     "Failed episodes, and how many of them failed in each way, with their share of the failures. "
     "Grounding: the policy did something else than the instruction means; execution: it did not "
     "complete what the instruction means."
+)
+_SENSITIVITY_NOTE = (
+    "Whether success is lower or higher than in explicit on the same episodes, or the first rate "
+    "of control arms than the second (open: the test does not decide), as tested everywhere, and "
+    "whether that holds under the other choices that can change it, with the verdict where it does "
+    "not. Within a choice, p-values are corrected over all differences to explicit of the policy, "
+    "or over all contrasts of its arms. An episode is a scene, so that rollouts and tasks are the "
+    "other units."
 )
 
 
@@ -125,6 +133,31 @@ def _failure_entries(trials: int, counts: Counter[str], kinds: Iterable[str]) ->
     for kind in kinds:
         share = f" ({100 * counts[kind] / total:.0f} %)" if counts[kind] else ""
         yield Entry(word=f"{counts[kind]}{share}")
+
+
+def make_sensitivity_table(data: RunData) -> Table:
+    """Make the table of the gaps and the control arms of all policies.
+
+    Raises:
+        InvalidValueError: there is no verdict that another choice could change.
+    """
+    tested = [(of.policy, one) for of in families_of(data) for one in try_choices(of.contrasts)]
+    if not any(one.others for _, one in tested):
+        raise InvalidValueError(
+            "No other choice can change the runs: they need explicit and another setting, or "
+            "control arms, in several tasks or with several seeds."
+        )
+    return Table(
+        key="sensitivity",
+        title="Verdicts under other choices of the analysis",
+        heads=(POLICY, "contrast"),
+        columns=(Column("verdict"), Column("in other analyses")),
+        rows=tuple(
+            Row(name, one.label, "ours", (Entry(word=one.verdict), Entry(word=one.sentence)))
+            for name, one in tested
+        ),
+        notes=(_SENSITIVITY_NOTE,),
+    )
 
 
 SUBGOALS = "subgoals"
