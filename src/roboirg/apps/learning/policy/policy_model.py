@@ -189,7 +189,9 @@ class SeenEpisode:
         kind = int(answer.moves[0, 0].argmax())
         thing = int(answer.things[0, 0, kind].argmax())
         keys = () if answer.keys is None else np.flatnonzero(answer.keys[0, 0].numpy() > 0)
-        return NetworkChoice(kind, thing if thing < self._history.tracks.count else None, tuple(keys))
+        return NetworkChoice(
+            kind, thing if thing < self._history.tracks.count else None, tuple(keys)
+        )
 
     def point(self, thing: int) -> NDArray[np.float64]:
         """Return column and row in the front picture of a thing, where it was last seen."""
