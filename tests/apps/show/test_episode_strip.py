@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from roboirg.apps.show.episode_strip import Said, StripMoment, draw_strip
+from roboirg.apps.show.episode_strip import SpokenSetting, StripMoment, draw_strip
 from roboirg.apps.show.episode_text import describe_motions, describe_video, fact_words
 from roboirg.apps.show.playthrough import (
     MAX_MOMENTS,
@@ -23,7 +23,10 @@ pytest.importorskip("matplotlib")
 import matplotlib as mpl
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 
-SAID = [Said("explicit", "Lift it.", "#000000"), Said("direct", "I like it. " * 30, "#0072B2")]
+SAID = [
+    SpokenSetting("explicit", "Lift it.", "#000000"),
+    SpokenSetting("direct", "I like it. " * 30, "#0072B2"),
+]
 
 
 def moments(count, caption="done"):

@@ -76,7 +76,7 @@ def _draw(
     """Print the scene and the instructions, and draw the oracle's episode."""
     from rich.console import Console
 
-    from roboirg.apps.show.episode_strip import Said
+    from roboirg.apps.show.episode_strip import SpokenSetting
     from roboirg.apps.show.episode_text import print_episode
     from roboirg.apps.show.playthrough import write_strip
     from roboirg.envs.factory import check_simulator
@@ -92,7 +92,7 @@ def _draw(
     print_episode(episode, settings, options, console)
     told = {name: replace(options, setting=name) for name in settings}
     said = [
-        Said(name, instruct_with(episode, one).text, all_settings()[name].color)
+        SpokenSetting(name, instruct_with(episode, one).text, all_settings()[name].color)
         for name, one in told.items()
         if not find_refusal(episode, one)
     ]

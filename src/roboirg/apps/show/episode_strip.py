@@ -50,7 +50,7 @@ class StripMoment:
     is_demonstration: bool = False
 
 
-class Said(NamedTuple):
+class SpokenSetting(NamedTuple):
     """An instruction, the setting that it is told in, and the setting's color."""
 
     setting: str
@@ -58,7 +58,7 @@ class Said(NamedTuple):
     color: str
 
 
-def draw_strip(title: str, said: Sequence[Said], moments: Sequence[StripMoment]) -> Figure:
+def draw_strip(title: str, said: Sequence[SpokenSetting], moments: Sequence[StripMoment]) -> Figure:
     """Draw the words above all moments, in order of time.
 
     Args:

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from roboirg.apps.show.episode_strip import Said, StripMoment, draw_strip
+from roboirg.apps.show.episode_strip import SpokenSetting, StripMoment, draw_strip
 from roboirg.core.episode import Episode
 from roboirg.core.errors import MotionPlanningError
 from roboirg.core.motions import Away, Motion, Swap
@@ -64,7 +64,9 @@ def play_through(episode: Episode) -> Playthrough:
     return Playthrough(verdict, env.session.world.elapsed, recorder.chosen())
 
 
-def write_strip(episode: Episode, said: Sequence[Said], path: Path) -> tuple[str, tuple[Path, ...]]:
+def write_strip(
+    episode: Episode, said: Sequence[SpokenSetting], path: Path
+) -> tuple[str, tuple[Path, ...]]:
     """Write a strip of the oracle's play, for light and dark pages.
 
     Args:
