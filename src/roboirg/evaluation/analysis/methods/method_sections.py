@@ -56,12 +56,9 @@ _POOL_NOTES: Mapping[str | None, str] = {
     None: f"{NOT_REPORTED} by roboirg, as the words are from a file",
 }
 
-_JOINTS = "8 numbers, seven joint angles (rad) and the first finger's position (m)"
-_WHOLE = "seven joint angles (rad), two finger positions (m), end-effector pose (6 numbers)"
 _STATES = {
-    **dict.fromkeys(("openpi", "mme-vla", "lerobot"), _JOINTS),
-    **dict.fromkeys(("challenge", "challenge+http", ""), _WHOLE),
-    "vla-eval": f"{_JOINTS}, unless the URL or the server declines it",
+    **dict.fromkeys(("openpi", "mme-vla", "lerobot"), "7 joint angles (rad), first finger (m)"),
+    "": "7 joint angles (rad), 2 finger positions (m), end-effector pose (6 numbers)",
 }
 
 Played = Mapping[str, PlayedFacts]
@@ -188,8 +185,7 @@ def _version(facts: PlayedFacts) -> str:
     if found != "built-in":
         return found
     is_unknown = facts.is_remote and "roboirg" not in facts.know("libraries")
-    version = f", whose version is {NOT_REPORTED} by the server" * is_unknown
-    return f"none of its own, as it is part of roboirg{version}"
+    return "part of roboirg" + f", whose version is {NOT_REPORTED} by the server" * is_unknown
 
 
 def _observations(results: Sequence[Summary], played: Played) -> Items:
@@ -280,5 +276,4 @@ def _training(played: Played, said: ColumnTexts) -> Items:
     texts = set().union(*(one.texts for one in said.values()))
     pools = Counter(_POOL_NOTES[pool] for _, pool in texts)
     listed = (f"{counted(pools[note], 'text')}: {note}" for note in sorted(pools))
-    other = "whether a policy was trained on these splits is another question"
-    yield item("whether these texts occur in the splits train and val", *listed, other)
+    yield item("occurrence in train and val, whether or not a policy learned from these", *listed)

@@ -43,10 +43,7 @@ SceneName = tuple[str, str, int]
 """Task, split and number."""
 
 _NO_REASON = f"reason for this selection: {NOT_REPORTED} by the user who chose it"
-_GUESS = (
-    "expected success if the right motions are made toward a goal drawn from those that fit the "
-    "last utterance alone, or from its named candidates; no floor without words"
-)
+_GUESS = "expected of right motions to a goal drawn from those that the last utterance leaves"
 _FEW_SCENES = 2
 """Of a task; over so few a bootstrap means nothing."""
 
@@ -131,19 +128,14 @@ def statistics_items(data: RunData, families: Sequence[Family]) -> Items:
     yield item(
         "differences to explicit",
         f"paired by scene, {test}, two-sided",
-        f"if the corrected p is at most {ALPHA}, the verdict is higher or lower than explicit, by "
-        "the sign of the difference; otherwise open",
+        f"verdict higher or lower than explicit if the corrected p is at most {ALPHA}; else open",
     )
     arms = [
         f"{policy}: its {kind} ({len(contrasts)})"
         for policy, kind, contrasts in families
         if kind == ARM_CONTRASTS and contrasts
     ]
-    yield item(
-        "multiplicity, by Holm's correction, separately within each of these families",
-        *_sizes(data.told()),
-        *arms,
-    )
+    yield item("Holm's correction, separately within each family", *_sizes(data.told()), *arms)
     yield (
         "contrasts of arms, where played; paired and tested alike",
         MEANING.rstrip(".") if arms else "none, without control arms",
@@ -193,7 +185,7 @@ def control_items(data: RunData, jobs: Sequence[Job]) -> Items:
     for options in sorted(by_options, key=options_sort_key):
         level = chance_level(by_options[options])
         text = NOT_REPORTED if level is None else f"{100 * float(level):.1f} %"
-        yield f"chance in {options_label(options)}", f"{text}, {_GUESS}"
+        yield f"chance in {options_label(options)}", f"{text}, {_GUESS}; no floor without words"
     told = data.told()
     controls = [one for one in told.names if one.is_privileged]
     listed = "; ".join(f"{told.names[one]}: {_rates(told, one)}" for one in controls)

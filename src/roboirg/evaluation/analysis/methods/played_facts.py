@@ -121,10 +121,7 @@ class PlayedFacts:
                 self.declared[key].add(_words(table[key]))
         self.declared["version"] = {*self.declared["version"], record.policy_version} - {"unknown"}
         if (found := record.inference) is not None:
-            dtypes = [
-                f"{one} (of the parameters; of the arithmetic: {NOT_REPORTED} by roboirg)"
-                for one in found.dtypes
-            ]
+            dtypes = [f"{one} (parameters; roboirg reads no arithmetic)" for one in found.dtypes]
             values = found.python, found.libraries, dtypes, found.devices
             for key, one in zip(("python", "libraries", "dtype", "device"), values, strict=True):
                 self.inference[key].add(_words(one))

@@ -186,9 +186,7 @@ def _paraphrases(arms: Arms) -> Sides | None:
 
 
 CONTRASTS = (
-    ArmContrast(
-        LANGUAGE_USE, "reached whichever was stated", "pursued the same both times", _language_use
-    ),
+    ArmContrast(LANGUAGE_USE, "each reached when stated", "same pursued", _language_use),
     ArmContrast(WORDS_WORTH, TOLD, SILENT, _against(SILENT, SILENT_EMPTY)),
     ArmContrast("order's worth", TOLD, SCRAMBLED, _against(SCRAMBLED)),
     ArmContrast("paraphrases", "all", "mean", _paraphrases),
