@@ -19,7 +19,7 @@ SILENT_TEXTS = {SILENT: "Please do your task.", SILENT_EMPTY: ""}
 ARMS: Mapping[str, str] = {
     TOLD: "the scene's own goal in the words of the setting",
     OTHER_GOAL: "another goal of the same scene, stated in the same setting, and judged by it",
-    SILENT: f"'{SILENT_TEXTS[SILENT]}' instead of all words",
+    SILENT: f"the whole instruction replaced by '{SILENT_TEXTS[SILENT]}'",
     SILENT_EMPTY: "no words at all",
     SCRAMBLED: "the content words in random order",
     PARAPHRASE: "another text of the same goal, in the same setting and pool of words",

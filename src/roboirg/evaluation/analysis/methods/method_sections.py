@@ -24,8 +24,10 @@ from roboirg.evaluation.analysis.methods.method_statistics import (
 )
 from roboirg.evaluation.analysis.methods.method_text import Sections
 from roboirg.evaluation.analysis.methods.played_facts import (
+    DECLARABLE,
     FIXED,
     NO_NETWORK,
+    NOT_RECORDED,
     NOT_REPORTED,
     Items,
     PlayedFacts,
@@ -40,6 +42,7 @@ from roboirg.evaluation.analysis.stats.run_data import RunData
 from roboirg.evaluation.analysis.stats.sensitivity import families_of
 from roboirg.evaluation.plan.plan import Plan
 from roboirg.evaluation.plan.stored_plans import read_plan
+from roboirg.evaluation.policy_calls import SERVER
 from roboirg.evaluation.records.record import DEFAULT_MAX_STEPS, Job, Record, Summary
 from roboirg.evaluation.records.store import iterate_records, read_results
 from roboirg.language.settings import all_settings
@@ -47,10 +50,15 @@ from roboirg.tasks import every_task
 from roboirg.util.media import CONTROL_RATE
 
 _POOL_NOTES: Mapping[str | None, str] = {
-    "test": "none, because the templates are held out",
-    "train": "possible, because the templates are the same",
-    FIXED: "none, because such texts are for control arms only",
-    None: f"{NOT_REPORTED}, because the words are from a file",
+    "test": "in neither, as their templates are held out",
+    "train": "perhaps, as their templates are the same",
+    FIXED: "in neither, as it is the fixed text of a control arm",
+    None: f"{NOT_REPORTED} by roboirg, as the words are from a file",
+}
+
+_STATES = {
+    **dict.fromkeys(("openpi", "mme-vla", "lerobot"), "7 joint angles (rad), first finger (m)"),
+    "": "7 joint angles (rad), 2 finger positions (m), end-effector pose (6 numbers)",
 }
 
 Played = Mapping[str, PlayedFacts]
@@ -116,8 +124,8 @@ def _horizon(results: Sequence[Summary], plan: Plan | None, played: Played) -> I
         if plan
     ]
     yield item(
-        "limits of wall-clock time, by the run's newest plan",
-        *(waits or [NOT_REPORTED]),
+        "wall-clock limits of the run's last plan",
+        *(waits or [f"{NOT_REPORTED}, as the run has no plan"]),
         "a rollout that exceeds one ends in an error",
     )
     yield item(
@@ -126,13 +134,13 @@ def _horizon(results: Sequence[Summary], plan: Plan | None, played: Played) -> I
         "the simulation waits for the policy",
     )
     for name, facts in played.items():
-        mean = f"{facts.steps / facts.calls:.1f}" if facts.calls else NOT_REPORTED
+        mean = f"{facts.steps / facts.calls:.1f}" if facts.calls else NOT_RECORDED
         every = facts.need("observe_every")
-        between = every if every in ("none", NOT_REPORTED) else f"every {every} steps"
+        between = every if every in ("none", NOT_RECORDED) else f"every {every} steps"
         yield item(
             name,
             f"actions: {_action_space(facts.need('actions'))}",
-            facts.labeled("chunk"),
+            f"{facts.labeled('chunk')}" + ", and may vary" * (NOT_REPORTED in facts.know("chunk")),
             "executed per call: the whole chunk, or to the rollout's end; "
             f"{mean} control steps on average",
             f"observations within a chunk: {between}",
@@ -146,7 +154,7 @@ def _limit(unit: str, values: Collection[float], default: float) -> str:
 
 
 def _action_space(name: str) -> str:
-    if name == NOT_REPORTED or ";" in name:
+    if name == NOT_RECORDED or ";" in name:
         return name
     space = find_action_space(name)
     steps = "one control step each" if not space.takes_many_steps else "of many control steps each"
@@ -160,14 +168,14 @@ def _precision(results: Sequence[Summary], played: Played) -> Items:
         yield item(
             name,
             f"computed {place}",
-            f"version: {_version(facts)}",
+            f"{DECLARABLE['version']}: {_version(facts)}",
             *map(facts.labeled, keys),
         )
     yield item(
         "simulation",
         f"package roboirg {distinct(one.package_version for one in results)}, which calls the "
         "policies",
-        f"version of SAPIEN: {NOT_REPORTED}",
+        f"version of SAPIEN: {NOT_REPORTED} by roboirg",
         f"processor: {distinct(one.processor for one in results)}",
     )
 
@@ -177,7 +185,7 @@ def _version(facts: PlayedFacts) -> str:
     if found != "built-in":
         return found
     is_unknown = facts.is_remote and "roboirg" not in facts.know("libraries")
-    return "that of roboirg" + f" ({NOT_REPORTED} by the server)" * is_unknown
+    return "part of roboirg" + f", whose version is {NOT_REPORTED} by the server" * is_unknown
 
 
 def _observations(results: Sequence[Summary], played: Played) -> Items:
@@ -190,20 +198,17 @@ def _observations(results: Sequence[Summary], played: Played) -> Items:
         f"{distinct(one.meshes for one in results)} meshes",
         "not rendered, as no policy has a camera" if blind else f"rendered on {devices}",
     )
-    yield item(
-        "state of the robot, in each observation",
-        "joint angles, finger positions and end-effector pose",
-        "a server gets what its protocol sends",
-    )
     for name, facts in played.items():
         cameras = facts.need("cameras")
-        size = "" if cameras in ("none", NOT_REPORTED) else ", each 256 × 256 pixels as rendered"
+        size = "" if cameras in ("none", NOT_RECORDED) else ", each 256 × 256 pixels as rendered"
         frames = facts.need("demonstration_frames")
-        kind = ", without pictures" if cameras == "none" != frames else ""
+        kind = ", the state of the robot without pictures" if cameras == "none" != frames else ""
+        state = _STATES.get(facts.scheme or SERVER * facts.is_remote, f"{NOT_REPORTED} by roboirg")
         yield item(
             name,
-            f"cameras given to it: {cameras}{size}",
+            f"cameras available to it: {cameras}{size}",
             f"depth: {facts.need('depth')}",
+            f"state of the robot given to it: {state}",
             f"frames of the video before its turn: {frames}{kind}",
             f"reads the simulator's state: {'yes' if facts.is_privileged else 'no'}",
             facts.labeled("preprocessing"),
@@ -233,7 +238,7 @@ def _instructions(results: Sequence[Summary], played: Played, said: ColumnTexts)
 def _counts(said: SaidTexts, *, is_fixed: bool) -> str:
     texts = counted(len(said.texts), "distinct text")
     if not said.commands:
-        return f"{texts}, " + ("fixed" if is_fixed else f"templates: {NOT_REPORTED}")
+        return f"{texts}, " + ("fixed" if is_fixed else f"templates: {NOT_RECORDED}")
     pools = {*POOLS} & {pool for _, pool in said.texts}
     tasks = {task for task, _ in said.commands} & every_task().keys()
     there = sum(
@@ -241,15 +246,15 @@ def _counts(said: SaidTexts, *, is_fixed: bool) -> str:
     )
     return (
         f"{texts}; command templates: {len(said.commands)} of the {there} in the pool for "
-        f"{counted(len(tasks), 'task')}; other wordings, such as those of earlier "
-        f"sentences and referring expressions: {len(said.wordings) or 'none'}"
+        f"{counted(len(tasks), 'task')}; distinct random choices for words outside the command and "
+        f"for referring expressions: {len(said.choices) or 'none'}, of a number not counted here"
     )
 
 
 def _reading(facts: PlayedFacts) -> Iterator[str]:
     yield facts.labeled("reads_text")
     lowered = {"yes": "in lower case", "no": "as written"}
-    yield f"sent: {lowered.get(facts.need('lowers_prompt'), NOT_REPORTED)}"
+    yield f"sent: {lowered.get(facts.need('lowers_prompt'), NOT_RECORDED)}"
     if facts.know("reads_text").split(",")[0] == "no":
         yield "what it does to the text, and texts cut at a limit of tokens: not applicable"
         return
@@ -257,7 +262,7 @@ def _reading(facts: PlayedFacts) -> Iterator[str]:
     limit, found = facts.need("prompt_tokens"), facts.verdicts
     if facts.know("dtype") == NO_NETWORK:
         yield f"texts cut at a limit of tokens: {NO_NETWORK}"
-    elif limit in ("none", NOT_REPORTED):
+    elif limit in ("none", NOT_RECORDED):
         yield f"texts cut at a limit of tokens: {NOT_REPORTED}, as it declares no limit"
     else:
         unsure = found.total() - found["heard"] - found["cut"]
@@ -271,4 +276,4 @@ def _training(played: Played, said: ColumnTexts) -> Items:
     texts = set().union(*(one.texts for one in said.values()))
     pools = Counter(_POOL_NOTES[pool] for _, pool in texts)
     listed = (f"{counted(pools[note], 'text')}: {note}" for note in sorted(pools))
-    yield item("occurrence of these texts in the splits for training, train and val", *listed)
+    yield item("occurrence in train and val, whether or not a policy learned from these", *listed)

@@ -42,8 +42,8 @@ from roboirg.tasks.splits.splits import SIZES, shipped_splits
 SceneName = tuple[str, str, int]
 """Task, split and number."""
 
-_NO_REASON = f"reason for this selection: {NOT_REPORTED}"
-_GUESS = "expected of a guess among the goals that fit the last utterance alone"
+_NO_REASON = f"reason for this selection: {NOT_REPORTED} by the user who chose it"
+_GUESS = "expected of right motions to a goal drawn from those that the last utterance leaves"
 _FEW_SCENES = 2
 """Of a task; over so few a bootstrap means nothing."""
 
@@ -123,19 +123,19 @@ def statistics_items(data: RunData, families: Sequence[Family]) -> Items:
         "intervals",
         f"95 %; {wilson}the bootstrap over each task's scenes ({DRAWS} resamples), paired for "
         "differences",
-        f"tasks with too few scenes for a bootstrap to mean anything: {', '.join(few) or 'none'}",
+        f"disregard the bootstrap, for too few scenes, in: {', '.join(few) or 'no task'}",
     )
     yield item(
         "differences to explicit",
         f"paired by scene, {test}, two-sided",
-        f"higher or lower, by the sign, if p ≤ {ALPHA} after the correction; else open",
+        f"verdict higher or lower than explicit if the corrected p is at most {ALPHA}; else open",
     )
     arms = [
         f"{policy}: its {kind} ({len(contrasts)})"
         for policy, kind, contrasts in families
         if kind == ARM_CONTRASTS and contrasts
     ]
-    yield item("multiplicity, by Holm's correction over families", *_sizes(data.told()), *arms)
+    yield item("Holm's correction, separately within each family", *_sizes(data.told()), *arms)
     yield (
         "contrasts of arms, where played; paired and tested alike",
         MEANING.rstrip(".") if arms else "none, without control arms",
@@ -150,7 +150,7 @@ def sensitivity_items(families: Sequence[Family]) -> Items:
             continue
         for found in try_choices(contrasts):
             least = 0.5 ** (found.pairs - 1)
-            power = f", too few for any verdict but open (p cannot be below {least:.3g})"
+            power = f", with which uncorrected p is at least {least:.3g}, so the verdict is open"
             yield item(
                 f"{policy}, {found.label}",
                 found.verdict,
@@ -163,7 +163,7 @@ def sensitivity_items(families: Sequence[Family]) -> Items:
         yield item(
             f"{policy}, other analyses of {kind}",
             f"tried: {', '.join(tried) or 'none'}",
-            f"not tried, as they change nothing here: {', '.join(rest) or 'none'}",
+            f"not tried, being identical here: {', '.join(rest) or 'none'}",
         )
 
 
@@ -173,7 +173,7 @@ def _sizes(told: RunData) -> Iterator[str]:
         rows = [one for one in told.summaries.values() if one.policy_run == policy_run and one.gap]
         tasks, suites = (sum(bool(one.scope[place]) for one in rows) for place in (0, 1))
         everywhere = len(rows) - tasks - suites
-        sizes = f"single tasks ({tasks}), suites ({suites}), all tasks ({everywhere})"
+        sizes = f"single tasks ({tasks}); in suites ({suites}); in all tasks ({everywhere})"
         yield f"{name}: its differences to explicit in {sizes}"
 
 
@@ -185,7 +185,7 @@ def control_items(data: RunData, jobs: Sequence[Job]) -> Items:
     for options in sorted(by_options, key=options_sort_key):
         level = chance_level(by_options[options])
         text = NOT_REPORTED if level is None else f"{100 * float(level):.1f} %"
-        yield f"chance in {options_label(options)}", f"{text}, {_GUESS}"
+        yield f"chance in {options_label(options)}", f"{text}, {_GUESS}; no floor without words"
     told = data.told()
     controls = [one for one in told.names if one.is_privileged]
     listed = "; ".join(f"{told.names[one]}: {_rates(told, one)}" for one in controls)

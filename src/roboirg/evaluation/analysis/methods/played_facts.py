@@ -15,11 +15,12 @@ from roboirg.evaluation.policy_calls import SERVER
 from roboirg.evaluation.records.record import Record
 
 NOT_REPORTED = "not reported"
+NOT_RECORDED = f"{NOT_REPORTED} in these records"
 NO_NETWORK = "not applicable, as there is no neural network"
 
 DECLARABLE = {
     "network": "network",
-    "version": "version",
+    "version": "version of the policy",
     "chunk": "nominal length of a chunk",
     "dtype": "number type of inference",
     "device": "device of inference",
@@ -28,11 +29,11 @@ DECLARABLE = {
     "preprocessing": "preprocessing of observations, relative to training",
     "reads_text": "reads the text",
     "text_normalization": "what it does to the text",
-    "trained_on": "words that it was trained on",
+    "trained_on": "words of the benchmark that it was trained on, or written for",
 }
 """Keys of a policy's ``metadata`` that methods sections read, and what they stand for."""
 
-_OF_NETWORKS = ("dtype", "device", "preprocessing", "text_normalization", "trained_on")
+_OF_NETWORKS = ("dtype", "preprocessing", "text_normalization")
 """Those that do not exist without a network."""
 
 FIXED = "fixed"
@@ -61,12 +62,12 @@ class SaidTexts:
     Attributes:
         texts: each with the pool of its words, or `FIXED`; None for words from elsewhere.
         commands: the templates of their commands, with the task.
-        wordings: other sentences, parts and referring expressions that were drawn.
+        choices: what was drawn for the other words.
     """
 
     texts: set[tuple[str, str | None]] = field(default_factory=set)
     commands: set[tuple[str, str]] = field(default_factory=set)
-    wordings: set[str] = field(default_factory=set)
+    choices: set[str] = field(default_factory=set)
 
     def add(self, record: Record) -> None:
         """Take in the text of a record."""
@@ -78,7 +79,7 @@ class SaidTexts:
         drawn = set(metadata.get("templates", ()) if is_ours else ())
         commands = {one for one in drawn if one.startswith("command-")}
         self.commands |= {(record.task, one) for one in commands}
-        self.wordings |= drawn - commands
+        self.choices |= drawn - commands
 
 
 @dataclass
@@ -89,6 +90,7 @@ class PlayedFacts:
         needs: distinct values of what the policy declares that it needs, by name.
         declared: distinct values in its metadata, by key of `DECLARABLE`.
         inference: distinct values of what its process computes with, by key of `DECLARABLE`.
+        scheme: of its URL; empty if it has none.
         is_remote: whether a server computes its actions.
         is_privileged: whether it reads the simulator's state.
         steps: control steps in all.
@@ -100,6 +102,7 @@ class PlayedFacts:
     needs: dict[str, set[str]] = field(default_factory=lambda: defaultdict(set))
     declared: dict[str, set[str]] = field(default_factory=lambda: defaultdict(set))
     inference: dict[str, set[str]] = field(default_factory=lambda: defaultdict(set))
+    scheme: str = ""
     is_remote: bool = False
     is_privileged: bool = False
     steps: int = 0
@@ -111,13 +114,14 @@ class PlayedFacts:
         """Take in one record."""
         for name, value in record.needs.items():
             self.needs[name].add(_words(value))
+        self.scheme = record.policy_spec.partition("://")[0] if "://" in record.policy_spec else ""
         for table in _tables(record.policy_metadata):
             self.is_remote |= SERVER in table
             for key in DECLARABLE.keys() & table.keys():
                 self.declared[key].add(_words(table[key]))
         self.declared["version"] = {*self.declared["version"], record.policy_version} - {"unknown"}
         if (found := record.inference) is not None:
-            dtypes = [f"{one} (parameters; arithmetic: {NOT_REPORTED})" for one in found.dtypes]
+            dtypes = [f"{one} (parameters; roboirg reads no arithmetic)" for one in found.dtypes]
             values = found.python, found.libraries, dtypes, found.devices
             for key, one in zip(("python", "libraries", "dtype", "device"), values, strict=True):
                 self.inference[key].add(_words(one))
@@ -130,7 +134,7 @@ class PlayedFacts:
     def need(self, name: str) -> str:
         """Return a declared need in words; in records from before needs were kept it is unknown."""
         if not self.needs:
-            return NOT_REPORTED
+            return NOT_RECORDED
         return "; ".join(sorted(one or "none" for one in self.needs.get(name, ("none",))))
 
     def know(self, key: str) -> str:
@@ -143,7 +147,7 @@ class PlayedFacts:
         known = _listed(self.declared.get(key, ())) or _listed(measured)
         if not known and key in _OF_NETWORKS and self.declared["network"] == {"none"}:
             return NO_NETWORK
-        return known or NOT_REPORTED + " by the server" * self.is_remote
+        return known or f"{NOT_REPORTED} by the {'server' if self.is_remote else 'policy'}"
 
     def labeled(self, key: str) -> str:
         """Return the same after what the key stands for."""
@@ -151,9 +155,9 @@ class PlayedFacts:
 
 
 def distinct(values: Iterable[object]) -> str:
-    """Return the distinct values in order; None among them is not reported."""
+    """Return the distinct values in order, without None."""
     found = sorted({str(one) for one in values if one is not None})
-    return ", ".join(found) or NOT_REPORTED
+    return ", ".join(found) or NOT_RECORDED
 
 
 def item(label: str, *parts: str) -> tuple[str, str]:

@@ -186,15 +186,15 @@ def _paraphrases(arms: Arms) -> Sides | None:
 
 
 CONTRASTS = (
-    ArmContrast(LANGUAGE_USE, "both followed", "same done", _language_use),
+    ArmContrast(LANGUAGE_USE, "each reached when stated", "same pursued", _language_use),
     ArmContrast(WORDS_WORTH, TOLD, SILENT, _against(SILENT, SILENT_EMPTY)),
     ArmContrast("order's worth", TOLD, SCRAMBLED, _against(SCRAMBLED)),
     ArmContrast("paraphrases", "all", "mean", _paraphrases),
     ArmContrast("repeat", TOLD, AGAIN, _against(AGAIN)),
 )
 MEANING = (
-    "Language use: first the scenes in which the told goal and another one were both reached when "
-    "stated; second those in which the same goal was pursued whichever was stated. Words' worth "
+    "Language use: first the share of scenes in which each of two goals was reached when stated; "
+    "second that in which the same goal was pursued whichever of them was stated. Words' worth "
     "and order's worth: success when told, against silence and against scrambled words. "
     "Paraphrases: all of them succeed, against their mean. Repeat: another policy seed."
 )
