@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 from roboirg.apps.learning.policy.recording import ExpertRecording
 from roboirg.apps.learning.policy.waypoint_expert import LEAVE
 
-Z_GRID = 0.0025
-"""Meters to which heights are rounded."""
+Z_GRID, STILL_GRID = 0.0025, 0.01
+"""Meters to which heights are rounded, and those at which the tool stays."""
 XY_GRID = 0.1
 """Meters to which a way in the plane from the tool's place is rounded."""
 RAREST = 0.0005
@@ -70,9 +70,8 @@ def decisions_of(recorded: ExpertRecording) -> list[ExpertDecision]:
         at_thing = bool(anchor >= 0)
         if at_thing or is_still:
             x = y = 0.0
-        move = Move(
-            at_thing, _round(x, XY_GRID), _round(y, XY_GRID), _round(z, Z_GRID), turn, gripper
-        )
+        z = _round(z, STILL_GRID if is_still else Z_GRID)
+        move = Move(at_thing, _round(x, XY_GRID), _round(y, XY_GRID), z, turn, gripper)
         found.append(ExpertDecision(int(look), move, int(anchor)))
     return found
 
