@@ -72,11 +72,8 @@ def decisions_of(recorded: ExpertRecording) -> list[ExpertDecision]:
         at_thing = bool(anchor >= 0)
         if at_thing or is_still:
             x = y = 0.0
-        if is_still:
-            z, turn = 0.0, STAY
-        move = Move(
-            at_thing, _round(x, XY_GRID), _round(y, XY_GRID), _round(z, Z_GRID), turn, gripper
-        )
+        places = _round(x, XY_GRID), _round(y, XY_GRID), 0.0 if is_still else _round(z, Z_GRID)
+        move = Move(at_thing, *places, STAY if is_still else turn, gripper)
         found.append(ExpertDecision(int(look), move, int(anchor)))
     return found
 
