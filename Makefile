@@ -3,15 +3,18 @@
 PYTHON := .venv/bin/python
 
 .DEFAULT_GOAL := help
-.PHONY: help setup test test-slow test-all every-test integrations lint docs demo card clean
+.PHONY: help setup dev test test-slow test-all every-test integrations lint docs demo card clean
 
 help: ## list the targets
 	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):.*## /  make \1\t/' | expand -t 21
 
-setup: ## make .venv and see to a Vulkan driver; quick when there is nothing to do
+setup: ## make .venv and a Vulkan driver, for playing and results; quick when nothing is missing
 	@scripts/setup
 
-lint: setup ## ruff and mypy
+dev: ## the same, and what tests, lint and documentation need
+	@scripts/setup dev
+
+lint: dev ## ruff and mypy
 	$(PYTHON) -m ruff check .
 	$(PYTHON) -m ruff format --check .
 	$(PYTHON) -m mypy
@@ -24,25 +27,25 @@ PYTEST = $(PYTHON) -m pytest -n 2 --dist loadfile --no-loadscope-reorder --junit
 test: lint ## lint, then every test but the slow ones
 	$(PYTEST) -m "not slow"
 
-test-slow: setup ## the slow tests alone
+test-slow: dev ## the slow tests alone
 	$(PYTEST) -m slow
 
 test-all: lint every-test ## lint, then every test; both at once with --jobs 2
 
-every-test: setup
+every-test: dev
 	$(PYTEST)
 
 integrations: ## the plug-ins in the real LeRobot, vla-eval and Inspect, in environments of their own
 	@scripts/test-integrations
 
-docs: setup ## the documentation site, in build/site; a warning or dead link is an error
+docs: dev ## the documentation site, in build/site; a warning or dead link is an error
 	NO_MKDOCS_2_WARNING=1 $(PYTHON) -m mkdocs build --strict
 
 demo: setup ## the main job: three policies, every task and setting; ends with a table and a page
 	.venv/bin/roboirg run --plan demo --out runs/demo
 	.venv/bin/roboirg report runs/demo
 
-card: setup ## write docs/language-card.md anew, after a change of words or episodes
+card: dev ## write docs/language-card.md anew, after a change of words or episodes
 	$(PYTHON) scripts/write_language_card.py
 
 clean: ## remove what the tools left behind; .venv and runs stay

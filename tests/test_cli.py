@@ -307,12 +307,13 @@ def test_wrong_wishes_are_one_sentence(roboirg, words: tuple[str, ...], sentence
 def test_an_episode_is_shown(roboirg, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(
-        "roboirg.apps.show.playthrough.draw_sheet", lambda _episode, path: f"success, in {path}"
+        "roboirg.apps.show.playthrough.write_strip",
+        lambda _episode, said, path: (" ".join(one.setting for one in said), (path,)),
     )
     said = roboirg("show", "VideoPlaceButton", "3", "--split", "val")
     assert (said.code, said.err) == (0, "")
     path = "VideoPlaceButton-val-3.png"
-    assert said.out.splitlines()[-2:] == [f"the oracle success, in {path}", path]
+    assert said.out.splitlines()[-2:] == ["the oracle explicit direct reasoning contextual", path]
     words = " ".join(said.out.split())
     for told in ("VideoPlaceButton/val/3 hard, seed", "target_3", "change places", "that is: cube_",
                  "relation", "contextual", "resolved"):  # fmt: skip
@@ -325,7 +326,9 @@ def test_a_shown_episode_is_a_picture(roboirg, tmp_path: Path) -> None:
     said = roboirg("show", "PickXtimes", "0", "--out", tmp_path / "sheet.png")
     assert (said.code, said.err) == (0, "")
     assert "the oracle success after " in said.out
-    assert (tmp_path / "sheet.png").read_bytes().startswith(b"\x89PNG")
+    for name in ("sheet.png", "sheet-dark.png"):
+        assert (tmp_path / name).read_bytes().startswith(b"\x89PNG")
+        assert str(tmp_path / name) in said.out
 
 
 def test_help_needs_nothing_heavy() -> None:

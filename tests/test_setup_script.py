@@ -1,5 +1,6 @@
 """The functions of scripts/setup, sourced by bash and fed with made-up apt sources."""
 
+import shutil
 import subprocess
 from pathlib import Path
 
@@ -138,3 +139,68 @@ def test_opencv_alone_needs_no_backports(apt_dir: Path) -> None:
     fakes = "mesa_candidate() { echo 22.3.6-1; }; "
     commands = bash(fakes + "administrator_commands ${OPENCV_PACKAGES[*]}", apt_dir).stdout
     assert commands == "apt-get update\napt-get install libgl1 libglib2.0-0\n"
+
+
+FAKES = """
+make_venv() {
+    mkdir -p .venv/bin
+    printf '#!/bin/sh\n' | tee .venv/bin/python >.venv/bin/roboirg
+    chmod +x .venv/bin/*
+}
+install_python_packages() { say "installing [$1]"; }
+ensure_libraries() { :; }
+"""
+
+
+@pytest.fixture
+def checkout(tmp_path: Path) -> Path:
+    """A checkout in which nothing is set up, and of which only the set-up script is real."""
+    (tmp_path / "scripts").mkdir()
+    shutil.copy(SETUP, tmp_path / "scripts")
+    (tmp_path / "pyproject.toml").write_text("[project]")
+    return tmp_path
+
+
+def installed(checkout: Path, words: str = "") -> list[str]:
+    """Set the checkout up; return which sets of extras were installed."""
+    done = subprocess.run(
+        ["bash", "-c", f"source scripts/setup; {FAKES} main {words}"],
+        cwd=checkout,
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    return [line.partition("installing ")[2] for line in done.stdout.splitlines() if "[" in line]
+
+
+def test_developers_packages_come_when_they_are_asked_for(checkout: Path) -> None:
+    assert installed(checkout) == ["[sim,report]"]
+    assert installed(checkout) == []
+    assert installed(checkout, "dev") == ["[sim,report,dev]"]
+    assert installed(checkout, "dev") == []
+    assert installed(checkout) == []  # what developers have is enough
+    assert installed(checkout, "dev") == []
+
+
+def test_changed_requirements_are_installed_and_no_more(checkout: Path) -> None:
+    installed(checkout, "dev")
+    (checkout / "pyproject.toml").write_text("[project]\ndependencies = []")
+    assert installed(checkout) == ["[sim,report]"]
+    assert installed(checkout, "dev") == ["[sim,report,dev]"]
+
+
+def test_an_unknown_argument_of_set_up_is_refused() -> None:
+    done = bash("main docs")
+    assert done.returncode == 1
+    assert "unknown argument 'docs'" in done.stderr
+
+
+def test_every_target_that_checks_or_writes_documents_sets_up_for_developers() -> None:
+    targets = ["lint", "test", "test-slow", "test-all", "docs", "card"]
+    for target in [*targets, "demo", "setup"]:
+        dry = subprocess.run(
+            ["make", "--dry-run", target], cwd=SETUP.parents[1], capture_output=True, text=True,
+            check=True,
+        )  # fmt: skip
+        wanted = "scripts/setup dev" if target in targets else "scripts/setup"
+        assert [one for one in dry.stdout.splitlines() if "scripts/setup" in one] == [wanted]

@@ -21,6 +21,7 @@ from roboirg.evaluation.analysis.figures.context import draw_context
 from roboirg.evaluation.analysis.figures.failures import COLORS, draw_failures
 from roboirg.evaluation.analysis.figures.figure_style import STYLE
 from roboirg.evaluation.analysis.figures.forms import PARTS, draw_forms
+from roboirg.evaluation.analysis.figures.gaps import draw_gaps
 from roboirg.evaluation.analysis.published import published_rows
 from roboirg.evaluation.analysis.stats.failure_counts import UNATTRIBUTED
 from roboirg.evaluation.analysis.stats.run_data import RunData
@@ -93,6 +94,7 @@ def test_all_figures_that_apply_are_written_and_are_the_same_again(tmp_path: Pat
 @pytest.mark.parametrize(
     ("name", "words"),
     [
+        ("gaps", ["listener", "forgetful", "direct", "2 tasks", "−100"]),
         ("averages", ["listener", "forgetful", "explicit", "(2 tasks)"]),
         (
             "forms",
@@ -229,7 +231,9 @@ def test_scenes_are_counted_in_whole_numbers(tmp_path: Path) -> None:
     assert not re.search(r"<!-- \d+\.\d+ -->", drawn)
 
 
-@pytest.mark.parametrize("draw", [draw_averages, draw_context, draw_failures, draw_forms])
+@pytest.mark.parametrize(
+    "draw", [draw_averages, draw_context, draw_failures, draw_forms, draw_gaps]
+)
 def test_no_name_leaves_the_figure(
     draw: Callable[[RunData], Figure | None], published_like: Callable[..., list[Summary]]
 ) -> None:
@@ -302,7 +306,11 @@ def test_the_command_draws_what_it_is_asked_for(tmp_path: Path) -> None:
     asked = [str(tmp_path / "run"), "--out", str(out), "--which", "averages, failures"]
     done = CliRunner().invoke(app, asked, catch_exceptions=False)
     assert done.exit_code == 0
-    assert sorted(path.stem for path in out.iterdir()) == ["averages"] * 3 + ["failures"] * 3
+    assert sorted(path.name for path in out.iterdir()) == sorted(
+        f"{name}{ending}"
+        for name in ("averages", "failures")
+        for ending in (".png", ".svg", ".pdf", "-dark.png", "-dark.svg")
+    )
     assert str(out / "averages.pdf") in done.output
     assert set(FIGURES) >= {"averages", "failures"}
     assert InstructionOptions("explicit") in {options for _, _, options in content().cells}
@@ -344,6 +352,60 @@ def test_published_figures_need_no_run() -> None:
     )
     assert draw_averages(RunData.of([])) is None
     assert draw_forms(RunData.of([])) is None
+
+
+def shown_gaps(drawn: Figure) -> dict[tuple[str, str], tuple[float, float, str]]:
+    """Explicit and implicit rate and the printed gap, by setting and policy."""
+    names = [label.get_text().replace("\n", " ") for label in drawn.axes[0].get_yticklabels()]
+    found = {}
+    for panel in drawn.axes:
+        dots = [line for line in panel.lines if line.get_marker() == "o"]
+        for place in range(len(dots) // 2):
+            explicit, implicit = dots[2 * place : 2 * place + 2]
+            policy = names[round(float(explicit.get_ydata()[0]))]  # type: ignore[index,arg-type]
+            found[panel.get_title(loc="left"), policy] = (
+                float(explicit.get_xdata()[0]),  # type: ignore[index,arg-type]
+                float(implicit.get_xdata()[0]),  # type: ignore[index,arg-type]
+                panel.texts[place].get_text(),
+            )
+    return found
+
+
+def test_gaps_of_a_run_are_the_summary_s() -> None:
+    found = content(planned=PLAN.jobs())
+    drawn = draw_gaps(found)
+    assert drawn is not None
+    shown = shown_gaps(drawn)
+    assert {setting for setting, _ in shown} == {"direct", "reasoning", "contextual", "spatial"}
+    for (setting, policy), (explicit, implicit, text) in shown.items():
+        key = next(one for one, name in found.names.items() if name == policy)
+        gap = found.summaries[key, ALL, InstructionOptions(setting)].gap
+        assert gap is not None
+        assert implicit - explicit == pytest.approx(100 * gap.value)
+        assert text == ("±0" if policy.startswith("listener") else "−100")
+
+
+def test_published_gaps_are_over_the_tasks_of_their_setting() -> None:
+    drawn = draw_gaps(RunData.of([]), published=True)
+    assert drawn is not None
+    shown = shown_gaps(drawn)
+    rows = {(row.model, row.options.setting): row for row in published_rows("main")}
+    models = {model for model, _ in rows}
+    assert len(shown) == 4 * len(models)
+    for (setting, policy), (explicit, implicit, _) in shown.items():
+        model = policy.removesuffix(" (published)")
+        assert implicit == pytest.approx(float(rows[model, setting].average))
+        played = [task for task, rate in rows[model, setting].rates.items() if rate is not None]
+        mean = rows[model, "explicit"].average_over(played)
+        assert mean is not None
+        assert explicit == pytest.approx(float(mean))
+    assert draw_gaps(RunData.of([])) is None
+
+
+def test_a_run_without_explicit_episodes_has_no_gaps(tmp_path: Path) -> None:
+    implicit = [one for one in results() if one.setting != "explicit"]
+    with pytest.raises(InvalidValueError, match="nothing to draw for gaps"):
+        write_figures(content(implicit), tmp_path, ["gaps"])
 
 
 def test_the_tables_of_forms_and_failures_are_the_figures_numbers() -> None:

@@ -23,6 +23,7 @@ import roboirg
 from roboirg.core.errors import InvalidValueError
 from roboirg.policies import Policy, PrivilegedPolicy, play
 from roboirg.policies.builtin.oracle_policy import OraclePolicy
+from roboirg.policies.hands.scripted_hands import ScriptedHands
 from roboirg.policies.planners import make_planner as make_by_kind
 from roboirg.policies.planners.hierarchical_policy import HierarchicalPolicy, with_planner
 from roboirg.policies.planners.oracle_planner import OracleOptions, OraclePlanner
@@ -472,3 +473,22 @@ def test_a_query_after_an_utterance_quotes_everything_that_was_said(kind):
     assert "This one is red. Take it." in last
     if kind == "gemini":  # its conversation says the same thing once
         assert last.count("Take it.") == 1
+
+
+class Silent:
+    """The scripted hands without their reports."""
+
+    cameras, demonstration_frames = (), "none"
+
+    def __init__(self):
+        self._hands = ScriptedHands()
+        self.attach, self.reset = self._hands.attach, self._hands.reset
+        self.follow, self.act = self._hands.follow, self._hands.act
+
+
+@pytest.mark.sim
+def test_a_planner_that_knows_the_order_sees_what_silent_hands_have_done():
+    policy = with_planner(make_by_kind("listener", {}, "test"), Silent())
+    assert not policy.reports
+    env = roboirg.make("VideoRepick", setting="explicit", cameras=(), demonstration_frames="none")
+    assert play(env, policy)["status"] == "success"

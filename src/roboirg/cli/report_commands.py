@@ -124,13 +124,13 @@ def figures(
     which: Annotated[
         str,
         typer.Option(
-            help="averages, forms, expressions, context, failures, arms, real, strips (a failure "
-            "in pictures), several separated by commas, or all that apply."
+            help="gaps, averages, forms, expressions, context, failures, arms, real, strips (a "
+            "failure in pictures), several separated by commas, or all that apply."
         ),
     ] = _ALL,
     published: Annotated[bool, typer.Option(help="Add the paper's values.")] = False,
 ) -> None:
-    """Draw the paper's figures of one or several runs, as PNG, SVG and PDF.
+    """Draw the figures of one or several runs as PNG, SVG and PDF, for light and dark pages.
 
     Example: roboirg figures runs/first --out figures
     """

@@ -89,7 +89,8 @@ _THAN = Phrases(
         r"|(?<=tape ))(?:except|apart from|outside)"
         rf"(?= (?:for )?(?:the|those|that|these|this|{COLOR})\b)",
         "a cube of another color":
-            "(?:another|(?:a|an|some|any) (?:different|other|new|distinct|alternative|separate))"
+            "(?:another|the remaining|(?:a|an|some|any) (?:different|other|new|distinct|alternative"
+            "|separate))"
             " color",
     },
     before=r"\b",

@@ -10,43 +10,19 @@ from typing import Any
 
 import pytest
 from msgspec.structs import replace
+from pack_runs import record, store, whole_run
 
 from roboirg.apps.leaderboard.board_page import read_packs, render_board, write_board
 from roboirg.apps.leaderboard.board_rows import BoardRow, PackedRun, board_rows
 from roboirg.apps.leaderboard.pack_checks import CHECKS_FILE, PackCheck, check_pack
 from roboirg.apps.leaderboard.packing import pack_run
 from roboirg.core.errors import InvalidValueError
-from roboirg.core.instruction_options import InstructionOptions
 from roboirg.evaluation.analysis.published import published_rows
-from roboirg.evaluation.plan.plan_file import read_plan_file
-from roboirg.evaluation.plan.plan_maker import make_plan
-from roboirg.evaluation.plan.stored_plans import write_plan
-from roboirg.evaluation.play.rollout_result import RolloutResult, make_record
-from roboirg.evaluation.records.record import Job, Record
-from roboirg.evaluation.records.store import RecordStore
 from roboirg.language.settings import EXPLICIT
 from roboirg.tasks import ALL, find_tasks
 from roboirg.tasks.splits.private_splits import SALT_VARIABLE, use_salt
 
 HOLDS = PackCheck("0" * 64, "now", 10, 10)
-
-
-def record(
-    policy: str,
-    task: str,
-    episode: int,
-    *,
-    won: bool,
-    privileged: bool = False,
-    split: str = "test",
-) -> Record:
-    result = RolloutResult(outcome="success" if won else "failure")
-    result.cause = None if won else "it failed"
-    job = Job(
-        policy=policy, task=task, split=split, episode=episode, options=InstructionOptions(EXPLICIT)
-    )
-    made = make_record(job, result, started_at="")
-    return replace(made, privileged=privileged, attribution=None)
 
 
 def run_of(policy: str, successes: int, *, episodes: int = 8, **marks: Any) -> PackedRun:
@@ -156,13 +132,6 @@ def test_published_rows_come_last_and_are_not_verified() -> None:
     assert {row.policy for row in rows[1:]} == {row.model for row in published_rows("main")}
 
 
-def store(folder: Path, results: list[Record]) -> Path:
-    with RecordStore(folder) as records:
-        for one in results:
-            records.append(one)
-    return folder
-
-
 def test_statuses_of_packs(tmp_path: Path) -> None:
     run = store(tmp_path / "run", [record("p", "StopCube", 0, won=True)])
     packs = tmp_path / "packs"
@@ -218,8 +187,7 @@ def test_the_page_of_thirty_runs_sorts_and_filters_without_network(
     runs += [run_of("good", 2, split=private, episodes=4)._replace(name="good-private")]
     runs += [run_of(f"p{number}", number % 3, episodes=3) for number in range(26)]
     runs[1] = runs[1]._replace(check=None)
-    path = tmp_path / "board.html"
-    write_board(runs, path)
+    path = write_board(runs, tmp_path)
     rows = board_rows(runs)
     with open_page(path.as_uri(), offline=True) as page:
 
@@ -255,20 +223,6 @@ def test_the_page_of_thirty_runs_sorts_and_filters_without_network(
         assert shown() == []
         page.check("#published")
         assert set(shown()) == {row.policy for row in rows if row.status == "published"}
-
-
-def whole_run(folder: Path, **changes: Any) -> Path:
-    """Store a whole run of the plan `challenge`, in which every seventh episode is an error."""
-    plan = make_plan(["random"], **(read_plan_file("challenge") | changes))
-    folder.mkdir()
-    write_plan(plan, folder)
-    made = []
-    for number, job in enumerate(plan.jobs()):
-        outcome = "error" if number % 7 == 0 else "success"
-        result = RolloutResult(outcome=outcome, error="policy")
-        result.cause = None if outcome == "success" else "policy: it raised"
-        made.append(make_record(job, result, started_at="", plan=plan.fingerprint))
-    return store(folder, made)
 
 
 def packs_of(tmp_path: Path, run: Path) -> PackedRun:

@@ -10,6 +10,7 @@ import functools
 import operator
 from collections import defaultdict
 from collections.abc import Collection, Iterable, Iterator, Sequence
+from pathlib import Path
 from typing import NamedTuple
 
 import msgspec
@@ -21,7 +22,9 @@ from roboirg.evaluation.analysis.stats.cells import PolicyRun
 from roboirg.evaluation.plan.plan import REQUIRED
 from roboirg.evaluation.plan.plan_file import named_plans, read_plan_file
 from roboirg.evaluation.plan.plan_maker import make_plan
+from roboirg.evaluation.plan.stored_plans import kept_fingerprints
 from roboirg.evaluation.records.record import IDENTITY, Summary
+from roboirg.evaluation.records.store import read_results
 
 _CHOSEN = {"policy", "actions", "demonstration_frames", "observe_every", "options"}
 """What a named plan leaves to the policy; words are compared apart."""
@@ -38,6 +41,11 @@ class NamedEpisodes(NamedTuple):
 
     keys: frozenset[object]
     in_robommes_words: bool
+
+
+def find_refusal(folder: Path) -> str:
+    """Return why the board does not rank a run; empty if it does."""
+    return refusal(read_results(folder), kept_fingerprints(folder))
 
 
 def refusal(results: Sequence[Summary], known: Collection[str]) -> str:

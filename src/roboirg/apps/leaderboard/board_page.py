@@ -1,4 +1,4 @@
-"""The leaderboard page: one self-contained HTML file."""
+"""The leaderboard as a static site: the board, a page for each packed run, and the rules."""
 
 from __future__ import annotations
 
@@ -6,8 +6,9 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
-from roboirg.apps.leaderboard.admission import refusal
+from roboirg.apps.leaderboard.admission import find_refusal
 from roboirg.apps.leaderboard.board_rows import BoardRate, BoardRow, PackedRun, board_rows
+from roboirg.apps.leaderboard.entry_tables import entry_facts, entry_tables
 from roboirg.apps.leaderboard.pack_checks import check_pack, read_check
 from roboirg.apps.leaderboard.packing import PACK_SUFFIX, opened_run
 from roboirg.core.errors import InvalidValueError
@@ -15,13 +16,15 @@ from roboirg.core.plain_text import printable
 from roboirg.core.version import __version__
 from roboirg.evaluation.analysis.page.report import check_report_support
 from roboirg.evaluation.analysis.stats.option_labels import setting_sort_key
-from roboirg.evaluation.plan.stored_plans import kept_fingerprints, read_plans
+from roboirg.evaluation.plan.plan_file import named_plans
+from roboirg.evaluation.plan.stored_plans import read_plans
 from roboirg.evaluation.records.store import read_results
 from roboirg.util.atomic_write import write_atomically
 from roboirg.util.web.page_templates import template_environment
 
-BOARD_FILE = "board.html"
-_TEMPLATE = "board.html.j2"
+BOARD_FILE = "index.html"
+ENTRIES = "entries"
+SITE = "site"
 
 
 class _Cell(NamedTuple):
@@ -67,10 +70,8 @@ def read_packs(
             check = check_pack(path, sample=sample, workers=workers)
         if check is None or check.records:  # else it could not even be opened
             with opened_run(path) as run:
-                results = read_results(run)
-                plans, known = read_plans(run), kept_fingerprints(run)
+                results, plans, why = read_results(run), read_plans(run), find_refusal(run)
             planned = [job for plan in plans for job in plan.drawable_jobs()]
-            why = refusal(results, known)
             packs.append(PackedRun(_name(path), results, planned, check, why))
         else:
             packs.append(PackedRun(_name(path), (), (), check))
@@ -79,26 +80,52 @@ def read_packs(
     return tuple(packs)
 
 
-def write_board(runs: Sequence[PackedRun], out: Path) -> None:
-    """Write the page of packed runs."""
-    write_atomically(out, render_board(runs))
+def write_board(runs: Sequence[PackedRun], folder: Path) -> Path:
+    """Write the site of packed runs into a folder; return its first page."""
+    try:
+        (folder / ENTRIES).mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InvalidValueError(f"Cannot write to {folder}: {error.strerror}.") from error
+    for run in runs:
+        write_atomically(folder / ENTRIES / f"{run.name}.html", render_entry(run))
+    write_atomically(folder / "rules.html", _render("rules", plans=named_plans()))
+    write_atomically(folder / BOARD_FILE, render_board(runs))
+    return folder / BOARD_FILE
 
 
 def render_board(runs: Sequence[PackedRun]) -> str:
-    """Return the page of packed runs."""
-    check_report_support()
-    environment = template_environment("roboirg.apps.leaderboard")
+    """Return the page that ranks packed runs."""
     rows = board_rows(runs)
     public = {(name, False) for row in rows for name in row.rates}
     private = {(name, True) for row in rows if row.private for name in row.private.rates}
     columns = sorted(public | private, key=lambda one: (setting_sort_key(one[0]), one[1]))
-    return environment.get_template(_TEMPLATE).render(
-        version=__version__,
+    return _render(
+        "board",
         columns=columns,
+        entries={run.name for run in runs},
         rows=[(row, [_cell(_rate(row, *column)) for column in columns]) for row in rows],
         conditions=sorted({row.conditions for row in rows}),
         unranked=[(run.name, _why_unranked(run)) for run in runs if run.refusal or not run.results],
     )
+
+
+def render_entry(run: PackedRun) -> str:
+    """Return the page of one packed run."""
+    return _render(
+        "entry",
+        top="../",
+        run=run,
+        file=f"{run.name}{PACK_SUFFIX}",
+        facts=entry_facts(run),
+        tables=entry_tables(run),
+    )
+
+
+def _render(name: str, *, top: str = "", **content: object) -> str:
+    check_report_support()
+    environment = template_environment("roboirg.apps.leaderboard")
+    template = environment.get_template(f"{name}.html.j2")
+    return template.render(version=__version__, top=top, **content)
 
 
 def _why_unranked(run: PackedRun) -> str:

@@ -31,11 +31,15 @@ def verify(
     run: RunOrPack,
     sample: SampleShare = "100%",
     sample_seed: SampleSeed = None,
+    submission: Annotated[
+        bool, typer.Option("--submission", help="Check also that the board would rank it.")
+    ] = False,
 ) -> None:
     """Play the actions of a run again and check its records; exit code 2 if one does not hold.
 
     Example: roboirg leaderboard verify runs/first --sample 10%
     """
+    from roboirg.apps.leaderboard.admission import find_refusal
     from roboirg.apps.leaderboard.packing import opened_run
     from roboirg.apps.leaderboard.run_verification import verify_run
     from roboirg.util.processor import worker_count
@@ -48,8 +52,11 @@ def verify(
             workers=worker_count(),
             progress=show,
         )
+        refusal = find_refusal(folder) if submission else ""
     _print(found)
-    if not found.holds:
+    if submission:
+        typer.echo(f"The board does not rank it: {refusal}." if refusal else "The board ranks it.")
+    if refusal or not found.holds:
         sys.exit(USAGE_ERROR)
 
 
@@ -73,7 +80,7 @@ def pack(
 
 def board(
     folder: Annotated[str, typer.Argument(help="Folder of packed runs.", metavar="DIR")],
-    out: Annotated[Path | None, typer.Option(help="Page to write.  (DIR/board.html)")] = None,
+    out: Annotated[Path | None, typer.Option(help="Folder to write.  (DIR/site)")] = None,
     verify_share: Annotated[
         str | None,
         typer.Option(
@@ -81,11 +88,11 @@ def board(
         ),
     ] = None,
 ) -> None:
-    """Make a leaderboard page of packed runs: verified, privileged, comparable or not.
+    """Make a static site of packed runs: the board, a page for each run, and the rules.
 
     Example: roboirg leaderboard board packs --verify 5%
     """
-    from roboirg.apps.leaderboard.board_page import BOARD_FILE, read_packs, write_board
+    from roboirg.apps.leaderboard.board_page import SITE, read_packs, write_board
     from roboirg.evaluation.analysis.page.report import check_report_support
     from roboirg.util.processor import worker_count
 
@@ -98,8 +105,7 @@ def board(
             workers=worker_count(),
             progress=show,
         )
-    page = out or path / BOARD_FILE
-    write_board(packs, page)
+    page = write_board(packs, out or path / SITE)
     typer.echo(f"{counted(len(packs), 'packed run')}: {page}")
 
 

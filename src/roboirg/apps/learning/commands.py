@@ -136,7 +136,10 @@ def learn_policy(
         str, typer.Option(help="Settings that it hears, separated by commas, or none.")
     ] = "explicit",
     memory: Annotated[
-        str, typer.Option(help="What it remembers: none, frames or recurrent.")
+        str,
+        typer.Option(
+            help="What it remembers: none, recurrent, ttt, framesamp, subgoal or keyframes."
+        ),
     ] = "recurrent",
     words: PolicyWords = NO_POLICY_WORDS,
     workers: Workers = None,

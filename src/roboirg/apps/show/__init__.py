@@ -1,1 +1,1 @@
-"""Inspection of one episode: its scene in words, and a contact sheet of the oracle's play."""
+"""Inspection of one episode: its scene in words, and a strip of pictures of the oracle's play."""

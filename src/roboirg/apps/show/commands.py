@@ -30,10 +30,13 @@ def show(
     settings: Settings = "all",
     choices: WordOptions = NO_WORDS,
     out: Annotated[
-        str | None, typer.Option(help="PNG file to write; TASK-SPLIT-EPISODE.png by default.")
+        str | None,
+        typer.Option(
+            help="PNG file to write, and a twin for dark pages; TASK-SPLIT-EPISODE.png by default."
+        ),
     ] = None,
 ) -> None:
-    """Print an episode's scene and instructions, and draw how the oracle plays it.
+    """Print an episode's scene and instructions, and draw what is said and what the oracle does.
 
     Example: roboirg show PickXtimes 3 --words
     """
@@ -73,18 +76,30 @@ def _draw(
     """Print the scene and the instructions, and draw the oracle's episode."""
     from rich.console import Console
 
+    from roboirg.apps.show.episode_strip import Said
     from roboirg.apps.show.episode_text import print_episode
-    from roboirg.apps.show.playthrough import draw_sheet
+    from roboirg.apps.show.playthrough import write_strip
     from roboirg.envs.factory import check_simulator
+    from roboirg.language.generator import find_refusal, instruct_with
+    from roboirg.language.settings import all_settings
+    from roboirg.util.figure_files import check_figure_support
 
     if path.suffix.lower() != ".png" or path.is_dir():
         raise InvalidValueError(f"{str(path)!r} is not a valid picture file; it must end in .png.")
     check_simulator()
+    check_figure_support()
     console = Console()
     print_episode(episode, settings, options, console)
-    verdict = draw_sheet(episode, path)
+    told = {name: replace(options, setting=name) for name in settings}
+    said = [
+        Said(name, instruct_with(episode, one).text, all_settings()[name].color)
+        for name, one in told.items()
+        if not find_refusal(episode, one)
+    ]
+    verdict, paths = write_strip(episode, said, path)
     console.print(f"[bold]the oracle[/] {verdict}", highlight=False)
-    typer.echo(path)
+    for one in paths:
+        typer.echo(one)
 
 
 def add_commands(app: typer.Typer) -> None:

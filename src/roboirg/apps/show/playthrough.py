@@ -7,15 +7,15 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from roboirg.apps.show.contact_sheet import SheetPanel, compose_sheet, evenly_spaced, write_png
+from roboirg.apps.show.episode_strip import Said, StripMoment, draw_strip
 from roboirg.core.episode import Episode
 from roboirg.core.errors import MotionPlanningError
 from roboirg.core.motions import Away, Motion, Swap
-from roboirg.core.observations import CAMERAS
 from roboirg.envs.factory import make
+from roboirg.evaluation.analysis.figures.figure_style import save
 from roboirg.judging import Status, plain_subgoal
-from roboirg.language import instruct
 from roboirg.policies import make_policy, play
+from roboirg.util.media import evenly_spaced
 
 if TYPE_CHECKING:
     from roboirg.envs.environment import RoboIRGEnv
@@ -40,7 +40,7 @@ class Playthrough:
 
     verdict: str
     steps: int
-    moments: tuple[SheetPanel, ...]
+    moments: tuple[StripMoment, ...]
 
 
 def play_through(episode: Episode) -> Playthrough:
@@ -64,19 +64,28 @@ def play_through(episode: Episode) -> Playthrough:
     return Playthrough(verdict, env.session.world.elapsed, recorder.chosen())
 
 
-def draw_sheet(episode: Episode, path: Path) -> str:
-    """Write a contact sheet of the oracle's play; returns the result in words.
+def write_strip(episode: Episode, said: Sequence[Said], path: Path) -> tuple[str, tuple[Path, ...]]:
+    """Write a strip of the oracle's play, for light and dark pages.
+
+    Args:
+        episode: to play.
+        said: what to print above the pictures.
+        path: of the picture; its twin for dark pages ends in ``-dark``.
+
+    Returns:
+        The result in words, and the files.
 
     Raises:
-        InvalidValueError: the file cannot be written.
+        InvalidValueError: the files cannot be written.
         RenderDeviceError: no Vulkan device can render.
-        MissingDependencyError: the simulator is not installed.
+        MissingDependencyError: the simulator or matplotlib is not installed.
     """
     played = play_through(episode)
     title = f"{episode.key} ({episode.difficulty}, seed {episode.seed})"
-    sheet = compose_sheet(title, instruct(episode).text, played.moments)
-    write_png(sheet, path)
-    return f"{played.verdict} after {played.steps} steps"
+    paths = save(
+        lambda: draw_strip(title, said, played.moments), path.parent, path.stem, formats=("png",)
+    )
+    return f"{played.verdict} after {played.steps} steps", paths
 
 
 @dataclass
@@ -89,7 +98,7 @@ class _MomentRecorder:
     """
 
     key_events: KeyEvents
-    captured: dict[int, tuple[int, SheetPanel]] = field(default_factory=dict)
+    captured: dict[int, tuple[int, StripMoment]] = field(default_factory=dict)
     _completed: int = 0
     _is_demonstration: bool | None = None
 
@@ -115,11 +124,11 @@ class _MomentRecorder:
     def capture(self, env: RoboIRGEnv, rank: int, caption: str) -> None:
         """Capture the current pictures."""
         step = env.session.world.elapsed
-        pictures = tuple(env.picture(camera).copy() for camera in CAMERAS)
-        moment = SheetPanel(step, caption, pictures, bool(self._is_demonstration))
+        picture = env.picture("front").copy()
+        moment = StripMoment(step, caption, picture, bool(self._is_demonstration))
         self.captured[step] = (rank, moment)
 
-    def chosen(self) -> tuple[SheetPanel, ...]:
+    def chosen(self) -> tuple[StripMoment, ...]:
         """Return the most remarkable moments, in order of time."""
         ranked = [self.captured[step] for step in sorted(self.captured)]
         chosen = choose_moments([rank for rank, _ in ranked])

@@ -118,7 +118,7 @@ def _execute(
     env: RoboIRGEnv, stages: tuple[Stage, ...], primitives: MotionPrimitives
 ) -> Iterator[_StagedChunk]:
     """Yield action chunks, stage by stage; a primitive that fails is retried."""
-    progress = _StageProgress(env, stages)
+    progress = StageProgress(env, stages)
     index, retries = 0, 0
     while index < len(stages):
         stage = stages[index]
@@ -146,7 +146,7 @@ def _get_ready(env: RoboIRGEnv) -> Iterator[_StagedChunk]:
         yield None, _hold_still(env)[:LISTENING_STEPS]
 
 
-class _StageProgress:
+class StageProgress:
     """Counts the completed stages of a plan.
 
     Args:

@@ -149,7 +149,10 @@ def needs_host(spec: str) -> bool:
         return spec.partition("://")[0] in CHECKPOINTS
     name, colon, _ = spec.partition(":")
     kind = policy_specs.find_kind(name) if colon else None
-    return is_foreign(spec) or (kind is not None and kind.has_weights)
+    if kind is None or not kind.has_weights:
+        return is_foreign(spec)
+    # A learned planner with scripted hands acts on the world.
+    return is_foreign(spec) or not hasattr(_declaring(spec), "attach")
 
 
 def is_privileged(spec: str) -> bool:

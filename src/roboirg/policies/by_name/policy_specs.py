@@ -107,7 +107,7 @@ def _system(spec: str, name: str, options: Mapping[str, str]) -> PolicyMaker:
     if not name:
         raise InvalidValueError(f"Policy {spec!r} names no system.")
     system = find_system(name, options)
-    return lambda seed: build_system(system, seed)
+    return lambda seed: build_system(system, seed, make_follower)
 
 
 def _planner(spec: str, name: str, options: Mapping[str, str]) -> PolicyMaker:
@@ -123,12 +123,12 @@ def _planner(spec: str, name: str, options: Mapping[str, str]) -> PolicyMaker:
         own["model"] = of_model
     planner = {"kind": name, **own}
     system = System(name=f"{PLANNER}:{name}", about="", policy=hands, planner=planner)
-    return lambda seed: build_system(system, seed)
+    return lambda seed: build_system(system, seed, make_follower)
 
 
 def _planner_of_class(spec: str, name: str, options: Mapping[str, str]) -> PolicyMaker:
     """Return what makes planners of a class with hands, or without."""
-    from roboirg.policies.by_name.systems import ELSEWHERE, HANDS, SCRIPTED, make_hands
+    from roboirg.policies.by_name.systems import ELSEWHERE, HANDS, SCRIPTED
     from roboirg.policies.planners.hierarchical_policy import with_planner
 
     if others := sorted(options.keys() - {HANDS}):
@@ -141,9 +141,24 @@ def _planner_of_class(spec: str, name: str, options: Mapping[str, str]) -> Polic
             if hasattr(planner, "attach"):
                 raise undeclared_error(f"{PLANNER}:{name}")
             return PlannerAlone(planner)
-        return with_planner(planner, make_hands(hands, seed), f"{PLANNER}:{name}")
+        return with_planner(planner, make_follower(hands, seed), f"{PLANNER}:{name}")
 
     return make
+
+
+def make_follower(spec: str, seed: int) -> Policy:
+    """Make what follows a planner: a policy of an installed kind or a class, or scripted hands.
+
+    Nothing is connected.
+    """
+    from roboirg.policies.by_name.systems import make_hands
+
+    name, colon, rest = spec.partition(":")
+    kind = find_kind(name) if colon else None
+    if kind is None:
+        return make_hands(spec, seed)
+    place, _, query = rest.partition("?")
+    return kind.read(spec, place, parse_query(spec, query))(seed)
 
 
 def undeclared_error(spec: str) -> InvalidValueError:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from importlib import resources
 from pathlib import Path
 from typing import Any
@@ -118,9 +118,11 @@ def find_system(name_or_file: str, overrides: Mapping[str, str]) -> System:
     return _overridden(check_options(System, entries, origin), overrides, origin)
 
 
-def build_system(system: System, seed: int) -> Policy:
-    """Make the policy of a system; nothing is connected."""
-    policy = make_hands(system.policy, seed)
+def build_system(
+    system: System, seed: int, make: Callable[[str, int], Policy] | None = None
+) -> Policy:
+    """Make the policy of a system, by `make_hands` unless something else makes it from its spec."""
+    policy = (make or make_hands)(system.policy, seed)
     if system.planner is None:
         return policy
     options = dict(system.planner)

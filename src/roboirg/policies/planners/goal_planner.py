@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 
 from roboirg.core.episode import HANDLES_HELD, Stage
 from roboirg.core.observations import Demonstration, Observation
-from roboirg.policies.builtin.scripted import ScriptedPolicy
+from roboirg.policies.builtin.scripted import ScriptedPolicy, StageProgress
 from roboirg.policies.contract.base import SubgoalEnd
 from roboirg.policies.planners.oracle_planner import OracleOptions, OraclePlanner, stage_subgoal
 from roboirg.tasks import get_task
@@ -30,6 +30,8 @@ DECIDERS: Mapping[str, str] = {
 class GoalPlanner(OraclePlanner):
     """Names the stages of the goal that it understands, one when the last is done. Privileged.
 
+    Of hands that do not report how subgoals end, it sees in the world what is completed.
+
     Words are its only skill: it knows the task and the scene, but not the goal. Where the rule
     gives no goal of the scene, and before everything has been said, it names nothing.
     """
@@ -43,6 +45,7 @@ class GoalPlanner(OraclePlanner):
         self._decider = decider(seed)
         self._heard: list[str] = []
         self._stages: Sequence[Stage] | None = None
+        self._progress: StageProgress | None = None
         self._index = self._retries = 0
 
     def reset(self, instruction: str, demonstration: Demonstration) -> None:
@@ -50,6 +53,7 @@ class GoalPlanner(OraclePlanner):
         super().reset(instruction, demonstration)
         self._heard, self._stages = [instruction], None
         self._index = self._retries = 0
+        self._progress = None
         if not self.env.unheard:
             self._decide()
 
@@ -73,6 +77,8 @@ class GoalPlanner(OraclePlanner):
     def plan(self, observation: Observation, step: int) -> str | None:  # noqa: ARG002
         """Return the next stage in words; None after the last."""
         stages = self._stages or ()
+        if self._progress is not None and not self.reports:
+            self._index = self._progress.completed()
         if self._index >= len(stages):
             return None
         return self.describe(stages, self._index)
@@ -91,6 +97,7 @@ class GoalPlanner(OraclePlanner):
     def begin(self, stages: Sequence[Stage]) -> None:
         """Begin the plan of a goal."""
         self._stages = stages
+        self._progress = StageProgress(self.env, tuple(stages)) if stages else None
 
 
 class FixedPlanner(GoalPlanner):

@@ -3,16 +3,36 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import torch
 from torch import Tensor, nn
 
 from roboirg.apps.learning.listener.listener_net import METERS, waves
-from roboirg.apps.learning.policy.memories import HEADS, MEMORIES, WIDTH, Looks, at_looks
+from roboirg.apps.learning.policy.body_layers import LAYERS, WIDTH, Join, body_layers, run_layer
+from roboirg.apps.learning.policy.fast_weights import FastWeightMemory
+from roboirg.apps.learning.policy.frame_memory import EvenFrameMemory, KeptFrameMemory
+from roboirg.apps.learning.policy.memories import (
+    LookMemory,
+    Looks,
+    NoMemory,
+    RecurrentMemory,
+    at_looks,
+)
+from roboirg.apps.learning.policy.policy_plan import CHOOSES
+from roboirg.apps.learning.policy.subgoal_net import ContextInput, KeepScore, PlannedBatch
 
-LAYERS = 2
+MEMORIES: Mapping[str, type[LookMemory]] = {
+    "none": NoMemory,
+    "recurrent": RecurrentMemory,
+    "ttt": FastWeightMemory,
+    "framesamp": EvenFrameMemory,
+    "hands": NoMemory,
+    "subgoal": KeptFrameMemory,
+    "keyframes": KeptFrameMemory,
+}
+"""What bodies remember, and what planners do: the last two name subgoals, which hands follow."""
 WAVES = 5
 CLOSED = -1e4
 """Score of a thing that cannot be chosen."""
@@ -38,6 +58,7 @@ class EpisodeBatch(NamedTuple):
         moves: (B, D) kinds of waypoints; -1 where there is none.
         things: (B, D) tracks; -1 where none is chosen.
         done: (B, D) completed stages; -1 where there is no decision.
+        planned: the subgoals, for hands; or what a planner named and keeps.
     """
 
     classes: Tensor
@@ -52,6 +73,7 @@ class EpisodeBatch(NamedTuple):
     moves: Tensor
     things: Tensor
     done: Tensor
+    planned: PlannedBatch | None = None
 
 
 class BodyAnswer(NamedTuple):
@@ -61,11 +83,13 @@ class BodyAnswer(NamedTuple):
         moves: (B, D, M) logits of kinds of waypoints.
         things: (B, D, M, K) logits of things for each kind.
         done: (B, D, MOST_DONE + 1) logits of how many stages are completed; only learned from.
+        keys: (B, D, RECENT) logits of keeping each of the recent looks; of `CHOOSES` only.
     """
 
     moves: Tensor
     things: Tensor
     done: Tensor
+    keys: Tensor | None = None
 
 
 class BodyNet(nn.Module):
@@ -76,9 +100,12 @@ class BodyNet(nn.Module):
         parts: number of parts of goals.
         at_things: for each kind of waypoint, whether it is at a thing.
         memory: a name of `MEMORIES`.
+        context: how many numbers it is given at each decision.
     """
 
-    def __init__(self, classes: int, parts: int, at_things: Sequence[bool], memory: str) -> None:
+    def __init__(
+        self, classes: int, parts: int, at_things: Sequence[bool], memory: str, context: int = 0
+    ) -> None:
         super().__init__()
         self.kinds = nn.Embedding(classes, WIDTH)
         self.spot = nn.Sequential(
@@ -90,15 +117,14 @@ class BodyNet(nn.Module):
         self.unseen = nn.Parameter(torch.randn(WIDTH) * 0.02)
         self.goal = nn.Linear(parts, WIDTH)
         self.memory = MEMORIES[memory]()
-        layer = nn.TransformerEncoderLayer(
-            WIDTH, HEADS, 2 * WIDTH, dropout=0.0, batch_first=True, norm_first=True
-        )
-        self.encoder = nn.TransformerEncoder(layer, LAYERS, enable_nested_tensor=False)
+        self.encoder = body_layers()
         self.move = nn.Linear(WIDTH, len(at_things))
         self.done = nn.Linear(WIDTH, MOST_DONE + 1)
         self.query = nn.Embedding(len(at_things), WIDTH)
         self.key = nn.Linear(WIDTH, WIDTH)
         self.mixed = nn.Linear(WIDTH, WIDTH)
+        self.given = ContextInput(context) if context else None
+        self.keeps = KeepScore() if memory == CHOOSES else None
 
     def forward(self, batch: EpisodeBatch) -> BodyAnswer:
         """Return what is said at the decisions."""
@@ -107,16 +133,27 @@ class BodyNet(nn.Module):
         remembered = self.memory(looks, batch.decisions)
         things = at_looks(looks.things, batch.decisions) + remembered.things + goal[:, :, None]
         whole = at_looks(looks.whole, batch.decisions) + remembered.whole
+        if self.given is not None and batch.planned is not None:
+            places = at_looks(batch.places, batch.decisions)
+            of_whole, of_things = self.given(batch.planned.context, places)
+            whole, things = whole + of_whole, things + of_things
         tokens = torch.cat([whole[:, :, None], things], 2).flatten(0, 1)
         closed = ~remembered.can_choose.flatten(0, 1)
         hidden = torch.cat([torch.zeros_like(closed[:, :1]), closed], 1)
-        encoded = self.encoder(tokens, src_key_padding_mask=hidden)
-        first, rest = encoded[:, 0], encoded[:, 1:]
+        joins = remembered.joins or [Join()] * LAYERS
+        for layer, join in zip(self.encoder.layers, joins, strict=True):
+            tokens = run_layer(layer, tokens, ~hidden, join)
+        first, rest = tokens[:, 0], tokens[:, 1:]
         queries = self.query.weight[None] + self.mixed(first)[:, None]
         scores = queries @ self.key(rest).transpose(1, 2) / math.sqrt(WIDTH)
         scores = scores.masked_fill(closed[:, None], CLOSED)
+        shape = batch.decisions.shape
         every = self.move(first), scores, self.done(first)
-        return BodyAnswer(*(one.unflatten(0, batch.decisions.shape) for one in every))
+        answer = BodyAnswer(*(one.reshape(*shape, *one.shape[1:]) for one in every))
+        if self.keeps is None:
+            return answer
+        keys = self.keeps(looks, batch.decisions, first.reshape(*shape, -1))
+        return answer._replace(keys=keys)
 
     def _looks(self, batch: EpisodeBatch, goal: Tensor) -> Looks:
         tool = batch.tool[:, :, None]
@@ -127,6 +164,8 @@ class BodyNet(nn.Module):
         numbers = torch.cat([waves(batch.places / METERS, WAVES), batch.turns, apart * 5.0], -1)
         things = self.kinds(batch.classes) + self.spot(numbers)
         things = torch.where(batch.seen[..., None], things, things + self.unseen)
+        own = self.tool(batch.tool)
+        kept = None if batch.planned is None else batch.planned.kept
         return Looks(
-            things, self.tool(batch.tool) + goal, batch.places, batch.seen, batch.known, batch.there
+            things, own + goal, own, batch.places, batch.seen, batch.known, batch.there, kept
         )

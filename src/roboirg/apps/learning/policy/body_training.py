@@ -21,11 +21,16 @@ from roboirg.apps.learning.policy.body_net import (
     BodyNet,
     EpisodeBatch,
 )
-from roboirg.apps.learning.policy.moves import ExpertDecision, Move
-from roboirg.apps.learning.policy.policy_data import EpisodeNumbers, to_batch, to_numbers
-from roboirg.apps.learning.policy.policy_model import goal_numbers, make_body
+from roboirg.apps.learning.policy.policy_data import (
+    Decision,
+    EpisodeNumbers,
+    to_batch,
+    to_numbers,
+)
+from roboirg.apps.learning.policy.policy_model import Kind, goal_numbers, make_body
 from roboirg.apps.learning.policy.policy_plan import PolicyPlan, Recorded
 from roboirg.apps.learning.policy.sight import Sight, SightNoise
+from roboirg.apps.learning.policy.subgoal_training import with_planned
 from roboirg.apps.learning.policy.training_curve import BodyScore, save_curve
 from roboirg.apps.learning.trained_file import load_unfinished, save_unfinished
 from roboirg.apps.learning.trainer import Progress, Trainer, even_batches
@@ -43,14 +48,14 @@ HELD_BACK = 10
 def train_body(
     plan: PolicyPlan,
     recorded: Sequence[Recorded],
-    decisions: Sequence[Sequence[ExpertDecision]],
-    moves: Sequence[Move],
+    decisions: Sequence[Sequence[Decision]],
+    moves: Sequence[Kind],
     sight: Sight,
     vocabulary: Vocabulary,
     folder: Path,
     progress: Progress,
 ) -> BodyNet:
-    """Return a body that has learned from recordings, and write how it learned."""
+    """Return a body, or a planner, that has learned from recordings; write how it learned."""
     torch.manual_seed(plan.seed)
     body = make_body(sight, vocabulary, moves, plan.memory)
     numbers = {move: number for number, move in enumerate(moves)}
@@ -63,10 +68,11 @@ def train_body(
 
     def see(times: int) -> list[EpisodeNumbers]:
         rng = np.random.default_rng((plan.seed, times))
-        return [
-            to_numbers(one.recording, own, goal, sight, numbers, SightNoise(), rng)
-            for one, own, goal in zip(recorded, decisions, goals, strict=True)
-        ]
+        found = []
+        for one, own, goal in zip(recorded, decisions, goals, strict=True):
+            episode = to_numbers(one.recording, own, goal, sight, numbers, SightNoise(), rng)
+            found.append(with_planned(plan.memory, one, episode, len(moves), sight, rng))
+        return found
 
     held_back = -(-len(recorded) // HELD_BACK)
     count = math.ceil((len(recorded) - held_back) / BATCH)
@@ -103,7 +109,7 @@ def train_body(
 def _made_of(
     plan: PolicyPlan,
     recorded: Sequence[Recorded],
-    moves: Sequence[Move],
+    moves: Sequence[Kind],
     sight: Sight,
     vocabulary: Vocabulary,
 ) -> list[Any]:
@@ -135,6 +141,10 @@ def body_loss(body: BodyNet, batch: EpisodeBatch) -> Tensor:
     chosen, wanted = _chosen(answer.things, batch)
     if len(wanted):
         loss = loss + functional.cross_entropy(chosen, wanted)
+    if answer.keys is not None and batch.planned is not None:
+        shown = batch.planned.keys >= 0
+        wanted_keys = batch.planned.keys[shown].float()
+        loss = loss + functional.binary_cross_entropy_with_logits(answer.keys[shown], wanted_keys)
     return loss
 
 

@@ -3,19 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from roboirg.apps.learning.learn_support import check_learn_support, file_version
 from roboirg.apps.learning.policy.recording import LOOK_EVERY
 from roboirg.core.actions import WAYPOINT
 from roboirg.core.observations import FRONT, Demonstration, Observation
 
 if TYPE_CHECKING:
-    from roboirg.apps.learning.policy.policy_model import SeenEpisode
+    from roboirg.apps.learning.policy.policy_model import PolicyModel, SeenEpisode
 
 
 class LearnedPolicy:
@@ -24,7 +22,8 @@ class LearnedPolicy:
     It looks at every eighth control step of the video and of its own time, and at each decision.
 
     Args:
-        path: file that `roboirg learn policy` wrote.
+        model: what it has learned.
+        version: of the file that holds it.
         seed: without effect, as nothing is random.
     """
 
@@ -33,12 +32,9 @@ class LearnedPolicy:
     demonstration_frames = LOOK_EVERY
     observe_every = LOOK_EVERY
 
-    def __init__(self, path: Path, seed: int = 0) -> None:
-        check_learn_support()
-        from roboirg.apps.learning.policy.policy_model import load_policy
-
-        self.seed, self.version = seed, file_version(path, "policy")
-        self._model = load_policy(path)
+    def __init__(self, model: PolicyModel, version: str, seed: int = 0) -> None:
+        self.seed, self.version = seed, version
+        self.model = model
         self._seen: SeenEpisode | None = None
         self._heard: list[str] = []
         self._goal: NDArray[np.float32] | None = None
@@ -46,14 +42,14 @@ class LearnedPolicy:
     @property
     def metadata(self) -> dict[str, Any]:
         """How it was trained."""
-        return {"trained": self._model.about}
+        return {"trained": self.model.about}
 
     def reset(self, instruction: str, demonstration: Demonstration) -> None:
         """Begin an episode, and see the video."""
         from roboirg.apps.learning.policy.policy_model import SeenEpisode
 
         self._heard, self._goal = [instruction], None
-        self._seen = SeenEpisode(self._model)
+        self._seen = SeenEpisode(self.model)
         length = len(demonstration["joint_positions"])
         if length:
             poses, fingers = demonstration["end_effector"], demonstration["gripper"]
@@ -69,25 +65,35 @@ class LearnedPolicy:
 
     def act(self, observation: Observation) -> NDArray[np.float64]:
         """Return the next waypoint (1, 7)."""
-        if self._seen is None:
-            raise RuntimeError("LearnedPolicy needs reset() before act().")
-        self._look(self._seen, observation)
-        if self._goal is None:
-            self._goal = self._seen.understand(" ".join(self._heard))
-        chosen = self._seen.decide(self._goal, _tool(observation))
+        seen = self.watch(observation)
+        chosen = seen.decide(self.understand(), tool_of(observation))
         return np.asarray(chosen, np.float64)[None]
 
-    def _look(self, seen: SeenEpisode, observation: Observation) -> None:
+    @property
+    def seen(self) -> SeenEpisode:
+        """The episode as it was seen so far."""
+        if self._seen is None:
+            raise RuntimeError(f"{type(self).__name__} needs reset() before it looks.")
+        return self._seen
+
+    def understand(self) -> NDArray[np.float32]:
+        """Return the goal that was heard, as `PolicyModel.understand` does."""
+        if self._goal is None:
+            self._goal = self.seen.understand(" ".join(self._heard))
+        return self._goal
+
+    def watch(self, observation: Observation) -> SeenEpisode:
         """See what happened since the last action, and what there is now."""
         passed: Sequence[Observation] = observation.get("history", ())
         looks: list[Mapping[str, Any]] = [*passed]
         if not passed or not _same(passed[-1], observation):
             looks.append(observation)
         pictures = [one[f"{FRONT}_rgb"] for one in looks]
-        seen.look(pictures, [_tool(one) for one in looks], is_video=False)
+        self.seen.look(pictures, [tool_of(one) for one in looks], is_video=False)
+        return self.seen
 
 
-def _tool(observation: Mapping[str, Any]) -> NDArray[np.float64]:
+def tool_of(observation: Mapping[str, Any]) -> NDArray[np.float64]:
     """Return the pose of the tool and the opening of a finger, (7,)."""
     return np.append(observation["end_effector"], observation["gripper"][0])
 

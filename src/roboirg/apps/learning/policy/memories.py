@@ -1,21 +1,24 @@
 """What a policy remembers: one class per kind of memory, all with the same inputs and outputs.
 
 A memory takes the embedded looks of an episode and gives, for each decision, a vector for each
-thing and one for the whole. Another memory is one class here, with its name in `MEMORIES`.
+thing and one for the whole, or what it does in the layers of the body. Another memory is one class
+with its name in `body_net.MEMORIES`.
 """
 
 from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import torch
 from torch import Tensor, nn
 
-WIDTH = 64
-HEADS = 4
+from roboirg.apps.learning.policy.body_layers import WIDTH, Join
+
+TIME_WAVES, SLOWEST = 8, 100.0
+"""Sines and cosines of a look's number in frames, and looks in a radian of the slowest."""
 
 
 class Looks(NamedTuple):
@@ -23,19 +26,23 @@ class Looks(NamedTuple):
 
     Attributes:
         things: (B, T, K, WIDTH) embedded as they are at each look, or were when last seen.
-        whole: (B, T, WIDTH) the robot's own state and the time.
+        whole: (B, T, WIDTH) the robot's own state, and the goal.
+        tool: (B, T, WIDTH) the same without the goal.
         places: (B, T, K, 2) x and y on the table, m.
         seen: (B, T, K) whether the look shows the thing.
         known: (B, T, K) whether it was seen until then, often enough to be no mistake.
         there: (B, T) whether the episode has the look.
+        kept: (B, D, S) looks that a planner keeps at each decision, -1 for none.
     """
 
     things: Tensor
     whole: Tensor
+    tool: Tensor
     places: Tensor
     seen: Tensor
     known: Tensor
     there: Tensor
+    kept: Tensor | None = None
 
 
 class Remembered(NamedTuple):
@@ -45,11 +52,13 @@ class Remembered(NamedTuple):
         things: (B, D, K, WIDTH).
         whole: (B, D, WIDTH).
         can_choose: (B, D, K) the things that may be chosen.
+        joins: what it does in each layer of the body, where it does anything; n is B times D.
     """
 
     things: Tensor
     whole: Tensor
     can_choose: Tensor
+    joins: Sequence[Join] = ()
 
 
 class LookMemory(nn.Module, ABC):
@@ -71,47 +80,55 @@ def at_looks(values: Tensor, decisions: Tensor) -> Tensor:
     return values[rows, decisions]
 
 
-class NoMemory(LookMemory):
-    """Remembers nothing: only what is seen now can be chosen."""
+def at_frames(tokens: Tensor, there: Tensor, frames: Tensor) -> tuple[Tensor, Tensor]:
+    """Return the tokens of some looks for each decision, in sequences; m tokens of each look.
 
-    def forward(self, looks: Looks, decisions: Tensor) -> Remembered:
-        things, whole = at_looks(looks.things, decisions), at_looks(looks.whole, decisions)
-        can_choose = at_looks(looks.seen & looks.known, decisions)
-        return Remembered(torch.zeros_like(things), torch.zeros_like(whole), can_choose)
+    Args:
+        tokens: (B, T, m, width).
+        there: (B, T, m) which of them there are.
+        frames: (B, D, F) numbers of looks; below 0 for none.
+
+    Returns:
+        The tokens (B * D, F * m, width), and which of them there are (B * D, F * m).
+    """
+    flat = frames.clamp(min=0).flatten(1)
+    shape = frames.shape[0] * frames.shape[1], frames.shape[2] * tokens.shape[2]
+    is_there = at_looks(there, flat) & (frames >= 0).flatten(1)[..., None]
+    return at_looks(tokens, flat).reshape(*shape, -1), is_there.reshape(shape)
 
 
-class FrameMemory(LookMemory):
-    """Attends to looks evenly spaced over all that was seen."""
-
-    frames = 8
+class FrameTokens(nn.Module):
+    """The tokens of looks, for memories of frames: what was seen and when, without the goal."""
 
     def __init__(self) -> None:
         super().__init__()
-        self.times = nn.Linear(2, WIDTH)
-        self.attention = nn.MultiheadAttention(WIDTH, HEADS, batch_first=True)
+        self.mixed = nn.Linear(2 * WIDTH, WIDTH)
+        self.time = nn.Linear(2 * TIME_WAVES, WIDTH)
+
+    def forward(self, looks: Looks) -> tuple[Tensor, Tensor]:
+        """Return tokens (B, T, 1 + K, WIDTH), the robot's first, and which there are."""
+        tool = looks.tool[:, :, None]
+        tokens = torch.cat([tool, looks.things], 2)
+        there = torch.cat([looks.there[..., None], looks.seen], 2)
+        turns = torch.arange(tokens.shape[1])[:, None] * SLOWEST ** -torch.linspace(
+            0, 1, TIME_WAVES
+        )
+        time = self.time(torch.cat([turns.sin(), turns.cos()], -1))[:, None]
+        return self.mixed(torch.cat([tokens, tool.expand_as(tokens)], -1)) + time, there
+
+
+def seen_now(looks: Looks, decisions: Tensor, joins: Sequence[Join] = ()) -> Remembered:
+    """Return that only what is seen now can be chosen, and what a memory does in each layer."""
+    things, whole = at_looks(looks.things, decisions), at_looks(looks.whole, decisions)
+    can_choose = at_looks(looks.seen & looks.known, decisions)
+    return Remembered(torch.zeros_like(things), torch.zeros_like(whole), can_choose, joins)
+
+
+class NoMemory(LookMemory):
+    """Remembers nothing."""
 
     def forward(self, looks: Looks, decisions: Tensor) -> Remembered:
-        count, width = looks.things.shape[2], looks.things.shape[3]
-        share = torch.linspace(0, 1, self.frames)
-        chosen = (decisions[..., None] * share).round().long()  # (B, D, frames)
-        batch, many, frames = chosen.shape
-        flat = chosen.reshape(batch, many * frames)
-        ages = (decisions[..., None] - chosen).float() / 20.0
-        times = self.times(torch.stack([ages, share.expand_as(ages)], -1))
-        things = at_looks(looks.things, flat).reshape(batch * many, frames, count, width)
-        whole = at_looks(looks.whole, flat).reshape(batch * many, frames, 1, width)
-        seen = at_looks(looks.seen, flat).reshape(batch * many, frames, count)
-        keys = torch.cat([whole, things], 2) + times.reshape(batch * many, frames, 1, width)
-        hidden = torch.cat([torch.zeros_like(seen[..., :1]), ~seen], 2)
-        now = at_looks(looks.things, decisions), at_looks(looks.whole, decisions)
-        queries = torch.cat([now[1][..., None, :], now[0]], 2).flatten(0, 1)
-        found, _ = self.attention(
-            queries, keys.flatten(1, 2), keys.flatten(1, 2),
-            key_padding_mask=hidden.flatten(1, 2), need_weights=False,
-        )  # fmt: skip
-        found = found.reshape(batch, many, count + 1, width)
-        can_choose = at_looks(looks.seen & looks.known, decisions)
-        return Remembered(found[:, :, 1:], found[:, :, 0], can_choose)
+        return seen_now(looks, decisions)
 
 
 class RecurrentMemory(LookMemory):
@@ -167,10 +184,3 @@ class RecurrentMemory(LookMemory):
         mean = (scores.softmax(-1)[..., None] * things * known[..., None]).sum(1)
         most = things.masked_fill(~known[..., None], -2.0).max(1).values
         return mean, most
-
-
-MEMORIES: Mapping[str, type[LookMemory]] = {
-    "none": NoMemory,
-    "frames": FrameMemory,
-    "recurrent": RecurrentMemory,
-}

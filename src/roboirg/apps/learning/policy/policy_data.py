@@ -11,11 +11,16 @@ import torch
 from numpy.typing import NDArray
 
 from roboirg.apps.learning.policy.body_net import TOOL_NUMBERS, EpisodeBatch
-from roboirg.apps.learning.policy.moves import ExpertDecision, Move
+from roboirg.apps.learning.policy.moves import ExpertDecision
+from roboirg.apps.learning.policy.planner_history import PlannedNumbers
 from roboirg.apps.learning.policy.recording import LOOK_EVERY, ExpertRecording
 from roboirg.apps.learning.policy.sight import GHOST, Sight, SightNoise, labeled_looks
+from roboirg.apps.learning.policy.subgoal_net import PlannedBatch
+from roboirg.apps.learning.policy.subgoals import SubgoalDecision
 from roboirg.apps.learning.policy.tracks import LookTokens, Tracks
 
+Decision = ExpertDecision | SubgoalDecision
+"""What is learned at a look: of a body a waypoint, of a planner a subgoal."""
 COUNTED_LOOKS = 10
 """Looks of an episode, besides those of decisions, at which a body learns what is completed."""
 
@@ -40,6 +45,7 @@ class EpisodeNumbers(NamedTuple):
     moves: NDArray[np.int64]
     things: NDArray[np.int64]
     done: NDArray[np.int64]
+    planned: PlannedNumbers | None = None
 
 
 class LookHistory:
@@ -99,10 +105,10 @@ def _tool_numbers(tool: NDArray[np.floating[Any]], *, is_video: bool) -> NDArray
 
 def to_numbers(
     recorded: ExpertRecording,
-    decisions: Sequence[ExpertDecision],
+    decisions: Sequence[Decision],
     goal: NDArray[np.float32],
     sight: Sight,
-    moves: Mapping[Move, int],
+    moves: Mapping[Any, int],
     noise: SightNoise,
     rng: np.random.Generator,
 ) -> EpisodeNumbers:
@@ -113,7 +119,7 @@ def to_numbers(
         decisions: of the episode; some looks between them are added, which have no move.
         goal: (parts,) 1 for each part of its goal.
         sight: of the camera.
-        moves: the number of each kind of waypoint.
+        moves: the number of each kind of waypoint, or of each form of subgoals.
         noise: of the detector.
         rng: draws the noise.
     """
@@ -160,7 +166,16 @@ def to_batch(episodes: Sequence[EpisodeNumbers]) -> EpisodeBatch:
         _pad([one.moves for one in episodes], -1),
         _pad([one.things for one in episodes], -1),
         _pad([one.done for one in episodes], -1),
+        _planned([one.planned for one in episodes if one.planned is not None]),
     )
+
+
+def _planned(episodes: Sequence[PlannedNumbers]) -> PlannedBatch | None:
+    if not episodes:
+        return None
+    context, kept, keys = zip(*episodes, strict=True)
+    # A decision that is there for padding sees the first look.
+    return PlannedBatch(_pad(context, 0), _pad(kept, 0), _pad(keys, -1))
 
 
 def _pad(arrays: Sequence[NDArray[Any]], fill: int) -> torch.Tensor:

@@ -20,9 +20,11 @@ from roboirg.apps.learning.listener.listener_net import (
 from roboirg.apps.learning.listener.object_relations import ObjectsInView, rank
 from roboirg.apps.learning.policy.body_net import BodyAnswer, BodyNet
 from roboirg.apps.learning.policy.moves import Move, waypoint
+from roboirg.apps.learning.policy.planner_history import PlannedNumbers, context_size
 from roboirg.apps.learning.policy.policy_data import EpisodeNumbers, LookHistory, to_batch
-from roboirg.apps.learning.policy.policy_plan import WORDLESS
-from roboirg.apps.learning.policy.sight import Sight
+from roboirg.apps.learning.policy.policy_plan import HANDS, PLANNERS, WORDLESS
+from roboirg.apps.learning.policy.sight import Sight, points_of
+from roboirg.apps.learning.policy.subgoals import ASKED_NUMBERS, SubgoalForm
 from roboirg.apps.learning.policy.task_net import TaskNet
 from roboirg.apps.learning.policy.thing_detector import ThingDetector
 from roboirg.apps.learning.policy.tracks import LookTokens
@@ -36,6 +38,8 @@ HOME = (math.pi, 0.0, 0.0)
 """Roll, pitch and yaw of the tool at the beginning, rad."""
 _BATCH = 32
 
+Kind = Move | SubgoalForm
+"""What a network chooses among: kinds of waypoints, or forms of subgoals."""
 Pictures = Sequence[NDArray[np.uint8]]
 
 
@@ -53,6 +57,8 @@ class PolicyModel(NamedTuple):
         memory: what it remembers; a name of `MEMORIES`.
         body: chooses the next waypoint.
         about: how it was trained, for records.
+        forms: of the subgoals that its planner names.
+        planner: names the next subgoal; None if it has none, and then its body follows none.
     """
 
     sight: Sight
@@ -65,6 +71,13 @@ class PolicyModel(NamedTuple):
     memory: str
     body: BodyNet
     about: dict[str, Any]
+    forms: tuple[SubgoalForm, ...] = ()
+    planner: BodyNet | None = None
+
+    @property
+    def goal_size(self) -> int:
+        """How many numbers `goal_numbers` has."""
+        return len(self.vocabulary.tasks) + len(self.vocabulary.parts)
 
     def understand(self, text: str, looks: Sequence[LookTokens]) -> NDArray[np.float32]:
         """Return the task and the goal that an instruction means, as `goal_numbers` does.
@@ -99,18 +112,35 @@ def goal_numbers(task: str, answer: str, vocabulary: Vocabulary) -> NDArray[np.f
     return found
 
 
+class Choice(NamedTuple):
+    """What a network chooses.
+
+    Attributes:
+        kind: number of the kind of waypoint, or of the form of a subgoal.
+        thing: track of the thing; None where there is none.
+        keys: places among the recent looks of those to be kept.
+    """
+
+    kind: int
+    thing: int | None
+    keys: tuple[int, ...]
+
+
 class SeenEpisode:
     """One episode as a policy sees it.
 
     Args:
         model: the policy.
+
+    Attributes:
+        video_looks: number of looks at the video.
     """
 
     def __init__(self, model: PolicyModel) -> None:
         self._model = model
         self._history = LookHistory()
         self._first: list[LookTokens] = []
-        self._video_looks = 0
+        self.video_looks = 0
 
     def look(
         self,
@@ -135,33 +165,57 @@ class SeenEpisode:
                 if len(self._history) in (FIRST_LOOKS if is_video else FIRST_LOOKS[:1]):
                     self._first.append(tokens)
                 self._history.add(tokens, tool, is_video=is_video)
+        self.video_looks += len(pictures) if is_video else 0
 
     def understand(self, text: str) -> NDArray[np.float32]:
         """Return the goal that an instruction means, as `PolicyModel.understand` does."""
         return self._model.understand(text, self._first)
 
+    @property
+    def looks(self) -> int:
+        """Number of looks so far."""
+        return len(self._history)
+
     @torch.no_grad()
+    def choose(
+        self, net: BodyNet, goal: NDArray[np.float32], planned: PlannedNumbers | None
+    ) -> Choice:
+        """Return what a network, body or planner, chooses after the last look."""
+        nothing = np.array([-1])
+        now = np.array([len(self._history) - 1])
+        looks = self._history.numbers()
+        numbers = EpisodeNumbers(looks, goal, now, nothing, nothing, nothing, planned)
+        answer: BodyAnswer = net(to_batch([numbers]))
+        kind = int(answer.moves[0, 0].argmax())
+        thing = int(answer.things[0, 0, kind].argmax())
+        keys = () if answer.keys is None else np.flatnonzero(answer.keys[0, 0].numpy() > 0)
+        return Choice(kind, thing if thing < self._history.tracks.count else None, tuple(keys))
+
+    def point(self, thing: int) -> NDArray[np.float64]:
+        """Return column and row in the front picture of a thing, where it was last seen."""
+        tracks, heights = self._history.tracks, self._model.sight.heights
+        height = heights[tracks.classes[thing]]
+        return points_of(np.append(tracks.places[thing].astype(np.float64), height))
+
     def decide(
-        self, goal: NDArray[np.float32], tool: NDArray[np.floating[Any]]
+        self,
+        goal: NDArray[np.float32],
+        tool: NDArray[np.floating[Any]],
+        planned: PlannedNumbers | None = None,
     ) -> NDArray[np.float64]:
         """Return the next waypoint (7), after the last look.
 
         Args:
             goal: as `understand` returns it.
             tool: (7,) of the last look.
+            planned: the subgoal to follow, for hands.
         """
-        nothing = np.array([-1])
-        now = np.array([len(self._history) - 1])
-        numbers = EpisodeNumbers(self._history.numbers(), goal, now, nothing, nothing, nothing)
-        answer: BodyAnswer = self._model.body(to_batch([numbers]))
-        kind = int(answer.moves[0, 0].argmax())
-        thing = int(answer.things[0, 0, kind].argmax())
-        tracks = self._history.tracks
-        move = self._model.moves[kind]
-        if not move.at_thing or thing >= tracks.count:
+        chosen = self.choose(self._model.body, goal, planned)
+        move, tracks = self._model.moves[chosen.kind], self._history.tracks
+        if not move.at_thing or chosen.thing is None:
             here = np.asarray(tool[:2], np.float64)
             return waypoint(move, tool, here, np.array([1.0, 0.0]), HOME)
-        return waypoint(move, tool, tracks.places[thing], tracks.turns[thing], HOME)
+        return waypoint(move, tool, tracks.places[chosen.thing], tracks.turns[chosen.thing], HOME)
 
 
 def save_policy(model: PolicyModel, path: Path) -> None:
@@ -170,7 +224,7 @@ def save_policy(model: PolicyModel, path: Path) -> None:
     Raises:
         InvalidValueError: the file cannot be written.
     """
-    content = {
+    content: dict[str, Any] = {
         "format": FORMAT,
         "classes": list(model.sight.classes),
         "heights": torch.from_numpy(np.asarray(model.sight.heights)),
@@ -183,7 +237,10 @@ def save_policy(model: PolicyModel, path: Path) -> None:
         "task_net": model.task_net.state_dict(),
         "reader": model.reader.state_dict(),
         "body": model.body.state_dict(),
+        "forms": [form.words for form in model.forms],
     }
+    if model.planner is not None:
+        content["planner"] = model.planner.state_dict()
     save_trained(content, path)
 
 
@@ -202,24 +259,32 @@ def _read(content: Mapping[str, Any]) -> PolicyModel:
     sight = Sight(tuple(content["classes"]), content["heights"].numpy())
     detector, reader = ThingDetector(len(sight.classes)), ListenerNet(vocabulary)
     task_net = TaskNet(vocabulary)
-    body = make_body(sight, vocabulary, moves, content["memory"])
+    memory = content["memory"]
+    body = make_body(sight, vocabulary, moves, HANDS if memory in PLANNERS else memory)
     nets: dict[str, Any] = {
         "detector": detector,
         "task_net": task_net,
         "reader": reader,
         "body": body,
     }
+    forms = tuple(map(SubgoalForm, content.get("forms", ())))
+    planner = make_body(sight, vocabulary, forms, memory) if memory in PLANNERS else None
+    if planner is not None:
+        nets["planner"] = planner
     for name, net in nets.items():
         net.load_state_dict(content[name])
         net.eval()
     corners = content["corners"].numpy()
     return PolicyModel(
-        sight, detector, vocabulary, task_net, reader, corners, moves, content["memory"], body,
-        content["about"],
+        sight, detector, vocabulary, task_net, reader, corners, moves, memory, body,
+        content["about"], forms, planner,
     )  # fmt: skip
 
 
-def make_body(sight: Sight, vocabulary: Vocabulary, moves: Sequence[Move], memory: str) -> BodyNet:
-    """Return an untrained body for these classes, goals and kinds of waypoints."""
+def make_body(sight: Sight, vocabulary: Vocabulary, moves: Sequence[Kind], memory: str) -> BodyNet:
+    """Return an untrained body for these classes, goals and kinds, or an untrained planner."""
     goal_size = len(vocabulary.tasks) + len(vocabulary.parts)
-    return BodyNet(len(sight.classes), goal_size, [move.at_thing for move in moves], memory)
+    planner = dict.fromkeys(PLANNERS, context_size(len(moves)))
+    context = {HANDS: ASKED_NUMBERS, **planner}.get(memory, 0)
+    at_things = [move.at_thing for move in moves]
+    return BodyNet(len(sight.classes), goal_size, at_things, memory, context)

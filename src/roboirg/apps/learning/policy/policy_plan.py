@@ -10,8 +10,13 @@ from roboirg.apps.learning.policy.recording import ExpertRecording
 from roboirg.core.episode import Episode
 from roboirg.core.word_pools import PoolName
 
-MEMORY_NAMES = ("none", "frames", "recurrent")
-"""The kinds of memory."""
+MEMORY_NAMES = ("none", "recurrent", "ttt", "framesamp", "subgoal", "keyframes")
+"""The kinds of memory; the last two are a planner's."""
+PLANNERS = ("subgoal", "keyframes")
+CHOOSES = "keyframes"
+"""The planner that chooses what it keeps."""
+HANDS = "hands"
+"""The body that follows the subgoals of a planner, and remembers nothing."""
 WORDLESS = "none"
 """Words of a policy that is trained without any."""
 MANY = 3
@@ -25,7 +30,7 @@ class PolicyPlan(NamedTuple):
         tasks: names of tasks.
         settings: names of settings whose instructions it hears; none for a policy without words.
         words: the pool of words.
-        memory: what it remembers; a name of `MEMORIES`.
+        memory: what it remembers; a name of `MEMORY_NAMES`.
         scenes: random scenes of each task in which the disturbed expert is recorded.
         drawn: those of them of which pictures are drawn, for the detector.
         goals: goals of each scene that the reader of words hears by place.

@@ -29,7 +29,13 @@ from roboirg.apps.learning.policy.policy_model import (
     PolicyModel,
     seen_things,
 )
-from roboirg.apps.learning.policy.policy_plan import WORDLESS, PolicyPlan, Recorded
+from roboirg.apps.learning.policy.policy_plan import (
+    HANDS,
+    PLANNERS,
+    WORDLESS,
+    PolicyPlan,
+    Recorded,
+)
 from roboirg.apps.learning.policy.recording import (
     ExpertRecording,
     load_recording,
@@ -45,6 +51,7 @@ from roboirg.apps.learning.policy.sight import (
     sight_of,
     turns_of,
 )
+from roboirg.apps.learning.policy.subgoals import forms_of, subgoals_due
 from roboirg.apps.learning.policy.task_net import TaskNet
 from roboirg.apps.learning.policy.thing_detector import (
     LabeledPicture,
@@ -94,7 +101,17 @@ def train_policy(plan: PolicyPlan, folder: Path, workers: int, progress: Progres
     lessons, vocabulary = _lessons(plan, recorded, sight, corners)
     decisions = [decisions_of(one.recording) for one in recorded]
     moves = common_moves(decisions)
-    body = train_body(plan, recorded, decisions, moves, sight, vocabulary, folder, progress)
+    planned = plan.memory in PLANNERS
+    hands = plan._replace(memory=HANDS) if planned else plan
+    body = train_body(hands, recorded, decisions, moves, sight, vocabulary, folder, progress)
+    forms = forms_of([one.episode.stages for one in recorded]) if planned else ()
+    planner = None
+    if planned:
+        due = [
+            subgoals_due(one.recording, one.episode.stages, [decision.look for decision in own])
+            for one, own in zip(recorded, decisions, strict=True)
+        ]
+        planner = train_body(plan, recorded, due, forms, sight, vocabulary, folder, progress)
     task_net, reader = _train_words(plan, lessons, vocabulary, progress)
     about: dict[str, Any] = {
         **plan._asdict(),
@@ -106,7 +123,7 @@ def train_policy(plan: PolicyPlan, folder: Path, workers: int, progress: Progres
     }
     return PolicyModel(
         sight, detector, vocabulary, task_net, reader, corners, moves, plan.memory,
-        body, about,
+        body, about, forms, planner,
     )  # fmt: skip
 
 

@@ -16,7 +16,9 @@ if TYPE_CHECKING:
 
 __all__ = ["FIGURES", "draw_figure", "write_figures"]
 
-FIGURES = ("averages", "forms", "expressions", "context", "failures", "arms", "real", "strips")
+FIGURES = (
+    "gaps", "averages", "forms", "expressions", "context", "failures", "arms", "real", "strips",
+)  # fmt: skip
 
 
 def write_figures(
@@ -27,7 +29,7 @@ def write_figures(
     published: bool = False,
     runs: Sequence[Path] = (),
 ) -> tuple[Path, ...]:
-    """Draw figures as PNG, SVG and PDF; the expressions as PNG and SVG.
+    """Draw figures as PNG, SVG and PDF, and as PNG and SVG for dark pages.
 
     Args:
         content: of the runs.
@@ -85,18 +87,16 @@ def _drawn(name: str, content: RunData, *, published: bool) -> Figure | None:
     from roboirg.evaluation.analysis.figures.context import draw_context
     from roboirg.evaluation.analysis.figures.failures import draw_failures
     from roboirg.evaluation.analysis.figures.forms import draw_forms
+    from roboirg.evaluation.analysis.figures.gaps import draw_gaps
     from roboirg.evaluation.analysis.figures.real_robot import draw_real_robot
 
     if name == "arms":
         return draw_arms(content)
     content = content.told()
-    match name:
-        case "averages":
-            return draw_averages(content, published=published)
-        case "context":
-            return draw_context(content, published=published)
-        case "forms":
-            return draw_forms(content)
-        case "real":
-            return draw_real_robot(content, published=published)
-    return draw_failures(content)
+    with_published = {
+        "gaps": draw_gaps, "averages": draw_averages, "context": draw_context,
+        "real": draw_real_robot,
+    }  # fmt: skip
+    if name in with_published:
+        return with_published[name](content, published=published)
+    return draw_forms(content) if name == "forms" else draw_failures(content)

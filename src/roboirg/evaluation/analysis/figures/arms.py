@@ -12,6 +12,7 @@ from roboirg.evaluation.analysis.figures.figure_style import (
     clear_axes,
     folded,
     new_figure,
+    paper,
 )
 from roboirg.evaluation.analysis.stats.arm_figures import ArmFigure, arm_figures
 from roboirg.evaluation.analysis.stats.option_labels import options_label
@@ -40,7 +41,7 @@ def draw_arms(content: RunData) -> Figure | None:
     axes = figure.subplots(len(panels), 1, squeeze=False, height_ratios=heights).ravel()
     for panel, (title, rows) in zip(axes, panels.items(), strict=True):
         _draw_panel(panel, rows)
-        panel.set_title(folded(title, TITLE_LETTERS), fontsize=8.5, loc="left", fontweight="bold")
+        panel.set_title(folded(title, TITLE_LETTERS), loc="left")
     axes[-1].set_xlabel("%: first filled, second hollow", loc="left")
     return figure
 
@@ -56,7 +57,7 @@ def _draw_panel(axes: Axes, rows: list[ArmFigure]) -> None:
             at, color = place + (0.15 if side else -0.15), COLORS[side]
             if interval is not None:
                 axes.plot([100 * end for end in interval], [at, at], color=color, linewidth=1)
-            filling = "white" if side else color
+            filling = paper() if side else color
             axes.plot(
                 100 * rate, at, SIGNS[side], color=color, markersize=3.5, markerfacecolor=filling
             )

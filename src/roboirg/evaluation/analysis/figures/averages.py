@@ -38,16 +38,10 @@ def draw_averages(content: RunData, *, published: bool = False) -> Figure | None
     results in the setting played; without results the published ones are over all of theirs.
     """
     is_alone = published and not content.cells
-    shared = _published_tasks() if is_alone else _shared_tasks(content.cells)
+    shared = published_tasks() if is_alone else shared_tasks(content.cells)
     if not shared:
         return None
-    found = summaries_by_key(
-        {
-            key: cell
-            for key, cell in content.cells.items()
-            if key.task in shared.get(key.options.setting, ()) and has_default_options(key.options)
-        }
-    )
+    found = summaries_by_key(cells_of(content.cells, shared))
     ghosts = _ghosts(shared) if published else []
     models = list(dict.fromkeys(model for model, _, _ in ghosts))
     settings = list(shared)
@@ -73,7 +67,16 @@ def draw_averages(content: RunData, *, published: bool = False) -> Figure | None
     return figure
 
 
-def _shared_tasks(cells: Cells) -> dict[str, list[str]]:
+def cells_of(cells: Cells, tasks: Mapping[str, Collection[str]]) -> Cells:
+    """Return the cells of the given tasks of each setting, with default options."""
+    return {
+        key: cell
+        for key, cell in cells.items()
+        if key.task in tasks.get(key.options.setting, ()) and has_default_options(key.options)
+    }
+
+
+def shared_tasks(cells: Cells) -> dict[str, list[str]]:
     """Return by setting the tasks that all policy runs with results in it played."""
     played: dict[str, dict[PolicyRun, list[str]]] = {}
     for key, cell in cells.items():
@@ -89,7 +92,7 @@ def _shared_tasks(cells: Cells) -> dict[str, list[str]]:
     return shared
 
 
-def _published_tasks() -> dict[str, list[str]]:
+def published_tasks() -> dict[str, list[str]]:
     """Return by setting the tasks that have published rates."""
     rows = {row.options.setting: row for row in published_rows("main")}
     settings = sorted(rows, key=setting_sort_key)

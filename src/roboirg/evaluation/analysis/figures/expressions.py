@@ -11,22 +11,20 @@ import msgspec
 
 from roboirg import language
 from roboirg.core.errors import RoboIRGError
+from roboirg.evaluation.analysis.figures.figure_style import clear_axes, new_figure, save
 from roboirg.evaluation.analysis.stats.run_data import RunData
 from roboirg.evaluation.play.job_instruction import instruct_job
 from roboirg.evaluation.records.record import Job
 from roboirg.language.instruction import Expression, Instruction
 from roboirg.language.settings import EXPLICIT, all_settings
-from roboirg.util.figure_files import save_figure
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 TITLE = "Referring expressions in the instructions"
-FORMATS = ("png", "svg")
 PANEL_INCHES, SIDE_INCHES = 2.6, 0.9
 ROW_INCHES, MARGIN_INCHES = 0.29, 1.25
-DOTS_PER_INCH = 200
 PANEL_RANGE = 1.25
 """Width of a panel in units of the longest bar; leaves space for its number."""
 
@@ -97,24 +95,14 @@ def _instruction(job: Job) -> Instruction | None:
 def write_figure(
     instructions: Sequence[Instruction], folder: Path, name: str, title: str
 ) -> tuple[Path, ...]:
-    """Draw the number of scenes with each class of referring expression, as PNG and SVG.
+    """Draw the number of scenes with each class of referring expression.
 
     Return the files; `name` has no extension.
     """
-    return save_figure(
-        lambda: _draw(instructions, title),
-        folder,
-        name,
-        formats=FORMATS,
-        dots_per_inch=DOTS_PER_INCH,
-        style={"font.size": 9},
-    )
+    return save(lambda: _draw(instructions, title), folder, name)
 
 
 def _draw(instructions: Sequence[Instruction], title: str) -> Figure:
-    # Without pyplot, which keeps every figure and looks for a display.
-    from matplotlib.figure import Figure
-    from matplotlib.layout_engine import ConstrainedLayoutEngine
     from matplotlib.ticker import MaxNLocator
 
     counts, scenes = expression_counts(instructions), scene_counts(instructions)
@@ -124,7 +112,7 @@ def _draw(instructions: Sequence[Instruction], title: str) -> Figure:
         PANEL_INCHES * max(1, len(settings)) + SIDE_INCHES,
         ROW_INCHES * len(classes) + MARGIN_INCHES,
     )
-    figure = Figure(figsize=size, layout=ConstrainedLayoutEngine(w_pad=0.08, h_pad=0.08))
+    figure = new_figure(*size)
     figure.suptitle(title, x=0.01, ha="left", fontsize=11, fontweight="bold")
     if settings:
         # One scale, to compare bars across panels.
@@ -146,9 +134,4 @@ def _draw_panel(panel: Axes, classes: Iterable[str], numbers: list[int], color: 
     bars = panel.barh(positions, numbers, color=color, height=0.72)
     panel.bar_label(bars, [str(one) if one else "" for one in numbers], padding=3, fontsize=8)
     panel.set_yticks(positions, list(classes))
-    panel.set_axisbelow(True)
-    panel.grid(axis="x", color="#dddddd", linewidth=0.6)
-    panel.tick_params(axis="both", length=0)
-    for side in ("top", "right", "left"):
-        panel.spines[side].set_visible(False)
-    panel.spines["bottom"].set_color("#999999")
+    clear_axes(panel, grid="x")

@@ -15,6 +15,7 @@ from roboirg.evaluation.analysis.figures.figure_style import (
     clear_axes,
     folded,
     new_figure,
+    paper,
 )
 from roboirg.evaluation.analysis.stats.cells import PolicyRun
 from roboirg.evaluation.analysis.stats.failure_counts import UNATTRIBUTED, count_failures
@@ -76,7 +77,7 @@ def draw_failures(content: RunData) -> Figure | None:
             key = (policy_run, options)
             _draw_bar(panel, place, counts.get(key), played[key])
         title = folded(content.name(policy_run), TITLE_LETTERS)
-        panel.set_title(title, fontsize=8.5, loc="left", fontweight="bold")
+        panel.set_title(title, loc="left")
         panel.set_xlabel("share of the episodes with a verdict, %")
         panel.set_xlim(0, 100)
         panel.set_xticks(range(0, 101, 25))
@@ -112,7 +113,7 @@ def _draw_bar(axes: Axes, place: int, counts: Counter[str] | None, played: int) 
             continue
         width = 100 * count / played
         axes.barh(
-            place, width, left=left, height=0.78, color=color, edgecolor="white", linewidth=0.5
+            place, width, left=left, height=0.78, color=color, edgecolor=paper(), linewidth=0.5
         )
         if width >= MIN_LABELED_PERCENT:
             axes.text(
@@ -130,7 +131,7 @@ def _add_legend(figure: Figure, kinds: list[str], columns: int) -> None:
         return group + kind.replace("_", " ")
 
     figure.legend(
-        [Patch(facecolor=COLORS[kind], edgecolor="white") for kind in kinds],
+        [Patch(facecolor=COLORS[kind], edgecolor=paper()) for kind in kinds],
         [words(kind) for kind in kinds],
         loc="outside lower center", ncols=columns, columnspacing=1.0, handletextpad=0.4,
     )  # fmt: skip

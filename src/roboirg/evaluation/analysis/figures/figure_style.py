@@ -14,7 +14,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-FORMATS = ("png", "svg", "pdf")
 COLUMN_INCHES, PAGE_INCHES = 3.4, 7.0
 """Widths of a column and of a page; figures are drawn at final size."""
 LEGEND_LINE_INCHES = 0.16
@@ -26,9 +25,29 @@ DOTS_PER_INCH = 300
 STYLE = {
     "font.size": 7.5,
     "axes.linewidth": 0.6,
+    "axes.edgecolor": "#999999",
+    "axes.titlesize": 8.5,
+    "axes.titleweight": "bold",
+    "lines.color": "#0072B2",
+    "grid.color": "#dddddd",
+    "grid.linewidth": 0.5,
     "legend.frameon": False,
     "legend.fontsize": 7,
 }
+DARK_PAPER, DARK_INK = "#0d1117", "#e6edf3"
+DARK_STYLE = {
+    **STYLE,
+    "figure.facecolor": DARK_PAPER,
+    "savefig.facecolor": DARK_PAPER,
+    "axes.facecolor": DARK_PAPER,
+    "axes.edgecolor": "#6e7681",
+    "lines.color": "#56B4E9",
+    "grid.color": "#30363d",
+    **dict.fromkeys(
+        ("text.color", "axes.labelcolor", "xtick.color", "ytick.color", "axes.titlecolor"), DARK_INK
+    ),
+}
+"""For pages with a dark background."""
 COLORS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#E69F00")
 """Okabe and Ito's colors, safe for color-blind readers; signs differ as well."""
 SIGNS = ("o", "s", "^", "D", "v", "P")
@@ -36,11 +55,41 @@ PUBLISHED_NOTE = "published: the same tasks, the paper's instructions and simula
 GHOST, GHOST_SIGNS = "#8a8a8a", ("d", "X", "p", "<", ">", "h", "8", "*")
 
 
-def save(draw: Callable[[], Figure | None], folder: Path, name: str) -> tuple[Path, ...]:
-    """Draw a figure in the common style and write it in all formats; see `save_figure`."""
-    return save_figure(
-        draw, folder, name, formats=FORMATS, dots_per_inch=DOTS_PER_INCH, style=STYLE
+def save(
+    draw: Callable[[], Figure | None],
+    folder: Path,
+    name: str,
+    formats: Sequence[str] = ("png", "svg", "pdf"),
+) -> tuple[Path, ...]:
+    """Draw a figure in the common style and write it in some formats, and for dark pages.
+
+    The files for dark pages end in ``-dark`` and have no PDF; see `save_figure`.
+    """
+    on_dark = [one for one in formats if one != "pdf"]
+    files = ((name, formats, STYLE), (f"{name}-dark", on_dark, DARK_STYLE))
+    return tuple(
+        path
+        for stem, endings, style in files
+        for path in save_figure(
+            draw, folder, stem, formats=endings, dots_per_inch=DOTS_PER_INCH, style=style
+        )
     )
+
+
+def paper() -> str:
+    """Return the color of the page that is being drawn."""
+    return _drawn_with("axes.facecolor")
+
+
+def first_color() -> str:
+    """Return the first of the colors, which is a lighter blue on dark pages."""
+    return _drawn_with("lines.color")
+
+
+def _drawn_with(name: str) -> str:
+    import matplotlib as mpl
+
+    return str(mpl.rcParams[name])
 
 
 def new_figure(width: float, height: float) -> Figure:
@@ -57,12 +106,10 @@ def new_figure(width: float, height: float) -> Figure:
 def clear_axes(axes: Axes, *, grid: str) -> None:
     """Remove most of the frame and add grid lines for one axis."""
     axes.set_axisbelow(True)
-    axes.grid(axis="x" if grid == "x" else "y", color="#dddddd", linewidth=0.5)
+    axes.grid(axis="x" if grid == "x" else "y")
     axes.tick_params(axis="both", length=0)
     for side in ("top", "right", "left" if grid == "x" else "bottom"):
         axes.spines[side].set_visible(False)
-    for spine in axes.spines.values():
-        spine.set_color("#999999")
 
 
 def folded(name: str, letters: int) -> str:

@@ -11,6 +11,7 @@ from roboirg.evaluation.analysis.figures.figure_style import (
     clear_axes,
     folded,
     new_figure,
+    paper,
 )
 from roboirg.evaluation.analysis.stats.form_gaps import FormRow, form_rows
 from roboirg.evaluation.analysis.stats.paired_tests import Gap
@@ -52,7 +53,7 @@ def draw_forms(content: RunData) -> Figure | None:
     for panel, (policy_run, rows) in zip(axes, panels.items(), strict=False):
         _draw_panel(panel, rows)
         title = folded(content.name(policy_run), TITLE_LETTERS)
-        panel.set_title(title, fontsize=8.5, loc="left", fontweight="bold")
+        panel.set_title(title, loc="left")
     for panel in axes[len(panels) :]:
         panel.set_visible(False)
     handles = _handles()
@@ -79,7 +80,7 @@ def _draw_panel(axes: Axes, rows: list[FormRow]) -> None:
     axes.set_xlabel("share of the episodes, %", x=50 / ROOM, fontsize=7.5)
     clear_axes(axes, grid="x")
     axes.spines["bottom"].set_bounds(0, 100)
-    axes.text(TEXT_AT, -0.72, "implicit − resolved", fontsize=6.5, va="center", color="#555555")
+    axes.text(TEXT_AT, -0.72, "implicit − resolved", fontsize=6.5, va="center")
 
 
 def _draw_bar(axes: Axes, place: float, gap: Gap) -> None:
@@ -89,7 +90,7 @@ def _draw_bar(axes: Axes, place: float, gap: Gap) -> None:
     for (_, color, pattern), count in zip(PARTS, counts, strict=True):
         width = 100 * count / overlap.trials if overlap.trials else 0.0
         axes.barh(
-            place, width, left=left, height=0.78, color=color, hatch=pattern, edgecolor="white",
+            place, width, left=left, height=0.78, color=color, hatch=pattern, edgecolor=paper(),
             linewidth=0.4,
         )  # fmt: skip
         left += width
@@ -102,4 +103,4 @@ def _draw_bar(axes: Axes, place: float, gap: Gap) -> None:
 def _handles() -> list[Patch]:
     from matplotlib.patches import Patch
 
-    return [Patch(facecolor=color, hatch=pattern, edgecolor="white") for _, color, pattern in PARTS]
+    return [Patch(facecolor=color, hatch=pattern, edgecolor=paper()) for _, color, pattern in PARTS]

@@ -11,6 +11,7 @@ from roboirg.evaluation.analysis.figures.figure_style import (
     clear_axes,
     legend_below,
     new_figure,
+    paper,
 )
 from roboirg.evaluation.analysis.published import TRIALS
 from roboirg.evaluation.analysis.stats.intervals import wilson_interval
@@ -124,7 +125,7 @@ def _draw(axes: Axes, task: str, series: Sequence[Series]) -> None:
             width,
             color=next(colors[one.published]),
             hatch=HATCH if one.published else None,
-            edgecolor="white",
+            edgecolor=paper(),
             label=f"{one.name} (published)" if one.published else one.name,
             yerr=[[max(bar.percent - bar.low, 0.0) for bar in bars],
                   [max(bar.high - bar.percent, 0.0) for bar in bars]],

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from roboirg.core.extras import extra_needed
-from roboirg.evaluation.analysis.figures.figure_style import PAGE_INCHES, new_figure
+from roboirg.evaluation.analysis.figures.figure_style import GHOST, PAGE_INCHES, new_figure
 from roboirg.evaluation.analysis.stats.option_labels import (
     REFERENCE,
     options_label,
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 PICTURES = 5
 MOMENT_COLOR = "#D62728"
-ROW_INCHES = 2.0
+ROW_INCHES = 1.9
 STEPS_PER_SECOND = 20
 PICTURE_PIXELS = 256
 _SUBGOAL_LETTERS, _TITLE_LETTERS = 26, 118
@@ -113,13 +113,13 @@ def _draw_strip(place: Any, strip: Strip) -> None:  # noqa: ANN401 - a SubFigure
         axes.set_yticks([])
         is_moment = step == moment
         for spine in axes.spines.values():
-            spine.set(
-                color=MOMENT_COLOR if is_moment else "#999999", linewidth=2.5 * is_moment + 0.5
-            )
+            spine.set(color=MOMENT_COLOR if is_moment else GHOST, linewidth=2.5 * is_moment + 0.5)
         text = f"{step / STEPS_PER_SECOND:.1f} s"
         if subgoal := _subgoal(record, step):
             text += "\n" + textwrap.fill(f"“{subgoal}”", _SUBGOAL_LETTERS)
-        axes.set_xlabel(text, fontsize=6, color=MOMENT_COLOR if is_moment else "black")
+        label = axes.set_xlabel(text, fontsize=6)
+        if is_moment:
+            label.set_color(MOMENT_COLOR)
 
 
 def _subgoal(record: Record, step: int) -> str | None:

@@ -1,10 +1,9 @@
-"""Contact sheets, the choice of moments, and an episode in words."""
+"""Strips of pictures, the choice of moments, and an episode in words."""
 
-import cv2
 import numpy as np
 import pytest
 
-from roboirg.apps.show.contact_sheet import SheetPanel, compose_sheet, evenly_spaced, write_png
+from roboirg.apps.show.episode_strip import Said, StripMoment, draw_strip
 from roboirg.apps.show.episode_text import describe_motions, describe_video, fact_words
 from roboirg.apps.show.playthrough import (
     MAX_MOMENTS,
@@ -15,78 +14,62 @@ from roboirg.apps.show.playthrough import (
 )
 from roboirg.core.conditions import Fact
 from roboirg.core.episode import Scene
-from roboirg.core.errors import InvalidValueError
 from roboirg.core.motions import Away, Glow, Point, Shuttle, Swap, Vanish
+from roboirg.evaluation.analysis.figures.figure_style import DARK_STYLE, STYLE
 from roboirg.tasks.splits.splits import get_episode
 
+pytest.importorskip("matplotlib")
 
-def picture(value):
-    return np.full((256, 256, 3), value, np.uint8)
+import matplotlib as mpl
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+
+SAID = [Said("explicit", "Lift it.", "#000000"), Said("direct", "I like it. " * 30, "#0072B2")]
 
 
 def moments(count, caption="done"):
     return [
-        SheetPanel(number, caption, (picture(10 + number), picture(100 + number)), number == 0)
+        StripMoment(number, caption, np.full((256, 256, 3), 10 + number, np.uint8), number == 0)
         for number in range(count)
     ]
 
 
+def drawn(count, caption="done", style=STYLE):
+    with mpl.rc_context(style):
+        figure = draw_strip("A title", SAID, moments(count, caption))
+        FigureCanvasAgg(figure).draw()
+    return figure
+
+
 @pytest.mark.parametrize("count", [1, 4, 6, 8, 12])
-def test_every_picture_is_there_once_and_whole(count):
-    sheet = compose_sheet("Title", "What is said. " * 40, moments(count))
-    for number in range(count):
-        for value in (10 + number, 100 + number):
-            found = (sheet == value).all(axis=-1).sum()
-            assert found >= 256 * 256
-            assert found < 256 * 256 * 1.01  # but for the grey edges of letters
+def test_every_picture_is_there_once_and_in_order_of_time(count):
+    figure = drawn(count)
+    values = [axes.images[0].get_array()[0, 0, 0] for axes in figure.axes]
+    assert values == [10 + number for number in range(count)]
+    places = [axes.get_position() for axes in figure.axes]
+    assert places == sorted(places, key=lambda one: (-one.y0, one.x0))
+    if count == 8:  # four and four
+        assert len({round(one.y0, 6) for one in places[:4]}) == 1
+        assert places[4].y0 < places[3].y0
 
 
-def test_moments_go_from_left_to_right_and_cameras_from_top_to_bottom():
-    sheet = compose_sheet("", "", moments(8, caption=""))
-    corners = [np.argwhere((sheet == 10 + number).all(axis=-1))[0] for number in range(8)]
-    wrists = [np.argwhere((sheet == 100 + number).all(axis=-1))[0] for number in range(8)]
-    assert len({y for y, _ in corners[:4]}) == 1  # eight are four and four
-    assert corners[4][0] > wrists[0][0] > corners[0][0]
-    assert [x for _, x in corners[:4]] == sorted({x for _, x in corners[:4]})
-    assert corners[4][1] == corners[0][1]
+@pytest.mark.parametrize("style", [STYLE, DARK_STYLE])
+@pytest.mark.parametrize("caption", ["done: pick", "done: pick up the container " * 30])
+def test_no_word_leaves_the_strip_and_none_is_drawn_over_another(style, caption):
+    figure = drawn(12, caption, style)
+    boxes = [text.get_window_extent() for text in figure.texts]
+    for number, box in enumerate(boxes):
+        assert box.x0 >= 0
+        assert box.x1 <= figure.bbox.x1
+        assert box.y0 >= 0
+        assert not [one for one in boxes[:number] if one.padded(-2).overlaps(box.padded(-2))]
 
 
-def test_captions_are_drawn_and_long_ones_stay_in_their_column():
-    short = compose_sheet("T", "s", moments(2, caption="pick"))
-    assert short.shape[0] < compose_sheet("T", "s", moments(2, caption="pick " * 30)).shape[0]
-    many = compose_sheet("T", "s", moments(2, caption="pick " * 900))
-    assert many.shape[0] < short.shape[0] + 200
-    assert (compose_sheet("Other", "s", moments(2)) != compose_sheet("T", "s", moments(2))).any()
-    compose_sheet("—", "naïve", moments(1, caption="×" * 400))  # no letters of the font
-
-
-def test_moments_of_the_video_have_another_color():
-    one = SheetPanel(3, "", (picture(0),))
-    assert (compose_sheet("", "", [one]) == (9, 105, 218)).all(axis=-1).any()
-    assert not (compose_sheet("", "", [one]) == (255, 176, 32)).all(axis=-1).any()
-    assert (compose_sheet("", "", moments(1)) == (255, 176, 32)).all(axis=-1).any()
-
-
-def test_pictures_are_written_in_their_colors(tmp_path):
-    image = np.zeros((4, 5, 3), np.uint8)
-    image[..., 0] = 200
-    write_png(image, tmp_path / "new" / "sheet.png")
-    read = cv2.imread(str(tmp_path / "new" / "sheet.png"))
-    assert (read[..., 2] == 200).all()
-    assert not read[..., :2].any()
-    with pytest.raises(InvalidValueError, match="cannot be written"):
-        write_png(image, tmp_path)
-
-
-def test_thinning_keeps_the_ends():
-    assert evenly_spaced(3, 5) == (0, 1, 2)
-    assert evenly_spaced(10, 4) == (0, 3, 6, 9)
-    assert evenly_spaced(10, 1) == (9,)
-    assert evenly_spaced(10, 0) == ()
-    for count in range(30):
-        for most in range(15):
-            kept = evenly_spaced(count, most)
-            assert len(set(kept)) == len(kept) == min(count, most)
+def test_what_is_said_is_above_the_pictures_in_its_setting_s_color():
+    found = {text.get_text(): text for text in drawn(3).texts}
+    assert {"A title", "explicit", "Lift it.", "direct", "0.0 s, video", "0.1 s"} <= set(found)
+    assert found["direct"].get_color() == "#0072B2"
+    on_dark = {text.get_text(): text for text in drawn(3, style=DARK_STYLE).texts}
+    assert on_dark["explicit"].get_color() == DARK_STYLE["text.color"]  # black would not be seen
 
 
 def test_the_remarkable_is_chosen_first_and_fillers_only_fill_up():
@@ -150,8 +133,8 @@ def test_a_playthrough_shows_the_start_each_stage_and_the_end():
     assert not turn.is_demonstration
     assert played.moments[-1].caption.startswith("success: pick up the container")
     assert played.moments[-1].step == played.steps
-    assert all(one.pictures[0].shape == (256, 256, 3) for one in played.moments)
-    assert len({one.pictures[0].tobytes() for one in played.moments}) > 2
+    assert all(one.picture.shape == (256, 256, 3) for one in played.moments)
+    assert len({one.picture.tobytes() for one in played.moments}) > 2
 
 
 def test_what_moves_by_itself_is_remarkable_while_it_does():
