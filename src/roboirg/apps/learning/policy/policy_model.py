@@ -112,7 +112,7 @@ def goal_numbers(task: str, answer: str, vocabulary: Vocabulary) -> NDArray[np.f
     return found
 
 
-class Choice(NamedTuple):
+class NetworkChoice(NamedTuple):
     """What a network chooses.
 
     Attributes:
@@ -179,7 +179,7 @@ class SeenEpisode:
     @torch.no_grad()
     def choose(
         self, net: BodyNet, goal: NDArray[np.float32], planned: PlannedNumbers | None
-    ) -> Choice:
+    ) -> NetworkChoice:
         """Return what a network, body or planner, chooses after the last look."""
         nothing = np.array([-1])
         now = np.array([len(self._history) - 1])
@@ -189,7 +189,9 @@ class SeenEpisode:
         kind = int(answer.moves[0, 0].argmax())
         thing = int(answer.things[0, 0, kind].argmax())
         keys = () if answer.keys is None else np.flatnonzero(answer.keys[0, 0].numpy() > 0)
-        return Choice(kind, thing if thing < self._history.tracks.count else None, tuple(keys))
+        return NetworkChoice(
+            kind, thing if thing < self._history.tracks.count else None, tuple(keys)
+        )
 
     def point(self, thing: int) -> NDArray[np.float64]:
         """Return column and row in the front picture of a thing, where it was last seen."""

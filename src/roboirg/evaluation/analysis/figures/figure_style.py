@@ -5,7 +5,7 @@ from __future__ import annotations
 import textwrap
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 from roboirg.evaluation.analysis.stats.intervals import Interval
 from roboirg.util.figure_files import save_figure
@@ -86,7 +86,7 @@ def first_color() -> str:
     return _drawn_with("lines.color")
 
 
-def _drawn_with(name: str) -> str:
+def _drawn_with(name: Literal["axes.facecolor", "lines.color"]) -> str:
     import matplotlib as mpl
 
     return str(mpl.rcParams[name])
