@@ -154,10 +154,10 @@ def test_moved_and_mirrored_pictures_keep_their_labels(seed):
     picture = np.zeros((256, 256, 3), np.uint8)
     picture[100, 50] = 255
     turns = turns_of(np.array([0.2]))
-    view = LabeledPicture(picture, np.array([0]), np.array([[50.0, 100.0]]), turns)
+    view = LabeledPicture(picture, np.array([0]), np.array([[50.5, 100.5]]), turns)
     found = varied(view, np.random.default_rng(seed))
     ((row, column),) = np.argwhere(found.picture[..., 0] == 255)
-    assert found.points.tolist() == [[column, row]]
+    assert found.points.tolist() == [[column + 0.5, row + 0.5]]
     is_mirrored = column > 128
     assert np.allclose(found.turns, turns_of(np.array([-0.2 if is_mirrored else 0.2])))
 

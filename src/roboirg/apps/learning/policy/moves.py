@@ -15,6 +15,8 @@ from roboirg.apps.learning.policy.waypoint_expert import LEAVE
 
 Z_GRID = 0.0025
 """Meters to which heights are rounded."""
+STAY = "stay"
+"""The turn of a tool that stays where it is while the gripper opens or closes."""
 XY_GRID = 0.1
 """Meters to which a way in the plane from the tool's place is rounded."""
 RAREST = 0.0005
@@ -28,8 +30,8 @@ class Move(NamedTuple):
         at_thing: whether it is at the place of a thing; else at that of the tool.
         x: from there, m.
         y: from there, m.
-        z: of the tool, m.
-        turn: how the tool turns: keep, align, home.
+        z: of the tool, m; 0 if it stays.
+        turn: how the tool turns: keep, align, home; stay if it does not move at all.
         gripper: -1 closes it, 1 opens it, 0 leaves it.
     """
 
@@ -70,9 +72,8 @@ def decisions_of(recorded: ExpertRecording) -> list[ExpertDecision]:
         at_thing = bool(anchor >= 0)
         if at_thing or is_still:
             x = y = 0.0
-        move = Move(
-            at_thing, _round(x, XY_GRID), _round(y, XY_GRID), _round(z, Z_GRID), turn, gripper
-        )
+        places = _round(x, XY_GRID), _round(y, XY_GRID), 0.0 if is_still else _round(z, Z_GRID)
+        move = Move(at_thing, *places, STAY if is_still else turn, gripper)
         found.append(ExpertDecision(int(look), move, int(anchor)))
     return found
 
@@ -109,6 +110,8 @@ def waypoint(
         turn: (2,) cosine and sine of four times the angle of the thing.
         home: (3,) roll, pitch, yaw of the tool at the beginning, rad.
     """
+    if move.turn == STAY:
+        return np.append(tool[:6], move.gripper)
     x, y = place if move.at_thing else tool[:2]
     angles = np.array(home if move.turn != "keep" else tool[3:6], np.float64)
     if move.turn == "align":

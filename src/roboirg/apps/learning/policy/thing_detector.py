@@ -19,7 +19,7 @@ CELL = 4
 GRID = ((ROWS[1] - ROWS[0]) // CELL, COLUMNS // CELL)
 CHANNELS = (16, 24, 40, 40)
 MOST_THINGS = 24
-LEAST_SCORE = 0.75
+LEAST_SCORE = 0.6
 MOST_SHIFT = 20
 """Pixels by which a picture is moved while a detector learns."""
 RARE = -4.0
@@ -113,7 +113,7 @@ def varied(view: LabeledPicture, rng: np.random.Generator) -> LabeledPicture:
     points, turns = view.points + np.array([right, down]), view.turns
     if rng.random() < 0.5:  # noqa: PLR2004
         picture, turns = picture[:, ::-1], turns * np.array([1.0, -1.0], np.float32)
-        points = np.array([columns - 1.0, 0.0]) + points * np.array([-1.0, 1.0])
+        points = np.array([columns, 0.0]) + points * np.array([-1.0, 1.0])
     return LabeledPicture(picture, view.classes, points, turns)
 
 
