@@ -190,7 +190,7 @@ UNSPOILED = {
     ),
     "VideoPlaceButton": (
         rf"After watching the video, place {POINTED} on "
-        r"the (?:other target|target (?:(?:used|i|s?he) .*"
+        r"the (?:other target(?:, not the one used .*)?|target (?:(?:used|i|s?he) .*"
         r"|of the placement (?:just|right) before or after .*))\."
     ),
 }

@@ -147,7 +147,7 @@ def test_statuses_of_packs(tmp_path: Path) -> None:
     assert "actions were not kept" in str(checks["empty-handed"])
     assert (packs / CHECKS_FILE).is_file()
     page = render_board(found)
-    assert "broken is not ranked: " in page
+    assert "broken is not ranked: " in re.sub("<[^>]+>", "", page)
     assert "empty-handed is not ranked: 1 record of no plan in the pack" in page
     run = run_of("p", 3, episodes=4)._replace(check=checks["empty-handed"])
     assert re.search(r'<b class="refuted">refuted</b>', render_board([run]))
@@ -276,7 +276,7 @@ def test_a_run_of_a_plan_of_ones_own_is_not_ranked(tmp_path: Path) -> None:
     found = packs_of(tmp_path, whole_run(tmp_path / "run", episodes="0-4"))
     assert "55 missing" in found.refusal
     assert own(board_rows([found])) == []
-    assert "run is not ranked" in render_board([found])
+    assert "run is not ranked" in re.sub("<[^>]+>", "", render_board([found]))
 
 
 def test_errors_count_as_failures(tmp_path: Path) -> None:

@@ -171,7 +171,7 @@ CUES = Pools(
         "Let's start.",
         "Okay, ready?",
         "Let's go.",
-        "Are you ready?",
+        "Okay, let's go.",
         "Let's begin.",
     ),
     test=(
