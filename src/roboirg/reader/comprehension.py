@@ -205,4 +205,5 @@ def _locates(words: Sentence, at: int) -> bool:
         return _HIDDEN.search(" ".join(words[:at])) is None
     if words[at] == "next":
         return following == ("to",)
-    return words[at] in PLACE_WORDS
+    # "The placement closest in time to that one" is no place.
+    return words[at] in PLACE_WORDS and words[at + 1 : at + 4] != ("in", "time", "to")

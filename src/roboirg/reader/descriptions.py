@@ -89,8 +89,7 @@ _THAN = Phrases(
         r"|(?<=tape ))(?:except|apart from|outside)"
         rf"(?= (?:for )?(?:the|those|that|these|this|{COLOR})\b)",
         "a cube of another color":
-            "(?:another|the remaining|(?:a|an|some|any) (?:different|other|new|distinct|alternative"
-            "|separate))"
+            "(?:another|(?:a|an|some|any) (?:different|other|new|distinct|alternative|separate))"
             " color",
     },
     before=r"\b",

@@ -13,7 +13,7 @@ from roboirg.reader.tokens import COLOR, NUMBER, number_of
 Span = tuple[int, int, str | None]
 _TIE = 0.01
 _SIDE = "(?P<side>farther to your (?:left|right)|closer to you|farther from you)"
-_COUNT = "(?:(?:first |now )?(?:count|note|check|find out|see) )?"
+_COUNT = "(?:(?:first |now )?(?:count|note|think|look|see) )?"
 _SWAPS = Phrases({
     "once for every time that cubes changed places":
         r"once for every time that cubes changed places\b",

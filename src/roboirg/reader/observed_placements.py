@@ -18,7 +18,7 @@ _FROM_THE_END = Phrases({
 })  # fmt: skip
 _BEFORE_PRESS = Phrases({
     "the placement right before the button press":
-        r"the placement (?:made just|right) before the button press\b",
+        r"the placement (?:right before the button press|that the button press followed)\b",
 })  # fmt: skip
 _AT = Phrases({
     "the placement that was made closest to you":

@@ -25,6 +25,9 @@ _IN_A_ROW = Phrases({
     "the cube in the middle from left to right":
         rf"the {_NOUN} {_WHEN}(?:comes )?(?:in the middle|as the middle one)(?: now)? from "
         r"(?P<way>left to right|near to far)\b",
+    "the middle cube from left to right":
+        r"the middle (?P<cube>cube|container)(?: now)? from "
+        r"(?P<row>left to right|near to far)\b",
 })  # fmt: skip
 _AS_MANY = Phrases({
     "the container that initially had as many containers in front of it as behind it":
@@ -35,6 +38,8 @@ _NEAREST = Phrases({
     "the cube nearest to the one closest to you":
         rf"the {_NOUN} {_WHEN}(?P<second>(?:second|2nd) )?(?:nearest|right next)"
         r"(?P<late> at first)? to the one ",
+    "the nearest neighbor of the cube closest to you":
+        r"the (?P<next>(?:second|2nd) )?nearest neighbor of the (?P<cube>cube|container) ",
 })  # fmt: skip
 _NOW = Phrases({"closest to you now": r" now\b"})
 _SET_ASIDE = Phrases({
@@ -111,7 +116,8 @@ def observed_thing(text: str, scene: Scene) -> Iterator[Span]:
 def _middles(text: str, scene: Scene) -> Iterator[Span]:
     for phrases in (_IN_A_ROW, _AS_MANY):
         for found in phrases.finditer(text):
-            noun, way = found["noun"], found["way"]
+            words = found.groupdict()
+            noun, way = words.get("cube") or found["noun"], words.get("row") or found["way"]
             middles: list[SceneObject] = []
             for at_time in _scenes(scene, noun, found["when"]):
                 middles += _middle(present(at_time, noun), 1 if "left" in way else 0)
@@ -134,8 +140,8 @@ def _neighbors(text: str, scene: Scene) -> Iterator[Span]:
         read = _place(text, found.end())
         if read is None:
             continue
-        (place, end), noun = read, found["noun"]
-        rank = 2 if found["second"] else 1
+        (place, end), noun = read, found["noun"] or found["cube"]
+        rank = 2 if found["second"] or found["next"] else 1
         nearest: list[SceneObject] = []
         for at_time in _scenes(scene, noun, found["when"] or found["late"]):
             for anchor in _at(place, at_time, noun):

@@ -44,7 +44,8 @@ _NEXT = Phrases({
 })  # fmt: skip
 _NEIGHBOR = Phrases({
     "the placement that is a neighbor of that":
-        r"\b(?:neighbor\w* (?:of|to)|adjacent to|next to|(?:just |right )?before or after)\b",
+        r"\b(?:neighbor\w* (?:of|to)|adjacent to|next to|(?:just |right )?before or after"
+        r"|(?:closest|nearest) in time to)\b",
 })  # fmt: skip
 _PENULTIMATE = Phrases({
     "its second to last visit": rf"\b(?P<rank>{ORDINAL}|next) (?:to|from) (?:the )?last\b",

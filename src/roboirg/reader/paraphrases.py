@@ -72,7 +72,7 @@ _RULES = Rewrites(
     r"no mean sorry actually wait:: \bTIMESREPAIR(TIMES)\b=>\1",
     r"no mean sorry actually wait:: (?<!not mean the )\bRANK(?: \w+)??REPAIR(RANK)\b=>\1",
     r"no mean sorry actually wait:: \b(?:before|after)REPAIR(before|after)\b=>\1",
-    r"but:: \bnot (?:on |at )?(?:the )?RANK(?: \w+)? ,? ?but (?:on |at )?(?:the )?(RANK)\b=>the \1",
+    r"but:: \bnot (?:on |at )?(?:the )?RANK(?: \w+)? ,? ?but (?:on |at )?(?:the )?(RANK)\b=>\1",
     # Sights
     r"show:: \bshow (?:me|us) where (?:is )?(CUBE)(?: is\b(?: hiding| hidden)?)?=>uncover \1",
     r"show:: \bshow (?:me|us) (?=the\b|an?\b|COLOR|what\b)=>uncover",

@@ -84,9 +84,10 @@ _SAME = Phrases({
     "that many of them": r"\b(?:that|as|this|so|equally) (?:many|often)\b",
     "the same number of blue cubes":
         r"\b(?:that same|that|this|the (?:exact |very )?same) (?:number|amount) of\b",
-    "my lucky number of blue cubes": r"\b(?:my (?:\w+ )?|the (?:right|chosen) )number of\b",
+    "my lucky number of blue cubes":
+        r"\b(?:my (?:\w+ )?|the (?:right|correct|chosen|selected|preferred|desired|agreed|final) )"
+        r"number of\b",
     "the number of times I mentioned": r"\bthe number of times(?= i\b)",
-    "the number of blue cubes I want": rf"\bthe number of(?= (?:{COLOR} )?cubes i\b)",
 })  # fmt: skip
 _REMAINING = Phrases({
     "the other number of times": r"\bthe other number\b(?: of times)?",

@@ -30,30 +30,31 @@ _EITHER_SIDE = r"\b(?:just |right )?before or after\b"
 _NEIGHBOR = Phrases({
     "at the placement next to that": r"\b(?:neighbor\w*|adjacent|next to|beside)\b",
     "at the placement right before or after that": _EITHER_SIDE,
+    "at the placement closest in time to that": r"\b(?:closest|nearest) in time to\b",
 })  # fmt: skip
 NOT_THAT = r"\bnot (?:at |in )?(?:that|this|it|the one|the moment|when)\b(?! pair| on)"
 """A regular expression for ``not at that moment``."""
-NOT_NAMED = r"\bnot (?:the |one |right |just |moment |used |at |directly )*(before|after)\b"
+NOT_NAMED = r"\bnot (?:the |one |right |just |moment |at |directly )*(before|after)\b"
 """A regular expression for ``not the one right before the press``; a group has the moment."""
-_LEAVE = r"(?:skip|let go|give up|gave up|leave out|left out|drop|trade|trade away)\b"
+_LEAVE = r"(?:skip|give up|gave up|leave out|left out|drop|trade|trade away)\b"
 _OTHER = Phrases({
     "at the other of the two moments":
         r"(?<!\bcolor )(?<!\bthem )(?<!\btwo )\bother (?:one |moment )?"
-        r"(?:of|moment|target|time|point|than)\b"
+        r"(?:of|moment|time|point|than)\b"
         r"(?! (?:the two|those|these|them|of)? ?(?:cube|box|tape|color)(?:e?s)?\b)",
     "I named one moment; put it where it was at the other one.":
         r"\b(?:at|in|during) the other one\b",
     "not at that moment": NOT_THAT,
     "at whichever he would not choose": r"\bwhichever\b.*\bnot\b",
     "at the moment she would skip":
-        r"\bthe (?:moment|target) s?he (?:(?:would|did|does) not"
+        r"\bthe moment s?he (?:(?:would|did|does) not"
         rf"(?! {_LEAVE})|(?:would )?(?:{_LEAVE}|miss out))\b",
 })  # fmt: skip
 _NOT = Phrases({"when it was not before but after the press": NOT_NAMED})
 _POINTER = Phrases({
     "at that very moment":
         r"\b(?:that|this|the same) (?:very )?(?:moment|time|point|instant|part|placement|one)\b",
-    "at the moment of her choice": r"\bthe (?:moment|target) (?:i|s?he|of (?:her|his) choice)\b",
+    "at the moment of her choice": r"\bthe moment (?:i|s?he|of (?:her|his) choice)\b",
     "at his favorite moment": r"\b(?:her|his) (?:favorite|preferred) moment\b",
     "where it was then": r"\bthen\b(?! (?:press|take|put|place|set|to|go|pick|lift|push)\b)",
 })  # fmt: skip

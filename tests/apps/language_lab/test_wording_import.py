@@ -190,8 +190,8 @@ UNSPOILED = {
     ),
     "VideoPlaceButton": (
         rf"After watching the video, place {POINTED} on "
-        r"the (?:other target(?:, not the one used .*)?|target (?:(?:used|i|s?he) .*"
-        r"|of the placement (?:just|right) before or after .*))\."
+        r"the target (?:used (?:then|at .*)"
+        r"|of the placement (?:just before or after|closest in time to) .*)\."
     ),
 }
 """Good English around a referring expression, in the sentences that are hardest to fill."""

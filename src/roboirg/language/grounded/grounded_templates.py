@@ -1,7 +1,7 @@
 """Wordings of the grounded setting: what is counted, what happened, and where things stand.
 
-The pools differ in constructions: *the cube nearest to the one closest to you* in one, *the cube
-right next to the one closest to you* in the other.
+The pools differ in constructions: *the nearest neighbor of the cube closest to you* in one, *the
+cube right next to the one closest to you* in the other.
 """
 
 from __future__ import annotations
@@ -28,12 +28,9 @@ STANDS_NOW = Standing(now=" now")
 STOOD = Standing(started="that started ")
 
 MIDDLE = Pools(
-    train=(
-        "the {noun}{now} in the middle from {way}",
-        "the {noun} {started}in the middle from {way}",
-    ),
+    train=("the middle {noun}{now} from {way}", "the {noun} {started}in the middle from {way}"),
     test=(
-        "the {noun} that is{now} in the middle from {way}",
+        "the {noun} that comes in the middle{now} from {way}",
         "the {noun} {started}as the middle one from {way}",
     ),
 )
@@ -42,7 +39,7 @@ WAYS = {"y": "left to right", "x": "near to far"}
 """By axis of the robot base frame."""
 _NEIGHBOR = Pools(
     train=(
-        "the {noun} nearest to the one {anchor}{now}",
+        "the nearest neighbor of the {noun} {anchor}{now}",
         "the {noun} {started}nearest to the one {anchor}",
     ),
     test=(
@@ -52,7 +49,7 @@ _NEIGHBOR = Pools(
 )
 _SECOND_NEIGHBOR = Pools(
     train=(
-        "the {noun} second nearest to the one {anchor}{now}",
+        "the second nearest neighbor of the {noun} {anchor}{now}",
         "the {noun} {started}second nearest to the one {anchor}",
     ),
     test=(
@@ -147,7 +144,7 @@ BESIDE = Pools(
 """As many as the cubes on one side of the cube in the video, and one more than that."""
 COUNTED = Pools(
     train=("Count {times}.", "First count {times}.", "Please count {times}.", "Now count {times}."),
-    test=("Note {times}.", "Check {times}.", "Find out {times}.", "See {times}."),
+    test=("Note {times}.", "Think {times}.", "Look {times}.", "See {times}."),
 )
 """An introduction: what is to be counted before the command."""
 SIDES = {
@@ -189,7 +186,7 @@ FROM_THE_END = (
 """The last placement, and the one before it."""
 BEFORE_PRESS = Pools(
     train=("the placement right before the button press",),
-    test=("the placement made just before the button press",),
+    test=("the placement that the button press followed",),
 )
 PLACEMENT_AT = Pools(train=("the placement {anchor}",), test=("the placement made {anchor}",))
 PLACEMENT_MOVED = {
@@ -206,12 +203,16 @@ PLACEMENT_INTRODUCTIONS = Pools(
     train=(
         "I liked {which}.",
         "I am thinking of {which}.",
-        "I noticed {which}.",
-        "I want {which}.",
+        "Think back to {which}.",
+        "In the video I noticed {which}.",
+        "What matters in the video is {which}.",
+        "Look closely at {which}.",
     ),
     test=(
         "Remember {which}.",
         "I was watching {which}.",
+        "In the video I liked {which}.",
+        "What counts in the video is {which}.",
         "You saw {which}.",
         "I mean {which}.",
     ),

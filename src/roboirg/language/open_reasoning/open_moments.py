@@ -6,7 +6,7 @@ from roboirg.language.balanced_draw import draw_balanced
 from roboirg.language.instruction import REFERENCE
 from roboirg.language.open_reasoning import open_templates as templates
 from roboirg.language.patterns.pattern import Derived, Pattern
-from roboirg.language.phrases import Phrase, anaphor, antecedent, fill, plain
+from roboirg.language.phrases import anaphor, antecedent, fill, plain
 from roboirg.language.request import InstructionRequest
 from roboirg.language.slot_types import relation
 from roboirg.language.templates.derivations import MOMENTS
@@ -28,21 +28,20 @@ def _derive(request: InstructionRequest) -> Derived:
     context = fill(template, {"who": who, "yes": named[favorite], "no": named[least]})
     pools = templates.FAVORITES if goal_is_favorite else templates.NOT_FAVORITES
     pointer = request.pick("favorite", pools)
-    resolved = MOMENTS[favorite] if goal_is_favorite else f"not {MOMENTS[favorite]}"
-    slot, value = goal_value.slot, goal_value.value
-
-    def which(noun: str) -> Phrase:
-        if request.resolved:
-            used = "" if noun.startswith("at") else " used"
-            return antecedent(f"{noun}{used} {resolved}", slot, value)
-        return anaphor(f"{noun} {pointer}", "choice" if goal_is_favorite else "other", slot, value)
-
+    resolved = MOMENTS[favorite] if goal_is_favorite else f"that is not {MOMENTS[favorite]}"
+    moment = (
+        antecedent(f"at the moment {resolved}", goal_value.slot, goal_value.value)
+        if request.resolved
+        else anaphor(
+            pointer, "choice" if goal_is_favorite else "other", goal_value.slot, goal_value.value
+        )
+    )
     notes: dict[str, object] = {
         "patterns": ["contextual logic"],
         "relation": "favorite" if goal_is_favorite else "not the favorite",
         "candidates": {goal_value.slot: list(MOMENTS)},
     }
-    return Derived(context, relation.pointed(request, goal_value, which), notes)
+    return Derived(context, relation.placed(request, goal_value, moment), notes)
 
 
 FAVORITE = Pattern(lambda request: bool(request.values_of("relation")), _derive)

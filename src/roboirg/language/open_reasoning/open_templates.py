@@ -154,32 +154,52 @@ WHO = Pools(
 PREFERENCES = (
     Pools(
         train=(
-            "{who} likes the target used {yes} more than the one used {no}.",
-            "{who} would not trade the target used {yes} for the one used {no}.",
+            "{who} likes the moment {yes} more than the one {no}.",
+            "{who} would not trade the moment {yes} for the one {no}.",
         ),
         test=(
-            "{who} finds the target used {yes} better than the one used {no}.",
-            "{who} would not swap the target used {yes} for the one used {no}.",
+            "{who} finds the moment {yes} better than the one {no}.",
+            "{who} would not swap the moment {yes} for the one {no}.",
         ),
     ),
     Pools(
         train=(
-            "{who} likes the target used {no} less than the one used {yes}.",
-            "{who} would trade the target used {no} for the one used {yes}.",
+            "{who} likes the moment {no} less than the one {yes}.",
+            "{who} would trade the moment {no} for the one {yes}.",
         ),
         test=(
-            "{who} finds the target used {no} worse than the one used {yes}.",
-            "{who} would swap the target used {no} for the one used {yes}.",
+            "{who} finds the moment {no} worse than the one {yes}.",
+            "{who} would swap the moment {no} for the one {yes}.",
         ),
     ),
 )
 """Two moments, the favorite one named first, or last; the same words lead to both."""
 FAVORITES = Pools(
-    train=("she would pick", "she would not skip", "she would choose", "she would not give up"),
-    test=("he would keep", "he would not drop", "he would go for", "he would not let go"),
+    train=(
+        "at the moment she would pick",
+        "at the moment she would not skip",
+        "at the moment she would choose",
+        "at the moment she would not give up",
+    ),
+    test=(
+        "at the moment he would keep",
+        "at the moment he would not drop",
+        "at the moment he would prefer",
+        "at the moment he would not trade away",
+    ),
 )
 NOT_FAVORITES = Pools(
-    train=("she would skip", "she would not pick", "she would give up", "she would not choose"),
-    test=("he would drop", "he would not keep", "he would let go", "he would not go for"),
+    train=(
+        "at the moment she would skip",
+        "at the moment she would not pick",
+        "at the moment she would give up",
+        "at the moment she would not choose",
+    ),
+    test=(
+        "at the moment he would drop",
+        "at the moment he would not keep",
+        "at the moment he would trade away",
+        "at the moment he would not prefer",
+    ),
 )
 """As often with *not* as the favorite ones, and of the same verbs."""

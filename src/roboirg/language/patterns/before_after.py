@@ -26,18 +26,16 @@ def _other(request: InstructionRequest) -> Derived:
     template = request.pick("two moments", derivations.TWO_MOMENTS_INTRODUCTIONS)
     introduced: dict[str, Phrase] = {
         "pair": antecedent(derivations.BOTH_MOMENTS, REFERENCE, " and ".join(derivations.MOMENTS)),
-        "single": antecedent(f"the one used right {rejected} it", REFERENCE, rejected),
+        "single": antecedent(f"the one right {rejected} it", REFERENCE, rejected),
     }
+    single = derivations.MOMENTS[rejected]
     slot, value = goal_value.slot, goal_value.value
-
-    def other(noun: str) -> Phrase:
-        words = derivations.MOMENT_COMPLEMENTS[noun]
-        if request.resolved:
-            left = f"{words}, not the one used {derivations.MOMENTS[rejected]}"
-            return antecedent(left, slot, value)
-        return anaphor(words, "other", slot, value)
-
-    fields = relation.pointed(request, goal_value, other)
+    other = (
+        antecedent(derivations.RESOLVED_MOMENT_COMPLEMENT.format(single=single), slot, value)
+        if request.resolved
+        else anaphor(derivations.MOMENT_COMPLEMENT, "other", slot, value)
+    )
+    fields = relation.placed(request, goal_value, other)
     return Derived(fill(template, introduced), fields, {"patterns": ["contextual logic"]})
 
 

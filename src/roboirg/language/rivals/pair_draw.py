@@ -53,9 +53,8 @@ def draw_pair(request: InstructionRequest, locate: Locate | None = None) -> Pair
     pair = balanced_rival(request, pairs, locate)
     bits = draw_balanced(request, "rival order")
     kind, text, fill = _remark(request, points_at_meant=bits.second)
-    if slot not in COLOR_SLOTS or kind == "correction":
-        # "The former, not the other number", "from the former to the other one" are hard to hear.
-        fill = "both"
+    if slot not in COLOR_SLOTS:
+        fill = "both"  # "The former, not the other number" is hard to hear
     pointers: tuple[templates.Pointers, ...] = (templates.RANKS,)
     if slot in COLOR_SLOTS:
         pointers = (templates.ORDER if locate else templates.RANKS, templates.ORDER)

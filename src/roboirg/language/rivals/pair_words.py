@@ -114,7 +114,7 @@ def pair_noun(request: InstructionRequest, pair: ValuePair) -> str:
         return "cubes"
     if pair.word_kind == "color":
         return request.task.commands.colored
-    return {"relation": "target"}.get(pair.word_kind, pair.word_kind)
+    return {"relation": "moment"}.get(pair.word_kind, pair.word_kind)
 
 
 def value_name(request: InstructionRequest, pair: ValuePair, value: GoalValue) -> str:
@@ -125,7 +125,7 @@ def value_name(request: InstructionRequest, pair: ValuePair, value: GoalValue) -
     if kind == "number":
         return cardinal(value.number)
     if kind == "relation":
-        return f"the one used {MOMENTS[str(value.value)]}"
+        return f"the moment {MOMENTS[str(value.value)]}"
     return f"the {ordinal(value.number)} {kind}"
 
 
@@ -172,17 +172,19 @@ def _chosen_fields(request: InstructionRequest, draw: PairDraw) -> Fields:
     if kind == "number":
         return {meant.field: chosen(request, draw, "the number of times")}
     if kind == "relation":
-        return relation.pointed(request, meant, lambda noun: chosen(request, draw, noun))
+        return relation.placed(request, meant, chosen(request, draw, "at the moment"))
     return wrapped(request, meant, chosen(request, draw, f"the {meant.slot_type}"))
 
 
 def _counted(request: InstructionRequest, draw: PairDraw) -> Fields:
-    """Return ``the number of red cubes I want``; resolved, ``two red cubes``."""
+    """Return ``the right number of red cubes``; resolved, ``two red cubes``."""
     meant, (color,) = draw.pair.meant, request.color_values
-    if request.resolved:
-        number = antecedent(cardinal(meant.number), meant.slot, meant.value)
-        return amount.amounts([amount.amount(number, amount.cubes(color, meant.number))])
-    clause = request.pick("rival clause", templates.CLAUSES)
+    words = request.pick("rival number", templates.NUMBERS_OF)
+    number = (
+        antecedent(cardinal(meant.number), meant.slot, meant.value)
+        if request.resolved
+        else anaphor(words, "choice", meant.slot, meant.value)
+    )
     # The plural fits any number that is not named.
-    cubes = (*plain("the number of "), *amount.cubes(color, 2), *plain(" "))
-    return amount.amounts([(*cubes, *anaphor(clause, "choice", meant.slot, meant.value))])
+    count = meant.number if request.resolved else 2
+    return amount.amounts([amount.amount(number, amount.cubes(color, count))])

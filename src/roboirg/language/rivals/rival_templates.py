@@ -112,25 +112,25 @@ ELEMENT_PAIRS = Pools(
     test=(
         "I considered {things}.",
         "Tom asked about {things}.",
-        "{things} would work.",
-        "My son likes {things}.",
+        "{things} are possible.",
+        "Think of {things}.",
         "Grandpa mentioned {things}.",
-        "We thought about {things}.",
+        "I have in mind {things}.",
     ),
 )
 """For visits and placements."""
 MOMENT_PAIRS = Pools(
     train=(
-        "I like the targets used {things}.",
-        "We talked about the targets used {things}.",
-        "I am thinking of the targets used {things}.",
-        "My kids like the targets used {things}.",
+        "Think of the moments {things}.",
+        "We talked about the moments {things}.",
+        "I am thinking of the moments {things}.",
+        "My kids liked the moments {things}.",
     ),
     test=(
-        "I considered the targets used {things}.",
-        "Tom likes the targets used {things}.",
-        "Mom asked about the targets used {things}.",
-        "The targets used {things} look nice.",
+        "I considered the moments {things}.",
+        "The moments {things} are possible.",
+        "Remember the moments {things}.",
+        "I have in mind the moments {things}.",
     ),
 )
 PAIR_REINFORCEMENTS = Pools(
@@ -236,20 +236,20 @@ CHOICES: dict[ReferenceKind, tuple[Pools[str], Pools[str]]] = {
     "contrast": (
         Pools(
             train=("I mean {yes}, not {no}.", "I want {yes}, not {no}."),
-            test=("It is {yes} and not {no}.", "My pick is {yes} and not {no}."),
+            test=("I chose {yes} and not {no}.", "I picked {yes} and did not pick {no}."),
         ),
         Pools(
             train=("I do not mean {no}, I mean {yes}.", "I do not want {no}, I want {yes}."),
-            test=("It is not {no}, it is {yes}.", "It is not {no} but {yes}."),
+            test=("It is not {no}, it is {yes}.", "Not {no}, I chose {yes}."),
         ),
     ),
     "correction": (
         Pools(
             train=(
+                "I actually mean {yes} instead of {no}.",
                 "Actually, I want {yes} instead of {no}.",
-                "Actually, let's use {yes} instead of {no}.",
             ),
-            test=("Now I prefer {yes} to {no}.", "In the end I chose {yes} over {no}."),
+            test=("I now prefer {yes} to {no}.", "I finally chose {yes} over {no}."),
         ),
         Pools(
             train=("I mean {no} - sorry, {yes}.", "Let's use {no} - or rather {yes}."),
@@ -263,7 +263,22 @@ CHOICES: dict[ReferenceKind, tuple[Pools[str], Pools[str]]] = {
 """
 
 CLAUSES = Pools(
-    train=("I mean", "I want", "I need", "I would like"),
-    test=("I chose", "I picked", "I asked for", "I selected"),
+    train=("I mean", "I want", "I prefer", "I need"),
+    test=("I chose", "I picked", "I have chosen", "I have picked"),
 )
 """Follow the noun in the command: *the cube I mean*."""
+NUMBERS_OF = Pools(
+    train=(
+        "the right number of",
+        "the agreed number of",
+        "the desired number of",
+        "my number of",
+    ),
+    test=(
+        "the chosen number of",
+        "the correct number of",
+        "the final number of",
+        "the selected number of",
+    ),
+)
+"""For a number of cubes: *the right number of red cubes*."""

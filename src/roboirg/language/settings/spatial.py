@@ -24,10 +24,8 @@ POINTING: Mapping[int, tuple[Pointer, ...]] = {
     2: (("the former", "former"), ("the latter", "latter")),
     3: (("the first", "first"), ("the second", "second"), ("the third", "third")),
 }
-_STANDS = re.compile(
-    r"(?P<before>.*)the (?P<noun>\w+)(?P<started> that started)? \{place\}(?: now)?"
-)
-"""Words for a thing at a place."""
+_STANDS_LAST = re.compile(r"(?P<before>.*)the (?P<noun>\w+) \{place\}")
+"""Words for a thing at a place, with nothing in between or after it."""
 PAIR = 2
 _NOUN = re.compile(r"^the \w+")
 _TIME = re.compile(r" now\b")
@@ -119,20 +117,20 @@ def _pointed(
     else:
         place = anaphor(words, expression, *_of(color))
     template = None
-    stands = _STANDS.fullmatch(request.task.commands.by_place)
-    if request.wordings is None and stands:
+    stands_last = _STANDS_LAST.fullmatch(request.task.commands.by_place)
+    if request.wordings is None and stands_last:
         # "That one over there": the noun is that of the introduction.
-        noun = stands["noun"]
+        noun = stands_last["noun"]
         words = request.sampler.pick(
             "noun there",
-            (f"that {noun}", "that one", f"that {noun} over", "the one over"),
+            (f"the {noun}", "that one", f"that {noun} over", "the one over"),
         )
-        pointing = anaphor(f"{words} there", expression, *_of(color))
-        if stands["started"]:  # something else may be there now
-            pointing = anaphor(f"that {noun}", "that", *_of(color))
-        named = stands[0].removeprefix(stands["before"]).format(place=landmark.phrase)
-        place = antecedent(named, *_of(color)) if request.resolved else pointing
-        template = stands["before"] + "{place}"
+        place = (
+            antecedent(f"the {noun} {landmark.phrase}", *_of(color))
+            if request.resolved
+            else anaphor(f"{words} there", expression, *_of(color))
+        )
+        template = stands_last["before"] + "{place}"
     return request.by_place(color, place, plural=request.count_of(color) > 1, template=template)
 
 

@@ -57,9 +57,8 @@ def _stated(request: InstructionRequest, goal_values: tuple[GoalValue, ...]) -> 
 
 def _counts_said(request: InstructionRequest, goal_values: tuple[GoalValue, ...]) -> bool:
     """Draw whether the command says how many cubes, and points back at the color alone."""
-    ((_, count), *others) = pairs(goal_values)
-    if others or count.number == 1:
-        return not others  # "That many of them" is no way to say one.
+    if len(pairs(goal_values)) > 1:
+        return False
     return request.sampler.pick("said in the command", ("color", "count")) == "count"
 
 

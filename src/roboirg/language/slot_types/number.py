@@ -46,7 +46,7 @@ def introduce_quantity(request: InstructionRequest, slot: str, quantity: int) ->
 
 
 def _pointing(_request: InstructionRequest, goal_values: tuple[GoalValue, ...]) -> Phrase:
-    return anaphor("that", "that", goal_values[0].slot, goal_values[0].value)
+    return anaphor("that number", "that", goal_values[0].slot, goal_values[0].value)
 
 
 def competing(request: InstructionRequest, goal_values: tuple[GoalValue, ...]) -> list[Phrase]:

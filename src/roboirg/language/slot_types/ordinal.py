@@ -81,7 +81,7 @@ def introduce_position(
 
 def _pointing(_request: InstructionRequest, goal_values: tuple[GoalValue, ...]) -> Phrase:
     (goal_value,) = goal_values
-    return anaphor("it", "it", goal_value.slot, goal_value.value)
+    return anaphor(f"that {goal_value.slot_type}", "that", goal_value.slot, goal_value.value)
 
 
 def _visit_competing(

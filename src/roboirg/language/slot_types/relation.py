@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 from roboirg.language.instruction import Expression
 from roboirg.language.phrases import Phrase, anaphor, antecedent, fill, plain
 from roboirg.language.request import GoalValue, InstructionRequest
@@ -23,16 +21,6 @@ def placed(request: InstructionRequest, goal_value: GoalValue, moment: Phrase) -
     if outside is None or outside.is_place:
         moment = (*plain(USED), *moment)
     return {goal_value.field: request.around(goal_value.field, moment)}
-
-
-def pointed(
-    request: InstructionRequest, goal_value: GoalValue, words: Callable[[str], Phrase]
-) -> Fields:
-    """Return ``the target I want``, or ``at the moment I want`` next to a target from outside."""
-    outside = request.outside_phrase(goal_value.field)
-    target = outside is None or outside.is_place
-    which = words("the target" if target else "at the moment")
-    return {goal_value.field: request.around(goal_value.field, which)}
 
 
 def named(goal_value: GoalValue) -> Phrase:
@@ -63,7 +51,7 @@ def _introduce(request: InstructionRequest, goal_values: tuple[GoalValue, ...]) 
 
 
 def _pointing(_request: InstructionRequest, goal_values: tuple[GoalValue, ...]) -> Phrase:
-    return anaphor("it", "it", goal_values[0].slot, goal_values[0].value)
+    return anaphor("that moment", "that", goal_values[0].slot, goal_values[0].value)
 
 
 def _competing(request: InstructionRequest, goal_values: tuple[GoalValue, ...]) -> list[Phrase]:

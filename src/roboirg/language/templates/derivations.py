@@ -68,23 +68,21 @@ EXCLUSIONS = Pools(
         Exclusion("{thing}[|s] that [is|are] {excluded}", "neither of these", "neither {colors}"),
         Exclusion("{thing}[|s] that [is|are] {excluded}", "neither of the two", "neither {colors}"),
         Exclusion(
-            "{thing}[|s] in the {excluded}", "remaining color", "color that is neither {colors}"
+            "{thing}[|s] in a color {excluded}", "not in that pair", "that is neither {colors}"
         ),
     ),
 )
 """For two colors."""
+_DIFFERENT = ("different from that", "different from {colors}")
+_OTHER_THAN = ("other than that", "other than {colors}")
 SINGLE_EXCLUSIONS = Pools(
     train=(
-        Exclusion(
-            "{thing}[|s] whose color is {excluded}",
-            "different from that",
-            "different from {colors}",
-        ),
-        Exclusion("{thing}[|s] of a {excluded}", "different color", "color other than {colors}"),
+        Exclusion("{thing}[|s] whose color is {excluded}", *_DIFFERENT),
+        Exclusion("{thing}[|s] of a color {excluded}", *_OTHER_THAN),
     ),
     test=(
-        Exclusion("{thing}[|s] of {excluded}", "another color", "a color other than {colors}"),
-        Exclusion("{thing}[|s] in {excluded}", "another color", "a color different from {colors}"),
+        Exclusion("{thing}[|s] in a color {excluded}", *_DIFFERENT),
+        Exclusion("{thing}[|s] in a color {excluded}", *_OTHER_THAN),
     ),
 )
 COMPLEMENT = "the {thing} in {other}"
@@ -128,14 +126,14 @@ MOMENT_ANAPHORS = ("at that moment", "then")
 BOTH_MOMENTS = "right before and right after the button press"
 TWO_MOMENTS_INTRODUCTIONS = Pools(
     train=(
-        "Of the targets used {pair}, my sister prefers {single}.",
-        "Between the targets used {pair}, Dad chose {single}.",
-        "Of the targets used {pair}, my brother liked {single} better.",
+        "Of the moments {pair}, my sister prefers {single}.",
+        "Between the moments {pair}, Dad chose {single}.",
+        "Of the moments {pair}, my brother liked {single} better.",
     ),
     test=(
-        "My uncle looked at the targets used {pair} and chose {single}.",
-        "Tom compared the targets used {pair} and liked {single} better.",
-        "Mom considered the targets used {pair} and picked {single}.",
+        "Of the times {pair}, my uncle would choose {single}.",
+        "Between the times {pair}, my sister chose {single}.",
+        "Of the placements {pair}, Mom picked {single}.",
     ),
 )
 NEIGHBOR_INTRODUCTIONS = Pools(
@@ -150,9 +148,9 @@ NEIGHBOR_INTRODUCTIONS = Pools(
         "You saw the placement {moment}.",
     ),
 )
-MOMENT_COMPLEMENTS = {"the target": "the other target", "at the moment": "at the other moment"}
-"""By the words for a moment in the command."""
-NEIGHBOR = "the placement right before or after {single}"
+MOMENT_COMPLEMENT = "at the other moment"
+RESOLVED_MOMENT_COMPLEMENT = "at the other moment, not {single}"
+NEIGHBOR = "the placement closest in time to {single}"
 """Of two placements, each is the other's neighbor; *earlier* would give it away."""
 
 
@@ -265,8 +263,8 @@ STEPS = (
     Step("two before", "two before {reference}", -2, spells=2),
 )
 NEIGHBORS = {
-    1: Step("neighbor", "right before or after {reference}", -1),
-    2: Step("neighbor", "right before or after {reference}", 1),
+    1: Step("neighbor", "closest in time to {reference}", -1),
+    2: Step("neighbor", "closest in time to {reference}", 1),
 }
 """The steps in a series of two elements, by position."""
 COUNTED_STEPS = (

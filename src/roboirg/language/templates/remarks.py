@@ -24,7 +24,7 @@ COLOR_REINFORCEMENTS = Pools(
     ),
 )
 NUMBER_REINFORCEMENTS = Pools(
-    train=("{ref} worked well.", "{ref} was enough.", "{ref} was about right."),
+    train=("{ref} worked well.", "{ref} was enough.", "{ref} is easy to remember."),
     test=("{ref} was perfect.", "I was happy with {ref}.", "{ref} seemed fine."),
 )
 VISIT_REINFORCEMENTS = Pools(
@@ -168,17 +168,17 @@ COMPETING_MOMENT_DISTRACTORS = Pools(
 
 CUES = Pools(
     train=(
-        "Let's start.",
-        "Okay, ready?",
-        "Let's go.",
-        "Okay, let's go.",
-        "Let's begin.",
+        "Now, please help.",
+        "Here is the job.",
+        "Okay, please help.",
+        "So, please help.",
+        "Anyway, please help.",
     ),
     test=(
-        "Where were we?",
-        "Well, your turn.",
-        "Okay, over to you.",
-        "Okay, back to work.",
-        "Now, your turn.",
+        "Anyway, here goes.",
+        "Well, here goes.",
+        "Now to my request.",
+        "Okay, here goes.",
+        "Now, my request.",
     ),
 )
