@@ -123,5 +123,6 @@ def test_the_figure_is_written_from_a_folder(tmp_path: Path) -> None:
     folder = a_run(tmp_path / "run", found)
     content = RunData.of([("run", found)])
     paths = write_figures(content, tmp_path / "figures", ["strips"], runs=[folder])
-    assert {path.name for path in paths} == {"strips.png", "strips.svg", "strips.pdf"}
+    endings = (".png", ".svg", ".pdf", "-dark.png", "-dark.svg")
+    assert {path.name for path in paths} == {f"strips{ending}" for ending in endings}
     assert "Picked the wrong." in (tmp_path / "figures" / "strips.svg").read_text()
