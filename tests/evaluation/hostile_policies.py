@@ -48,10 +48,11 @@ class Searcher(Hostile):
             frames += [frame.f_back] if frame.f_back else []
         for one in gc.get_objects():
             types.add(type(one).__name__)
-            if isinstance(one, dict | list | tuple | set):
+            if issubclass(type(one), dict | list | tuple | set):
                 values = one.values() if isinstance(one, dict) else one
-                with contextlib.suppress(RuntimeError):
-                    texts |= {value for value in values if isinstance(value, str)}
+                # What changes meanwhile, and proxies of what is gone.
+                with contextlib.suppress(RuntimeError, ReferenceError):
+                    texts |= {value for value in values if issubclass(type(value), str)}
         self.metadata = {
             "world": "PaperWorld" in types,
             "job": "Job" in types,
