@@ -105,7 +105,7 @@ def render_board(runs: Sequence[PackedRun]) -> str:
         entries={run.name for run in runs},
         rows=[(row, [_cell(_rate(row, *column)) for column in columns]) for row in rows],
         conditions=sorted({row.conditions for row in rows}),
-        unranked=[(run.name, _why_unranked(run)) for run in runs if run.refusal or not run.results],
+        unranked=[(run.name, why) for run in runs if (why := run.why_unranked)],
     )
 
 
@@ -126,12 +126,6 @@ def _render(name: str, *, top: str = "", **content: object) -> str:
     environment = template_environment("roboirg.apps.leaderboard")
     template = environment.get_template(f"{name}.html.j2")
     return template.render(version=__version__, top=top, **content)
-
-
-def _why_unranked(run: PackedRun) -> str:
-    if run.refusal:
-        return run.refusal
-    return run.check.problem if run.check else "no records"
 
 
 def _rate(row: BoardRow, setting: str, is_private: bool) -> BoardRate | None:

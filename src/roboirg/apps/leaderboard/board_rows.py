@@ -66,7 +66,7 @@ class PackedRun(NamedTuple):
         results: of its records.
         planned: jobs of its plans.
         check: what `roboirg leaderboard verify` found; None if it was not asked.
-        refusal: why the run is not ranked; empty if it is.
+        refusal: why the board does not rank its plans; empty if it does.
     """
 
     name: str
@@ -74,6 +74,13 @@ class PackedRun(NamedTuple):
     planned: Sequence[Job]
     check: PackCheck | None
     refusal: str = ""
+
+    @property
+    def why_unranked(self) -> str:
+        """Why the run is not ranked; empty if it is."""
+        if self.refusal or self.results:
+            return self.refusal
+        return (self.check.problem if self.check else "") or "no records"
 
 
 @dataclass(frozen=True)

@@ -32,11 +32,8 @@ _FLOORS_NOTE = (
 
 def entry_facts(run: PackedRun) -> list[tuple[str, str]]:
     """Return name and value of what a reader wants to know about a run."""
-    if run.refusal or not run.results:
-        why = run.refusal or (run.check.problem if run.check else "no records")
-        facts = [("ranked", f"no: {why}")]
-    else:
-        facts = [("ranked", "yes")]
+    why = run.why_unranked
+    facts = [("ranked", f"no: {why}" if why else "yes")]
     for row in board_rows([run]):
         if row.status == "published":
             continue

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 import torch
+from torch import nn
 
 from roboirg.core.errors import InvalidValueError
 from roboirg.util.atomic_write import replacing
@@ -43,6 +44,13 @@ def load_unfinished(path: Path, made_of: object) -> dict[str, Any] | None:
             f"{str(path)!r} cannot be read ({type(error).__name__}); delete it to learn it again."
         ) from error
     return content if content.get("made_of") == made_of else None
+
+
+def load_nets(nets: Mapping[str, nn.Module], content: Mapping[str, Any]) -> None:
+    """Give networks the weights that a file has under their names, ready to be used."""
+    for name, net in nets.items():
+        net.load_state_dict(content[name])
+        net.eval()
 
 
 def load_trained(

@@ -51,7 +51,7 @@ class StripMoment:
 
 
 class SpokenSetting(NamedTuple):
-    """An instruction, the setting that it is told in, and the setting's color."""
+    """An instruction, its setting, and the setting's color."""
 
     setting: str
     words: str

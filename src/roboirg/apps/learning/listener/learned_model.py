@@ -19,7 +19,7 @@ from roboirg.apps.learning.listener.object_relations import (
     nothing_of,
     relate,
 )
-from roboirg.apps.learning.trained_file import load_trained, save_trained
+from roboirg.apps.learning.trained_file import load_nets, load_trained, save_trained
 from roboirg.core.episode import Goal
 from roboirg.core.errors import InvalidValueError
 from roboirg.policies.vlm.goal_schema import goal_schema
@@ -141,8 +141,5 @@ def _read(content: Mapping[str, Any]) -> LearnedModel:
     vocabulary = Vocabulary(**{name: tuple(own) for name, own in content["vocabulary"].items()})
     plane = TablePlane(**{name: one.numpy() for name, one in content["plane"].items()})
     detector, reader = DetectorNet(len(vocabulary.classes)), ListenerNet(vocabulary)
-    detector.load_state_dict(content["detector"])
-    reader.load_state_dict(content["reader"])
-    detector.eval()
-    reader.eval()
+    load_nets({"detector": detector, "reader": reader}, content)
     return LearnedModel(vocabulary, detector, plane, reader, content["without"], content["about"])

@@ -28,7 +28,7 @@ from roboirg.apps.learning.policy.subgoals import ASKED_NUMBERS, SubgoalForm
 from roboirg.apps.learning.policy.task_net import TaskNet
 from roboirg.apps.learning.policy.thing_detector import ThingDetector
 from roboirg.apps.learning.policy.tracks import LookTokens
-from roboirg.apps.learning.trained_file import load_trained, save_trained
+from roboirg.apps.learning.trained_file import load_nets, load_trained, save_trained
 from roboirg.policies.vlm.goal_schema import goal_schema
 
 FORMAT = "roboirg-policy-1"
@@ -77,7 +77,7 @@ class PolicyModel(NamedTuple):
     @property
     def goal_size(self) -> int:
         """How many numbers `goal_numbers` has."""
-        return len(self.vocabulary.tasks) + len(self.vocabulary.parts)
+        return goal_size(self.vocabulary)
 
     def understand(self, text: str, looks: Sequence[LookTokens]) -> NDArray[np.float32]:
         """Return the task and the goal that an instruction means, as `goal_numbers` does.
@@ -103,9 +103,14 @@ def seen_things(
     return rank([one.classes for one in looks], places, corners, classes)
 
 
+def goal_size(vocabulary: Vocabulary) -> int:
+    """Return how many numbers `goal_numbers` has."""
+    return len(vocabulary.tasks) + len(vocabulary.parts)
+
+
 def goal_numbers(task: str, answer: str, vocabulary: Vocabulary) -> NDArray[np.float32]:
     """Return 1 for the task and for each part of an answer, else 0: (tasks + parts,)."""
-    found = np.zeros(len(vocabulary.tasks) + len(vocabulary.parts), np.float32)
+    found = np.zeros(goal_size(vocabulary), np.float32)
     found[vocabulary.tasks.index(task)] = 1.0
     for part in parts_of(answer):
         found[len(vocabulary.tasks) + vocabulary.parts.index(part)] = 1.0
@@ -273,9 +278,7 @@ def _read(content: Mapping[str, Any]) -> PolicyModel:
     planner = make_body(sight, vocabulary, forms, memory) if memory in PLANNERS else None
     if planner is not None:
         nets["planner"] = planner
-    for name, net in nets.items():
-        net.load_state_dict(content[name])
-        net.eval()
+    load_nets(nets, content)
     corners = content["corners"].numpy()
     return PolicyModel(
         sight, detector, vocabulary, task_net, reader, corners, moves, memory, body,
@@ -285,8 +288,7 @@ def _read(content: Mapping[str, Any]) -> PolicyModel:
 
 def make_body(sight: Sight, vocabulary: Vocabulary, moves: Sequence[Kind], memory: str) -> BodyNet:
     """Return an untrained body for these classes, goals and kinds, or an untrained planner."""
-    goal_size = len(vocabulary.tasks) + len(vocabulary.parts)
     planner = dict.fromkeys(PLANNERS, context_size(len(moves)))
     context = {HANDS: ASKED_NUMBERS, **planner}.get(memory, 0)
     at_things = [move.at_thing for move in moves]
-    return BodyNet(len(sight.classes), goal_size, at_things, memory, context)
+    return BodyNet(len(sight.classes), goal_size(vocabulary), at_things, memory, context)

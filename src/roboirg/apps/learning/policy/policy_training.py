@@ -61,7 +61,7 @@ from roboirg.apps.learning.policy.thing_detector import (
 )
 from roboirg.apps.learning.policy.tracks import LookTokens
 from roboirg.apps.learning.policy.waypoint_expert import Disturbance
-from roboirg.apps.learning.trained_file import load_unfinished, save_unfinished
+from roboirg.apps.learning.trained_file import load_nets, load_unfinished, save_unfinished
 from roboirg.apps.learning.trainer import Progress, Trainer, batch_count, batches
 from roboirg.core.episode import Episode
 from roboirg.core.errors import InvalidValueError, MotionPlanningError
@@ -185,14 +185,12 @@ def _detector(
     """Return the folder's detector if it is of the same plan, or train it."""
     path = folder / "detector.pt"
     made_of = [list(sight.classes), list(plan.tasks), plan.drawn, plan.detector_epochs]
+    torch.manual_seed(plan.seed)
     detector = ThingDetector(len(sight.classes))
     kept = load_unfinished(path, made_of)
     if kept is not None:
-        detector.load_state_dict(kept["net"])
-        detector.eval()
+        load_nets({"net": detector}, kept)
         return detector
-    torch.manual_seed(plan.seed)
-    detector = ThingDetector(len(sight.classes))
     views = [view for one in recorded for view in labeled_pictures(one.recording, sight)]
     rng, variation = random.Random(plan.seed), np.random.default_rng(plan.seed)
     trainer = Trainer[LabeledPicture](
