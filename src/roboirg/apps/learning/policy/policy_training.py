@@ -115,18 +115,22 @@ def train_policy(plan: PolicyPlan, folder: Path, workers: int, progress: Progres
         ]
         planner = train_body(plan, recorded, due, forms, sight, vocabulary, folder, progress)
     task_net, reader = _train_words(plan, lessons, vocabulary, progress)
-    about: dict[str, Any] = {
+    about = {**about_policy(plan), "episodes": len(recorded)}
+    return PolicyModel(
+        sight, detector, vocabulary, task_net, reader, corners, moves, plan.memory,
+        body, about, forms, planner,
+    )  # fmt: skip
+
+
+def about_policy(plan: PolicyPlan) -> dict[str, Any]:
+    """Return what a policy's file says about its plan."""
+    return {
         **plan._asdict(),
         "tasks": list(plan.tasks),
         "settings": list(plan.settings),
         "words": plan.words if plan.settings else WORDLESS,
         "language_version": LANGUAGE_VERSION,
-        "episodes": len(recorded),
     }
-    return PolicyModel(
-        sight, detector, vocabulary, task_net, reader, corners, moves, plan.memory,
-        body, about, forms, planner,
-    )  # fmt: skip
 
 
 def record_all(plan: PolicyPlan, folder: Path, workers: int, progress: Progress) -> list[Recorded]:
