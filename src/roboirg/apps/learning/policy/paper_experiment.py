@@ -31,8 +31,12 @@ PARTS: Mapping[str, str] = {
     "planner": "paper-planners",
 }
 """The packaged plan that each part of the experiment changes."""
+HELD_OUT = "test"
+"""The pool of words that is spoken in every split: that of the packaged plans' split."""
 OWN_TASKS = ("context", "planner")
 """Parts with three tasks of their own."""
+SEED_MARK = "-seed"
+"""Between the name of a row and a training seed other than 0."""
 RUNS = "runs"
 """Folder of the runs, one for each part."""
 
@@ -41,8 +45,9 @@ class ExperimentPlan(NamedTuple):
     """What is trained and played.
 
     Attributes:
-        memories: names of memories; each is a row.
-        seeds: training seeds, from 0; the rows of later ones have their number.
+        memories: names of memories; each is a row. Those that no system has are no part of the
+            paper's experiment, but can be played with the others.
+        seeds: training seeds, from 0.
         parts: names of `PARTS`.
         played: settings that are played; none for those of the paper's plans.
     """
@@ -53,9 +58,15 @@ class ExperimentPlan(NamedTuple):
     played: tuple[str, ...] = ()
 
 
-def row_name(memory: str, seed: int = 0) -> str:
-    """Return what the row of a memory is called: by its mechanism, never by a system."""
-    return f"small-{memory}" + (f"-{seed}" if seed else "")
+def row_name(memory: str, seed: int = 0, change: str = "") -> str:
+    """Return what a row's policy is called: by its mechanism, never by a system."""
+    return f"small-{memory}{change}" + (f"{SEED_MARK}{seed}" if seed else "")
+
+
+def row_of(policy: str) -> tuple[str, int]:
+    """Return the row of a policy, and its training seed."""
+    row, _, seed = policy.partition(SEED_MARK)
+    return row, int(seed or 0)
 
 
 def train_rows(
@@ -110,8 +121,9 @@ def part_plan(
         given["settings"] = ",".join(experiment.played)
     if part in OWN_TASKS:
         changes = {name: one for name, one in changes.items() if name != "tasks"}
+    if changes.get("split", given["split"]) != given["split"]:
+        given["wordings"] = HELD_OUT
     policies = _with_planners(experiment, files) if part == "planner" else _rows(files)
-    # The files of a folder have the same names wherever the command is given.
     return make_plan([f"{name}={spec}" for name, spec in policies.items()], **{**given, **changes})
 
 
@@ -130,8 +142,8 @@ def _with_planners(experiment: ExperimentPlan, files: Mapping[str, Path]) -> dic
             name = row_name(memory, seed)
             own = f"trained:{files[name].absolute()}"
             found[name] = own
-            found[f"{name}-interpreter"] = f"planner:listener?hands={own}"
-            found[f"{name}-scripted-hands"] = f"{own}?hands=scripted"
+            found[row_name(memory, seed, "-interpreter")] = f"planner:listener?hands={own}"
+            found[row_name(memory, seed, "-scripted-hands")] = f"{own}?hands=scripted"
     if found:
         found["interpreter-scripted-hands"] = "planner:listener?hands=scripted"
     return found

@@ -8,9 +8,16 @@ from decimal import Decimal
 from pathlib import Path
 from typing import NamedTuple
 
+import msgspec
 import numpy as np
 
-from roboirg.apps.learning.policy.paper_experiment import RESOLVED, SYSTEMS, row_name, runs_of
+from roboirg.apps.learning.policy.paper_experiment import (
+    RESOLVED,
+    SYSTEMS,
+    row_name,
+    row_of,
+    runs_of,
+)
 from roboirg.evaluation.analysis.published import TRIALS, PublishedRow, published_rows
 from roboirg.evaluation.analysis.stats.cells import Cells, gather
 from roboirg.evaluation.analysis.stats.intervals import SEED, Z_95, Interval
@@ -19,6 +26,7 @@ from roboirg.evaluation.analysis.stats.paired_tests import Gap, Pairs, holm, mea
 from roboirg.evaluation.analysis.stats.run_summary import ALL, SummaryRow, summarize
 from roboirg.evaluation.analysis.tables.paper_tables import is_informative, make_table
 from roboirg.evaluation.analysis.tables.rendering.markdown import markdown
+from roboirg.evaluation.records.record import Summary
 from roboirg.evaluation.records.store import read_results
 from roboirg.language.settings import EXPLICIT, plain_settings
 
@@ -29,7 +37,8 @@ _TITLE = "# The paper's experiment with small policies"
 _INTRODUCTION = (
     "Rows called *small-…* have a mechanism of the paper on the small body of the learned policy. "
     "They are not the paper's systems; the page *The paper's mechanisms on a small body* of the "
-    "documentation lists what differs. Published rates have 150 rollouts in each cell."
+    "documentation lists what differs. Published rates have 150 rollouts in each cell. Policies "
+    "that differ in their training seed alone are one row; intervals are over scenes."
 )
 
 
@@ -54,13 +63,19 @@ Column = Mapping[str, Difference]
 def write_paper_page(folder: Path, parts: Sequence[str]) -> Path:
     """Write the page of the runs that were played, and return its path."""
     found = {
-        part: gather([(part, read_results(run))])
+        part: gather([(part, [_of_row(one) for one in read_results(run)])])
         for part, run in runs_of(folder, parts).items()
         if run.exists()
     }
     page = folder / PAGE
     page.write_text("\n\n".join(_sections(found)) + "\n", encoding="utf-8")
     return page
+
+
+def _of_row(result: Summary) -> Summary:
+    """Return the result of a policy as one of its row: a training seed counts as a policy seed."""
+    row, seed = row_of(result.policy)
+    return msgspec.structs.replace(result, policy=row, policy_seed=seed, policy_version="trained")
 
 
 def _sections(found: Mapping[str, Cells]) -> Iterator[str]:
