@@ -198,7 +198,7 @@ def _play_paper(plan: PolicyPlan, words: PolicyWords, out: Path, workers: int) -
     from roboirg.apps.learning.policy.paper_experiment import (
         PARTS,
         ExperimentPlan,
-        part_plan,
+        part_options,
         runs_of,
         train_rows,
     )
@@ -206,6 +206,7 @@ def _play_paper(plan: PolicyPlan, words: PolicyWords, out: Path, workers: int) -
     from roboirg.apps.learning.policy.policy_plan import MEMORY_NAMES
     from roboirg.cli.names import known_name
     from roboirg.evaluation.api.python_run import play_plan
+    from roboirg.evaluation.plan.plan_maker import make_plan
 
     experiment = ExperimentPlan(**words.choices(ExperimentPlan))
     for memory in experiment.memories:
@@ -216,7 +217,7 @@ def _play_paper(plan: PolicyPlan, words: PolicyWords, out: Path, workers: int) -
     changes = {"tasks": ",".join(plan.tasks)}
     changes |= {name: words.fields[name] for name in PLAYED if name in words.fields}
     for part, run in runs_of(out, experiment.parts).items():
-        made = part_plan(part, experiment, files, changes)
+        made = make_plan(**part_options(part, experiment, files, changes))
         play_plan(made, run, workers=workers, progress=True, on_record=None)
     typer.echo(str(write_paper_page(out, experiment.parts)))
 

@@ -4,16 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from pydantic import PositiveInt
 
 from roboirg.apps.learning.policy.policy_plan import PLANNERS, PolicyPlan
-from roboirg.apps.learning.trainer import Progress
 from roboirg.core.errors import InvalidValueError
-from roboirg.evaluation.plan.plan import Plan
 from roboirg.evaluation.plan.plan_file import read_plan_file
-from roboirg.evaluation.plan.plan_maker import make_plan
+from roboirg.language.settings import EXPLICIT, plain_settings
+
+if TYPE_CHECKING:
+    from roboirg.apps.learning.trainer import Progress
 
 SYSTEMS: Mapping[str, str] = {
     "none": "pi0.5",
@@ -104,10 +105,10 @@ def train_rows(
     return found
 
 
-def part_plan(
+def part_options(
     part: str, experiment: ExperimentPlan, files: Mapping[str, Path], changes: Mapping[str, Any]
-) -> Plan:
-    """Return the plan of a part: the packaged one with the rows as policies.
+) -> dict[str, Any]:
+    """Return a part's options of `make_plan`: the packaged plan's with the rows as policies.
 
     Args:
         part: a name of `PARTS`.
@@ -117,14 +118,18 @@ def part_plan(
     """
     given = read_plan_file(PARTS[part])
     given |= {"forms": RESOLVED if part == RESOLVED else "implicit", "policy_seeds": "0"}
-    if experiment.played and part != "context":
-        given["settings"] = ",".join(experiment.played)
+    if part != "context":
+        settings = experiment.played or plain_settings()
+        given["settings"] = ",".join(
+            name for name in settings if part != RESOLVED or name != EXPLICIT
+        )
     if part in OWN_TASKS:
         changes = {name: one for name, one in changes.items() if name != "tasks"}
     if changes.get("split", given["split"]) != given["split"]:
         given["wordings"] = HELD_OUT
     policies = _with_planners(experiment, files) if part == "planner" else _rows(files)
-    return make_plan([f"{name}={spec}" for name, spec in policies.items()], **{**given, **changes})
+    named = [f"{name}={spec}" for name, spec in policies.items()]
+    return {**given, **changes, "policies": named}
 
 
 def _rows(files: Mapping[str, Path]) -> dict[str, str]:

@@ -68,8 +68,13 @@ def write_paper_page(folder: Path, parts: Sequence[str]) -> Path:
         if run.exists()
     }
     page = folder / PAGE
-    page.write_text("\n\n".join(_sections(found)) + "\n", encoding="utf-8")
+    page.write_text(paper_text(found), encoding="utf-8")
     return page
+
+
+def paper_text(found: Mapping[str, Cells]) -> str:
+    """Return the page in Markdown; policies of each part's cells are rows."""
+    return "\n\n".join(_sections(found)) + "\n"
 
 
 def _of_row(result: Summary) -> Summary:
