@@ -199,7 +199,7 @@ def _play_paper(plan: PolicyPlan, words: PolicyWords, out: Path, workers: int) -
         PARTS,
         ExperimentPlan,
         part_options,
-        runs_of,
+        run_of,
         train_rows,
     )
     from roboirg.apps.learning.policy.paper_page import write_paper_page
@@ -216,10 +216,10 @@ def _play_paper(plan: PolicyPlan, words: PolicyWords, out: Path, workers: int) -
     files = train_rows(experiment, plan, out, workers, _print_tenths())
     changes = {"tasks": ",".join(plan.tasks)}
     changes |= {name: words.fields[name] for name in PLAYED if name in words.fields}
-    for part, run in runs_of(out, experiment.parts).items():
+    for part in experiment.parts:
         made = make_plan(**part_options(part, experiment, files, changes))
-        play_plan(made, run, workers=workers, progress=True, on_record=None)
-    typer.echo(str(write_paper_page(out, experiment.parts)))
+        play_plan(made, run_of(out, part), workers=workers, progress=True, on_record=None)
+    typer.echo(str(write_paper_page(out)))
 
 
 def _plan(words: TrainingWords, without: str) -> TrainingPlan:

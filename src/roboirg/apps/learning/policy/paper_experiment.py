@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -11,7 +11,6 @@ from pydantic import PositiveInt
 from roboirg.apps.learning.policy.policy_plan import PLANNERS, PolicyPlan
 from roboirg.core.errors import InvalidValueError
 from roboirg.evaluation.plan.plan_file import read_plan_file
-from roboirg.language.settings import EXPLICIT, plain_settings
 
 if TYPE_CHECKING:
     from roboirg.apps.learning.trainer import Progress
@@ -24,14 +23,14 @@ SYSTEMS: Mapping[str, str] = {
     "keyframes": "MemER",
 }
 """The paper's system with the mechanism of each memory."""
-RESOLVED = "resolved"
+MAIN, RESOLVED = "main", "resolved"
 PARTS: Mapping[str, str] = {
-    "main": "paper",
+    MAIN: "paper",
     RESOLVED: "paper",
     "context": "paper-context",
     "planner": "paper-planners",
 }
-"""The packaged plan that each part of the experiment changes."""
+"""The packaged plan that each part of the experiment changes. Resolved forms join the main run."""
 HELD_OUT = "test"
 """The pool of words that is spoken in every split: that of the packaged plans' split."""
 OWN_TASKS = ("context", "planner")
@@ -39,7 +38,7 @@ OWN_TASKS = ("context", "planner")
 SEED_MARK = "-seed"
 """Between the name of a row and a training seed other than 0."""
 RUNS = "runs"
-"""Folder of the runs, one for each part."""
+"""Folder of the runs."""
 
 
 class ExperimentPlan(NamedTuple):
@@ -117,12 +116,10 @@ def part_options(
         changes: other options of `make_plan`; tasks do not change parts with tasks of their own.
     """
     given = read_plan_file(PARTS[part])
-    given |= {"forms": RESOLVED if part == RESOLVED else "implicit", "policy_seeds": "0"}
-    if part != "context":
-        settings = experiment.played or plain_settings()
-        given["settings"] = ",".join(
-            name for name in settings if part != RESOLVED or name != EXPLICIT
-        )
+    given |= {"forms": f"implicit,{RESOLVED}" if part == RESOLVED else "implicit"}
+    given |= {"policy_seeds": "0"}
+    if experiment.played and part != "context":
+        given["settings"] = ",".join(experiment.played)
     if part in OWN_TASKS:
         changes = {name: one for name, one in changes.items() if name != "tasks"}
     if changes.get("split", given["split"]) != given["split"]:
@@ -154,6 +151,6 @@ def _with_planners(experiment: ExperimentPlan, files: Mapping[str, Path]) -> dic
     return found
 
 
-def runs_of(folder: Path, parts: Sequence[str] = tuple(PARTS)) -> dict[str, Path]:
-    """Return the folder of each part's run."""
-    return {part: folder / RUNS / part for part in parts}
+def run_of(folder: Path, part: str) -> Path:
+    """Return the folder of the run to which a part belongs."""
+    return folder / RUNS / (MAIN if part == RESOLVED else part)
