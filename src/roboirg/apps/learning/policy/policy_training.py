@@ -69,6 +69,7 @@ from roboirg.language import LANGUAGE_VERSION
 from roboirg.tasks.splits.splits import get_episode
 from roboirg.util.media import decode_png
 from roboirg.util.parallel_map import parallel_map
+from roboirg.util.short_hash import short_hash
 
 RECORDED_SPLIT = "random"
 PICTURE_EVERY = 16
@@ -114,7 +115,7 @@ def train_policy(plan: PolicyPlan, folder: Path, workers: int, progress: Progres
             for one, own in zip(recorded, decisions, strict=True)
         ]
         planner = train_body(plan, recorded, due, forms, sight, vocabulary, folder, progress)
-    task_net, reader = _train_words(plan, lessons, vocabulary, progress)
+    task_net, reader = _train_words(plan, lessons, vocabulary, folder, progress)
     about = {**about_policy(plan), "episodes": len(recorded)}
     return PolicyModel(
         sight, detector, vocabulary, task_net, reader, corners, moves, plan.memory,
@@ -261,10 +262,33 @@ def first_looks(
 
 
 def _train_words(
-    plan: PolicyPlan, lessons: Sequence[Lesson], vocabulary: Vocabulary, progress: Progress
+    plan: PolicyPlan,
+    lessons: Sequence[Lesson],
+    vocabulary: Vocabulary,
+    folder: Path,
+    progress: Progress,
 ) -> tuple[TaskNet, ListenerNet]:
-    """Return what names the task, and what reads the goal."""
+    """Return what names the task, and what reads the goal: the folder's, or train them."""
+    path = folder / f"words-{plan.heard}-{plan.seed}.pt"
+    texts = short_hash("\n".join(one.given.text for one in lessons))
+    made_of = [*map(list, vocabulary), texts, plan.reader_epochs]
+    kept = load_unfinished(path, made_of)
+    if kept is not None:
+        task_net, reader = TaskNet(vocabulary), ListenerNet(vocabulary)
+        load_nets({"task_net": task_net, "reader": reader}, kept)
+        return task_net, reader
     torch.manual_seed(plan.seed)
+    task_net = _train_tasks(plan, lessons, vocabulary, progress)
+    reader = train_reader(lessons, vocabulary, plan.reader_epochs, plan.seed, progress)
+    nets = {"task_net": task_net.state_dict(), "reader": reader.state_dict()}
+    save_unfinished(nets, made_of, path)
+    return task_net, reader
+
+
+def _train_tasks(
+    plan: PolicyPlan, lessons: Sequence[Lesson], vocabulary: Vocabulary, progress: Progress
+) -> TaskNet:
+    """Return what names the task."""
     rng = random.Random(plan.seed)
     task_net = TaskNet(vocabulary)
     numbers = {task: number for number, task in enumerate(plan.tasks)}
@@ -280,7 +304,7 @@ def _train_words(
         trainer.run(batches(lessons, rng))
         progress("tasks", epoch + 1, TASK_EPOCHS)
     task_net.eval()
-    return task_net, train_reader(lessons, vocabulary, plan.reader_epochs, plan.seed, progress)
+    return task_net
 
 
 def _thinned(text: str, rng: random.Random) -> str:
