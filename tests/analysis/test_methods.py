@@ -174,6 +174,8 @@ def test_texts_and_templates_are_counted(tmp_path: Path) -> None:
     direct = {record(episode, setting="direct").instruction for episode in range(4)}
     assert counts["explicit, arm told"].startswith(f"{len(told)} distinct texts; command")
     assert counts["direct, arm silent"] == "1 distinct text, fixed"
+    chance = found["Controls and floors"]["chance in direct"]
+    assert chance.endswith("without any words: mine, arm silent, direct: 100.0 %")
     (label,) = set(found["Use of the words in training"]) - {"mine"}
     seen = found["Use of the words in training"][label]
     assert f"{len(told) + len(direct)} texts: in neither, as their templates are held out" in seen
@@ -187,7 +189,14 @@ def test_each_other_analysis_has_a_verdict_or_a_reason(tmp_path: Path) -> None:
         for seed in (0, 1)
         for episode in range(3)
     ]
-    found = sections(tmp_path, *played)["Sensitivity to analysis choices"]
+    found = sections(tmp_path, *played)
+    assert found["Statistics"][
+        "Holm's correction"
+    ] == "3 families, each corrected alone; " + "; ".join(
+        f"mine, differences to explicit in {scope}: 1 test"
+        for scope in ("single tasks", "suites", "all tasks")
+    )
+    found = found["Sensitivity to analysis choices"]
     assert found["mine, direct less explicit"] == (
         "open; 3 paired scenes, with which uncorrected p is at least 0.25, so the verdict is open; "
         "does not hold in 1 of 4: unit rollout (lower)"

@@ -11,7 +11,7 @@ from collections.abc import Collection, Iterator, Mapping, Sequence
 from pathlib import Path
 
 from roboirg.core.actions import find_action_space
-from roboirg.core.arms import ARMS, PARAPHRASE, SILENT_TEXTS, paraphrase_number
+from roboirg.core.arms import ARMS, OTHER_GOAL, PARAPHRASE, SILENT_TEXTS, paraphrase_number
 from roboirg.core.instruction_options import OPTION_HELP
 from roboirg.core.plain_text import counted
 from roboirg.core.word_pools import POOLS, pool_of
@@ -107,12 +107,14 @@ def _terms(jobs: Sequence[Job]) -> Items:
 
 def _horizon(results: Sequence[Summary], plan: Plan | None, played: Played) -> Items:
     limits = {one.max_steps for one in results}
+    has_other = any(one.arm == OTHER_GOAL for one in results)
+    both = " (in the arm other-goal: and the scene's own)" * has_other
     yield item(
         "step limit of a rollout",
         _limit("control steps of the policy", limits, DEFAULT_MAX_STEPS),
         "the video before its turn does not count",
-        "a rollout ends when its goal is decided (in the arm other-goal: and the scene's own), or "
-        "at the limit, where what is undecided fails",
+        f"a rollout ends when its goal is decided{both}",
+        "or at the limit, where what is undecided fails",
     )
     fields = {"call of the policy": "policy_timeout_s", "rollout": "episode_timeout_s"}
     waits = [
@@ -138,7 +140,7 @@ def _horizon(results: Sequence[Summary], plan: Plan | None, played: Played) -> I
             name,
             f"actions: {_action_space(facts.need('actions'))}",
             *map(facts.labeled, ("chunk", "execute")),
-            "executed per call: all actions that it returned, but none after the rollout's end",
+            "executed per call: all actions returned, but none after the rollout's end",
             f"on average {mean} control steps, calls that an end cut short included",
             f"returned per call on average: {NOT_REPORTED} by roboirg",
             f"observations within a chunk: {between}",

@@ -22,7 +22,7 @@ DECLARABLE = {
     "network": "network",
     "version": "version of the policy",
     "chunk": "length of a chunk, as declared",
-    "execute": "actions used of a chunk",
+    "execute": "actions returned of each chunk",
     "dtype": "number type of the computation",
     "parameter_dtype": "number type of the parameters",
     "device": "device of inference",
