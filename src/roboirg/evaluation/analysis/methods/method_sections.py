@@ -108,12 +108,12 @@ def _terms(jobs: Sequence[Job]) -> Items:
 def _horizon(results: Sequence[Summary], plan: Plan | None, played: Played) -> Items:
     limits = {one.max_steps for one in results}
     has_other = any(one.arm == OTHER_GOAL for one in results)
-    both = " (in the arm other-goal: and the scene's own)" * has_other
+    both = " (arm other-goal: and that on the scene's own goal)" * has_other
     yield item(
         "step limit of a rollout",
         _limit("control steps of the policy", limits, DEFAULT_MAX_STEPS),
         "the video before its turn does not count",
-        f"a rollout ends when its goal is decided{both}",
+        f"a rollout ends with its verdict{both}",
         "or at the limit, where what is undecided fails",
     )
     fields = {"call of the policy": "policy_timeout_s", "rollout": "episode_timeout_s"}

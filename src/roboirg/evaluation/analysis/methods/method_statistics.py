@@ -184,7 +184,9 @@ def control_items(data: RunData, jobs: Sequence[Job]) -> Items:
     silent = [one for one in data.names if one.conditions.arm in SILENT_TEXTS]
     for options in settings:
         level = chance_level(job for job in jobs if job.column == options)
-        silence = _rates(data, silent, [options]) or f"{NOT_REPORTED}, as no arm was silent"
+        silence = (
+            _rates(data, silent, [options]) or f"{NOT_REPORTED}, as no silent arm has a result"
+        )
         yield item(
             f"chance in {options_label(options)}",
             (NOT_REPORTED if level is None else f"{100 * float(level):.1f} %") + f", {_GUESS}",
