@@ -75,11 +75,10 @@ def screening_items(jobs: Sequence[Job]) -> Items:
     counts = f"counts of the {counted(len(scenes), 'scene')} above, not of the whole split"
     yield item("screening when the split was made", counts, *_rejections(scenes))
     for column, own in columns.items():
-        setting, known = column.options.setting, every_task()
-        unknown = {one for one in scenes if one[0] not in known}
-        usable = unknown | {
-            one for one in scenes - unknown if setting in settings_of(known[one[0]])
+        has = {
+            one: column.options.setting in settings_of(task) for one, task in every_task().items()
         }
+        usable = {one for one in scenes if has.get(one[0], True)}
         is_told = column.arm == TOLD
         missing = "the setting cannot express them" if is_told else "there is no such goal or text"
         yield item(
@@ -184,13 +183,11 @@ def control_items(data: RunData, jobs: Sequence[Job]) -> Items:
     silent = [one for one in data.names if one.conditions.arm in SILENT_TEXTS]
     for options in settings:
         level = chance_level(job for job in jobs if job.column == options)
-        silence = (
-            _rates(data, silent, [options]) or f"{NOT_REPORTED}, as no silent arm has a result"
-        )
+        floor = _rates(data, silent, [options]) or f"{NOT_REPORTED}, as no silent arm has a result"
         yield item(
             f"chance in {options_label(options)}",
             (NOT_REPORTED if level is None else f"{100 * float(level):.1f} %") + f", {_GUESS}",
-            f"success without any words: {silence}",
+            f"success without any words: {floor}",
         )
     told = data.told()
     listed = _rates(told, [one for one in told.names if one.is_privileged], settings)
