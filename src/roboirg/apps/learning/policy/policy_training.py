@@ -60,12 +60,12 @@ from roboirg.apps.learning.policy.thing_detector import (
     varied,
 )
 from roboirg.apps.learning.policy.tracks import LookTokens
-from roboirg.apps.learning.policy.waypoint_expert import Disturbance
 from roboirg.apps.learning.trained_file import load_nets, load_unfinished, save_unfinished
 from roboirg.apps.learning.trainer import Progress, Trainer, batch_count, batches
 from roboirg.core.episode import Episode
 from roboirg.core.errors import InvalidValueError, MotionPlanningError
 from roboirg.language import LANGUAGE_VERSION
+from roboirg.policies.builtin.waypoint_expert import Disturbance
 from roboirg.tasks.splits.splits import get_episode
 from roboirg.util.media import decode_png
 from roboirg.util.parallel_map import parallel_map
