@@ -136,5 +136,5 @@ def test_what_is_no_log_is_refused(tmp_path: Path, content: bytes) -> None:
     path = action_path(tmp_path, "0" * 64)
     path.parent.mkdir(parents=True)
     path.write_bytes(content)
-    with pytest.raises(StoreError, match="is no action log"):
+    with pytest.raises(StoreError, match="is not an action log"):
         read_actions(tmp_path, "0" * 64)

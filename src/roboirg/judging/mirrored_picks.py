@@ -28,7 +28,7 @@ def refine_wrong_object(
     sides = {other for name in meant for other in mirrored[name]}
     if not sides & {found.subject, place}:
         return found
-    words = f"{found.sentence[:-1]}; the words mean that one with left and right exchanged"
+    words = f"{found.sentence[:-1]}; the words mean it only with left and right exchanged"
     return FailureAttribution.of("mirrored_pick", found.subject, found.step, words)
 
 

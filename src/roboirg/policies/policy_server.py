@@ -91,7 +91,7 @@ def open_server(
         listening = listen(service(make), metadata, options)
     except OSError as error:  # of another package's transport
         raise InvalidValueError(
-            f"Cannot listen at {options.host}:{options.port} ({error})."
+            f"Cannot listen on {options.host}:{options.port} ({error})."
         ) from error
     endpoint = Endpoint(options.host, listening.socket.getsockname()[1])
     return PolicyServer(listening, f"{protocol}://{endpoint}")

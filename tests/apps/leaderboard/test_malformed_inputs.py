@@ -385,7 +385,7 @@ PLAN_FILES: Mapping[str, tuple[str, str]] = {
 def test_plan_files_are_regular_files(make: Callable[[Path], object], tmp_path: Path) -> None:
     make(tmp_path / "plan.yaml")
     message = refusal(lambda folder: read_plan_file(str(folder / "plan.yaml")), tmp_path)
-    assert message.endswith("is no regular file.")
+    assert message.endswith("is not a regular file.")
 
 
 @pytest.mark.parametrize("name", PLAN_FILES)
@@ -461,8 +461,8 @@ def test_action_files_are_refused(name: str, run: Path) -> None:
     path = run / _action_name(run)
     path.write_bytes(ACTION_FILES[name](path.read_bytes()))
     digest = line_of(run)["action_log"]
-    assert "is no action log" in refusal(lambda folder: read_actions(folder, digest), run)
-    assert fit(verify(run)).count("is no action log") == 2  # both records name it
+    assert "is not an action log" in refusal(lambda folder: read_actions(folder, digest), run)
+    assert fit(verify(run)).count("is not an action log") == 2  # both records name it
 
 
 def _repacked(change: Callable[[dict[str, bytes]], object]) -> Callable[[bytes], bytes]:

@@ -113,8 +113,8 @@ def _check_size(paths: Mapping[str, Path], folder: Path) -> None:
     if sum(sizes.values()) > _MAX_BYTES:
         largest = max(sizes, key=lambda name: sizes[name])
         raise StoreError(
-            f"The files of {folder} have {sum(sizes.values()):,} bytes, the largest, {largest}, "
-            f"{sizes[largest]:,}; a pack holds at most {_MAX_BYTES >> 30} GiB."
+            f"The files of {folder} have {sum(sizes.values()):,} bytes (the largest, {largest}, "
+            f"has {sizes[largest]:,}); a pack holds at most {_MAX_BYTES >> 30} GiB."
         )
 
 
@@ -135,7 +135,7 @@ def opened_run(path: Path) -> Iterator[Path]:
                 _unpack(archive, path, folder)
         except UNREADABLE_ARCHIVE as error:
             words = printable(" ".join(str(error).split()))[:_MOST_SHOWN].rstrip(".")
-            raise StoreError(f"{path} is no packed run: {words}.") from error
+            raise StoreError(f"{path} is not a packed run: {words}.") from error
         yield folder
 
 
@@ -145,7 +145,7 @@ def _manifest(archive: zipfile.ZipFile, path: Path) -> PackManifest:
             raise ValueError("it is too large")
         return PackManifest.model_validate_json(archive.read(MANIFEST))
     except (KeyError, ValueError) as error:
-        raise StoreError(f"{path} is no packed run: its {MANIFEST} cannot be read.") from error
+        raise StoreError(f"{path} is not a packed run: its {MANIFEST} cannot be read.") from error
 
 
 def _unpack(archive: zipfile.ZipFile, path: Path, folder: Path) -> None:
@@ -180,7 +180,7 @@ def _safe(name: str, path: Path) -> str:
     is_known = name in (RECORDS_FILE, PLAN_FILE) or top in folders
     if not is_known or len(name) > MOST_PATH_LETTERS or not re.fullmatch(RELATIVE_PATH, name):
         shown = printable(name[:_MOST_SHOWN])
-        raise StoreError(f"{path} holds {shown!r}, which is no file of a run.")
+        raise StoreError(f"{path} holds {shown!r}, which does not belong to a run.")
     return name
 
 

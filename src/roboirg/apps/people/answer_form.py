@@ -120,7 +120,7 @@ def checked_answer(
     kinds = tuple(episode.scene[one].kind for one in objects)
     if not form.least <= len(kinds) or kinds != form.kinds[: len(kinds)]:
         raise InvalidValueError(
-            f"The answer points at {', '.join(kinds) or 'nothing'}; it points at "
+            f"The answer points at {', '.join(kinds) or 'nothing'}; it must point at "
             f"{', '.join(form.kinds) or 'nothing'}, in this order."
         )
     if len(set(objects)) < len(objects):
@@ -131,7 +131,9 @@ def checked_answer(
         if not isinstance(value, str | int) or type(value) is not type(field.values[0]):
             raise InvalidValueError(f"The answer has no {field.name!r}.")
         if value not in field.values:
-            raise InvalidValueError(f"{field.name!r} is {value!r}; it is one of {field.values}.")
+            raise InvalidValueError(
+                f"{field.name!r} is {value!r}; it must be one of {field.values}."
+            )
         chosen[field.name] = value
     return FormAnswer(tuple(objects), chosen)
 

@@ -138,7 +138,7 @@ class DrivingPolicy:
         from roboirg.simulation.expert.motion_planning import MotionPlanner
 
         if (row[:3] < REACH_LOW).any() or (row[:3] > REACH_HIGH).any():
-            raise InvalidValueError("that is outside of the arm's reach.")
+            raise InvalidValueError("that point is out of the arm's reach.")
         env = self._session.env
         if env is None:
             raise RuntimeError("There is no environment.")
@@ -146,7 +146,7 @@ class DrivingPolicy:
         try:
             MotionPlanner(robot).plan_move(robot.arm_positions, tool_pose(row))
         except MotionPlanningError as error:
-            raise InvalidValueError("the arm does not reach that.") from error
+            raise InvalidValueError("the arm cannot reach that pose.") from error
 
     def _known_pose(self) -> NDArray[np.float64]:
         if self._pose is None:
@@ -161,7 +161,7 @@ def _number(value: object, most: float) -> float:
         InvalidValueError: it is none.
     """
     if isinstance(value, bool) or not isinstance(value, int | float) or not abs(value) <= most:
-        raise InvalidValueError(f"{value!r} is no number up to {most:g}.")
+        raise InvalidValueError(f"{value!r} is not a number up to {most:g}.")
     return float(value)
 
 

@@ -108,7 +108,7 @@ class ListeningStudy(BaseModel):
             raise InvalidValueError("A study has one form and one set of stages.")
         if self.plan.split == TRAINING:
             raise InvalidValueError(
-                f"Practice and checks are episodes of the split {TRAINING!r}; choose another one."
+                f"Practice and checks are episodes of the split {TRAINING!r}; choose another split."
             )
         if self.practice + self.checks > SIZES[TRAINING]:
             raise InvalidValueError(
@@ -245,4 +245,4 @@ def read_listening_study(folder: Path) -> ListeningStudy:
             "with: roboirg listen plan."
         ) from error
     except ValidationError as error:
-        raise InvalidValueError(f"{path} is no study of this version ({error}).") from error
+        raise InvalidValueError(f"{path} is not a study of this version ({error}).") from error

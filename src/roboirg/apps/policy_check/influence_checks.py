@@ -45,15 +45,16 @@ def check_constant(player: PolicyPlayer) -> Iterator[CheckResult]:
         yield CheckResult(
             "constant",
             WARN,
-            f"All {len(rows)} actions of two episodes are the same one; usually the model's output "
-            "is not read, or a server answers with a placeholder.",
+            f"All {len(rows)} actions of two episodes are the same; usually the model's output is "
+            "not read, or a server answers with a placeholder.",
         )
     elif all(_repeats(rollout.chunks) for rollout in rollouts):
         yield CheckResult(
             "repetition",
             WARN,
-            "Every answer of an episode is the first one again although all it sees has changed; "
-            "usually a chunk is kept and never computed anew. Clear it once its actions are given.",
+            "Every answer of an episode repeats the first although all inputs have changed; "
+            "usually a chunk is kept and never recomputed. Clear it once its actions are "
+            "returned.",
         )
 
 
@@ -68,15 +69,15 @@ def check_language(player: PolicyPlayer) -> Iterator[CheckResult]:
         yield from _not_checked(player, name)
         return
     if any(_changes(player, name, instruction=words) for words in OTHER_COMMANDS):
-        yield CheckResult(name, PASS, "Other instructions have other actions.")
+        yield CheckResult(name, PASS, "Other instructions lead to other actions.")
         yield from check_prompt_end(player)
     else:
         yield CheckResult(
             name,
             WARN,
-            f"{len(OTHER_COMMANDS) + 1} instructions have the same actions, bit for bit; usually "
-            "the words do not reach the model. Check the prompt's name in the request, and that "
-            "reset() keeps the instruction.",
+            f"{len(OTHER_COMMANDS) + 1} instructions lead to the same actions, bit for bit; "
+            "usually the words do not reach the model. Check the prompt's name in the request, "
+            "and that reset() keeps the instruction.",
         )
 
 
@@ -102,13 +103,14 @@ def check_prompt_end(player: PolicyPlayer) -> Iterator[CheckResult]:
         yield CheckResult(
             name,
             NOTE,
-            f"The last of {words} words changes nothing, as it declares {declared} tokens.",
+            f"The last of {words} words changes nothing, as the policy declares a limit of "
+            f"{declared} tokens.",
         )
         return
     yield CheckResult(
         name,
         WARN,
-        f"The last of {words} words changes nothing: the prompt is cut, and the command stands at "
+        f"The last of {words} words changes nothing: the prompt is cut, and the command comes at "
         f"its end. Instructions have up to {MAX_WORDS} words; raise the model's limit of tokens, "
         "or declare it as prompt_tokens.",
     )
@@ -131,19 +133,19 @@ def check_pictures(player: PolicyPlayer) -> Iterator[CheckResult]:
         )
     ]
     if not ignored:
-        yield CheckResult(name, PASS, f"Those of {' and '.join(cameras)} change the actions.")
+        yield CheckResult(name, PASS, f"Pictures of {' and '.join(cameras)} change the actions.")
         return
     which = " and ".join(ignored)
-    seen = f"Other pictures of {which} have the same actions, bit for bit"
+    seen = f"Other pictures of {which} lead to the same actions, bit for bit"
     if len(ignored) < len(cameras) and _changes_with_video(player, name, ignored):
         yield CheckResult(name, NOTE, f"{seen}; those in the video change them.")
         return
     yield CheckResult(
         name,
         WARN,
-        f"{seen}; usually what it sees now does not reach the model, or one camera's pictures are "
-        "given twice. If it does not need a camera, take it out of `cameras`, which saves "
-        "rendering.",
+        f"{seen}; usually the current pictures do not reach the model, or one camera's pictures "
+        "are passed twice. If the policy does not need a camera, remove it from `cameras` to "
+        "save rendering.",
     )
 
 
@@ -158,8 +160,8 @@ def check_state(player: PolicyPlayer) -> Iterator[CheckResult]:
         yield CheckResult(
             name,
             NOTE,
-            "Joints, fingers and tool change nothing; right for a model of pictures alone, wrong "
-            "if it was trained with the robot's state.",
+            "Joints, fingers and tool change nothing, which is right for a model of pictures "
+            "alone and wrong if it was trained with the robot's state.",
         )
 
 
@@ -169,13 +171,13 @@ def check_video(player: PolicyPlayer) -> Iterator[CheckResult]:
     if not _can_compare(player) or player.needs.demonstration_frames == "none":
         return
     if _changes_with_video(player, name, player.needs.cameras, STATE_FIELDS):
-        yield CheckResult(name, PASS, "Another video has other actions.")
+        yield CheckResult(name, PASS, "Another video leads to other actions.")
     else:
         yield CheckResult(
             name,
             NOTE,
-            "Another video has the same actions, bit for bit; if it needs none, "
-            'demonstration_frames = "none" saves time, else it is lost on the way.',
+            "Another video leads to the same actions, bit for bit; if the policy needs no video, "
+            'demonstration_frames = "none" saves time; otherwise the video is lost on the way.',
         )
 
 

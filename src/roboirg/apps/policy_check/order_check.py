@@ -40,8 +40,8 @@ def check_order(player: PolicyPlayer) -> Iterator[CheckResult]:
                 FAIL,
                 f"{one.instruction!r} leads to other actions once {explicit.instruction!r} was "
                 f"heard in the same scene (by up to {describe_difference(first, after)}): results "
-                "of implicit words depend on their order. Keep nothing of an episode in the "
-                "module, the class, files or the server.",
+                "of implicit instructions depend on the order of play. Keep nothing of an "
+                "episode in the module, the class, files or the server.",
             )
             return
     yield CheckResult(NAME, PASS, "Implicit words mean the same before and after explicit ones.")

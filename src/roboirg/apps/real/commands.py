@@ -114,7 +114,7 @@ def run(
         str, typer.Option(help="Who scores the trials: judge (only with the twin) or operator.")
     ] = "",
     retry_errors: Annotated[
-        bool, typer.Option(help="Play trials again that ended in an error or were void.")
+        bool, typer.Option(help="Play trials again that ended in an error or were declared void.")
     ] = True,
 ) -> None:
     """Play the trials of a study in order, on a robot or its twin.

@@ -128,7 +128,7 @@ class RoboIRGVectorEnv(gymnasium.vector.VectorEnv[Batch, Any, NDArray[Any]]):
         seeds = self._check_seeds(seed)
         self._chosen, self._kept = self._settings.with_reset_options(kept), kept
         if isinstance(self._task, Episode) and any(one is not None for one in episodes):
-            raise InvalidValueError("This environment was made of one episode; it takes no other.")
+            raise InvalidValueError("This environment was made for one episode; it takes no other.")
         requests: dict[int, Request] = {
             index: ("reset", (self._choose(index, seeds[index], episodes[index]),))
             for index in np.flatnonzero(mask).tolist()
@@ -317,7 +317,7 @@ class RoboIRGVectorEnv(gymnasium.vector.VectorEnv[Batch, Any, NDArray[Any]]):
                 "False."
             )
         if not found.all() and not self._was_reset:
-            raise gymnasium.error.ResetNeeded("The first reset is one of all sub-environments.")
+            raise gymnasium.error.ResetNeeded("The first reset must be of all sub-environments.")
         return found
 
 

@@ -118,8 +118,8 @@ def _claim(folder: Path, request: ExportRequest) -> None:
         changed = [name for name, value in wanted.items() if held.get(name) != value]
         if changed:
             raise InvalidValueError(
-                f"{str(folder)!r} has pictures of another {' and '.join(changed)}; choose another "
-                "--out."
+                f"{str(folder)!r} has pictures with another {' and '.join(changed)}; choose "
+                "another --out."
             )
         return
     if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):

@@ -96,7 +96,7 @@ def too_long_text(audit: PromptAudit, verdict: PromptVerdict) -> str | None:
         return None
     return (
         f"the instruction needs {_between(audit.needed)} tokens, but the policy's model reads "
-        f"{audit.limit}; --long-prompts send plays the episode all the same"
+        f"{audit.limit}; --long-prompts send plays the episode anyway"
     )
 
 

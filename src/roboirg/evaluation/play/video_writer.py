@@ -74,7 +74,7 @@ def check_video_support() -> None:
     Raises:
         MissingDependencyError: PyAV is not installed.
     """
-    with extra_needed("All but --video off needs PyAV", "sim"):
+    with extra_needed("Recording videos needs PyAV", "sim"):
         import av  # noqa: F401 - an extra, and slow to import
 
 

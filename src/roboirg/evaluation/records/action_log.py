@@ -70,7 +70,7 @@ def action_path(folder: Path, digest: str) -> Path:
         StoreError: it is not a digest, so it would be another file's name.
     """
     if not _DIGEST.fullmatch(digest):
-        raise StoreError(f"{digest!r} is no digest of actions: 64 hexadecimal digits.")
+        raise StoreError(f"{digest!r} is not a digest of actions, which has 64 hexadecimal digits.")
     return folder / ACTION_FOLDER / digest[:2] / f"{digest}{_SUFFIX}"
 
 
@@ -104,9 +104,9 @@ def read_actions(folder: Path, digest: str) -> ActionLog:
     except FileNotFoundError:
         raise StoreError(f"The actions {path} are missing.") from None
     except (InvalidActionError, InvalidValueError, *UNREADABLE_ARCHIVE) as error:
-        raise StoreError(f"{path} is no action log: {error}") from error
+        raise StoreError(f"{path} is not an action log: {error}") from error
     if log.digest != digest:
-        raise StoreError(f"{path} has another content than its name says: {log.digest}.")
+        raise StoreError(f"{path} does not have the content that its name gives, but {log.digest}.")
     return log
 
 

@@ -144,8 +144,8 @@ BREAKDOWNS: Mapping[str, Breakdown] = {
             "rival",
             "recency rival",
             lambda record: _reference(record) or _rival(record),
-            "Commands that say “it”: with a recency rival, the last remark before the command "
-            "is about one other thing. With a rival: how the words single one of two values out.",
+            "Commands that say “it”: with a recency rival, the last remark before the command is "
+            "about another thing. With a rival: how the words single out one of two values.",
         ),
         Breakdown(
             "difficulty",
