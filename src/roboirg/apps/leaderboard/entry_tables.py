@@ -26,7 +26,7 @@ _GAPS_NOTE = (
 _FLOORS_NOTE = (
     "Success on the test split without understanding, in percent: by chance after the command, "
     "by always answering the most frequent goal, by the best rule about the words, by learners "
-    "that see only the words or only the scene, and by the best of these."
+    "that see only the words or only the scene, and by any of these."
 )
 
 
