@@ -316,7 +316,7 @@ def test_tables_by_everything(run: Path, tmp_path: Path, monkeypatch: pytest.Mon
 def test_wrong_use_of_by(run: Path, tmp_path: Path) -> None:
     with pytest.raises(UnknownNameError, match="break-down"):
         call("tables", run, "--by", "colour")
-    with pytest.raises(InvalidValueError, match="--by has tables of its own"):
+    with pytest.raises(InvalidValueError, match="--by prints tables of its own"):
         call("tables", run, "--by", "slots", "--published")
     with pytest.raises(InvalidValueError, match="--by needs a run"):
         call("tables", "--by", "slots")

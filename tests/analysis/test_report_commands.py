@@ -110,7 +110,7 @@ def test_what_the_run_lacks_is_said(run: Path, tmp_path: Path) -> None:
     with pytest.raises(StoreError, match="no records in"):
         call("tables", tmp_path)
     (tmp_path / "file").write_text("")
-    with pytest.raises(StoreError, match="Cannot write to"):
+    with pytest.raises(InvalidValueError, match="Cannot write"):
         call("tables", run, "--out", tmp_path / "file")
 
 

@@ -355,13 +355,8 @@ def _print(found: list[Table]) -> None:
 
 def _write(found: list[Table], folder: Path, suffix: str, name: str) -> None:
     from roboirg.evaluation.analysis.tables.rendering import get_format
-    from roboirg.evaluation.records.store import StoreError
     from roboirg.util.atomic_write import write_atomically
 
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise StoreError(f"Cannot write to {folder}: {error.strerror}.") from error
     for table in found:
         path = folder / f"{table.key}{suffix}"
         write_atomically(path, get_format(name).draw(table))

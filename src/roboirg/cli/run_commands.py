@@ -88,7 +88,7 @@ def run(
 
     Example: roboirg run --policy oracle --tasks PickXtimes --out runs/first
     """
-    from roboirg.evaluation.plan.plan_text import plan_text
+    from roboirg.evaluation.plan.plan_file import plan_text
     from roboirg.evaluation.run.record_hook import split_command
 
     add_working_directory(last=True)

@@ -92,7 +92,7 @@ def test_a_page_of_a_run_that_is_not_ranked_gives_the_reason_as_text(site: Path)
 
 def test_a_site_that_cannot_be_written_is_one_sentence(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
-    with pytest.raises(InvalidValueError, match="Cannot write to"):
+    with pytest.raises(InvalidValueError, match="Cannot write"):
         write_board([], tmp_path / "file")
 
 

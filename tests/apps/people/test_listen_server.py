@@ -14,9 +14,9 @@ from dataclasses import replace
 import msgspec
 import numpy as np
 import pytest
-from study_fakes import Serving, answer_all, draw_things, make_study, things_of
+from study_fakes import Serving, all_answers, answer_all, draw_things, make_study, things_of
 
-from roboirg.apps.people.answer_form import all_answers, answer_of, goal_of
+from roboirg.apps.people.answer_form import answer_of, goal_of
 from roboirg.apps.people.listener_answers import (
     ANSWERS_FILE,
     AnswerLog,

@@ -144,7 +144,6 @@ def score_grounding(
     for name in names:
         found = list(floor_answers(name, items))
         if write_floors is not None:
-            write_floors.mkdir(parents=True, exist_ok=True)
             write_answers(write_floors / f"{name}.jsonl", found)
         scores += score_answers(items, found, name)
     console = Console()

@@ -20,7 +20,7 @@ from pydantic import BaseModel, ConfigDict
 from roboirg.core.errors import InvalidValueError
 from roboirg.core.plain_text import printable
 from roboirg.core.version import __version__
-from roboirg.evaluation.records.action_log import ACTION_FOLDER
+from roboirg.evaluation.records.action_log import ACTION_FOLDER, UNREADABLE_ARCHIVE
 from roboirg.evaluation.records.episode_log import LOG_FOLDER
 from roboirg.evaluation.records.record_codec import StoreError, read_summary
 from roboirg.evaluation.records.run_files import (
@@ -32,7 +32,6 @@ from roboirg.evaluation.records.run_files import (
     run_file,
 )
 from roboirg.evaluation.records.store import RECORDS_FILE, StoredRun
-from roboirg.util.archive_errors import UNREADABLE_ARCHIVE
 from roboirg.util.atomic_write import replacing
 from roboirg.util.regular_file import open_regular
 

@@ -7,7 +7,6 @@ and remembered. Values are asked for only where pointing leaves them open, as fo
 from __future__ import annotations
 
 import functools
-import itertools
 import json
 from collections import Counter, defaultdict
 from collections.abc import Mapping, Sequence
@@ -136,30 +135,6 @@ def checked_answer(
             )
         chosen[field.name] = value
     return FormAnswer(tuple(objects), chosen)
-
-
-def all_answers(episode: Episode, seen: Sequence[str]) -> list[FormAnswer]:
-    """Return every answer that fills the form.
-
-    Args:
-        episode: the episode.
-        seen: names of the objects that can be pointed at.
-    """
-    form = answer_form(episode.task)
-    of_kind: dict[ObjectKind, list[str]] = defaultdict(list)
-    for name in seen:
-        of_kind[episode.scene[name].kind].append(name)
-    pointings = [
-        objects
-        for length in range(form.least, len(form.kinds) + 1)
-        for objects in itertools.product(*(of_kind[kind] for kind in form.kinds[:length]))
-        if len(set(objects)) == length
-    ]
-    values = [
-        dict(zip((field.name for field in form.fields), chosen, strict=True))
-        for chosen in itertools.product(*(field.values for field in form.fields))
-    ]
-    return [FormAnswer(objects, chosen) for objects in pointings for chosen in values]
 
 
 def _pointed(episode: Episode, goal: Goal) -> tuple[str, ...]:

@@ -6,13 +6,23 @@ which two equal episodes differ cannot be checked so.
 
 from __future__ import annotations
 
+import secrets
 from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from roboirg.apps.policy_check.check_result import NOTE, PASS, WARN, CheckResult
-from roboirg.apps.policy_check.policy_player import SECOND, VIDEO_STEPS, PolicyPlayer, are_equal
-from roboirg.apps.policy_check.synthetic_episodes import SyntheticEpisode
+from roboirg import language
+from roboirg.apps.policy_check.check_result import FAIL, NOTE, PASS, WARN, CheckResult
+from roboirg.apps.policy_check.policy_player import (
+    SECOND,
+    VIDEO_STEPS,
+    PolicyPlayer,
+    are_equal,
+    describe_difference,
+)
+from roboirg.apps.policy_check.synthetic_episodes import SyntheticEpisode, SyntheticEpisodes
+from roboirg.language.settings import ACCEPTANCE_SETTINGS, EXPLICIT
+from roboirg.tasks.splits.splits import get_episode
 
 STATE_FIELDS = ("joint_positions", "gripper", "end_effector")
 OTHER_COMMANDS = (
@@ -223,3 +233,31 @@ def _long_prompt(remarks: int, end: str) -> str:
 
 def _episode(player: PolicyPlayer, instruction: str) -> SyntheticEpisode:
     return player.make_episodes().episode(instruction, 0)
+
+
+def check_order(player: PolicyPlayer) -> Iterator[CheckResult]:
+    """Check that implicit words lead to the same actions before and after explicit ones."""
+    name = "order of words"
+    if not player.repeatable:
+        return
+    episode = get_episode("PickXtimes", "train", 0)
+    words = {name: language.instruct(episode, name).text for name in ACCEPTANCE_SETTINGS}
+    # Nothing can remember this scene, not even a server that was checked before.
+    scene = SyntheticEpisodes(player.needs, secrets.randbits(32)).episode("", VIDEO_STEPS)
+    explicit = scene._replace(instruction=words.pop(EXPLICIT))
+    implicit = [scene._replace(instruction=text) for text in words.values()]
+    before = [player.play(name, one) for one in implicit]
+    player.play(name, explicit)
+    for one, first in zip(implicit, before, strict=True):
+        after = player.play(name, one)
+        if not are_equal(first, after):
+            yield CheckResult(
+                name,
+                FAIL,
+                f"{one.instruction!r} leads to other actions once {explicit.instruction!r} was "
+                f"heard in the same scene (by up to {describe_difference(first, after)}): results "
+                "of implicit instructions depend on the order of play. Keep nothing of an "
+                "episode in the module, the class, files or the server.",
+            )
+            return
+    yield CheckResult(name, PASS, "Implicit words mean the same before and after explicit ones.")

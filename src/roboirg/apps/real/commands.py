@@ -175,7 +175,7 @@ def score(
 
 def _play(study: Study, console: OperatorConsole, policies: list[str], *, retry: bool) -> None:
     """Play a study and print a summary; exits with 2 if a trial ended in an error."""
-    from roboirg.apps.real.control.interruption import Interruption
+    from roboirg.apps.real.control.control_loop import Interruption
 
     # SIGTERM stops the run like Ctrl-C, with the arm at rest.
     interruption = Interruption()

@@ -124,10 +124,6 @@ def _claim(folder: Path, request: ExportRequest) -> None:
         return
     if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
         raise InvalidValueError(f"{str(folder)!r} is not an empty folder; choose another --out.")
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise InvalidValueError(f"Cannot write {folder}: {error.strerror or error}.") from error
     write_atomically(path, json.dumps(wanted))
 
 

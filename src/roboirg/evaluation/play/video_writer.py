@@ -19,7 +19,7 @@ from roboirg.core.observations import FRONT
 from roboirg.core.subgoal_text import Point
 from roboirg.evaluation.play.point_sheet import with_ring
 from roboirg.evaluation.records.film import LAST_FRAME_REPEATS, VideoOptions
-from roboirg.util.text_overlay import draw_text, wrap_text
+from roboirg.util.media import draw_text, wrap_text
 
 if TYPE_CHECKING:
     from av.container import OutputContainer

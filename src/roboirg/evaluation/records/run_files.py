@@ -69,7 +69,6 @@ def keep_earlier_plan(content: bytes, folder: Path) -> None:
     """Write a plan that is not the newest."""
     path = folder / EARLIER_PLANS / f"{short_hash(content)}.json"
     if not path.exists():
-        path.parent.mkdir(parents=True, exist_ok=True)
         write_atomically(path, content)
 
 
