@@ -1,4 +1,4 @@
-"""Listeners: the interpreter in front of the scripted expert."""
+"""Listeners: the interpreter, or a surface rule for the words, in front of the scripted expert."""
 
 from __future__ import annotations
 

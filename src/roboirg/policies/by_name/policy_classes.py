@@ -32,8 +32,8 @@ BUILTIN: Mapping[str, str] = {
     "last-mention": "roboirg.policies.builtin.listeners:LastMentionPolicy",
     "elimination": "roboirg.policies.builtin.listeners:EliminationPolicy",
     "surface": "roboirg.policies.builtin.listeners:SurfacePolicy",
-    "habit": "roboirg.policies.builtin.word_ignorers:HabitPolicy",
-    "previous-goal": "roboirg.policies.builtin.word_ignorers:PreviousGoalPolicy",
+    "habit": "roboirg.policies.builtin.oracle_policy:HabitPolicy",
+    "previous-goal": "roboirg.policies.builtin.oracle_policy:PreviousGoalPolicy",
     "random": "roboirg.policies.builtin.random_policy:RandomPolicy",
 }
 
