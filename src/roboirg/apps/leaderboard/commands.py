@@ -113,11 +113,7 @@ def board(
 
 
 def _share(text: str) -> float:
-    """Return a share such as 5% or 0.05.
-
-    Raises:
-        InvalidValueError: it is no number.
-    """
+    """Return a share such as 5% or 0.05."""
     number = text.strip().removesuffix("%")
     try:
         return float(number) / (100 if "%" in text else 1)

@@ -168,11 +168,7 @@ def _unpack(archive: zipfile.ZipFile, path: Path, folder: Path) -> None:
 
 
 def _safe(name: str, path: Path) -> str:
-    """Return the name of a file of a run.
-
-    Raises:
-        StoreError: it is the name of another file, perhaps outside the folder.
-    """
+    """Return the name of a file of a run, if it is one; others may lead outside the folder."""
     parts = PurePosixPath(name).parts
     top = parts[0] if parts else ""
     folders = {EARLIER_PLANS, *_PACKED_FOLDERS.values()}

@@ -89,11 +89,7 @@ class DrivingPolicy:
             return rows
 
     def _rows(self, wanted: Mapping[str, Any]) -> NDArray[np.float64]:
-        """Return the way points of a command.
-
-        Raises:
-            InvalidValueError: it is none.
-        """
+        """Return the way points of a command."""
         pose = self._known_pose().copy()
         grip, count = LEAVE, 1
         match wanted:
@@ -116,11 +112,7 @@ class DrivingPolicy:
         return np.tile(np.append(pose, grip), (count, 1))
 
     def _point_below(self, x: float, y: float) -> NDArray[np.float64]:
-        """Return the point of the world that a pixel of the front picture shows, m.
-
-        Raises:
-            InvalidValueError: the picture does not show anything there.
-        """
+        """Return the point of the world that a pixel of the front picture shows, m."""
         seen = self._seen
         if seen is None:
             raise RuntimeError("There is no observation.")
@@ -155,11 +147,7 @@ class DrivingPolicy:
 
 
 def _number(value: object, most: float) -> float:
-    """Return a finite number between plus and minus `most`.
-
-    Raises:
-        InvalidValueError: it is none.
-    """
+    """Return a finite number between plus and minus `most`."""
     if isinstance(value, bool) or not isinstance(value, int | float) or not abs(value) <= most:
         raise InvalidValueError(f"{value!r} is not a number up to {most:g}.")
     return float(value)

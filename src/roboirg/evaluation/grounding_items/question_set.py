@@ -107,11 +107,7 @@ def collect_items(
 
 
 def _claim(folder: Path, request: ExportRequest) -> None:
-    """Note how the pictures are made, or check that those in the folder are made so.
-
-    Raises:
-        InvalidValueError: they are not, or the folder holds something else.
-    """
+    """Note how the pictures are made, or check that those in the folder are made so."""
     path, wanted = folder / PARTS / REQUEST_FILE, request.pictures()
     if path.exists():
         held = json.loads(path.read_bytes())

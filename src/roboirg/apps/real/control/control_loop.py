@@ -247,11 +247,7 @@ class ControlLoop:
         return None if reply is None else reply.result()
 
     def _receive(self, what: str, stopped: Callable[[], bool] = _never) -> PolicyReply | None:
-        """Wait for a reply in the machine's time; None if the operator ends the trial.
-
-        Raises:
-            EpisodeError: there is none within `reply_timeout_s`.
-        """
+        """Wait for a reply in the machine's time; None if the operator ends the trial."""
         deadline = time.monotonic() + self.reply_timeout_s
         while (left := deadline - time.monotonic()) > 0:
             reply = self.worker.receive(min(POLL_S, left))

@@ -121,11 +121,7 @@ class VlaEvalPolicy(RemotePolicy):
 
 
 def _as_rows(reply: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the reply with its action, which is a single one, as rows.
-
-    Raises:
-        PolicyReplyError: it has no array of numbers.
-    """
+    """Return the reply with its action, which is a single one, as rows."""
     name = next((name for name in ("actions", "action") if name in reply), None)
     if name is None:
         return dict(reply)
