@@ -28,7 +28,7 @@ _OF_VERDICT: Mapping[str, str] = {
 PLANNER_FAILURES: Mapping[str, str] = {
     "no answer": "its model was silent, late or out of reach; such episodes are errors, left out "
     "of the rates",
-    "unreadable": "the last replies of its model were no subgoal of a known form",
+    "unreadable": "the last replies of its model were not subgoals of a known form",
     "refused": "its last subgoals fitted nothing or several things",
     "wrong thing": "it had another thing handled, or one on the other side",
     "wrong place": "it had the right thing put elsewhere",

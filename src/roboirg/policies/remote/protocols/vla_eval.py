@@ -128,7 +128,9 @@ def _as_rows(reply: Mapping[str, Any]) -> dict[str, Any]:
     try:
         return {"actions": np.atleast_2d(np.asarray(reply[name], np.float64))}
     except (TypeError, ValueError) as error:
-        raise PolicyReplyError(f"The server sent an action that is no array: {error}.") from error
+        raise PolicyReplyError(
+            f"The server sent an action that is not an array: {error}."
+        ) from error
 
 
 PROTOCOL = Protocol(
