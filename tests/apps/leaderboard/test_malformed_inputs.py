@@ -206,8 +206,8 @@ REFUSED_RECORDS: Mapping[str, tuple[Change, str]] = {
     "step 10**25": (record(steps=10**25), r"\$\.steps"),
     "a million stages": (option(stages=[1] * 1_000_000), "length <= 100"),
     "cause of 5 MB": (record(outcome="failure", cause="x" * 5_000_000), r"\$\.cause"),
-    "version in bidi marks": (record(language_version="\u202e0.0.2"), "controls a terminal"),
-    "policy with a line end": (record(policy="random\n"), "controls a terminal"),
+    "version in bidi marks": (record(language_version="\u202e0.0.2"), "control characters"),
+    "policy with a line end": (record(policy="random\n"), "control characters"),
     "video with a line end": (record(video="videos/a.mp4\n"), "path below"),
     "video outside": (record(video="videos/../../secret.mp4"), "path below"),
     "line of 65 MiB": (

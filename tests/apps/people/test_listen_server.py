@@ -226,7 +226,7 @@ def test_a_new_server_goes_on_where_the_last_one_was(study):
 
 def test_a_study_without_pictures_is_not_served(study):
     (study / "questions" / "items.jsonl").unlink()
-    with pytest.raises(InvalidValueError, match="give roboirg listen plan again"):
+    with pytest.raises(InvalidValueError, match="run roboirg listen plan again"):
         ListeningSession(study)
 
 
