@@ -314,7 +314,7 @@ def test_tables_by_everything(run: Path, tmp_path: Path, monkeypatch: pytest.Mon
 
 
 def test_wrong_use_of_by(run: Path, tmp_path: Path) -> None:
-    with pytest.raises(UnknownNameError, match="break-down"):
+    with pytest.raises(UnknownNameError, match="breakdown"):
         call("tables", run, "--by", "colour")
     with pytest.raises(InvalidValueError, match="--by prints tables of its own"):
         call("tables", run, "--by", "slots", "--published")
