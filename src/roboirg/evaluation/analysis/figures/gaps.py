@@ -98,7 +98,7 @@ def draw_gaps(content: RunData, *, published: bool = False) -> Figure | None:
     panels[0].set_ylim(len(lines) - 0.5, -0.5)
     names = [folded(one.name, NAME_LETTERS) for one in lines]
     panels[0].set_yticks(range(len(lines)), names)
-    _add_legend(figure, any(drop.ends for drop in drops))
+    _add_legend(figure, drops)
     return figure
 
 
@@ -198,13 +198,16 @@ def _draw_panel(axes: Axes, lines: Sequence[PolicyDrops], setting: str) -> None:
     clear_axes(axes, grid="x")
 
 
-def _add_legend(figure: Figure, has_intervals: bool) -> None:
+def _add_legend(figure: Figure, drops: Sequence[Drop]) -> None:
     from matplotlib.lines import Line2D
 
     gray: dict[str, Any] = {"color": GHOST, "marker": "o", "linestyle": "none", "markersize": 4.8}
-    handles = [Line2D([], [], **gray, markerfacecolor=paper()), Line2D([], [], **gray)]
-    labels = ["success with explicit instructions, %", "with implicit ones; number: difference"]
-    if has_intervals:
+    handles, labels, interval = [Line2D([], [], **gray)], ["success, %"], "95 % interval"
+    if any(drop.explicit is not None for drop in drops):
+        handles.insert(0, Line2D([], [], **gray, markerfacecolor=paper()))
+        labels = ["success with explicit instructions, %", "with implicit ones; number: difference"]
+        interval = f"{interval} of the difference"
+    if any(drop.ends for drop in drops):
         handles.append(Line2D([], [], color=GHOST, linewidth=4.5, alpha=0.3))
-        labels.append("95 % interval of the difference")
+        labels.append(interval)
     figure.legend(handles, labels, loc="outside lower center", ncols=3, columnspacing=1.5)
