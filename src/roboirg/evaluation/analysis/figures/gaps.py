@@ -202,12 +202,12 @@ def _add_legend(figure: Figure, drops: Sequence[Drop]) -> None:
     from matplotlib.lines import Line2D
 
     gray: dict[str, Any] = {"color": GHOST, "marker": "o", "linestyle": "none", "markersize": 4.8}
-    handles, labels, interval = [Line2D([], [], **gray)], ["success, %"], "95 % interval"
+    handles, labels = [Line2D([], [], **gray)], ["success, %"]
     if any(drop.explicit is not None for drop in drops):
         handles.insert(0, Line2D([], [], **gray, markerfacecolor=paper()))
         labels = ["success with explicit instructions, %", "with implicit ones; number: difference"]
-        interval = f"{interval} of the difference"
     if any(drop.ends for drop in drops):
         handles.append(Line2D([], [], color=GHOST, linewidth=4.5, alpha=0.3))
-        labels.append(interval)
+        of_gaps = any(drop.ends and drop.explicit is not None for drop in drops)
+        labels.append("95 % interval of the difference" if of_gaps else "95 % interval")
     figure.legend(handles, labels, loc="outside lower center", ncols=3, columnspacing=1.5)
