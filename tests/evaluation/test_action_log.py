@@ -93,7 +93,7 @@ def test_a_changed_file_is_refused(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("digest", ["", "../../etc/passwd", "A" * 64, "0" * 63, "0" * 64 + "\n"])
 def test_what_is_no_digest_names_no_file(tmp_path: Path, digest: str) -> None:
-    with pytest.raises(StoreError, match="no digest"):
+    with pytest.raises(StoreError, match="not a digest"):
         action_path(tmp_path, digest)
 
 

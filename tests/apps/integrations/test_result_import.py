@@ -201,5 +201,5 @@ def test_devices_and_pipes_are_not_read(harness, tmp_path):
     (tmp_path / "device").symlink_to("/dev/zero")
     os.mkfifo(tmp_path / "pipe")
     for name in ("device", "pipe"):
-        with pytest.raises(InvalidValueError, match="no regular file"):
+        with pytest.raises(InvalidValueError, match="not a regular file"):
             import_results(harness, tmp_path / name, tmp_path / "run", OPTIONS)
