@@ -12,8 +12,8 @@ import numpy as np
 from roboirg.apps.learning.listener.listener_study import HELD_OUT, TEST, VARIANTS, StudyAnswer
 from roboirg.core.episode import ENVIRONMENT_VERSION
 from roboirg.core.instruction_options import InstructionOptions
-from roboirg.evaluation.analysis.figures.averages import draw_averages
 from roboirg.evaluation.analysis.figures.figure_style import save
+from roboirg.evaluation.analysis.figures.gaps import draw_gaps
 from roboirg.evaluation.analysis.stats.cells import (
     CellKey,
     CellResults,
@@ -97,7 +97,7 @@ def save_study_figure(cells: Cells, folder: Path) -> tuple[Path, ...]:
     }
     names = {key.policy_run: key.policy_run.policy for key in own}
     content = RunData((), own, summaries_by_key(own), names)
-    return save(lambda: draw_averages(content), folder, FIGURE)
+    return save(lambda: draw_gaps(content), folder, FIGURE)
 
 
 def _cells_of(cells: Cells, pool: str, *, has_rival: bool) -> Cells:
