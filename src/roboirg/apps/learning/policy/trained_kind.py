@@ -7,8 +7,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from roboirg.apps.learning.learn_support import check_learn_support, file_version
+from roboirg.apps.learning.policy.joint_chunks import JointChunks, JointChunksOfHands
 from roboirg.apps.learning.policy.learned_policy import LearnedPolicy
 from roboirg.apps.learning.policy.subgoal_following import LearnedHands, LearnedPlanner
+from roboirg.core.actions import JOINT_ANGLE, WAYPOINT
 from roboirg.core.errors import InvalidValueError, UnknownNameError
 from roboirg.policies.by_name.policy_specs import PolicyKind, PolicyMaker, make_follower
 from roboirg.policies.by_name.systems import HANDS
@@ -17,17 +19,24 @@ from roboirg.policies.planners.hierarchical_policy import HierarchicalPolicy, wi
 if TYPE_CHECKING:
     from roboirg.apps.learning.policy.policy_model import PolicyModel
 
+ACTIONS = "actions"
+"""Option: the action space."""
+
 
 def _trained(spec: str, name: str, options: Mapping[str, str]) -> PolicyMaker:
     """Return what makes learned policies; with ``hands=…`` learned planners with those hands."""
-    if others := sorted(options.keys() - {HANDS}):
-        raise UnknownNameError("option of trained:", others[0], [HANDS])
+    if others := sorted(options.keys() - {ACTIONS, HANDS}):
+        raise UnknownNameError("option of trained:", others[0], [ACTIONS, HANDS])
     if not name:
         raise InvalidValueError(f"Policy {spec!r} names no file.")
-    path = Path(name)
-    hands = options.get(HANDS)
+    path, hands = Path(name), options.get(HANDS)
+    actions = options.get(ACTIONS, WAYPOINT.name)
+    if actions not in (WAYPOINT.name, JOINT_ANGLE.name):
+        raise UnknownNameError("actions of trained:", actions, [WAYPOINT.name, JOINT_ANGLE.name])
     if hands is None:
-        return lambda seed: make_learned(path, seed)
+        return lambda seed: make_learned(path, seed, actions)
+    if ACTIONS in options:
+        raise InvalidValueError(f"Policy {spec!r} has other hands, which have their own actions.")
 
     def make(seed: int) -> HierarchicalPolicy:
         model, version = _load(path)
@@ -40,16 +49,26 @@ def _trained(spec: str, name: str, options: Mapping[str, str]) -> PolicyMaker:
     return make
 
 
-def make_learned(path: Path, seed: int = 0) -> LearnedPolicy:
+def make_learned(
+    path: Path, seed: int = 0, actions: str = WAYPOINT.name
+) -> LearnedPolicy | JointChunks:
     """Return the policy of a file; one with a planner follows the subgoals of others, too.
+
+    Args:
+        path: of the file.
+        seed: without effect, as nothing is random.
+        actions: name of the action space, waypoint or joint_angle.
 
     Raises:
         InvalidValueError: the file is none.
         MissingDependencyError: there is no PyTorch.
     """
     model, version = _load(path)
-    kind = LearnedPolicy if model.planner is None else LearnedHands
-    return kind(model, version, seed)
+    if model.planner is None:
+        policy = LearnedPolicy(model, version, seed)
+        return JointChunks(policy) if actions == JOINT_ANGLE.name else policy
+    hands = LearnedHands(model, version, seed)
+    return JointChunksOfHands(hands) if actions == JOINT_ANGLE.name else hands
 
 
 def _load(path: Path) -> tuple[PolicyModel, str]:

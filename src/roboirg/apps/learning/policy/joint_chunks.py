@@ -1,0 +1,128 @@
+"""Learned policies as policies in joint angles, which every policy server can offer."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any, ClassVar, cast
+
+import numpy as np
+import sapien
+import sapien.physx
+from numpy.typing import NDArray
+
+from roboirg.apps.learning.policy.learned_policy import LearnedPolicy
+from roboirg.apps.learning.policy.recording import LOOK_EVERY
+from roboirg.apps.learning.policy.subgoal_following import LearnedHands
+from roboirg.core.actions import ARM_JOINTS, JOINT_ANGLE
+from roboirg.core.errors import MotionPlanningError
+from roboirg.core.observations import FRONT, Demonstration, Observation
+from roboirg.simulation.controllers import WaypointController
+from roboirg.simulation.panda import JointTrajectory, Panda
+from roboirg.simulation.physics_settings import OPEN
+from roboirg.simulation.proprioception import Proprioception, ProprioceptiveState
+
+
+class JointChunks:
+    """Plans the waypoints of a learned policy, and returns the plan in chunks of joint angles.
+
+    A chunk ends where the policy looks next, after at most eight rows; all of them must be
+    executed. Joint positions, fingers and pictures of the front camera are all that is read of
+    observations and of the video: the tool's pose is computed, and a history is not needed. While
+    a waypoint cannot be reached the robot keeps still, and the policy is asked again at each look.
+
+    Args:
+        policy: chooses the waypoints.
+    """
+
+    cameras = (FRONT,)
+    actions: ClassVar[str] = JOINT_ANGLE.name
+    demonstration_frames = LOOK_EVERY
+
+    def __init__(self, policy: LearnedPolicy) -> None:
+        self.policy, self.version = policy, policy.version
+
+    @property
+    def metadata(self) -> dict[str, Any]:
+        """How it was trained."""
+        return self.policy.metadata
+
+    def reset(self, instruction: str, demonstration: Demonstration) -> None:
+        """Begin an episode, and see the video, whose pictures are all or every eighth."""
+        self._robot = _ObservedRobot()
+        self._steps, self._gripper = 0, OPEN
+        self._plan: Iterator[JointTrajectory] = iter(())
+        self._rows: JointTrajectory = np.empty((0, ARM_JOINTS + 1))
+        joints, video = demonstration["joint_positions"], demonstration
+        if len(joints):
+            fingers, pictures = demonstration["gripper"], demonstration["front_rgb"]
+            states = map(self._robot.observe, joints, fingers)
+            video = {
+                "joint_positions": joints,
+                "gripper": fingers,
+                "end_effector": np.stack([one["end_effector"] for one in states]),
+                "front_rgb": pictures[:: LOOK_EVERY if len(pictures) == len(joints) else 1],
+            }
+        self.policy.reset(instruction, video)
+
+    def hear(self, text: str, step: int) -> None:
+        """Hear another utterance."""
+        self.policy.hear(text, step)
+
+    def act(self, observation: Observation) -> JointTrajectory:
+        """Return the rows until the next look (n, 8), n <= 8."""
+        state = self._robot.observe(observation["joint_positions"], observation["gripper"])
+        now = cast("Observation", {**observation, **state, "history": ()})
+        to_look = LOOK_EVERY - self._steps % LOOK_EVERY
+        if not len(self._rows):
+            # After the move this plans the gripper's motion where the arm has arrived.
+            self._rows = next(self._plan, self._rows)
+        if not len(self._rows):
+            (waypoint,) = self.policy.act(now)
+            self._plan = self._robot.controller.trajectories(waypoint)
+            try:
+                self._rows = next(self._plan)
+            except MotionPlanningError:
+                still = np.append(state["joint_positions"], self._gripper)
+                self._rows = np.tile(still, (to_look, 1))
+        elif to_look == LOOK_EVERY:
+            self.policy.watch(now)
+        chunk, self._rows = self._rows[:to_look], self._rows[to_look:]
+        self._steps, self._gripper = self._steps + len(chunk), float(chunk[-1, -1])
+        return chunk
+
+
+class JointChunksOfHands(JointChunks):
+    """The same for hands, which follow subgoals."""
+
+    policy: LearnedHands
+
+    @property
+    def subgoal(self) -> str | None:
+        """The one that they follow."""
+        return self.policy.subgoal
+
+    def follow(self, subgoal: str) -> None:
+        """Set the subgoal, which holds from the next waypoint on."""
+        self.policy.follow(subgoal)
+
+
+class _ObservedRobot:
+    """A robot outside of the world, which stands as another one is observed to stand.
+
+    Attributes:
+        controller: plans from there.
+    """
+
+    def __init__(self) -> None:
+        self._scene = sapien.Scene([sapien.physx.PhysxCpuSystem()])
+        self._robot = Panda(self._scene, visible=False)
+        self._proprioception = Proprioception(self._robot)
+        self.controller = WaypointController(self._robot)
+
+    def observe(
+        self, joints: NDArray[np.floating[Any]], fingers: NDArray[np.floating[Any]]
+    ) -> ProprioceptiveState:
+        """Stand at joint positions (7), rad, with fingers (2), m; return proprioception there."""
+        self._robot.articulation.set_qpos(np.concatenate([joints, fingers]))
+        self._proprioception.update()
+        return self._proprioception.read()
