@@ -112,7 +112,7 @@ def test_looks_count_the_stages_that_are_completed(recorded):
 @pytest.mark.sim
 def test_an_interrupted_training_goes_on_where_it_was(recorded, tmp_path):
     torch = pytest.importorskip("torch")
-    from roboirg.apps.learning.listener.listener_net import make_vocabulary
+    from roboirg.apps.learning.listener.vocabulary import make_vocabulary
     from roboirg.apps.learning.policy.body_training import train_body
 
     plan = PolicyPlan(("ButtonUnmask",), body_epochs=4)
