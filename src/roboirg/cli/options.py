@@ -112,7 +112,7 @@ class PlanWords(OptionGroup):
         return {} if name is None else read_plan_file(name, self.section)
 
     def choices(self, kind: type) -> dict[str, Any]:
-        """Return what the plan's section gives, each a field of this class.
+        """Return what the plan's section gives of the fields of this class.
 
         Raises:
             UnknownNameError: a key is none of its own.
@@ -133,6 +133,7 @@ class PlanWords(OptionGroup):
         return {
             name: as_typed_field(f"{self.section}.{name}", types[name], value)
             for name, value in given.items()
+            if name in types
         }
 
     @property

@@ -17,6 +17,7 @@ from roboirg.apps.learning.policy.fast_weights import (  # noqa: E402
     FastNorm,
 )
 from roboirg.apps.learning.policy.frame_memory import even_frames  # noqa: E402
+from roboirg.apps.learning.policy.memories import Carried  # noqa: E402
 from roboirg.apps.learning.policy.policy_plan import (  # noqa: E402
     HANDS,
     MEMORY_NAMES,
@@ -73,6 +74,28 @@ def same(one, other):
 def test_no_memory_sees_the_future(memory):
     body, batch = body_of(memory), batch_of(1)
     assert same(body(batch), body(changed(batch, slice(8, None))))
+
+
+def first_of(batch, looks, things):
+    """Return the first looks of a batch, in which some things were not yet seen, and the last."""
+    parts = [one[:, :looks, :things] for one in batch[:5]]
+    last = torch.tensor([[looks - 1]])
+    return batch._replace(
+        **dict(zip(batch._fields, parts, strict=False)),
+        tool=batch.tool[:, :looks],
+        there=batch.there[:, :looks],
+        decisions=last,
+    )
+
+
+@pytest.mark.parametrize("memory", sorted(MEMORIES))
+def test_what_is_carried_gives_what_all_looks_give(memory):
+    body, batch = body_of(memory), batch_of(1)
+    batch.seen[:, :4, 3:], batch.known[:, :4, 3:] = False, False
+    carried = Carried()
+    for looks, things in ((1, 3), (4, 3), (5, THINGS), (5, THINGS), (LOOKS, THINGS)):
+        part = first_of(batch, looks, things)
+        assert same(body(part, carried), body(part))
 
 
 @pytest.mark.parametrize("memory", sorted(MEMORIES))

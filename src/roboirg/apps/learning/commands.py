@@ -13,6 +13,7 @@ from roboirg.core.plain_text import counted
 
 if TYPE_CHECKING:
     from roboirg.apps.learning.listener.listener_training import TrainingPlan
+    from roboirg.apps.learning.policy.policy_plan import PolicyPlan
     from roboirg.apps.learning.trainer import Progress
 
 # Heavy modules are imported inside the commands, so that --help is fast.
@@ -121,11 +122,13 @@ class PolicyWords(PlanWords):
     section = "training"
     own = (
         "scenes", "drawn", "goals", "detector_epochs", "body_epochs", "reader_epochs", "seed",
-        "encoders",
+        "encoders", "memories", "seeds", "parts", "played",
     )  # fmt: skip
 
 
 NO_POLICY_WORDS = PolicyWords()
+PLAYED = ("episodes", "split")
+"""Keys of a plan that change what the paper's experiment plays."""
 
 
 @learn_app.command("policy")
@@ -145,12 +148,21 @@ def learn_policy(
         ),
     ] = "recurrent",
     words: PolicyWords = NO_POLICY_WORDS,
+    paper: Annotated[
+        bool,
+        typer.Option(
+            "--paper",
+            help="Train a policy for each mechanism of the paper, play the paper's experiment with "
+            "them, and write a page with the published results next to these.",
+        ),
+    ] = False,
     workers: Workers = None,
 ) -> None:
     """Train a policy that acts on pictures and words: records the expert, then learns.
 
     What is there already is used again. A plan may have, under `training`: scenes, drawn, goals,
-    detector_epochs, body_epochs, reader_epochs, seed, encoders.
+    detector_epochs, body_epochs, reader_epochs, seed, encoders; with --paper also memories, seeds,
+    parts (main, resolved, context, planner), played (settings), and at its top episodes and split.
 
     Example: roboirg learn policy --tasks PickXtimes --out learned
     """
@@ -168,15 +180,45 @@ def learn_policy(
         **words.choices(PolicyPlan),
     )
     check_learn_support()
+    out.mkdir(parents=True, exist_ok=True)
+    if paper:
+        _play_paper(plan, words, out, worker_count(workers))
+        return
     from roboirg.apps.learning.policy.policy_model import save_policy
     from roboirg.apps.learning.policy.policy_training import train_policy
 
-    out.mkdir(parents=True, exist_ok=True)
     path = out / f"{plan.name}.pt"
     check_output_file(path)
     save_policy(train_policy(plan, out, worker_count(workers), _print_tenths()), path)
     typer.echo(f"{path}, {path.stat().st_size / 2**20:.1f} MiB")
     typer.echo(f"Play it with: roboirg run --policy trained:{path} --tasks {tasks} --out runs")
+
+
+def _play_paper(plan: PolicyPlan, words: PolicyWords, out: Path, workers: int) -> None:
+    from roboirg.apps.learning.policy.paper_experiment import (
+        PARTS,
+        ExperimentPlan,
+        part_plan,
+        runs_of,
+        train_rows,
+    )
+    from roboirg.apps.learning.policy.paper_page import write_paper_page
+    from roboirg.apps.learning.policy.policy_plan import MEMORY_NAMES
+    from roboirg.cli.names import known_name
+    from roboirg.evaluation.api.python_run import play_plan
+
+    experiment = ExperimentPlan(**words.choices(ExperimentPlan))
+    for memory in experiment.memories:
+        known_name("memory", memory, MEMORY_NAMES)
+    for part in experiment.parts:
+        known_name("part", part, tuple(PARTS))
+    files = train_rows(experiment, plan, out, workers, _print_tenths())
+    changes = {"tasks": ",".join(plan.tasks)}
+    changes |= {name: words.fields[name] for name in PLAYED if name in words.fields}
+    for part, run in runs_of(out, experiment.parts).items():
+        made = part_plan(part, experiment, files, changes)
+        play_plan(made, run, workers=workers, progress=True, on_record=None)
+    typer.echo(str(write_paper_page(out, experiment.parts)))
 
 
 def _plan(words: TrainingWords, without: str) -> TrainingPlan:

@@ -24,6 +24,11 @@ class Progress(Protocol):
         """Show it."""
 
 
+def part_of(progress: Progress, name: str) -> Progress:
+    """Return a progress that names what it is a part of."""
+    return lambda work, *done: progress(f"{name}: {work}", *done)
+
+
 class KeptTraining(NamedTuple):
     """The file in which a training is kept after each pass, and all that the result depends on."""
 

@@ -96,6 +96,7 @@ def run_study(
     """
     from roboirg.apps.learning.listener.learned_model import save_model
     from roboirg.apps.learning.listener.listener_training import check_plan, see_episodes, teach
+    from roboirg.apps.learning.trainer import part_of
 
     check_plan(plan)
     work = work_folder(folder)
@@ -109,7 +110,7 @@ def run_study(
             if model is None:
                 scenes = scenes or see_episodes(common, work, workers, progress)
                 answers.unlink(missing_ok=True)
-                model = teach(scenes, own, work / f"reader-{name}.pt", _named(progress, name))
+                model = teach(scenes, own, work / f"reader-{name}.pt", part_of(progress, name))
                 save_model(model, path)
             if not answers.exists():
                 shown = shown or _show_all(plan.tasks, work, workers, progress)
@@ -135,10 +136,6 @@ def _trained(path: Path, plan: TrainingPlan) -> LearnedModel | None:
         return None
     model = load_model(path)
     return model if model.about == plan.about else None
-
-
-def _named(progress: Progress, name: str) -> Progress:
-    return lambda work, *done: progress(f"{name}: {work}", *done)
 
 
 def _show_all(

@@ -14,6 +14,8 @@ from roboirg.apps.learning.policy.body_layers import LAYERS, WIDTH, Join, body_l
 from roboirg.apps.learning.policy.fast_weights import FastWeightMemory
 from roboirg.apps.learning.policy.frame_memory import EvenFrameMemory, KeptFrameMemory
 from roboirg.apps.learning.policy.memories import (
+    CLOSED,
+    Carried,
     LookMemory,
     Looks,
     NoMemory,
@@ -34,8 +36,6 @@ MEMORIES: Mapping[str, type[LookMemory]] = {
 }
 """What bodies remember, and what planners do: the last two name subgoals, which hands follow."""
 WAVES = 5
-CLOSED = -1e4
-"""Score of a thing that cannot be chosen."""
 TOOL_NUMBERS = 7
 """x, y, z, cosine and sine of its angle, a finger's opening, video or not."""
 MOST_DONE = 24
@@ -126,10 +126,10 @@ class BodyNet(nn.Module):
         self.given = ContextInput(context) if context else None
         self.keeps = KeepScore() if memory == CHOOSES else None
 
-    def forward(self, batch: EpisodeBatch) -> BodyAnswer:
-        """Return what is said at the decisions."""
+    def forward(self, batch: EpisodeBatch, carried: Carried | None = None) -> BodyAnswer:
+        """Return what is said at the decisions; what is carried is as in `Looks`."""
         goal = self.goal(batch.goals)[:, None]
-        looks = self._looks(batch, goal)
+        looks = self._looks(batch, goal)._replace(carried=carried)
         remembered = self.memory(looks, batch.decisions)
         things = at_looks(looks.things, batch.decisions) + remembered.things + goal[:, :, None]
         whole = at_looks(looks.whole, batch.decisions) + remembered.whole

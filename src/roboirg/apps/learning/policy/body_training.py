@@ -15,13 +15,8 @@ from torch import Tensor
 from torch.nn import functional
 
 from roboirg.apps.learning.listener.vocabulary import Vocabulary
-from roboirg.apps.learning.policy.body_net import (
-    CLOSED,
-    MOST_DONE,
-    BodyAnswer,
-    BodyNet,
-    EpisodeBatch,
-)
+from roboirg.apps.learning.policy.body_net import MOST_DONE, BodyAnswer, BodyNet, EpisodeBatch
+from roboirg.apps.learning.policy.memories import CLOSED
 from roboirg.apps.learning.policy.policy_data import (
     Decision,
     EpisodeNumbers,

@@ -18,6 +18,7 @@ from roboirg.apps.learning.policy.body_layers import (
     split_heads,
 )
 from roboirg.apps.learning.policy.memories import (
+    Carried,
     FrameTokens,
     LookMemory,
     Looks,
@@ -113,7 +114,8 @@ class FastWeightMemory(LookMemory):
 
     def forward(self, looks: Looks, decisions: Tensor) -> Remembered:
         tokens, there = self.frames(looks)
-        tokens = tokens + self.out(self.norm(self._through_time(tokens, there)))
+        found = self._through_time(tokens, there, looks.carried or Carried())
+        tokens = tokens + self.out(self.norm(found))
         recent = decisions[..., None] - torch.arange(LAST - 1, -1, -1)
         narrow, there = at_frames(self.narrow(tokens), there, recent)
         joins: list[Join] = []
@@ -122,9 +124,14 @@ class FastWeightMemory(LookMemory):
             joins.append(join)
         return seen_now(looks, decisions, joins)
 
-    def _through_time(self, tokens: Tensor, there: Tensor) -> Tensor:
-        """Return what the weights give at each look (B, T, m, WIDTH), after its own update."""
-        batch, length, count, _ = tokens.shape
+    def _through_time(self, tokens: Tensor, there: Tensor, carried: Carried) -> Tensor:
+        """Return what the weights give at each look (B, T, m, WIDTH), after its own update.
+
+        At looks that were taken in before it is what was given then.
+        """
+        count = tokens.shape[2]
+        tokens, there = tokens[:, carried.looks :], there[:, carried.looks :]
+        batch, length = tokens.shape[:2]
         parts = self.projected(tokens).reshape(batch, length, count, 3, FAST_HEADS, SIZE).unbind(3)
         queries, keys, values = (
             norm(part).transpose(2, 3) for norm, part in zip(self.norms, parts, strict=True)
@@ -133,15 +140,23 @@ class FastWeightMemory(LookMemory):
         rates = functional.softplus(self.rate(tokens) + start).clamp(0.0, MOST_RATE)
         rates = (rates * there[..., None]).transpose(2, 3)[..., None]
         norm = FastNorm(self.scale, self.shift)
-        fast = Fast(
-            self.weights.expand(batch, -1, -1, -1),
-            tokens.new_zeros(batch, FAST_HEADS, 1, SIZE),
+        fast, given = carried.state or (
+            Fast(
+                self.weights.expand(batch, -1, -1, -1),
+                tokens.new_zeros(batch, FAST_HEADS, 1, SIZE),
+            ),
+            tokens.new_zeros(batch, 0, count, WIDTH),
         )
         found = []
         for now in range(length):
             fast = fast.after(keys[:, now], values[:, now], rates[:, now], norm)
             found.append(fast.read(queries[:, now], norm))
-        return torch.stack(found, 1).transpose(2, 3).reshape(batch, length, count, WIDTH)
+        given = functional.pad(given, (0, 0, 0, count - given.shape[2]))
+        if found:
+            new = torch.stack(found, 1).transpose(2, 3).reshape(batch, length, count, WIDTH)
+            given = torch.cat([given, new], 1)
+        carried.looks, carried.state = given.shape[1], (fast, given)
+        return given
 
 
 class ExpertLayer(nn.Module):

@@ -10,15 +10,30 @@ from __future__ import annotations
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import torch
 from torch import Tensor, nn
+from torch.nn import functional
 
 from roboirg.apps.learning.policy.body_layers import WIDTH, Join
 
+CLOSED = -1e4
+"""Score of a thing that cannot be chosen."""
 TIME_WAVES, SLOWEST = 8, 100.0
 """Sines and cosines of a look's number in frames, and looks in a radian of the slowest."""
+
+
+class Carried:
+    """What a memory that steps from look to look goes on from, so that no look is taken twice.
+
+    Attributes:
+        looks: number of looks taken in.
+        state: what is known after them; None before the first one.
+    """
+
+    looks: int = 0
+    state: Any = None
 
 
 class Looks(NamedTuple):
@@ -33,6 +48,8 @@ class Looks(NamedTuple):
         known: (B, T, K) whether it was seen until then, often enough to be no mistake.
         there: (B, T) whether the episode has the look.
         kept: (B, D, S) looks that a planner keeps at each decision, -1 for none.
+        carried: what a memory knows of the first looks, and updates; None before the first look.
+            Decisions are at looks that are new.
     """
 
     things: Tensor
@@ -43,6 +60,7 @@ class Looks(NamedTuple):
     known: Tensor
     there: Tensor
     kept: Tensor | None = None
+    carried: Carried | None = None
 
 
 class Remembered(NamedTuple):
@@ -136,34 +154,41 @@ class RecurrentMemory(LookMemory):
 
     def __init__(self) -> None:
         super().__init__()
-        self.thing = nn.GRUCell(3 * WIDTH, WIDTH)
-        self.whole = nn.GRUCell(3 * WIDTH, WIDTH)
+        self.thing = _PartedCell()
+        self.whole = _PartedCell()
         self.nearness = nn.Parameter(torch.tensor(1.0))
         self.pool = nn.Linear(WIDTH, 1)
 
     def forward(self, looks: Looks, decisions: Tensor) -> Remembered:
+        carried = looks.carried or Carried()
         batch, length, count, width = looks.things.shape
-        near = self._nearness(looks)
-        things = looks.things.new_zeros(batch, count, width)
-        whole = looks.things.new_zeros(batch, width)
-        kept_things, kept_whole = [], []
-        for now in range(length):
-            seen, there = looks.seen[:, now, :, None], looks.there[:, now, None]
-            around = near[:, now] @ things
-            shared = whole[:, None].expand(-1, count, -1)
-            given = torch.cat([looks.things[:, now], around, shared], -1)
-            updated = self.thing(given.flatten(0, 1), things.flatten(0, 1)).view_as(things)
-            things = torch.where(seen & there[:, None], updated, things)
-            summary = torch.cat(
-                [looks.whole[:, now], *self._summary(things, looks.known[:, now])], -1
-            )
-            whole = torch.where(there, self.whole(summary, whole), whole)
+        things, whole = carried.state or (
+            looks.things.new_zeros(batch, 0, width),
+            looks.things.new_zeros(batch, width),
+        )
+        things = functional.pad(things, (0, 0, 0, count - things.shape[1]))
+        new = slice(carried.looks, None)
+        near = self._nearness(looks)[:, new].unbind(1)
+        updates = (looks.seen & looks.there[..., None])[:, new, :, None].unbind(1)
+        there, known = (one[:, new, ..., None].unbind(1) for one in (looks.there, looks.known))
+        of_things, of_whole = (
+            cell.first(one[:, new]).unbind(1)
+            for cell, one in ((self.thing, looks.things), (self.whole, looks.whole))
+        )
+        kept_things, kept_whole = [things], [whole]
+        for now in range(length - carried.looks):
+            around = near[now] @ things
+            updated = self.thing(of_things[now], around, whole[:, None], things)
+            things = torch.where(updates[now], updated, things)
+            mean, most = self._summary(things, known[now])
+            whole = torch.where(there[now], self.whole(of_whole[now], mean, most, whole), whole)
             kept_things.append(things)
             kept_whole.append(whole)
-        all_things, all_whole = torch.stack(kept_things, 1), torch.stack(kept_whole, 1)
+        at = decisions - carried.looks + 1
+        carried.looks, carried.state = length, (things, whole)
         return Remembered(
-            at_looks(all_things, decisions),
-            at_looks(all_whole, decisions),
+            at_looks(torch.stack(kept_things, 1), at),
+            at_looks(torch.stack(kept_whole, 1), at),
             at_looks(looks.known, decisions),
         )
 
@@ -180,7 +205,32 @@ class RecurrentMemory(LookMemory):
         return scores.softmax(-1)[..., :-1]
 
     def _summary(self, things: Tensor, known: Tensor) -> tuple[Tensor, Tensor]:
-        scores = self.pool(things).squeeze(-1).masked_fill(~known, -1e4)
-        mean = (scores.softmax(-1)[..., None] * things * known[..., None]).sum(1)
-        most = things.masked_fill(~known[..., None], -2.0).max(1).values
-        return mean, most
+        """Return a weighed mean and the maximum (B, WIDTH) of things (B, K, …) known (B, K, 1)."""
+        scores = self.pool(things).masked_fill(~known, CLOSED)
+        mean = (scores.softmax(1) * known).transpose(1, 2) @ things
+        return mean[:, 0], things.masked_fill(~known, -2.0).amax(1)
+
+
+class _PartedCell(nn.Module):
+    """A gated recurrent unit with three inputs, of which the first is known for all looks."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.first = nn.Linear(WIDTH, 3 * WIDTH)
+        self.second, self.third = (nn.Linear(WIDTH, 3 * WIDTH, bias=False) for _ in range(2))
+        self.own = nn.Linear(WIDTH, 3 * WIDTH)
+
+    def forward(self, of_first: Tensor, second: Tensor, third: Tensor, state: Tensor) -> Tensor:
+        """Return the next state (…, WIDTH).
+
+        Args:
+            of_first: (…, 3 * WIDTH) what `first` makes of the first input.
+            second: (…, WIDTH).
+            third: (…, WIDTH).
+            state: (…, WIDTH).
+        """
+        given = of_first + self.second(second) + self.third(third)
+        own = self.own(state)
+        reset, keep = (given[..., : 2 * WIDTH] + own[..., : 2 * WIDTH]).sigmoid().chunk(2, -1)
+        new = (given[..., 2 * WIDTH :] + reset * own[..., 2 * WIDTH :]).tanh()
+        return torch.lerp(new, state, keep)

@@ -15,6 +15,7 @@ from roboirg.apps.learning.listener.listener_net import ListenerNet
 from roboirg.apps.learning.listener.object_relations import ObjectsInView, rank
 from roboirg.apps.learning.listener.vocabulary import ListenerInput, Vocabulary, parts_of
 from roboirg.apps.learning.policy.body_net import BodyAnswer, BodyNet
+from roboirg.apps.learning.policy.memories import Carried
 from roboirg.apps.learning.policy.moves import Move, waypoint
 from roboirg.apps.learning.policy.planner_history import PlannedNumbers, context_size
 from roboirg.apps.learning.policy.policy_data import EpisodeNumbers, LookHistory, to_batch
@@ -141,6 +142,7 @@ class SeenEpisode:
         self._model = model
         self._history = LookHistory()
         self._first: list[LookTokens] = []
+        self._carried: dict[BodyNet, tuple[NDArray[np.float32], Carried]] = {}
         self.video_looks = 0
 
     def look(
@@ -186,7 +188,11 @@ class SeenEpisode:
         now = np.array([len(self._history) - 1])
         looks = self._history.numbers()
         numbers = EpisodeNumbers(looks, goal, now, nothing, nothing, nothing, planned)
-        answer: BodyAnswer = net(to_batch([numbers]))
+        goal_before, carried = self._carried.get(net, (goal, Carried()))
+        if not np.array_equal(goal, goal_before):
+            carried = Carried()
+        self._carried[net] = goal, carried
+        answer: BodyAnswer = net(to_batch([numbers]), carried)
         kind = int(answer.moves[0, 0].argmax())
         thing = int(answer.things[0, 0, kind].argmax())
         keys = () if answer.keys is None else np.flatnonzero(answer.keys[0, 0].numpy() > 0)

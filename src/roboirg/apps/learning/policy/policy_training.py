@@ -67,8 +67,10 @@ from roboirg.util.media import decode_png
 from roboirg.util.parallel_map import parallel_map
 
 RECORDED_SPLIT = "random"
-PICTURE_EVERY = 6
-"""Looks from one picture to the next in episodes that are drawn."""
+PICTURE_EVERY = 16
+"""Looks from one picture to the next in scenes that are drawn; many scenes help more than many
+pictures of each."""
+MOST_LOOKS = 10_000
 DETECTOR_BATCH, DETECTOR_RATE = 16, 8e-3
 TASK_EPOCHS, TASK_RATE = 6, 5e-3
 FORGOTTEN_WORDS = 0.1
@@ -109,18 +111,22 @@ def train_policy(plan: PolicyPlan, folder: Path, workers: int, progress: Progres
         ]
         planner = train_body(plan, recorded, due, forms, sight, vocabulary, folder, progress)
     task_net, reader = _train_words(plan, lessons, vocabulary, progress)
-    about: dict[str, Any] = {
+    about = {**about_policy(plan), "episodes": len(recorded)}
+    return PolicyModel(
+        sight, detector, vocabulary, task_net, reader, corners, moves, plan.memory,
+        body, about, forms, planner,
+    )  # fmt: skip
+
+
+def about_policy(plan: PolicyPlan) -> dict[str, Any]:
+    """Return what a policy's file says about its plan."""
+    return {
         **plan._asdict(),
         "tasks": list(plan.tasks),
         "settings": list(plan.settings),
         "words": plan.words if plan.settings else WORDLESS,
         "language_version": LANGUAGE_VERSION,
-        "episodes": len(recorded),
     }
-    return PolicyModel(
-        sight, detector, vocabulary, task_net, reader, corners, moves, plan.memory,
-        body, about, forms, planner,
-    )  # fmt: skip
 
 
 def record_all(plan: PolicyPlan, folder: Path, workers: int, progress: Progress) -> list[Recorded]:
@@ -165,12 +171,12 @@ def _record(folder: Path, drawn: int, job: tuple[str, int]) -> None:
     Of a scene in which not even the video can be planned, only that is kept.
     """
     task, number = job
-    every = PICTURE_EVERY if number < drawn else 0
+    pictures = range(number % PICTURE_EVERY, MOST_LOOKS if number < drawn else 0, PICTURE_EVERY)
     episode = get_episode(task, RECORDED_SPLIT, number)
     recorded = unplanned(episode)
     for disturbance in (Disturbance(), None):
         with contextlib.suppress(MotionPlanningError):
-            recorded = record_episode(episode, 1, disturbance, every)
+            recorded = record_episode(episode, 1, disturbance, pictures)
             break
     save_recording(recorded, _path(folder, task, number))
 

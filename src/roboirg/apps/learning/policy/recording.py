@@ -79,7 +79,7 @@ class ExpertRecording(NamedTuple):
 
 
 def record_episode(
-    episode: Episode, seed: int, disturbance: Disturbance | None, picture_every: int = 0
+    episode: Episode, seed: int, disturbance: Disturbance | None, drawn: range = range(0)
 ) -> ExpertRecording:
     """Let the disturbed expert play an episode, and return what was to be seen.
 
@@ -87,17 +87,17 @@ def record_episode(
         episode: the episode.
         seed: of the disturbance.
         disturbance: how waypoints are moved; None for not at all.
-        picture_every: looks from one picture to the next; 0 draws nothing.
+        drawn: numbers of the looks of which a picture is drawn.
     """
     env = make(
         episode,
         actions=WaypointExpert.actions,
-        cameras=(FRONT,) if picture_every else (),
+        cameras=(FRONT,) if drawn else (),
         demonstration_frames="none",
     )
     env.draws = False
     try:
-        return _LookRecorder(env, WaypointExpert(seed, disturbance), picture_every).record()
+        return _LookRecorder(env, WaypointExpert(seed, disturbance), drawn).record()
     finally:
         env.close()
 
@@ -113,9 +113,9 @@ def unplanned(episode: Episode) -> ExpertRecording:
 class _LookRecorder(EpisodeLoop):
     """Plays one episode and notes looks and decisions."""
 
-    def __init__(self, env: RoboIRGEnv, policy: WaypointExpert, picture_every: int) -> None:
+    def __init__(self, env: RoboIRGEnv, policy: WaypointExpert, drawn: range) -> None:
         super().__init__(env, policy)
-        self._expert, self._picture_every = policy, picture_every
+        self._expert, self._drawn = policy, drawn
         self._rows: list[tuple[Any, ...]] = []
         self._decisions: list[tuple[int, ExpertWaypoint]] = []
         self._pictures: dict[int, bytes] = {}
@@ -178,7 +178,7 @@ class _LookRecorder(EpisodeLoop):
         bodies = [world.bodies[item.name] for item in self.env.episode.scene.objects]
         things = [(*body.position, body.yaw) for body in bodies]
         visible = visible_of(world, bodies)
-        if self._picture_every and number % self._picture_every == 0:
+        if number in self._drawn:
             segments = world.cameras.segmentation(FRONT)
             shown = [int((segments == body.segment).sum()) >= MIN_PIXELS for body in bodies]
             visible = [one and in_view for one, in_view in zip(visible, shown, strict=True)]

@@ -1,0 +1,150 @@
+"""The paper's experiment with its mechanisms on the small body: train them, and play its tables."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from pydantic import PositiveInt
+
+from roboirg.apps.learning.policy.policy_plan import PLANNERS, PolicyPlan
+from roboirg.apps.learning.trainer import Progress, part_of
+from roboirg.core.errors import InvalidValueError
+from roboirg.evaluation.plan.plan import Plan
+from roboirg.evaluation.plan.plan_file import read_plan_file
+from roboirg.evaluation.plan.plan_maker import make_plan
+
+SYSTEMS: Mapping[str, str] = {
+    "none": "pi0.5",
+    "ttt": "TTT-Expert",
+    "framesamp": "FrameS-Modul",
+    "subgoal": "GroundSG-QwenVL",
+    "keyframes": "MemER",
+}
+"""The paper's system with the mechanism of each memory."""
+RESOLVED = "resolved"
+PARTS: Mapping[str, str] = {
+    "main": "paper",
+    RESOLVED: "paper",
+    "context": "paper-context",
+    "planner": "paper-planners",
+}
+"""The packaged plan that each part of the experiment changes."""
+HELD_OUT = "test"
+"""The pool of words that is spoken in every split: that of the packaged plans' split."""
+OWN_TASKS = ("context", "planner")
+"""Parts with three tasks of their own."""
+SEED_MARK = "-seed"
+"""Between the name of a row and a training seed other than 0."""
+RUNS = "runs"
+"""Folder of the runs, one for each part."""
+
+
+class ExperimentPlan(NamedTuple):
+    """What is trained and played.
+
+    Attributes:
+        memories: names of memories; each is a row. Those that no system has are no part of the
+            paper's experiment, but can be played with the others.
+        seeds: training seeds, from 0.
+        parts: names of `PARTS`.
+        played: settings that are played; none for those of the paper's plans.
+    """
+
+    memories: tuple[str, ...] = tuple(SYSTEMS)
+    seeds: PositiveInt = 1
+    parts: tuple[str, ...] = tuple(PARTS)
+    played: tuple[str, ...] = ()
+
+
+def row_name(memory: str, seed: int = 0, change: str = "") -> str:
+    """Return what a row's policy is called: by its mechanism, never by a system."""
+    return f"small-{memory}{change}" + (f"{SEED_MARK}{seed}" if seed else "")
+
+
+def row_of(policy: str) -> tuple[str, int]:
+    """Return the row of a policy, and its training seed."""
+    row, _, seed = policy.partition(SEED_MARK)
+    return row, int(seed or 0)
+
+
+def train_rows(
+    experiment: ExperimentPlan, plan: PolicyPlan, folder: Path, workers: int, progress: Progress
+) -> dict[str, Path]:
+    """Return the file of each row's policy; what is there already is used again.
+
+    Args:
+        experiment: which rows.
+        plan: of the training; its memory and seed are the rows'.
+        folder: for recordings and files.
+        workers: processes that record.
+        progress: called with the row and a kind of work, what is done of it, and all of it.
+    """
+    from roboirg.apps.learning.policy.policy_model import load_policy, save_policy
+    from roboirg.apps.learning.policy.policy_training import about_policy, train_policy
+
+    found = {}
+    for seed in range(experiment.seeds):
+        for memory in experiment.memories:
+            own, name = plan._replace(memory=memory, seed=seed), row_name(memory, seed)
+            path = folder / f"{own.name}.pt"
+            if not path.exists():
+                save_policy(train_policy(own, folder, workers, part_of(progress, name)), path)
+            trained = load_policy(path).about
+            if any(trained[key] != value for key, value in about_policy(own).items()):
+                raise InvalidValueError(
+                    f"{str(path)!r} was trained by another plan; give another folder, or delete it."
+                )
+            found[name] = path
+    return found
+
+
+def part_plan(
+    part: str, experiment: ExperimentPlan, files: Mapping[str, Path], changes: Mapping[str, Any]
+) -> Plan:
+    """Return the plan of a part: the packaged one with the rows as policies.
+
+    Args:
+        part: a name of `PARTS`.
+        experiment: which rows.
+        files: of each row.
+        changes: other options of `make_plan`; tasks do not change parts with tasks of their own.
+    """
+    given = read_plan_file(PARTS[part])
+    given |= {"forms": RESOLVED if part == RESOLVED else "implicit", "policy_seeds": "0"}
+    if experiment.played and part != "context":
+        given["settings"] = ",".join(experiment.played)
+    if part in OWN_TASKS:
+        changes = {name: one for name, one in changes.items() if name != "tasks"}
+    if changes.get("split", given["split"]) != given["split"]:
+        given["wordings"] = HELD_OUT
+    policies = _with_planners(experiment, files) if part == "planner" else _rows(files)
+    return make_plan([f"{name}={spec}" for name, spec in policies.items()], **{**given, **changes})
+
+
+def _rows(files: Mapping[str, Path]) -> dict[str, str]:
+    return {name: f"trained:{path.absolute()}" for name, path in files.items()}
+
+
+def _with_planners(experiment: ExperimentPlan, files: Mapping[str, Path]) -> dict[str, str]:
+    """Return the rows with planners, and the same hands and planners with others.
+
+    The stronger planner is the interpreter of the words; the stronger hands are the scripted ones.
+    """
+    found = {}
+    for seed in range(experiment.seeds):
+        for memory in (one for one in experiment.memories if one in PLANNERS):
+            name = row_name(memory, seed)
+            own = f"trained:{files[name].absolute()}"
+            found[name] = own
+            found[row_name(memory, seed, "-interpreter")] = f"planner:listener?hands={own}"
+            found[row_name(memory, seed, "-scripted-hands")] = f"{own}?hands=scripted"
+    if found:
+        found["interpreter-scripted-hands"] = "planner:listener?hands=scripted"
+    return found
+
+
+def runs_of(folder: Path, parts: Sequence[str] = tuple(PARTS)) -> dict[str, Path]:
+    """Return the folder of each part's run."""
+    return {part: folder / RUNS / part for part in parts}

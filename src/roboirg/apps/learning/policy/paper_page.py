@@ -1,0 +1,237 @@
+"""The page of the paper's experiment: published and own tables, and the same questions to both."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from decimal import Decimal
+from pathlib import Path
+from typing import NamedTuple
+
+import msgspec
+import numpy as np
+
+from roboirg.apps.learning.policy.paper_experiment import (
+    RESOLVED,
+    SYSTEMS,
+    row_name,
+    row_of,
+    runs_of,
+)
+from roboirg.evaluation.analysis.published import TRIALS, PublishedRow, published_rows
+from roboirg.evaluation.analysis.stats.cells import Cells, gather
+from roboirg.evaluation.analysis.stats.intervals import SEED, Z_95, Interval
+from roboirg.evaluation.analysis.stats.option_labels import options_label
+from roboirg.evaluation.analysis.stats.paired_tests import Gap, Pairs, holm, measure_gap
+from roboirg.evaluation.analysis.stats.run_summary import ALL, SummaryRow, summarize
+from roboirg.evaluation.analysis.tables.paper_tables import is_informative, make_table
+from roboirg.evaluation.analysis.tables.rendering.markdown import markdown
+from roboirg.evaluation.records.record import Summary
+from roboirg.evaluation.records.store import read_results
+from roboirg.language.settings import EXPLICIT, plain_settings
+
+PAGE = "paper.md"
+FIRST = "none"
+"""The memory that the others are compared with."""
+_TITLE = "# The paper's experiment with small policies"
+_INTRODUCTION = (
+    "Rows called *small-…* have a mechanism of the paper on the small body of the learned policy. "
+    "They are not the paper's systems; the page *The paper's mechanisms on a small body* of the "
+    "documentation lists what differs. Published rates have 150 rollouts in each cell. Policies "
+    "that differ in their training seed alone are one row; intervals are over scenes."
+)
+
+
+class Difference(NamedTuple):
+    """A difference of two rates, 0 to 1.
+
+    Attributes:
+        value: the first less the second.
+        interval: 95 %.
+        p_value: not corrected.
+    """
+
+    value: float
+    interval: Interval | None
+    p_value: float
+
+
+Column = Mapping[str, Difference]
+"""By row."""
+
+
+def write_paper_page(folder: Path, parts: Sequence[str]) -> Path:
+    """Write the page of the runs that were played, and return its path."""
+    found = {
+        part: gather([(part, [_of_row(one) for one in read_results(run)])])
+        for part, run in runs_of(folder, parts).items()
+        if run.exists()
+    }
+    page = folder / PAGE
+    page.write_text("\n\n".join(_sections(found)) + "\n", encoding="utf-8")
+    return page
+
+
+def _of_row(result: Summary) -> Summary:
+    """Return the result of a policy as one of its row: a training seed counts as a policy seed."""
+    row, seed = row_of(result.policy)
+    return msgspec.structs.replace(result, policy=row, policy_seed=seed, policy_version="trained")
+
+
+def _sections(found: Mapping[str, Cells]) -> Iterator[str]:
+    yield _TITLE
+    yield _INTRODUCTION
+    for which in ("main", "context", "planner"):
+        cells = found.get(which, {})
+        if cells and is_informative(which, cells):
+            yield markdown(make_table(which, cells, published=True)).rstrip()
+    main = found.get("main", {})
+    if main:
+        yield from _questions(main, found.get(RESOLVED, {}))
+
+
+def _questions(main: Cells, resolved: Cells) -> Iterator[str]:
+    settings = [name for name in plain_settings() if name != EXPLICIT]
+    yield "## Does explicit success carry over, and which setting costs most?"
+    yield "Success in each setting less explicit success on the same scenes, in points."
+    yield _table(settings, lambda one: _own_gaps(main, one), lambda one: _published(one, EXPLICIT))
+    yield "## Do memory and referring come apart?"
+    yield "Success less that of the row without memory, in points."
+    every = [EXPLICIT, *settings]
+    yield _table(every, lambda one: _own_against(main, one), lambda one: _published(one, None))
+    yield "## Do planners keep more?"
+    yield "Success in each setting by explicit success, in percent."
+    yield _retention(main, settings)
+    if resolved:
+        yield "## Do resolved forms recover it?"
+        yield "Success with references replaced by names less success with references, in points."
+        both = {**main, **resolved}
+        yield _table(settings, lambda one: _own_form_gaps(both, one), lambda _: {})
+
+
+def _table(
+    settings: Sequence[str],
+    ours: Callable[[str], Column],
+    published: Callable[[str], Column],
+) -> str:
+    """Return a table of differences; a star marks p at most 0.05 with Holm's correction by row."""
+    columns = [{**ours(name), **published(name)} for name in settings]
+    rows = list(dict.fromkeys(row for column in columns for row in column))
+    lines = [f"| row | {' | '.join(settings)} |", f"| --- |{' --- |' * len(settings)}"]
+    for row in rows:
+        own = [column.get(row) for column in columns]
+        adjusted = iter(holm([one.p_value for one in own if one is not None]))
+        cells = ["–" if one is None else _difference_text(one, next(adjusted)) for one in own]
+        lines.append(f"| {row} | {' | '.join(cells)} |")
+    note = "\\* p ≤ 0.05 with Holm's correction over the row. In parentheses: 95 % intervals."
+    return "\n".join(lines) + f"\n\n{note}"
+
+
+def _difference_text(one: Difference, p_value: float) -> str:
+    star = "\\*" if p_value <= 0.05 else ""  # noqa: PLR2004
+    ends = "" if one.interval is None else " ({:+.0f} to {:+.0f})".format(*_percent(one.interval))
+    return f"{100 * one.value:+.1f}{star}{ends}"
+
+
+def _percent(interval: Interval) -> tuple[float, float]:
+    return 100 * interval.low, 100 * interval.high
+
+
+def _averages(cells: Cells, setting: str) -> Iterator[SummaryRow]:
+    """Yield the averages over tasks in a setting, in the order of the mechanisms."""
+    for one in summarize(cells, np.random.default_rng(SEED)):
+        if one.scope == ALL and one.options.setting == setting and one.options.form == "implicit":
+            yield one
+
+
+def _own_gaps(cells: Cells, setting: str) -> dict[str, Difference]:
+    averages = _averages(cells, setting)
+    return {one.policy_run.policy: _as_difference(one.gap) for one in averages if one.gap}
+
+
+def _own_form_gaps(cells: Cells, setting: str) -> dict[str, Difference]:
+    found = {}
+    for one in _averages(cells, setting):
+        if one.form_gap is not None:
+            gap = _as_difference(one.form_gap)
+            ends = gap.interval
+            turned = None if ends is None else Interval(-ends.high, -ends.low)
+            found[one.policy_run.policy] = Difference(-gap.value, turned, gap.p_value)
+    return found
+
+
+def _as_difference(gap: Gap) -> Difference:
+    return Difference(gap.value, gap.interval, gap.p_value)
+
+
+def _own_against(cells: Cells, setting: str) -> dict[str, Difference]:
+    """Return each row less the first one on the same episodes, averaged over tasks."""
+    own = {key: cell for key, cell in cells.items() if key.options.setting == setting}
+    first = {
+        key.task: cell for key, cell in own.items() if key.policy_run.policy == row_name(FIRST)
+    }
+    found = {}
+    for policy in dict.fromkeys(key.policy_run.policy for key in own):
+        pairs = [
+            Pairs.of(cell, first[key.task])
+            for key, cell in own.items()
+            if key.policy_run.policy == policy and key.task in first
+        ]
+        gap = measure_gap(pairs, np.random.default_rng(SEED))
+        if gap is not None and policy != row_name(FIRST):
+            found[policy] = _as_difference(gap)
+    return found
+
+
+def _published(setting: str, reference: str | None) -> dict[str, Difference]:
+    """Return published rates less those of the setting `reference`, or less the first system's.
+
+    The trials of two published cells are taken as independent, as only their rates are known.
+    """
+    rows = {(one.model, one.options.setting): one for one in published_rows("main")}
+    found = {}
+    for system in SYSTEMS.values():
+        other = (system, reference) if reference else (SYSTEMS[FIRST], setting)
+        if other != (system, setting):
+            found[system] = _independent(rows[system, setting], rows[other])
+    return found
+
+
+def _independent(first: PublishedRow, second: PublishedRow) -> Difference:
+    tasks = [task for task, rate in first.rates.items() if rate is not None]
+    ours, theirs = ([_share(one.rates[task]) for task in tasks] for one in (first, second))
+    trials = math.prod(TRIALS["main"])
+    variance = sum(one * (1 - one) for one in (*ours, *theirs)) / trials / len(tasks) ** 2
+    value, spread = sum(ours) / len(tasks) - sum(theirs) / len(tasks), math.sqrt(variance)
+    interval = Interval(value - Z_95 * spread, value + Z_95 * spread)
+    p_value = math.erfc(abs(value) / spread / math.sqrt(2)) if spread else 1.0
+    return Difference(value, interval, p_value)
+
+
+def _share(rate: Decimal | None) -> float:
+    return 0.0 if rate is None else float(rate) / 100
+
+
+def _retention(cells: Cells, settings: Sequence[str]) -> str:
+    kept: dict[str, dict[str, str]] = {}
+    for setting in settings:
+        for one in _averages(cells, setting):
+            if one.gap is not None and one.gap.retention is not None:
+                ends = one.gap.retention_interval
+                shown = "" if ends is None else " ({:.0f} to {:.0f})".format(*_percent(ends))
+                text = f"{100 * one.gap.retention:.0f}{shown}"
+                kept.setdefault(one.policy_run.policy, {})[options_label(one.options)] = text
+    rows = {(one.model, one.options.setting): one for one in published_rows("main")}
+    for system in SYSTEMS.values():
+        for setting in settings:
+            own, explicit = rows[system, setting], rows[system, EXPLICIT]
+            tasks = [task for task, rate in own.rates.items() if rate is not None]
+            whole = explicit.average_over(tasks)
+            if whole:
+                kept.setdefault(system, {})[setting] = f"{100 * own.average / whole:.0f}"
+    lines = [f"| row | {' | '.join(settings)} |", f"| --- |{' --- |' * len(settings)}"]
+    lines += [
+        f"| {row} | {' | '.join(own.get(name, '–') for name in settings)} |"
+        for row, own in kept.items()
+    ]
+    return "\n".join(lines)
