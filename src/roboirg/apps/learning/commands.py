@@ -69,12 +69,12 @@ def learn_listener(
         _run_study(plan, out, count)
         return
     from roboirg.apps.learning.listener.learned_model import save_model
-    from roboirg.apps.learning.listener.listener_study import work_folder
+    from roboirg.apps.learning.listener.listener_study import WORK
     from roboirg.apps.learning.listener.listener_training import train_listener
 
     check_output_file(out)
-    work = work_folder(out.parent)
-    save_model(train_listener(plan, work, out.stem, count, _print_tenths()), out)
+    model = train_listener(plan, out.parent / WORK, out.stem, count, _print_tenths())
+    save_model(model, out)
     typer.echo(f"{out}, {out.stat().st_size / 2**20:.1f} MiB")
 
 

@@ -25,6 +25,8 @@ LATER_STEP = 40
 """Control step of a second look at scenes with a video: the containers have appeared by then."""
 MIN_PIXELS = 12
 """Objects of which fewer pixels are visible are not labeled."""
+_StoredViews = list[tuple[bytes, tuple[str, ...], list[list[float]], list[list[float]]]]
+"""Views in a file: fields as in `LabeledView`, the picture as PNG."""
 NO_PICTURE: Pixels = np.zeros((0, 0, 3), np.uint8)
 
 
@@ -91,15 +93,6 @@ def look_as_played(episode: Episode) -> tuple[LabeledView, ...]:
         env.close()
 
 
-class StoredView(msgspec.Struct):
-    """A view in a file; its picture is a PNG."""
-
-    picture: bytes
-    names: tuple[str, ...]
-    centers: list[tuple[float, float]]
-    positions: list[tuple[float, float]]
-
-
 def draw_missing(
     folder: Path,
     episodes: Sequence[Episode],
@@ -108,6 +101,7 @@ def draw_missing(
     show: Callable[[int, int], object],
 ) -> None:
     """Draw the views of episodes that a folder does not have, by `look` or `look_as_played`."""
+    folder.mkdir(parents=True, exist_ok=True)
     missing = [one for one in episodes if not _path(folder, one).exists()]
     there = len(episodes) - len(missing)
     for done, _ in enumerate(parallel_map(partial(_store, folder, draw), missing, workers), 1):
@@ -115,24 +109,15 @@ def draw_missing(
 
 
 def read_views(folder: Path, episode: Episode, *, pictures: bool) -> tuple[LabeledView, ...]:
-    """Return the views of an episode from a folder, or only their labels.
-
-    Raises:
-        InvalidValueError: the file is damaged.
-    """
+    """Return the views of an episode from a folder, or only their labels."""
     path = _path(folder, episode)
     try:
-        stored = msgspec.msgpack.decode(path.read_bytes(), type=list[StoredView])
+        stored = msgspec.msgpack.decode(path.read_bytes(), type=_StoredViews)
     except (OSError, msgspec.DecodeError) as error:
         raise InvalidValueError(f"{str(path)!r} cannot be read ({error}); delete it.") from error
     return tuple(
-        LabeledView(
-            decode_png(one.picture) if pictures else NO_PICTURE,
-            one.names,
-            _points_of(one.centers),
-            _points_of(one.positions),
-        )
-        for one in stored
+        LabeledView(decode_png(png) if pictures else NO_PICTURE, names, *map(_points_of, points))
+        for png, names, *points in stored
     )
 
 
@@ -144,7 +129,7 @@ def _store(
     folder: Path, draw: Callable[[Episode], tuple[LabeledView, ...]], episode: Episode
 ) -> None:
     stored = [
-        StoredView(encode_png(Picture(picture)), names, centers.tolist(), positions.tolist())
+        (encode_png(Picture(picture)), names, centers.tolist(), positions.tolist())
         for picture, names, centers, positions in draw(episode)
     ]
     write_atomically(_path(folder, episode), msgspec.msgpack.encode(stored))

@@ -73,20 +73,6 @@ class Trainer(Generic[One]):
             self._optimizer, rate, total_steps=max(steps, 1), pct_start=0.1
         )
 
-    def _state(self) -> dict[str, Any]:
-        return {
-            "net": self._net.state_dict(),
-            "optimizer": self._optimizer.state_dict(),
-            "schedule": self._schedule.state_dict(),
-            "random": torch.get_rng_state(),
-        }
-
-    def _restore(self, state: Mapping[str, Any]) -> None:
-        self._net.load_state_dict(state["net"])
-        self._optimizer.load_state_dict(state["optimizer"])
-        self._schedule.load_state_dict(state["schedule"])
-        torch.set_rng_state(state["random"])
-
     def run(self, batches: Iterable[Sequence[One]]) -> float:
         """Take a step for each batch; returns the mean loss."""
         self._net.train()
@@ -111,20 +97,22 @@ class Trainer(Generic[One]):
     ) -> list[dict[str, float]]:
         """Learn in several passes, or go on where a training that was kept ended.
 
+        Returns the mean loss of each pass, with the score after it.
+
         Args:
             passes: how many.
             batches: of a pass, by its number from 0.
             show: called after each pass with its number from 1, with all, and how well it goes.
             score: how good the network is now.
             kept: where the training is kept.
-
-        Returns:
-            The mean loss of each pass, with the score after it.
         """
+        parts = {"net": self._net, "optimizer": self._optimizer, "schedule": self._schedule}
         state = None if kept is None else load_unfinished(kept.path, kept.made_of)
         found: list[dict[str, float]] = []
         if state is not None and "found" in state:
-            self._restore(state)
+            for name, part in parts.items():
+                part.load_state_dict(state[name])
+            torch.set_rng_state(state["random"])
             found = state["found"]
         for number in range(len(found), passes):
             loss = self.run(batches(number))
@@ -132,7 +120,9 @@ class Trainer(Generic[One]):
             with torch.no_grad():
                 found.append({"loss": loss, **score()})
             if kept is not None:
-                save_unfinished({**self._state(), "found": found}, kept.made_of, kept.path)
+                state = {name: part.state_dict() for name, part in parts.items()}
+                state |= {"random": torch.get_rng_state(), "found": found}
+                save_unfinished(state, kept.made_of, kept.path)
             note = ", ".join(f"{name} {value:.3f}" for name, value in found[-1].items())
             show(number + 1, passes, note)
         self._net.eval()

@@ -27,12 +27,7 @@ PADDING, UNKNOWN = 0, 1
 
 
 class Tokens(NamedTuple):
-    """What an encoder makes of n inputs.
-
-    Attributes:
-        values: float (n, tokens, WIDTH); there may be no token.
-        there: bool (n, tokens), False for padding.
-    """
+    """Tokens of n inputs: (n, tokens, WIDTH), and (n, tokens) False for padding."""
 
     values: Tensor
     there: Tensor
@@ -43,12 +38,10 @@ class TokenEncoder(nn.Module):
 
     It is made with the vocabulary and, by keyword, its settings: plain data, which the trained file
     keeps. A text may be empty, and nothing may be seen.
-
-    Attributes:
-        reads_pixels: whether inputs have pictures, not only the objects that are seen.
     """
 
     reads_pixels: ClassVar[bool] = False
+    """Whether inputs must have pictures, not only the objects that are seen."""
 
 
 class WordEncoder(TokenEncoder):

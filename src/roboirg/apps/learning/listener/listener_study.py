@@ -68,11 +68,7 @@ VARIANTS = (
 class StudyAnswer(NamedTuple):
     """What one listener made of one instruction of the test split.
 
-    Attributes:
-        listener: name of the variant.
-        episode: its place in the split.
-        words: their pool.
-        understood: the slots of the goal.
+    `words` is their pool, `understood` has the slots of the goal.
     """
 
     listener: str
@@ -94,20 +90,20 @@ def run_study(
     becomes a file ``NAME-SEED.pt``, and its answers ``NAME-SEED.jsonl`` next to it; those that are
     there and were made of the same plan are used again.
     """
-    from roboirg.apps.learning.listener.learned_model import save_model
+    from roboirg.apps.learning.listener.learned_model import load_model, save_model
     from roboirg.apps.learning.listener.listener_training import check_plan, see_episodes, teach
     from roboirg.apps.learning.trainer import part_of
 
     check_plan(plan)
-    work = work_folder(folder)
+    work = folder / WORK
     shown: list[tuple[Episode, list[Pixels]]] = []
     for seed in range(plan.seed, plan.seed + plan.seeds):
         common, scenes = plan._replace(seed=seed), None
         for variant in VARIANTS:
             own, name = variant.plan(common), f"{variant.name}-{seed}"
             path, answers = folder / f"{name}.pt", folder / f"{name}.jsonl"
-            model = _trained(path, own)
-            if model is None:
+            model = load_model(path) if path.exists() else None
+            if model is None or model.about != own.about:
                 scenes = scenes or see_episodes(common, work, workers, progress)
                 answers.unlink(missing_ok=True)
                 model = teach(scenes, own, work / f"reader-{name}.pt", part_of(progress, name))
@@ -119,23 +115,6 @@ def run_study(
                 write_atomically(answers, text)
             for line in answers.read_text("utf-8").splitlines():
                 yield StudyAnswer(**json.loads(line))
-
-
-def work_folder(folder: Path) -> Path:
-    """Return where pictures and unfinished listeners of a folder are kept."""
-    found = folder / WORK
-    found.mkdir(parents=True, exist_ok=True)
-    return found
-
-
-def _trained(path: Path, plan: TrainingPlan) -> LearnedModel | None:
-    """Return the listener of a file; None unless it was made of the same plan."""
-    from roboirg.apps.learning.listener.learned_model import load_model
-
-    if not path.exists():
-        return None
-    model = load_model(path)
-    return model if model.about == plan.about else None
 
 
 def _show_all(

@@ -112,11 +112,7 @@ def train_listener(
 
 
 def check_plan(plan: TrainingPlan) -> None:
-    """Check early what would be found out after pictures are drawn.
-
-    Raises:
-        InvalidValueError: no task has one of the settings, or an encoder is wrong.
-    """
+    """Raise early what would else be raised after pictures are drawn."""
     if not any(set(plan.settings) & set(settings_of(get_task(task))) for task in plan.tasks):
         raise InvalidValueError(f"None of these tasks has the setting {', '.join(plan.settings)}.")
     make_encoders(make_vocabulary(["a"], ["cube"], plan.tasks), plan.encoders)

@@ -149,7 +149,7 @@ def _rows(
     for variant in VARIANTS:
         own = [found.get((variant.name, pool, setting)) for setting in settings]
         cells = [
-            (_percent([one.rate]), _percent(one.interval, " to "), _percent(one.by_seed))
+            (_percent([one.rate]), _percent(one.interval, "–"), _percent(one.by_seed))
             if one
             else (NOT_APPLICABLE,) * 3
             for one in own
