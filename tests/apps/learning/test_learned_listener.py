@@ -3,7 +3,6 @@
 import csv
 import json
 import re
-import shutil
 from fractions import Fraction
 from pathlib import Path
 from types import SimpleNamespace
@@ -16,7 +15,7 @@ from typer.testing import CliRunner
 from roboirg.apps.learning.labeled_views import LATER_STEP, class_of, look, pictures_to_see
 from roboirg.apps.learning.listener import listener_study, study_report
 from roboirg.apps.learning.listener.learned_answers import learned_answers
-from roboirg.apps.learning.listener.listener_study import VARIANTS, WORK
+from roboirg.apps.learning.listener.listener_study import VARIANTS
 from roboirg.apps.learning.listener.study_report import trained_rate
 from roboirg.apps.learning.listener.vocabulary import parts_of, split_words
 from roboirg.core.errors import InvalidValueError, MissingDependencyError
@@ -164,12 +163,16 @@ def plan_of(**changes):
     return few._replace(**changes)
 
 
-def pictures_from(folder, target):
-    """Give a folder for a training the pictures of another one."""
-    target.mkdir(parents=True, exist_ok=True)
-    for path in folder.glob("*.views"):
-        shutil.copy(path, target)
-    return target
+@pytest.fixture
+def few(torch, monkeypatch):
+    """Few episodes of each split, and two listeners in a study."""
+    from roboirg.apps.learning.listener import listener_training
+
+    monkeypatch.setattr(listener_training, "SIZES", {"train": 4})
+    monkeypatch.setattr(listener_training, "VALIDATED", 1)
+    monkeypatch.setattr(listener_study, "SIZES", {"test": 3})
+    for module in (listener_study, study_report):
+        monkeypatch.setattr(module, "VARIANTS", VARIANTS[:2])
 
 
 @pytest.fixture(scope="module")
@@ -243,12 +246,11 @@ def test_it_plays_with_the_hands_of_the_oracle(trained):
 
 
 @pytest.mark.sim
-def test_an_interrupted_training_goes_on_and_gives_the_same_listener(trained, torch, tmp_path):
+def test_an_interrupted_training_goes_on_and_gives_the_same_listener(few, torch, tmp_path):
     from roboirg.apps.learning.listener.listener_training import train_listener
 
     def train(name, progress):
-        folder = pictures_from(trained[1].parent, tmp_path / name)
-        return train_listener(plan_of(scenes=0, reader_epochs=2), folder, "own", 0, progress)
+        return train_listener(plan_of(reader_epochs=2), tmp_path / name, "own", 0, progress)
 
     def stop(work, done, total, note=""):
         if work == "reader":
@@ -267,7 +269,7 @@ def test_an_interrupted_training_goes_on_and_gives_the_same_listener(trained, to
 
 
 @pytest.mark.sim
-def test_an_encoder_of_one_s_own_is_trained_and_loaded(trained, torch, tmp_path, monkeypatch):
+def test_an_encoder_of_one_s_own_is_trained_and_loaded(few, torch, tmp_path, monkeypatch):
     from roboirg.apps.learning.listener import encoders
     from roboirg.apps.learning.listener.learned_model import load_model, save_model
     from roboirg.apps.learning.listener.listener_training import train_listener
@@ -275,9 +277,8 @@ def test_an_encoder_of_one_s_own_is_trained_and_loaded(trained, torch, tmp_path,
     monkeypatch.setitem(encoders.ENCODERS, "shades", None)  # which takes it away in the end
     (block,) = re.findall(r"```python\n(.*?class .*?)```", PAGE.read_text(), re.DOTALL)
     exec(block, {})  # noqa: S102 - the page's example
-    plan = plan_of(scenes=0, reader_epochs=1, encoders={"shades": {"size": 4}, "words": {}})
-    folder = pictures_from(trained[1].parent, tmp_path)
-    model = train_listener(plan, folder, "own", 0, lambda *_: None)
+    plan = plan_of(reader_epochs=2, encoders={"shades": {"size": 4}, "words": {}})
+    model = train_listener(plan, tmp_path, "own", 0, lambda *_: None)
     save_model(model, tmp_path / "own.pt")
     again = load_model(tmp_path / "own.pt")
     assert again.about["encoders"] == {"shades": {"size": 4}, "words": {}}
@@ -335,20 +336,14 @@ def test_what_a_variant_does_not_get_changes_nothing(torch):
 
 
 @pytest.mark.sim
-def test_the_study_writes_every_listener_tables_and_a_figure_and_goes_on(
-    trained, tmp_path, monkeypatch
-):
-    few = VARIANTS[:2]
-    monkeypatch.setattr(listener_study, "VARIANTS", few)
-    monkeypatch.setattr(study_report, "VARIANTS", few)
-    short = {"scenes": 0, "detector_epochs": 1, "reader_epochs": 1, "seeds": 2}
-    pictures_from(trained[1].parent, tmp_path / WORK)
+def test_the_study_writes_every_listener_tables_and_a_figure_and_goes_on(few, tmp_path):
+    short = {"scenes": 2, "detector_epochs": 1, "reader_epochs": 1, "seeds": 2}
     plan = plan_file(tasks="StopCube", training=short)
     words = ["learn", "listener", "--study", "--plan", plan, "--out", str(tmp_path)]
     done = CliRunner().invoke(app, words)
     assert done.exit_code == 0, done.output
     files = {path: path.stat().st_mtime_ns for path in tmp_path.glob("*-?.*")}
-    names = {f"{variant.name}-{seed}" for variant in few for seed in (0, 1)}
+    names = {f"{variant.name}-{seed}" for variant in VARIANTS[:2] for seed in (0, 1)}
     assert {path.name for path in files} == {
         f"{name}.{end}" for name in names for end in ("pt", "jsonl")
     }
@@ -357,7 +352,7 @@ def test_the_study_writes_every_listener_tables_and_a_figure_and_goes_on(
     assert "2 training seeds" in text
     assert (tmp_path / "study.png").stat().st_size > 5000
     answers = [json.loads(line) for line in (tmp_path / "all-1.jsonl").read_text().splitlines()]
-    goals = {place: get_episode("StopCube", "test", place).goal["visit"] for place in range(50)}
+    goals = {place: get_episode("StopCube", "test", place).goal["visit"] for place in range(3)}
     for one in answers:
         assert one["is_right"] == (one["understood"]["visit"] == goals[one["episode"]])
     with (tmp_path / "by-task.csv").open() as file:

@@ -26,7 +26,7 @@ METERS = 0.5
 PADDING, UNKNOWN = 0, 1
 
 
-class Tokens(NamedTuple):
+class InputTokens(NamedTuple):
     """Tokens of n inputs: (n, tokens, WIDTH), and (n, tokens) False for padding."""
 
     values: Tensor
@@ -34,7 +34,7 @@ class Tokens(NamedTuple):
 
 
 class TokenEncoder(nn.Module):
-    """Makes `Tokens` of a sequence of `ListenerInput`, and is trained with the reader.
+    """Makes `InputTokens` of a sequence of `ListenerInput`, and is trained with the reader.
 
     It is made with the vocabulary and, by keyword, its settings: plain data, which the trained file
     keeps. A text may be empty, and nothing may be seen.
@@ -53,7 +53,7 @@ class WordEncoder(TokenEncoder):
         self.words = nn.Embedding(len(vocabulary.words) + 2, WIDTH, padding_idx=PADDING)
         self.order = nn.Parameter(torch.randn(MAX_WORDS, WIDTH) * 0.02)
 
-    def forward(self, inputs: Sequence[ListenerInput]) -> Tokens:
+    def forward(self, inputs: Sequence[ListenerInput]) -> InputTokens:
         # The command stands at the end.
         rows = [
             [self._numbers.get(word, UNKNOWN) for word in split_words(one.text)[-MAX_WORDS:]]
@@ -62,7 +62,7 @@ class WordEncoder(TokenEncoder):
         longest = max(map(len, rows))
         padded = [[*row, *[PADDING] * (longest - len(row))] for row in rows]
         words = torch.tensor(padded, dtype=torch.long)  # also where nothing is said
-        return Tokens(self.words(words) + self.order[:longest], words != PADDING)
+        return InputTokens(self.words(words) + self.order[:longest], words != PADDING)
 
 
 class ObjectEncoder(TokenEncoder):
@@ -76,7 +76,7 @@ class ObjectEncoder(TokenEncoder):
         self.places = nn.Linear(4 * WAVES + 2, WIDTH)
         self.relations = nn.Linear(relation_count(classes), WIDTH, bias=False)
 
-    def forward(self, inputs: Sequence[ListenerInput]) -> Tokens:
+    def forward(self, inputs: Sequence[ListenerInput]) -> InputTokens:
         counts = [len(one.seen.kinds) for one in inputs]
         shape = len(inputs), max(counts)
         kinds, views = (torch.zeros(shape, dtype=torch.long) for _ in range(2))
@@ -89,7 +89,7 @@ class ObjectEncoder(TokenEncoder):
             relations[number, :count] = torch.from_numpy(one.seen.relations)
         there = torch.arange(shape[1]) < torch.tensor(counts)[:, None]
         encoded = self.kinds(kinds) + self.views(views) + self.places(waves(places, WAVES))
-        return Tokens(encoded + self.relations(relations), there)
+        return InputTokens(encoded + self.relations(relations), there)
 
 
 ENCODERS: dict[str, type[TokenEncoder]] = {"words": WordEncoder, "objects": ObjectEncoder}
