@@ -3,7 +3,7 @@
 PYTHON := .venv/bin/python
 
 .DEFAULT_GOAL := help
-.PHONY: help setup dev test test-slow test-all every-test integrations lint docs demo card clean
+.PHONY: help setup dev style types test fast-tests test-slow test-all every-test integrations lint docs demo card clean
 
 help: ## list the targets
 	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):.*## /  make \1\t/' | expand -t 21
@@ -14,9 +14,13 @@ setup: ## make .venv and a Vulkan driver, for playing and results; quick when no
 dev: ## the same, and what tests, lint and documentation need
 	@scripts/setup dev
 
-lint: dev ## ruff and mypy
+lint: style types ## ruff and mypy
+
+style: dev
 	$(PYTHON) -m ruff check .
 	$(PYTHON) -m ruff format --check .
+
+types: dev
 	$(PYTHON) -m mypy
 
 # Two workers: every one that renders takes a core and 0.5 GiB. What the tests of a file make for
@@ -24,7 +28,10 @@ lint: dev ## ruff and mypy
 # reads the report.
 PYTEST = $(PYTHON) -m pytest -n 2 --dist loadfile --no-loadscope-reorder --junitxml build/$@.xml
 
-test: lint ## lint, then every test but the slow ones
+test: style ## lint, and every test but the slow ones
+	@$(MAKE) --no-print-directory --jobs 2 types fast-tests
+
+fast-tests: dev
 	$(PYTEST) -m "not slow"
 
 test-slow: dev ## the slow tests alone

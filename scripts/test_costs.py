@@ -1,8 +1,8 @@
 """Print what each group of tests costs: items and seconds, the most costly group first.
 
-``make test`` leaves a report in build/test.xml, as pytest's option --junitxml does:
+``make test`` leaves a report in build/fast-tests.xml, as pytest's option --junitxml does:
 
-    python scripts/test_costs.py build/test.xml [MORE.xml ...] [--by file] [--top 30]
+    python scripts/test_costs.py build/fast-tests.xml [MORE.xml ...] [--by file] [--top 30]
 
 Seconds of the clock, fixtures included; what two workers did side by side counts for both.
 """

@@ -94,11 +94,13 @@ def test_what_a_policy_declares_and_its_process_reports_is_there(tmp_path: Path)
         record(1, outcome="failure", steps=10, calls=1, attempt=2, **known),
     )
     assert "actions: ee_pose (" in found["Horizon and control rate"]["mine"]
-    assert "10.0 control steps on average" in found["Horizon and control rate"]["mine"]
-    for word in ("bfloat16", "cuda:0", "torch 2.9", "3.12.1"):
+    assert "on average 10.0 control steps" in found["Horizon and control rate"]["mine"]
+    computed = f"number type of the computation: {NOT_REPORTED} by the policy"
+    parameters = "number type of the parameters: bfloat16"
+    for word in (computed, parameters, "cuda:0", "torch 2.9", "3.12.1"):
         assert word in found["Precision of inference"]["mine"]
     assert (
-        "cameras available to it: front, each 256 × 256 pixels as rendered"
+        "and whose pictures it was given: front, each 256 × 256 pixels as rendered"
         in found["Observations"]["mine"]
     )
     assert "resized to 224" in found["Observations"]["mine"]
@@ -115,11 +117,11 @@ def test_a_server_speaks_for_its_own_process(tmp_path: Path) -> None:
     found = sections(tmp_path, record(0, inference=mine, policy_metadata=server))
     text = found["Precision of inference"]["mine"]
     assert "computed by its server" in text
-    assert "number type of inference: float16" in text
+    assert "number type of the computation: float16" in text
     assert f"versions of libraries: {NOT_REPORTED} by the server" in text
     assert f"version of the policy: {NOT_REPORTED} by the server" in text
     assert "3.11" not in text
-    assert f"length of a chunk: {NOT_REPORTED} by the server" in found[HORIZON]["mine"]
+    assert f"length of a chunk, as declared: {NOT_REPORTED} by the server" in found[HORIZON]["mine"]
 
 
 @pytest.mark.parametrize(
@@ -157,7 +159,7 @@ def test_built_in_policies_have_no_network(tmp_path: Path, name: str) -> None:
 def test_the_policy_behind_a_planner_does_not_speak_for_the_planner(tmp_path: Path) -> None:
     metadata = {"planner": {"model": "large"}, "policy": {"network": "none", "dtype": "float16"}}
     found = sections(tmp_path, record(0, policy_metadata=metadata))
-    assert "number type of inference: float16" in found["Precision of inference"]["mine"]
+    assert "number type of the computation: float16" in found["Precision of inference"]["mine"]
     assert f"device of inference: {NOT_REPORTED}" in found["Precision of inference"]["mine"]
 
 
@@ -172,6 +174,8 @@ def test_texts_and_templates_are_counted(tmp_path: Path) -> None:
     direct = {record(episode, setting="direct").instruction for episode in range(4)}
     assert counts["explicit, arm told"].startswith(f"{len(told)} distinct texts; command")
     assert counts["direct, arm silent"] == "1 distinct text, fixed"
+    chance = found["Controls and floors"]["chance in direct"]
+    assert chance.endswith("without any words: mine, arm silent, direct: 100.0 %")
     (label,) = set(found["Use of the words in training"]) - {"mine"}
     seen = found["Use of the words in training"][label]
     assert f"{len(told) + len(direct)} texts: in neither, as their templates are held out" in seen
@@ -185,7 +189,14 @@ def test_each_other_analysis_has_a_verdict_or_a_reason(tmp_path: Path) -> None:
         for seed in (0, 1)
         for episode in range(3)
     ]
-    found = sections(tmp_path, *played)["Sensitivity to analysis choices"]
+    found = sections(tmp_path, *played)
+    assert found["Statistics"][
+        "Holm's correction"
+    ] == "3 families, each corrected alone; " + "; ".join(
+        f"mine, differences to explicit in {scope}: 1 test"
+        for scope in ("single tasks", "suites", "all tasks")
+    )
+    found = found["Sensitivity to analysis choices"]
     assert found["mine, direct less explicit"] == (
         "open; 3 paired scenes, with which uncorrected p is at least 0.25, so the verdict is open; "
         "does not hold in 1 of 4: unit rollout (lower)"
@@ -222,7 +233,7 @@ def test_what_cannot_show_anything_is_named(tmp_path: Path) -> None:
     other = [msgspec.structs.replace(record(episode), policy="other") for episode in range(3)]
     found = sections(tmp_path / "more", *two, *other)
     assert found["Statistics"]["intervals"].endswith("too few scenes, in: no task")
-    assert found["Controls and floors"][CONTROL] == "mine (privileged): explicit 100.0 %"
+    assert found["Controls and floors"][CONTROL] == "mine (privileged), explicit: 100.0 %"
 
 
 @pytest.mark.parametrize("name", FORMATS)

@@ -151,6 +151,14 @@ def test_all_rows_are_played_until_the_end(stage: Callable[..., RolloutResult]) 
     assert world.closed
 
 
+def test_a_record_holds_what_the_job_prescribes_instead_of_the_policy(
+    stage: Callable[..., RolloutResult],
+) -> None:
+    job = replace(JOB, demonstration_frames=4)
+    needs = stage(PaperWorld(), PaperPolicy(), job).needs
+    assert (needs["demonstration_frames"], needs["cameras"]) == (4, [])
+
+
 def test_one_row_is_a_chunk_of_one(stage: Callable[..., RolloutResult]) -> None:
     assert stage(PaperWorld(2), PaperPolicy(np.zeros(8))).steps == 2
 

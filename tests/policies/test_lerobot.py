@@ -154,6 +154,7 @@ def test_a_checkpoint_is_fed_its_own_names(checkpoint):
     for name in ("tokenizer_processor", "unnormalizer_processor (ACTION MEAN_STD)"):
         assert name in policy.metadata["preprocessing"]
     assert policy.metadata["text_normalization"] == "tokenizer_processor"
+    assert (policy.metadata["chunk"], policy.metadata["execute"]) == (6, 4)
     batch = checkpoint.model.batches[0]
     assert batch["task"] == [INSTRUCTION]
     assert batch[FRONT].shape == (1, 3, 8, 8)

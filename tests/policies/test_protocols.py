@@ -238,7 +238,8 @@ def test_a_protocol_travels_over_any_transport(scheme, monkeypatch):
         open_server("random", scheme)
     client = make_policy(f"{scheme}://localhost:1?wait=0", 0)
     client.reset(INSTRUCTION, video(2))
-    assert client.metadata == {"server": "localhost:1", "local": True}
+    used = 16 if scheme == "mme-vla" else "all"
+    assert client.metadata == {"server": "localhost:1", "local": True, "execute": used}
     assert client.act(moment(2, history=())).shape == (16, 8)
     client.close()
 

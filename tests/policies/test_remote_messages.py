@@ -60,6 +60,7 @@ def test_challenge_sends_these_bytes(server_class):
             "server": server.place,
             "name": "submission",
             "version": "phase-1",
+            "execute": "all",
         }
         assert policy.version == "phase-1"
         policy.close()

@@ -325,7 +325,7 @@ def _load(place: str, device: str, execute: int | None) -> LoadedCheckpoint:
         is_noiseless=config.type in _NOISELESS and not is_single,
         steps=getattr(config, "n_action_steps", None),
         remembered=config.n_obs_steps if config.type in _QUEUED else None,
-        metadata=_describe(config, _step_names(before), _step_names(after)),
+        metadata=_describe(config, _step_names(before), _step_names(after, of_actions=True)),
     )  # fmt: skip
 
 
@@ -357,25 +357,27 @@ def _describe(config: Any, before: Sequence[str], after: Sequence[str]) -> dict[
         for name, one in (config.input_features or {}).items()
     ]
     found: dict[str, Any] = {
-        "preprocessing": f"inputs {', '.join(inputs)}; pictures scaled to [0, 1], as in LeRobot's "
-        "datasets; then the checkpoint's own steps, saved with it in training: "
-        f"{', '.join(before) or 'none'}; on its actions: {', '.join(after) or 'none'}"
+        "preprocessing": f"the checkpoint declares the inputs {', '.join(inputs)}; of the pictures "
+        "given it is fed these alone, by roboirg resized to a declared square and scaled in "
+        "brightness to [0, 1], as in LeRobot's datasets; then the preprocessor that training "
+        f"saved with it is applied to all inputs, in the steps {', '.join(before) or 'none'}; its "
+        f"postprocessor is applied to the actions, in the steps {', '.join(after) or 'none'}"
     }
     tokenizers = [name for name in before if "tokenizer" in name]
     if tokenizers:
         found |= {"reads_text": "yes", "text_normalization": ", ".join(tokenizers)}
     elif config.type in _WORDLESS:
         found["reads_text"] = f"no, a policy of type {config.type} has no input for text"
-    chunk = getattr(config, "chunk_size", None)
-    return found if chunk is None else {**found, "chunk": chunk}
+    sizes = {"chunk": "chunk_size", "execute": "n_action_steps"}
+    return found | {key: vars(config)[one] for key, one in sizes.items() if one in vars(config)}
 
 
-def _step_names(processor: object) -> list[str]:
+def _step_names(processor: object, *, of_actions: bool = False) -> list[str]:
     """Return the names of a processor's steps; normalizers with what they normalize, and how."""
     found = []
     for step in getattr(processor, "steps", ()):
         modes = step.get_config().get("norm_map", {})
-        listed = ", ".join(f"{kind} {mode}" for kind, mode in modes.items())
+        own = [f"{one} {mode}" for one, mode in modes.items() if (one == "ACTION") == of_actions]
         name = getattr(step, "_registry_name", type(step).__name__)
-        found.append(f"{name} ({listed})" if listed else name)
+        found.append(f"{name} ({', '.join(own)})" if own else name)
     return found

@@ -26,7 +26,7 @@ def depth(seed, row):
     return np.full((256, 256, 1), 400 + seed % 100 + row, np.int16)
 
 
-def arrays_of(episode, rows, video_length, *, has_depth):
+def arrays_of(episode, rows, video_length, *, has_depth, disturbed=False):
     rng = np.random.default_rng(episode.seed)
     labels = ["pick up the cube"] * (rows // 2) + ["press the button"] * (rows - rows // 2)
     grounded = [f"{text} at <3, {row // 4}>" for row, text in enumerate(labels)]
@@ -42,6 +42,8 @@ def arrays_of(episode, rows, video_length, *, has_depth):
         "grounded_subgoals": stack_texts(grounded),
         "grounded_online_subgoals": stack_texts(grounded),
     }
+    if disturbed:
+        arrays["labels"] = actions + 1.0
     for camera in CAMERAS if has_depth else ():
         arrays[f"{camera}_extrinsic"] = rng.normal(size=(rows, 3, 4)).astype(np.float32)
         arrays[f"{camera}_intrinsic"] = rng.normal(size=(3, 3)).astype(np.float32)
@@ -89,9 +91,13 @@ def record(
                 environment_version=ENVIRONMENT_VERSION,
                 coding=spec.coding,
                 depth=spec.depth,
+                actions=spec.actions,
+                disturbed=spec.disturbed,
                 picture_error=tracks.finish(),
             )
-            arrays = arrays_of(episode, rows, video_length, has_depth=spec.depth)
+            arrays = arrays_of(
+                episode, rows, video_length, has_depth=spec.depth, disturbed=spec.disturbed
+            )
             counts = {f"{one}_histogram": tracks.histograms[one] for one in spec.cameras}
             file.finish(facts, arrays | counts)
         if only_successes and status != "success":

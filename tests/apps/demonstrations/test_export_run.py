@@ -150,6 +150,18 @@ def test_a_policy_is_recorded_in_every_setting(export):
     assert set(table["policy"].to_pylist()) == {"listener"}
 
 
+def test_the_action_of_a_disturbed_frame_is_what_should_have_been_done(export):
+    root = export(tasks=("PickXtimes",), episodes=(0,), settings=("explicit",), disturbed=True)
+    (executed,) = read_dataset(root)
+    table = parquet.read_table(root / "data/chunk-000/file-000.parquet")
+    labels = np.array(table["action"].to_pylist())
+    assert np.allclose(labels, executed.actions + 1.0)
+    assert np.array_equal(table["executed_action"].to_pylist(), executed.actions)
+    assert "**disturbed**" in (root / "README.md").read_text()
+    (row,) = parquet.read_table(root / "meta/demonstrations.parquet").to_pylist()
+    assert (row["disturbed"], row["actions"]) == (True, "joint_angle")
+
+
 def test_other_options_and_folders_are_refused(tmp_path, export, make_plan, monkeypatch):
     root = export()
     with pytest.raises(InvalidValueError, match="complete export already"):
@@ -192,6 +204,13 @@ def test_plans_that_make_no_sense_are_refused(make_plan):
         make_plan(cameras=())
     with pytest.raises(UnknownNameError, match=r"Did you mean 'wrist'\?"):
         make_plan(cameras=("wrists",))
+    with pytest.raises(InvalidValueError, match="only the oracle is disturbed"):
+        make_plan(disturbed=True, policy="random")
+    with pytest.raises(InvalidValueError, match="no place for one that was not executed"):
+        make_plan(disturbed=True, format="robomme-hdf5")
+    for other in ({"format": "lerobot-v2.1"}, {"video": "prefix"}, {"variations": 2}):
+        with pytest.raises(InvalidValueError, match="actions is 'waypoint': such frames have the"):
+            make_plan(actions="waypoint", **other)
     for other in ({"format": "robomme-hdf5"}, {"names": "openpi"}):
         with pytest.raises(InvalidValueError, match=r"cameras is front and size 256; .* both cam"):
             make_plan(cameras=("front",), **other)

@@ -4,6 +4,7 @@ import zipfile
 
 import numpy as np
 import pytest
+from pyarrow import parquet
 
 from roboirg.apps.demonstrations import export_run
 from roboirg.apps.demonstrations.dataset_reading import read_dataset
@@ -88,6 +89,24 @@ def test_an_export_without_pictures_replays_exactly(tmp_path, make_plan):
     changed = replay(recorded)
     assert not changed.agrees
     assert changed.largest > 0.01
+
+
+@pytest.mark.parametrize("actions", ["joint_angle", "waypoint"])
+def test_a_disturbed_expert_is_labeled_by_what_it_meant_and_replays_exactly(
+    tmp_path, make_plan, actions
+):
+    plan = make_plan(
+        tasks=("VideoUnmask",), split="random", episodes=(3,), settings=("explicit",),
+        pictures="none", actions=actions, disturbed=True,
+    )  # fmt: skip
+    export_run.run_export(plan, tmp_path / "data", 0, lambda *_: None)
+    (recorded,) = read_dataset(tmp_path / "data")
+    table = parquet.read_table(tmp_path / "data/data/chunk-000/file-000.parquet")
+    labels = np.array(table["action"].to_pylist())
+    differs = np.abs(labels - recorded.actions).max(axis=1) > 1e-6
+    assert 0 < differs.sum() < len(differs)
+    result = replay(recorded)
+    assert (result.agrees, result.largest, result.final) == (True, 0.0, 0.0)
 
 
 @pytest.mark.slow

@@ -16,12 +16,12 @@ from roboirg.apps.learning.policy.recording import (
     save_recording,
 )
 from roboirg.apps.learning.policy.sight import sight_of, turns_of
-from roboirg.apps.learning.policy.waypoint_expert import Disturbance, WaypointExpert
 from roboirg.core.errors import InvalidValueError, MissingDependencyError
 from roboirg.envs.factory import make
 from roboirg.evaluation.records.store import read_records
 from roboirg.main import app
 from roboirg.policies import play
+from roboirg.policies.builtin.waypoint_expert import Disturbance, WaypointExpert
 from roboirg.policies.by_name.loading import is_privileged, make_policy, needs_host
 from roboirg.tasks.splits.splits import get_episode
 

@@ -29,7 +29,7 @@ class ExportWords(PlanWords):
     section = "demonstrations"
     own = (
         "cameras", "size", "video", "names", "extra_actions", "variations", "policy", "outcomes",
-        "language_columns",
+        "language_columns", "actions", "disturbed",
     )  # fmt: skip
 
 
@@ -68,7 +68,8 @@ def export_demonstrations(
     """Export demonstrations for training, recorded once per episode, in the words of every setting.
 
     A plan may have, under `demonstrations`: cameras, size, video, names, extra_actions, variations,
-    policy, outcomes, language_columns. Words are those for training unless it has `wordings: test`.
+    policy, outcomes, language_columns, actions, disturbed. Words are those for training unless it
+    has `wordings: test`.
 
     Example: roboirg export demonstrations --tasks PickXtimes --out data
     """

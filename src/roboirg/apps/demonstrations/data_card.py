@@ -22,6 +22,12 @@ from roboirg.language import LANGUAGE_VERSION
 _BAR = 40
 _BINS = 12
 
+_MEANINGS = {
+    "joint_angle": "absolute joint targets (rad) and the gripper, +1 open to -1 closed",
+    "waypoint": "the tool's x, y, z (m), roll, pitch, yaw (rad, extrinsic x-y-z, unwrapped) in the "
+    "world frame, and what the gripper does there, +1 open, -1 close, 0 neither",
+}
+
 
 def card_text(
     plan: ExportPlan, parts: Sequence[DatasetPart], facts: Sequence[TrajectoryFacts], root: Path
@@ -68,10 +74,13 @@ def card_text(
 
 def _head_line(plan: ExportPlan) -> str:
     pool = pool_of(plan.split, plan.options.wordings)
+    rate = f"{FRAME_RATE} frames per second, one per control step."
+    if plan.actions == "waypoint":
+        rate = f"A frame per waypoint; time stamps count frames, {FRAME_RATE} to the second."
     return (
         f"Split {plan.split}, format {plan.format}, written by roboirg {__version__} (environment "
         f"{ENVIRONMENT_VERSION}, language {LANGUAGE_VERSION}, wordings of the pool {pool!r}). "
-        f"{FRAME_RATE} frames per second, one per control step."
+        f"{rate}"
     )
 
 
@@ -115,11 +124,11 @@ def _histogram(rows: NDArray[np.int64]) -> Iterator[str]:
 
 
 def _content_lines(plan: ExportPlan, facts: Sequence[TrajectoryFacts]) -> Iterator[str]:
+    yield "State: seven joint angles (rad) and the first finger (m)."
     origin = "recorded on a robot" if plan.is_teleoperated else "exactly what was executed"
-    yield (
-        "State: seven joint angles (rad) and the first finger (m). Action: absolute joint targets "
-        f"(rad) and the gripper, +1 open to -1 closed; {origin}."
-    )
+    if plan.disturbed:
+        origin = "what the **disturbed** expert should have done; `executed_action` is what it did"
+    yield f"Action: {_MEANINGS[plan.actions]}; {origin}."
     if plan.video == "prefix":
         yield "Frames of the video come before the policy's, with `is_video_demo`."
     elif plan.video == "sidecar":

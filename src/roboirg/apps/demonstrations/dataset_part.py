@@ -134,6 +134,8 @@ def episode_row(trajectory: Trajectory, placed: PlacedText, length: int) -> dict
         "cause": facts.cause,
         "policy": facts.policy,
         "variation": facts.variation,
+        "actions": facts.actions,
+        "disturbed": facts.disturbed,
         "trajectory": _trajectory_name(facts, options),
         "final_state": [
             *trajectory.joint_positions[-1].tolist(),

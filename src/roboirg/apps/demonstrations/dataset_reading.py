@@ -14,7 +14,9 @@ from numpy.typing import NDArray
 
 from roboirg.apps.demonstrations.dataset_part import EPISODE_TABLE
 from roboirg.apps.demonstrations.formats.robomme_hdf5 import SHARED_FOLDER, check_hdf5_support
+from roboirg.apps.demonstrations.frame_columns import EXECUTED
 from roboirg.apps.demonstrations.parquet_tables import read_rows
+from roboirg.core.actions import JOINT_ANGLE
 from roboirg.core.errors import InvalidValueError
 from roboirg.util.parquet_support import check_parquet_support
 
@@ -33,10 +35,11 @@ class ReplayableTrajectory:
         seed: of the scene.
         split: of the episode; None if the dataset does not say, as RoboMME's.
         index: of the episode in the split; None likewise.
-        actions: (n, 8) that the policy executed.
+        actions: (n, size) that were executed, in a disturbed trajectory not those to learn.
         states: (n, 8) after each of the actions: joints (rad) and the first finger (m).
         final_state: (9,) joints and both fingers at the end; None if the dataset does not say.
         status: how it ended; RoboMME's are successes.
+        space: name of the action space.
     """
 
     name: str
@@ -48,6 +51,7 @@ class ReplayableTrajectory:
     states: NDArray[np.float64]
     final_state: NDArray[np.float64] | None
     status: str
+    space: str = JOINT_ANGLE.name
 
 
 def read_dataset(path: Path) -> Iterator[ReplayableTrajectory]:
@@ -90,7 +94,7 @@ def _read_tables(root: Path, info: Mapping[str, Any]) -> Iterator[ReplayableTraj
     seen: set[str] = set()
     places = _data_files(root, info)
     state = next(name for name in _STATES if name in info["features"])
-    action = next(name for name in _ACTIONS if name in info["features"])
+    action = next(name for name in (EXECUTED, *_ACTIONS) if name in info["features"])
     for row in read_rows(root / EPISODE_TABLE):
         if row["trajectory"] in seen:
             continue
@@ -112,6 +116,7 @@ def _read_tables(root: Path, info: Mapping[str, Any]) -> Iterator[ReplayableTraj
             states=np.concatenate([states[1:], final[None, : _JOINTS + 1]]),
             final_state=final,
             status=row["status"],
+            space=row.get("actions", JOINT_ANGLE.name),
         )
 
 

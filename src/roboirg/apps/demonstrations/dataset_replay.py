@@ -97,7 +97,7 @@ def _read_log(path: Path) -> dict[str, ReplayResult]:
 
 def replay(recorded: ReplayableTrajectory) -> ReplayResult:
     """Execute the actions of a trajectory in its episode."""
-    env = make(_find_episode(recorded), cameras=())
+    env = make(_find_episode(recorded), cameras=(), actions=recorded.space)
     try:
         env.reset()
         steps, largest, final = 0, 0.0, float("nan")

@@ -67,6 +67,8 @@ class ExportPlan:
         policy: who moves the robot.
         outcomes: whether failures are exported too.
         language_columns: whether the dataset has LeRobot's language columns.
+        actions: the action space, and what a frame is: a control step, or a waypoint.
+        disturbed: whether the oracle is disturbed on its way.
     """
 
     tasks: tuple[str, ...]
@@ -86,6 +88,8 @@ class ExportPlan:
     policy: str = ORACLE
     outcomes: Outcomes = "successes"
     language_columns: bool = False
+    actions: Literal["joint_angle", "waypoint"] = "joint_angle"
+    disturbed: bool = False
 
     def validated(self) -> ExportPlan:
         """Return this plan if its values are known and go together.
@@ -116,10 +120,27 @@ class ExportPlan:
             raise InvalidValueError(
                 f"Language columns belong to the format 'lerobot-v3'; this is {self.format!r}."
             )
+        self._check_disturbed()
         self._check_pictures()
         if self.format == "robomme-hdf5":
             self._check_hdf5()
         return self
+
+    def _check_disturbed(self) -> None:
+        if self.disturbed and (self.policy != ORACLE or self.format == "robomme-hdf5"):
+            raise InvalidValueError(
+                f"disturbed is true, the policy {self.policy!r} and the format {self.format!r}: "
+                "only the oracle is disturbed, and a time step of 'robomme-hdf5' is the result of "
+                "its action, so it has no place for one that was not executed."
+            )
+        form = (self.format, self.names, self.video, self.extra_actions)
+        fits = form == ("lerobot-v3", "lerobot", "none", ())
+        fits &= self.disturbed or self.variations == 1
+        if self.actions == "waypoint" and not fits:
+            raise InvalidValueError(
+                "actions is 'waypoint': such frames have the format 'lerobot-v3', `names: lerobot`,"
+                " `video: none`, no extra_actions, and variations only with `disturbed: true`."
+            )
 
     def _check_pictures(self) -> None:
         check_cameras(self.cameras)
@@ -162,8 +183,9 @@ class ExportPlan:
         is_video_apart = self.video == "sidecar" and self.pictures != "png"
         has_depth = self.format == "robomme-hdf5"
         return RecordingSpec(
-            self.pictures, self.video != "none", is_video_apart, has_depth, self.cameras, self.size
-        )
+            self.pictures, self.video != "none", is_video_apart, has_depth, self.cameras, self.size,
+            self.actions, self.disturbed,
+        )  # fmt: skip
 
     def fingerprint(self) -> str:
         """Return a hash of everything that determines the dataset."""
@@ -222,6 +244,8 @@ class RecordingJob(NamedTuple):
         spec += ["depth"] * self.spec.depth
         spec += self.spec.cameras * (self.spec.cameras != CAMERAS)
         spec += [str(self.spec.size)] * (self.spec.size != SIZE)
+        spec += [self.spec.actions] * (self.spec.actions != ExportPlan.actions)
+        spec += ["disturbed"] * self.spec.disturbed
         name = f"{self.task}-{self.split}-{self.number:05d}-{self.variation:03d}{said}"
         return f"{name}-{'-'.join(spec)}{SUFFIX}"
 

@@ -34,6 +34,9 @@ _KEYS: Mapping[str, Mapping[str, str]] = {
     },
 }
 
+EXECUTED = "executed_action"
+"""Column of what was executed where that is not the action to learn."""
+
 
 class PlacedText(NamedTuple):
     """An instruction at its place in a dataset.
@@ -95,7 +98,10 @@ class FrameColumns:
         """Return what ``info.json`` says of each column."""
         found = {self.keys[camera]: self._picture_feature() for camera in self.cameras}
         found[self.keys["state"]] = _feature("float32", [*JOINTS, "gripper"])
-        found[self.keys["action"]] = _feature("float32", [*JOINTS, "gripper"])
+        names = _POSE if self.plan.actions == "waypoint" else [*JOINTS, "gripper"]
+        found[self.keys["action"]] = _feature("float32", names)
+        if self.plan.disturbed:
+            found[EXECUTED] = _feature("float32", names)
         if "delta" in self.plan.extra_actions:
             found["delta_action"] = _feature("float32", [*JOINTS, "gripper"])
         if "pose" in self.plan.extra_actions:
@@ -134,11 +140,13 @@ class FrameColumns:
     def numbers(self, trajectory: Trajectory) -> dict[str, NDArray[Any]]:
         """Return the columns of numbers that do not depend on the instruction, (frames, size)."""
         facts, rows = trajectory.facts, np.array(self.rows(trajectory.facts), dtype=np.int64)
-        actions = trajectory.actions[rows + 1].astype(np.float32)
+        actions = trajectory.targets[rows + 1].astype(np.float32)
         columns: dict[str, NDArray[Any]] = {
             self.keys["state"]: trajectory.state[rows],
             self.keys["action"]: actions,
         }
+        if self.plan.disturbed:
+            columns[EXECUTED] = trajectory.actions[rows + 1].astype(np.float32)
         if "delta" in self.plan.extra_actions:
             moved = actions[:, :7] - trajectory.joint_positions[rows]
             columns["delta_action"] = np.column_stack([moved, actions[:, 7]])

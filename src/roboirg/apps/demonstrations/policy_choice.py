@@ -7,13 +7,26 @@ from roboirg.core.errors import MotionPlanningError
 from roboirg.envs.factory import make
 from roboirg.policies import Policy, make_policy, play
 from roboirg.policies.builtin.oracle_policy import VariedOraclePolicy
+from roboirg.policies.builtin.waypoint_expert import (
+    Disturbance,
+    JointWaypointExpert,
+    WaypointExpert,
+)
 
 MAX_DRAWS = 20
 """Seeds to try for a variation that succeeds."""
 
 
 def choose_policy(job: RecordingJob) -> Policy:
-    """Return the policy of a trajectory: for a variation, one that succeeds if any does."""
+    """Return the policy of a trajectory: for a variation, one that succeeds if any does.
+
+    A disturbed one is not chosen by its success: others would show less of how to recover.
+    """
+    disturbance = Disturbance() if job.spec.disturbed else None
+    if job.policy == ORACLE and job.spec.actions == WaypointExpert.actions:
+        return WaypointExpert(job.variation, disturbance)
+    if disturbance is not None:
+        return JointWaypointExpert(job.variation, disturbance)
     if job.policy != ORACLE or job.variation == 0:
         return make_policy(job.policy, 0)
     return VariedOraclePolicy(find_variation(job))

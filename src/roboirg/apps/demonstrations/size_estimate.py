@@ -29,6 +29,8 @@ _FRAME_BYTES = {"png": 205_000, "lossless-video": 67_000, "lossy-video": 8_800, 
 """Bytes of both pictures of a frame, 256 pixels wide."""
 _HDF5_FRAME_BYTES = 257_000
 """Bytes of a time step with pictures and depth, both compressed."""
+_WAYPOINT_STEPS = 20
+"""Control steps of a waypoint: the mean of all tasks."""
 _ROW_BYTES = 150
 """Bytes of a frame without pictures."""
 
@@ -56,6 +58,8 @@ def estimate_size(plan: ExportPlan) -> SizeEstimate:
     frames = pictures = 0
     for job, said in jobs:
         steps, video = _LENGTHS.get(job.task, _OTHER_TASK)
+        if plan.actions == "waypoint":
+            steps //= _WAYPOINT_STEPS
         length = steps + (video if plan.video != "none" else 0)
         frames += length * len(said)
         # Version 2.1 has a file for each episode; the others store pictures once.

@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from roboirg.apps.demonstrations.picture_coding import PictureCoding
+from roboirg.core.actions import JOINT_ANGLE
 from roboirg.core.errors import InvalidValueError
 from roboirg.core.observations import CAMERAS
 from roboirg.util.atomic_write import replacing
@@ -47,11 +48,13 @@ class TrajectoryFacts:
         status: success, failure or timeout.
         cause: why it is no success; empty for a success.
         video_length: rows of the video before the policy's first observation.
-        steps: control steps of the policy.
+        steps: actions of the policy, control steps or waypoints.
         demonstration_source: who moved the robot in the video: recorded, planned or none.
         environment_version: of scenes, rules and physics.
         coding: how the pictures are stored.
         depth: whether depth and calibration are stored.
+        actions: name of the action space.
+        disturbed: whether the actions that were executed are not those to learn from.
         picture_error: of a lossy video, for each camera the mean absolute error, the largest error
             (both of 255) and the PSNR (dB), over all of its frames; empty if lossless.
         version: of the file.
@@ -72,6 +75,8 @@ class TrajectoryFacts:
     environment_version: int
     coding: PictureCoding
     depth: bool
+    actions: str = JOINT_ANGLE.name
+    disturbed: bool = False
     picture_error: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
     version: int = TRAJECTORY_VERSION
 
@@ -96,10 +101,10 @@ class Trajectory:
         gripper: (rows, 2) float32 finger positions, m.
         end_effector: (rows, 6) float64: position (m) and unwrapped extrinsic x-y-z angles (rad) of
             the tool in the world frame.
-        actions: (rows, 8) float64: joint targets (rad) and the gripper, +1 open to -1 closed; each
-            value is that of a float32.
-        pose_actions: (rows, 7) float64: the tool's pose at those joint targets, as `end_effector`,
-            and the gripper.
+        actions: (rows, 8) float64: joint targets (rad) and the gripper, +1 open to -1 closed, as
+            executed; each value is that of a float32. Of waypoints (rows, 7), unwrapped.
+        pose_actions: (rows, 7) float64: the tool's pose at the joint targets to learn, as
+            `end_effector`, and the gripper.
         subgoals: (rows,) texts: what the robot was doing in the step that led to the row.
         online_subgoals: (rows,) texts: what had to happen next, by the judge.
         grounded_subgoals: as `subgoals`, with the pixel of the object.
@@ -109,6 +114,8 @@ class Trajectory:
             follows.
         calibration: ``front_extrinsic`` (rows, 3, 4), ``front_intrinsic`` (3, 3) and the same for
             the wrist, float32; empty without depth.
+        labels: of a disturbed trajectory, what the undisturbed expert would have done, as
+            `actions`; else None.
     """
 
     path: Path
@@ -124,6 +131,12 @@ class Trajectory:
     grounded_online_subgoals: NDArray[np.str_]
     histograms: Mapping[str, NDArray[np.int64]]
     calibration: Mapping[str, NDArray[np.float32]]
+    labels: NDArray[np.float64] | None = None
+
+    @property
+    def targets(self) -> NDArray[np.float64]:
+        """The actions to learn from, as `actions`."""
+        return self.actions if self.labels is None else self.labels
 
     @property
     def state(self) -> NDArray[np.float32]:

@@ -24,7 +24,14 @@ from roboirg.apps.demonstrations.trajectory import (
     picture_name,
     stack_texts,
 )
-from roboirg.core.actions import ARM_JOINTS, check_chunk
+from roboirg.core.actions import (
+    ARM_JOINTS,
+    JOINT_ANGLE,
+    POSE_SIZE,
+    WAYPOINT,
+    check_chunk,
+    find_action_space,
+)
 from roboirg.core.episode import ENVIRONMENT_VERSION, Episode
 from roboirg.core.errors import InvalidValueError, MotionPlanningError
 from roboirg.core.instruction_options import InstructionOptions
@@ -40,6 +47,8 @@ from roboirg.util.atomic_write import replacing
 if TYPE_CHECKING:
     from roboirg.envs.environment import RoboIRGEnv
 
+_ANGLES = slice(3, POSE_SIZE)
+
 
 class RecordingSpec(NamedTuple):
     """What a trajectory holds.
@@ -51,6 +60,8 @@ class RecordingSpec(NamedTuple):
         depth: whether depth and calibration are stored.
         cameras: whose pictures are stored.
         size: width and height of the pictures, pixels.
+        actions: name of the action space; a row is a control step, or a waypoint.
+        disturbed: whether the expert is disturbed on its way.
     """
 
     coding: PictureCoding = "png"
@@ -59,6 +70,8 @@ class RecordingSpec(NamedTuple):
     depth: bool = False
     cameras: tuple[str, ...] = CAMERAS
     size: int = SIZE
+    actions: str = JOINT_ANGLE.name
+    disturbed: bool = False
 
 
 @dataclass
@@ -67,6 +80,7 @@ class _Rows:
 
     observations: list[Mapping[str, Any]] = field(default_factory=list)
     actions: list[NDArray[np.float64]] = field(default_factory=list)
+    labels: list[NDArray[np.float64]] = field(default_factory=list)
     subgoals: list[str] = field(default_factory=list)
     online: list[str] = field(default_factory=list)
 
@@ -151,7 +165,7 @@ def record_trajectory(
 
     Args:
         episode: the episode.
-        policy: moves the robot, by joint angles.
+        policy: moves the robot, in the action space of `spec`.
         path: file to write.
         spec: what it holds.
         options: of the instruction; None for the explicit instruction.
@@ -163,15 +177,16 @@ def record_trajectory(
         InvalidValueError: the policy has another action space; or the file cannot be written.
     """
     actions = PolicyNeeds.of(policy, "actions").actions
-    if actions != "joint_angle":
+    if actions != spec.actions:
         raise InvalidValueError(
-            f"Policy {policy_name!r} acts in {actions!r}; demonstrations hold "
-            "joint angles, so it must act in 'joint_angle'."
+            f"Policy {policy_name!r} acts in {actions!r}; these demonstrations are recorded in "
+            f"{spec.actions!r}."
         )
     said, is_drawn = options or InstructionOptions(), spec.coding != "none"
     env = make(
         episode,
         **asdict(said),
+        actions=spec.actions,
         cameras=CAMERAS if policy_name != "oracle" else spec.cameras if is_drawn else (),
         depth=spec.depth,
         calibration=spec.depth,
@@ -211,6 +226,7 @@ class _Recorder(EpisodeLoop):
         self._rows = _Rows()
         self._video: list[Mapping[str, Any]] = []
         self._video_session: object = None
+        self._is_waypoint = env.actions == WAYPOINT.name
 
     def record(self, policy_name: str, variation: int) -> TrajectoryFacts:
         """Play the episode and store what happens."""
@@ -247,7 +263,8 @@ class _Recorder(EpisodeLoop):
         from roboirg.simulation.physics_settings import HOME_ACTION
 
         observation, info = super().begin()
-        self._add_row(HOME_ACTION, observation, self.env.subgoal, self.env.subgoal)
+        home = self._pose_actions(HOME_ACTION[None])[0] if self._is_waypoint else HOME_ACTION
+        self._add_row(home, home, observation, self.env.subgoal, self.env.subgoal)
         return observation, info
 
     def act(self, observation: dict[str, Any]) -> ArrayLike:
@@ -262,26 +279,41 @@ class _Recorder(EpisodeLoop):
         observation: dict[str, Any] = {}
         info: dict[str, Any] = {}
         heard: list[Mapping[str, Any]] = []
-        for exact in check_chunk(actions):
-            action = exact.astype(np.float32).astype(np.float64)
+        chunk = check_chunk(actions, find_action_space(self.env.actions))
+        labels = getattr(self.policy, "labels", chunk) if self._spec.disturbed else chunk
+        for exact, wanted in zip(chunk, labels, strict=True):
+            action, label = self._rounded(exact), self._rounded(wanted)
             observation, info = super().execute(action[None])
             heard += info["heard"]
             online = self.env.subgoal
             stage = getattr(self.policy, "stage", None)
             doing = online if stage is None else stage.subgoal
-            self._add_row(action, observation, doing, online)
+            self._add_row(action, label, observation, doing, online)
             if info["status"] != "ongoing":
                 break
         return observation, {**info, "heard": heard}
 
+    def _rounded(self, action: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return an action in float32; a waypoint's angles near those of the one before."""
+        if self._is_waypoint:
+            angles = np.unwrap([self._rows.actions[-1][_ANGLES], action[_ANGLES]], axis=0)[1]
+            action = np.concatenate([action[:3], angles, action[POSE_SIZE:]])
+        return action.astype(np.float32).astype(np.float64)
+
     def _add_row(
-        self, action: NDArray[np.float64], observation: Mapping[str, Any], doing: str, online: str
+        self,
+        action: NDArray[np.float64],
+        label: NDArray[np.float64],
+        observation: Mapping[str, Any],
+        doing: str,
+        online: str,
     ) -> None:
         rows = self._rows
         self._tracks.add(observation, is_video=False)
         kept = {key: value for key, value in observation.items() if not _is_picture(key)}
         rows.observations.append(kept)
         rows.actions.append(action)
+        rows.labels.append(label)
         rows.subgoals.append(doing)
         rows.online.append(online)
 
@@ -305,6 +337,8 @@ class _Recorder(EpisodeLoop):
             environment_version=ENVIRONMENT_VERSION,
             coding=self._spec.coding,
             depth=self._spec.depth,
+            actions=self._spec.actions,
+            disturbed=self._spec.disturbed,
             picture_error=self._tracks.finish(),
         )
 
@@ -322,8 +356,11 @@ class _Recorder(EpisodeLoop):
         }
         for name in [f"{camera}_intrinsic" for camera in CAMERAS if self._spec.depth]:
             arrays[name] = rows.observations[0][name]
-        arrays["actions"] = np.concatenate([video.actions[:length], rows.actions])
-        arrays["pose_actions"] = self._pose_actions(arrays["actions"])
+        arrays["actions"] = np.array([*video.actions[:length], *rows.actions])
+        labels = np.array([*video.actions[:length], *rows.labels])
+        arrays["pose_actions"] = labels if self._is_waypoint else self._pose_actions(labels)
+        if self._spec.disturbed:
+            arrays["labels"] = labels
         seen = list(info["demonstration_subgoals"][:length])
         online = [*seen, *rows.online]
         doing = [*seen, *_with_pixels(rows.subgoals, rows.online)]

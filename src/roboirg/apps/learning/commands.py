@@ -198,14 +198,15 @@ def _play_paper(plan: PolicyPlan, words: PolicyWords, out: Path, workers: int) -
     from roboirg.apps.learning.policy.paper_experiment import (
         PARTS,
         ExperimentPlan,
-        part_plan,
-        runs_of,
+        part_options,
+        run_of,
         train_rows,
     )
     from roboirg.apps.learning.policy.paper_page import write_paper_page
     from roboirg.apps.learning.policy.policy_plan import MEMORY_NAMES
     from roboirg.cli.names import known_name
     from roboirg.evaluation.api.python_run import play_plan
+    from roboirg.evaluation.plan.plan_maker import make_plan
 
     experiment = ExperimentPlan(**words.choices(ExperimentPlan))
     for memory in experiment.memories:
@@ -215,10 +216,10 @@ def _play_paper(plan: PolicyPlan, words: PolicyWords, out: Path, workers: int) -
     files = train_rows(experiment, plan, out, workers, _print_tenths())
     changes = {"tasks": ",".join(plan.tasks)}
     changes |= {name: words.fields[name] for name in PLAYED if name in words.fields}
-    for part, run in runs_of(out, experiment.parts).items():
-        made = part_plan(part, experiment, files, changes)
-        play_plan(made, run, workers=workers, progress=True, on_record=None)
-    typer.echo(str(write_paper_page(out, experiment.parts)))
+    for part in experiment.parts:
+        made = make_plan(**part_options(part, experiment, files, changes))
+        play_plan(made, run_of(out, part), workers=workers, progress=True, on_record=None)
+    typer.echo(str(write_paper_page(out)))
 
 
 def _plan(words: TrainingWords, without: str) -> TrainingPlan:

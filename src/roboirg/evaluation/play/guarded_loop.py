@@ -93,7 +93,6 @@ class GuardedLoop(EpisodeLoop):
         with self._guard.policy("policy's reset()", "policy_reset"):
             self.start_policy(first, info["demonstration"])
             result.policy_metadata = policy_metadata(self.policy, is_ours=self._is_ours)
-            result.needs = PolicyNeeds.of(self.policy).declared
             result.inference = inference_facts(self.policy)
         result.action_space = self._space.name
         return observation, info

@@ -247,6 +247,7 @@ def play_with(
         with guard.environment("env_reset"):
             result.prepared = result.prepared or PreparedJob(job)
             env = make_env(result.prepared, needs)
+            result.needs = needs.declared
         GuardedLoop(env, policy, job, needs.action_space, result, guard, writer).play()
     except EpisodeError as error:
         broke = error.kind == "environment"

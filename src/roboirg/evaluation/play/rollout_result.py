@@ -86,7 +86,7 @@ class RolloutResult:
         policy: its version and whether it is privileged; None if it was never loaded.
         prompt_limit: what the policy declares about its prompt; None if it declares nothing.
         policy_metadata: what the policy reports about itself.
-        needs: what it declares that it needs.
+        needs: what it declares that it needs, or the job prescribes instead.
         inference: what its process computes with; None if it was not asked.
         action_space: name of the action space; None if the episode did not get that far.
         answers: what was executed of each answer of the policy.

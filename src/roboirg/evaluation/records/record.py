@@ -392,7 +392,7 @@ class Record(Summary, frozen=True, kw_only=True, forbid_unknown_fields=True):
         goal: what the instruction conveys, a value for each slot.
         metadata: of the instruction: reasoning pattern, relation, stages, landmarks, ….
         policy_metadata: what the policy reports about itself: checkpoint, server, model, ….
-        needs: what it declares that it needs, as in `PolicyNeeds`; what is not declared is absent.
+        needs: what it declares that it needs, or the job prescribes instead, as in `PolicyNeeds`.
         calls: how often it was asked for actions.
         inference: what its process computes with; None if it was not asked.
         end_state: hash of the state in which the episode left the world and the judge; None if it

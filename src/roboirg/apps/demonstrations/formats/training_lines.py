@@ -32,13 +32,19 @@ lerobot-train --dataset.repo_id=local/roboirg --dataset.root={root}{backend} \\
     --policy.type=act --policy.push_to_hub=false --policy.device=cuda \\
     --policy.pretrained_backbone_weights=null --dataset.use_imagenet_stats=false \\
     --batch_size=64 --steps=20000 --wandb.enable=false --output_dir=outputs/act
-roboirg run --policy 'act=lerobot://outputs/act/checkpoints/last/pretrained_model?device=cuda' \\
-    --tasks {task} --out runs/act
-```
+{after}```
 
 The same line with `--policy.type=diffusion` trains Diffusion Policy, and with `--policy.type=vqbet`
 VQ-BeT, which takes one camera. None of the three reads the instruction: train them on one task at a
 time. With `null`, they begin without the weights of ImageNet, and nothing is downloaded.
+"""
+_LEROBOT_RUN = """\
+roboirg run --policy 'act=lerobot://outputs/act/checkpoints/last/pretrained_model?device=cuda' \\
+    --tasks {task} --out runs/act
+"""
+_WAYPOINTS = """\
+# lerobot:// plays joint angles alone. To play a policy of waypoints, write a class with
+# actions = "waypoint", and round its gripper to -1, 0 or 1.
 """
 _PYAV = " --dataset.video_backend=pyav"
 """Of a dataset with videos; LeRobot's usual decoder, torchcodec, needs FFmpeg on the system."""
@@ -167,7 +173,8 @@ def training_text(plan: ExportPlan, root: Path) -> str:
     if plan.is_teleoperated:
         return _LEROBOT_ON_ROBOT.format(root=place, recipe=recipe, horizon=HORIZON)
     backend = _PYAV if FrameColumns(plan).has_videos else ""
-    text = _LEROBOT.format(root=place, task=plan.tasks[0], backend=backend)
+    after = _WAYPOINTS if plan.actions == "waypoint" else _LEROBOT_RUN.format(task=plan.tasks[0])
+    text = _LEROBOT.format(root=place, after=after, backend=backend)
     if plan.names == "openpi":
         keys = FrameColumns(plan).keys
         renamed = {

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from roboirg.apps.learning.policy.recording import ExpertRecording
-from roboirg.apps.learning.policy.waypoint_expert import LEAVE
+from roboirg.policies.builtin.waypoint_expert import LEAVE
 
 Z_GRID = 0.0025
 """Meters to which heights are rounded."""

@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from pydantic import PositiveInt
 
 from roboirg.apps.learning.policy.policy_plan import PLANNERS, PolicyPlan
-from roboirg.apps.learning.trainer import Progress, part_of
 from roboirg.core.errors import InvalidValueError
-from roboirg.evaluation.plan.plan import Plan
 from roboirg.evaluation.plan.plan_file import read_plan_file
-from roboirg.evaluation.plan.plan_maker import make_plan
+
+if TYPE_CHECKING:
+    from roboirg.apps.learning.trainer import Progress
 
 SYSTEMS: Mapping[str, str] = {
     "none": "pi0.5",
@@ -23,14 +23,14 @@ SYSTEMS: Mapping[str, str] = {
     "keyframes": "MemER",
 }
 """The paper's system with the mechanism of each memory."""
-RESOLVED = "resolved"
+MAIN, RESOLVED = "main", "resolved"
 PARTS: Mapping[str, str] = {
-    "main": "paper",
+    MAIN: "paper",
     RESOLVED: "paper",
     "context": "paper-context",
     "planner": "paper-planners",
 }
-"""The packaged plan that each part of the experiment changes."""
+"""The packaged plan that each part of the experiment changes. Resolved forms join the main run."""
 HELD_OUT = "test"
 """The pool of words that is spoken in every split: that of the packaged plans' split."""
 OWN_TASKS = ("context", "planner")
@@ -38,7 +38,7 @@ OWN_TASKS = ("context", "planner")
 SEED_MARK = "-seed"
 """Between the name of a row and a training seed other than 0."""
 RUNS = "runs"
-"""Folder of the runs, one for each part."""
+"""Folder of the runs."""
 
 
 class ExperimentPlan(NamedTuple):
@@ -83,6 +83,7 @@ def train_rows(
     """
     from roboirg.apps.learning.policy.policy_model import load_policy, save_policy
     from roboirg.apps.learning.policy.policy_training import about_policy, train_policy
+    from roboirg.apps.learning.trainer import part_of
 
     found = {}
     for seed in range(experiment.seeds):
@@ -100,10 +101,10 @@ def train_rows(
     return found
 
 
-def part_plan(
+def part_options(
     part: str, experiment: ExperimentPlan, files: Mapping[str, Path], changes: Mapping[str, Any]
-) -> Plan:
-    """Return the plan of a part: the packaged one with the rows as policies.
+) -> dict[str, Any]:
+    """Return a part's options of `make_plan`: the packaged plan's with the rows as policies.
 
     Args:
         part: a name of `PARTS`.
@@ -112,7 +113,8 @@ def part_plan(
         changes: other options of `make_plan`; tasks do not change parts with tasks of their own.
     """
     given = read_plan_file(PARTS[part])
-    given |= {"forms": RESOLVED if part == RESOLVED else "implicit", "policy_seeds": "0"}
+    given |= {"forms": f"implicit,{RESOLVED}" if part == RESOLVED else "implicit"}
+    given |= {"policy_seeds": "0"}
     if experiment.played and part != "context":
         given["settings"] = ",".join(experiment.played)
     if part in OWN_TASKS:
@@ -120,7 +122,8 @@ def part_plan(
     if changes.get("split", given["split"]) != given["split"]:
         given["wordings"] = HELD_OUT
     policies = _with_planners(experiment, files) if part == "planner" else _rows(files)
-    return make_plan([f"{name}={spec}" for name, spec in policies.items()], **{**given, **changes})
+    named = [f"{name}={spec}" for name, spec in policies.items()]
+    return {**given, **changes, "policies": named}
 
 
 def _rows(files: Mapping[str, Path]) -> dict[str, str]:
@@ -145,6 +148,6 @@ def _with_planners(experiment: ExperimentPlan, files: Mapping[str, Path]) -> dic
     return found
 
 
-def runs_of(folder: Path, parts: Sequence[str] = tuple(PARTS)) -> dict[str, Path]:
-    """Return the folder of each part's run."""
-    return {part: folder / RUNS / part for part in parts}
+def run_of(folder: Path, part: str) -> Path:
+    """Return the folder of the run to which a part belongs."""
+    return folder / RUNS / (MAIN if part == RESOLVED else part)

@@ -12,11 +12,13 @@ import msgspec
 import numpy as np
 
 from roboirg.apps.learning.policy.paper_experiment import (
+    MAIN,
+    PARTS,
     RESOLVED,
     SYSTEMS,
     row_name,
     row_of,
-    runs_of,
+    run_of,
 )
 from roboirg.evaluation.analysis.published import TRIALS, PublishedRow, published_rows
 from roboirg.evaluation.analysis.stats.cells import Cells, gather
@@ -24,13 +26,14 @@ from roboirg.evaluation.analysis.stats.intervals import SEED, Z_95, Interval
 from roboirg.evaluation.analysis.stats.option_labels import options_label
 from roboirg.evaluation.analysis.stats.paired_tests import Gap, Pairs, holm, measure_gap
 from roboirg.evaluation.analysis.stats.run_summary import ALL, SummaryRow, summarize
-from roboirg.evaluation.analysis.tables.paper_tables import is_informative, make_table
+from roboirg.evaluation.analysis.tables.paper_tables import Which, is_informative, make_table
 from roboirg.evaluation.analysis.tables.rendering.markdown import markdown
 from roboirg.evaluation.records.record import Summary
 from roboirg.evaluation.records.store import read_results
 from roboirg.language.settings import EXPLICIT, plain_settings
 
 PAGE = "paper.md"
+TABLES: tuple[Which, ...] = (MAIN, "context", "planner")
 FIRST = "none"
 """The memory that the others are compared with."""
 _TITLE = "# The paper's experiment with small policies"
@@ -60,16 +63,22 @@ Column = Mapping[str, Difference]
 """By row."""
 
 
-def write_paper_page(folder: Path, parts: Sequence[str]) -> Path:
+def write_paper_page(folder: Path) -> Path:
     """Write the page of the runs that were played, and return its path."""
+    runs = {part: run_of(folder, part) for part in PARTS if part != RESOLVED}
     found = {
         part: gather([(part, [_of_row(one) for one in read_results(run)])])
-        for part, run in runs_of(folder, parts).items()
+        for part, run in runs.items()
         if run.exists()
     }
     page = folder / PAGE
-    page.write_text("\n\n".join(_sections(found)) + "\n", encoding="utf-8")
+    page.write_text(paper_text(found), encoding="utf-8")
     return page
+
+
+def paper_text(found: Mapping[str, Cells]) -> str:
+    """Return the page in Markdown; policies of each part's cells are rows."""
+    return "\n\n".join(_sections(found)) + "\n"
 
 
 def _of_row(result: Summary) -> Summary:
@@ -81,32 +90,33 @@ def _of_row(result: Summary) -> Summary:
 def _sections(found: Mapping[str, Cells]) -> Iterator[str]:
     yield _TITLE
     yield _INTRODUCTION
-    for which in ("main", "context", "planner"):
+    for which in TABLES:
         cells = found.get(which, {})
         if cells and is_informative(which, cells):
             yield markdown(make_table(which, cells, published=True)).rstrip()
-    main = found.get("main", {})
-    if main:
-        yield from _questions(main, found.get(RESOLVED, {}))
+    if MAIN in found:
+        yield from _questions(found[MAIN])
 
 
-def _questions(main: Cells, resolved: Cells) -> Iterator[str]:
+def _questions(main: Cells) -> Iterator[str]:
     settings = [name for name in plain_settings() if name != EXPLICIT]
+    averages = _averages(main)
     yield "## Does explicit success carry over, and which setting costs most?"
     yield "Success in each setting less explicit success on the same scenes, in points."
-    yield _table(settings, lambda one: _own_gaps(main, one), lambda one: _published(one, EXPLICIT))
+    yield _table(
+        settings, lambda one: _own_gaps(averages, one), lambda one: _published(one, EXPLICIT)
+    )
     yield "## Do memory and referring come apart?"
     yield "Success less that of the row without memory, in points."
     every = [EXPLICIT, *settings]
     yield _table(every, lambda one: _own_against(main, one), lambda one: _published(one, None))
     yield "## Do planners keep more?"
     yield "Success in each setting by explicit success, in percent."
-    yield _retention(main, settings)
-    if resolved:
+    yield _retention(averages, settings)
+    if any(one.form_gap for one in averages):
         yield "## Do resolved forms recover it?"
         yield "Success with references replaced by names less success with references, in points."
-        both = {**main, **resolved}
-        yield _table(settings, lambda one: _own_form_gaps(both, one), lambda _: {})
+        yield _table(settings, lambda one: _own_form_gaps(averages, one), lambda _: {})
 
 
 def _table(
@@ -137,22 +147,24 @@ def _percent(interval: Interval) -> tuple[float, float]:
     return 100 * interval.low, 100 * interval.high
 
 
-def _averages(cells: Cells, setting: str) -> Iterator[SummaryRow]:
-    """Yield the averages over tasks in a setting, in the order of the mechanisms."""
-    for one in summarize(cells, np.random.default_rng(SEED)):
-        if one.scope == ALL and one.options.setting == setting and one.options.form == "implicit":
-            yield one
+def _averages(cells: Cells) -> list[SummaryRow]:
+    """Return the averages over tasks of implicit forms."""
+    found = summarize(cells, np.random.default_rng(SEED))
+    return [one for one in found if one.scope == ALL and one.options.form == "implicit"]
 
 
-def _own_gaps(cells: Cells, setting: str) -> dict[str, Difference]:
-    averages = _averages(cells, setting)
-    return {one.policy_run.policy: _as_difference(one.gap) for one in averages if one.gap}
+def _own_gaps(averages: Sequence[SummaryRow], setting: str) -> dict[str, Difference]:
+    return {
+        one.policy_run.policy: _as_difference(one.gap)
+        for one in averages
+        if one.gap and one.options.setting == setting
+    }
 
 
-def _own_form_gaps(cells: Cells, setting: str) -> dict[str, Difference]:
+def _own_form_gaps(averages: Sequence[SummaryRow], setting: str) -> dict[str, Difference]:
     found = {}
-    for one in _averages(cells, setting):
-        if one.form_gap is not None:
+    for one in averages:
+        if one.form_gap is not None and one.options.setting == setting:
             gap = _as_difference(one.form_gap)
             ends = gap.interval
             turned = None if ends is None else Interval(-ends.high, -ends.low)
@@ -212,15 +224,14 @@ def _share(rate: Decimal | None) -> float:
     return 0.0 if rate is None else float(rate) / 100
 
 
-def _retention(cells: Cells, settings: Sequence[str]) -> str:
+def _retention(averages: Sequence[SummaryRow], settings: Sequence[str]) -> str:
     kept: dict[str, dict[str, str]] = {}
-    for setting in settings:
-        for one in _averages(cells, setting):
-            if one.gap is not None and one.gap.retention is not None:
-                ends = one.gap.retention_interval
-                shown = "" if ends is None else " ({:.0f} to {:.0f})".format(*_percent(ends))
-                text = f"{100 * one.gap.retention:.0f}{shown}"
-                kept.setdefault(one.policy_run.policy, {})[options_label(one.options)] = text
+    for one in averages:
+        if one.gap is not None and one.gap.retention is not None:
+            ends = one.gap.retention_interval
+            shown = "" if ends is None else " ({:.0f} to {:.0f})".format(*_percent(ends))
+            text = f"{100 * one.gap.retention:.0f}{shown}"
+            kept.setdefault(one.policy_run.policy, {})[options_label(one.options)] = text
     rows = {(one.model, one.options.setting): one for one in published_rows("main")}
     for system in SYSTEMS.values():
         for setting in settings:

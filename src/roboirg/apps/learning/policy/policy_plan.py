@@ -57,11 +57,15 @@ class PolicyPlan(NamedTuple):
     encoders: Mapping[str, dict[str, Any]] = USUAL_ENCODERS
 
     @property
+    def heard(self) -> str:
+        """Which settings it hears, for names of files."""
+        few = "-".join(self.settings) or WORDLESS
+        return "all" if len(self.settings) > MANY else few
+
+    @property
     def name(self) -> str:
         """What distinguishes it from others in the same folder: memory, words and seed."""
-        few = "-".join(self.settings) or WORDLESS
-        heard = "all" if len(self.settings) > MANY else few
-        return f"{self.memory}-{heard}-{self.seed}"
+        return f"{self.memory}-{self.heard}-{self.seed}"
 
 
 class Recorded(NamedTuple):

@@ -57,14 +57,15 @@ from roboirg.apps.learning.policy.thing_detector import (
     varied,
 )
 from roboirg.apps.learning.policy.tracks import LookTokens
-from roboirg.apps.learning.policy.waypoint_expert import Disturbance
 from roboirg.apps.learning.trainer import KeptTraining, Progress, Trainer, batch_count, batches
 from roboirg.core.episode import Episode
 from roboirg.core.errors import InvalidValueError, MotionPlanningError
 from roboirg.language import LANGUAGE_VERSION
+from roboirg.policies.builtin.waypoint_expert import Disturbance
 from roboirg.tasks.splits.splits import get_episode
 from roboirg.util.media import decode_png
 from roboirg.util.parallel_map import parallel_map
+from roboirg.util.short_hash import short_hash
 
 RECORDED_SPLIT = "random"
 PICTURE_EVERY = 16
@@ -110,7 +111,7 @@ def train_policy(plan: PolicyPlan, folder: Path, workers: int, progress: Progres
             for one, own in zip(recorded, decisions, strict=True)
         ]
         planner = train_body(plan, recorded, due, forms, sight, vocabulary, folder, progress)
-    task_net, reader = _train_words(plan, lessons, vocabulary, progress)
+    task_net, reader = _train_words(plan, lessons, vocabulary, folder, progress)
     about = {**about_policy(plan), "episodes": len(recorded)}
     return PolicyModel(
         sight, detector, vocabulary, task_net, reader, corners, moves, plan.memory,
@@ -260,10 +261,34 @@ def first_looks(
 
 
 def _train_words(
-    plan: PolicyPlan, lessons: Sequence[Lesson], vocabulary: Vocabulary, progress: Progress
+    plan: PolicyPlan,
+    lessons: Sequence[Lesson],
+    vocabulary: Vocabulary,
+    folder: Path,
+    progress: Progress,
 ) -> tuple[TaskNet, ListenerNet]:
-    """Return what names the task, and what reads the goal."""
+    """Return what names the task, and what reads the goal: the folder's, or train them."""
+    texts = short_hash("\n".join(one.given.text for one in lessons))
+    made_of = [*map(list, vocabulary), texts, plan.reader_epochs, dict(plan.encoders)]
+    name = f"{plan.heard}-{plan.seed}.pt"
     torch.manual_seed(plan.seed)
+    kept = KeptTraining(folder / f"tasks-{name}", made_of)
+    task_net = _train_tasks(plan, lessons, vocabulary, kept, progress)
+    reader = train_reader(
+        lessons, vocabulary, plan.reader_epochs, plan.seed, progress, plan.encoders,
+        kept=KeptTraining(folder / f"words-{name}", made_of),
+    )  # fmt: skip
+    return task_net, reader
+
+
+def _train_tasks(
+    plan: PolicyPlan,
+    lessons: Sequence[Lesson],
+    vocabulary: Vocabulary,
+    kept: KeptTraining,
+    progress: Progress,
+) -> TaskNet:
+    """Return what names the task."""
     rng = random.Random(plan.seed)
     task_net = TaskNet(vocabulary)
     numbers = {task: number for number, task in enumerate(plan.tasks)}
@@ -275,10 +300,13 @@ def _train_words(
         return functional.cross_entropy(scores, wanted)
 
     trainer = Trainer[Lesson](task_net, task_loss, TASK_RATE, TASK_EPOCHS * batch_count(lessons))
-    trainer.learn(TASK_EPOCHS, lambda _: batches(lessons, rng), partial(progress, "tasks"))
-    return task_net, train_reader(
-        lessons, vocabulary, plan.reader_epochs, plan.seed, progress, plan.encoders
-    )
+
+    def mixed(number: int) -> Iterator[list[Lesson]]:
+        rng.seed(f"{plan.seed}/{number}")
+        return batches(lessons, rng)
+
+    trainer.learn(TASK_EPOCHS, mixed, partial(progress, "tasks"), kept=kept)
+    return task_net
 
 
 def _thinned(text: str, rng: random.Random) -> str:

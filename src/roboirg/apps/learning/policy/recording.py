@@ -11,16 +11,16 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from roboirg.apps.learning.labeled_views import MIN_PIXELS, class_of
-from roboirg.apps.learning.policy.waypoint_expert import (
-    Disturbance,
-    ExpertWaypoint,
-    WaypointExpert,
-)
 from roboirg.core.episode import Episode
 from roboirg.core.errors import InvalidValueError
 from roboirg.core.observations import FRONT, Demonstration
 from roboirg.envs.environment import RoboIRGEnv
 from roboirg.envs.factory import make
+from roboirg.policies.builtin.waypoint_expert import (
+    Disturbance,
+    ExpertWaypoint,
+    WaypointExpert,
+)
 from roboirg.policies.contract.play import EpisodeLoop
 from roboirg.simulation.bodies import Body
 from roboirg.simulation.proprioception import euler_angles

@@ -18,8 +18,8 @@ from roboirg.apps.learning.policy.planner_history import (
 from roboirg.apps.learning.policy.policy_plan import CHOOSES
 from roboirg.apps.learning.policy.recording import LOOK_EVERY
 from roboirg.apps.learning.policy.subgoals import asked_numbers
-from roboirg.apps.learning.policy.waypoint_expert import LEAVE
 from roboirg.core.observations import FRONT, Demonstration, Observation
+from roboirg.policies.builtin.waypoint_expert import LEAVE
 
 if TYPE_CHECKING:
     from roboirg.apps.learning.policy.policy_model import PolicyModel, SeenEpisode

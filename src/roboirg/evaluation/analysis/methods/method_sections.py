@@ -7,11 +7,11 @@ played; `method_statistics` has how scenes were selected and results were analyz
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from pathlib import Path
 
 from roboirg.core.actions import find_action_space
-from roboirg.core.arms import ARMS, PARAPHRASE, SILENT_TEXTS, paraphrase_number
+from roboirg.core.arms import ARMS, OTHER_GOAL, PARAPHRASE, SILENT_TEXTS, paraphrase_number
 from roboirg.core.instruction_options import OPTION_HELP
 from roboirg.core.plain_text import counted
 from roboirg.core.word_pools import POOLS, pool_of
@@ -43,7 +43,7 @@ from roboirg.evaluation.analysis.stats.sensitivity import families_of
 from roboirg.evaluation.plan.plan import Plan
 from roboirg.evaluation.plan.stored_plans import read_plan
 from roboirg.evaluation.policy_calls import SERVER
-from roboirg.evaluation.records.record import DEFAULT_MAX_STEPS, Job, Record, Summary
+from roboirg.evaluation.records.record import DEFAULT_MAX_STEPS, Job, Summary
 from roboirg.evaluation.records.store import iterate_records, read_results
 from roboirg.language.settings import all_settings
 from roboirg.tasks import every_task
@@ -75,7 +75,9 @@ def make_sections(folder: Path) -> Sections:
     results, plan = read_results(folder), read_plan(folder)
     planned = plan.drawable_jobs() if plan else ()
     data = RunData.of([(str(folder), results)], planned)
-    played, said = read_facts(_newest(folder, results))
+    kept = {(one.slug, one.started_at) for one in results}  # without what was played again
+    newest = (one for one in iterate_records(folder) if (one.slug, one.started_at) in kept)
+    played, said = read_facts(newest)
     families = [*families_of(data)]
     jobs = planned or [one.identity for one in results]
     return {
@@ -93,12 +95,6 @@ def make_sections(folder: Path) -> Sections:
     }
 
 
-def _newest(folder: Path, results: Iterable[Summary]) -> Iterator[Record]:
-    """Yield the records behind results, without those that were played again."""
-    kept = {(one.slug, one.started_at) for one in results}
-    return (one for one in iterate_records(folder) if (one.slug, one.started_at) in kept)
-
-
 def _terms(jobs: Sequence[Job]) -> Items:
     yield "scene", "one numbered start of a task: its objects, their motions, a goal"
     yield "rollout", "one scene played once, in one setting and arm, with one policy seed"
@@ -111,11 +107,14 @@ def _terms(jobs: Sequence[Job]) -> Items:
 
 def _horizon(results: Sequence[Summary], plan: Plan | None, played: Played) -> Items:
     limits = {one.max_steps for one in results}
+    has_other = any(one.arm == OTHER_GOAL for one in results)
+    both = " (arm other-goal: and that on the scene's own goal)" * has_other
     yield item(
         "step limit of a rollout",
         _limit("control steps of the policy", limits, DEFAULT_MAX_STEPS),
         "the video before its turn does not count",
-        "a rollout ends with its verdict, or at the limit as a failure",
+        f"a rollout ends with its verdict{both}",
+        "or at the limit, where what is undecided fails",
     )
     fields = {"call of the policy": "policy_timeout_s", "rollout": "episode_timeout_s"}
     waits = [
@@ -140,9 +139,10 @@ def _horizon(results: Sequence[Summary], plan: Plan | None, played: Played) -> I
         yield item(
             name,
             f"actions: {_action_space(facts.need('actions'))}",
-            f"{facts.labeled('chunk')}" + ", and may vary" * (NOT_REPORTED in facts.know("chunk")),
-            "executed per call: the whole chunk, or to the rollout's end; "
-            f"{mean} control steps on average",
+            *map(facts.labeled, ("chunk", "execute")),
+            "executed per call: all actions returned, but none after the rollout's end",
+            f"on average {mean} control steps, calls that an end cut short included",
+            f"returned per call on average: {NOT_REPORTED} by roboirg",
             f"observations within a chunk: {between}",
         )
 
@@ -164,13 +164,9 @@ def _action_space(name: str) -> str:
 def _precision(results: Sequence[Summary], played: Played) -> Items:
     for name, facts in played.items():
         place = "by its server" if facts.is_remote else "on the machine of the simulation"
-        keys = ("dtype", "device", "libraries", "python")
-        yield item(
-            name,
-            f"computed {place}",
-            f"{DECLARABLE['version']}: {_version(facts)}",
-            *map(facts.labeled, keys),
-        )
+        keys = ("dtype", "parameter_dtype", "device", "libraries", "python")
+        version = f"{DECLARABLE['version']}: {_version(facts)}"
+        yield item(name, f"computed {place}", version, *map(facts.labeled, keys))
     yield item(
         "simulation",
         f"package roboirg {distinct(one.package_version for one in results)}, which calls the "
@@ -206,10 +202,10 @@ def _observations(results: Sequence[Summary], played: Played) -> Items:
         state = _STATES.get(facts.scheme or SERVER * facts.is_remote, f"{NOT_REPORTED} by roboirg")
         yield item(
             name,
-            f"cameras available to it: {cameras}{size}",
+            f"cameras that it declares to need, and whose pictures it was given: {cameras}{size}",
             f"depth: {facts.need('depth')}",
             f"state of the robot given to it: {state}",
-            f"frames of the video before its turn: {frames}{kind}",
+            f"frames of the video before its turn, given to it: {frames}{kind}",
             f"reads the simulator's state: {'yes' if facts.is_privileged else 'no'}",
             facts.labeled("preprocessing"),
         )
@@ -246,8 +242,8 @@ def _counts(said: SaidTexts, *, is_fixed: bool) -> str:
     )
     return (
         f"{texts}; command templates: {len(said.commands)} of the {there} in the pool for "
-        f"{counted(len(tasks), 'task')}; distinct random choices for words outside the command and "
-        f"for referring expressions: {len(said.choices) or 'none'}, of a number not counted here"
+        f"{counted(len(tasks), 'task')}; distinct random choices of other words and of referring "
+        f"expressions: {len(said.choices) or 'none'} used; possible: {NOT_REPORTED} by roboirg"
     )
 
 
@@ -276,4 +272,4 @@ def _training(played: Played, said: ColumnTexts) -> Items:
     texts = set().union(*(one.texts for one in said.values()))
     pools = Counter(_POOL_NOTES[pool] for _, pool in texts)
     listed = (f"{counted(pools[note], 'text')}: {note}" for note in sorted(pools))
-    yield item("occurrence in train and val, whether or not a policy learned from these", *listed)
+    yield item("occurrence of the texts in the splits train and val, learned from or not", *listed)

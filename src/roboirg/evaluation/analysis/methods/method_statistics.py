@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import itertools
 from collections import Counter, defaultdict
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 
-from roboirg.core.arms import TOLD
+from roboirg.core.arms import SILENT_TEXTS, TOLD
 from roboirg.core.episode import SPLITS
+from roboirg.core.instruction_options import InstructionOptions
 from roboirg.core.plain_text import counted
 from roboirg.evaluation.analysis.methods.played_facts import (
     NOT_REPORTED,
@@ -20,15 +22,13 @@ from roboirg.evaluation.analysis.stats.arm_figures import MEANING, arm_figures
 from roboirg.evaluation.analysis.stats.cells import PolicyRun
 from roboirg.evaluation.analysis.stats.chance import chance_level
 from roboirg.evaluation.analysis.stats.intervals import ALPHA, DRAWS
-from roboirg.evaluation.analysis.stats.option_labels import (
-    options_label,
-    options_sort_key,
-)
+from roboirg.evaluation.analysis.stats.option_labels import options_label, options_sort_key
 from roboirg.evaluation.analysis.stats.rates import p_text, points
 from roboirg.evaluation.analysis.stats.run_data import RunData
-from roboirg.evaluation.analysis.stats.run_summary import ALL, ScopeKey
+from roboirg.evaluation.analysis.stats.run_summary import ALL, ALL_TASKS, ScopeKey
 from roboirg.evaluation.analysis.stats.sensitivity import (
     ARM_CONTRASTS,
+    EXPLICIT_GAPS,
     Family,
     offers_for,
     try_choices,
@@ -43,7 +43,10 @@ SceneName = tuple[str, str, int]
 """Task, split and number."""
 
 _NO_REASON = f"reason for this selection: {NOT_REPORTED} by the user who chose it"
-_GUESS = "expected of right motions to a goal drawn from those that the last utterance leaves"
+_GUESS = (
+    "success expected of a policy that moves perfectly but picks at random among the goals "
+    "compatible with the last utterance, or with the candidates named before it, if any"
+)
 _FEW_SCENES = 2
 """Of a task; over so few a bootstrap means nothing."""
 
@@ -67,18 +70,22 @@ def screening_items(jobs: Sequence[Job]) -> Items:
         f"{len(scenes)} of the {whole or 'unlimited'} that these tasks have in the split "
         f"{distinct(splits)}, numbered {span} in each task",
         "all there are" if is_whole else _NO_REASON,
-        "none was left out for its result",
+        "roboirg leaves out none for its result; whether the user did is not known to it",
     )
-    yield item("screening when the split was made", *_rejections(scenes))
+    counts = f"counts of the {counted(len(scenes), 'scene')} above, not of the whole split"
+    yield item("screening when the split was made", counts, *_rejections(scenes))
     for column, own in columns.items():
-        usable = {one for one in scenes if _has_setting(one[0], column.options.setting)}
+        has = {
+            one: column.options.setting in settings_of(task) for one, task in every_task().items()
+        }
+        usable = {one for one in scenes if has.get(one[0], True)}
         is_told = column.arm == TOLD
         missing = "the setting cannot express them" if is_told else "there is no such goal or text"
         yield item(
             column.label,
             f"{len(own)} of {counted(len(scenes), 'scene')} planned",
             f"left out, as their tasks do not have the setting: {len(scenes - usable)}",
-            f"as {missing}: {len(usable - own)}",
+            f"left out, as {missing}: {len(usable - own)}",
         )
 
 
@@ -86,8 +93,8 @@ def _rejections(scenes: set[SceneName]) -> Iterator[str]:
     published = {one for one in scenes if is_published(*one)}
     if published:
         yield (
-            f"{counted(len(published), 'scene')} published by RoboMME and used unchanged; rejected "
-            f"here: none; criteria of their selection: {NOT_REPORTED} by RoboMME"
+            f"{counted(len(published), 'scene')} published by RoboMME and used unchanged, none "
+            f"rejected by roboirg; RoboMME's criteria and rejections: {NOT_REPORTED} by RoboMME"
         )
     shipped = {one for one in scenes - published if one[0] in shipped_splits() and one[1] in SPLITS}
     if shipped:
@@ -96,16 +103,12 @@ def _rejections(scenes: set[SceneName]) -> Iterator[str]:
             for task, split, number in shipped
         )
         yield (
-            f"{counted(len(shipped), 'scene')} sampled, after {rejected} rejected: no room for an "
-            "object, a setting that cannot express it, or not solved by the oracle"
+            f"{counted(len(shipped), 'scene')} sampled by roboirg, after it rejected {rejected} in "
+            "their places: no room for an object, a setting that cannot express it, or not solved "
+            "by the oracle"
         )
     if others := len(scenes - published - shipped):
         yield f"{counted(others, 'scene')} sampled; how many were rejected: {NOT_REPORTED}"
-
-
-def _has_setting(task: str, setting: str) -> bool:
-    found = every_task().get(task)
-    return found is None or setting in settings_of(found)
 
 
 def statistics_items(data: RunData, families: Sequence[Family]) -> Items:
@@ -115,10 +118,9 @@ def statistics_items(data: RunData, families: Sequence[Family]) -> Items:
     test = "McNemar's exact test" if seeds == 1 else "the exact sign-flip test over scenes"
     yield "unit", "the scene; its rollouts with several policy seeds are one cluster"
     yield "averages", "means over tasks, each with the same weight"
-    scenes: defaultdict[str, set[int]] = defaultdict(set)
-    for _, one in data.results:
-        scenes[one.task].add(one.episode)
-    few = [f"{task} ({len(own)})" for task, own in scenes.items() if len(own) <= _FEW_SCENES]
+    scenes = dict.fromkeys((one.task, one.episode) for _, one in data.results)
+    sizes = Counter(task for task, _ in scenes)
+    few = [f"{task} ({size})" for task, size in sizes.items() if size <= _FEW_SCENES]
     yield item(
         "intervals",
         f"95 %; {wilson}the bootstrap over each task's scenes ({DRAWS} resamples), paired for "
@@ -130,12 +132,20 @@ def statistics_items(data: RunData, families: Sequence[Family]) -> Items:
         f"paired by scene, {test}, two-sided",
         f"verdict higher or lower than explicit if the corrected p is at most {ALPHA}; else open",
     )
-    arms = [
-        f"{policy}: its {kind} ({len(contrasts)})"
-        for policy, kind, contrasts in families
-        if kind == ARM_CONTRASTS and contrasts
-    ]
-    yield item("Holm's correction, separately within each family", *_sizes(data.told()), *arms)
+    arms = [one for one in families if one.kind == ARM_CONTRASTS and one.contrasts]
+    told = data.told()
+    tests = Counter(
+        f"{told.names[one.policy_run]}, {EXPLICIT_GAPS} in "
+        + ("single tasks" if one.scope.task else "suites" if one.scope.suite else ALL_TASKS)
+        for one in told.summaries.values()
+        if one.gap
+    )
+    tests.update({f"{one.policy}, {one.kind}": len(one.contrasts) for one in arms})
+    yield item(
+        "Holm's correction",
+        f"{counted(len(tests), 'family', 'families')}, each corrected alone",
+        *(f"{family}: {counted(size, 'test')}" for family, size in tests.items()),
+    )
     yield (
         "contrasts of arms, where played; paired and tested alike",
         MEANING.rstrip(".") if arms else "none, without control arms",
@@ -167,28 +177,20 @@ def sensitivity_items(families: Sequence[Family]) -> Items:
         )
 
 
-def _sizes(told: RunData) -> Iterator[str]:
-    """Yield the sizes of each policy's families of differences to explicit."""
-    for policy_run, name in told.names.items():
-        rows = [one for one in told.summaries.values() if one.policy_run == policy_run and one.gap]
-        tasks, suites = (sum(bool(one.scope[place]) for one in rows) for place in (0, 1))
-        everywhere = len(rows) - tasks - suites
-        sizes = f"single tasks ({tasks}); in suites ({suites}); in all tasks ({everywhere})"
-        yield f"{name}: its differences to explicit in {sizes}"
-
-
 def control_items(data: RunData, jobs: Sequence[Job]) -> Items:
     """Yield chance levels, positive controls, and what the control arms show."""
-    by_options = defaultdict(list)
-    for job in jobs:
-        by_options[job.column].append(job)
-    for options in sorted(by_options, key=options_sort_key):
-        level = chance_level(by_options[options])
-        text = NOT_REPORTED if level is None else f"{100 * float(level):.1f} %"
-        yield f"chance in {options_label(options)}", f"{text}, {_GUESS}; no floor without words"
+    settings = sorted({job.column for job in jobs}, key=options_sort_key)
+    silent = [one for one in data.names if one.conditions.arm in SILENT_TEXTS]
+    for options in settings:
+        level = chance_level(job for job in jobs if job.column == options)
+        floor = _rates(data, silent, [options]) or f"{NOT_REPORTED}, as no silent arm has a result"
+        yield item(
+            f"chance in {options_label(options)}",
+            (NOT_REPORTED if level is None else f"{100 * float(level):.1f} %") + f", {_GUESS}",
+            f"success without any words: {floor}",
+        )
     told = data.told()
-    controls = [one for one in told.names if one.is_privileged]
-    listed = "; ".join(f"{told.names[one]}: {_rates(told, one)}" for one in controls)
+    listed = _rates(told, [one for one in told.names if one.is_privileged], settings)
     if len(told.names) == 1:
         listed = f"none, as {next(iter(told.names.values()))} is the only policy"
     yield "positive control, another policy that reads the simulator's state", listed or "none"
@@ -201,20 +203,19 @@ def control_items(data: RunData, jobs: Sequence[Job]) -> Items:
             f"difference {points(one.gap.value, 1)} points, corrected {p_text(one.p_holm)}",
             counted(one.gap.episodes, "scene"),
         )
-    is_resolved = any(one.form == "resolved" for one in jobs)
-    yield (
-        "control with references replaced by names (form resolved)",
-        "played" if is_resolved else "not played",
+    played = "played" if any(one.form == "resolved" for one in jobs) else "not played"
+    yield "control with references replaced by names (form resolved)", played
+
+
+def _rates(
+    data: RunData, policy_runs: Iterable[PolicyRun], settings: Iterable[InstructionOptions]
+) -> str:
+    keys = (ScopeKey(*key) for key in itertools.product(policy_runs, [ALL], settings))
+    return ", ".join(
+        f"{data.names[key.policy_run]}, {options_label(key.options)}: {100 * float(row.rate):.1f} %"
+        for key in keys
+        if (row := data.summaries.get(key)) and row.rate is not None
     )
-
-
-def _rates(data: RunData, policy_run: PolicyRun) -> str:
-    found = []
-    for options in sorted({key.options for key in data.cells}, key=options_sort_key):
-        row = data.summaries.get(ScopeKey(policy_run, ALL, options))
-        if row is not None and row.rate is not None:
-            found.append(f"{options_label(options)} {100 * float(row.rate):.1f} %")
-    return ", ".join(found)
 
 
 def error_items(
@@ -225,15 +226,12 @@ def error_items(
     yield item(
         "policy seeds",
         f"{counted(len(seeds), 'seed')}, numbered {distinct(seeds)}",
-        "the seed that a policy gets is made from this number and the scene",
+        "the seed that a policy gets is made from this number, the scene and a secret in the plan",
     )
     again = sum(one.repeated for one in played.values())
     yield "rollouts begun again after a fault", f"{again} of {len(results)}"
     kinds = Counter(one.error for one in results if one.outcome == "error")
-    listed = ", ".join(f"{kind} {count}" for kind, count in kinds.items())
-    by_kind = f" ({listed})" if listed else ""
-    yield (
-        "rollouts that ended in an error, which are in no rate",
-        f"{kinds.total()} of {len(results)}{by_kind}",
-    )
+    listed = [f"{kind} {count}" for kind, count in kinds.items()]
+    count = f"{kinds.total()} of {len(results)}"
+    yield item("rollouts that ended in an error, which are in no rate", count, *listed)
     yield "rollouts planned and not played", f"{sum(one.missing for one in data.cells.values())}"

@@ -21,19 +21,21 @@ NO_NETWORK = "not applicable, as there is no neural network"
 DECLARABLE = {
     "network": "network",
     "version": "version of the policy",
-    "chunk": "nominal length of a chunk",
-    "dtype": "number type of inference",
+    "chunk": "length of a chunk, as declared",
+    "execute": "actions returned of each chunk",
+    "dtype": "number type of the computation",
+    "parameter_dtype": "number type of the parameters",
     "device": "device of inference",
     "libraries": "versions of libraries",
     "python": "version of Python",
-    "preprocessing": "preprocessing of observations, relative to training",
+    "preprocessing": "preprocessing, relative to training, as declared",
     "reads_text": "reads the text",
     "text_normalization": "what it does to the text",
     "trained_on": "words of the benchmark that it was trained on, or written for",
 }
 """Keys of a policy's ``metadata`` that methods sections read, and what they stand for."""
 
-_OF_NETWORKS = ("dtype", "preprocessing", "text_normalization")
+_OF_NETWORKS = ("dtype", "parameter_dtype", "preprocessing", "text_normalization")
 """Those that do not exist without a network."""
 
 FIXED = "fixed"
@@ -87,7 +89,7 @@ class PlayedFacts:
     """What is known of one policy of a run.
 
     Attributes:
-        needs: distinct values of what the policy declares that it needs, by name.
+        needs: distinct values of what the policy declares that it needs, or the run prescribes.
         declared: distinct values in its metadata, by key of `DECLARABLE`.
         inference: distinct values of what its process computes with, by key of `DECLARABLE`.
         scheme: of its URL; empty if it has none.
@@ -121,9 +123,9 @@ class PlayedFacts:
                 self.declared[key].add(_words(table[key]))
         self.declared["version"] = {*self.declared["version"], record.policy_version} - {"unknown"}
         if (found := record.inference) is not None:
-            dtypes = [f"{one} (parameters; roboirg reads no arithmetic)" for one in found.dtypes]
-            values = found.python, found.libraries, dtypes, found.devices
-            for key, one in zip(("python", "libraries", "dtype", "device"), values, strict=True):
+            keys = "python", "libraries", "parameter_dtype", "device"
+            values = found.python, found.libraries, found.dtypes, found.devices
+            for key, one in zip(keys, values, strict=True):
                 self.inference[key].add(_words(one))
         self.is_privileged |= record.privileged
         self.steps += record.steps
@@ -132,10 +134,9 @@ class PlayedFacts:
         self.repeated += record.attempt > 1
 
     def need(self, name: str) -> str:
-        """Return a declared need in words; in records from before needs were kept it is unknown."""
-        if not self.needs:
-            return NOT_RECORDED
-        return "; ".join(sorted(one or "none" for one in self.needs.get(name, ("none",))))
+        """Return a need in words; in records from before needs were kept it is unknown."""
+        found = self.needs.get(name, {""}) if self.needs else ()
+        return _listed(one or "none" for one in found) or NOT_RECORDED
 
     def know(self, key: str) -> str:
         """Return what is known under a key of `DECLARABLE`.

@@ -86,7 +86,8 @@ class RemotePolicy(ABC):
         """
         self.instruction = instruction
         server = self._session.begin()
-        self.metadata = {"server": str(self._session.spec.endpoint), **as_json(server)}
+        used = {"execute": getattr(self.options, "execute", None) or "all"}
+        self.metadata = {"server": str(self._session.spec.endpoint), **as_json(server), **used}
         with self._closed_on_error():
             self.begin_episode(demonstration)
 

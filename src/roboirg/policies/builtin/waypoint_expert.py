@@ -9,10 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from roboirg.core.actions import ARM_JOINTS, WAYPOINT
+from roboirg.core.actions import ARM_JOINTS, JOINT_ANGLE, POSE_SIZE, WAYPOINT
 from roboirg.core.episode import HANDLES_HELD, Goal, Primitive
 from roboirg.core.observations import Observation
 from roboirg.policies.builtin.oracle_policy import OraclePolicy
+from roboirg.simulation.controllers import WaypointController
 from roboirg.simulation.expert.primitives import MotionPrimitives
 from roboirg.simulation.physics_settings import CLOSED, GRIPPER_STEPS, OPEN
 
@@ -81,9 +82,12 @@ class WaypointExpert(OraclePolicy):
 
     Attributes:
         last: the decision that `act` has just made.
+        labels: (1, 7) what the expert would have done instead of the action that `act` has just
+            returned: the same, unless it or the move before the gripper's action is disturbed.
     """
 
     actions: ClassVar[str] = WAYPOINT.name
+    labels: NDArray[np.float64]
 
     def __init__(self, seed: int = 0, disturbance: Disturbance | None = None) -> None:
         super().__init__(seed)
@@ -93,6 +97,7 @@ class WaypointExpert(OraclePolicy):
         self._gripper = OPEN
         self._primitives: _WaypointPrimitives | None = None
         self._stalled: ExpertWaypoint | None = None
+        self._missed: NDArray[np.float64] | None = None
         self._waits = 0
 
     def make_primitives(self, env: RoboIRGEnv) -> MotionPrimitives:
@@ -102,7 +107,7 @@ class WaypointExpert(OraclePolicy):
 
     def decide(self, env: RoboIRGEnv, instruction: str) -> Goal:
         """Return the episode's goal; the instruction is ignored."""
-        self._gripper, self._stalled, self._waits = OPEN, None, 0
+        self._gripper, self._stalled, self._missed, self._waits = OPEN, None, None, 0
         self._rng = np.random.default_rng((env.episode.seed, self.seed))
         return super().decide(env, instruction)
 
@@ -110,12 +115,19 @@ class WaypointExpert(OraclePolicy):
         """Return the next waypoint (1, 7), perhaps disturbed; `last` is the undisturbed one."""
         decided = self._stalled or self._next()
         self._stalled = None
-        self.last = decided
+        self.last, wanted = decided, decided.action
         how = self._disturbance
-        if how is not None and decided.action[-1] == LEAVE and self._rng.random() < how.stall:
+        if how is not None and wanted[-1] == LEAVE and self._rng.random() < how.stall:
             self._stalled = decided
-            return self._here(LEAVE)[None]
-        return self._disturb(decided.action)[None]
+            action = self._here(LEAVE)
+        else:
+            action = self._disturb(wanted)
+        if wanted[-1] == LEAVE:
+            self._missed = None if np.array_equal(action, wanted) else wanted
+        elif self._missed is not None:  # where the gripper is not meant to open or close
+            wanted = np.append(self._missed[:POSE_SIZE], wanted[-1])
+        self.labels = wanted[None]
+        return action[None]
 
     def _next(self) -> ExpertWaypoint:
         """Return the next decision; after the last one the tool stays where it is."""
@@ -194,6 +206,49 @@ class WaypointExpert(OraclePolicy):
         elif rng.random() < how.low:
             moved[:2] += rng.normal(0.0, how.miss, 2)
         return moved
+
+
+class JointWaypointExpert(WaypointExpert):
+    """The same expert in joint angles, which go where those of its waypoints go.
+
+    `labels` are (n, 8): the targets of the undisturbed way after as many control steps, planned
+    from where the disturbed one begins; after its end, that end. As both begin together, they lead
+    from where the robot has been moved back to the expert's way.
+    """
+
+    actions: ClassVar[str] = JOINT_ANGLE.name
+
+    def decide(self, env: RoboIRGEnv, instruction: str) -> Goal:
+        """Return the episode's goal; the instruction is ignored."""
+        self._controller = WaypointController(env.session.world.robot)
+        self._moves: Iterator[JointTrajectory] = iter(())
+        self._way: JointTrajectory | None = None
+        return super().decide(env, instruction)
+
+    def act(self, observation: Observation) -> NDArray[np.floating[Any]]:
+        """Return the targets (n, 8) of the next move, perhaps disturbed, or of the gripper."""
+        executed = next(self._moves, None)
+        if executed is None:
+            (action,) = super().act(observation)
+            (wanted,) = self.labels
+            self._way = None if np.array_equal(action, wanted) else self._way_of(wanted)
+            self._moves = self._controller.trajectories(action)
+            executed = next(self._moves)
+        if self._way is None:
+            self.labels = executed
+        else:
+            last = len(self._way) - 1
+            self.labels = self._way[np.minimum(np.arange(len(executed)), last)]
+            self._way = self._way[min(len(executed), last) :]
+        return executed
+
+    def _way_of(self, waypoint: NDArray[np.float64]) -> JointTrajectory:
+        """Return the way to a waypoint, with the gripper's action at its end."""
+        move = next(self._controller.trajectories(waypoint))
+        if waypoint[-1] == LEAVE:
+            return move
+        end = np.append(move[-1, :ARM_JOINTS], waypoint[-1])
+        return np.concatenate([move, np.tile(end, (GRIPPER_STEPS, 1))])
 
 
 class _WaypointPrimitives(MotionPrimitives):

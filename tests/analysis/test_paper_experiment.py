@@ -1,0 +1,94 @@
+"""The paper's experiment with small policies: what is played, and what is asked of both."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import msgspec
+import pytest
+
+from roboirg.apps.learning.policy.paper_experiment import (
+    PARTS,
+    SYSTEMS,
+    ExperimentPlan,
+    part_options,
+    row_name,
+    row_of,
+)
+from roboirg.apps.learning.policy.paper_page import paper_text
+from roboirg.evaluation.analysis.stats.cells import gather
+from roboirg.evaluation.plan.plan_maker import make_plan
+
+FILES = {row_name(memory): Path(f"{memory}-explicit-0.pt") for memory in SYSTEMS}
+ROW_OF = {system: row_name(memory) for memory, system in SYSTEMS.items()}
+
+
+def played(options):
+    """Return what one policy plays; those of the options need PyTorch and files."""
+    return make_plan(**{**options, "policies": ["oracle"]}).jobs()
+
+
+@pytest.mark.parametrize(
+    ("part", "cells", "policies"),
+    [("main", 51, 5), ("resolved", 91, 5), ("context", 12, 5), ("planner", 15, 7)],
+)
+def test_each_part_plays_the_cells_of_the_paper(part, cells, policies):
+    options = part_options(part, ExperimentPlan(), FILES, {"episodes": "2"})
+    assert len(options["policies"]) == policies
+    assert len(played(options)) == cells * 2
+
+
+def test_held_out_words_are_spoken_in_every_split():
+    changes = {"episodes": "1", "split": "val", "tasks": "PickXtimes"}
+    for part in PARTS:
+        jobs = played(part_options(part, ExperimentPlan(), FILES, changes))
+        assert {job.options.wordings for job in jobs} == {"test"}
+    jobs = played(part_options("main", ExperimentPlan(), FILES, {"episodes": "1"}))
+    assert {job.options.wordings for job in jobs} == {None}
+
+
+@pytest.mark.parametrize("seed", [0, 1, 12])
+def test_a_policy_names_its_row_and_its_training_seed(seed):
+    for memory in SYSTEMS:
+        for change in ("", "-interpreter"):
+            name = row_name(memory, seed, change)
+            assert row_of(name) == (row_name(memory, 0, change), seed)
+
+
+def values(section, row):
+    """Return the differences in a row of a section's table."""
+    line = next(line for line in section.splitlines() if line.startswith(f"| {row} |"))
+    texts = [part.strip().split(" ")[0].strip("\\*") for part in line.split("|")[2:-1]]
+    return [None if text == "–" else float(text) for text in texts]
+
+
+def test_the_same_questions_have_the_same_answers_for_equal_rates(published_like):
+    results = [
+        msgspec.structs.replace(one, policy=ROW_OF[one.policy])
+        for one in published_like("main")
+        if one.policy in ROW_OF
+    ]
+    text = paper_text({"main": gather([("main", results)])})
+    carried, apart, kept = text.split("\n## ")[1:]
+    for system, row in ROW_OF.items():
+        assert values(carried, row) == pytest.approx(values(carried, system), abs=0.11)
+        assert values(kept, row) == pytest.approx(values(kept, system), abs=1.01)
+        if row != row_name("none"):
+            assert values(apart, row) == pytest.approx(values(apart, system), abs=0.11)
+    assert values(carried, "FrameS-Modul")[0] == pytest.approx(-16.1, abs=0.1)
+
+
+def test_resolved_forms_are_compared_with_references(published_like):
+    results = [
+        msgspec.structs.replace(one, policy="small-none") for one in published_like("main", "pi0.5")
+    ]
+    better = [
+        msgspec.structs.replace(
+            one, outcome="success", options=replace(one.options, form="resolved")
+        )
+        for one in results
+        if one.options.setting != "explicit"
+    ]
+    found = gather([("main", [*results, *better])])
+    recovered = values(paper_text({"main": found}).split("\n## ")[-1], "small-none")
+    lost = [100 - 21.2, 100 - 13.6, 100 - 17.3, 100 - 12.4]
+    assert recovered == pytest.approx(lost, abs=0.2)
