@@ -30,8 +30,8 @@ from roboirg.apps.language_lab.corpus_statistics import (
     phrase_counts,
 )
 from roboirg.apps.real.control.robot import HORIZON
-from roboirg.apps.real.study.execution_horizon import at_horizon
 from roboirg.apps.real.study.study_plan import DEFAULT_DEMONSTRATIONS, DEFAULT_TRIALS
+from roboirg.apps.real.study.study_run import at_horizon
 from roboirg.core.errors import InvalidValueError
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.core.word_pools import POOLS

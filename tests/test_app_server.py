@@ -168,7 +168,7 @@ def test_an_error_of_ours_logs_its_traceback(tmp_path, caplog):
 def test_a_port_in_use_is_an_error(tmp_path):
     with PageServer(tmp_path, str) as server:
         for port in (server.port, 70_000, -1):
-            with pytest.raises(InvalidValueError, match=f"Cannot listen at 127.0.0.1:{port} "):
+            with pytest.raises(InvalidValueError, match=f"Cannot listen on 127.0.0.1:{port} "):
                 PageServer(tmp_path, str, port)
 
 

@@ -88,7 +88,7 @@ def canned(monkeypatch: pytest.MonkeyPatch) -> type[CannedPlayer]:
         (("--episodes", "50,"), "There is no episode 50: split 'test' has episodes 0 to 49."),
         (("--episodes", "four"), "'four' is not a valid episode"),
         (("--policy", "listner"), "Did you mean 'listener'?"),
-        (("--workers", "-1"), "workers is -1; it must be at least 0, this process only."),
+        (("--workers", "-1"), "workers is -1; it must be at least 0 (this process only)."),
         (("--plan", "papr"), "Did you mean 'paper'?"),
         (("--executor", "slurm"), "There is no executor 'slurm'; known: local, ray."),
     ],
@@ -449,7 +449,7 @@ def test_a_dry_run_says_what_models_will_be_asked(roboirg, tmp_path: Path) -> No
     words = (*RUN, "--policy", f"p=planner:stateless?{model}", "--settings", "explicit")
     said = roboirg(*words, "--dry-run", "--out", tmp_path / "out")
     assert said.code == 0, said.err
-    assert "what models will be asked" in said.out
+    assert "expected calls of models" in said.out
     assert "not known" in said.out
     assert not (tmp_path / "out").exists()
 
@@ -473,7 +473,7 @@ def test_a_dry_run_names_the_forms_it_counts(
 @pytest.mark.parametrize(
     ("words", "sentence"),
     [
-        (("--workers", "-2"), "workers is -2; it must be at least 0, this process only."),
+        (("--workers", "-2"), "workers is -2; it must be at least 0 (this process only)."),
         (("--executor", "slurm"), "There is no executor 'slurm'"),
         (("--out", "{file}"), "Cannot write to {file}: {file} is not a folder"),
         (("--out", "{file}/deep/er"), "{file} is not a folder"),

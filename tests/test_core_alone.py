@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 from all_commands import all_commands, make_run, words_of
 
-from roboirg.cli.missing_extras import _MODULES, describe_missing
+from roboirg.main import _MODULES, describe_missing
 
 WALK = """
 import io, json, sys, traceback

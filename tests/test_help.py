@@ -17,9 +17,8 @@ from roboirg.core.instruction_options import (
     InstructionKeywords,
 )
 from roboirg.evaluation.plan.plan import Plan
-from roboirg.evaluation.plan.plan_file import read_plan_file
+from roboirg.evaluation.plan.plan_file import plan_text, read_plan_file
 from roboirg.evaluation.plan.plan_maker import make_plan
-from roboirg.evaluation.plan.plan_text import plan_text
 from roboirg.main import app
 
 LINES, LINES_OF_RUN, COLUMNS = 45, 60, 100

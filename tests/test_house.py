@@ -194,11 +194,23 @@ def test_no_page_has_a_forbidden_twin():
     check_empty(found)
 
 
-@pytest.mark.parametrize("twin", ["data set", "time line"])
+@pytest.mark.parametrize("twin", ["data set", "time line", "way-point", "2550", "tells the user"])
 def test_no_program_has_a_forbidden_twin(twin):
     assert twin in dict(forbidden_twins())
     pattern = re.compile(r"\b" + r"[\s#]+".join(twin.split()) + r"s?\b", re.IGNORECASE)
     check_empty([path for path, text in texts() if path.suffix != ".md" and pattern.search(text)])
+
+
+def test_no_text_of_the_program_says_beside():
+    read = ("reader", "language", "policies/vlm/prompts")  # what people and models are asked with
+    found = [
+        path
+        for path in sorted(PACKAGE.rglob("*"))
+        if path.suffix in (".py", ".j2", ".toml", ".md")
+        and not str(path.relative_to(PACKAGE)).startswith(read)
+        and re.search(r"\bbeside\b", path.read_text("utf-8"))
+    ]
+    check_empty(found)
 
 
 def test_the_verb_of_a_count_agrees_with_it():

@@ -9,6 +9,7 @@ from __future__ import annotations
 import importlib
 import pkgutil
 import sys
+from collections.abc import Mapping
 from typing import Annotated
 
 import typer
@@ -22,9 +23,9 @@ from roboirg.cli import (
     report_commands,
     run_commands,
 )
-from roboirg.cli.missing_extras import describe_missing
 from roboirg.cli.run_commands import INTERRUPTED, USAGE_ERROR
 from roboirg.core.errors import RoboIRGError
+from roboirg.core.extras import install_command
 from roboirg.core.plain_text import printable
 from roboirg.core.version import __version__
 
@@ -46,6 +47,20 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
+_MODULES: Mapping[str, tuple[str, ...]] = {
+    "sim": ("sapien", "gymnasium", "toppra", "av", "cv2", "zstandard"),
+    "light": ("fast_simplification",),
+    "pages": ("starlette", "uvicorn"),
+    "report": ("jinja2", "markupsafe", "matplotlib", "sklearn", "scipy"),
+    "export": ("pyarrow",),
+    "demonstrations": ("h5py",),
+    "learn": ("torch",),
+    "ray": ("ray",),
+    "remote": ("websockets", "msgpack", "httpx"),
+    "tokens": ("sentencepiece", "tokenizers"),
+    "vlm": ("openai", "google"),
+}
+"""Modules that each extra brings. Where two bring one, the extra with which it is mostly used."""
 
 
 def _print_version(wanted: bool) -> None:
@@ -128,3 +143,15 @@ def _print_usage_error(error: Exception) -> int:
     command = getattr(context, "command_path", "roboirg")
     typer.echo(f"roboirg: {words}; see {command} --help.", err=True)
     return USAGE_ERROR
+
+
+def describe_missing(error: ModuleNotFoundError) -> str | None:
+    """Return one sentence that names the extra with the missing module; None if none has it."""
+    module = (error.name or "").partition(".")[0]
+    for extra, modules in _MODULES.items():
+        if module in modules:
+            return (
+                f"This command needs the package {module!r}, which is not installed; "
+                f"run: {install_command(extra)}"
+            )
+    return None

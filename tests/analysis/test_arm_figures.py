@@ -123,8 +123,7 @@ def test_tables_figures_and_sentences_have_each_policy_once():
     assert uses["knows, explicit"][0].text == "24"
     assert draw_figure("arms", data) is not None
     assert draw_figure("arms", data_of(play("mine", {"told": "own"}))) is None
-    averages = draw_figure("averages", data)
-    assert averages is not None
+    assert draw_figure("gaps", data) is not None
     with pytest.raises(InvalidValueError, match="--arms told"):
         make_arm_table(data_of(play("mine", {"told": "own"})))
     sides = data_of(play("mine", LISTENER)), data_of(play("knows", HABIT))

@@ -314,9 +314,9 @@ def test_tables_by_everything(run: Path, tmp_path: Path, monkeypatch: pytest.Mon
 
 
 def test_wrong_use_of_by(run: Path, tmp_path: Path) -> None:
-    with pytest.raises(UnknownNameError, match="break-down"):
+    with pytest.raises(UnknownNameError, match="breakdown"):
         call("tables", run, "--by", "colour")
-    with pytest.raises(InvalidValueError, match="--by has tables of its own"):
+    with pytest.raises(InvalidValueError, match="--by prints tables of its own"):
         call("tables", run, "--by", "slots", "--published")
     with pytest.raises(InvalidValueError, match="--by needs a run"):
         call("tables", "--by", "slots")
@@ -337,7 +337,7 @@ def test_older_runs_are_unknown(records: tuple[Record, ...], tmp_path: Path) -> 
     rows = [line for line in output.splitlines() if line.startswith("│")]
     assert rows
     assert all("unknown" in line for line in rows)
-    assert "Unknown: the records were written before this was noted." in output
+    assert "Unknown: the records are older than this field." in output
 
 
 def test_policies_are_compared_by_label(run: Path) -> None:
@@ -346,7 +346,7 @@ def test_policies_are_compared_by_label(run: Path) -> None:
     assert "By recency rival:" in output
     assert "  contextual, recency rival: " in output
     assert "  reasoning, color exclusion: no clear difference" in output
-    assert "A break-down is corrected by itself, over all its rows." in output
+    assert "Each breakdown is corrected separately, over all its rows." in output
     assert "By " not in call("compare", f"{run}:listener", f"{run}:forgetful")
 
 
@@ -372,7 +372,7 @@ def test_a_compared_label_is_the_difference_on_its_episodes(result: Any) -> None
         np.random.default_rng(SEED),
         {"letter": dict.fromkeys(labels, ())},
     )
-    assert "By letter: no instruction has any." in list(sentences(empty, "better", "listener"))
+    assert "By letter: no instruction has one." in list(sentences(empty, "better", "listener"))
 
 
 # The page

@@ -139,5 +139,5 @@ def test_an_interval_that_excludes_0_beside_a_large_p_is_explained(result) -> No
         r"^direct: no clear difference, .*p = 0\.125 \(uncorrected 0\.031\)", words, re.M
     )
     assert words.count("uncorrected") == 1
-    assert "An interval is of one gap alone" in words
-    assert "An interval is of one gap alone" not in text(first, first)
+    assert "An interval belongs to one gap alone" in words
+    assert "An interval belongs to one gap alone" not in text(first, first)

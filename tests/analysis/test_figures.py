@@ -16,7 +16,6 @@ from roboirg.cli.report_commands import figures
 from roboirg.core.errors import InvalidValueError, UnknownNameError
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.evaluation.analysis.figures import FIGURES, write_figures
-from roboirg.evaluation.analysis.figures.averages import draw_averages
 from roboirg.evaluation.analysis.figures.context import draw_context
 from roboirg.evaluation.analysis.figures.failures import COLORS, draw_failures
 from roboirg.evaluation.analysis.figures.figure_style import STYLE
@@ -81,7 +80,7 @@ def texts(path: Path) -> str:
 def test_all_figures_that_apply_are_written_and_are_the_same_again(tmp_path: Path) -> None:
     paths = write_figures(content(planned=PLAN.jobs()), tmp_path / "a" / "b")
     names = {path.name for path in paths}
-    assert {f"{name}.{ending}" for name in ("averages", "forms", "failures")
+    assert {f"{name}.{ending}" for name in ("gaps", "forms", "failures")
             for ending in ("png", "svg", "pdf")} <= names  # fmt: skip
     assert "expressions.png" in names
     # Nothing is known about contexts of other lengths.
@@ -95,7 +94,6 @@ def test_all_figures_that_apply_are_written_and_are_the_same_again(tmp_path: Pat
     ("name", "words"),
     [
         ("gaps", ["listener", "forgetful", "direct", "2 tasks", "−100"]),
-        ("averages", ["listener", "forgetful", "explicit", "(2 tasks)"]),
         (
             "forms",
             ["only resolved", "all tasks", "counting", "permanence", "−100 [−100, −", "±0 ["],
@@ -188,21 +186,16 @@ def test_published_means_are_over_the_tasks_that_all_policies_played(
         )
         if one.task in tasks
     ]
-    drawn = draw_averages(content(found), published=True)
+    drawn = draw_gaps(content(found), published=True)
     assert drawn is not None
-    (axes,) = drawn.axes
-    assert {label.get_text().split("\n")[1] for label in axes.get_xticklabels()} == {"(2 tasks)"}
-    heights = {
-        line.get_label(): line.get_ydata()[0]  # type: ignore[index]
-        for line in axes.lines
-        if 0 <= line.get_xdata()[0] < 0.5  # type: ignore[index]
-    }
+    titles = {panel.get_title(loc="right") for panel in drawn.axes if panel.get_visible()}
+    assert titles == {"2 tasks"}
     explicit = next(
         row for row in published_rows("main")
         if row.model == "MemER" and row.options.setting == "explicit"
     )  # fmt: skip
     both = explicit.average_over(("BinFill", "PickXtimes"))
-    assert heights["MemER (published)"] == float(both) == 62.0
+    assert shown_gaps(drawn)["direct", "MemER (published)"][0] == float(both) == 62.0
     everything = [task for task, rate in explicit.rates.items() if rate is not None]
     assert explicit.average_over(everything) == explicit.average
     assert explicit.average_over(["BinFill", "MyTask"]) is explicit.average_over([]) is None
@@ -216,12 +209,12 @@ def test_published_values_need_shared_tasks(published_like: Callable[..., list[S
         if one.task in ("BinFill", "StopCube")
     ]
     assert {label for label in found if label.setting == "spatial"}
-    shared = draw_averages(content(found), published=True)
+    shared = draw_gaps(content(found), published=True)
     assert shared is not None  # spatial has one of the two tasks only
-    assert [label.get_text() for label in shared.axes[0].get_xticklabels()] == ["spatial\n(1 task)"]
-    real = draw_averages(content(published_like("real")), published=True)
+    assert {panel.get_title(loc="left") for panel in shared.axes} == {"spatial"}
+    real = draw_gaps(content(published_like("real")), published=True)
     assert real is not None
-    assert not any("published" in str(line.get_label()) for line in real.axes[0].lines)
+    assert not any("published" in name.get_text() for name in real.axes[0].get_yticklabels())
 
 
 def test_scenes_are_counted_in_whole_numbers(tmp_path: Path) -> None:
@@ -231,9 +224,7 @@ def test_scenes_are_counted_in_whole_numbers(tmp_path: Path) -> None:
     assert not re.search(r"<!-- \d+\.\d+ -->", drawn)
 
 
-@pytest.mark.parametrize(
-    "draw", [draw_averages, draw_context, draw_failures, draw_forms, draw_gaps]
-)
+@pytest.mark.parametrize("draw", [draw_context, draw_failures, draw_forms, draw_gaps])
 def test_no_name_leaves_the_figure(
     draw: Callable[[RunData], Figure | None], published_like: Callable[..., list[Summary]]
 ) -> None:
@@ -262,9 +253,9 @@ def test_no_name_leaves_the_figure(
 
 
 def test_what_is_incomplete_is_called_so(tmp_path: Path) -> None:
-    write_figures(content(results()[:-2], planned=PLAN.jobs()), tmp_path, ["averages"])
-    drawn = texts(tmp_path / "averages.svg")
-    assert "<!-- forgetful (privileged) (incomplete)" in drawn
+    write_figures(content(results()[:-2], planned=PLAN.jobs()), tmp_path, ["gaps"])
+    drawn = texts(tmp_path / "gaps.svg")
+    assert "(incomplete)" in drawn
     assert "<!-- listener (privileged) -->" in drawn
 
 
@@ -286,11 +277,11 @@ def test_runs_that_hold_the_same_episodes_stand_apart(tmp_path: Path) -> None:
 
 
 def test_wrong_names_and_places_are_one_sentence(tmp_path: Path) -> None:
-    with pytest.raises(UnknownNameError, match="Did you mean 'averages'"):
-        write_figures(content(), tmp_path, ["average"])
+    with pytest.raises(UnknownNameError, match="Did you mean 'gaps'"):
+        write_figures(content(), tmp_path, ["gap"])
     (tmp_path / "file").write_text("")
     with pytest.raises(InvalidValueError, match="Cannot write to"):
-        write_figures(content(), tmp_path / "file", ["averages"])
+        write_figures(content(), tmp_path / "file", ["gaps"])
     happy = [one for one in results() if one.outcome == "success"]
     with pytest.raises(InvalidValueError, match="nothing to draw for failures"):
         write_figures(content(happy), tmp_path, ["failures"])
@@ -303,16 +294,16 @@ def test_the_command_draws_what_it_is_asked_for(tmp_path: Path) -> None:
         for one in results():
             store.append(one)  # type: ignore[arg-type]
     out = tmp_path / "figures"
-    asked = [str(tmp_path / "run"), "--out", str(out), "--which", "averages, failures"]
+    asked = [str(tmp_path / "run"), "--out", str(out), "--which", "gaps, failures"]
     done = CliRunner().invoke(app, asked, catch_exceptions=False)
     assert done.exit_code == 0
     assert sorted(path.name for path in out.iterdir()) == sorted(
         f"{name}{ending}"
-        for name in ("averages", "failures")
+        for name in ("gaps", "failures")
         for ending in (".png", ".svg", ".pdf", "-dark.png", "-dark.svg")
     )
-    assert str(out / "averages.pdf") in done.output
-    assert set(FIGURES) >= {"averages", "failures"}
+    assert str(out / "gaps.pdf") in done.output
+    assert set(FIGURES) >= {"gaps", "failures"}
     assert InstructionOptions("explicit") in {options for _, _, options in content().cells}
 
 
@@ -328,30 +319,17 @@ def test_the_real_robot_s_figure_has_a_panel_per_task(
         write_figures(content(results()), tmp_path, ["real"])
 
 
-def test_published_figures_need_no_run() -> None:
-    drawn = draw_averages(RunData.of([]), published=True)
+@pytest.mark.parametrize("kept", ["explicit", "direct"])
+def test_rates_without_another_setting_stand_alone(kept: str) -> None:
+    assert draw_gaps(RunData.of([])) is draw_forms(RunData.of([])) is None
+    found = content([one for one in results() if one.setting == kept and one.form == "implicit"])
+    drawn = draw_gaps(found, published=True)
     assert drawn is not None
-    (axes,) = drawn.axes
-    labels = [label.get_text() for label in axes.get_xticklabels()]
-    assert labels == [
-        "explicit\n(11 tasks)",
-        "direct\n(11 tasks)",
-        "reasoning\n(11 tasks)",
-        "contextual\n(11 tasks)",
-        "spatial\n(7 tasks)",
-    ]
-    shown = sorted(
-        (line.get_label(), round(line.get_xdata()[0]), round(float(line.get_ydata()[0]), 2))  # type: ignore[index,call-overload]
-        for line in axes.lines
-        if str(line.get_label()).endswith("(published)")
-    )
-    settings = [label.split("\n")[0] for label in labels]
-    assert shown == sorted(
-        (f"{row.model} (published)", settings.index(row.options.setting), float(row.average))
-        for row in published_rows("main")
-    )
-    assert draw_averages(RunData.of([])) is None
-    assert draw_forms(RunData.of([])) is None
+    (panel,) = drawn.axes
+    assert panel.get_title(loc="left") == kept
+    dots = [line.get_xdata()[0] for line in panel.lines if line.get_marker() == "o"]  # type: ignore[index]
+    own = [found.summaries[key, ALL, InstructionOptions(kept)].rate for key in found.names]
+    assert dots[: len(own)] == [100 * float(rate) for rate in own if rate is not None]
 
 
 def shown_gaps(drawn: Figure) -> dict[tuple[str, str], tuple[float, float, str]]:
@@ -400,12 +378,6 @@ def test_published_gaps_are_over_the_tasks_of_their_setting() -> None:
         assert mean is not None
         assert explicit == pytest.approx(float(mean))
     assert draw_gaps(RunData.of([])) is None
-
-
-def test_a_run_without_explicit_episodes_has_no_gaps(tmp_path: Path) -> None:
-    implicit = [one for one in results() if one.setting != "explicit"]
-    with pytest.raises(InvalidValueError, match="nothing to draw for gaps"):
-        write_figures(content(implicit), tmp_path, ["gaps"])
 
 
 def test_the_tables_of_forms_and_failures_are_the_figures_numbers() -> None:

@@ -75,7 +75,7 @@ def test_a_complete_run_has_no_marks(result) -> None:
     assert {entry.text for row in table.rows for entry in row.entries} == {"50.00"}
     assert not any(entry.marks for row in table.rows for entry in row.entries)
     assert {entry.change for entry in entries(table, "direct").values()} == {0}
-    assert "One policy was played" in notes(table)
+    assert "Only one policy was played" in notes(table)
     assert "2 episodes per cell, each played once" in notes(table)
     assert "Bold" not in notes(table)
 

@@ -39,7 +39,7 @@ def test_a_reset_chooses_episode_and_words():
         env.reset(options={"episode": 50})
     own = roboirg.make(get_episode("PickXtimes", "test", 3), cameras=())
     own.reset(options={"setting": "spatial"})
-    with pytest.raises(InvalidValueError, match="made of one episode; reset takes no 'episode'"):
+    with pytest.raises(InvalidValueError, match="made for one episode; reset takes no 'episode'"):
         own.reset(options={"episode": 5})
 
 

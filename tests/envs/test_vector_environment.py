@@ -16,7 +16,7 @@ from selection import slow_but
 import roboirg
 from roboirg.core.errors import InvalidActionError, InvalidValueError, UnknownNameError
 from roboirg.envs.registration import environment_id
-from roboirg.envs.vector.vector_infos import stack_infos
+from roboirg.envs.vector.vector_environment import stack_infos
 from roboirg.envs.vector.vector_workers import SubEnvironmentError
 from roboirg.simulation.physics_settings import HOME_ACTION
 

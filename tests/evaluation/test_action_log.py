@@ -87,13 +87,13 @@ def test_a_changed_file_is_refused(tmp_path: Path) -> None:
     digest = write_actions(a_log(), tmp_path)
     other = write_actions(a_log(5), tmp_path)
     action_path(tmp_path, digest).write_bytes(action_path(tmp_path, other).read_bytes())
-    with pytest.raises(StoreError, match="another content"):
+    with pytest.raises(StoreError, match="does not have the content"):
         read_actions(tmp_path, digest)
 
 
 @pytest.mark.parametrize("digest", ["", "../../etc/passwd", "A" * 64, "0" * 63, "0" * 64 + "\n"])
 def test_what_is_no_digest_names_no_file(tmp_path: Path, digest: str) -> None:
-    with pytest.raises(StoreError, match="no digest"):
+    with pytest.raises(StoreError, match="not a digest"):
         action_path(tmp_path, digest)
 
 
@@ -136,5 +136,5 @@ def test_what_is_no_log_is_refused(tmp_path: Path, content: bytes) -> None:
     path = action_path(tmp_path, "0" * 64)
     path.parent.mkdir(parents=True)
     path.write_bytes(content)
-    with pytest.raises(StoreError, match="is no action log"):
+    with pytest.raises(StoreError, match="is not an action log"):
         read_actions(tmp_path, "0" * 64)

@@ -184,7 +184,7 @@ def test_the_dry_run_prints_the_shares(tmp_path: Path) -> None:
     row = next(line for line in said.output.splitlines() if "64 tokens" in line)
     assert "system:pi0.5" in row
     assert "100 %" in row
-    assert "Not declared, so unknown (prompt_tokens=N): far." in said.output
+    assert "No limit declared (prompt_tokens=N), so cuts are unknown: far." in said.output
 
 
 SERVED = '''

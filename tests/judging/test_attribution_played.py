@@ -100,7 +100,7 @@ def test_a_listener_who_takes_left_for_right_picks_the_mirrored_cube() -> None:
     found = finding(env, info, mirrored)
     assert found is not None
     assert (found.kind, found.failure, found.subject) == ("grounding", "mirrored_pick", right.name)
-    assert found.sentence.endswith("; the words mean that one with left and right exchanged.")
+    assert found.sentence.endswith("; the words mean it only with left and right exchanged.")
     untold = finding(env, info)
     assert untold is not None
     assert untold.failure == "wrong_object"

@@ -117,7 +117,7 @@ def test_a_kind_from_outside_is_judged_and_described(toppled: FactTraits) -> Non
     event = EventRecord(step=3, kind="toppled", subject="pillar", place=None, holds=True)
     assert event_text(event, {"pillar": "the red pillar"}) == "knocked the red pillar over"
     over = replace(event, holds=False)
-    assert event_text(over, {}) == "knocked pillar over; that is over"
+    assert event_text(over, {}) == "knocked pillar over; this no longer holds"
     picked = Fact("picked", "cube")
     plan = [stage(picked), stage(TOPPLED)]
     assert classify_grounding_error(TOPPLED, plan, 0) == "wrong_count"

@@ -11,10 +11,9 @@ from hypothesis import strategies as st
 from wording_stand_ins import same_number, train_episodes
 
 from roboirg.apps.language_lab.robomme.wording_writer import wording_text
-from roboirg.apps.language_lab.validation import pairing
-from roboirg.apps.language_lab.validation.episode_checks import check_episode
+from roboirg.apps.language_lab.validation import episode_checks
+from roboirg.apps.language_lab.validation.episode_checks import check_episode, unpaired
 from roboirg.apps.language_lab.validation.leaks import find_leaks
-from roboirg.apps.language_lab.validation.pairing import unpaired
 from roboirg.core.episode import Goal
 from roboirg.core.errors import InvalidValueError
 from roboirg.core.goal_slots import COLOR_SLOTS
@@ -449,7 +448,7 @@ def test_a_pair_with_our_command_in_one_form_is_no_pair(monkeypatch):
         setting = "explicit" if outside else "direct"
         return instruct_with(one, dataclasses.replace(options, setting=setting, wordings=outside))
 
-    monkeypatch.setattr(pairing, "instruct_with", say)
+    monkeypatch.setattr(episode_checks, "instruct_with", say)
     assert ("direct", "resolved, more than its references differ") in unpaired(episode, ["direct"])
 
 

@@ -43,7 +43,7 @@ def test_folders_that_are_no_checkpoints_are_one_sentence_each(tmp_path, monkeyp
         "data": "has no config.json; it is a dataset, from which lerobot-train makes",
         "empty": "has no config.json; a checkpoint of LeRobot holds config.json, model.saf",
         "laptop": "needs 'observation.images.laptop'; there are observation.state, obs",
-        "foreign": "describes no policy of LeRobot",
+        "foreign": "does not describe a LeRobot policy",
     }.items():
         with pytest.raises(InvalidValueError) as caught:
             load_policy_class(f"lerobot://{place}")
@@ -63,7 +63,7 @@ def test_each_file_of_a_checkpoint_is_missed(tmp_path, name):
 def test_a_damaged_configuration_is_named(tmp_path, content):
     folder = write_checkpoint(tmp_path / "act")
     (folder / "config.json").write_text(content)
-    with pytest.raises(InvalidValueError, match=r"config\.json' describes no policy"):
+    with pytest.raises(InvalidValueError, match=r"config\.json' does not describe"):
         read_facts(str(folder))
 
 

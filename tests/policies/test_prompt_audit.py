@@ -16,7 +16,6 @@ from roboirg.policies.by_name.loading import policy_needs
 from roboirg.policies.by_name.systems import all_systems
 from roboirg.policies.contract.policy_needs import PolicyNeeds
 from roboirg.policies.lerobot_policy import LeRobotPolicy
-from roboirg.policies.prompt_length.declared_limit import prompt_limit
 from roboirg.policies.prompt_length.prompt_audit import (
     PromptLimit,
     Tokens,
@@ -26,7 +25,7 @@ from roboirg.policies.prompt_length.prompt_audit import (
     fewest_tokens,
     most_tokens,
 )
-from roboirg.policies.prompt_length.tokenizer_file import read_tokenizer
+from roboirg.policies.prompt_length.tokenizer_file import prompt_limit, read_tokenizer
 
 WORDS = ["Put", "the", "red", "cube", "into", "bin.", "Remember:", "green_one", "Zürich", "quokka"]
 TEXTS = st.lists(st.sampled_from(WORDS), min_size=1, max_size=30).map(" ".join)
@@ -265,7 +264,7 @@ def test_a_lerobot_checkpoint_says_its_limit_itself(tmp_path):
 def test_optional_libraries_are_imported_when_they_are_used():
     code = (
         "import sys; from roboirg.policies.by_name.loading import policy_needs;"
-        "from roboirg.policies.prompt_length.declared_limit import prompt_limit;"
+        "from roboirg.policies.prompt_length.tokenizer_file import prompt_limit;"
         "prompt_limit(policy_needs('openpi://localhost:1?prompt_tokens=64'));"
         "sys.exit(bool({'sentencepiece', 'tokenizers'} & set(sys.modules)))"
     )

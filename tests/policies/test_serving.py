@@ -279,7 +279,7 @@ def test_the_http_interface_tells_what_is_wrong():
         ({"protocol": "mmevla"}, UnknownNameError, "Did you mean 'mme-vla'"),
         ({"protocol": "vla-eval"}, InvalidValueError, "vla-eval:// is for clients only"),
         ({"port": 70000}, InvalidValueError, "port is 70000"),
-        ({"host": "192.0.2.1"}, InvalidValueError, "Cannot listen at 192"),
+        ({"host": "192.0.2.1"}, InvalidValueError, "Cannot listen on 192"),
     ],
 )
 def test_what_cannot_be_served_is_told(options, error, words):

@@ -7,7 +7,7 @@ import pytest
 
 import roboirg
 from roboirg.policies import make_policy, play
-from roboirg.policies.builtin import shortcut_listeners
+from roboirg.policies.builtin import listeners
 from roboirg.policies.by_name.loading import is_privileged, policy_version
 from roboirg.policies.by_name.policy_classes import BUILTIN
 from roboirg.shortcuts import SURFACE_RULES
@@ -20,7 +20,7 @@ def test_every_rule_is_a_policy_of_its_name():
     assert set(SURFACE_RULES) <= set(BUILTIN)
     for rule in SURFACE_RULES:
         policy = make_policy(rule, 3)
-        assert isinstance(policy, shortcut_listeners.ShortcutPolicy)
+        assert isinstance(policy, listeners.ShortcutPolicy)
         assert (policy.rule, policy.seed, policy.cameras) == (rule, 3, ())
         assert is_privileged(rule)
         assert policy_version(rule) == "built-in"

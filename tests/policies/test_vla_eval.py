@@ -141,8 +141,8 @@ def test_the_server_is_told_apart_by_its_class_and_harness():
         ("text", "replied with an error: text"),
         ({"actions": np.zeros(7)}, r"got shape \(1, 7\)"),
         ({"actions": [float("nan")] * 8}, "finite"),
-        ({"actions": "left"}, "an action that is no array"),
-        ({"actions": [[1.0], [2.0, 3.0]]}, "an action that is no array"),
+        ({"actions": "left"}, "an action that is not an array"),
+        ({"actions": [[1.0], [2.0, 3.0]]}, "an action that is not an array"),
         ({"other": 1}, "without 'actions'; it holds 'other'"),
     ],
 )

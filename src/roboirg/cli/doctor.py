@@ -244,12 +244,7 @@ def _check_memory() -> Check:
 
 
 def _render_test_frame() -> str:
-    """Draw a lit red box; returns a description of the picture.
-
-    Raises:
-        MissingDependencyError: SAPIEN is not installed.
-        RenderDeviceError: no device can render, or the picture is wrong.
-    """
+    """Draw a lit red box; returns a description of the picture."""
     # Imported here because only the child process may load them.
     devices = importlib.import_module("roboirg.simulation.rendering.render_device")
     device = devices.describe_device(devices.find_render_device())

@@ -29,7 +29,9 @@ Split = Annotated[str, typer.Option(help="train, val, test or random.")]
 AnySplit = Annotated[str, typer.Option(help="train, val, test or all.")]
 Workers = Annotated[
     int | None,
-    typer.Option(help="Worker processes, 0 for none but this.  (ROBOIRG_WORKERS, or one per core)"),
+    typer.Option(
+        help="Worker processes; 0 works in this process.  (ROBOIRG_WORKERS, or one per core)"
+    ),
 ]
 
 
@@ -85,7 +87,8 @@ PlanName = Annotated[
     str | None,
     typer.Option(
         "--plan",
-        help="Plan with the words, and defaults of options here (roboirg run --show-plan).",
+        help="Plan that sets the words and the defaults of these options (see roboirg run "
+        "--show-plan).",
     ),
 ]
 SELECTION = ("tasks", "split", "episodes", "settings")
@@ -166,7 +169,7 @@ class PlanWords(OptionGroup):
         found = self.forms()
         if len(found) > 1:
             raise InvalidValueError(
-                f"The plan's forms are {' and '.join(found)}; here it must have one."
+                f"The plan's forms are {' and '.join(found)}; this command needs exactly one."
             )
         return found[0]
 

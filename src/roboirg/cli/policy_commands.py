@@ -49,16 +49,19 @@ def serve(
     protocol: Annotated[
         str, typer.Option(help=f"Protocol of the clients: one of {_PROTOCOLS}.")
     ] = "mme-vla",
-    host: Annotated[str, typer.Option(help="Address to listen at.")] = LOOPBACK,
-    port: Annotated[int, typer.Option(help="0 for any free port.")] = 8000,
-    seed: Annotated[int, typer.Option(help="Of the policy's random choices.")] = 0,
+    host: Annotated[str, typer.Option(help="Address to listen on.")] = LOOPBACK,
+    port: Annotated[int, typer.Option(help="Port to listen on; 0 for any free port.")] = 8000,
+    seed: Annotated[int, typer.Option(help="Seed of the policy's random choices.")] = 0,
     api_key_env: Annotated[
         str | None,
         typer.Option(help="Environment variable with the key that clients must send."),
     ] = None,
     timeout_s: Annotated[
         float,
-        typer.Option(min=1, help="Seconds a connection may be idle, or a message take to arrive."),
+        typer.Option(
+            min=1,
+            help="Seconds for which a connection may be idle or a message may take to arrive.",
+        ),
     ] = TIMEOUT_S,
 ) -> None:
     """Serve a policy to this benchmark and other clients of a protocol.
@@ -80,9 +83,9 @@ def serve(
         signal.signal(number, _stop)
     if host not in LOOPBACK_NAMES and key is None:
         typer.echo(
-            f"Every client that reaches {host} can use it, as there is no --api-key-env.", err=True
+            f"Without --api-key-env, every client that reaches {host} can use the policy.", err=True
         )
-    typer.echo(f"{policy} at {server.url}; Ctrl-C stops.")
+    typer.echo(f"{policy} at {server.url}; press Ctrl-C to stop.")
     server.listening.serve_forever()
     # Only a signal ends it, and that ends the process.
     raise RoboIRGError(f"The server at {server.url} has stopped by itself.")

@@ -39,7 +39,7 @@ def report(
     videos: Annotated[bool, typer.Option(help="Embed the videos in the page.")] = True,
     serve: Annotated[
         bool,
-        typer.Option("--serve", help="Write no file: serve the page and videos until Ctrl-C."),
+        typer.Option("--serve", help="Serve page and videos until Ctrl-C; write no file."),
     ] = False,
     port: Annotated[
         int, typer.Option(help="Port on loopback for --serve; 0 chooses a free one.")
@@ -47,8 +47,7 @@ def report(
     methods: Annotated[
         str | None,
         typer.Option(
-            help="Write no file: print the methods section of the run in this format, markdown, "
-            "latex or json.",
+            help="Print the methods section of the run as markdown, latex or json; write no file.",
             metavar="FORMAT",
         ),
     ] = None,
@@ -119,12 +118,12 @@ def figures(
     out: Annotated[Path, typer.Option(help="Folder for the figures; created if missing.")],
     runs: Annotated[
         list[str] | None,
-        typer.Argument(help="The --out folders of runs; none with --published.", metavar="RUN"),
+        typer.Argument(help="The --out folders of runs; optional with --published.", metavar="RUN"),
     ] = None,
     which: Annotated[
         str,
         typer.Option(
-            help="gaps, averages, forms, expressions, context, failures, arms, real, strips (a "
+            help="gaps, forms, expressions, context, failures, arms, real, strips (a "
             "failure in pictures), several separated by commas, or all that apply."
         ),
     ] = _ALL,
@@ -151,7 +150,7 @@ def figures(
 def tables(
     runs: Annotated[
         list[str] | None,
-        typer.Argument(help="The --out folders of runs; none with --published.", metavar="RUN"),
+        typer.Argument(help="The --out folders of runs; optional with --published.", metavar="RUN"),
     ] = None,
     which: Annotated[
         str,
@@ -169,14 +168,15 @@ def tables(
     floors: Annotated[
         str | None,
         typer.Option(
-            help="Add the expected success of listeners that do not understand: chance, the "
-            "forgetful listener's; shortcuts and learners by name, several separated by commas; or "
-            "all."
+            help="Add the expected success of listeners that do not understand: chance (the "
+            "forgetful listener's level), shortcuts and learners by name, several separated "
+            "by commas, or all."
         ),
     ] = None,
     by: By = None,
     out: Annotated[
-        Path | None, typer.Option(help="Folder for a file of each table; prints without it.")
+        Path | None,
+        typer.Option(help="Folder for one file per table; without it, they are printed."),
     ] = None,
 ) -> None:
     """Print the paper's tables, failures, or gaps by kind of words, for one or several runs.
@@ -189,13 +189,14 @@ def tables(
     output = get_format(format)
     if which in (*DIAGNOSTIC_TABLES, SUBGOALS):
         if published or floors or by is not None:
-            raise InvalidValueError(f"--which {which} goes without --published, --floors and --by.")
+            raise InvalidValueError(f"--which {which} excludes --published, --floors and --by.")
         found = [_diagnostic_table(which, runs or [])]
     elif by is None:
         found = _tables(which, _cells(runs or []), published=published, floors=floors)
     elif published or floors or which != _ALL:
         raise InvalidValueError(
-            "--by has tables of its own, without --which, --published and --floors."
+            "--by prints tables of its own; it cannot be combined with --which, --published or "
+            "--floors."
         )
     else:
         found = _breakdown_tables(runs or [], by)
@@ -209,7 +210,10 @@ def tables(
 
 def compare(
     first: Annotated[str, typer.Argument(help="A run's folder, or RUN:policy.", metavar="A")],
-    second: Annotated[str, typer.Argument(help="Another, or the same run.", metavar="B")],
+    second: Annotated[
+        str,
+        typer.Argument(help="Another run's folder or RUN:policy, or the same run.", metavar="B"),
+    ],
     by: By = None,
 ) -> None:
     """Compare two policies on the same episodes and say where one is clearly better.
@@ -351,13 +355,8 @@ def _print(found: list[Table]) -> None:
 
 def _write(found: list[Table], folder: Path, suffix: str, name: str) -> None:
     from roboirg.evaluation.analysis.tables.rendering import get_format
-    from roboirg.evaluation.records.store import StoreError
     from roboirg.util.atomic_write import write_atomically
 
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise StoreError(f"Cannot write to {folder}: {error.strerror}.") from error
     for table in found:
         path = folder / f"{table.key}{suffix}"
         write_atomically(path, get_format(name).draw(table))

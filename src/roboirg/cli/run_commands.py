@@ -51,7 +51,9 @@ RetryErrors = Annotated[
 
 OnRecord = Annotated[
     str | None,
-    typer.Option(help="Command that gets each stored record as a line of JSON on its input."),
+    typer.Option(
+        help="Command that reads each stored record as a line of JSON from its standard input."
+    ),
 ]
 
 
@@ -67,7 +69,7 @@ def run(
     plan: PlanName = None,
     workers: Workers = None,
     executor: Annotated[
-        str, typer.Option(help="Where to play: local, or ray (its cluster in RAY_ADDRESS).")
+        str, typer.Option(help="Where to play: local, or ray (cluster address in RAY_ADDRESS).")
     ] = "local",
     retry_errors: RetryErrors = True,
     on_record: OnRecord = None,
@@ -77,7 +79,7 @@ def run(
     ] = False,
     show_plan: Annotated[
         bool,
-        typer.Option("--show-plan", help="Only print the plan, all of its fields explained."),
+        typer.Option("--show-plan", help="Only print the plan, with all fields explained."),
     ] = False,
 ) -> None:
     """Play episodes and store a record of each in OUT/records.jsonl; resumes where it stopped.
@@ -86,7 +88,7 @@ def run(
 
     Example: roboirg run --policy oracle --tasks PickXtimes --out runs/first
     """
-    from roboirg.evaluation.plan.plan_text import plan_text
+    from roboirg.evaluation.plan.plan_file import plan_text
     from roboirg.evaluation.run.record_hook import split_command
 
     add_working_directory(last=True)
@@ -308,7 +310,7 @@ def _print_model_costs(
     from roboirg.evaluation.run.cost_estimate import model_costs, unknown_costs
     from roboirg.util.console_width import widen
 
-    table = Table(title="what models will be asked, about", title_justify="left")
+    table = Table(title="expected calls of models", title_justify="left")
     table.add_column("policy")
     table.add_column("setting")
     for name in ("calls", "tokens in", "tokens out", "US$"):
@@ -319,11 +321,13 @@ def _print_model_costs(
         table.add_row(one.policy, one.setting, *(f"{size:,.0f}" for size in one.sizes), cost)
         measured += one.measured
     table.caption = (
-        "for a model that names the right subgoals, one call each or as its planner asks; tokens "
+        "for a model that names the right subgoals, with one call each or as its planner asks; "
+        "tokens "
         + (
-            "by the stored answers"
+            "estimated from the stored answers"
             if measured
-            else "by letters and pictures, without thoughts; US$ by input_price and output_price"
+            else "estimated from letters and pictures, without thoughts; US$ from input_price "
+            "and output_price"
         )
     )
     if table.row_count:
@@ -344,7 +348,7 @@ def _print_prompt_shares(
     from roboirg.util.console_width import widen
 
     shares = prompt_shares(jobs)
-    table = Table(title="instructions that are cut", title_justify="left")
+    table = Table(title="instructions cut off at a policy's limit", title_justify="left")
     for name in ("policy", "reads", *settings):
         table.add_column(name, justify="left" if name == "policy" else "right")
     for one in shares:
@@ -358,7 +362,7 @@ def _print_prompt_shares(
     undeclared = [one.policy for one in shares if one.limit is None and one.policy not in BUILTIN]
     if undeclared:
         console.print(
-            f"Not declared, so unknown (prompt_tokens=N): {', '.join(undeclared)}.",
+            f"No limit declared (prompt_tokens=N), so cuts are unknown: {', '.join(undeclared)}.",
             highlight=False,
             markup=False,
         )

@@ -49,8 +49,8 @@ PolicySeeds = Annotated[
 Arms = Annotated[
     str | None,
     _episodes(
-        help="told and control arms of its scenes: other-goal, silent, scrambled, paraphrase:2, "
-        "again.  (told)"
+        help="told, and control arms of the same scenes: other-goal, silent, scrambled, "
+        "paraphrase:2, again.  (told)"
     ),
 ]
 Stages = Annotated[
@@ -59,12 +59,14 @@ Stages = Annotated[
 ]
 Wordings = Annotated[
     str | None,
-    _words(help="Our words for train or test, or a file with commands.  (ours of the split)"),
+    _words(
+        help="train or test for our words of that pool, or a wording file.  (ours of the split)"
+    ),
 ]
 MaxSteps = Annotated[int | None, _play(help="Limit in control steps, 20 per second.  (1300)")]
 MaxCost = Annotated[
     float | None,
-    _play(help="US dollars that models may cost in all; then the run stops, to be resumed."),
+    _play(help="Most US dollars that models may cost; then the run stops and can be resumed."),
 ]
 Video = Annotated[str | None, _play(help="Record videos of episodes: off, failures or all.  (off)")]
 

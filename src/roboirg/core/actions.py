@@ -89,7 +89,7 @@ ACTION_SPACES: Mapping[str, ActionSpace] = {
 def choice_action(label: str, point: tuple[float, float] | None = None) -> NDArray[np.float64]:
     """Return the action of a choice: its letter, and row and column of the point if it has one."""
     if len(label) != 1 or not label.isascii() or not label.isalpha():
-        raise InvalidActionError(f"Choice {label!r} is no letter.")
+        raise InvalidActionError(f"Choice {label!r} is not a letter.")
     return np.array([ord(label.lower()) - ord("a"), *(point or (NO_POINT, NO_POINT))])
 
 

@@ -66,7 +66,7 @@ def parse_arm(text: str) -> tuple[str, ...]:
     number = int(count) if count.isdecimal() and len(count) < 4 else 0  # noqa: PLR2004
     if colon and not 1 <= number <= MOST_PARAPHRASES:
         raise InvalidValueError(
-            f"The arm {text!r} has no number of paraphrases from 1 to {MOST_PARAPHRASES}, such as "
-            f"{PARAPHRASE}:{PARAPHRASES}."
+            f"The arm {text!r} must have a number of paraphrases from 1 to {MOST_PARAPHRASES}, "
+            f"such as {PARAPHRASE}:{PARAPHRASES}."
         )
     return tuple(f"{PARAPHRASE}-{one + 1}" for one in range(number or PARAPHRASES))

@@ -48,7 +48,9 @@ def check_choices(actions: NDArray[np.float64], choices: Sequence[Choice]) -> No
     for number, *point in actions:
         if number not in range(len(choices)):
             listed = ", ".join(f"{one.label} ({one.action})" for one in choices)
-            raise InvalidActionError(f"Choice number {number:g} is none of 0 to n - 1: {listed}.")
+            raise InvalidActionError(
+                f"Choice number {number:g} is not one of 0 to {len(choices) - 1}: {listed}."
+            )
         chosen = choices[int(number)]
         if chosen.kind is not None and not ((point > low) & (point <= high)).all():
             raise InvalidActionError(

@@ -312,7 +312,7 @@ class RoboIRGEnv(gymnasium.Env[dict[str, Any], NDArray[np.floating[Any]]]):
         """Choose the episode and the instruction of a reset."""
         if isinstance(self._task, Episode) and (fixed := {"split", "episode"} & set(options)):
             raise InvalidValueError(
-                f"This environment was made of one episode; reset takes no {min(fixed)!r}."
+                f"This environment was made for one episode; reset takes no {min(fixed)!r}."
             )
         settings = self._settings.with_reset_options(options)
         self._select_episode(settings, choose_index(settings, seed, self._last_index))

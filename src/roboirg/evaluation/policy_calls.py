@@ -71,8 +71,8 @@ def policy_subgoal(policy: Policy) -> str | None:
         return None
     if not isinstance(subgoal, str) or not re.fullmatch(SUBGOAL, subgoal):
         raise InvalidValueError(
-            f"The policy's subgoal is {clip_text(repr(subgoal), 80)}; it must be a text of at most "
-            f"{MOST_SUBGOAL_LETTERS} characters, none of which controls a terminal."
+            f"The policy's subgoal is {clip_text(repr(subgoal), 80)}; it must be a text of at "
+            f"most {MOST_SUBGOAL_LETTERS} characters, without control characters."
         )
     if not is_encodable(subgoal):
         raise InvalidValueError("The policy's subgoal has lone surrogates.")

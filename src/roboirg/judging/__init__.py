@@ -1,6 +1,6 @@
 """Judge episodes from facts, without a simulator, and attribute failures."""
 
-from roboirg.judging.events import Event, changes
+from roboirg.judging.episode_replay import Event, changes
 from roboirg.judging.failure_analysis import attribute_failure
 from roboirg.judging.failure_attribution import EXECUTION, GROUNDING, FailureAttribution
 from roboirg.judging.judge import Judge, Status, plain_subgoal

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from collections.abc import Set as AbstractSet
 from dataclasses import dataclass
 from typing import NamedTuple
 
 from roboirg.core.conditions import All, Condition, Fact, facts_of
 from roboirg.core.episode import Episode, Stage
 from roboirg.core.fact_traits import FactRole
-from roboirg.judging.events import Event
 from roboirg.judging.fact_history import FactHistory
 from roboirg.judging.judge import Judge, Status
 
@@ -195,3 +195,33 @@ def _intervals(events: Sequence[Event]) -> tuple[FactInterval, ...]:
             intervals.append(FactInterval(event.fact, starts.pop(event.fact), event.step))
     intervals += [FactInterval(fact, start, None) for fact, start in starts.items()]
     return tuple(sorted(intervals, key=lambda interval: (interval.start, interval.fact.kind)))
+
+
+class Event(NamedTuple):
+    """A fact that started to hold (`holds`) or ceased to, at the evaluation after `step` steps."""
+
+    step: int
+    fact: Fact
+    holds: bool
+
+    def as_dict(self) -> dict[str, str | int | bool | None]:
+        """Return the event as plain JSON values, for records."""
+        kind, subject, place = self.fact
+        return {
+            "step": self.step,
+            "kind": kind,
+            "subject": subject,
+            "place": place,
+            "holds": self.holds,
+        }
+
+
+def changes(step: int, before: AbstractSet[Fact], now: AbstractSet[Fact]) -> tuple[Event, ...]:
+    """Return the events between two evaluations: first the facts that ceased, then the new ones."""
+    started = [Event(step, fact, True) for fact in sorted(now - before, key=_order)]
+    ceased = [Event(step, fact, False) for fact in sorted(before - now, key=_order)]
+    return (*ceased, *started)
+
+
+def _order(fact: Fact) -> tuple[str, str, str]:
+    return fact.kind, fact.subject, fact.place or ""

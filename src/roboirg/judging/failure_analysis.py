@@ -8,7 +8,7 @@ intentions.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from typing import NamedTuple
 
 from roboirg.core.conditions import (
@@ -23,14 +23,16 @@ from roboirg.core.conditions import (
 )
 from roboirg.core.episode import Episode
 from roboirg.judging.end_state import describe_end_state
-from roboirg.judging.episode_replay import EpisodeReplay, FactInterval, rejudge
-from roboirg.judging.events import Event
+from roboirg.judging.episode_replay import EpisodeReplay, Event, FactInterval, rejudge
 from roboirg.judging.fact_history import FactHistory
 from roboirg.judging.failure_attribution import FailureAttribution, FailureName
 from roboirg.judging.grounding_errors import classify_grounding_error
 from roboirg.judging.judge import Status, describe_violation
-from roboirg.judging.mirrored_picks import MirroredObjects, refine_wrong_object
 from roboirg.judging.release_errors import find_excusing_release
+
+MirroredObjects = Mapping[str, Collection[str]]
+"""For each object that an instruction means, those that it would mean with left and right
+exchanged."""
 
 
 class _Deviation(NamedTuple):
@@ -199,3 +201,35 @@ def _failure_of(violation: Fact | Rule) -> FailureName | None:
 def _describe_deviation(replay: EpisodeReplay, deviation: _Deviation) -> str:
     stage = replay.stages[max(replay.expected_stages[deviation.step], 0)]
     return describe_violation(deviation.violation, stage, replay.episode.scene)
+
+
+def refine_wrong_object(
+    found: FailureAttribution, replay: EpisodeReplay, mirrored: MirroredObjects, place: str | None
+) -> FailureAttribution:
+    """Return a ``mirrored_pick`` if the wrong object or place is the mirrored one.
+
+    The mirrored one of which object depends on the order: it is the one that the current stage
+    expects or, if it expects none that the words mean, the last one before or the next one after.
+    The step of `found` counts since the world began; `place` is None if the act has none.
+    """
+    if found.failure not in ("wrong_object", "wrong_place"):
+        return found
+    meant = _meant_objects(replay, mirrored, max(replay.expected_stages[found.step], 0))
+    sides = {other for name in meant for other in mirrored[name]}
+    if not sides & {found.subject, place}:
+        return found
+    words = f"{found.sentence[:-1]}; the words mean it only with left and right exchanged"
+    return FailureAttribution.of("mirrored_pick", found.subject, found.step, words)
+
+
+def _meant_objects(
+    replay: EpisodeReplay, mirrored: MirroredObjects, current: int
+) -> frozenset[str]:
+    """Return the objects named by places that a stage expects, looking first back, then ahead."""
+    stages = replay.stages
+    for stage in (*reversed(stages[: current + 1]), *stages[current + 1 :]):
+        facts = facts_of(stage.expects)
+        names = {name for fact in facts for name in (fact.subject, fact.place)}
+        if meant := names & mirrored.keys():
+            return frozenset(name for name in meant if name is not None)
+    return frozenset()

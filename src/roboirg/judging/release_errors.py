@@ -83,7 +83,7 @@ def describe_release(replay: EpisodeReplay, grip: FactInterval, step: int) -> Fa
     expected = expected_action(replay, replay.expected_stages[step])
     if grip.end is not None and Fact("held", name) in replay.facts[grip.end]:
         return FailureAttribution.of(
-            "misplaced", name, step, f"put {words} down beside its place; {expected}"
+            "misplaced", name, step, f"put {words} down next to its place; {expected}"
         )
     return FailureAttribution.of("dropped", name, step, f"dropped {words}; {expected}")
 

@@ -66,7 +66,7 @@ def arm_episode(episode: Episode, arm: str) -> Episode:
         return episode
     goal = draw_other_goal(episode)
     if goal is None:
-        raise InvalidValueError(f"The scene of {episode.key} has no other goal of as many picks.")
+        raise InvalidValueError(f"The scene of {episode.key} has no other goal with as many picks.")
     return with_goal(episode, goal)
 
 

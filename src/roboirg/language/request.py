@@ -158,7 +158,7 @@ class InstructionRequest:
         colors = self.task.commands.colors
         if color not in colors:
             raise InvalidValueError(
-                f"{color!r} is no color of {self.task.name}; its colors are {', '.join(colors)}."
+                f"{color!r} is not a color of {self.task.name}; its colors are {', '.join(colors)}."
             )
         return tuple(other for other in colors if other != color)
 

@@ -59,7 +59,7 @@ def read_facts(place: str) -> CheckpointFacts:
         is_policy = False
     if not is_policy:
         raise InvalidValueError(
-            f"{str(path)!r} describes no policy of LeRobot: it must be JSON with `type` and "
+            f"{str(path)!r} does not describe a LeRobot policy: it must be JSON with `type` and "
             "`input_features`."
         )
     limit = config.get("tokenizer_max_length")

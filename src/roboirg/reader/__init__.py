@@ -22,10 +22,14 @@ from roboirg.reader.negations import is_negated_command, unread_negations
 from roboirg.reader.observations import observe
 from roboirg.reader.paraphrases import paraphrased
 from roboirg.reader.pick_order import in_order
-from roboirg.reader.preferences import with_preference
 from roboirg.reader.reference_resolution import ReferenceResolver
 from roboirg.reader.repetitions import added_up
-from roboirg.reader.selections import read_selection, unsettled_choice, with_selection
+from roboirg.reader.selections import (
+    read_selection,
+    unsettled_choice,
+    with_preference,
+    with_selection,
+)
 from roboirg.reader.temporal_relations import mentioned_times
 from roboirg.reader.tokens import Sentence, split_sentences
 from roboirg.reader.vocabulary import VERBS

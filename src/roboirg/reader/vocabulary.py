@@ -159,7 +159,7 @@ def register_words(synonyms: Mapping[str, str]) -> None:
             continue
         if word in SYNONYMS or is_known(word):
             raise InvalidValueError(
-                f"The interpreter knows the word {word!r} already; teach it another one."
+                f"The interpreter already knows the word {word!r}; teach it another one."
             )
         if not is_known(meaning):
             raise InvalidValueError(

@@ -120,8 +120,8 @@ def check_drawing_process() -> None:
     """Remember that this process draws, and refuse if one from which it was forked had drawn."""
     if _drawing_processes - {os.getpid()}:
         raise RoboIRGError(
-            "This process was forked from one that had drawn pictures, and the renderer's threads "
-            "do not survive that; start it otherwise, as with AsyncVectorEnv(..., "
+            "This process was forked from one that had drawn pictures, and the renderer's "
+            "threads do not survive a fork; start it another way, such as AsyncVectorEnv(..., "
             "context='spawn') or roboirg.make_vec."
         )
     _drawing_processes.add(os.getpid())

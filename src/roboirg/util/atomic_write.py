@@ -16,10 +16,12 @@ def replacing(path: Path) -> Iterator[Path]:
     """Yield a path next to `path` to write to; the file replaces `path` when the block ends.
 
     If the block raises, the partial file is removed and `path` stays as it was. Readers see the
-    old or the new content, never a part, and the content is on the disk before the name is.
+    old or the new content, never a part, and the content is on the disk before the name is. A
+    folder that is missing is made.
     """
     part = path.with_name(f".{path.name}.{secrets.token_hex(8)}.part")
     try:
+        path.parent.mkdir(parents=True, exist_ok=True)
         yield part
         sync_to_disk(part)
         part.replace(path)

@@ -28,7 +28,7 @@ def parallel_map(
         workers: number of processes; 0 runs all calls in this process.
     """
     if workers < 0:
-        raise InvalidValueError(f"workers is {workers}; it must be at least 0, this process only.")
+        raise InvalidValueError(f"workers is {workers}; it must be at least 0 (this process only).")
     if workers == 0:
         yield from ((item, work(item)) for item in items)
         return

@@ -21,7 +21,7 @@ def open_regular(path: Path) -> BufferedReader:
     file = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
     if not stat.S_ISREG(os.fstat(file).st_mode):
         os.close(file)
-        raise InvalidValueError(f"{path} is no regular file.")
+        raise InvalidValueError(f"{path} is not a regular file.")
     return os.fdopen(file, "rb")
 
 

@@ -59,4 +59,4 @@ def test_the_command_writes_every_round_to_a_new_file(
     assert "must name a new file" in str(again.exception)
     assert path.read_bytes() == before
     lost = CliRunner().invoke(app, [*words[:-1], str(tmp_path / "missing" / "rounds.json")])
-    assert "is in no folder that exists" in str(lost.exception)
+    assert "is not in an existing folder" in str(lost.exception)

@@ -325,7 +325,7 @@ def test_an_export_goes_on_and_gives_the_same_bytes(exported, monkeypatch):
     monkeypatch.setattr(question_set, "store_media", None)  # nothing is drawn again
     assert export_grounding(request, folder, 0) == facts
     assert {path: path.read_bytes() for path in before} == before
-    with pytest.raises(InvalidValueError, match="pictures of another frames; choose another"):
+    with pytest.raises(InvalidValueError, match="pictures with another frames; choose another"):
         export_grounding(request._replace(frames=5), folder, 0)
     fewer = export_grounding(request._replace(settings=("direct",)), folder, 0)
     assert fewer.items == len(SEEN)

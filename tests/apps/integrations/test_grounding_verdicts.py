@@ -197,5 +197,5 @@ def test_inspect_says_what_is_wrong(data):
 
     with pytest.raises(InvalidValueError, match="no question 'poem'"):
         roboirg_grounding(data=str(data), question="poem")
-    with pytest.raises(InvalidValueError, match="has no item of the settings sung"):
+    with pytest.raises(InvalidValueError, match="has no items with the settings sung"):
         roboirg_grounding(data=str(data), settings="sung")

@@ -38,7 +38,7 @@ def test_lerobot_s_seeds_become_episodes(tmp_path):
         ("VideoUnmask", "spatial", "test", "theirs")
     }
     failure = records[1]
-    assert failure.cause == "the harness does not tell the cause"
+    assert failure.cause == "the harness does not report the cause"
     assert failure.attribution is None
     imported = failure.policy_metadata["imported"]
     assert (imported["from"], imported["file"]) == ("lerobot", "eval_info.json")
@@ -152,7 +152,7 @@ def test_wrong_files_are_refused_in_a_sentence(tmp_path):
     path = lerobot_file(tmp_path)
     with pytest.raises(UnknownNameError, match="no harness 'lerobt'"):
         import_results("lerobt", path, tmp_path / "run", OPTIONS)
-    with pytest.raises(InvalidValueError, match="is not a file of results of vla-eval"):
+    with pytest.raises(InvalidValueError, match="is not a results file of vla-eval"):
         import_results("vla-eval", path, tmp_path / "run", OPTIONS)
     with pytest.raises(InvalidValueError, match="There is no file"):
         import_results("vla-eval", tmp_path / "none.sqlite", tmp_path / "run", OPTIONS)
@@ -185,7 +185,7 @@ EPISODE = b'{"task": "PickXtimes", "episode": 0, "success": false, "steps": %s}'
 )
 def test_files_that_are_no_results_are_refused(harness, content, tmp_path):
     (tmp_path / "results").write_bytes(content)
-    with pytest.raises(InvalidValueError, match="is not a file of results of"):
+    with pytest.raises(InvalidValueError, match="is not a results file of"):
         import_results(harness, tmp_path / "results", tmp_path / "run", OPTIONS)
 
 
@@ -201,5 +201,5 @@ def test_devices_and_pipes_are_not_read(harness, tmp_path):
     (tmp_path / "device").symlink_to("/dev/zero")
     os.mkfifo(tmp_path / "pipe")
     for name in ("device", "pipe"):
-        with pytest.raises(InvalidValueError, match="no regular file"):
+        with pytest.raises(InvalidValueError, match="not a regular file"):
             import_results(harness, tmp_path / name, tmp_path / "run", OPTIONS)

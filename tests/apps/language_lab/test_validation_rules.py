@@ -13,7 +13,7 @@ from roboirg.apps.language_lab.validation import (
     ValidationResults,
     batches,
     check_episode,
-    pairing,
+    episode_checks,
     validate,
     validate_batch,
 )
@@ -116,9 +116,9 @@ def test_other_words_are_not_paired(monkeypatch, setting, form, changed, complai
         turns[changed] = Utterance(turns[changed].stage, f"Well, {turns[changed].text}")
         return dataclasses.replace(said, utterances=tuple(turns), mentions=())
 
-    assert not list(pairing.unpaired(EPISODE, expressible(EPISODE)))
-    monkeypatch.setattr(pairing, "instruct_with", changing)
-    found = list(pairing.unpaired(EPISODE, expressible(EPISODE)))
+    assert not list(episode_checks.unpaired(EPISODE, expressible(EPISODE)))
+    monkeypatch.setattr(episode_checks, "instruct_with", changing)
+    found = list(episode_checks.unpaired(EPISODE, expressible(EPISODE)))
     assert any(one == setting and complaint in words for one, words in found)
 
 
@@ -126,8 +126,10 @@ def test_a_resolved_form_that_resolves_nothing_is_noticed(monkeypatch):
     def lazy(episode, options):
         return instruct_with(episode, dataclasses.replace(options, form="implicit"))
 
-    monkeypatch.setattr(pairing, "instruct_with", lazy)
-    complaints = " ".join(words for _, words in pairing.unpaired(EPISODE, expressible(EPISODE)))
+    monkeypatch.setattr(episode_checks, "instruct_with", lazy)
+    complaints = " ".join(
+        words for _, words in episode_checks.unpaired(EPISODE, expressible(EPISODE))
+    )
     assert "still the implicit one" in complaints
     assert "still points back" in complaints
 

@@ -138,17 +138,17 @@ def test_statuses_of_packs(tmp_path: Path) -> None:
     packs.mkdir()
     pack_run(run, packs / "empty-handed.roboirg.zip")
     (packs / "broken.roboirg.zip").write_bytes(b"no zip")
-    with pytest.raises(Exception, match="no packed run"):
+    with pytest.raises(Exception, match="not a packed run"):
         read_packs(packs)
     found = read_packs(packs, sample=1.0)
     checks = {one.name: one.check for one in found}
     assert all(check is not None for check in checks.values())
-    assert "no packed run" in str(checks["broken"])
+    assert "not a packed run" in str(checks["broken"])
     assert "actions were not kept" in str(checks["empty-handed"])
     assert (packs / CHECKS_FILE).is_file()
     page = re.sub("<[^>]+>", "", render_board(found))
     assert "broken is not ranked: " in page
-    assert "empty-handed is not ranked: 1 record of no plan in the pack" in page
+    assert "empty-handed is not ranked: 1 record that belong to no plan in the pack" in page
     run = run_of("p", 3, episodes=4)._replace(check=checks["empty-handed"])
     assert re.search(r'<b class="refuted">refuted</b>', render_board([run]))
 

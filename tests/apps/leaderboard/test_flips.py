@@ -101,7 +101,7 @@ def test_a_comparison_tells_how_much_a_policy_differs_from_itself(tmp_path: Path
     known, unknown = read_flips(one), read_flips(two)
     text = "\n".join(sentences(found, "p", "q", (known, unknown)))
     assert "explicit: no clear difference" in text
-    assert "Verdicts that change by themselves: p 33.3 % (1 of 3)." in text
+    assert "Verdicts that change between repeated runs: p 33.3 % (1 of 3)." in text
     assert "not known of q" in text
     text = "\n".join(sentences(found, "p", "q", (known, known)))
     assert "p 33.3 % (1 of 3), q 33.3 % (1 of 3)" in text

@@ -108,14 +108,14 @@ def test_names_stay_in_the_folder(run: Path, tmp_path: Path, name: str) -> None:
     manifest["files"][name] = "0" * 64
     change: dict[str, bytes | None] = {name: b"x", MANIFEST: json.dumps(manifest).encode()}
     forged = rewritten(tmp_path / "a.zip", tmp_path / "forged.zip", change)
-    with pytest.raises(StoreError, match="no file of a run"), opened_run(forged):
+    with pytest.raises(StoreError, match="not belong to a run"), opened_run(forged):
         pass
 
 
 def test_what_is_no_pack_is_named(tmp_path: Path) -> None:
     path = tmp_path / "text"
     path.write_text("text")
-    with pytest.raises(StoreError, match="no packed run"), opened_run(path):
+    with pytest.raises(StoreError, match="not a packed run"), opened_run(path):
         pass
     with pytest.raises(RoboIRGError):
         pack_run(tmp_path / "nothing", tmp_path / "a.zip")

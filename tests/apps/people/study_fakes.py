@@ -1,10 +1,13 @@
 """Studies with made-up pictures: every thing is a square, so no simulator is needed."""
 
+import itertools
 import threading
+from collections import defaultdict
 from fractions import Fraction
 
 import numpy as np
 
+from roboirg.apps.people.answer_form import FormAnswer, answer_form
 from roboirg.apps.people.listen_server import ListenServer
 from roboirg.apps.people.listening_session import QUESTIONS, ListeningSession
 from roboirg.apps.people.listening_study import PEOPLE, ListeningStudy, write_listening_study
@@ -98,3 +101,22 @@ def answer_all(session: ListeningSession, choose):
         body = {"objects": [things.index(one) for one in objects], "values": values, "seconds": 1.5}
         session.answer(code, number, body)
     return code
+
+
+def all_answers(episode, seen):
+    """Return every answer that fills the form; `seen` can be pointed at."""
+    form = answer_form(episode.task)
+    of_kind = defaultdict(list)
+    for name in seen:
+        of_kind[episode.scene[name].kind].append(name)
+    pointings = [
+        objects
+        for length in range(form.least, len(form.kinds) + 1)
+        for objects in itertools.product(*(of_kind[kind] for kind in form.kinds[:length]))
+        if len(set(objects)) == length
+    ]
+    values = [
+        dict(zip((field.name for field in form.fields), chosen, strict=True))
+        for chosen in itertools.product(*(field.values for field in form.fields))
+    ]
+    return [FormAnswer(objects, chosen) for objects in pointings for chosen in values]

@@ -4,10 +4,10 @@ import itertools
 from dataclasses import replace
 
 import pytest
+from study_fakes import all_answers
 
 from roboirg.apps.people.answer_form import (
     FormAnswer,
-    all_answers,
     answer_form,
     answer_of,
     checked_answer,

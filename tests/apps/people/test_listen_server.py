@@ -14,9 +14,9 @@ from dataclasses import replace
 import msgspec
 import numpy as np
 import pytest
-from study_fakes import Serving, answer_all, draw_things, make_study, things_of
+from study_fakes import Serving, all_answers, answer_all, draw_things, make_study, things_of
 
-from roboirg.apps.people.answer_form import all_answers, answer_of, goal_of
+from roboirg.apps.people.answer_form import answer_of, goal_of
 from roboirg.apps.people.listener_answers import (
     ANSWERS_FILE,
     AnswerLog,
@@ -226,7 +226,7 @@ def test_a_new_server_goes_on_where_the_last_one_was(study):
 
 def test_a_study_without_pictures_is_not_served(study):
     (study / "questions" / "items.jsonl").unlink()
-    with pytest.raises(InvalidValueError, match="give roboirg listen plan again"):
+    with pytest.raises(InvalidValueError, match="run roboirg listen plan again"):
         ListeningSession(study)
 
 

@@ -7,10 +7,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as some
 
-from roboirg.apps.people.latin_square import balanced_square
 from roboirg.apps.people.listening_study import (
     PEOPLE,
     ListeningStudy,
+    balanced_square,
     read_listening_study,
     write_listening_study,
 )

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 from msgspec.structs import replace
-from study_fakes import answer_all, make_study
+from study_fakes import all_answers, answer_all, make_study
 
-from roboirg.apps.people.answer_form import FormAnswer, all_answers, answer_of, goal_of
+from roboirg.apps.people.answer_form import FormAnswer, answer_of, goal_of
 from roboirg.apps.people.listening_session import ListeningSession
 from roboirg.apps.people.people_run import answered_plan
 from roboirg.core.errors import InvalidValueError, UnknownNameError

@@ -124,7 +124,7 @@ class ReadsPlaceholder(Honest):
         return np.tile(np.append(REST, 1.0), (ROWS, 1))
 
 
-@planted("repetition", "the first one again")
+@planted("repetition", "repeats the first")
 class NeverComputesAnew(Honest):
     def reset(self, instruction, demonstration):
         super().reset(instruction, demonstration)
@@ -148,7 +148,7 @@ class ComputesAfterLooking(Honest):
         return chunk if given is None else given
 
 
-@planted("language", "3 instructions have the same actions")
+@planted("language", "3 instructions lead to the same actions")
 class LosesPrompt(Honest):
     def reset(self, instruction, demonstration):
         super().reset("", demonstration)
@@ -186,7 +186,7 @@ class IgnoresState(Honest):
         return 1.0
 
 
-@planted("video", "Another video has the same actions", NOTE)
+@planted("video", "Another video leads to the same actions", NOTE)
 class IgnoresVideo(Honest):
     def reset(self, instruction, demonstration):
         super().reset(instruction, {})

@@ -3,7 +3,7 @@
 import pytest
 
 from roboirg.apps.real.control.robot import HORIZON
-from roboirg.apps.real.study.execution_horizon import at_horizon
+from roboirg.apps.real.study.study_run import at_horizon
 from roboirg.core.errors import UnknownNameError
 from roboirg.policies import make_policy
 

@@ -10,7 +10,7 @@ import pytest
 from real_start import start
 from selection import slow_but
 
-from roboirg.apps.real.control.interruption import Interruption
+from roboirg.apps.real.control.control_loop import Interruption
 from roboirg.apps.real.study.failure_choices import failure_choices
 from roboirg.apps.real.study.study_plan import read_study
 from roboirg.apps.real.study.trial_log import TrialLog, trial_metadata

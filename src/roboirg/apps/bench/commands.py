@@ -28,7 +28,7 @@ def bench(
     from roboirg.util.freed_memory import keep_freed_memory
 
     if out is not None and (out.exists() or not out.parent.is_dir()):
-        why = "exists" if out.exists() else "is in no folder that exists"
+        why = "exists" if out.exists() else "is not in an existing folder"
         raise InvalidValueError(f"{str(out)!r} {why}; --out must name a new file.")
     keep_freed_memory()
     where = bench_runner.circumstances(load=os.getloadavg()[1])

@@ -137,8 +137,8 @@ def _policy_run(items: Sequence[GroundingItem], name: str) -> PolicyRun:
     }
     if len(kinds) != 1:
         raise InvalidValueError(
-            "The items are of several splits, wordings or versions, which are not averaged; "
-            "export and score each by itself."
+            "The items come from several splits, wordings or versions, whose scores are not "
+            "averaged; export and score each separately."
         )
     ((split, wordings, language, environment),) = kinds
     conditions = EvalConditions(split, wordings=None if wordings == OWN_WORDS else wordings)

@@ -100,7 +100,7 @@ def score_grounding(
     data: Annotated[Path, typer.Option(help="Folder of the dataset.")],
     answers: Annotated[
         list[Path] | None,
-        typer.Argument(help="Files of answers; the model's name is the file's.", metavar="ANSWERS"),
+        typer.Argument(help="Files of answers, each named after its model.", metavar="ANSWERS"),
     ] = None,
     floor: Annotated[
         str | None,
@@ -133,7 +133,7 @@ def score_grounding(
 
     names = _floors(floor)
     if not answers and not names:
-        raise InvalidValueError("There is nothing to score: give files of answers, or --floor.")
+        raise InvalidValueError("There is nothing to score; give files of answers or --floor.")
     items = read_items(data)
     scores = [
         one
@@ -144,7 +144,6 @@ def score_grounding(
     for name in names:
         found = list(floor_answers(name, items))
         if write_floors is not None:
-            write_floors.mkdir(parents=True, exist_ok=True)
             write_answers(write_floors / f"{name}.jsonl", found)
         scores += score_answers(items, found, name)
     console = Console()

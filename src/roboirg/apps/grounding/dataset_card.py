@@ -92,8 +92,8 @@ def _lines(facts: DatasetFacts, frames: int, every: int) -> Iterator[str]:
     yield "# RoboIRGBench: grounding"
     yield ""
     yield (
-        "What was shown, what is seen, what was said; what is meant? Implicit references in "
-        "instructions to a robot, without the robot. Made by "
+        "Given what was shown, what is visible and what was said: what is meant? These items "
+        "test implicit references in instructions to a robot, without the robot. Made by "
         f"`roboirg export grounding` of RoboIRGBench {__version__}, language {language}, "
         f"environment {environment}. Each item has the answer as slots, as a choice, and as "
         "pixels with masks."

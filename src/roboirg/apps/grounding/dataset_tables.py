@@ -41,7 +41,6 @@ def write_parquet(items: Sequence[GroundingItem], folder: Path, split: str) -> P
 
     schema = _arrow_schema()
     path = folder / DATA / f"{split}-00000-of-00001.parquet"
-    path.parent.mkdir(parents=True, exist_ok=True)
     contents: dict[str, bytes] = {}
     dictionaries = ["picture.bytes", "frames.list.element.bytes", *schema.names]
     with (
@@ -67,7 +66,6 @@ def write_tsv(items: Sequence[GroundingItem], folder: Path, split: str) -> Path:
     """
     questions = load_prompts("grounding_questions")
     path = folder / TSV_FOLDER / f"roboirg_grounding_{split}.tsv"
-    path.parent.mkdir(parents=True, exist_ok=True)
     text = io.StringIO()
     columns = (
         "index", "image", "image_path", "question", *LETTERS, "answer", "category", "l2-category",

@@ -18,8 +18,8 @@ from roboirg.evaluation.grounding_items.verdicts import right_reply
 NO_ANSWER = "no answer"
 MOST_MISTAKES = 40
 _CONFUSION_NOTE = (
-    "Number of instructions that leave the slot to their context, by what was understood. Bold is "
-    "right."
+    "Number of instructions whose command leaves the slot to the context, by the value "
+    "understood. Correct values are in bold."
 )
 
 

@@ -81,11 +81,11 @@ def _entries(row: ScoreRow) -> tuple[Entry, ...]:
 
 def _notes(scores: Sequence[GroundingScore]) -> Iterator[str]:
     yield (
-        "In percent, as means over tasks. Random: random goals of the scene, letters or pixels. "
-        "Above random: 0 is random, 100 all right. Command: a guess among the goals that fit the "
-        "command alone. Hidden slots: those that the command leaves to its context, each counted "
-        "once. Gap: points to explicit on the same episodes, with the p-value of the exact paired "
-        "test after Holm's correction."
+        "Percent correct, as means over tasks. Random: goals of the scene, letters or pixels "
+        "drawn at random. Above random: 0 is random, 100 all correct. Command: a guess among the "
+        "goals that fit the command alone. Hidden slots: those that the command leaves to its "
+        "context, each counted once. Gap: difference to explicit on the same episodes in points, "
+        "with the p-value of the exact paired test after Holm's correction."
     )
     for score in scores:
         name = f"{score.name}, {QUESTIONS[score.kind]}"
@@ -93,7 +93,8 @@ def _notes(scores: Sequence[GroundingScore]) -> Iterator[str]:
             replies = counted(score.unparsed, "reply", "replies")
             yield f"{name}: {replies} without an answer, counted as wrong."
         if score.missing:
-            yield f"{name}: {counted(score.missing, 'item')} not answered, and in no rate."
+            items = counted(score.missing, "item")
+            yield f"{name}: {items} not answered and left out of the rates."
 
 
 def _percent(rate: float | None) -> str:
@@ -142,7 +143,7 @@ _BREAKDOWNS: tuple[tuple[Breakdown, ItemLabels], ...] = tuple(
         (
             "pattern",
             "reasoning pattern",
-            "Each episode counts in its main pattern.",
+            "Each episode counts once, under its main pattern.",
             lambda item: () if item.pattern is None else (item.pattern,),
         ),
         (
@@ -166,7 +167,7 @@ _BREAKDOWNS: tuple[tuple[Breakdown, ItemLabels], ...] = tuple(
         (
             "meters",
             "distance from the camera",
-            "Of the first thing that is meant.",
+            "The distance of the first object that is meant.",
             lambda item: (range_label(item.meters, METERS_EDGES, "m"),),
         ),
     )

@@ -20,7 +20,8 @@ def import_results(
     file: Annotated[
         Path,
         typer.Argument(
-            help="eval_info.json, recording-ID.sqlite, a log as JSON, or an episode per line."
+            help="eval_info.json, recording-ID.sqlite, a log as JSON, or a file with one episode "
+            "per line."
         ),
     ],
     out: Annotated[Path, typer.Option(help="Folder for the records.")],
@@ -29,7 +30,7 @@ def import_results(
         list[str] | None,
         typer.Option(
             "--set",
-            help="FIELD=VALUE of all records, such as max_steps=900; seed=VALUE is that of "
+            help="FIELD=VALUE for all records, such as max_steps=900; seed=VALUE is the seed of "
             "lerobot-eval (1000); repeatable.",
         ),
     ] = None,

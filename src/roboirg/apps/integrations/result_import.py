@@ -37,7 +37,7 @@ from roboirg.util.regular_file import read_regular
 
 LEROBOT_SEED = 1000
 """The seed of lerobot-eval's first episode, if none is given."""
-UNTOLD_CAUSE = "the harness does not tell the cause"
+UNTOLD_CAUSE = "the harness does not report the cause"
 
 _MOST_BYTES = 512 << 20
 """Of a file of JSON."""
@@ -96,7 +96,7 @@ def import_results(harness: str, path: Path, out: Path, options: ImportOptions) 
     except (AttributeError, ArithmeticError, KeyError, RecursionError, TypeError, ValueError,
             sqlite3.Error) as error:  # fmt: skip
         raise InvalidValueError(
-            f"{path} is not a file of results of {harness} ({type(error).__name__}: {error})."
+            f"{path} is not a results file of {harness} ({type(error).__name__}: {error})."
         ) from error
     _refuse_repeated(records, path)
     with RecordStore(out) as store:
@@ -115,7 +115,8 @@ def _read_lerobot(path: Path, options: ImportOptions) -> Iterator[Record]:
         names = entry["task_group"].rsplit("-", 2)
         if len(names) != 3:  # noqa: PLR2004
             raise InvalidValueError(
-                f"{path}: {entry['task_group']!r} is not one of our groups, task-setting-split."
+                f"{path}: {entry['task_group']!r} is not a task group of this benchmark, "
+                "task-setting-split."
             )
         task, setting, split = names
         for index, success in enumerate(entry["metrics"]["successes"]):

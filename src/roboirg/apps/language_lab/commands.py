@@ -168,10 +168,10 @@ def score_shortcuts(
         str | None, typer.Option(help="A row for each pattern, task or slot of a setting.")
     ] = None,
     learned: Annotated[
-        bool, typer.Option(help="Add what is learned from words or scenes alone (minutes).")
+        bool, typer.Option(help="Add learners that see only words or only scenes (takes minutes).")
     ] = False,
 ) -> None:
-    """Score rules and learners that see words or scenes alone: how much needs no understanding.
+    """Score rules and learners that see only words or only scenes: what needs no understanding.
 
     Example: roboirg language shortcuts --settings reasoning --by pattern
     """
@@ -192,8 +192,8 @@ def score_shortcuts(
         check_learning_support()
         if not {TRAINING_SPLIT, JUDGING_SPLIT}.isdisjoint(splits):
             raise InvalidValueError(
-                f"--learned learns from the splits {TRAINING_SPLIT} and {JUDGING_SPLIT}, so "
-                f"--split {split} would test it on what it has seen; ask for test."
+                f"--learned trains on the splits {TRAINING_SPLIT} and {JUDGING_SPLIT}, so --split "
+                f"{split} would test it on what it has seen; choose --split test."
             )
     options = replace(words.options(), form=words.form())
     names, chosen = known_tasks(tasks, options.wordings), known_settings(settings)

@@ -56,7 +56,7 @@ def refusal(results: Sequence[Summary], known: Collection[str]) -> str:
         known: fingerprints of the plans in the pack.
     """
     if stray := sum(one.plan not in known for one in results):
-        return f"{counted(stray, 'record')} of no plan in the pack"
+        return f"{counted(stray, 'record')} that belong to no plan in the pack"
     by_run: dict[PolicyRun, list[Summary]] = defaultdict(list)
     for one in results:
         if one.arm == TOLD:
@@ -77,12 +77,12 @@ def _run_refusal(played: Sequence[Summary]) -> str:
     if (0, 0) in differences.values():
         return ""
     if not differences:
-        return f"the words of {first.policy} are those of no named plan"
+        return f"the words of {first.policy} match no named plan"
     name, (missing, more) = min(differences.items(), key=lambda one: sum(one[1]))
     parts = [f"{missing:,} missing"] * bool(missing) + [f"{more:,} not in it"] * bool(more)
     return (
-        f"the episodes of {first.policy} are no whole plan of {', '.join(named_plans())}; "
-        f"nearest is {name}: {' and '.join(parts)}"
+        f"the episodes of {first.policy} do not make up a whole plan of "
+        f"{', '.join(named_plans())}; nearest is {name}: {' and '.join(parts)}"
     )
 
 

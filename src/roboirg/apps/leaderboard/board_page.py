@@ -82,10 +82,6 @@ def read_packs(
 
 def write_board(runs: Sequence[PackedRun], folder: Path) -> Path:
     """Write the site of packed runs into a folder; return its first page."""
-    try:
-        (folder / ENTRIES).mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise InvalidValueError(f"Cannot write to {folder}: {error.strerror}.") from error
     for run in runs:
         write_atomically(folder / ENTRIES / f"{run.name}.html", render_entry(run))
     write_atomically(folder / "rules.html", _render("rules", plans=named_plans()))

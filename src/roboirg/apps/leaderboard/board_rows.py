@@ -228,7 +228,10 @@ def _status(check: PackCheck | None, *, needs_salt: bool) -> tuple[Status, str]:
     if check.problem:
         return "refuted", f"does not hold: {check.problem}"
     if not check.played:
-        return "unchecked", f"words and files of {check.records:,} records hold; nothing was played"
+        return (
+            "unchecked",
+            f"{check.records:,} records have the right words and files; none was played",
+        )
     return "verified", f"{check.played:,} of {check.records:,} episodes played again; all hold"
 
 
@@ -240,7 +243,7 @@ def _conditions(policy_run: PolicyRun) -> str:
         f"{conditions.max_steps} steps",
     ]
     if versions is not None:
-        parts.append(f"words {versions.language}, world {versions.environment}")
+        parts.append(f"language {versions.language}, environment {versions.environment}")
     return "; ".join(parts)
 
 
@@ -297,7 +300,7 @@ def _published() -> Iterable[BoardRow]:
             policy=model,
             source="the paper",
             status="published",
-            status_text="published; its actions are not, so it cannot be checked",
+            status_text="published without its actions, so it cannot be checked",
             is_privileged=False,
             conditions=f"the paper's episodes and words; {MAX_STEPS} steps",
             episodes=0,

@@ -21,9 +21,11 @@ if TYPE_CHECKING:
 _MOST_SHOWN = 20
 
 RunOrPack = Annotated[str, typer.Argument(help="Output folder of a run, or its packed file.")]
-SampleShare = Annotated[str, typer.Option(help="Share of the episodes whose actions are played.")]
+SampleShare = Annotated[
+    str, typer.Option(help="Share of the episodes whose actions are played again.")
+]
 SampleSeed = Annotated[
-    int | None, typer.Option(help="Draw the same sample again; another one each time without it.")
+    int | None, typer.Option(help="Seed of the sample; without it, every call draws another one.")
 ]
 
 
@@ -32,7 +34,7 @@ def verify(
     sample: SampleShare = "100%",
     sample_seed: SampleSeed = None,
     submission: Annotated[
-        bool, typer.Option("--submission", help="Check also that the board would rank it.")
+        bool, typer.Option("--submission", help="Also check whether the board would rank it.")
     ] = False,
 ) -> None:
     """Play the actions of a run again and check its records; exit code 2 if one does not hold.
@@ -84,7 +86,8 @@ def board(
     verify_share: Annotated[
         str | None,
         typer.Option(
-            "--verify", help="Share of the episodes to play again where not done yet, such as 5%."
+            "--verify",
+            help="Share of the episodes to play again, such as 5%, of packs not verified yet.",
         ),
     ] = None,
 ) -> None:
@@ -110,11 +113,7 @@ def board(
 
 
 def _share(text: str) -> float:
-    """Return a share such as 5% or 0.05.
-
-    Raises:
-        InvalidValueError: it is no number.
-    """
+    """Return a share such as 5% or 0.05."""
     number = text.strip().removesuffix("%")
     try:
         return float(number) / (100 if "%" in text else 1)
@@ -138,8 +137,8 @@ def _print(found: Verification) -> None:
         )
     if found.errors:
         typer.echo(
-            f"{counted(found.errors, 'record')} of errors: whether a policy raised cannot be "
-            "played again, and the rates leave them out."
+            f"{counted(found.errors, 'record')} ended in an error: actions do not show whether a "
+            "policy raised one, and the rates leave such episodes out."
         )
     for note in found.notes:
         typer.echo(note)
@@ -152,7 +151,7 @@ def _print(found: Verification) -> None:
         typer.echo(f"… and {counted(len(found.checks) - _MOST_SHOWN, 'more record')}.")
     wrong = len(found.checks) + len(found.missing) + len(found.doubled)
     fails = f"{counted(wrong, 'thing')} {verb_for(wrong, 'do')} not hold."
-    typer.echo("All of it holds." if found.holds else fails)
+    typer.echo("Everything holds." if found.holds else fails)
 
 
 def _print_some(what: str, slugs: tuple[str, ...]) -> None:
@@ -164,7 +163,9 @@ def _print_some(what: str, slugs: tuple[str, ...]) -> None:
 
 def repeat(
     run: Folder,
-    out: Annotated[str, typer.Option(help="Folder of the repetition; the same again to resume.")],
+    out: Annotated[
+        str, typer.Option(help="Folder for the repetition; give the same folder again to resume.")
+    ],
 ) -> None:
     """Play a run's plan again with its policies, and print which verdicts changed.
 
@@ -180,9 +181,7 @@ def repeat(
         raise InvalidValueError(f"{out} is the run itself; choose another --out.")
     plan = read_plan(folder)
     if plan is None:
-        raise InvalidValueError(
-            f"{run} has no plan.json that can be read, so it cannot be repeated."
-        )
+        raise InvalidValueError(f"{run} has no readable plan.json, so it cannot be repeated.")
     add_working_directory(last=True)
     summary = play(
         with_secret(plan, folder).checked(),
@@ -217,7 +216,7 @@ def _print_flips(episodes: tuple[RepeatedEpisode, ...]) -> None:
         where = (
             ""
             if changed.differs_at is None
-            else f"; actions differ from number {changed.differs_at} on"
+            else f"; the actions differ from number {changed.differs_at} on"
         )
         typer.echo(f"{changed.slug}: {' then '.join(changed.outcomes)}{where}")
     for policy, (before, now) in dict.fromkeys((one.policy, one.arithmetic) for one in episodes):

@@ -21,12 +21,12 @@ from roboirg.evaluation.analysis.tables.table import NOT_APPLICABLE, Column, Ent
 
 _GAPS_NOTE = (
     "Success in percent, the mean over tasks; the gap to explicit is over the same episodes, in "
-    "points. p-values are of the exact paired test, after Holm's correction over the settings."
+    "points. p-values are from the exact paired test, after Holm's correction over the settings."
 )
 _FLOORS_NOTE = (
-    "What is reached on the test split without understanding, in percent: by chance after the "
-    "command, by always answering the most frequent goal, by the best rule about the words, by "
-    "learners of the words alone and of the scene alone, and by any of them."
+    "Success on the test split without understanding, in percent: by chance after the command, "
+    "by always answering the most frequent goal, by the best rule about the words, by learners "
+    "that see only the words or only the scene, and by any of these."
 )
 
 

@@ -91,7 +91,7 @@ def _problem(found: Verification) -> str:
 
 
 def _versions() -> str:
-    return f"world {ENVIRONMENT_VERSION}, words {LANGUAGE_VERSION}"
+    return f"environment {ENVIRONMENT_VERSION}, language {LANGUAGE_VERSION}"
 
 
 def _kept(folder: Path) -> dict[str, PackCheck]:

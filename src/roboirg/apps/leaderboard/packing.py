@@ -20,7 +20,7 @@ from pydantic import BaseModel, ConfigDict
 from roboirg.core.errors import InvalidValueError
 from roboirg.core.plain_text import printable
 from roboirg.core.version import __version__
-from roboirg.evaluation.records.action_log import ACTION_FOLDER
+from roboirg.evaluation.records.action_log import ACTION_FOLDER, UNREADABLE_ARCHIVE
 from roboirg.evaluation.records.episode_log import LOG_FOLDER
 from roboirg.evaluation.records.record_codec import StoreError, read_summary
 from roboirg.evaluation.records.run_files import (
@@ -32,7 +32,6 @@ from roboirg.evaluation.records.run_files import (
     run_file,
 )
 from roboirg.evaluation.records.store import RECORDS_FILE, StoredRun
-from roboirg.util.archive_errors import UNREADABLE_ARCHIVE
 from roboirg.util.atomic_write import replacing
 from roboirg.util.regular_file import open_regular
 
@@ -113,8 +112,8 @@ def _check_size(paths: Mapping[str, Path], folder: Path) -> None:
     if sum(sizes.values()) > _MAX_BYTES:
         largest = max(sizes, key=lambda name: sizes[name])
         raise StoreError(
-            f"The files of {folder} have {sum(sizes.values()):,} bytes, the largest, {largest}, "
-            f"{sizes[largest]:,}; a pack holds at most {_MAX_BYTES >> 30} GiB."
+            f"The files of {folder} have {sum(sizes.values()):,} bytes (the largest, {largest}, "
+            f"has {sizes[largest]:,}); a pack holds at most {_MAX_BYTES >> 30} GiB."
         )
 
 
@@ -135,7 +134,7 @@ def opened_run(path: Path) -> Iterator[Path]:
                 _unpack(archive, path, folder)
         except UNREADABLE_ARCHIVE as error:
             words = printable(" ".join(str(error).split()))[:_MOST_SHOWN].rstrip(".")
-            raise StoreError(f"{path} is no packed run: {words}.") from error
+            raise StoreError(f"{path} is not a packed run: {words}.") from error
         yield folder
 
 
@@ -145,7 +144,7 @@ def _manifest(archive: zipfile.ZipFile, path: Path) -> PackManifest:
             raise ValueError("it is too large")
         return PackManifest.model_validate_json(archive.read(MANIFEST))
     except (KeyError, ValueError) as error:
-        raise StoreError(f"{path} is no packed run: its {MANIFEST} cannot be read.") from error
+        raise StoreError(f"{path} is not a packed run: its {MANIFEST} cannot be read.") from error
 
 
 def _unpack(archive: zipfile.ZipFile, path: Path, folder: Path) -> None:
@@ -169,18 +168,14 @@ def _unpack(archive: zipfile.ZipFile, path: Path, folder: Path) -> None:
 
 
 def _safe(name: str, path: Path) -> str:
-    """Return the name of a file of a run.
-
-    Raises:
-        StoreError: it is the name of another file, perhaps outside the folder.
-    """
+    """Return the name of a file of a run, if it is one; others may lead outside the folder."""
     parts = PurePosixPath(name).parts
     top = parts[0] if parts else ""
     folders = {EARLIER_PLANS, *_PACKED_FOLDERS.values()}
     is_known = name in (RECORDS_FILE, PLAN_FILE) or top in folders
     if not is_known or len(name) > MOST_PATH_LETTERS or not re.fullmatch(RELATIVE_PATH, name):
         shown = printable(name[:_MOST_SHOWN])
-        raise StoreError(f"{path} holds {shown!r}, which is no file of a run.")
+        raise StoreError(f"{path} holds {shown!r}, which does not belong to a run.")
     return name
 
 

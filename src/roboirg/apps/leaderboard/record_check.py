@@ -112,11 +112,11 @@ def _check(record: Record, folder: Path, *, play: bool) -> RecordCheck:
         return RecordCheck(record.slug, (*findings, *_words(record, again)))
     findings += _differences(record, again, PLAYED_FIELDS)
     if played is None:
-        findings.append("actions: played again, the episode takes none.")
+        findings.append("actions: when played again, the episode takes none.")
         return RecordCheck(record.slug, tuple(findings), ReplayVerdict.DIFFERENT, float("inf"))
     verdict, deviation = _compare_ends(record, again, log, played)
     if verdict is ReplayVerdict.DIFFERENT:
-        findings.append(f"end_state: played again, it differs by {deviation:.2g} (m, rad, s).")
+        findings.append(f"end_state: when played again, it differs by {deviation:.2g} (m, rad, s).")
     if not _same_answers(played, log):
         findings.append("actions: some of them come after the end of the episode.")
     return RecordCheck(record.slug, tuple(findings), verdict, deviation)

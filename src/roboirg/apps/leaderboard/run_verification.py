@@ -143,7 +143,7 @@ def _completeness(
     notes = []
     if outside := len(there - jobs.keys()):
         whose = "an earlier plan" if plans else "no plan that is kept"
-        notes.append(f"Of {whose}: {counted(outside, 'record')}.")
+        notes.append(f"From {whose}: {counted(outside, 'record')}.")
     return tuple(sorted(missing)), tuple(notes)
 
 

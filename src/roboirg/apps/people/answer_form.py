@@ -7,7 +7,6 @@ and remembered. Values are asked for only where pointing leaves them open, as fo
 from __future__ import annotations
 
 import functools
-import itertools
 import json
 from collections import Counter, defaultdict
 from collections.abc import Mapping, Sequence
@@ -120,7 +119,7 @@ def checked_answer(
     kinds = tuple(episode.scene[one].kind for one in objects)
     if not form.least <= len(kinds) or kinds != form.kinds[: len(kinds)]:
         raise InvalidValueError(
-            f"The answer points at {', '.join(kinds) or 'nothing'}; it points at "
+            f"The answer points at {', '.join(kinds) or 'nothing'}; it must point at "
             f"{', '.join(form.kinds) or 'nothing'}, in this order."
         )
     if len(set(objects)) < len(objects):
@@ -131,33 +130,11 @@ def checked_answer(
         if not isinstance(value, str | int) or type(value) is not type(field.values[0]):
             raise InvalidValueError(f"The answer has no {field.name!r}.")
         if value not in field.values:
-            raise InvalidValueError(f"{field.name!r} is {value!r}; it is one of {field.values}.")
+            raise InvalidValueError(
+                f"{field.name!r} is {value!r}; it must be one of {field.values}."
+            )
         chosen[field.name] = value
     return FormAnswer(tuple(objects), chosen)
-
-
-def all_answers(episode: Episode, seen: Sequence[str]) -> list[FormAnswer]:
-    """Return every answer that fills the form.
-
-    Args:
-        episode: the episode.
-        seen: names of the objects that can be pointed at.
-    """
-    form = answer_form(episode.task)
-    of_kind: dict[ObjectKind, list[str]] = defaultdict(list)
-    for name in seen:
-        of_kind[episode.scene[name].kind].append(name)
-    pointings = [
-        objects
-        for length in range(form.least, len(form.kinds) + 1)
-        for objects in itertools.product(*(of_kind[kind] for kind in form.kinds[:length]))
-        if len(set(objects)) == length
-    ]
-    values = [
-        dict(zip((field.name for field in form.fields), chosen, strict=True))
-        for chosen in itertools.product(*(field.values for field in form.fields))
-    ]
-    return [FormAnswer(objects, chosen) for objects in pointings for chosen in values]
 
 
 def _pointed(episode: Episode, goal: Goal) -> tuple[str, ...]:

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 # Heavy modules are imported inside the commands, so that --help is fast.
 
 listen_app = typer.Typer(
-    no_args_is_help=True, help="Ask people what is meant; the oracle's hands play their answers."
+    no_args_is_help=True, help="Ask people what is meant; the scripted expert plays their answers."
 )
 
 
@@ -40,8 +40,10 @@ class StudyWords(PlanWords):
 NO_WORDS = StudyWords()
 
 Study = Annotated[Path, typer.Argument(help="Folder of the study.")]
-Host = Annotated[str, typer.Option(help="Address to listen at; 0.0.0.0 for other machines, too.")]
-Port = Annotated[int, typer.Option(help="Port to listen at; 0 for any free port.")]
+Host = Annotated[
+    str, typer.Option(help="Address to listen on; 0.0.0.0 lets other machines connect.")
+]
+Port = Annotated[int, typer.Option(help="Port to listen on; 0 for any free port.")]
 
 
 @listen_app.command()
@@ -49,7 +51,7 @@ Port = Annotated[int, typer.Option(help="Port to listen at; 0 for any free port.
 def plan(
     folder: Study,
     people: Annotated[
-        int, typer.Option(help="How many people; best a multiple of the number of settings.")
+        int, typer.Option(help="Number of people, ideally a multiple of the number of settings.")
     ],
     tasks: Tasks = "all",
     settings: Settings = "all",
@@ -58,7 +60,7 @@ def plan(
     ] = "4",
     words: StudyWords = NO_WORDS,
 ) -> None:
-    """Plan a study of listeners and draw its pictures; continues one that was interrupted.
+    """Plan a study of listeners and draw its pictures, or continue an interrupted one.
 
     A plan may have, under `listening`: practice, checks, seed, frames_every, and consent, the text
     that people agree to.
@@ -113,10 +115,10 @@ def serve_study(
     port: Port = 0,
     people: Annotated[
         int | None,
-        typer.Option(min=1, help="How many may take part, if not as many as planned."),
+        typer.Option(min=1, help="Number of people who may take part, if not as planned."),
     ] = None,
 ) -> None:
-    """Serve the page of a study; every answer is on the disk before the next question comes.
+    """Serve the page of a study; each answer is stored before the next question is shown.
 
     Example: roboirg listen serve study
     """
@@ -130,12 +132,12 @@ def serve_study(
 def print_results(
     folder: Study,
     play: Annotated[
-        bool, typer.Option("--play", help="Let the oracle's hands play the answers first.")
+        bool, typer.Option("--play", help="Let the scripted expert play the answers first.")
     ] = False,
 ) -> None:
     """Print how far people agree, how long they take, whether they pay attention.
 
-    Records of what --play plays are in FOLDER/run.
+    --play writes its records to FOLDER/run.
 
     Example: roboirg listen results study
     """
@@ -164,7 +166,7 @@ def _print_listeners(folder: Path) -> None:
     read_listening_study(folder)
     events = read_events(folder)
     if not events:
-        raise InvalidValueError(f"No question of {str(folder)!r} was answered yet.")
+        raise InvalidValueError(f"No question of {str(folder)!r} has been answered yet.")
     console = Console()
     widen(console)
     for table in (setting_table(events), person_table(events)):
@@ -190,7 +192,7 @@ def _serve(server: KeyedPageServer, words: str) -> None:
 def drive(
     task: Annotated[str, typer.Argument(help="Name of the task.")],
     episode: Annotated[int, typer.Argument(help="Position in the split, from 0.")],
-    setting: Annotated[str, typer.Option(help="Setting of the words.")] = "explicit",
+    setting: Annotated[str, typer.Option(help="Setting of the instruction.")] = "explicit",
     words: PlanWords = NO_PLAN,
     out: run_commands.Out = "runs/driven",
     name: Annotated[str, typer.Option(help="Name of the policy in the records.")] = "person",
@@ -222,7 +224,8 @@ def drive(
     jobs = made.jobs()
     if len(jobs) != 1:
         raise InvalidValueError(
-            f"One task, one setting and one form are driven at a time; these are {len(jobs)} jobs."
+            "drive plays one task, one setting and one form at a time; these options make "
+            f"{len(jobs)} jobs."
         )
     job = msgspec.structs.replace(jobs[0], policy=name, spec=None)
     server = DriveServer(job, run_commands.folder_of(out), host, port)

@@ -89,11 +89,7 @@ class DrivingPolicy:
             return rows
 
     def _rows(self, wanted: Mapping[str, Any]) -> NDArray[np.float64]:
-        """Return the way points of a command.
-
-        Raises:
-            InvalidValueError: it is none.
-        """
+        """Return the way points of a command."""
         pose = self._known_pose().copy()
         grip, count = LEAVE, 1
         match wanted:
@@ -116,11 +112,7 @@ class DrivingPolicy:
         return np.tile(np.append(pose, grip), (count, 1))
 
     def _point_below(self, x: float, y: float) -> NDArray[np.float64]:
-        """Return the point of the world that a pixel of the front picture shows, m.
-
-        Raises:
-            InvalidValueError: the picture does not show anything there.
-        """
+        """Return the point of the world that a pixel of the front picture shows, m."""
         seen = self._seen
         if seen is None:
             raise RuntimeError("There is no observation.")
@@ -138,7 +130,7 @@ class DrivingPolicy:
         from roboirg.simulation.expert.motion_planning import MotionPlanner
 
         if (row[:3] < REACH_LOW).any() or (row[:3] > REACH_HIGH).any():
-            raise InvalidValueError("that is outside of the arm's reach.")
+            raise InvalidValueError("that point is out of the arm's reach.")
         env = self._session.env
         if env is None:
             raise RuntimeError("There is no environment.")
@@ -146,7 +138,7 @@ class DrivingPolicy:
         try:
             MotionPlanner(robot).plan_move(robot.arm_positions, tool_pose(row))
         except MotionPlanningError as error:
-            raise InvalidValueError("the arm does not reach that.") from error
+            raise InvalidValueError("the arm cannot reach that pose.") from error
 
     def _known_pose(self) -> NDArray[np.float64]:
         if self._pose is None:
@@ -155,13 +147,9 @@ class DrivingPolicy:
 
 
 def _number(value: object, most: float) -> float:
-    """Return a finite number between plus and minus `most`.
-
-    Raises:
-        InvalidValueError: it is none.
-    """
+    """Return a finite number between plus and minus `most`."""
     if isinstance(value, bool) or not isinstance(value, int | float) or not abs(value) <= most:
-        raise InvalidValueError(f"{value!r} is no number up to {most:g}.")
+        raise InvalidValueError(f"{value!r} is not a number up to {most:g}.")
     return float(value)
 
 

@@ -32,8 +32,8 @@ _SETTING_NOTE = (
     "attention checks are left out."
 )
 _PERSON_NOTE = (
-    "Checks are questions with a plain command. Seconds: median to an answer. Hidden: seconds in "
-    "which the page could not be seen while a question was asked, in all."
+    "Checks are questions with a plain command. Seconds: median time to an answer. Hidden: total "
+    "seconds for which the page was out of sight during questions."
 )
 
 

@@ -66,7 +66,7 @@ class ListeningSession:
             open_wordings(self.study.plan.wordings, self.study.plan.options.wordings)
         if not (self.questions_folder / ITEMS_FILE).exists():
             raise InvalidValueError(
-                f"The study {str(folder)!r} has no pictures yet; give roboirg listen plan again."
+                f"The study {str(folder)!r} has no pictures yet; run roboirg listen plan again."
             )
         self._items: dict[object, GroundingItem] = {
             (one.task, one.split, one.episode, one.options): one
@@ -158,7 +158,7 @@ class ListeningSession:
                 episode, _names(view, body.get("objects")), _mapping(body.get("values"))
             )
             if given is not None and FormAnswer(given.objects, given.values) != answer:
-                raise OutOfDateError("This question was answered already.")
+                raise OutOfDateError("This question has already been answered.")
             if given is None:
                 self._store(person, number, question, answer, body)
             if question.kind != "practice":
@@ -221,7 +221,7 @@ class ListeningSession:
 
     def _person(self, code: str) -> int:
         if code not in self._people:
-            raise InvalidValueError("This study knows no such code.")
+            raise InvalidValueError("This code does not belong to this study.")
         return self._people[code]
 
     def _questions(self, person: int) -> tuple[PersonQuestion, ...]:

@@ -19,7 +19,6 @@ import msgspec
 import numpy as np
 from pydantic import BaseModel, ConfigDict, ValidationError
 
-from roboirg.apps.people.latin_square import balanced_square
 from roboirg.apps.people.people_listener import STUDY_FILE
 from roboirg.core.errors import InvalidValueError
 from roboirg.core.instruction_options import DEFAULT_DELIVERY, InstructionOptions
@@ -108,7 +107,7 @@ class ListeningStudy(BaseModel):
             raise InvalidValueError("A study has one form and one set of stages.")
         if self.plan.split == TRAINING:
             raise InvalidValueError(
-                f"Practice and checks are episodes of the split {TRAINING!r}; choose another one."
+                f"Practice and checks are episodes of the split {TRAINING!r}; choose another split."
             )
         if self.practice + self.checks > SIZES[TRAINING]:
             raise InvalidValueError(
@@ -223,10 +222,6 @@ def write_listening_study(study: ListeningStudy, folder: Path) -> None:
         return
     if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
         raise InvalidValueError(f"{str(folder)!r} is not an empty folder; choose another one.")
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise InvalidValueError(f"Cannot write {folder}: {error.strerror or error}.") from error
     write_atomically(path, study.model_dump_json(indent=2) + "\n")
 
 
@@ -245,4 +240,28 @@ def read_listening_study(folder: Path) -> ListeningStudy:
             "with: roboirg listen plan."
         ) from error
     except ValidationError as error:
-        raise InvalidValueError(f"{path} is no study of this version ({error}).") from error
+        raise InvalidValueError(f"{path} is not a study of this version ({error}).") from error
+
+
+@functools.cache
+def balanced_square(conditions: int) -> tuple[tuple[int, ...], ...]:
+    """Return the orders of conditions, one row per person.
+
+    Every condition stands once in each row, and in every column equally often; over all rows, each
+    condition directly follows each other one equally often. For an even number of conditions there
+    are as many rows, for an odd one twice as many, of which the first half is a Latin square too.
+
+    Args:
+        conditions: how many there are, at least 1.
+    """
+    first = [0]
+    low, high = 1, conditions - 1
+    while low <= high:
+        first.append(low)
+        if low < high:
+            first.append(high)
+        low, high = low + 1, high - 1
+    rows = [tuple((one + shift) % conditions for one in first) for shift in range(conditions)]
+    if conditions % 2 and conditions > 1:
+        rows += [row[::-1] for row in rows]
+    return tuple(rows)

@@ -37,7 +37,7 @@ def answered_plan(folder: Path) -> Plan:
     study = read_listening_study(folder)
     answers = [one for one in standing_answers(read_events(folder)) if one.kind == "item"]
     if not answers:
-        raise InvalidValueError(f"No question of {str(folder)!r} was answered yet.")
+        raise InvalidValueError(f"No question of {str(folder)!r} has been answered yet.")
     seeds = tuple(range(1 + max(one.policy_seed for one in answers)))
     fields: dict[str, Any] = dict(study.plan) | {
         "policies": (f"{PEOPLE}={PEOPLE}:{folder.absolute()}",),

@@ -29,7 +29,7 @@ def check_joint_units(player: PolicyPlayer) -> Iterator[CheckResult]:
         yield CheckResult(
             "joint units",
             FAIL,
-            "Joint targets are within the robot's limits if they are degrees, and far beyond them "
+            "Joint targets are within the robot's limits if read as degrees and far beyond them "
             "as radians; convert them to radians.",
         )
 
@@ -42,9 +42,9 @@ def check_joint_targets(player: PolicyPlayer) -> Iterator[CheckResult]:
         yield CheckResult(
             "joint targets",
             WARN,
-            f"All are within {NEAR_ZERO} rad of 0, where joint {BENT_JOINT + 1} (at most {limit} "
-            "rad) cannot be; usually they are changes of the joints, or not brought back from "
-            "their normalized form. Absolute targets in radians are wanted.",
+            f"All are within {NEAR_ZERO} rad of 0, which joint {BENT_JOINT + 1} (at most {limit} "
+            "rad) cannot reach; usually they are changes of the joints, or normalized values "
+            "that were not scaled back. Absolute targets in radians are expected.",
         )
 
 

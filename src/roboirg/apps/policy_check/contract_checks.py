@@ -47,7 +47,7 @@ def check_loading(player: PolicyPlayer) -> Iterator[CheckResult]:
         raise CheckAbortedError("loads", FAIL, f"It has no {missing[0]}().")
     if hasattr(policy, "attach"):
         raise CheckAbortedError(
-            "loads", NOTE, "It is privileged: it needs a simulator, and there is none here."
+            "loads", NOTE, "It is privileged: it needs a simulator, which is not available here."
         )
     yield CheckResult("loads", PASS, f"{type(policy).__name__} was made with seed {player.seed}.")
 
@@ -78,7 +78,7 @@ def check_acting(player: PolicyPlayer) -> Iterator[CheckResult]:
             raise
         check, verdict, message = error.args
         raise CheckAbortedError(
-            check, verdict, f"{message[:-1]}; with pictures as {works} it acts: convert them."
+            check, verdict, f"{message[:-1]}; it acts with pictures as {works}: convert them."
         ) from error
     yield from _describe_actions(player, "without a video", rollout)
     steps = sum(map(len, rollout.chunks))
@@ -132,7 +132,7 @@ def check_inputs(player: PolicyPlayer) -> Iterator[CheckResult]:
     if changed:
         yield CheckResult("inputs unchanged", FAIL, f"It changed {changed} in place.")
     else:
-        yield CheckResult("inputs unchanged", PASS, "Demonstration and observations are as before.")
+        yield CheckResult("inputs unchanged", PASS, "Demonstration and observations are unchanged.")
 
 
 def check_determinism(player: PolicyPlayer) -> Iterator[CheckResult]:
@@ -170,7 +170,7 @@ def check_reset(player: PolicyPlayer) -> Iterator[CheckResult]:
     before = player.play(name, player.without_video, calls=2 * CALLS).chunks
     if _holds(before, after.chunks[0]) and not _holds(before, expected.chunks[0]):
         message = (
-            "The first answer after reset() is one of the episode before: a queue of actions "
+            "The first answer after reset() belongs to the previous episode: a queue of actions "
             "outlives the episode; empty it in reset()."
         )
     else:
@@ -202,14 +202,14 @@ def check_turns(player: PolicyPlayer) -> Iterator[CheckResult]:
         difference = largest_difference(alone, shared)
         if difference == 0:
             yield CheckResult(
-                check, PASS, f"Two episodes {how} have the actions that each has alone."
+                check, PASS, f"Two episodes {how} have the same actions as each alone."
             )
         else:
             yield CheckResult(
                 check,
                 FAIL,
-                f"Two episodes {how} differ by up to {difference:.3g} from each alone; what "
-                f"belongs to an episode must be in {where}, not in the module.",
+                f"Two episodes {how} differ by up to {difference:.3g} from each alone; keep what "
+                f"belongs to an episode in {where}, not in the module.",
             )
 
 

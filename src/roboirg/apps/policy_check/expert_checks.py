@@ -138,7 +138,7 @@ def _read_answers(
             error = _error(read, moments)
             yield _Attempt(convention.check, error, convention.means, convention.remedy)
     error = _error(answers[1:], moments[:-1])
-    remedy = "Each answer comes one call late: compute it from what is shown with the call."
+    remedy = "Each answer comes one call late: compute it from the observation of the same call."
     yield _Attempt("late answers", error, "one moment earlier", remedy)
 
 
@@ -170,8 +170,8 @@ def _check_jumps(
             "jumps",
             WARN,
             f"At each of {len(moments)} moments of an expert's episode the first target is "
-            f"{min(jumps):.2g} rad or more from the joints; usually targets are not brought back "
-            "from their normalized form, or the joints are in another order.",
+            f"{min(jumps):.2g} rad or more from the joints; usually normalized targets were not "
+            "scaled back, or the joints are in another order.",
         )
 
 

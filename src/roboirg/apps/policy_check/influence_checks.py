@@ -6,13 +6,23 @@ which two equal episodes differ cannot be checked so.
 
 from __future__ import annotations
 
+import secrets
 from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from roboirg.apps.policy_check.check_result import NOTE, PASS, WARN, CheckResult
-from roboirg.apps.policy_check.policy_player import SECOND, VIDEO_STEPS, PolicyPlayer, are_equal
-from roboirg.apps.policy_check.synthetic_episodes import SyntheticEpisode
+from roboirg import language
+from roboirg.apps.policy_check.check_result import FAIL, NOTE, PASS, WARN, CheckResult
+from roboirg.apps.policy_check.policy_player import (
+    SECOND,
+    VIDEO_STEPS,
+    PolicyPlayer,
+    are_equal,
+    describe_difference,
+)
+from roboirg.apps.policy_check.synthetic_episodes import SyntheticEpisode, SyntheticEpisodes
+from roboirg.language.settings import ACCEPTANCE_SETTINGS, EXPLICIT
+from roboirg.tasks.splits.splits import get_episode
 
 STATE_FIELDS = ("joint_positions", "gripper", "end_effector")
 OTHER_COMMANDS = (
@@ -45,15 +55,16 @@ def check_constant(player: PolicyPlayer) -> Iterator[CheckResult]:
         yield CheckResult(
             "constant",
             WARN,
-            f"All {len(rows)} actions of two episodes are the same one; usually the model's output "
-            "is not read, or a server answers with a placeholder.",
+            f"All {len(rows)} actions of two episodes are the same; usually the model's output is "
+            "not read, or a server answers with a placeholder.",
         )
     elif all(_repeats(rollout.chunks) for rollout in rollouts):
         yield CheckResult(
             "repetition",
             WARN,
-            "Every answer of an episode is the first one again although all it sees has changed; "
-            "usually a chunk is kept and never computed anew. Clear it once its actions are given.",
+            "Every answer of an episode repeats the first although all inputs have changed; "
+            "usually a chunk is kept and never recomputed. Clear it once its actions are "
+            "returned.",
         )
 
 
@@ -68,15 +79,15 @@ def check_language(player: PolicyPlayer) -> Iterator[CheckResult]:
         yield from _not_checked(player, name)
         return
     if any(_changes(player, name, instruction=words) for words in OTHER_COMMANDS):
-        yield CheckResult(name, PASS, "Other instructions have other actions.")
+        yield CheckResult(name, PASS, "Other instructions lead to other actions.")
         yield from check_prompt_end(player)
     else:
         yield CheckResult(
             name,
             WARN,
-            f"{len(OTHER_COMMANDS) + 1} instructions have the same actions, bit for bit; usually "
-            "the words do not reach the model. Check the prompt's name in the request, and that "
-            "reset() keeps the instruction.",
+            f"{len(OTHER_COMMANDS) + 1} instructions lead to the same actions, bit for bit; "
+            "usually the words do not reach the model. Check the prompt's name in the request, "
+            "and that reset() keeps the instruction.",
         )
 
 
@@ -102,13 +113,14 @@ def check_prompt_end(player: PolicyPlayer) -> Iterator[CheckResult]:
         yield CheckResult(
             name,
             NOTE,
-            f"The last of {words} words changes nothing, as it declares {declared} tokens.",
+            f"The last of {words} words changes nothing, as the policy declares a limit of "
+            f"{declared} tokens.",
         )
         return
     yield CheckResult(
         name,
         WARN,
-        f"The last of {words} words changes nothing: the prompt is cut, and the command stands at "
+        f"The last of {words} words changes nothing: the prompt is cut, and the command comes at "
         f"its end. Instructions have up to {MAX_WORDS} words; raise the model's limit of tokens, "
         "or declare it as prompt_tokens.",
     )
@@ -131,19 +143,19 @@ def check_pictures(player: PolicyPlayer) -> Iterator[CheckResult]:
         )
     ]
     if not ignored:
-        yield CheckResult(name, PASS, f"Those of {' and '.join(cameras)} change the actions.")
+        yield CheckResult(name, PASS, f"Pictures of {' and '.join(cameras)} change the actions.")
         return
     which = " and ".join(ignored)
-    seen = f"Other pictures of {which} have the same actions, bit for bit"
+    seen = f"Other pictures of {which} lead to the same actions, bit for bit"
     if len(ignored) < len(cameras) and _changes_with_video(player, name, ignored):
         yield CheckResult(name, NOTE, f"{seen}; those in the video change them.")
         return
     yield CheckResult(
         name,
         WARN,
-        f"{seen}; usually what it sees now does not reach the model, or one camera's pictures are "
-        "given twice. If it does not need a camera, take it out of `cameras`, which saves "
-        "rendering.",
+        f"{seen}; usually the current pictures do not reach the model, or one camera's pictures "
+        "are passed twice. If the policy does not need a camera, remove it from `cameras` to "
+        "save rendering.",
     )
 
 
@@ -158,8 +170,8 @@ def check_state(player: PolicyPlayer) -> Iterator[CheckResult]:
         yield CheckResult(
             name,
             NOTE,
-            "Joints, fingers and tool change nothing; right for a model of pictures alone, wrong "
-            "if it was trained with the robot's state.",
+            "Joints, fingers and tool change nothing, which is right for a model of pictures "
+            "alone and wrong if it was trained with the robot's state.",
         )
 
 
@@ -169,13 +181,13 @@ def check_video(player: PolicyPlayer) -> Iterator[CheckResult]:
     if not _can_compare(player) or player.needs.demonstration_frames == "none":
         return
     if _changes_with_video(player, name, player.needs.cameras, STATE_FIELDS):
-        yield CheckResult(name, PASS, "Another video has other actions.")
+        yield CheckResult(name, PASS, "Another video leads to other actions.")
     else:
         yield CheckResult(
             name,
             NOTE,
-            "Another video has the same actions, bit for bit; if it needs none, "
-            'demonstration_frames = "none" saves time, else it is lost on the way.',
+            "Another video leads to the same actions, bit for bit; if the policy needs no video, "
+            'demonstration_frames = "none" saves time; otherwise the video is lost on the way.',
         )
 
 
@@ -221,3 +233,31 @@ def _long_prompt(remarks: int, end: str) -> str:
 
 def _episode(player: PolicyPlayer, instruction: str) -> SyntheticEpisode:
     return player.make_episodes().episode(instruction, 0)
+
+
+def check_order(player: PolicyPlayer) -> Iterator[CheckResult]:
+    """Check that implicit words lead to the same actions before and after explicit ones."""
+    name = "order of words"
+    if not player.repeatable:
+        return
+    episode = get_episode("PickXtimes", "train", 0)
+    words = {name: language.instruct(episode, name).text for name in ACCEPTANCE_SETTINGS}
+    # Nothing can remember this scene, not even a server that was checked before.
+    scene = SyntheticEpisodes(player.needs, secrets.randbits(32)).episode("", VIDEO_STEPS)
+    explicit = scene._replace(instruction=words.pop(EXPLICIT))
+    implicit = [scene._replace(instruction=text) for text in words.values()]
+    before = [player.play(name, one) for one in implicit]
+    player.play(name, explicit)
+    for one, first in zip(implicit, before, strict=True):
+        after = player.play(name, one)
+        if not are_equal(first, after):
+            yield CheckResult(
+                name,
+                FAIL,
+                f"{one.instruction!r} leads to other actions once {explicit.instruction!r} was "
+                f"heard in the same scene (by up to {describe_difference(first, after)}): results "
+                "of implicit instructions depend on the order of play. Keep nothing of an "
+                "episode in the module, the class, files or the server.",
+            )
+            return
+    yield CheckResult(name, PASS, "Implicit words mean the same before and after explicit ones.")

@@ -31,11 +31,11 @@ from roboirg.apps.policy_check.expert_episode import RecordExpert
 from roboirg.apps.policy_check.influence_checks import (
     check_constant,
     check_language,
+    check_order,
     check_pictures,
     check_state,
     check_video,
 )
-from roboirg.apps.policy_check.order_check import check_order
 from roboirg.apps.policy_check.policy_player import PolicyPlayer
 from roboirg.core.plain_text import counted
 from roboirg.policies.contract.base import Policy

@@ -114,7 +114,7 @@ def run(
         str, typer.Option(help="Who scores the trials: judge (only with the twin) or operator.")
     ] = "",
     retry_errors: Annotated[
-        bool, typer.Option(help="Play trials again that ended in an error or were void.")
+        bool, typer.Option(help="Play trials again that ended in an error or were declared void.")
     ] = True,
 ) -> None:
     """Play the trials of a study in order, on a robot or its twin.
@@ -175,7 +175,7 @@ def score(
 
 def _play(study: Study, console: OperatorConsole, policies: list[str], *, retry: bool) -> None:
     """Play a study and print a summary; exits with 2 if a trial ended in an error."""
-    from roboirg.apps.real.control.interruption import Interruption
+    from roboirg.apps.real.control.control_loop import Interruption
 
     # SIGTERM stops the run like Ctrl-C, with the arm at rest.
     interruption = Interruption()

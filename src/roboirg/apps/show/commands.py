@@ -32,7 +32,8 @@ def show(
     out: Annotated[
         str | None,
         typer.Option(
-            help="PNG file to write, and a twin for dark pages; TASK-SPLIT-EPISODE.png by default."
+            help="PNG file to write, with a second one for dark pages; TASK-SPLIT-EPISODE.png by "
+            "default."
         ),
     ] = None,
 ) -> None:

@@ -24,7 +24,6 @@ from roboirg.envs.env_options import EnvOptions
 from roboirg.envs.env_settings import EnvSettings, choose_index
 from roboirg.envs.environment import RoboIRGEnv
 from roboirg.envs.vector.drawn_on_demand import LazyObservation
-from roboirg.envs.vector.vector_infos import stack_infos
 from roboirg.envs.vector.vector_workers import (
     Recipe,
     Request,
@@ -128,7 +127,7 @@ class RoboIRGVectorEnv(gymnasium.vector.VectorEnv[Batch, Any, NDArray[Any]]):
         seeds = self._check_seeds(seed)
         self._chosen, self._kept = self._settings.with_reset_options(kept), kept
         if isinstance(self._task, Episode) and any(one is not None for one in episodes):
-            raise InvalidValueError("This environment was made of one episode; it takes no other.")
+            raise InvalidValueError("This environment was made for one episode; it takes no other.")
         requests: dict[int, Request] = {
             index: ("reset", (self._choose(index, seeds[index], episodes[index]),))
             for index in np.flatnonzero(mask).tolist()
@@ -317,7 +316,7 @@ class RoboIRGVectorEnv(gymnasium.vector.VectorEnv[Batch, Any, NDArray[Any]]):
                 "False."
             )
         if not found.all() and not self._was_reset:
-            raise gymnasium.error.ResetNeeded("The first reset is one of all sub-environments.")
+            raise gymnasium.error.ResetNeeded("The first reset must be of all sub-environments.")
         return found
 
 
@@ -332,3 +331,35 @@ def _find_mode(mode: str | AutoresetMode) -> AutoresetMode:
     if mode not in names:
         raise UnknownNameError("autoreset mode", mode, names)
     return names[mode]
+
+
+def stack_infos(infos: Sequence[Mapping[str, Any] | None]) -> dict[str, Any]:
+    """Return an array (n,) for each key of n infos, and under ``_key`` who has it.
+
+    Texts become arrays of Unicode, where None is empty; flags and numbers keep their type; maps
+    become maps of arrays, and everything else arrays of objects.
+
+    Args:
+        infos: of the sub-environments, in their order; None for those without one.
+    """
+    stacked: dict[str, Any] = {}
+    for key in dict.fromkeys(key for info in infos if info is not None for key in info):
+        there = np.array([info is not None and key in info for info in infos])
+        values = [info[key] if info is not None and key in info else None for info in infos]
+        stacked[key] = _stack(values)
+        stacked[f"_{key}"] = there
+    return stacked
+
+
+def _stack(values: Sequence[Any]) -> NDArray[Any] | dict[str, Any]:
+    present = [value for value in values if value is not None]
+    if present and all(type(value) is dict for value in present):
+        return stack_infos(values)
+    # Of our infos only texts may be None in all of them.
+    for kind in (str, bool, int, float):
+        if all(type(value) is kind for value in present):
+            return np.array([kind() if value is None else value for value in values])
+    stacked = np.empty(len(values), dtype=object)
+    for index, value in enumerate(values):
+        stacked[index] = value
+    return stacked

@@ -132,8 +132,8 @@ class Results:
             make_table(which, self.cells, published=published, floors=floors)
         )
 
-    def plot(self, which: str = "averages", *, published: bool = False) -> Plot:
-        """Return one of the figures: averages, forms, context or failures.
+    def plot(self, which: str = "gaps", *, published: bool = False) -> Plot:
+        """Return one of the figures: gaps, forms, context, failures, arms or real.
 
         Raises:
             UnknownNameError: there is no such figure.

@@ -60,15 +60,15 @@ def read_answers(path: Path, items: Sequence[GroundingItem]) -> list[Answer]:
             raise InvalidValueError(f"{place}: {answer}")
         if answer.id not in known:
             raise InvalidValueError(
-                f"{place}: the dataset has no item {clip_text(answer.id, _MAX_QUOTE)!r}; "
-                "are these answers to another one?"
+                f"{place}: the dataset has no item {clip_text(answer.id, _MAX_QUOTE)!r}; are "
+                "these answers to another dataset?"
             )
         if answer[:2] in seen:
-            raise InvalidValueError(f"{place}: {answer.kind} of item {answer.id!r} again.")
+            raise InvalidValueError(f"{place}: {answer.kind} of item {answer.id!r} occurs again.")
         seen.add(answer[:2])
         answers.append(answer)
     if not answers:
-        raise InvalidValueError(f"Answers {str(path)!r}: there are none.")
+        raise InvalidValueError(f"Answers {str(path)!r}: the file holds no answers.")
     return answers
 
 
@@ -100,7 +100,8 @@ def _answers_of(row: Any) -> Iterator[Answer | str]:  # noqa: ANN401 - whatever 
         return
     name, kind = row["id"], row.get("kind", "slots")
     if kind not in QUESTION_KINDS:
-        yield f"kind is {clip_text(repr(kind), _MAX_QUOTE)}; it is {', '.join(QUESTION_KINDS)}."
+        kinds = ", ".join(QUESTION_KINDS)
+        yield f"kind is {clip_text(repr(kind), _MAX_QUOTE)}; it must be one of {kinds}."
     elif "reply" in row:
         reply = row["reply"]
         yield Answer(name, kind, reply if isinstance(reply, str) else "")

@@ -56,7 +56,6 @@ def store_content(folder: Path, kind: str, content: bytes, suffix: str) -> str:
     name = hashlib.sha256(content).hexdigest()[:NAME_DIGITS]
     path = folder / kind / f"{name}{suffix}"
     if not path.exists():
-        path.parent.mkdir(parents=True, exist_ok=True)
         write_atomically(path, content)
     return f"{kind}/{path.name}"
 

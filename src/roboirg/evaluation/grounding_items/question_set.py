@@ -107,27 +107,19 @@ def collect_items(
 
 
 def _claim(folder: Path, request: ExportRequest) -> None:
-    """Note how the pictures are made, or check that those in the folder are made so.
-
-    Raises:
-        InvalidValueError: they are not, or the folder holds something else.
-    """
+    """Note how the pictures are made, or check that those in the folder are made so."""
     path, wanted = folder / PARTS / REQUEST_FILE, request.pictures()
     if path.exists():
         held = json.loads(path.read_bytes())
         changed = [name for name, value in wanted.items() if held.get(name) != value]
         if changed:
             raise InvalidValueError(
-                f"{str(folder)!r} has pictures of another {' and '.join(changed)}; choose another "
-                "--out."
+                f"{str(folder)!r} has pictures with another {' and '.join(changed)}; choose "
+                "another --out."
             )
         return
     if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
         raise InvalidValueError(f"{str(folder)!r} is not an empty folder; choose another --out.")
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise InvalidValueError(f"Cannot write {folder}: {error.strerror or error}.") from error
     write_atomically(path, json.dumps(wanted))
 
 

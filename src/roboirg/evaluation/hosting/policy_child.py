@@ -101,7 +101,7 @@ class PolicyChild:
             raise _explain(self._close()) from None
         except (RoboIRGError, RecursionError, ValueError) as error:
             self.end()
-            words = f"the process sent what is no reply ({error})"
+            words = f"the process sent no valid reply ({error})"
             raise EpisodeLostError("policy", words[:MAX_WORDS], alone=False) from None
 
     def loss(self) -> EpisodeLostError | None:

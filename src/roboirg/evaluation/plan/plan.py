@@ -92,8 +92,8 @@ class Plan(BaseModel):
     tasks: tuple[str, ...]
     """Tasks or suites; all for the whole benchmark."""
     settings: tuple[str, ...] | SettingsName = "all"
-    """Settings; all for every setting that can express the episode, without the harder ones; every
-    for these, too."""
+    """Settings; all for every setting that can express the episode, except the harder ones; every
+    adds these."""
     in_turns: tuple[str, ...] = ()
     """Settings that are also played with the utterances one after another."""
     forms: tuple[str, ...] = ("implicit",)
@@ -106,10 +106,11 @@ class Plan(BaseModel):
     """Every seed plays every episode."""
     arms: tuple[str, ...] = (TOLD,)
     """told, and control arms of the same scenes: other-goal, silent, silent-empty, scrambled,
-    paraphrase:N (N other texts), again (another policy seed). What has no such arm is left out."""
+    paraphrase:N (N other texts), again (another policy seed). Scenes without such an arm
+    are left out."""
     seed_secret: str | None = None
-    """Text from which, with the policy seed and the scene, the seeds of policies are made; without
-    one, the run draws it, or takes that of its folder."""
+    """Text from which, with the policy seed and the scene, the seeds of policies are derived; if
+    missing, the run uses its folder's or draws one."""
     stages: tuple[tuple[int, ...], ...] = (ALL_STAGES,)
     """Sets of stages of the contextual setting; every set is played."""
     options: InstructionOptions = InstructionOptions()
@@ -130,26 +131,25 @@ class Plan(BaseModel):
     meshes: str = DEFAULT_MESHES
     """Meshes for rendering: faithful or light."""
     video: VideoMode = "off"
-    """Episodes whose video is recorded: off, failures or all. This and all that follows is no part
-    of a record's identity."""
+    """Episodes whose video is recorded: off, failures or all. This and all fields below are not
+    part of a record's identity."""
     policy_process: PolicyProcessMode = "own"
     """own: a policy that is neither built in nor remote has a process of its own; shared: it runs
-    in the world's process, for debuggers."""
+    in the simulator's process, for debuggers."""
     batch: int = DEFAULT_BATCH
-    """Most episodes that a policy is asked about at once."""
+    """Largest number of episodes that a policy is asked about at once."""
     devices: tuple[str, ...] = ()
-    """GPUs, such as 0,1; each policy has a process on each of them. Without any, one on any."""
+    """GPUs, such as 0,1; each policy gets a process on each. If empty, one process on any GPU."""
     long_prompts: LongPrompts = "send"
-    """Episodes whose prompt is longer than what the policy declares that its model reads: send or
-    refuse."""
+    """What to do with prompts longer than the limit that a policy declares: send or refuse."""
     policy_timeout_s: float = 600.0
     """Time limit of one call of a policy, seconds."""
     episode_timeout_s: float = 7200.0
     """Time limit of an episode, seconds."""
     max_cost: float | None = Field(default=None, gt=0)
-    """US dollars that the models of the run may cost; then it stops, to be resumed with more."""
+    """Most US dollars that models may cost; then the run stops and can be resumed with more."""
     model_replies: Literal["stored", "anew"] = "stored"
-    """stored: a model is not asked again what its reply in the folder answers; anew: it is."""
+    """stored: replies in the folder are used again; anew: models are asked again."""
     cluster: WorkerNeeds = WorkerNeeds()
     """What a worker reserves on a machine of a Ray cluster, and what it gets from this one."""
     tries: int = 2
@@ -192,8 +192,7 @@ class Plan(BaseModel):
             for text in value if isinstance(value, tuple) else (value,):
                 if isinstance(text, str) and re.search(f"[{CONTROLS}]", text):
                     raise InvalidValueError(
-                        f"The plan has {text[:80]!r} as {name}; no character of it may control a "
-                        "terminal."
+                        f"The plan has {text[:80]!r} as {name}; it must have no control characters."
                     )
         return self
 
@@ -261,8 +260,8 @@ class Plan(BaseModel):
                 raise InvalidValueError(f"Policy {name!r} is not text: it has lone surrogates.")
             if not re.fullmatch(NAME, name):
                 raise InvalidValueError(
-                    f"Policy {name[:80]!r} has no name for records: at most 1,000 characters, "
-                    "none of which controls a terminal."
+                    f"Policy {name[:80]!r} has no valid name for records: at most 1,000 "
+                    "characters, without control characters."
                 )
             if self.policy_process == "own":
                 describe_policy(spec, again=True)

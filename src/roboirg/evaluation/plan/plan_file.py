@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import importlib.resources
-from collections.abc import Mapping
+import textwrap
+from collections.abc import Iterator, Mapping, Sequence
 from importlib.resources.abc import Traversable
 from pathlib import Path
 from typing import Any
 
+import msgspec
 import yaml
 
 from roboirg.core.errors import InvalidValueError, UnknownNameError
+from roboirg.core.instruction_options import OPTION_HELP
 from roboirg.evaluation.plan.plan import SINGLE_OPTIONS, Plan
 from roboirg.evaluation.plan.stored_plans import from_schema_3
 from roboirg.util.regular_file import read_regular
@@ -37,6 +40,9 @@ _LISTS = frozenset(
     }
 )
 """Keys whose values are lists on the command line."""
+_WIDTH = 100
+_END = "...\n"
+"""What YAML writes after a text that stands alone."""
 
 
 def named_plans() -> tuple[str, ...]:
@@ -144,3 +150,50 @@ def _as_typed(key: str, value: object) -> object:
     typed = ",".join(map(str, value)) or ("none" if key == "retry_on" else "")
     # A single number without a comma would mean the first n episodes.
     return f"{typed}," if key == "episodes" and len(value) == 1 else typed
+
+
+def plan_text(plan: Plan) -> str:
+    """Return a plan as YAML that `read_plan_file` reads; the comments explain each field."""
+    return "\n".join(
+        f"{_comment(explanation)}\n{_line(name, value)}"
+        for name, value, explanation in _fields(plan)
+    )
+
+
+def _fields(plan: Plan) -> Iterator[tuple[str, object, str]]:
+    """Yield name, value and explanation of each key of a plan file."""
+    for name, field in Plan.model_fields.items():
+        if name == "options":
+            for option in SINGLE_OPTIONS:
+                yield option, getattr(plan.options, option), OPTION_HELP[option]
+        elif name == "episodes":
+            yield name, _ranges(plan.episodes), str(field.description)
+        else:
+            yield name, getattr(plan, name), str(field.description)
+
+
+def _comment(text: str) -> str:
+    return textwrap.fill(text, _WIDTH, initial_indent="# ", subsequent_indent="# ")
+
+
+def _line(name: str, value: object) -> str:
+    """Return a key with its value; lists stand in brackets."""
+    if value is None:
+        return f"{name}:\n"
+    text = yaml.safe_dump(
+        msgspec.to_builtins(value), default_flow_style=True, width=_WIDTH, allow_unicode=True
+    )
+    return f"{name}: {text.removesuffix(_END)}"
+
+
+def _ranges(numbers: Sequence[int]) -> str:
+    """Return numbers as typed: 0-3,7 for 0, 1, 2, 3 and 7."""
+    runs: list[list[int]] = []
+    for number in numbers:
+        if runs and number == runs[-1][-1] + 1:
+            runs[-1].append(number)
+        else:
+            runs.append([number])
+    texts = [str(run[0]) if len(run) == 1 else f"{run[0]}-{run[-1]}" for run in runs]
+    # One number without a comma would mean the first episodes.
+    return f"{texts[0]}," if len(numbers) == 1 else ",".join(texts)

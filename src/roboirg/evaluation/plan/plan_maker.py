@@ -76,12 +76,12 @@ def make_plan(
     split, names = str(options.get("split", "test")), _task_names(tasks)
     if options.get("wordings") == REQUIRED:
         raise InvalidValueError(
-            "This plan needs words from outside: make a wording file with `roboirg language "
+            "This plan needs RoboMME's sentences: make a wording file with `roboirg language "
             "import-robomme PATH --out robomme.toml`, where PATH is a clone of RoboMME's "
             "repository, and give it with --wordings robomme.toml."
         )
     check_names("video mode", [options.get("video", "off")], VIDEO_MODES)
-    check_names("way with long prompts", [options.get("long_prompts", "send")], LONG_PROMPTS)
+    check_names("way to handle long prompts", [options.get("long_prompts", "send")], LONG_PROMPTS)
     try:
         plan = Plan(
             policies=parse_policies(policies),

@@ -13,12 +13,12 @@ from roboirg.evaluation.hosting.policy_descriptions import describe_policy
 from roboirg.evaluation.play.job_instruction import instruct_job
 from roboirg.evaluation.records.record import Job, PromptAudit
 from roboirg.language.instruction import Instruction
-from roboirg.policies.prompt_length.declared_limit import prompt_limit
 from roboirg.policies.prompt_length.prompt_audit import (
     InstructionAudit,
     PromptLimit,
     audit_instruction,
 )
+from roboirg.policies.prompt_length.tokenizer_file import prompt_limit
 
 Verdicts = Counter[PromptVerdict]
 
@@ -96,7 +96,7 @@ def too_long_text(audit: PromptAudit, verdict: PromptVerdict) -> str | None:
         return None
     return (
         f"the instruction needs {_between(audit.needed)} tokens, but the policy's model reads "
-        f"{audit.limit}; --long-prompts send plays the episode all the same"
+        f"{audit.limit}; --long-prompts send plays the episode anyway"
     )
 
 

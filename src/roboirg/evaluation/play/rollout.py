@@ -50,7 +50,7 @@ from roboirg.policies.contract.base import Policy, close_policy
 from roboirg.policies.contract.policy_needs import PolicyNeeds
 from roboirg.policies.contract.random_state import episode_policy_seed
 from roboirg.policies.planners.hierarchical_policy import HierarchicalPolicy, with_planner
-from roboirg.policies.prompt_length.declared_limit import prompt_limit
+from roboirg.policies.prompt_length.tokenizer_file import prompt_limit
 from roboirg.policies.vlm.models.reply_store import ReplySettings, use_replies
 
 PlayJob = Callable[[Job], Record]

@@ -19,7 +19,7 @@ from roboirg.core.observations import FRONT
 from roboirg.core.subgoal_text import Point
 from roboirg.evaluation.play.point_sheet import with_ring
 from roboirg.evaluation.records.film import LAST_FRAME_REPEATS, VideoOptions
-from roboirg.util.text_overlay import draw_text, wrap_text
+from roboirg.util.media import draw_text, wrap_text
 
 if TYPE_CHECKING:
     from av.container import OutputContainer
@@ -74,7 +74,7 @@ def check_video_support() -> None:
     Raises:
         MissingDependencyError: PyAV is not installed.
     """
-    with extra_needed("All but --video off needs PyAV", "sim"):
+    with extra_needed("Recording videos needs PyAV", "sim"):
         import av  # noqa: F401 - an extra, and slow to import
 
 

@@ -8,8 +8,11 @@ from __future__ import annotations
 
 import hashlib
 import io
+import lzma
 import re
+import struct
 import zipfile
+import zlib
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -19,7 +22,6 @@ from numpy.typing import NDArray
 from roboirg.core.actions import check_chunk, find_action_space
 from roboirg.core.errors import InvalidActionError, InvalidValueError
 from roboirg.evaluation.records.record_codec import StoreError
-from roboirg.util.archive_errors import UNREADABLE_ARCHIVE
 from roboirg.util.atomic_write import write_atomically
 from roboirg.util.regular_file import read_regular
 
@@ -30,6 +32,11 @@ _KINDS = {"space": "U", "rows": "f", "requests": "i", "end_state": "f"}
 """The arrays of a file, and NumPy's letter for the kind of their numbers or text."""
 _MAX_BYTES = 16_777_216
 """Largest content that is unpacked; an episode of 1300 steps has less than 0.2 MB."""
+UNREADABLE_ARCHIVE = (
+    ArithmeticError, EOFError, KeyError, MemoryError, OSError, RuntimeError, SyntaxError, TypeError,
+    ValueError, lzma.LZMAError, struct.error, zipfile.BadZipFile, zlib.error,
+)  # fmt: skip
+"""Raised by `zipfile` and NumPy for content that is damaged, encrypted or odd."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,7 +77,7 @@ def action_path(folder: Path, digest: str) -> Path:
         StoreError: it is not a digest, so it would be another file's name.
     """
     if not _DIGEST.fullmatch(digest):
-        raise StoreError(f"{digest!r} is no digest of actions: 64 hexadecimal digits.")
+        raise StoreError(f"{digest!r} is not a digest of actions, which has 64 hexadecimal digits.")
     return folder / ACTION_FOLDER / digest[:2] / f"{digest}{_SUFFIX}"
 
 
@@ -83,10 +90,6 @@ def write_actions(log: ActionLog, folder: Path) -> str:
     digest = log.digest
     path = action_path(folder, digest)
     if not path.exists():
-        try:
-            path.parent.mkdir(parents=True, exist_ok=True)
-        except OSError as error:
-            raise InvalidValueError(f"Cannot write {path}: {error.strerror}.") from error
         write_atomically(path, _pack(log))
     return digest
 
@@ -104,9 +107,9 @@ def read_actions(folder: Path, digest: str) -> ActionLog:
     except FileNotFoundError:
         raise StoreError(f"The actions {path} are missing.") from None
     except (InvalidActionError, InvalidValueError, *UNREADABLE_ARCHIVE) as error:
-        raise StoreError(f"{path} is no action log: {error}") from error
+        raise StoreError(f"{path} is not an action log: {error}") from error
     if log.digest != digest:
-        raise StoreError(f"{path} has another content than its name says: {log.digest}.")
+        raise StoreError(f"{path} does not have the content that its name gives, but {log.digest}.")
     return log
 
 

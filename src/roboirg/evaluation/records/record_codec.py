@@ -38,7 +38,7 @@ class DamagedLineError(StoreError):
 
 
 _MEANINGS = {
-    NAME: f"of at most {MOST_NAME_LETTERS:,} characters, none of which controls a terminal",
+    NAME: f"of at most {MOST_NAME_LETTERS:,} characters, without control characters",
     RELATIVE_PATH: "that is a path below the run's folder, in letters, digits, '_', '.' and '-'",
 }
 
@@ -100,7 +100,7 @@ def _read(decoder: msgspec.json.Decoder[Stored], line: bytes, path: Path, number
         raise StoreError(f"{path} line {number} is not a record: {problem}.")
     for value in astuple(stored.options):
         if isinstance(value, str) and not _is_name(value):
-            problem = f"{value[:80]!r} is no value of an instruction option"
+            problem = f"{value[:80]!r} is not a value of an instruction option"
             raise StoreError(f"{path} line {number} is not a record: {problem}.")
     return stored
 

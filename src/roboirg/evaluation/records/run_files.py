@@ -40,8 +40,9 @@ def run_file(folder: Path, name: str) -> Path:
     ):
         shown = printable(name[:MOST_PATH_LETTERS])
         raise ForeignPathError(
-            f"{shown!r} is no file below {folder}: its name is longer than {MOST_PATH_LETTERS}, "
-            "has other characters than letters, digits, '_', '.' and '-', or links lead elsewhere."
+            f"{shown!r} is not a file below {folder}: its name is longer than "
+            f"{MOST_PATH_LETTERS}, has characters other than letters, digits, '_', '.' and '-', "
+            "or a link leads elsewhere."
         )
     return path
 
@@ -68,7 +69,6 @@ def keep_earlier_plan(content: bytes, folder: Path) -> None:
     """Write a plan that is not the newest."""
     path = folder / EARLIER_PLANS / f"{short_hash(content)}.json"
     if not path.exists():
-        path.parent.mkdir(parents=True, exist_ok=True)
         write_atomically(path, content)
 
 

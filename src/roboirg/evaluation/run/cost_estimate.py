@@ -96,15 +96,15 @@ def unknown_costs(jobs: Iterable[Job]) -> Iterator[str]:
     for name, spec in dict.fromkeys((job.policy, job.policy_spec) for job in jobs):
         if hands_of(spec) not in (None, SCRIPTED) and _asker(spec) is not None:
             yield (
-                f"{name}: how long its hands take is not known before they play, so calls are "
-                f"counted as with the scripted hands, {SUBGOAL_STEPS} control steps for a subgoal "
-                f"in chunks of {CHUNK}; before each chunk there are at most 2, or "
+                f"{name}: how long its hands take is unknown before they play, so calls are "
+                f"counted as with the scripted hands: {SUBGOAL_STEPS} control steps for a "
+                f"subgoal, in chunks of {CHUNK}. Before each chunk there are at most 2 calls, or "
                 f"{2 * MOST_REFUSALS} if the hands refuse its subgoals."
             )
         elif undeclared(spec).startswith(f"{PLANNER}:") and hands_of(spec) is None:
             yield (
-                f"{name}: calls of models are not known, because the planner's code is your own; "
-                "its plan() is called before each chunk of the hands."
+                f"{name}: the number of model calls is unknown, because the planner is your own "
+                "code; its plan() is called before each chunk of the hands."
             )
 
 

@@ -86,8 +86,8 @@ def estimate_text(
         f"{times[1]} if they use up their limit ({found.max_steps:,} control steps in all)."
     )
     lines.append(
-        f"A control step of the world takes {1000 * speed.step_s:.1f} ms ({basis}); the time of "
-        "the policies themselves, and of videos, comes on top."
+        f"A control step of the world takes {1000 * speed.step_s:.1f} ms ({basis}); policies and "
+        "videos take time in addition."
     )
     return tuple(lines)
 

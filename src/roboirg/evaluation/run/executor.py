@@ -140,5 +140,5 @@ def choose_executor(
     """
     count = worker_count(workers)
     if count < 0:
-        raise InvalidValueError(f"workers is {count}; it must be at least 0, this process only.")
+        raise InvalidValueError(f"workers is {count}; it must be at least 0 (this process only).")
     return LocalProcesses(count, episode_timeout_s) if count else InProcess()

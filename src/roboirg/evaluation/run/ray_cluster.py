@@ -120,11 +120,7 @@ def _connected(ray: ModuleType, address: str | None, folder: str | None) -> Iter
 
 
 def _runtime_environment(needs: WorkerNeeds) -> dict[str, Any]:
-    """Return Ray's runtime environment of the actors.
-
-    Raises:
-        InvalidValueError: a variable that they need is not set here.
-    """
+    """Return Ray's runtime environment of the actors."""
     missing = [name for name in needs.variables if name not in os.environ]
     if missing:
         raise InvalidValueError(

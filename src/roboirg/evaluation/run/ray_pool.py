@@ -188,11 +188,7 @@ class RayPool:
         return True
 
     def _check_head(self, left: int) -> None:
-        """Wait for the head.
-
-        Raises:
-            RoboIRGError: it has not answered for too long.
-        """
+        """Wait for the head; an error ends the run if it has not answered for too long."""
         if time.monotonic() - self._reached > HEAD_LOST_S:
             raise RoboIRGError(
                 f"The head of the Ray cluster at {self._address} has not answered for "
@@ -347,11 +343,7 @@ class RayPool:
             self._leave_out(machine, f"lost {machine.losses} times in a row, at last {reason}")
 
     def _leave_out(self, machine: _Machine, fault: str) -> None:
-        """Use a machine no more.
-
-        Raises:
-            RoboIRGError: it was the last one.
-        """
+        """Use a machine no more; an error ends the run if it was the last one."""
         if machine.fault is not None:
             return
         machine.fault = fault = fault.rstrip(".")

@@ -38,8 +38,8 @@ def split_command(text: str) -> list[str]:
     if not words or shutil.which(words[0]) is None:
         name = words[0] if words else ""
         raise InvalidValueError(
-            f"--on-record {text!r}: there is no program {name!r}; give a command that reads a "
-            "record a line, such as 'python tracker.py'."
+            f"--on-record {text!r}: there is no program {name!r}; give a command that reads one "
+            "record per line, such as 'python tracker.py'."
         )
     return words
 
@@ -150,7 +150,7 @@ class HookedReporter:
         except Exception as error:  # noqa: BLE001 - whatever a hook raises must not end the run
             if self._works:
                 self._reporter.warn(
-                    f"What records are handed to failed ({type(error).__name__}: {error}); it gets "
-                    "no more of this run. All records are stored."
+                    f"The receiver of records failed ({type(error).__name__}: {error}); it "
+                    "receives no more records of this run. All records are stored."
                 )
             self._works = False

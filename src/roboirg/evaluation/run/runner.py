@@ -153,11 +153,7 @@ def check_run(plan: Plan, folder: Path) -> None:
 
 
 def _check_writable(folder: Path) -> None:
-    """Check that a run's folder can be written, or made; nothing is.
-
-    Raises:
-        StoreError: it cannot.
-    """
+    """Check that a run's folder can be written, or made; nothing is."""
     place = next(one for one in (folder, *folder.absolute().parents) if one.exists())
     records = folder / RECORDS_FILE
     if not place.is_dir():

@@ -126,7 +126,7 @@ class _TaskReader:
             self._fail(f"has a command with the text {text!r}; it must be a sentence")
         self._check_printable(text)
         if set("{}[]") & set(FIELD.sub("", text)):
-            self._fail(f"has a bracket that is no field in the command {text!r}")
+            self._fail(f"has a bracket that is not a field in the command {text!r}")
         when = {slot: self._condition(slot, value) for slot, value in
                 self._table(table.get("when", {}), "when", list(SLOTS)).items()}  # fmt: skip
         phrases = {**shared, **self._phrases(table.get("phrases", {}))}

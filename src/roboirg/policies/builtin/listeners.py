@@ -1,4 +1,4 @@
-"""Listeners: the interpreter in front of the scripted expert."""
+"""Listeners: the interpreter, or a surface rule for the words, in front of the scripted expert."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ import numpy as np
 
 from roboirg.core.episode import Episode, Goal
 from roboirg.policies.builtin.scripted import READING, ScriptedPolicy
+from roboirg.shortcuts import draw_goal, guess_goal
 from roboirg.shortcuts.command_chance import fitting_goals
 
 if TYPE_CHECKING:
@@ -54,3 +55,44 @@ class ForgetfulPolicy(ListenerPolicy):
     def decide(self, env: RoboIRGEnv, instruction: str) -> Goal:  # noqa: ARG002
         """Return a goal that fits the final command alone."""
         return super().decide(env, env.instruction.command)
+
+
+class ShortcutPolicy(ScriptedPolicy):
+    """Chooses a goal by a surface rule, from the instruction and the task's vocabulary alone.
+
+    If the scene does not have that goal, for want of a color, it holds still.
+    """
+
+    rule: ClassVar[str]
+    """Name of a rule in `roboirg.shortcuts.SURFACE_RULES`."""
+    metadata: ClassVar[Mapping[str, str]] = READING
+
+    def decide(self, env: RoboIRGEnv, instruction: str) -> Goal | None:
+        """Return the goal of the rule; what the rule leaves open is drawn at random."""
+        episode = env.episode
+        guess = guess_goal(self.rule, instruction, episode.task)
+        return draw_goal(guess, episode, choice_generator(self.seed, episode, instruction))
+
+
+class FirstMentionPolicy(ShortcutPolicy):
+    """Takes the values that are named first."""
+
+    rule = "first-mention"
+
+
+class LastMentionPolicy(ShortcutPolicy):
+    """Takes the values that are named last."""
+
+    rule = "last-mention"
+
+
+class EliminationPolicy(ShortcutPolicy):
+    """Takes values that are not named."""
+
+    rule = "elimination"
+
+
+class SurfacePolicy(ShortcutPolicy):
+    """Chooses among the first value, the unnamed one and arithmetic by key words of the command."""
+
+    rule = "surface"

@@ -1,4 +1,4 @@
-"""The oracle, which knows the goal and the poses of all objects; and one that varies its motion."""
+"""Policies that know a goal without words: the oracles, and those that control arms find out."""
 
 from __future__ import annotations
 
@@ -9,6 +9,8 @@ import numpy as np
 
 from roboirg.core.episode import Goal
 from roboirg.policies.builtin.scripted import WORDLESS, ScriptedPolicy
+from roboirg.tasks import get_task
+from roboirg.tasks.splits.splits import get_episode, split_size
 
 if TYPE_CHECKING:
     from roboirg.envs.environment import RoboIRGEnv
@@ -38,3 +40,34 @@ class VariedOraclePolicy(OraclePolicy):
 
         rng = np.random.default_rng((env.episode.seed, self.seed))
         return VariedPrimitives(env.session.world, MotionVariation.draw(rng), rng)
+
+
+class HabitPolicy(ScriptedPolicy):
+    """Executes the scene's own goal whatever is said, as a policy that knows its scenes by heart.
+
+    It succeeds in every arm but ``other-goal``.
+    """
+
+    listens: ClassVar[bool] = False
+    metadata: ClassVar[Mapping[str, str]] = WORDLESS
+
+    def decide(self, env: RoboIRGEnv, instruction: str) -> Goal:  # noqa: ARG002
+        """Return the scene's own goal."""
+        return (env.original or env.episode).goal
+
+
+class PreviousGoalPolicy(ScriptedPolicy):
+    """Executes the goal of the episode before, as if the words of that one were still there.
+
+    If the scene does not have that goal, it holds still.
+    """
+
+    listens: ClassVar[bool] = False
+    metadata: ClassVar[Mapping[str, str]] = WORDLESS
+
+    def decide(self, env: RoboIRGEnv, instruction: str) -> Goal | None:  # noqa: ARG002
+        """Return the goal of the split's episode before this one, of the last before the first."""
+        episode = env.episode
+        before = (episode.index - 1) % split_size(episode.split)
+        goal = get_episode(episode.task, episode.split, before).goal
+        return goal if goal in get_task(episode.task).goals(episode.scene) else None

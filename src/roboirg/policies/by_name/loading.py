@@ -51,7 +51,9 @@ def load_policy_class(spec: str) -> type[Any]:
     """
     name = undeclared(spec)
     if name != spec and not is_foreign(name):
-        raise InvalidValueError(f"Policy {name!r} is no class of yours; leave out {PRIVILEGED!r}.")
+        raise InvalidValueError(
+            f"Policy {name!r} is not a class of your own; leave out {PRIVILEGED!r}."
+        )
     factory = policy_specs.find_policy_factory(name) if ":" in name else None
     # A factory has every attribute of a class that is read here.
     found = find_class(name) if factory is None else cast("type[Any]", factory)

@@ -28,12 +28,12 @@ BUILTIN: Mapping[str, str] = {
     "oracle": "roboirg.policies.builtin.oracle_policy:OraclePolicy",
     "listener": "roboirg.policies.builtin.listeners:ListenerPolicy",
     "forgetful": "roboirg.policies.builtin.listeners:ForgetfulPolicy",
-    "first-mention": "roboirg.policies.builtin.shortcut_listeners:FirstMentionPolicy",
-    "last-mention": "roboirg.policies.builtin.shortcut_listeners:LastMentionPolicy",
-    "elimination": "roboirg.policies.builtin.shortcut_listeners:EliminationPolicy",
-    "surface": "roboirg.policies.builtin.shortcut_listeners:SurfacePolicy",
-    "habit": "roboirg.policies.builtin.word_ignorers:HabitPolicy",
-    "previous-goal": "roboirg.policies.builtin.word_ignorers:PreviousGoalPolicy",
+    "first-mention": "roboirg.policies.builtin.listeners:FirstMentionPolicy",
+    "last-mention": "roboirg.policies.builtin.listeners:LastMentionPolicy",
+    "elimination": "roboirg.policies.builtin.listeners:EliminationPolicy",
+    "surface": "roboirg.policies.builtin.listeners:SurfacePolicy",
+    "habit": "roboirg.policies.builtin.oracle_policy:HabitPolicy",
+    "previous-goal": "roboirg.policies.builtin.oracle_policy:PreviousGoalPolicy",
     "random": "roboirg.policies.builtin.random_policy:RandomPolicy",
 }
 

@@ -82,7 +82,7 @@ class PrivilegedPolicyFactory(PolicyFactory):
 
     def attach(self, env: RoboIRGEnv) -> None:
         """Raise TypeError: only the policies themselves can be attached."""
-        raise TypeError(f"{self.spec} makes policies; call attach({env}) on one of those.")
+        raise TypeError(f"{self.spec} makes policies; call attach({env}) on one of them.")
 
 
 def find_policy_factory(spec: str) -> PolicyFactory | None:

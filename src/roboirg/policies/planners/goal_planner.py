@@ -18,10 +18,10 @@ _BUILTIN = "roboirg.policies.builtin"
 DECIDERS: Mapping[str, str] = {
     "listener": f"{_BUILTIN}.listeners:ListenerPolicy",
     "forgetful": f"{_BUILTIN}.listeners:ForgetfulPolicy",
-    "first-mention": f"{_BUILTIN}.shortcut_listeners:FirstMentionPolicy",
-    "last-mention": f"{_BUILTIN}.shortcut_listeners:LastMentionPolicy",
-    "elimination": f"{_BUILTIN}.shortcut_listeners:EliminationPolicy",
-    "surface": f"{_BUILTIN}.shortcut_listeners:SurfacePolicy",
+    "first-mention": f"{_BUILTIN}.listeners:FirstMentionPolicy",
+    "last-mention": f"{_BUILTIN}.listeners:LastMentionPolicy",
+    "elimination": f"{_BUILTIN}.listeners:EliminationPolicy",
+    "surface": f"{_BUILTIN}.listeners:SurfacePolicy",
     "fixed": f"{_BUILTIN}.listeners:ListenerPolicy",
 }
 """Classes of policies whose ``decide`` gives each planner the goal."""

@@ -11,7 +11,13 @@ from typing import Any
 
 from roboirg.core.errors import InvalidValueError, RoboIRGError
 from roboirg.core.extras import extra_needed
-from roboirg.policies.prompt_length.prompt_audit import LINE_BREAK_TOKENS, Tokenize, Tokens
+from roboirg.policies.contract.policy_needs import PolicyNeeds
+from roboirg.policies.prompt_length.prompt_audit import (
+    LINE_BREAK_TOKENS,
+    PromptLimit,
+    Tokenize,
+    Tokens,
+)
 from roboirg.util.regular_file import read_regular
 
 JSON = ".json"
@@ -93,3 +99,17 @@ def _read_json(path: str, content: bytes) -> Tokenize:
         return Tokens(kept, tuple(end for _, end in found), LINE_BREAK_TOKENS)
 
     return tokenize
+
+
+def prompt_limit(needs: PolicyNeeds) -> PromptLimit | None:
+    """Return the limit that a policy declares; None if it declares none."""
+    if needs.prompt_tokens is None:
+        return None
+    path = needs.tokenizer
+    return PromptLimit(
+        needs.prompt_tokens,
+        needs.prompt_added,
+        None if path is None else read_tokenizer(path),
+        None if path is None else Path(path).name,
+        needs.lowers_prompt,
+    )

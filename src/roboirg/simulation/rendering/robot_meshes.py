@@ -17,14 +17,9 @@ import sapien
 import sapien.render
 from numpy.typing import NDArray
 
+from roboirg.core.extras import extra_needed
 from roboirg.simulation.rendering import camera_mesh, shaders
 from roboirg.simulation.rendering.mesh_cache import Arrays, cached_arrays, source_code
-from roboirg.simulation.rendering.mesh_simplification import (
-    CAMERA_SHARE,
-    LINK_SHARE,
-    MIN_TRIANGLES,
-    simplify,
-)
 from roboirg.simulation.rendering.occlusion import unoccluded_triangles
 from roboirg.simulation.rendering.render_settings import RenderSettings
 from roboirg.simulation.rendering.triangles import (
@@ -37,6 +32,11 @@ from roboirg.simulation.rendering.viewpoint import to_front_camera
 
 FINGER = "finger.glb"
 """Never simplified, because the wrist camera sees it from very near."""
+LINK_SHARE = 0.1
+CAMERA_SHARE = 0.05
+"""Shares of triangles to keep; for the camera, of its visible triangles."""
+MIN_TRIANGLES = 500
+"""Parts with fewer triangles are not simplified."""
 
 
 class _PoseKey(NamedTuple):
@@ -218,10 +218,7 @@ def _cache_name(path: Path, rendering: RenderSettings) -> str:
 
 def _source_bytes() -> bytes:
     """Return what determines derived meshes; the installed files are verified separately."""
-    return (
-        source_code("robot_meshes", "triangles", "camera_mesh", "mesh_simplification")
-        + camera_mesh.packed_mask()
-    )
+    return source_code("robot_meshes", "triangles", "camera_mesh") + camera_mesh.packed_mask()
 
 
 def _numbered(part: IndexedTriangles, number: int) -> Arrays:
@@ -241,3 +238,28 @@ def _read_installed_mesh(path: Path) -> list[tuple[Triangles, _MaterialKey | Non
         )
         for part in sapien.render.RenderShapeTriangleMesh(str(path)).parts
     ]
+
+
+def simplify(
+    corners: NDArray[np.float32], *, share: float
+) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    """Return nearly the same shape with fewer triangles.
+
+    Args:
+        corners: corners of the triangles, (n, 3, 3), meters.
+        share: share of triangles to keep.
+
+    Returns:
+        Corners (m, 3, 3) and normals (m, 3).
+    """
+    with extra_needed("Light meshes need fast-simplification", "light"):
+        import fast_simplification
+    points, faces = np.unique(corners.reshape(-1, 3), axis=0, return_inverse=True)
+    points, faces = fast_simplification.simplify(
+        points, faces.reshape(-1, 3).astype(np.int32), target_reduction=1.0 - share
+    )
+    kept = points[faces].astype(np.float32)
+    normals = np.cross(kept[:, 1] - kept[:, 0], kept[:, 2] - kept[:, 0])
+    sizes = np.linalg.norm(normals, axis=1, keepdims=True)
+    whole = sizes[:, 0] > 0
+    return kept[whole], (normals[whole] / sizes[whole]).astype(np.float32)

@@ -75,7 +75,7 @@ def published_text() -> str:
     if found != SHA256:
         raise RoboIRGError(
             f"The shipped file {FILE} is damaged: its SHA-256 is {found}, it should be {SHA256}; "
-            "install the package anew."
+            "install the package again."
         )
     return text
 

@@ -23,14 +23,15 @@ from typing import NamedTuple, SupportsIndex
 
 import numpy as np
 
-from roboirg.core.episode import SPLITS, Difficulty, Episode, Goal, Scene, Split
+from roboirg.core.conditions import Fact, facts_of
+from roboirg.core.episode import SPLITS, Difficulty, Episode, Goal, Scene, Split, Stage
 from roboirg.core.errors import InvalidValueError, SceneRejectedError, UnknownNameError
+from roboirg.core.fact_traits import FACT_TRAITS, FactTraits
 from roboirg.tasks import Task, get_task
 from roboirg.tasks.splits.fingerprint import fingerprint
 from roboirg.tasks.splits.private_splits import RANDOM, check_salt, is_private, private_seed
 from roboirg.tasks.splits.published_episodes import published_episode
 from roboirg.tasks.splits.recordings import is_recorded
-from roboirg.tasks.stage_checks import check_stages
 
 SIZES: Mapping[Split, int] = {"train": 100, "val": 50, "test": 50, "random": 1_000_000}
 CYCLE: tuple[Difficulty, ...] = ("easy", "easy", "medium", "hard")
@@ -45,6 +46,8 @@ SEED_STRIDE = 100
 MAX_REJECTED = SEED_STRIDE - 1
 """Limit of seeds passed over for an episode; the seed after that belongs to the next episode."""
 SPLITS_FILE = "splits.json"
+ROBOT = "robot"
+"""The subject of facts about the robot itself."""
 
 
 class TaskSplits(NamedTuple):
@@ -226,3 +229,31 @@ def _sampled(task: Task, split: Split, index: int, passed_over: int) -> Episode:
     else:
         seed = slot_seed(task, split, index) + passed_over
     return make_episode(task.name, seed, slot_difficulty(index), split, index)
+
+
+def check_stages(task: str, scene: Scene, stages: Iterable[Stage]) -> None:
+    """Check that each fact that stages expect or forbid is one that can hold in a scene."""
+    kinds = {item.name: item.kind for item in scene.objects} | {ROBOT: ROBOT}
+    for stage in stages:
+        for condition in (stage.expects, *stage.forbids):
+            for fact in facts_of(condition):
+                if fact.kind not in FACT_TRAITS:
+                    raise UnknownNameError("kind of fact", fact.kind, FACT_TRAITS)
+                for problem in _problems(fact, FACT_TRAITS[fact.kind], kinds):
+                    raise InvalidValueError(f"{task}: {fact!r} can never hold: {problem}.")
+
+
+def _problems(fact: Fact, traits: FactTraits, kinds: dict[str, str]) -> Iterable[str]:
+    """Yield why a fact can never hold, given the kind of each object."""
+    if fact.place is None and traits.places:
+        yield f"it needs a place, which is a {' or a '.join(traits.places)}"
+    if fact.place is not None and not traits.places:
+        yield f"{fact.kind} has no place"
+    parts = ((fact.subject, traits.subjects), (fact.place, traits.places))
+    for name, fitting in parts:
+        if name is None:
+            continue
+        if name not in kinds:
+            yield f"the scene has no {name!r}; it has {', '.join(kinds)}"
+        elif kinds[name] not in fitting:
+            yield f"{name!r} is a {kinds[name]}, not a {' or a '.join(fitting)}"

@@ -150,7 +150,7 @@ def json_endpoint(
         except (ValueError, RecursionError):
             body = None
         if not isinstance(body, dict):
-            raise HTTPException(400, "The request is no JSON object.")
+            raise HTTPException(400, "The request is not a JSON object.")
         return JSONResponse(await run_in_threadpool(answer, request, body))
 
     return endpoint

@@ -27,5 +27,5 @@ def listen(host: str, port: int) -> socket.socket:
         return socket.create_server((host, port), family=family, backlog=_BACKLOG)
     except (OSError, OverflowError) as error:
         raise InvalidValueError(
-            f"Cannot listen at {host}:{port} ({error}); choose another port, or 0 for any free one."
+            f"Cannot listen on {host}:{port} ({error}); choose another port, or 0 for any free one."
         ) from error

@@ -71,7 +71,7 @@ def roboirg_grounding(
     ]
     if not chosen:
         raise InvalidValueError(
-            f"{data!r} has no item of the settings {settings} and the tasks {tasks}."
+            f"{data!r} has no items with the settings {settings} and the tasks {tasks}."
         )
     return Task(
         dataset=MemoryDataset(chosen, name=f"roboirg_grounding_{kind}"),

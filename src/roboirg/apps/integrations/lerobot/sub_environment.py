@@ -74,7 +74,7 @@ class LeRobotSubEnvironment(gymnasium.Env[dict[str, Any], NDArray[np.floating[An
         **options: Unpack[EnvOptions],
     ) -> None:
         if video not in VIDEO_DELIVERIES:
-            raise UnknownNameError("way with the video", video, VIDEO_DELIVERIES)
+            raise UnknownNameError("way to show the video", video, VIDEO_DELIVERIES)
         if not isinstance(video_frames, int) or video_frames < 1:
             raise InvalidValueError(f"video_frames is {video_frames!r}; it must be 1 or more.")
         if not options.get("cameras", CAMERAS):

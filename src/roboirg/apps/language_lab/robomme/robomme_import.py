@@ -7,8 +7,9 @@ implicit commands are validated as our own are; a setting whose commands break a
 
 from __future__ import annotations
 
+import re
 from collections import defaultdict
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
@@ -21,7 +22,6 @@ from roboirg.apps.language_lab.robomme.goal_sentences import (
     load_function,
 )
 from roboirg.apps.language_lab.robomme.phrase_widening import widen
-from roboirg.apps.language_lab.robomme.pointing_commands import with_pointing
 from roboirg.apps.language_lab.robomme.template_search import find_templates
 from roboirg.apps.language_lab.robomme.wording_writer import wording_text
 from roboirg.apps.language_lab.validation.episode_checks import check_episode
@@ -49,6 +49,10 @@ READ_SCENES = 8
 """Scenes in which all goals are read back; of the others, the goals that these lack."""
 CHECKED_EPISODES = 10
 """Episodes whose implicit instructions are validated, with other goals than their own, too."""
+_REPEATEDLY = re.compile(r"\b(?:repeatedly|over and over) ", re.IGNORECASE)
+_RELATIVE_CLAUSE = re.compile(
+    r"(?P<clause>\b(?:that|which) (?:was|were|is|are|has|have|had)\b[^,;.{}]*) (?=\{repeats\})"
+)
 
 
 class Refused(NamedTuple):
@@ -301,3 +305,23 @@ def summary(found: Wordings) -> Sequence[str]:
         own = f"; own commands in {', '.join(sorted(wordings.own))}" if wordings.own else ""
         lines.append(f"{task}: {counted(len(wordings.commands), 'command')}{own}")
     return lines
+
+
+def with_pointing(commands: Iterable[WordedCommand]) -> tuple[WordedCommand, ...]:
+    """Return the commands, with those that are for referring expressions before the others."""
+    found: list[WordedCommand] = []
+    for command in commands:
+        text = _pointing(command.text)
+        if text != command.text:
+            found.append(replace(command, text=text, pointed=frozenset({"repeats"})))
+        found.append(command)
+    return tuple(found)
+
+
+def _pointing(text: str) -> str:
+    if "{repeats}" not in text:
+        return text
+    rest = _REPEATEDLY.sub("", text)
+    if text[0].isupper():
+        rest = rest[0].upper() + rest[1:]
+    return _RELATIVE_CLAUSE.sub(r"\g<clause>, doing so ", rest)

@@ -33,7 +33,7 @@ from roboirg.evaluation.records.store import read_results
 from roboirg.language.settings import EXPLICIT, plain_settings
 
 PAGE = "paper.md"
-TABLES: tuple[Which, ...] = (MAIN, "context", "planner")
+TABLES: tuple[Which, ...] = ("main", "context", "planner")
 FIRST = "none"
 """The memory that the others are compared with."""
 _TITLE = "# The paper's experiment with small policies"

@@ -17,11 +17,13 @@ which it is detected, before anything else happens.
 from __future__ import annotations
 
 import contextlib
+import signal
 import time
 import traceback
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
+from types import FrameType
 from typing import Any
 
 import numpy as np
@@ -245,11 +247,7 @@ class ControlLoop:
         return None if reply is None else reply.result()
 
     def _receive(self, what: str, stopped: Callable[[], bool] = _never) -> PolicyReply | None:
-        """Wait for a reply in the machine's time; None if the operator ends the trial.
-
-        Raises:
-            EpisodeError: there is none within `reply_timeout_s`.
-        """
+        """Wait for a reply in the machine's time; None if the operator ends the trial."""
         deadline = time.monotonic() + self.reply_timeout_s
         while (left := deadline - time.monotonic()) > 0:
             reply = self.worker.receive(min(POLL_S, left))
@@ -258,3 +256,34 @@ class ControlLoop:
         stack = "".join(traceback.format_stack(limit=3))
         limit = f"{self.reply_timeout_s:g} s"
         raise EpisodeError("timeout", f"policy's {what} did not return within {limit}", stack)
+
+
+class Interruption:
+    """Turns SIGINT and SIGTERM into KeyboardInterrupt, and remembers them.
+
+    Python drops what is raised in finalizers and in callbacks of libraries. An arm must not move on
+    because of that, so the control loop asks again in each period.
+    """
+
+    def __init__(self) -> None:
+        self._came = False
+
+    def watch(self) -> None:
+        """Handle the signals from now on, in the main thread; an ignored SIGINT stays ignored."""
+        signal.signal(signal.SIGTERM, self._handle)
+        if signal.getsignal(signal.SIGINT) is not signal.SIG_IGN:
+            signal.signal(signal.SIGINT, self._handle)
+
+    def before(self, requested: Callable[[], bool]) -> Callable[[], bool]:
+        """Return a function that raises KeyboardInterrupt after a signal, else asks `requested`."""
+
+        def ask() -> bool:
+            if self._came:
+                raise KeyboardInterrupt
+            return requested()
+
+        return ask
+
+    def _handle(self, _number: int, _frame: FrameType | None) -> None:
+        self._came = True
+        raise KeyboardInterrupt

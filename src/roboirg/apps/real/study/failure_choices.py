@@ -13,7 +13,7 @@ EXECUTION_WORDS: tuple[tuple[FailureName, str], ...] = (
     ("nothing_reached", "never reached the right object"),
     ("missed_grasp", "reached the right object but did not lift it"),
     ("dropped", "dropped the right object"),
-    ("misplaced", "put the right object down beside its place"),
+    ("misplaced", "put the right object down next to its place"),
     ("out_of_time", "ran out of time, or stopped half-way"),
 )
 

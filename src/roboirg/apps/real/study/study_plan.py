@@ -173,14 +173,9 @@ def write_study(plan: StudyPlan, folder: Path) -> Path:
     """Write ``plan.json`` atomically; returns its path.
 
     Raises:
-        InvalidValueError: the folder holds another plan.
-        StoreError: the file cannot be written.
+        InvalidValueError: the folder holds another plan, or the file cannot be written.
     """
     path = folder / PLAN_FILE
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise InvalidValueError(f"Cannot write to {folder}: {error.strerror}.") from error
     if path.exists() and read_study(folder) != plan:
         raise InvalidValueError(
             f"{folder} holds another plan; repeat its options, or choose another --out."

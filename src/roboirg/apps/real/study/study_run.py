@@ -16,8 +16,7 @@ import msgspec
 from roboirg.apps.real.control.control_loop import ControlLoop
 from roboirg.apps.real.control.limits import Limits
 from roboirg.apps.real.control.policy_workers import PolicyProcess, PolicyThread
-from roboirg.apps.real.control.robot import JudgingRobot, Robot
-from roboirg.apps.real.study.execution_horizon import at_horizon
+from roboirg.apps.real.control.robot import HORIZON, JudgingRobot, Robot
 from roboirg.apps.real.study.study_plan import PlannedTrial, StudyPlan
 from roboirg.apps.real.study.trial_log import UNSCORED, TrialLog
 from roboirg.core.actions import JOINT_ANGLE
@@ -31,11 +30,15 @@ from roboirg.evaluation.play.rollout_result import make_record, utc_now
 from roboirg.evaluation.records.record import Job, Record
 from roboirg.language import LANGUAGE_VERSION
 from roboirg.policies.by_name.loading import is_privileged
+from roboirg.policies.by_name.policy_specs import SYSTEM
+from roboirg.policies.by_name.systems import find_system
+from roboirg.policies.contract.policy_urls import is_url, parse_query, split_url
 from roboirg.policies.contract.random_state import episode_policy_seed
 
 ROBOT_LOCK = ".robot.lock"
 
 Scorer = Literal["judge", "operator"]
+_SCHEME, _OPTION = "mme-vla", "execute"
 
 
 def _never() -> bool:
@@ -260,3 +263,20 @@ def _without_verdict(record: Record) -> Record:
     return msgspec.structs.replace(
         record, outcome="error", error="infrastructure", cause=UNSCORED, attribution=None, events=()
     )
+
+
+def at_horizon(spec: str) -> str:
+    """Return a policy's spec with the study's horizon.
+
+    Policies and systems behind ``mme-vla://`` execute fewer actions in simulation, as RoboMME's
+    client does. What already names a number keeps it, as TTT-Expert's stride.
+    """
+    head, _, query = spec.partition("?")
+    option = _OPTION
+    url = spec
+    if head.startswith(f"{SYSTEM}:"):
+        url = find_system(head.partition(":")[2], parse_query(spec, query)).policy
+        option = f"policy.{_OPTION}"
+    if not is_url(url) or split_url(url).scheme != _SCHEME or _OPTION in split_url(url).options:
+        return spec
+    return f"{spec}{'&' if query else '?'}{option}={HORIZON}"

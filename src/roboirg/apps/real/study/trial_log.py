@@ -214,11 +214,7 @@ def trial_metadata(record: Record) -> dict[str, JsonValue]:
 
 
 def _append_record(folder: Path, record: Record) -> None:
-    """Append a record; wait while another process writes, such as the robot's loop or the page.
-
-    Raises:
-        StoreError: the record cannot be written.
-    """
+    """Append a record; wait while another process writes, such as the robot's loop or the page."""
     deadline = time.monotonic() + LOCK_TIMEOUT_S
     while True:
         try:

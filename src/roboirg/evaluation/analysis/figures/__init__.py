@@ -16,9 +16,7 @@ if TYPE_CHECKING:
 
 __all__ = ["FIGURES", "draw_figure", "write_figures"]
 
-FIGURES = (
-    "gaps", "averages", "forms", "expressions", "context", "failures", "arms", "real", "strips",
-)  # fmt: skip
+FIGURES = ("gaps", "forms", "expressions", "context", "failures", "arms", "real", "strips")
 
 
 def write_figures(
@@ -83,7 +81,6 @@ def draw_figure(name: str, content: RunData, *, published: bool = False) -> Figu
 
 def _drawn(name: str, content: RunData, *, published: bool) -> Figure | None:
     from roboirg.evaluation.analysis.figures.arms import draw_arms
-    from roboirg.evaluation.analysis.figures.averages import draw_averages
     from roboirg.evaluation.analysis.figures.context import draw_context
     from roboirg.evaluation.analysis.figures.failures import draw_failures
     from roboirg.evaluation.analysis.figures.forms import draw_forms
@@ -93,10 +90,7 @@ def _drawn(name: str, content: RunData, *, published: bool) -> Figure | None:
     if name == "arms":
         return draw_arms(content)
     content = content.told()
-    with_published = {
-        "gaps": draw_gaps, "averages": draw_averages, "context": draw_context,
-        "real": draw_real_robot,
-    }  # fmt: skip
+    with_published = {"gaps": draw_gaps, "context": draw_context, "real": draw_real_robot}
     if name in with_published:
         return with_published[name](content, published=published)
     return draw_forms(content) if name == "forms" else draw_failures(content)

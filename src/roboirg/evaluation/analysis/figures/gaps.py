@@ -1,4 +1,4 @@
-"""Figure: what each implicit setting costs each policy, next to explicit instructions."""
+"""Figure: success of each policy in each implicit setting, next to explicit instructions."""
 
 from __future__ import annotations
 
@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.core.plain_text import counted
-from roboirg.evaluation.analysis.figures.averages import cells_of, published_tasks, shared_tasks
 from roboirg.evaluation.analysis.figures.figure_style import (
     GHOST,
     LEGEND_LINE_INCHES,
@@ -19,8 +18,13 @@ from roboirg.evaluation.analysis.figures.figure_style import (
     paper,
 )
 from roboirg.evaluation.analysis.published import published_rows
+from roboirg.evaluation.analysis.stats.cells import Cells, PolicyRun
 from roboirg.evaluation.analysis.stats.intervals import Interval
-from roboirg.evaluation.analysis.stats.option_labels import REFERENCE
+from roboirg.evaluation.analysis.stats.option_labels import (
+    REFERENCE,
+    has_default_options,
+    setting_sort_key,
+)
 from roboirg.evaluation.analysis.stats.rates import points
 from roboirg.evaluation.analysis.stats.run_data import RunData, summaries_by_key
 from roboirg.evaluation.analysis.stats.run_summary import ALL, ScopeKey
@@ -38,17 +42,18 @@ TICK = 25
 
 
 class Drop(NamedTuple):
-    """The fall from explicit to an implicit setting, on the same tasks and episodes.
+    """The fall from explicit to an implicit setting, on the same tasks and episodes, in percent.
 
     Attributes:
-        explicit: mean success of the explicit setting, percent.
+        explicit: mean success of the explicit setting; None if it was not played.
         implicit: that of the implicit setting.
-        interval: 95 % interval of the difference, percentage points; None if unknown.
+        ends: of the 95 % interval of the difference, seen from `explicit`, or of `implicit` alone;
+            None if unknown.
     """
 
-    explicit: float
+    explicit: float | None
     implicit: float
-    interval: Interval | None = None
+    ends: Interval | None = None
 
 
 class PolicyDrops(NamedTuple):
@@ -63,10 +68,12 @@ def draw_gaps(content: RunData, *, published: bool = False) -> Figure | None:
     """Draw a panel for each implicit setting and in it a line for each policy.
 
     In each panel, all policies are compared on the tasks that all of them played in the setting;
-    the published ones alone on all of theirs. None without an implicit setting next to explicit.
+    the published ones alone on all of theirs. Without explicit, or with nothing else, the rates
+    stand alone. None without results.
     """
-    tasks = shared_tasks(content.cells) if content.cells else published_tasks()
-    tasks.pop(REFERENCE.setting, None)
+    tasks = _shared_tasks(content.cells) if content.cells else _published_tasks()
+    if len(tasks) > 1:
+        tasks.pop(REFERENCE.setting, None)
     lines = _own(content, tasks) + (_published(tasks) if published else [])
     lines = [one for one in lines if one.drops]
     settings = [name for name in tasks if any(name in one.drops for one in lines)]
@@ -83,30 +90,71 @@ def draw_gaps(content: RunData, *, published: bool = False) -> Figure | None:
         panel.set_title(counted(len(tasks[setting]), "task"), loc="right", **TASKS_STYLE)
     for panel in panels[len(settings) :]:
         panel.set_visible(False)
-    most = max(max(drop[:2]) for one in lines for drop in one.drops.values())
+    drops = [drop for one in lines for drop in one.drops.values()]
+    most = max(max(drop.implicit, drop.explicit or 0) for drop in drops)
     end = max(TICK, TICK * -(-int(most + 0.999) // TICK))
     panels[0].set_xlim(-0.04 * end, 1.04 * end)
     panels[0].set_xticks(range(0, end + 1, TICK))
     panels[0].set_ylim(len(lines) - 0.5, -0.5)
     names = [folded(one.name, NAME_LETTERS) for one in lines]
     panels[0].set_yticks(range(len(lines)), names)
-    _add_legend(figure, any(d.interval for one in lines for d in one.drops.values()))
+    _add_legend(figure, drops)
     return figure
+
+
+def _cells_of(cells: Cells, tasks: Mapping[str, Collection[str]]) -> Cells:
+    """Return the cells of the given tasks of each setting, with default options."""
+    return {
+        key: cell
+        for key, cell in cells.items()
+        if key.task in tasks.get(key.options.setting, ()) and has_default_options(key.options)
+    }
+
+
+def _shared_tasks(cells: Cells) -> dict[str, list[str]]:
+    """Return by setting the tasks that all policy runs with results in it played."""
+    played: dict[str, dict[PolicyRun, list[str]]] = {}
+    for key, cell in cells.items():
+        if has_default_options(key.options) and cell.trials:
+            runs = played.setdefault(key.options.setting, {})
+            runs.setdefault(key.policy_run, []).append(key.task)
+    shared = {}
+    for setting in sorted(played, key=setting_sort_key):
+        first, *others = played[setting].values()
+        tasks = [task for task in first if all(task in other for other in others)]
+        if tasks:
+            shared[setting] = tasks
+    return shared
+
+
+def _published_tasks() -> dict[str, list[str]]:
+    """Return by setting the tasks that have published rates."""
+    rows = {row.options.setting: row for row in published_rows("main")}
+    settings = sorted(rows, key=setting_sort_key)
+    return {
+        one: [task for task, rate in rows[one].rates.items() if rate is not None]
+        for one in settings
+    }
 
 
 def _own(content: RunData, tasks: Mapping[str, Collection[str]]) -> list[PolicyDrops]:
     """Return a line for each policy run."""
     # Explicit cells stay whole: a drop is paired with those of its own tasks.
-    known = {**tasks, REFERENCE.setting: {key.task for key in content.cells}}
-    found = summaries_by_key(cells_of(content.cells, known))
+    known = {REFERENCE.setting: {key.task for key in content.cells}, **tasks}
+    found = summaries_by_key(_cells_of(content.cells, known))
     lines = []
     for policy_run in content.names:
         drops = {}
         for setting in tasks:
             one = found.get(ScopeKey(policy_run, ALL, InstructionOptions(setting)))
-            if one is not None and one.rate is not None and one.gap is not None:
-                rate, gap = 100 * float(one.rate), one.gap
-                drops[setting] = Drop(rate - 100 * gap.value, rate, gap.interval)
+            if one is None or one.rate is None:
+                continue
+            rate = 100 * float(one.rate)
+            explicit = None if one.gap is None else rate - 100 * one.gap.value
+            ends = one.interval if one.gap is None else one.gap.interval
+            if ends is not None:
+                ends = Interval(*(100 * end + (explicit or 0) for end in ends))
+            drops[setting] = Drop(explicit, rate, ends)
         lines.append(PolicyDrops(content.name(policy_run), is_own=True, drops=drops))
     return lines
 
@@ -123,7 +171,8 @@ def _published(tasks: Mapping[str, Collection[str]]) -> list[PolicyDrops]:
             explicit = reference.average_over(names)
             implicit = None if row is None else row.average_over(names)
             if explicit is not None and implicit is not None:
-                drops[setting] = Drop(float(explicit), float(implicit))
+                alone = setting == REFERENCE.setting
+                drops[setting] = Drop(None if alone else float(explicit), float(implicit))
         lines.append(PolicyDrops(f"{reference.model} (published)", is_own=False, drops=drops))
     return lines
 
@@ -135,26 +184,30 @@ def _draw_panel(axes: Axes, lines: Sequence[PolicyDrops], setting: str) -> None:
         if drop is None:
             continue
         color = first_color() if one.is_own or not has_own else GHOST
-        if drop.interval is not None:
-            ends = [drop.explicit + 100 * end for end in drop.interval]
-            axes.plot(ends, [place, place], color=color, linewidth=4.5, alpha=0.3)
-        axes.plot(drop[:2], [place, place], color=color, linewidth=1.3)
-        axes.plot(drop.explicit, place, "o", color=color, markersize=4.8, markerfacecolor=paper())
+        if drop.ends is not None:
+            axes.plot(drop.ends, [place, place], color=color, linewidth=4.5, alpha=0.3)
+        if drop.explicit is not None:
+            fall = [drop.explicit, drop.implicit]
+            axes.plot(fall, [place, place], color=color, linewidth=1.3)
+            axes.plot(fall[0], place, "o", color=color, markersize=4.8, markerfacecolor=paper())
+            axes.text(
+                1.02, place, points((fall[1] - fall[0]) / 100),
+                transform=axes.get_yaxis_transform(), va="center", fontsize=7,
+            )  # fmt: skip
         axes.plot(drop.implicit, place, "o", color=color, markersize=4.8)
-        axes.text(
-            1.02, place, points((drop.implicit - drop.explicit) / 100),
-            transform=axes.get_yaxis_transform(), va="center", fontsize=7,
-        )  # fmt: skip
     clear_axes(axes, grid="x")
 
 
-def _add_legend(figure: Figure, has_intervals: bool) -> None:
+def _add_legend(figure: Figure, drops: Sequence[Drop]) -> None:
     from matplotlib.lines import Line2D
 
     gray: dict[str, Any] = {"color": GHOST, "marker": "o", "linestyle": "none", "markersize": 4.8}
-    handles = [Line2D([], [], **gray, markerfacecolor=paper()), Line2D([], [], **gray)]
-    labels = ["success with explicit instructions, %", "with implicit ones; number: difference"]
-    if has_intervals:
+    handles, labels = [Line2D([], [], **gray)], ["success, %"]
+    if any(drop.explicit is not None for drop in drops):
+        handles.insert(0, Line2D([], [], **gray, markerfacecolor=paper()))
+        labels = ["success with explicit instructions, %", "with implicit ones; number: difference"]
+    if any(drop.ends for drop in drops):
         handles.append(Line2D([], [], color=GHOST, linewidth=4.5, alpha=0.3))
-        labels.append("95 % interval of the difference")
+        of_gaps = any(drop.ends and drop.explicit is not None for drop in drops)
+        labels.append("95 % interval of the difference" if of_gaps else "95 % interval")
     figure.legend(handles, labels, loc="outside lower center", ncols=3, columnspacing=1.5)

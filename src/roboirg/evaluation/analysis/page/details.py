@@ -101,7 +101,7 @@ def event_text(event: EventRecord, names: Mapping[str, str]) -> str:
         names.get(name, name.replace("_", " ")) for name in (event.subject, event.place or "")
     )
     if not event.holds and not traits.ceased:
-        return f"{traits.past.format(subject=subject, place=place)}; that is over"
+        return f"{traits.past.format(subject=subject, place=place)}; this no longer holds"
     words = traits.past if event.holds else traits.ceased
     return words.format(subject=subject, place=place)
 

@@ -146,7 +146,7 @@ def notes(one: SummaryRow, subject: str) -> list[str]:
             lines.append(f"95 % interval {low} to {high} %")
     lines += _gap_notes(one)
     if one.errors:
-        lines.append(f"{counted(one.errors, 'error')} in no rate")
+        lines.append(f"{counted(one.errors, 'error')} left out of the rates")
     if one.missing:
         lines.append(f"{one.missing} still to be played")
     return lines

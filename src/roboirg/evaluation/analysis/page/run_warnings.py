@@ -116,8 +116,8 @@ def _incomplete(entries: EpisodeEntries) -> Iterable[str]:
     if errors:
         kinds = ", ".join(f"{count} {kind}" for kind, count in errors.most_common())
         yield (
-            f"{errors.total()} of {counted(total, 'episode')} ended in an error ({kinds}). "
-            "Errors are in no rate; cells and averages that lack them are marked “!”."
+            f"{errors.total()} of {counted(total, 'episode')} ended in an error ({kinds}). Errors "
+            "are left out of the rates; cells and averages with errors are marked “!”."
         )
 
 

@@ -144,8 +144,8 @@ BREAKDOWNS: Mapping[str, Breakdown] = {
             "rival",
             "recency rival",
             lambda record: _reference(record) or _rival(record),
-            "Commands that say “it”: with a recency rival, the last remark before the command "
-            "is about one other thing. With a rival: how the words single one of two values out.",
+            "Commands that say “it”: with a recency rival, the last remark before the command is "
+            "about another thing. With a rival: how the words single out one of two values.",
         ),
         Breakdown(
             "difficulty",
@@ -159,18 +159,18 @@ BREAKDOWNS: Mapping[str, Breakdown] = {
 
 
 def find_breakdowns(names: Iterable[str]) -> tuple[Breakdown, ...]:
-    """Return the break-downs of some names."""
+    """Return the breakdowns of some names."""
     wanted = tuple(names)
     for name in wanted:
         if name not in BREAKDOWNS:
-            raise UnknownNameError("break-down", name, BREAKDOWNS)
+            raise UnknownNameError("breakdown", name, BREAKDOWNS)
     return tuple(BREAKDOWNS[name] for name in dict.fromkeys(wanted))
 
 
 def label_instructions(
     breakdowns: Sequence[Breakdown], records: Iterable[Record]
 ) -> dict[str, Labels]:
-    """Return the labels of all instructions by the name of the break-down.
+    """Return the labels of all instructions by the name of the breakdown.
 
     Reads one record after the other and keeps none. The same instruction in a record that answers
     the question and in an older one that does not has the known labels.

@@ -32,7 +32,7 @@ class ComparisonKey(NamedTuple):
     Attributes:
         task: one task or, as None, all tasks that both policies played.
         options: instruction options.
-        label: of the instructions, in a break-down; None for all instructions.
+        label: of the instructions, in a breakdown; None for all instructions.
     """
 
     task: str | None
@@ -49,7 +49,7 @@ class ComparisonResult:
         tasks: that were paired.
         gap: first less second.
         p_holm: its p-value after Holm's correction over all averages, over all single cells, or
-            over all parts of a break-down.
+            over all parts of a breakdown.
         unpaired: trials with a verdict of one policy that the other did not play.
         unjudged: trials of either policy that ended in an error or are still to be played.
     """
@@ -93,7 +93,7 @@ class Comparison:
         second: the other.
         averages: for each set of options, the unweighted mean over the tasks that both played.
         cells: for each task and set of options.
-        parts: by the title of a break-down, the averages over the instructions of each label.
+        parts: by the title of a breakdown, the averages over the instructions of each label.
     """
 
     first: PolicyRun
@@ -115,7 +115,7 @@ def compare(
         first: the cells of one policy run.
         second: the cells of the other.
         rng: of the bootstrap.
-        labels: of the instructions, by the title of each wanted break-down.
+        labels: of the instructions, by the title of each wanted breakdown.
 
     Raises:
         InvalidValueError: one side has several policies or versions, the two have different

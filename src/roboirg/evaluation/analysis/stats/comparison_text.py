@@ -39,7 +39,7 @@ def sentences(
             yield f"  {_subject(result)}: {_better(result, names)}, {_figures(result)}."
     for title, results in comparison.parts.items():
         yield ""
-        yield f"By {title}:" if results else f"By {title}: no instruction has any."
+        yield f"By {title}:" if results else f"By {title}: no instruction has one."
         for result in results:
             yield f"  {_sentence(result, names)}"
     yield ""
@@ -71,7 +71,7 @@ def _own_flips(
         for name, run, own in zip(names, runs, flips or ({}, {}), strict=True)
         if (run.policy, result.key.options) in own
     ]
-    return f" Verdicts that change by themselves: {', '.join(found)}." if found else ""
+    return f" Verdicts that change between repeated runs: {', '.join(found)}." if found else ""
 
 
 def _subject(result: ComparisonResult) -> str:
@@ -122,7 +122,7 @@ def _caveats(comparison: Comparison) -> Iterator[str]:
     unpaired = sum(result.unpaired for result in comparison.averages)
     unjudged = sum(result.unjudged for result in comparison.averages)
     several = any(len(result.tasks) > 1 for result in comparison.averages)
-    yield "p-values are of the exact paired test, after Holm's correction" + (
+    yield "p-values are from the exact paired test, after Holm's correction" + (
         ": over the averages, and over the single cells. An average is the unweighted mean over "
         "tasks."
         if several
@@ -131,11 +131,11 @@ def _caveats(comparison: Comparison) -> Iterator[str]:
     shown = (*comparison.averages, *itertools.chain.from_iterable(comparison.parts.values()))
     if any(map(_is_surprising, shown)):
         yield (
-            "An interval is of one gap alone, so it may exclude 0 although p is above 0.05: p is "
-            "corrected for all gaps that are tested together, and it decides."
+            "An interval belongs to one gap alone, so it may exclude 0 although p is above 0.05; "
+            "p is corrected for all gaps that are tested together, and p decides."
         )
     if comparison.parts:
-        yield "A break-down is corrected by itself, over all its rows."
+        yield "Each breakdown is corrected separately, over all its rows."
     if unpaired:
         verb = verb_for(unpaired, "are")
         yield f"{counted(unpaired, 'trial')} without a counterpart {verb} left out."

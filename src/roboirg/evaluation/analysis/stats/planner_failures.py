@@ -26,14 +26,15 @@ _OF_VERDICT: Mapping[str, str] = {
     "lost": "wrong time",
 }
 PLANNER_FAILURES: Mapping[str, str] = {
-    "no answer": "its model was silent, late or out of reach; such episodes are errors, in no rate",
-    "unreadable": "the last replies of its model were no subgoal of a known form",
+    "no answer": "its model was silent, late or out of reach; such episodes are errors, left out "
+    "of the rates",
+    "unreadable": "the last replies of its model were not subgoals of a known form",
     "refused": "its last subgoals fitted nothing or several things",
     "wrong thing": "it had another thing handled, or one on the other side",
     "wrong place": "it had the right thing put elsewhere",
     "wrong count": "it had the task ended with another number, or something done once too often",
     "wrong time": "it had the right thing done at another time or in another order",
-    "stopped early": f"it said that all was done, or named no new act for {IDLE_STEPS} steps",
+    "stopped early": f"it reported that all was done, or named no new act for {IDLE_STEPS} steps",
     "went on too long": "it was still having things done when time was up",
     "hands": "its last subgoal came to nothing, or was due and not completed",
 }

@@ -29,11 +29,10 @@ COLUMNS = tuple(
     map(Column, ("episodes", "first, %", "second, %", "chance", "difference", "95 % interval", "p"))
 )
 _NOTE = (
-    "Each figure compares two rates on the same scenes, as means over tasks, in percent with 95 % "
-    f"intervals. {MEANING} "
-    "Chance is the success in silence of a random goal of the scene. Differences are in points; "
-    "p-values are corrected over all rows of the policy. Scenes without an arm are in none of its "
-    "figures."
+    "Each figure compares two rates on the same scenes, as means over tasks, in percent with 95 "
+    f"% intervals. {MEANING} Chance is the success of pursuing a random goal of the scene without "
+    "words. Differences are in points; p-values are corrected over all rows of the policy. "
+    "Scenes without an arm are left out of its figures."
 )
 
 

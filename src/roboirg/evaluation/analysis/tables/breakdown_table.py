@@ -38,7 +38,7 @@ def make_breakdown_table(
     found: Labels,
     names: Mapping[PolicyRun, str] | None = None,
 ) -> Table:
-    """Make the table of one break-down."""
+    """Make the table of one breakdown."""
     ordered = sort_cells(cells, list(names or policy_order(cells, ())))
     rows = break_down(ordered, found, np.random.default_rng(SEED))
     names = names or labels(ordered)
@@ -95,7 +95,7 @@ def _notes(breakdown: Breakdown, cells: Cells, rows: tuple[BreakdownRow, ...]) -
         f"{breakdown.note}"
     )
     if any(row.label == UNKNOWN for row in rows):
-        yield "Unknown: the records were written before this was noted."
+        yield "Unknown: the records are older than this field."
     if any(row.gap is None and row.results.options != REFERENCE for row in rows):
         yield f"{NOT_APPLICABLE} without explicit on the same episodes."
     left_out = sum(cell.errors + cell.missing for cell in cells.values())

@@ -37,12 +37,12 @@ _FAILURES_NOTE = (
     "complete what the instruction means."
 )
 _SENSITIVITY_NOTE = (
-    "Whether success is lower or higher than in explicit on the same episodes, or the first rate "
-    "of control arms than the second (open: the test does not decide), as tested everywhere, and "
-    "whether that holds under the other choices that can change it, with the verdict where it does "
-    "not. Within a choice, p-values are corrected over all differences to explicit of the policy, "
-    "or over all contrasts of its arms. An episode is a scene, so that rollouts and tasks are the "
-    "other units."
+    "A verdict says whether success is lower or higher than in explicit on the same episodes, "
+    "or, for control arms, the first rate than the second (open: the test does not decide). Next "
+    "to it stands whether it holds under the other choices of the analysis that can change it, "
+    "and the verdict where it does not. Within a choice, p-values are corrected over all "
+    "differences to explicit of the policy, or over all contrasts of its arms. An episode is a "
+    "scene, so that rollouts and tasks are the other units."
 )
 
 
@@ -144,8 +144,8 @@ def make_sensitivity_table(data: RunData) -> Table:
     tested = [(of.policy, one) for of in families_of(data) for one in try_choices(of.contrasts)]
     if not any(one.others for _, one in tested):
         raise InvalidValueError(
-            "No other choice can change the runs: they need explicit and another setting, or "
-            "control arms, in several tasks or with several seeds."
+            "There are no verdicts that another choice could change: the runs need explicit and "
+            "another setting, or control arms, in several tasks or with several seeds."
         )
     return Table(
         key="sensitivity",

@@ -27,10 +27,10 @@ from roboirg.evaluation.analysis.tables.table import (
 
 COLUMNS = tuple(map(Column, ("episodes", "cut, %", "success, all", "heard", "success, heard")))
 NOTE = (
-    "Cut: the policy's model reads fewer tokens than the prompt needs, so its end, where the "
-    "command stands, does not arrive; between two bounds if the tokenizer is not known. Success "
-    "in percent over all episodes with a verdict, and over those that were heard whole. "
-    "Policies that declare no limit (prompt_tokens) are not in this table."
+    "Cut: the policy's model reads fewer tokens than the prompt needs, so the end of the prompt, "
+    "where the command stands, does not arrive; between two bounds if the tokenizer is not "
+    "known. Success in percent over all episodes with a verdict, and over those that were heard "
+    "whole. Policies that declare no limit (prompt_tokens) are not in this table."
 )
 
 

@@ -247,7 +247,7 @@ def _legend(tables: Sequence[RunTable]) -> list[str]:
     if NO_GAP in gaps:
         legend.append(f"({NO_GAP}) explicit has no success either, so the gap says nothing")
     if any(cell.errors for cell in cells):
-        legend.append(f"{ERROR_MARK} episodes ended in an error and are in no rate")
+        legend.append(f"{ERROR_MARK} episodes ended in an error and are left out of the rates")
     if any(cell.missing for cell in cells):
         legend.append(f"{MISSING_MARK} episodes are still to be played")
     if any(table.policy_run.is_privileged for table in tables):

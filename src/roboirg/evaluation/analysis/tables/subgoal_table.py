@@ -16,9 +16,10 @@ from roboirg.evaluation.records.record import Record
 from roboirg.judging import SUBGOAL_VERDICTS
 
 _NOTE = (
-    "Subgoals that a planner named, counted when they or the due stage were new: what was due; "
-    "another thing, or a point off it; another place for the right thing; the right act for "
-    "another time; or an act that was not due (lost). Shares are of the cell's subgoals."
+    "Subgoals that a planner named, each counted when it or the due stage was new: right (the one "
+    "that was due), wrong thing (or a point off it), wrong place (for the right thing), wrong "
+    "count (the right act at another time), or lost (an act that was not due). Shares are of the "
+    "cell's subgoals."
 )
 _COSTS: Mapping[str, str] = {
     "calls": "calls",

@@ -190,7 +190,8 @@ def _incomplete_notes(cells: Iterable[CellResults], entries: Iterable[Entry]) ->
     if errors:
         verb = verb_for(errors, "are")
         notes.append(
-            f"{ERROR_MARK} {counted(errors, 'trial')} ended in an error and {verb} in no rate."
+            f"{ERROR_MARK} {counted(errors, 'trial')} ended in an error and {verb} left out of "
+            "the rates."
         )
     if missing:
         verb = verb_for(missing, "are")
@@ -200,7 +201,7 @@ def _incomplete_notes(cells: Iterable[CellResults], entries: Iterable[Entry]) ->
     if any(PARTIAL_MARK in entry.marks for entry in entries):
         notes.append(f"{PARTIAL_MARK} a partial average: a task is incomplete or was not played.")
     if errors or missing:
-        notes.append("Incomplete entries have no arrow, and their columns no best.")
+        notes.append("Incomplete entries have no arrow, and their columns no best entry.")
     return notes
 
 
@@ -208,7 +209,7 @@ def _version_notes(policy_runs: Sequence[PolicyRun]) -> list[str]:
     """Say whether there is a policy to compare with, and which rows are not comparable."""
     notes = []
     if len(policy_runs) == 1:
-        notes.append("One policy was played; there is none to compare it with.")
+        notes.append("Only one policy was played; nothing is compared.")
     for name in ("language", "environment"):
         versions = _versions(policy_runs, name)
         if len(versions) > 1:
@@ -289,8 +290,8 @@ def _unequal_average_notes(which: RateTable) -> list[str]:
             text = f"{row.model} {printed} and {same - row.average}"
             drops.setdefault(row.options.setting, []).append(text)
     return [
-        f"The paper sets its {setting} averages, which are over fewer tasks, against the explicit "
-        "ones over all. Drops as printed, and on the same tasks, as in this table: "
+        f"The paper compares its {setting} averages, which are over fewer tasks, with the "
+        "explicit ones over all. Drops as printed, and on the same tasks, as in this table: "
         f"{', '.join(texts)}."
         for setting, texts in drops.items()
     ]

@@ -157,9 +157,6 @@ def _read_observations(message: Message) -> list[Observation]:
     """Return the observations in a request, oldest first.
 
     Depth and matrices are read if the client sends them.
-
-    Raises:
-        ValueError: a list is missing, or they differ in length.
     """
     goals = message.get("task_goal")
     if not isinstance(goals, list) or not goals or not isinstance(goals[0], str):

@@ -121,18 +121,16 @@ class VlaEvalPolicy(RemotePolicy):
 
 
 def _as_rows(reply: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the reply with its action, which is a single one, as rows.
-
-    Raises:
-        PolicyReplyError: it has no array of numbers.
-    """
+    """Return the reply with its action, which is a single one, as rows."""
     name = next((name for name in ("actions", "action") if name in reply), None)
     if name is None:
         return dict(reply)
     try:
         return {"actions": np.atleast_2d(np.asarray(reply[name], np.float64))}
     except (TypeError, ValueError) as error:
-        raise PolicyReplyError(f"The server sent an action that is no array: {error}.") from error
+        raise PolicyReplyError(
+            f"The server sent an action that is not an array: {error}."
+        ) from error
 
 
 PROTOCOL = Protocol(

@@ -91,6 +91,6 @@ def call_with_timeout(seconds: float, call: Callable[[], Value], what: str) -> V
 def timeout_error(what: str, seconds: float) -> PolicyTimeoutError:
     """Return the error for a reply that took too long."""
     return PolicyTimeoutError(
-        f"{what} did not answer within {seconds:g} s; timeout_s "
-        "allows it more, and max_output_tokens shortens answers."
+        f"{what} did not answer within {seconds:g} s; raise timeout_s, or shorten answers with "
+        "max_output_tokens."
     )

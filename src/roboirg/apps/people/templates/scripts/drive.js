@@ -124,7 +124,7 @@ const verdict = (now) => {
       h("div", { class: "actions" }, button("Drive it again", begin, { class: "main" })))));
 };
 
-const PHASES = { loading: "The table is being laid…", driving: "Your move", moving: "Moving…", over: "", idle: "", failed: "" };
+const PHASES = { loading: "The table is being set up…", driving: "Your move", moving: "Moving…", over: "", idle: "", failed: "" };
 
 /** Follow one episode to its end. */
 const follow = async () => {
@@ -153,7 +153,7 @@ const follow = async () => {
 
 const begin = async () => {
   waiting = null;
-  main.replaceChildren(h("p", { class: "text" }, "The table is being laid…"));
+  main.replaceChildren(h("p", { class: "text" }, "The table is being set up…"));
   await ask("/begin", {});
   await follow();
 };

@@ -151,7 +151,7 @@ const watch = (question, plays, go) => {
     h("div", { class: "picture" }, video),
     h("div", { class: "panel" },
       h("h1", {}, "Watch"),
-      h("p", {}, "This is what the robot was shown. It happened before it was told what to do."),
+      h("p", {}, "This is what the robot was shown. It happened before the robot got its instruction."),
       h("div", { class: "actions" }, onward, again))),
   (event) => {
     if (event.key === " ") { start(video); return true; }
