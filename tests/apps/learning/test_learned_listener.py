@@ -1,18 +1,32 @@
 """The listener that learns: labels, what it reads and sees, its file, and its command."""
 
+import csv
+import json
+import re
+from fractions import Fraction
+from pathlib import Path
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from plan_files import plan_file
 from typer.testing import CliRunner
 
-from roboirg.apps.learning.labeled_views import LATER_STEP, class_of, look
+from roboirg.apps.learning.labeled_views import LATER_STEP, class_of, look, pictures_to_see
+from roboirg.apps.learning.listener import listener_study, study_report
+from roboirg.apps.learning.listener.learned_answers import learned_answers
 from roboirg.apps.learning.listener.listener_study import VARIANTS
+from roboirg.apps.learning.listener.study_report import trained_rate
+from roboirg.apps.learning.listener.vocabulary import parts_of, split_words
 from roboirg.core.errors import InvalidValueError, MissingDependencyError
 from roboirg.main import app
 from roboirg.policies.by_name.loading import is_privileged, make_policy
 from roboirg.policies.vlm.goal_schema import goal_schema
 from roboirg.tasks import get_task
 from roboirg.tasks.splits.splits import get_episode
+from roboirg.util.media import Clip, Picture, encode_mp4, encode_png
+
+PAGE = Path(__file__).parents[3] / "docs" / "learned-listener.md"
 
 
 def test_without_pytorch_one_sentence_says_what_to_do(monkeypatch, tmp_path):
@@ -63,9 +77,7 @@ def torch():
     return pytest.importorskip("torch")
 
 
-def test_answers_fall_apart_into_parts_that_tell_them_apart(torch):
-    from roboirg.apps.learning.listener.listener_net import parts_of
-
+def test_answers_fall_apart_into_parts_that_tell_them_apart():
     assert parts_of('{"color": "red", "repeats": 2}') == ["color=red", "repeats=2"]
     assert parts_of('{"colors": ["red", "blue"]}') == [
         "colors.length=2",
@@ -77,15 +89,54 @@ def test_answers_fall_apart_into_parts_that_tell_them_apart(torch):
         assert len({tuple(parts_of(answer)) for answer in goals}) == len(goals)
 
 
-def test_of_a_video_the_first_frame_and_a_later_one_are_seen():
-    pytest.importorskip("torch")
-    from roboirg.apps.learning.listener.learned_model import pictures_to_see
+def test_digits_are_read_as_words():
+    said = "Pick up the 3rd cube 2 times, then 57."
+    assert split_words(said) == split_words("pick up the third cube two times, then 57.")
+    assert "57" in split_words(said)
 
+
+def test_of_a_video_the_first_frame_and_a_later_one_are_seen():
     frames = [np.full((2, 2, 3), number, np.uint8) for number in range(9)]
     now = np.full((2, 2, 3), 99, np.uint8)
     assert [one.max() for one in pictures_to_see(now, [], 8)] == [99]
     assert [one.max() for one in pictures_to_see(now, frames, 8)] == [0, LATER_STEP // 8]
     assert [one.max() for one in pictures_to_see(now, frames[:2], 8)] == [0, 1]
+
+
+@pytest.mark.parametrize("every", [4, 8])
+def test_answers_see_the_steps_of_a_long_video_that_are_seen_when_playing(tmp_path, every):
+    shades = np.arange(0, 900, every) // 4
+    frames = np.broadcast_to(shades[:, None, None, None], (len(shades), 32, 32, 3))
+    clip = Clip(frames.astype(np.uint8), Fraction(20, every))
+    (tmp_path / "a.mp4").write_bytes(encode_mp4(clip))
+    (tmp_path / "a.png").write_bytes(encode_png(Picture(np.full((32, 32, 3), 255, np.uint8))))
+    seen = []
+
+    def understand(task, text, pictures):
+        seen.extend(round(float(one.mean())) for one in pictures)
+        return next(iter(goal_schema(task).goals.values()))
+
+    item = SimpleNamespace(id="1", task="VideoUnmask", text="Do it.", picture="a.png")
+    given = [SimpleNamespace(**vars(item), video=video) for video in ("a.mp4", None)]
+    model = SimpleNamespace(understand=understand)
+    assert len(list(learned_answers(model, given, tmp_path))) == 2
+    assert np.allclose(seen, [0, LATER_STEP // 4, 255], atol=3)
+
+
+def test_intervals_grow_with_the_differences_between_trainings():
+    rng = np.random.default_rng(0)
+    tasks = [(rng.random((3, 50)) < 0.8).astype(float) for _ in range(11)]
+    alike = trained_rate([np.tile(one[:1], (3, 1)) for one in tasks])
+    single = trained_rate([one[:1] for one in tasks])
+    assert alike.rate == pytest.approx(single.rate)
+    assert alike.interval == pytest.approx(single.interval)
+    apart = trained_rate([one * [[1], [1], [0.5]] for one in tasks])
+    assert len(set(apart.by_seed)) == 3
+    low, high = apart.interval
+    assert low < min(apart.by_seed) < max(apart.by_seed) < high
+    certain = trained_rate([np.ones((3, 50))])
+    assert certain.rate == 1.0
+    assert 0.9 < certain.interval.low < certain.interval.high == 1.0
 
 
 def scene_of(*views):
@@ -106,8 +157,22 @@ def scene_of(*views):
 def plan_of(**changes):
     from roboirg.apps.learning.listener.listener_training import TrainingPlan
 
-    few = TrainingPlan(("StopCube",), ("explicit", "direct"), detector_epochs=1, reader_epochs=8)
+    few = TrainingPlan(
+        ("StopCube",), ("explicit", "direct"), scenes=3, detector_epochs=1, reader_epochs=24
+    )
     return few._replace(**changes)
+
+
+@pytest.fixture
+def few(torch, monkeypatch):
+    """Few episodes of each split, and two listeners in a study."""
+    from roboirg.apps.learning.listener import listener_training
+
+    monkeypatch.setattr(listener_training, "SIZES", {"train": 4})
+    monkeypatch.setattr(listener_training, "VALIDATED", 1)
+    monkeypatch.setattr(listener_study, "SIZES", {"test": 3})
+    for module in (listener_study, study_report):
+        monkeypatch.setattr(module, "VARIANTS", VARIANTS[:2])
 
 
 @pytest.fixture(scope="module")
@@ -117,8 +182,9 @@ def trained(torch, tmp_path_factory):
     from roboirg.apps.learning.listener.listener_training import train_listener
 
     torch.set_num_threads(1)
-    model = train_listener(plan_of(), 0, lambda *_: None)
-    path = tmp_path_factory.mktemp("learned") / "listener.pt"
+    folder = tmp_path_factory.mktemp("learned")
+    model = train_listener(plan_of(), folder, "listener", 0, lambda *_: None)
+    path = folder / "listener.pt"
     save_model(model, path)
     return model, path
 
@@ -180,13 +246,70 @@ def test_it_plays_with_the_hands_of_the_oracle(trained):
 
 
 @pytest.mark.sim
-def test_the_same_plan_gives_the_same_listener(trained, torch):
+def test_an_interrupted_training_goes_on_and_gives_the_same_listener(few, torch, tmp_path):
     from roboirg.apps.learning.listener.listener_training import train_listener
 
-    plan = plan_of(reader_epochs=1)
-    one, other = (train_listener(plan, 0, lambda *_: None) for _ in range(2))
-    mine, theirs = one.reader.state_dict(), other.reader.state_dict()
-    assert all(torch.equal(mine[name], theirs[name]) for name in mine)
+    def train(name, progress):
+        return train_listener(plan_of(reader_epochs=2), tmp_path / name, "own", 0, progress)
+
+    def stop(work, done, total, note=""):
+        if work == "reader":
+            raise KeyboardInterrupt
+
+    whole = train("whole", lambda *_: None)
+    with pytest.raises(KeyboardInterrupt):
+        train("parts", stop)
+    shown = []
+    parts = train("parts", lambda *one: shown.append(one))
+    assert [one[:3] for one in shown] == [("reader", 2, 2)]
+    assert re.fullmatch(r"loss \d\.\d{3}, held back right \d\.\d{3}", shown[0][3])
+    for name in ("reader", "detector"):
+        mine, theirs = (getattr(one, name).state_dict() for one in (whole, parts))
+        assert all(torch.equal(mine[key], theirs[key]) for key in mine)
+
+
+@pytest.mark.sim
+def test_an_encoder_of_one_s_own_is_trained_and_loaded(few, torch, tmp_path, monkeypatch):
+    from roboirg.apps.learning.listener import encoders
+    from roboirg.apps.learning.listener.learned_model import load_model, save_model
+    from roboirg.apps.learning.listener.listener_training import train_listener
+
+    monkeypatch.setitem(encoders.ENCODERS, "shades", None)  # which takes it away in the end
+    (block,) = re.findall(r"```python\n(.*?class .*?)```", PAGE.read_text(), re.DOTALL)
+    exec(block, {})  # noqa: S102 - the page's example
+    plan = plan_of(reader_epochs=2, encoders={"shades": {"size": 4}, "words": {}})
+    model = train_listener(plan, tmp_path, "own", 0, lambda *_: None)
+    save_model(model, tmp_path / "own.pt")
+    again = load_model(tmp_path / "own.pt")
+    assert again.about["encoders"] == {"shades": {"size": 4}, "words": {}}
+    picture = look(get_episode("StopCube", "val", 0))[0].picture
+    with torch.no_grad():
+        mine, theirs, dark = (
+            one.reader([one.see([seen])._replace(task="StopCube", text="Stop it.")])[0]
+            for one, seen in ((model, picture), (again, picture), (again, picture // 2))
+        )
+    assert torch.equal(mine, theirs)
+    assert not torch.equal(mine, dark)
+
+
+def test_wrong_encoders_end_before_pictures_are_drawn(torch, tmp_path):
+    for encoders, words in (
+        ({"wrods": {}}, "encoder 'wrods'"),
+        ({"words": {"size": 3}}, "Encoder 'words' with {'size': 3}"),
+    ):
+        plan = plan_file(tasks="StopCube", training={"encoders": encoders})
+        call = ["learn", "listener", "--plan", plan, "--out", str(tmp_path / "own.pt")]
+        with pytest.raises(InvalidValueError, match=words):
+            raise CliRunner().invoke(app, call).exception
+    assert not list(tmp_path.rglob("*.*"))
+
+
+def test_a_study_without_matplotlib_ends_before_pictures_are_drawn(torch, tmp_path, monkeypatch):
+    monkeypatch.setitem(__import__("sys").modules, "matplotlib", None)
+    done = CliRunner().invoke(app, ["learn", "listener", "--study", "--out", str(tmp_path)])
+    with pytest.raises(MissingDependencyError, match=r"\[report\]"):
+        raise done.exception
+    assert not list(tmp_path.iterdir())
 
 
 @pytest.mark.parametrize("content", [b"", b"not a checkpoint", None])
@@ -200,7 +323,7 @@ def test_files_that_are_no_listener_are_one_sentence(torch, tmp_path, content):
 
 def test_what_a_variant_does_not_get_changes_nothing(torch):
     from roboirg.apps.learning.listener.learned_model import hide
-    from roboirg.apps.learning.listener.listener_net import ListenerInput
+    from roboirg.apps.learning.listener.vocabulary import ListenerInput
 
     seen = scene_of([("cube red", 0.0, 0.1)], [("container", 0.0, 0.1)])
     given = ListenerInput("StopCube", "Stop it.", seen)
@@ -213,14 +336,35 @@ def test_what_a_variant_does_not_get_changes_nothing(torch):
 
 
 @pytest.mark.sim
-def test_the_study_writes_every_listener_a_table_and_a_figure(torch, tmp_path):
-    short = {"scenes": 0, "detector_epochs": 1, "reader_epochs": 2}
+def test_the_study_writes_every_listener_tables_and_a_figure_and_goes_on(few, tmp_path):
+    short = {"scenes": 2, "detector_epochs": 1, "reader_epochs": 1, "seeds": 2}
     plan = plan_file(tasks="StopCube", training=short)
     words = ["learn", "listener", "--study", "--plan", plan, "--out", str(tmp_path)]
     done = CliRunner().invoke(app, words)
     assert done.exit_code == 0, done.output
-    names = {one.name for one in tmp_path.glob("*.pt")}
-    assert names == {f"{variant.name}.pt" for variant in VARIANTS}
+    files = {path: path.stat().st_mtime_ns for path in tmp_path.glob("*-?.*")}
+    names = {f"{variant.name}-{seed}" for variant in VARIANTS[:2] for seed in (0, 1)}
+    assert {path.name for path in files} == {
+        f"{name}.{end}" for name in names for end in ("pt", "jsonl")
+    }
     text = (tmp_path / "study.md").read_text()
     assert text.count("## ") == 3
+    assert "2 training seeds" in text
     assert (tmp_path / "study.png").stat().st_size > 5000
+    answers = [json.loads(line) for line in (tmp_path / "all-1.jsonl").read_text().splitlines()]
+    goals = {place: get_episode("StopCube", "test", place).goal["visit"] for place in range(3)}
+    for one in answers:
+        assert one["is_right"] == (one["understood"]["visit"] == goals[one["episode"]])
+    with (tmp_path / "by-task.csv").open() as file:
+        rows = [
+            one for one in csv.DictReader(file) if (one["listener"], one["seed"]) == ("all", "1")
+        ]
+    assert sum(int(one["right"]) for one in rows) == sum(one["is_right"] for one in answers)
+    assert sum(int(one["answers"]) for one in rows) == len(answers)
+    lost = tmp_path / "explicit-1.pt"
+    lost.unlink()
+    again = CliRunner().invoke(app, words)
+    assert again.exit_code == 0, again.output
+    changed = {path for path, time in files.items() if path.stat().st_mtime_ns != time}
+    assert changed == {lost, lost.with_suffix(".jsonl")}
+    assert (tmp_path / "study.md").read_text() == text

@@ -112,7 +112,7 @@ def test_looks_count_the_stages_that_are_completed(recorded):
 @pytest.mark.sim
 def test_an_interrupted_training_goes_on_where_it_was(recorded, tmp_path):
     torch = pytest.importorskip("torch")
-    from roboirg.apps.learning.listener.listener_net import make_vocabulary
+    from roboirg.apps.learning.listener.vocabulary import make_vocabulary
     from roboirg.apps.learning.policy.body_training import train_body
 
     plan = PolicyPlan(("ButtonUnmask",), body_epochs=4)
@@ -120,7 +120,7 @@ def test_an_interrupted_training_goes_on_where_it_was(recorded, tmp_path):
     sight, decisions = sight_of([recorded]), decisions_of(recorded)
     vocabulary = make_vocabulary([""], sight.classes, plan.tasks)
 
-    def stop(work, done, total):
+    def stop(work, done, total, note):
         if done == 2:
             raise KeyboardInterrupt
 
@@ -137,7 +137,7 @@ def test_an_interrupted_training_goes_on_where_it_was(recorded, tmp_path):
     with pytest.raises(KeyboardInterrupt):
         train("parts", stop)
     passes = []
-    parts = train("parts", lambda work, done, total: passes.append(done))
+    parts = train("parts", lambda work, done, total, note: passes.append(done))
     assert passes == [3, 4]
     for name, value in whole.state_dict().items():
         assert torch.equal(value, parts.state_dict()[name]), name

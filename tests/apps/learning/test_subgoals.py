@@ -150,7 +150,8 @@ def test_what_is_replayed_is_what_a_planner_that_is_right_would_be_given():
 def policy_of(memory):
     """Return a policy that has learned nothing."""
     torch = pytest.importorskip("torch")
-    from roboirg.apps.learning.listener.listener_net import ListenerNet, make_vocabulary
+    from roboirg.apps.learning.listener.listener_net import ListenerNet
+    from roboirg.apps.learning.listener.vocabulary import make_vocabulary
     from roboirg.apps.learning.policy.moves import Move
     from roboirg.apps.learning.policy.policy_model import PolicyModel, make_body
     from roboirg.apps.learning.policy.policy_plan import HANDS

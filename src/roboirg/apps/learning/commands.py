@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -15,6 +14,7 @@ from roboirg.core.plain_text import counted
 if TYPE_CHECKING:
     from roboirg.apps.learning.listener.listener_training import TrainingPlan
     from roboirg.apps.learning.policy.policy_plan import PolicyPlan
+    from roboirg.apps.learning.trainer import Progress
 
 # Heavy modules are imported inside the commands, so that --help is fast.
 
@@ -25,7 +25,7 @@ class TrainingWords(PlanWords):
     """A plan with words, and what is rare in a training."""
 
     section = "training"
-    own = ("scenes", "goals", "detector_epochs", "reader_epochs", "seed")
+    own = ("scenes", "goals", "detector_epochs", "reader_epochs", "seed", "seeds", "encoders")
 
 
 NO_WORDS = TrainingWords()
@@ -52,7 +52,10 @@ def learn_listener(
 ) -> None:
     """Train a listener on the train split: pictures with free labels, then instructions.
 
-    A plan may have, under `training`: scenes, goals, detector_epochs, reader_epochs, seed.
+    Pictures and what is unfinished are kept in the folder listener-work next to the result, so
+    that a command that was killed goes on. A plan may have, under `training`: scenes, goals,
+    detector_epochs, reader_epochs, seed, encoders; for a study also seeds, how many times each
+    listener is trained (3).
 
     Example: roboirg learn listener --out listener.pt
     """
@@ -66,31 +69,28 @@ def learn_listener(
         _run_study(plan, out, count)
         return
     from roboirg.apps.learning.listener.learned_model import save_model
+    from roboirg.apps.learning.listener.listener_study import WORK
     from roboirg.apps.learning.listener.listener_training import train_listener
 
     check_output_file(out)
-    save_model(train_listener(plan, count, _print_tenths()), out)
+    model = train_listener(plan, out.parent / WORK, out.stem, count, _print_tenths())
+    save_model(model, out)
     typer.echo(f"{out}, {out.stat().st_size / 2**20:.1f} MiB")
 
 
 def _run_study(plan: TrainingPlan, out: Path, workers: int) -> None:
-    from roboirg.apps.learning.listener.listener_study import run_study
-    from roboirg.apps.learning.listener.study_report import (
-        save_study_figure,
-        study_cells,
-        study_text,
-    )
+    from roboirg.util.figure_files import check_figure_support
 
     if out.exists() and not out.is_dir():
         raise InvalidValueError(f"{str(out)!r} is a file; --study needs a folder as --out.")
-    out.mkdir(parents=True, exist_ok=True)
-    cells = study_cells(run_study(plan, out, workers, _print_tenths()))
-    page = out / "study.md"
+    check_figure_support()
+    from roboirg.apps.learning.listener.listener_study import run_study
+    from roboirg.apps.learning.listener.study_report import write_study
+
+    answers = run_study(plan, out, workers, _print_tenths())
     about = plan._asdict().items()
     shown = {name: value for name, value in about if name not in ("tasks", "settings", "without")}
-    page.write_text(study_text(cells, shown), encoding="utf-8")
-    save_study_figure(cells, out)
-    typer.echo(str(page))
+    typer.echo(str(write_study(answers, shown, out)))
 
 
 @learn_app.command("answers")
@@ -122,7 +122,7 @@ class PolicyWords(PlanWords):
     section = "training"
     own = (
         "scenes", "drawn", "goals", "detector_epochs", "body_epochs", "reader_epochs", "seed",
-        "memories", "seeds", "parts", "played",
+        "encoders", "memories", "seeds", "parts", "played",
     )  # fmt: skip
 
 
@@ -161,8 +161,8 @@ def learn_policy(
     """Train a policy that acts on pictures and words: records the expert, then learns.
 
     What is there already is used again. A plan may have, under `training`: scenes, drawn, goals,
-    detector_epochs, body_epochs, reader_epochs, seed; with --paper also memories, seeds, parts
-    (main, resolved, context, planner), played (settings), and at its top episodes and split.
+    detector_epochs, body_epochs, reader_epochs, seed, encoders; with --paper also memories, seeds,
+    parts (main, resolved, context, planner), played (settings), and at its top episodes and split.
 
     Example: roboirg learn policy --tasks PickXtimes --out learned
     """
@@ -237,15 +237,15 @@ def _plan(words: TrainingWords, without: str) -> TrainingPlan:
     )
 
 
-def _print_tenths() -> Callable[[str, int, int], None]:
-    """Return a function that prints progress whenever another tenth is done."""
+def _print_tenths() -> Progress:
+    """Return a function that prints progress where it has a note or another tenth is done."""
     shown: dict[str, int] = {}
 
-    def progress(work: str, done: int, total: int) -> None:
+    def progress(work: str, done: int, total: int, note: str = "") -> None:
         tenth = 10 * done // total
-        if shown.get(work) != tenth:
+        if note or shown.get(work) != tenth:
             shown[work] = tenth
-            typer.echo(f"{work}: {done} of {total}", err=True)
+            typer.echo(f"{work}: {done} of {total}{note and f', {note}'}", err=True)
 
     return progress
 

@@ -16,21 +16,21 @@ Trained = TypeVar("Trained")
 
 
 def save_trained(content: Mapping[str, Any], path: Path) -> None:
-    """Write what was learned.
+    """Write what was learned, whole or not at all.
 
     Raises:
         InvalidValueError: the file cannot be written.
     """
     try:
-        torch.save(dict(content), path)
-    except (OSError, RuntimeError) as error:
+        with replacing(path) as part:
+            torch.save(dict(content), part)
+    except RuntimeError as error:
         raise InvalidValueError(f"Cannot write {path}: {error}.") from error
 
 
 def save_unfinished(content: Mapping[str, Any], made_of: object, path: Path) -> None:
-    """Write what was learned on the way, whole or not at all, with what it was made of."""
-    with replacing(path) as part:
-        torch.save({**content, "made_of": made_of}, part)
+    """Write what was learned on the way, with what it was made of."""
+    save_trained({**content, "made_of": made_of}, path)
 
 
 def load_unfinished(path: Path, made_of: object) -> dict[str, Any] | None:

@@ -5,15 +5,35 @@ from __future__ import annotations
 import math
 import random
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from typing import Any, Generic, TypeVar
+from pathlib import Path
+from typing import Any, Generic, NamedTuple, Protocol, TypeVar
 
 import torch
 from torch import nn
 
+from roboirg.apps.learning.trained_file import load_unfinished, save_unfinished
+
 BATCH = 32
 One = TypeVar("One")
-Progress = Callable[[str, int, int], None]
-"""Called with a kind of work, what is done of it, and all of it."""
+
+
+class Progress(Protocol):
+    """Shows what is done of a kind of work, all of it, and how well it goes."""
+
+    def __call__(self, work: str, done: int, total: int, note: str = "") -> None:
+        """Show it."""
+
+
+def part_of(progress: Progress, name: str) -> Progress:
+    """Return a progress that names what it is a part of."""
+    return lambda work, *done: progress(f"{name}: {work}", *done)
+
+
+class KeptTraining(NamedTuple):
+    """The file in which a training is kept after each pass, and all that the result depends on."""
+
+    path: Path
+    made_of: object
 
 
 def batch_count(lessons: Sequence[object], size: int = BATCH) -> int:
@@ -53,20 +73,6 @@ class Trainer(Generic[One]):
             self._optimizer, rate, total_steps=max(steps, 1), pct_start=0.1
         )
 
-    def state(self) -> dict[str, Any]:
-        """Return what `restore` needs to go on from here."""
-        return {
-            "net": self._net.state_dict(),
-            "optimizer": self._optimizer.state_dict(),
-            "schedule": self._schedule.state_dict(),
-        }
-
-    def restore(self, state: Mapping[str, Any]) -> None:
-        """Go on from where a trainer of the same network was."""
-        self._net.load_state_dict(state["net"])
-        self._optimizer.load_state_dict(state["optimizer"])
-        self._schedule.load_state_dict(state["schedule"])
-
     def run(self, batches: Iterable[Sequence[One]]) -> float:
         """Take a step for each batch; returns the mean loss."""
         self._net.train()
@@ -80,3 +86,44 @@ class Trainer(Generic[One]):
             self._optimizer.step()
             self._schedule.step()
         return sum(losses) / max(1, len(losses))
+
+    def learn(
+        self,
+        passes: int,
+        batches: Callable[[int], Iterable[Sequence[One]]],
+        show: Callable[[int, int, str], None],
+        score: Callable[[], Mapping[str, float]] = dict,
+        kept: KeptTraining | None = None,
+    ) -> list[dict[str, float]]:
+        """Learn in several passes, or go on where a training that was kept ended.
+
+        Returns the mean loss of each pass, with the score after it.
+
+        Args:
+            passes: how many.
+            batches: of a pass, by its number from 0.
+            show: called after each pass with its number from 1, with all, and how well it goes.
+            score: how good the network is now.
+            kept: where the training is kept.
+        """
+        parts = {"net": self._net, "optimizer": self._optimizer, "schedule": self._schedule}
+        state = None if kept is None else load_unfinished(kept.path, kept.made_of)
+        found: list[dict[str, float]] = []
+        if state is not None and "found" in state:
+            for name, part in parts.items():
+                part.load_state_dict(state[name])
+            torch.set_rng_state(state["random"])
+            found = state["found"]
+        for number in range(len(found), passes):
+            loss = self.run(batches(number))
+            self._net.eval()
+            with torch.no_grad():
+                found.append({"loss": loss, **score()})
+            if kept is not None:
+                state = {name: part.state_dict() for name, part in parts.items()}
+                state |= {"random": torch.get_rng_state(), "found": found}
+                save_unfinished(state, kept.made_of, kept.path)
+            note = ", ".join(f"{name} {value:.3f}" for name, value in found[-1].items())
+            show(number + 1, passes, note)
+        self._net.eval()
+        return found

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from roboirg.apps.learning.labeled_views import pictures_to_see
 from roboirg.apps.learning.learn_support import check_learn_support, file_version
 from roboirg.core.episode import Goal
 from roboirg.core.observations import FRONT, Demonstration
@@ -22,8 +23,8 @@ FRAMES_EVERY = 8
 class LearnedListener(ScriptedPolicy):
     """Executes the goal that a trained listener understands.
 
-    It gets the words, the video and the first picture; only the hands are privileged. If the scene
-    does not have the goal, it holds still.
+    It gets the words and the pictures of `pictures_to_see`; only the hands are privileged. If the
+    scene does not have the goal, it holds still.
     """
 
     cameras = (FRONT,)
@@ -53,8 +54,6 @@ class LearnedListener(ScriptedPolicy):
 
     def decide(self, env: RoboIRGEnv, instruction: str) -> Goal | None:
         """Return the goal that is understood; None if the scene does not have it."""
-        from roboirg.apps.learning.listener.learned_model import pictures_to_see
-
         frames = self._demonstration.get(f"{FRONT}_rgb", ())
         pictures = pictures_to_see(env.picture(FRONT), frames, FRAMES_EVERY)
         self._demonstration = {}

@@ -6,33 +6,29 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, Literal, NamedTuple, get_args
 
-import numpy as np
 import torch
-from numpy.typing import NDArray
 
-from roboirg.apps.learning.labeled_views import LATER_STEP
 from roboirg.apps.learning.listener.detector_net import DetectorNet
-from roboirg.apps.learning.listener.listener_net import ListenerInput, ListenerNet, Vocabulary
+from roboirg.apps.learning.listener.listener_net import ListenerNet
 from roboirg.apps.learning.listener.object_relations import (
-    ObjectsInView,
     TablePlane,
     nothing_of,
     relate,
 )
+from roboirg.apps.learning.listener.vocabulary import ListenerInput, Vocabulary
 from roboirg.apps.learning.trained_file import load_nets, load_trained, save_trained
 from roboirg.core.episode import Goal
 from roboirg.core.errors import InvalidValueError
 from roboirg.policies.vlm.goal_schema import goal_schema
+from roboirg.util.media import Pixels
 
-FORMAT = "roboirg-listener-2"
+FORMAT = "roboirg-listener-3"
 Without = Literal["none", "pictures", "video", "words"]
 WITHOUTS: tuple[Without, ...] = get_args(Without)
 """What a variant does not get; the words are then empty.
 
 Without the video, nothing is seen of a scene that has one.
 """
-
-Pixels = NDArray[np.uint8]
 
 
 class LearnedModel(NamedTuple):
@@ -62,52 +58,34 @@ class LearnedModel(NamedTuple):
             text: everything that was said.
             pictures: those of `pictures_to_see`.
         """
-        return self.understand_seen(task, text, self.see(pictures))
+        return self.understand_seen(self.see(pictures)._replace(task=task, text=text))
 
-    def understand_seen(self, task: str, text: str, seen: ObjectsInView) -> Goal:
-        """Return the best goal of a task for an instruction, of a scene that has been seen.
+    def understand_seen(self, given: ListenerInput) -> Goal:
+        """Return the best goal for an instruction, of a scene that has been seen.
 
         Raises:
             InvalidValueError: it was not trained on the task.
         """
-        if task not in self.vocabulary.tasks:
+        if given.task not in self.vocabulary.tasks:
             raise InvalidValueError(
-                f"This listener was not trained on {task}, but on "
+                f"This listener was not trained on {given.task}, but on "
                 f"{', '.join(self.vocabulary.tasks)}."
             )
         with torch.no_grad():
-            (scores,) = self.reader([self.hide(ListenerInput(task, text, seen))])
-        return list(goal_schema(task).goals.values())[int(scores.argmax())]
+            (scores,) = self.reader([hide(given, self.without)])
+        return list(goal_schema(given.task).goals.values())[int(scores.argmax())]
 
-    def see(self, pictures: Sequence[Pixels]) -> ObjectsInView:
-        """Return the objects of pictures."""
-        return relate(self.detector.find(pictures), self.plane, self.vocabulary.classes)
-
-    def hide(self, given: ListenerInput) -> ListenerInput:
-        """Return an input without what this listener does not get."""
-        return hide(given, self.without)
+    def see(self, pictures: Sequence[Pixels]) -> ListenerInput:
+        """Return what is seen in pictures, without task and words."""
+        seen = relate(self.detector.find(pictures), self.plane, self.vocabulary.classes)
+        return ListenerInput("", "", seen, tuple(pictures))
 
 
 def hide(given: ListenerInput, without: Without) -> ListenerInput:
     """Return an input without pictures, video or words."""
     if without == "pictures" or (without == "video" and given.seen.looks > 1):
-        return given._replace(seen=nothing_of(given.seen))
+        return given._replace(seen=nothing_of(given.seen), pictures=())
     return given._replace(text="") if without == "words" else given
-
-
-def pictures_to_see(first: Pixels, frames: Sequence[Pixels] | Pixels, every: int) -> list[Pixels]:
-    """Return the pictures that a listener looks at.
-
-    Of a video, its first frame and one two seconds later; without one, the first picture.
-
-    Args:
-        first: at the start of the policy's turn.
-        frames: of the video; may be empty.
-        every: control steps between two frames.
-    """
-    if not len(frames):
-        return [first]
-    return [frames[0], frames[min(LATER_STEP // every, len(frames) - 1)]]
 
 
 def save_model(model: LearnedModel, path: Path) -> None:
@@ -121,6 +99,7 @@ def save_model(model: LearnedModel, path: Path) -> None:
         "vocabulary": {name: list(value) for name, value in model.vocabulary._asdict().items()},
         "detector": model.detector.state_dict(),
         "plane": {name: torch.from_numpy(one) for name, one in model.plane._asdict().items()},
+        "encoders": model.reader.settings,
         "reader": model.reader.state_dict(),
         "without": model.without,
         "about": model.about,
@@ -140,6 +119,7 @@ def load_model(path: Path) -> LearnedModel:
 def _read(content: Mapping[str, Any]) -> LearnedModel:
     vocabulary = Vocabulary(**{name: tuple(own) for name, own in content["vocabulary"].items()})
     plane = TablePlane(**{name: one.numpy() for name, one in content["plane"].items()})
-    detector, reader = DetectorNet(len(vocabulary.classes)), ListenerNet(vocabulary)
+    detector = DetectorNet(len(vocabulary.classes))
+    reader = ListenerNet(vocabulary, content["encoders"])
     load_nets({"detector": detector, "reader": reader}, content)
     return LearnedModel(vocabulary, detector, plane, reader, content["without"], content["about"])

@@ -2,28 +2,32 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+import json
+from collections.abc import Iterator, Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from roboirg.apps.learning.labeled_views import LATER_STEP
+from roboirg.apps.learning.labeled_views import draw_missing, look_as_played, read_views
 from roboirg.core.episode import Episode, Split
 from roboirg.core.instruction_options import InstructionOptions
-from roboirg.core.observations import FRONT
 from roboirg.core.word_pools import POOLS, PoolName
-from roboirg.envs.environment import RoboIRGEnv
 from roboirg.language import FORMS
 from roboirg.language.rivals import RIVAL_SETTINGS
 from roboirg.language.settings import all_settings, plain_settings
 from roboirg.language.variants import instructions
+from roboirg.policies.vlm.goal_schema import goal_schema
 from roboirg.tasks.splits.splits import SIZES, get_episode
-from roboirg.util.parallel_map import parallel_map
+from roboirg.util.atomic_write import write_atomically
+from roboirg.util.media import Pixels
 
 if TYPE_CHECKING:
-    from roboirg.apps.learning.listener.learned_model import LearnedModel, Pixels
+    from roboirg.apps.learning.listener.learned_model import LearnedModel
     from roboirg.apps.learning.listener.listener_training import TrainingPlan
     from roboirg.apps.learning.trainer import Progress
 
+WORK = "listener-work"
+"""Folder next to trained listeners for pictures, detectors and readers on the way."""
 TEST: Split = "test"
 HELD_OUT: PoolName = "test"
 
@@ -64,86 +68,82 @@ VARIANTS = (
 class StudyAnswer(NamedTuple):
     """What one listener made of one instruction of the test split.
 
-    Attributes:
-        listener: title of the variant.
-        task: of the episode.
-        episode: its place in the split.
-        options: of the instruction; `wordings` is the pool of words.
-        is_right: whether it understood the goal.
+    `words` is their pool, `understood` has the slots of the goal.
     """
 
     listener: str
+    seed: int
     task: str
     episode: int
-    options: InstructionOptions
+    setting: str
+    words: str
+    understood: dict[str, Any]
     is_right: bool
 
 
 def run_study(
     plan: TrainingPlan, folder: Path, workers: int, progress: Progress
 ) -> Iterator[StudyAnswer]:
-    """Train every listener of the study, write its file, and yield what it understands.
+    """Train every listener of the study with every seed, and yield what it understands.
 
-    The scenes are drawn once, and all listeners have the same detector.
-
-    Args:
-        plan: of the first listener; the others differ as `VARIANTS` says.
-        folder: for the files, ``NAME.pt``.
-        workers: processes that draw pictures; 0 uses this one.
-        progress: called with a kind of work, what is done of it, and all of it.
+    The scenes are drawn once, and all listeners of a seed have the same detector. Each listener
+    becomes a file ``NAME-SEED.pt``, and its answers ``NAME-SEED.jsonl`` next to it; those that are
+    there and were made of the same plan are used again.
     """
-    from roboirg.apps.learning.listener.learned_model import save_model
-    from roboirg.apps.learning.listener.listener_training import see_episodes, teach
+    from roboirg.apps.learning.listener.learned_model import load_model, save_model
+    from roboirg.apps.learning.listener.listener_training import check_plan, see_episodes, teach
+    from roboirg.apps.learning.trainer import part_of
 
-    scenes = see_episodes(plan, workers, progress)
-    shown = list(_show_all(plan.tasks, workers, progress))
-    for variant in VARIANTS:
-
-        def follow(work: str, done: int, total: int, name: str = variant.name) -> None:
-            progress(f"{name}: {work}", done, total)
-
-        model = teach(scenes, variant.plan(plan), follow)
-        save_model(model, folder / f"{variant.name}.pt")
-        yield from _answers(model, variant.title, shown)
+    check_plan(plan)
+    work = folder / WORK
+    shown: list[tuple[Episode, list[Pixels]]] = []
+    for seed in range(plan.seed, plan.seed + plan.seeds):
+        common, scenes = plan._replace(seed=seed), None
+        for variant in VARIANTS:
+            own, name = variant.plan(common), f"{variant.name}-{seed}"
+            path, answers = folder / f"{name}.pt", folder / f"{name}.jsonl"
+            model = load_model(path) if path.exists() else None
+            if model is None or model.about != own.about:
+                scenes = scenes or see_episodes(common, work, workers, progress)
+                answers.unlink(missing_ok=True)
+                model = teach(scenes, own, work / f"reader-{name}.pt", part_of(progress, name))
+                save_model(model, path)
+            if not answers.exists():
+                shown = shown or _show_all(plan.tasks, work, workers, progress)
+                found = _answers(model, variant.name, seed, shown)
+                text = "".join(json.dumps(one._asdict()) + "\n" for one in found)
+                write_atomically(answers, text)
+            for line in answers.read_text("utf-8").splitlines():
+                yield StudyAnswer(**json.loads(line))
 
 
 def _show_all(
-    tasks: Sequence[str], workers: int, progress: Progress
-) -> Iterator[tuple[Episode, Sequence[Pixels]]]:
-    """Yield the episodes of the test split with the pictures that a listener looks at."""
+    tasks: Sequence[str], work: Path, workers: int, progress: Progress
+) -> list[tuple[Episode, list[Pixels]]]:
+    """Return the episodes of the test split with the pictures that a listener looks at."""
     episodes = [get_episode(task, TEST, place) for task in tasks for place in range(SIZES[TEST])]
-    found = {}
-    for episode, pictures in parallel_map(pictures_of, episodes, workers):
-        found[episode.key] = pictures
-        progress("test pictures", len(found), len(episodes))
-    yield from ((episode, found[episode.key]) for episode in episodes)
-
-
-def pictures_of(episode: Episode) -> list[Pixels]:
-    """Return the pictures that a learned listener looks at when it plays an episode."""
-    from roboirg.apps.learning.listener.learned_model import pictures_to_see
-
-    # Only the first frame and the one at that step are looked at.
-    env = RoboIRGEnv(episode, cameras=(FRONT,), demonstration_frames=LATER_STEP)
-    try:
-        observation, info = env.reset()
-        video = info["demonstration"]
-        frames = video["front_rgb"] if video.length else ()
-        return pictures_to_see(observation["front_rgb"], frames, LATER_STEP)
-    finally:
-        env.close()
+    draw_missing(work, episodes, look_as_played, workers, partial(progress, "test pictures"))
+    return [
+        (one, [view.picture for view in read_views(work, one, pictures=True)]) for one in episodes
+    ]
 
 
 def _answers(
-    model: LearnedModel, title: str, shown: Sequence[tuple[Episode, Sequence[Pixels]]]
+    model: LearnedModel, name: str, seed: int, shown: Sequence[tuple[Episode, list[Pixels]]]
 ) -> Iterator[StudyAnswer]:
-    understand = _reader_of(model, shown)
+    # Every scene has many instructions, and is looked at once.
+    seen = {episode.key: model.see(pictures) for episode, pictures in shown}
     episodes = [episode for episode, _ in shown]
     for options in told_options():
         told = instructions(episodes, (options.setting,), FORMS[:1], options)
         for episode, instruction in told:
-            is_right = understand(episode, instruction.text)
-            yield StudyAnswer(title, episode.task, episode.index, options, is_right)
+            task, given = episode.task, seen[episode.key]
+            goal = model.understand_seen(given._replace(task=task, text=instruction.text))
+            slots = json.loads(goal_schema(task).answers[goal])
+            yield StudyAnswer(
+                name, seed, task, episode.index, options.setting, str(options.wordings), slots,
+                goal == episode.goal,
+            )  # fmt: skip
 
 
 def told_options() -> Iterator[InstructionOptions]:
@@ -153,15 +153,3 @@ def told_options() -> Iterator[InstructionOptions]:
             yield InstructionOptions(setting, wordings=pool)
     for setting in RIVAL_SETTINGS:
         yield InstructionOptions(setting, wordings=HELD_OUT)
-
-
-def _reader_of(
-    model: LearnedModel, shown: Sequence[tuple[Episode, Sequence[Pixels]]]
-) -> Callable[[Episode, str], bool]:
-    # Every scene has many instructions, and is looked at once.
-    seen = {episode.key: model.see(pictures) for episode, pictures in shown}
-
-    def understand(episode: Episode, text: str) -> bool:
-        return model.understand_seen(episode.task, text, seen[episode.key]) == episode.goal
-
-    return understand

@@ -3,42 +3,42 @@
 from __future__ import annotations
 
 import random
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
+from functools import partial
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 import torch
 from pydantic import NonNegativeInt, PositiveInt
 
-from roboirg.apps.learning.labeled_views import LabeledView, look
+from roboirg.apps.learning.labeled_views import LabeledView, draw_missing, look, read_views
 from roboirg.apps.learning.listener.detector_net import SIZE, DetectorNet, detector_loss
+from roboirg.apps.learning.listener.encoders import ENCODERS, make_encoders
 from roboirg.apps.learning.listener.learned_model import LearnedModel, Without, hide
-from roboirg.apps.learning.listener.listener_net import (
-    ListenerInput,
-    make_vocabulary,
-)
 from roboirg.apps.learning.listener.object_relations import (
-    ObjectsInView,
     SeenObjects,
     TablePlane,
     fit_plane,
     relate,
 )
 from roboirg.apps.learning.listener.reader_training import lesson_of, said, train_reader
-from roboirg.apps.learning.trainer import Progress, Trainer, batch_count, batches
-from roboirg.core.episode import Episode, Split
+from roboirg.apps.learning.listener.vocabulary import USUAL_ENCODERS, ListenerInput, make_vocabulary
+from roboirg.apps.learning.trainer import KeptTraining, Progress, Trainer, batch_count, batches
+from roboirg.core.episode import ENVIRONMENT_VERSION, Episode, Split
 from roboirg.core.errors import InvalidValueError
 from roboirg.core.word_pools import PoolName
 from roboirg.language import LANGUAGE_VERSION
 from roboirg.language.settings import settings_of
 from roboirg.tasks import get_task
 from roboirg.tasks.splits.splits import SIZES, get_episode
-from roboirg.util.parallel_map import parallel_map
 
 TRAINING_SPLIT: Split = "train"
+RANDOM: Split = "random"
 DETECTOR_RATE = 1e-2
-
-_NO_PICTURE = np.zeros((0, 0, 3), np.uint8)
+_VERSIONS = LANGUAGE_VERSION, ENVIRONMENT_VERSION
+VALIDATED = 10
+"""Episodes of each task's val split that show how training goes."""
 
 
 class TrainingPlan(NamedTuple):
@@ -56,6 +56,8 @@ class TrainingPlan(NamedTuple):
         reader_epochs: passes over all instructions.
         without: what it does not get.
         seed: of initial weights and order.
+        seeds: in a study, how many times each listener is trained; one more from seed to seed.
+        encoders: the settings of each encoder of the reader.
     """
 
     tasks: tuple[str, ...]
@@ -66,116 +68,117 @@ class TrainingPlan(NamedTuple):
     detector_epochs: PositiveInt = 6
     reader_epochs: PositiveInt = 12
     without: Without = "none"
-    seed: int = 0
+    seed: NonNegativeInt = 0
+    seeds: PositiveInt = 3
+    encoders: Mapping[str, dict[str, Any]] = USUAL_ENCODERS
+
+    @property
+    def about(self) -> dict[str, Any]:
+        """All that a listener depends on, as plain data."""
+        about = self._asdict() | {"tasks": list(self.tasks), "settings": list(self.settings)}
+        del about["seeds"]
+        about["language_version"], about["environment_version"] = _VERSIONS
+        return about
 
 
 class SeenEpisodes(NamedTuple):
     """Scenes with what a trained detector sees of them, for any number of listeners.
 
     Attributes:
-        episodes: all of them.
-        seen: the objects, by the episode's key.
+        held_back: episodes that show how training goes.
+        seen: what is seen of each, by its key, without task and words.
         classes: of objects, in the order of their numbers.
-        detector: finds objects.
-        plane: of the table.
     """
 
     episodes: tuple[Episode, ...]
-    seen: Mapping[str, ObjectsInView]
+    held_back: tuple[Episode, ...]
+    seen: Mapping[str, ListenerInput]
     classes: tuple[str, ...]
     detector: DetectorNet
     plane: TablePlane
 
 
-def train_listener(plan: TrainingPlan, workers: int, progress: Progress) -> LearnedModel:
+def train_listener(
+    plan: TrainingPlan, folder: Path, name: str, workers: int, progress: Progress
+) -> LearnedModel:
     """Return a listener that has learned from the train split and random scenes.
 
-    Args:
-        plan: how.
-        workers: processes that draw pictures; 0 uses this one.
-        progress: called with a kind of work, what is done of it, and all of it.
+    Pictures, the detector and the reader on the way stay in the folder, and are used again as far
+    as they fit. The name is the listener's among those of the folder.
     """
-    check_settings(plan)
-    return teach(see_episodes(plan, workers, progress), plan, progress)
+    check_plan(plan)
+    scenes = see_episodes(plan, folder, workers, progress)
+    return teach(scenes, plan, folder / f"reader-{name}-{plan.seed}.pt", progress)
 
 
-def check_settings(plan: TrainingPlan) -> None:
-    """Raise unless some task has one of the settings.
-
-    Raises:
-        InvalidValueError: none has.
-    """
+def check_plan(plan: TrainingPlan) -> None:
+    """Raise early what would else be raised after pictures are drawn."""
     if not any(set(plan.settings) & set(settings_of(get_task(task))) for task in plan.tasks):
         raise InvalidValueError(f"None of these tasks has the setting {', '.join(plan.settings)}.")
+    make_encoders(make_vocabulary(["a"], ["cube"], plan.tasks), plan.encoders)
 
 
-def see_episodes(plan: TrainingPlan, workers: int, progress: Progress) -> SeenEpisodes:
+def see_episodes(
+    plan: TrainingPlan, folder: Path, workers: int, progress: Progress
+) -> SeenEpisodes:
     """Train a detector on the pictures of the train split, and look at all episodes.
 
-    Of random scenes only the labels are kept: they stand for what the detector would find.
-
-    Args:
-        plan: which tasks, how many scenes and passes.
-        workers: processes that draw pictures; 0 uses this one.
-        progress: called with a kind of work, what is done of it, and all of it.
+    Of random scenes the labels stand for what the detector would find.
     """
-    torch.manual_seed(plan.seed)
-    episodes = tuple(_episodes(plan))
-    views: dict[str, tuple[LabeledView, ...]] = {}
-    for episode, own in parallel_map(_look, episodes, workers):
-        views[episode.key] = own
-        progress("pictures", len(views), len(episodes))
-    every = [view for episode in episodes for view in views[episode.key]]
-    classes = tuple(sorted({name for view in every for name in view.names}))
-    plane = fit_plane(
-        np.concatenate([view.centers for view in every]) / SIZE,
-        np.concatenate([view.positions for view in every]),
+    episodes = (
+        *_episodes(plan, TRAINING_SPLIT, SIZES[TRAINING_SPLIT]),
+        *_episodes(plan, RANDOM, plan.scenes),
     )
-    detector = _train_detector([one for one in every if one.picture.size], classes, plan, progress)
-    seen = {
-        key: relate(_seen(own, detector, classes), plane, classes) for key, own in views.items()
+    held_back = _episodes(plan, "val", VALIDATED)
+    every = (*episodes, *held_back)
+    draw_missing(folder, every, look, workers, partial(progress, "pictures"))
+    pixels = any(ENCODERS[name].reads_pixels for name in plan.encoders)
+    views = {
+        one.key: read_views(folder, one, pictures=pixels or one.split != RANDOM) for one in every
     }
-    return SeenEpisodes(episodes, seen, classes, detector, plane)
+    labeled = [view for own in views.values() for view in own]
+    classes = tuple(sorted({name for view in labeled for name in view.names}))
+    plane = fit_plane(
+        np.concatenate([view.centers for view in labeled]) / SIZE,
+        np.concatenate([view.positions for view in labeled]),
+    )
+    shown, unseen = (
+        [view for one in own if one.split != RANDOM for view in views[one.key]]
+        for own in (episodes, held_back)
+    )
+    detector = _train_detector(shown, unseen, classes, plan, folder, progress)
+    seen = {}
+    for one in every:
+        own, pictures = views[one.key], tuple(view.picture for view in views[one.key])
+        found = _labels(own, classes) if one.split == RANDOM else detector.find(pictures)
+        given = ListenerInput("", "", relate(found, plane, classes), pictures if pixels else ())
+        seen[one.key] = given
+    return SeenEpisodes(episodes, held_back, seen, classes, detector, plane)
 
 
-def teach(scenes: SeenEpisodes, plan: TrainingPlan, progress: Progress) -> LearnedModel:
-    """Return a listener that has learned to read the instructions of scenes.
-
-    Args:
-        scenes: seen before.
-        plan: which settings and words, how many passes, and what it does not get.
-        progress: called with a kind of work, what is done of it, and all of it.
-    """
+def teach(scenes: SeenEpisodes, plan: TrainingPlan, kept: Path, progress: Progress) -> LearnedModel:
+    """Return a listener that has learned to read; `kept` is its file after each pass."""
     torch.manual_seed(plan.seed)
-    spoken = said(scenes.episodes, plan.settings, plan.words, plan.goals, plan.seed)
-    told = [(episode, instruction.text) for episode, instruction in spoken]
-    vocabulary = make_vocabulary((text for _, text in told), scenes.classes, plan.tasks)
-    lessons = [
-        lesson_of(
-            hide(ListenerInput(episode.task, text, scenes.seen[episode.key]), plan.without), episode
-        )
-        for episode, text in told
-    ]
-    reader = train_reader(lessons, vocabulary, plan.reader_epochs, plan.seed, progress)
-    about: dict[str, Any] = {**plan._asdict(), "language_version": LANGUAGE_VERSION}
-    about |= {"tasks": list(plan.tasks), "settings": list(plan.settings)}
-    return LearnedModel(vocabulary, scenes.detector, scenes.plane, reader, plan.without, about)
+    told, asked = (
+        [
+            (episode, scenes.seen[episode.key]._replace(task=episode.task, text=instruction.text))
+            for episode, instruction in said(own, plan.settings, plan.words, goals, plan.seed)
+        ]
+        for own, goals in ((scenes.episodes, plan.goals), (scenes.held_back, 1))
+    )
+    vocabulary = make_vocabulary((given.text for _, given in told), scenes.classes, plan.tasks)
+    lessons, held_back = (
+        [lesson_of(hide(given, plan.without), episode) for episode, given in own]
+        for own in (told, asked)
+    )
+    reader = train_reader(
+        lessons, vocabulary, plan.reader_epochs, plan.seed, progress, plan.encoders, held_back,
+        KeptTraining(kept, plan.about),
+    )  # fmt: skip
+    return LearnedModel(vocabulary, scenes.detector, scenes.plane, reader, plan.without, plan.about)
 
 
-def _look(episode: Episode) -> tuple[LabeledView, ...]:
-    """Return the labeled pictures of an episode; of a random scene only the labels."""
-    views = look(episode)
-    if episode.split == TRAINING_SPLIT:
-        return views
-    return tuple(view._replace(picture=_NO_PICTURE) for view in views)
-
-
-def _seen(
-    views: Sequence[LabeledView], detector: DetectorNet, classes: Sequence[str]
-) -> list[SeenObjects]:
-    if all(view.picture.size for view in views):
-        found: list[SeenObjects] = detector.find([view.picture for view in views])
-        return found
+def _labels(views: Sequence[LabeledView], classes: Sequence[str]) -> list[SeenObjects]:
     numbers = {name: number for number, name in enumerate(classes)}
     return [
         SeenObjects(
@@ -187,26 +190,37 @@ def _seen(
 
 
 def _train_detector(
-    shown: Sequence[LabeledView], classes: Sequence[str], plan: TrainingPlan, progress: Progress
+    shown: Sequence[LabeledView],
+    held_back: Sequence[LabeledView],
+    classes: Sequence[str],
+    plan: TrainingPlan,
+    folder: Path,
+    progress: Progress,
 ) -> DetectorNet:
-    detector, rng = DetectorNet(len(classes)), random.Random(plan.seed)
-    epochs = plan.detector_epochs
+    torch.manual_seed(plan.seed)
+    detector, epochs = DetectorNet(len(classes)), plan.detector_epochs
     trainer = Trainer[LabeledView](
         detector,
         lambda batch: detector_loss(detector, batch, classes),
         DETECTOR_RATE,
         epochs * batch_count(shown),
     )
-    for epoch in range(epochs):
-        trainer.run(batches(shown, rng))
-        progress("detector", epoch + 1, epochs)
-    detector.eval()
+
+    def score() -> dict[str, float]:
+        groups = list(batches(held_back, random.Random(0)))
+        losses = [float(detector_loss(detector, one, classes)) for one in groups]
+        return {"held back": sum(losses) / len(losses)}
+
+    made_of = [list(plan.tasks), list(classes), epochs, ENVIRONMENT_VERSION]
+    trainer.learn(
+        epochs,
+        lambda number: batches(shown, random.Random(f"{plan.seed}/{number}")),
+        partial(progress, "detector"),
+        score,
+        KeptTraining(folder / f"detector-{plan.seed}.pt", made_of),
+    )
     return detector
 
 
-def _episodes(plan: TrainingPlan) -> Iterator[Episode]:
-    for task in plan.tasks:
-        yield from (
-            get_episode(task, TRAINING_SPLIT, place) for place in range(SIZES[TRAINING_SPLIT])
-        )
-        yield from (get_episode(task, "random", place) for place in range(plan.scenes))
+def _episodes(plan: TrainingPlan, split: Split, count: int) -> tuple[Episode, ...]:
+    return tuple(get_episode(task, split, place) for task in plan.tasks for place in range(count))

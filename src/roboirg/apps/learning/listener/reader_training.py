@@ -3,14 +3,22 @@
 from __future__ import annotations
 
 import random
-from collections.abc import Iterable, Iterator, Sequence
-from typing import NamedTuple
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from functools import partial
+from typing import Any, NamedTuple
 
 import torch
 from torch.nn import functional
 
-from roboirg.apps.learning.listener.listener_net import ListenerInput, ListenerNet, Vocabulary
-from roboirg.apps.learning.trainer import Progress, Trainer, batch_count, even_batches
+from roboirg.apps.learning.listener.listener_net import ListenerNet
+from roboirg.apps.learning.listener.vocabulary import USUAL_ENCODERS, ListenerInput, Vocabulary
+from roboirg.apps.learning.trainer import (
+    KeptTraining,
+    Progress,
+    Trainer,
+    batch_count,
+    even_batches,
+)  # fmt: skip
 from roboirg.core.episode import Episode
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.core.word_pools import PoolName
@@ -75,7 +83,14 @@ def lesson_of(given: ListenerInput, episode: Episode) -> Lesson:
 
 
 def train_reader(
-    lessons: Sequence[Lesson], vocabulary: Vocabulary, epochs: int, seed: int, progress: Progress
+    lessons: Sequence[Lesson],
+    vocabulary: Vocabulary,
+    epochs: int,
+    seed: int,
+    progress: Progress,
+    encoders: Mapping[str, Mapping[str, Any]] = USUAL_ENCODERS,
+    held_back: Sequence[Lesson] = (),
+    kept: KeptTraining | None = None,
 ) -> ListenerNet:
     """Return a reader that has learned from instructions.
 
@@ -85,18 +100,31 @@ def train_reader(
         epochs: passes over all of them.
         seed: of their order.
         progress: called after each pass.
+        encoders: by name, with their settings.
+        held_back: what shows how training goes.
+        kept: where the training is kept.
     """
-    reader, rng = ListenerNet(vocabulary), random.Random(seed)
+    reader = ListenerNet(vocabulary, encoders)
     trainer = Trainer[Lesson](
         reader,
         lambda batch: _reader_loss(reader, batch),
         READER_RATE,
         epochs * batch_count(lessons),
     )
-    for epoch in range(epochs):
-        trainer.run(even_batches([_forget(one, rng) for one in lessons], rng, _length))
-        progress("reader", epoch + 1, epochs)
-    reader.eval()
+
+    def mixed(number: int) -> Iterator[list[Lesson]]:
+        rng = random.Random(f"{seed}/{number}")
+        return even_batches([_forget(one, rng) for one in lessons], rng, _length)
+
+    def score() -> dict[str, float]:
+        right = [
+            int(scores.argmax()) == one.goal
+            for batch in even_batches(held_back, random.Random(0), _length)
+            for scores, one in zip(reader([one.given for one in batch]), batch, strict=True)
+        ]
+        return {"held back right": sum(right) / len(right)} if right else {}
+
+    trainer.learn(epochs, mixed, partial(progress, "reader"), score, kept)
     return reader
 
 

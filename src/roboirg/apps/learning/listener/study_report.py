@@ -2,37 +2,38 @@
 
 from __future__ import annotations
 
-from collections import defaultdict
-from collections.abc import Iterable, Iterator, Mapping
+import csv
+import io
+import math
+from collections import Counter, defaultdict
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
-from roboirg.apps.learning.listener.listener_study import HELD_OUT, TEST, VARIANTS, StudyAnswer
-from roboirg.core.episode import ENVIRONMENT_VERSION
-from roboirg.core.instruction_options import InstructionOptions
-from roboirg.evaluation.analysis.figures.figure_style import save
-from roboirg.evaluation.analysis.figures.gaps import draw_gaps
-from roboirg.evaluation.analysis.stats.cells import (
-    CellKey,
-    CellResults,
-    Cells,
-    EvalConditions,
-    PolicyRun,
-    Trial,
-    Versions,
+from roboirg.apps.learning.listener.listener_study import HELD_OUT, VARIANTS, StudyAnswer
+from roboirg.core.plain_text import counted
+from roboirg.evaluation.analysis.figures.figure_style import (
+    draw_point,
+    legend_below,
+    rates_figure,
+    save,
 )
-from roboirg.evaluation.analysis.stats.intervals import SEED
-from roboirg.evaluation.analysis.stats.run_data import RunData, summaries_by_key
-from roboirg.evaluation.analysis.stats.run_summary import ALL, SummaryRow, summarize
+from roboirg.evaluation.analysis.stats.intervals import ALPHA, Interval, without_spread
 from roboirg.evaluation.analysis.tables.rendering.markdown import markdown
 from roboirg.evaluation.analysis.tables.table import NOT_APPLICABLE, Column, Entry, Row, Table
-from roboirg.language import LANGUAGE_VERSION
 from roboirg.language.rivals import RIVAL_SETTINGS
 from roboirg.language.settings import all_settings
+from roboirg.util.atomic_write import write_atomically
 
-FIGURE = "study"
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+FIGURE, BY_TASK = "study", "by-task.csv"
+HEIGHT_INCHES, SPREAD = 2.5, 0.62
+"""Of the figure without its legend; width of the points of a setting, of 1."""
 _SECTIONS = (
     ("Held-out words", HELD_OUT, False),
     ("Words of the training pool", "train", False),
@@ -40,87 +41,141 @@ _SECTIONS = (
 )
 """The title of each section, and its words: of which pool, and whether with a rival."""
 _NOTE = (
-    "Right answers in percent, and the 95 % interval: means over tasks, implicit form, test split."
+    "Right answers in percent, and the 95 % interval over trainings and scenes: means over tasks "
+    "and {}, implicit form, test split."
 )
 
-
-def study_cells(answers: Iterable[StudyAnswer]) -> Cells:
-    """Return answers as results of listeners, one policy run each."""
-    verdicts: dict[CellKey, dict[Trial, bool]] = defaultdict(dict)
-    versions = Versions("study", LANGUAGE_VERSION, ENVIRONMENT_VERSION)
-    for one in answers:
-        run = PolicyRun(one.listener, EvalConditions(TEST), versions)
-        verdicts[CellKey(run, one.task, one.options)][Trial(one.episode, 0)] = one.is_right
-    return {key: CellResults(own) for key, own in verdicts.items()}
+Verdicts = NDArray[np.float64]
+"""Of one task: 1 where an answer is right, else 0; shape (training seeds, episodes)."""
+ListenerCell = tuple[str, str, str]
+"""Listener, pool of words, setting."""
 
 
-def study_text(cells: Cells, about: Mapping[str, Any]) -> str:
-    """Return the tables in Markdown.
+class TrainedRate(NamedTuple):
+    """How often a listener is right, the mean over tasks: of all trainings, and of each."""
 
-    Args:
-        cells: of the study.
-        about: how the first listener was trained.
+    rate: float
+    interval: Interval
+    by_seed: tuple[float, ...]
+
+
+def trained_rate(tasks: Sequence[Verdicts]) -> TrainedRate:
+    """Return the mean of tasks with its interval.
+
+    The interval adds the variance between trainings, which all answer the same instructions, to
+    that between scenes within tasks. It is Student's with Satterthwaite's degrees of freedom, so
+    that few trainings that differ make it long; with a single one it is over scenes only.
     """
+    by_seed = np.mean([one.mean(axis=1) for one in tasks], axis=0)
+    rate, seeds, sizes = float(by_seed.mean()), len(by_seed), [one.shape[1] for one in tasks]
+    trainings = float(by_seed.var(ddof=1)) / seeds if seeds > 1 else 0.0
+    apart = [float(one.mean(axis=0).var()) / max(1, one.shape[1] - 1) for one in tasks]
+    scenes = sum(apart) / len(tasks) ** 2
+    interval = without_spread(rate, sum(sizes))
+    if variance := trainings + scenes:
+        from scipy import special  # SciPy's statistics take a second to import
+
+        parts = trainings**2 / max(1, seeds - 1) + scenes**2 / max(1, sum(sizes) - len(sizes))
+        half = float(special.stdtrit(variance**2 / parts, 1 - ALPHA / 2)) * math.sqrt(variance)
+        interval = Interval(max(0.0, rate - half), min(1.0, rate + half))
+    return TrainedRate(rate, interval, tuple(by_seed.tolist()))
+
+
+def write_study(answers: Iterable[StudyAnswer], about: Mapping[str, Any], folder: Path) -> Path:
+    """Write the page of a study, its figure and its table by task; return the page."""
+    answers = list(answers)
+    found = {cell: trained_rate(tasks) for cell, tasks in _verdicts(answers).items()}
     trained = ", ".join(f"{name} {value}" for name, value in about.items())
     parts = ["# What a listener learns", f"Trained with: {trained}."]
-    parts += [markdown(table) for table in study_tables(cells)]
+    parts += [markdown(table) for table in _tables(found)]
     parts.append(f"![Right answers by setting, held-out words]({FIGURE}.png)")
-    return "\n\n".join(part.rstrip("\n") for part in parts) + "\n"
+    parts.append(f"By task: {BY_TASK}. Every answer: NAME-SEED.jsonl.")
+    page = folder / "study.md"
+    write_atomically(page, "\n\n".join(part.rstrip("\n") for part in parts) + "\n")
+    write_atomically(folder / BY_TASK, _by_task(answers))
+    save(lambda: _draw(found), folder, FIGURE)
+    return page
 
 
-def study_tables(cells: Cells) -> Iterator[Table]:
+def _verdicts(answers: Iterable[StudyAnswer]) -> dict[ListenerCell, list[Verdicts]]:
+    """Return the verdicts of each cell by task."""
+    found: dict[tuple[ListenerCell, str], dict[int, list[bool]]] = defaultdict(dict)
+    for one in answers:
+        trained = found[(one.listener, one.words, one.setting), one.task]
+        trained.setdefault(one.seed, []).append(one.is_right)
+    cells: dict[ListenerCell, list[Verdicts]] = defaultdict(list)
+    for (cell, _), trained in found.items():
+        cells[cell].append(np.array(list(trained.values()), float))
+    return cells
+
+
+def _by_task(answers: Sequence[StudyAnswer]) -> str:
+    """Return how many answers are right as CSV."""
+    asked = Counter(one[:3] + one[4:6] for one in answers)
+    right = Counter(one[:3] + one[4:6] for one in answers if one.is_right)
+    text = io.StringIO()
+    rows = csv.writer(text, lineterminator="\n")
+    rows.writerow(["listener", "seed", "task", "setting", "words", "right", "answers"])
+    rows.writerows([*key, right[key], count] for key, count in asked.items())
+    return text.getvalue()
+
+
+def _tables(found: Mapping[ListenerCell, TrainedRate]) -> Iterator[Table]:
     """Yield a table for each kind of words of the test split."""
+    seeds = max(len(one.by_seed) for one in found.values())
     for title, pool, has_rival in _SECTIONS:
-        own = _cells_of(cells, pool, has_rival=has_rival)
-        found = {
-            (one.policy_run.policy, one.options.setting): one
-            for one in summarize(own, np.random.default_rng(SEED))
-            if one.scope == ALL
-        }
-        settings = [name for name in all_settings() if any(key[1] == name for key in found)]
-        if found:
+        settings = _settings(found, pool, has_rival=has_rival)
+        if settings:
             yield Table(
                 key=title.lower().replace(" ", "-"),
                 title=title,
                 heads=("listener", ""),
                 columns=tuple(map(Column, settings)),
-                rows=tuple(_rows(found, settings)),
-                notes=(_NOTE,),
+                rows=tuple(_rows(found, pool, settings)),
+                notes=(_NOTE.format(counted(seeds, "training seed")),),
             )
 
 
-def save_study_figure(cells: Cells, folder: Path) -> tuple[Path, ...]:
-    """Draw the means over tasks by setting, in held-out words, and write the files."""
-    own = {
-        key._replace(options=InstructionOptions(key.options.setting)): results
-        for key, results in _cells_of(cells, HELD_OUT, has_rival=False).items()
-    }
-    names = {key.policy_run: key.policy_run.policy for key in own}
-    content = RunData((), own, summaries_by_key(own), names)
-    return save(lambda: draw_gaps(content), folder, FIGURE)
+def _settings(
+    found: Mapping[ListenerCell, TrainedRate], pool: str, *, has_rival: bool
+) -> list[str]:
+    asked = {setting for _, words, setting in found if words == pool}
+    return [one for one in all_settings() if one in asked and (one in RIVAL_SETTINGS) == has_rival]
 
 
-def _cells_of(cells: Cells, pool: str, *, has_rival: bool) -> Cells:
-    return {
-        key: results
-        for key, results in cells.items()
-        if key.options.wordings == pool and (key.options.setting in RIVAL_SETTINGS) == has_rival
-    }
-
-
-def _rows(found: Mapping[tuple[str, str], SummaryRow], settings: list[str]) -> Iterator[Row]:
+def _rows(
+    found: Mapping[ListenerCell, TrainedRate], pool: str, settings: Sequence[str]
+) -> Iterator[Row]:
     for variant in VARIANTS:
-        name = variant.title
-        own = [found.get((name, setting)) for setting in settings]
-        yield Row(name, "right", "ours", tuple(Entry(word=_percent(one)) for one in own))
-        yield Row(name, "interval", "ours", tuple(Entry(word=_interval(one)) for one in own))
+        own = [found.get((variant.name, pool, setting)) for setting in settings]
+        cells = [
+            (_percent([one.rate]), _percent(one.interval, "–"), _percent(one.by_seed))
+            if one
+            else (NOT_APPLICABLE,) * 3
+            for one in own
+        ]
+        for name, words in zip(
+            ("right", "interval", "by seed"), zip(*cells, strict=True), strict=True
+        ):
+            yield Row(variant.title, name, "ours", tuple(Entry(word=word) for word in words))
 
 
-def _percent(row: SummaryRow | None) -> str:
-    return NOT_APPLICABLE if row is None or row.rate is None else f"{100 * float(row.rate):.1f}"
+def _percent(rates: Iterable[float], between: str = ", ") -> str:
+    return between.join(f"{100 * rate:.1f}" for rate in rates)
 
 
-def _interval(row: SummaryRow | None) -> str:
-    if row is None or row.interval is None:
-        return NOT_APPLICABLE
-    return " to ".join(f"{100 * end:.1f}" for end in row.interval)
+def _draw(found: Mapping[ListenerCell, TrainedRate]) -> Figure:
+    """Draw the means over tasks by setting, in held-out words."""
+    settings = _settings(found, HELD_OUT, has_rival=False)
+    figure, axes = rates_figure(HEIGHT_INCHES, [variant.title for variant in VARIANTS])
+    for number, variant in enumerate(VARIANTS):
+        shift = SPREAD * ((number + 0.5) / len(VARIANTS) - 0.5)
+        for place, setting in enumerate(settings):
+            one = found.get((variant.name, HELD_OUT, setting))
+            if one is not None:
+                draw_point(axes, place + shift, one.rate, one.interval, number, variant.title)
+    axes.set_xticks(range(len(settings)), settings)
+    axes.set_xlim(-0.5, len(settings) - 0.5)
+    axes.set_ylabel("right, %")
+    legend_below(figure, axes)
+    return figure

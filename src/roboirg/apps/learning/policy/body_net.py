@@ -9,7 +9,7 @@ from typing import NamedTuple
 import torch
 from torch import Tensor, nn
 
-from roboirg.apps.learning.listener.listener_net import METERS, waves
+from roboirg.apps.learning.listener.encoders import METERS, waves
 from roboirg.apps.learning.policy.body_layers import LAYERS, WIDTH, Join, body_layers, run_layer
 from roboirg.apps.learning.policy.fast_weights import FastWeightMemory
 from roboirg.apps.learning.policy.frame_memory import EvenFrameMemory, KeptFrameMemory

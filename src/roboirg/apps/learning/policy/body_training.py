@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 import random
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -13,13 +14,8 @@ import torch
 from torch import Tensor
 from torch.nn import functional
 
-from roboirg.apps.learning.listener.listener_net import Vocabulary
-from roboirg.apps.learning.policy.body_net import (
-    MOST_DONE,
-    BodyAnswer,
-    BodyNet,
-    EpisodeBatch,
-)
+from roboirg.apps.learning.listener.vocabulary import Vocabulary
+from roboirg.apps.learning.policy.body_net import MOST_DONE, BodyAnswer, BodyNet, EpisodeBatch
 from roboirg.apps.learning.policy.memories import CLOSED
 from roboirg.apps.learning.policy.policy_data import (
     Decision,
@@ -31,9 +27,8 @@ from roboirg.apps.learning.policy.policy_model import Kind, goal_numbers, make_b
 from roboirg.apps.learning.policy.policy_plan import PolicyPlan, Recorded
 from roboirg.apps.learning.policy.sight import Sight, SightNoise
 from roboirg.apps.learning.policy.subgoal_training import with_planned
-from roboirg.apps.learning.policy.training_curve import BodyScore, save_curve
-from roboirg.apps.learning.trained_file import load_unfinished, save_unfinished
-from roboirg.apps.learning.trainer import Progress, Trainer, even_batches
+from roboirg.apps.learning.policy.training_curve import SHOWN, BodyScore, save_curve
+from roboirg.apps.learning.trainer import KeptTraining, Progress, Trainer, even_batches
 from roboirg.policies.vlm.goal_schema import goal_schema
 
 RATE = 2e-3
@@ -83,25 +78,22 @@ def train_body(
         plan.body_epochs * count,
     )
     path = folder / f"body-{plan.memory}-{plan.seed}.pt"
-    made_of = _made_of(plan, recorded, moves, sight, vocabulary)
-    kept = load_unfinished(path, made_of)
-    scores: list[BodyScore] = []
-    if kept is not None:
-        trainer.restore(kept)
-        scores = [BodyScore(*one) for one in kept["scores"]]
     shown: list[EpisodeNumbers] = []
-    for epoch in range(len(scores), plan.body_epochs):
-        if not shown or epoch % NEW_NOISE_EVERY == 0:
-            shown = see(epoch // NEW_NOISE_EVERY)
-        learned = [one for number, one in enumerate(shown) if number % HELD_BACK]
-        order = random.Random(f"{plan.seed}/{epoch}")
-        loss = trainer.run(even_batches(learned, order, _length, BATCH))
-        scores.append(BodyScore(epoch + 1, loss, *score(body, shown[::HELD_BACK])))
-        save_unfinished(
-            {**trainer.state(), "scores": [tuple(one) for one in scores]}, made_of, path
-        )
-        progress("body", epoch + 1, plan.body_epochs)
-    body.eval()
+
+    def mixed(number: int) -> Iterator[list[EpisodeNumbers]]:
+        if not shown or number % NEW_NOISE_EVERY == 0:
+            shown[:] = see(number // NEW_NOISE_EVERY)
+        learned = [one for place, one in enumerate(shown) if place % HELD_BACK]
+        return even_batches(learned, random.Random(f"{plan.seed}/{number}"), _length, BATCH)
+
+    found = trainer.learn(
+        plan.body_epochs,
+        mixed,
+        partial(progress, "body"),
+        lambda: dict(zip(SHOWN, score(body, shown[::HELD_BACK]), strict=True)),
+        KeptTraining(path, _made_of(plan, recorded, moves, sight, vocabulary)),
+    )
+    scores = [BodyScore(epoch, **one) for epoch, one in enumerate(found, 1)]
     save_curve(scores, path)
     return body
 

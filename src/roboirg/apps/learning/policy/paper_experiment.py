@@ -83,18 +83,15 @@ def train_rows(
     """
     from roboirg.apps.learning.policy.policy_model import load_policy, save_policy
     from roboirg.apps.learning.policy.policy_training import about_policy, train_policy
+    from roboirg.apps.learning.trainer import part_of
 
     found = {}
     for seed in range(experiment.seeds):
         for memory in experiment.memories:
             own, name = plan._replace(memory=memory, seed=seed), row_name(memory, seed)
             path = folder / f"{own.name}.pt"
-
-            def follow(work: str, done: int, total: int, name: str = name) -> None:
-                progress(f"{name}: {work}", done, total)
-
             if not path.exists():
-                save_policy(train_policy(own, folder, workers, follow), path)
+                save_policy(train_policy(own, folder, workers, part_of(progress, name)), path)
             trained = load_policy(path).about
             if any(trained[key] != value for key, value in about_policy(own).items()):
                 raise InvalidValueError(

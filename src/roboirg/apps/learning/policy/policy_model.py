@@ -11,13 +11,9 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
-from roboirg.apps.learning.listener.listener_net import (
-    ListenerInput,
-    ListenerNet,
-    Vocabulary,
-    parts_of,
-)
+from roboirg.apps.learning.listener.listener_net import ListenerNet
 from roboirg.apps.learning.listener.object_relations import ObjectsInView, rank
+from roboirg.apps.learning.listener.vocabulary import ListenerInput, Vocabulary, parts_of
 from roboirg.apps.learning.policy.body_net import BodyAnswer, BodyNet
 from roboirg.apps.learning.policy.memories import Carried
 from roboirg.apps.learning.policy.moves import Move, waypoint
@@ -32,7 +28,7 @@ from roboirg.apps.learning.policy.tracks import LookTokens
 from roboirg.apps.learning.trained_file import load_nets, load_trained, save_trained
 from roboirg.policies.vlm.goal_schema import goal_schema
 
-FORMAT = "roboirg-policy-1"
+FORMAT = "roboirg-policy-2"
 FIRST_LOOKS = (0, 5)
 """Looks at which the reader of words sees a video, two seconds apart; else it sees the first."""
 HOME = (math.pi, 0.0, 0.0)
@@ -248,6 +244,7 @@ def save_policy(model: PolicyModel, path: Path) -> None:
         "about": model.about,
         "detector": model.detector.state_dict(),
         "task_net": model.task_net.state_dict(),
+        "encoders": model.reader.settings,
         "reader": model.reader.state_dict(),
         "body": model.body.state_dict(),
         "forms": [form.words for form in model.forms],
@@ -270,7 +267,8 @@ def _read(content: Mapping[str, Any]) -> PolicyModel:
     vocabulary = Vocabulary(**{name: tuple(own) for name, own in content["vocabulary"].items()})
     moves = tuple(Move(*move) for move in content["moves"])
     sight = Sight(tuple(content["classes"]), content["heights"].numpy())
-    detector, reader = ThingDetector(len(sight.classes)), ListenerNet(vocabulary)
+    detector = ThingDetector(len(sight.classes))
+    reader = ListenerNet(vocabulary, content["encoders"])
     task_net = TaskNet(vocabulary)
     memory = content["memory"]
     body = make_body(sight, vocabulary, moves, HANDS if memory in PLANNERS else memory)

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from collections.abc import Mapping
+from typing import Any, NamedTuple
 
 from pydantic import NonNegativeInt, PositiveInt
 
+from roboirg.apps.learning.listener.vocabulary import USUAL_ENCODERS
 from roboirg.apps.learning.policy.recording import ExpertRecording
 from roboirg.core.episode import Episode
 from roboirg.core.word_pools import PoolName
@@ -38,6 +40,7 @@ class PolicyPlan(NamedTuple):
         body_epochs: passes over all episodes.
         reader_epochs: passes over all instructions.
         seed: of initial weights, noise and order.
+        encoders: the settings of each encoder of the reader.
     """
 
     tasks: tuple[str, ...]
@@ -51,6 +54,7 @@ class PolicyPlan(NamedTuple):
     body_epochs: PositiveInt = 24
     reader_epochs: PositiveInt = 12
     seed: NonNegativeInt = 0
+    encoders: Mapping[str, dict[str, Any]] = USUAL_ENCODERS
 
     @property
     def heard(self) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import math
 import random
 from collections.abc import Iterator, Sequence
 from functools import partial
@@ -14,14 +15,10 @@ import torch
 from numpy.typing import NDArray
 from torch.nn import functional
 
-from roboirg.apps.learning.listener.listener_net import (
-    ListenerInput,
-    ListenerNet,
-    Vocabulary,
-    make_vocabulary,
-)
+from roboirg.apps.learning.listener.listener_net import ListenerNet
 from roboirg.apps.learning.listener.object_relations import corners_of
 from roboirg.apps.learning.listener.reader_training import Lesson, lesson_of, said, train_reader
+from roboirg.apps.learning.listener.vocabulary import ListenerInput, Vocabulary, make_vocabulary
 from roboirg.apps.learning.policy.body_training import train_body
 from roboirg.apps.learning.policy.moves import common_moves, decisions_of
 from roboirg.apps.learning.policy.policy_model import (
@@ -60,8 +57,7 @@ from roboirg.apps.learning.policy.thing_detector import (
     varied,
 )
 from roboirg.apps.learning.policy.tracks import LookTokens
-from roboirg.apps.learning.trained_file import load_nets, load_unfinished, save_unfinished
-from roboirg.apps.learning.trainer import Progress, Trainer, batch_count, batches
+from roboirg.apps.learning.trainer import KeptTraining, Progress, Trainer, batch_count, batches
 from roboirg.core.episode import Episode
 from roboirg.core.errors import InvalidValueError, MotionPlanningError
 from roboirg.language import LANGUAGE_VERSION
@@ -190,27 +186,30 @@ def _detector(
     plan: PolicyPlan, recorded: Sequence[Recorded], sight: Sight, folder: Path, progress: Progress
 ) -> ThingDetector:
     """Return the folder's detector if it is of the same plan, or train it."""
-    path = folder / "detector.pt"
     made_of = [list(sight.classes), list(plan.tasks), plan.drawn, plan.detector_epochs]
     torch.manual_seed(plan.seed)
     detector = ThingDetector(len(sight.classes))
-    kept = load_unfinished(path, made_of)
-    if kept is not None:
-        load_nets({"net": detector}, kept)
-        return detector
-    views = [view for one in recorded for view in labeled_pictures(one.recording, sight)]
-    rng, variation = random.Random(plan.seed), np.random.default_rng(plan.seed)
+    views: list[LabeledPicture] = []
+    count = sum(len(one.recording.pictures) for one in recorded)
+
+    def moved(number: int) -> Iterator[list[LabeledPicture]]:
+        if not views:
+            views.extend(
+                view for one in recorded for view in labeled_pictures(one.recording, sight)
+            )
+        variation = np.random.default_rng((plan.seed, number))
+        rng = random.Random(f"{plan.seed}/{number}")
+        for batch in batches(views, rng, DETECTOR_BATCH):
+            yield [varied(one, variation) for one in batch]
+
     trainer = Trainer[LabeledPicture](
         detector,
-        lambda batch: detector_loss(detector, [varied(one, variation) for one in batch]),
+        lambda batch: detector_loss(detector, batch),
         DETECTOR_RATE,
-        plan.detector_epochs * batch_count(views, DETECTOR_BATCH),
+        plan.detector_epochs * math.ceil(count / DETECTOR_BATCH),
     )
-    for epoch in range(plan.detector_epochs):
-        trainer.run(batches(views, rng, DETECTOR_BATCH))
-        progress("detector", epoch + 1, plan.detector_epochs)
-    detector.eval()
-    save_unfinished({"net": detector.state_dict()}, made_of, path)
+    kept = KeptTraining(folder / "detector.pt", made_of)
+    trainer.learn(plan.detector_epochs, moved, partial(progress, "detector"), kept=kept)
     return detector
 
 
@@ -269,24 +268,25 @@ def _train_words(
     progress: Progress,
 ) -> tuple[TaskNet, ListenerNet]:
     """Return what names the task, and what reads the goal: the folder's, or train them."""
-    path = folder / f"words-{plan.heard}-{plan.seed}.pt"
     texts = short_hash("\n".join(one.given.text for one in lessons))
-    made_of = [*map(list, vocabulary), texts, plan.reader_epochs]
-    kept = load_unfinished(path, made_of)
-    if kept is not None:
-        task_net, reader = TaskNet(vocabulary), ListenerNet(vocabulary)
-        load_nets({"task_net": task_net, "reader": reader}, kept)
-        return task_net, reader
+    made_of = [*map(list, vocabulary), texts, plan.reader_epochs, dict(plan.encoders)]
+    name = f"{plan.heard}-{plan.seed}.pt"
     torch.manual_seed(plan.seed)
-    task_net = _train_tasks(plan, lessons, vocabulary, progress)
-    reader = train_reader(lessons, vocabulary, plan.reader_epochs, plan.seed, progress)
-    nets = {"task_net": task_net.state_dict(), "reader": reader.state_dict()}
-    save_unfinished(nets, made_of, path)
+    kept = KeptTraining(folder / f"tasks-{name}", made_of)
+    task_net = _train_tasks(plan, lessons, vocabulary, kept, progress)
+    reader = train_reader(
+        lessons, vocabulary, plan.reader_epochs, plan.seed, progress, plan.encoders,
+        kept=KeptTraining(folder / f"words-{name}", made_of),
+    )  # fmt: skip
     return task_net, reader
 
 
 def _train_tasks(
-    plan: PolicyPlan, lessons: Sequence[Lesson], vocabulary: Vocabulary, progress: Progress
+    plan: PolicyPlan,
+    lessons: Sequence[Lesson],
+    vocabulary: Vocabulary,
+    kept: KeptTraining,
+    progress: Progress,
 ) -> TaskNet:
     """Return what names the task."""
     rng = random.Random(plan.seed)
@@ -300,10 +300,12 @@ def _train_tasks(
         return functional.cross_entropy(scores, wanted)
 
     trainer = Trainer[Lesson](task_net, task_loss, TASK_RATE, TASK_EPOCHS * batch_count(lessons))
-    for epoch in range(TASK_EPOCHS):
-        trainer.run(batches(lessons, rng))
-        progress("tasks", epoch + 1, TASK_EPOCHS)
-    task_net.eval()
+
+    def mixed(number: int) -> Iterator[list[Lesson]]:
+        rng.seed(f"{plan.seed}/{number}")
+        return batches(lessons, rng)
+
+    trainer.learn(TASK_EPOCHS, mixed, partial(progress, "tasks"), kept=kept)
     return task_net
 
 

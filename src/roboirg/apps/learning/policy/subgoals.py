@@ -7,7 +7,6 @@ from typing import NamedTuple, get_args
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import truncnorm
 
 from roboirg.apps.learning.policy.recording import ExpertRecording
 from roboirg.apps.learning.policy.sight import Sight, points_of
@@ -126,6 +125,8 @@ def recorded_subgoals(
             spot = recorded.things[began, recorded.names.index(stage.points_at), :3]
             point = points_of(spot.astype(np.float64))
             if rng is not None:
+                from scipy.stats import truncnorm  # takes a second, and looks for PyTorch
+
                 most = FARTHEST / SPREAD
                 point += truncnorm.rvs(-most, most, scale=SPREAD, size=2, random_state=rng)
         texts[index] = SubgoalForm(stage.subgoal).at(point)

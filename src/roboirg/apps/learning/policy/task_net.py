@@ -7,8 +7,8 @@ from collections.abc import Sequence
 import torch
 from torch import Tensor, nn
 
-from roboirg.apps.learning.listener.listener_net import Vocabulary, split_words
 from roboirg.apps.learning.listener.object_relations import ObjectsInView
+from roboirg.apps.learning.listener.vocabulary import Vocabulary, split_words
 
 WIDTH = 32
 
