@@ -253,9 +253,9 @@ def drop(run: Path, wanted: Callable[[dict[str, Any]], bool], **changes: Any) ->
     [
         (lambda run: run, ""),
         (lambda run: drop(run, lambda one: one["outcome"] == "success"), "nearest is challenge"),
-        (lambda run: drop(run, lambda one: True, plan=None), "110 records of no plan"),
+        (lambda run: drop(run, lambda one: True, plan=None), "110 records outside every plan"),
         (lambda run: drop(run, lambda one: one["task"] != "StopCube"), "10 missing"),
-        (lambda run: reword(run, "mine@1a2b3c4d"), "of no named plan"),
+        (lambda run: reword(run, "mine@1a2b3c4d"), "match no named plan"),
         (lambda run: drop(run, lambda one: True, max_steps=3000), "110 not in it"),
         (lambda run: drop(run, lambda one: True, policy_seed=5), "110 not in it"),
     ],

@@ -120,7 +120,7 @@ def test_a_submission_must_hold_and_be_ranked(packs: Path, monkeypatch: pytest.M
     assert bad.exit_code == 2
     unranked = verified(monkeypatch, part, "--submission")
     assert unranked.exit_code == 2
-    assert "The board does not rank it: 1 record of no plan" in unranked.output
+    assert "The board does not rank it: 1 record outside every plan" in unranked.output
     assert verified(monkeypatch, part).exit_code == 0  # it holds all the same
 
 

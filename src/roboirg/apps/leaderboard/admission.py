@@ -56,7 +56,7 @@ def refusal(results: Sequence[Summary], known: Collection[str]) -> str:
         known: fingerprints of the plans in the pack.
     """
     if stray := sum(one.plan not in known for one in results):
-        return f"{counted(stray, 'record')} that belong to no plan in the pack"
+        return f"{counted(stray, 'record')} outside every plan in the pack"
     by_run: dict[PolicyRun, list[Summary]] = defaultdict(list)
     for one in results:
         if one.arm == TOLD:
