@@ -48,7 +48,7 @@ class PolicyPlan(NamedTuple):
     words: PoolName = "train"
     memory: str = "recurrent"
     scenes: PositiveInt = 300
-    drawn: PositiveInt = 150
+    drawn: PositiveInt = 300
     goals: PositiveInt = 4
     detector_epochs: PositiveInt = 12
     body_epochs: PositiveInt = 24
