@@ -387,7 +387,7 @@ def test_the_command_prints_a_row_for_each_setting_or_pattern():
         (("--tasks", "StopCube", "--settings", "spatial"), "nothing to score"),
         (("--split", "none"), "nothing to score"),
         (("--seeds", "-1"), "number of random seeds is -1"),
-        (("--learned", "--split", "val"), "ask for test"),
+        (("--learned", "--split", "val"), "choose --split test"),
         (("--plan", plan_file(distractors=0)), "distractors"),
     ],
 )
