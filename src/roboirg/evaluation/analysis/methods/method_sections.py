@@ -41,7 +41,7 @@ from roboirg.evaluation.analysis.stats.option_labels import options_sort_key
 from roboirg.evaluation.analysis.stats.run_data import RunData
 from roboirg.evaluation.analysis.stats.sensitivity import families_of
 from roboirg.evaluation.plan.plan import Plan
-from roboirg.evaluation.plan.stored_plans import read_plan
+from roboirg.evaluation.plan.stored_plans import read_earlier_plans, read_plan
 from roboirg.evaluation.policy_calls import SERVER
 from roboirg.evaluation.records.record import DEFAULT_MAX_STEPS, Job, Summary
 from roboirg.evaluation.records.store import iterate_records, read_results
@@ -56,6 +56,7 @@ _POOL_NOTES: Mapping[str | None, str] = {
     None: f"{NOT_REPORTED} by roboirg, as the words are from a file",
 }
 
+_SIZE = "; rendered at 256 × 256 pixels and sent to it at that size"
 _STATES = {
     **dict.fromkeys(("openpi", "mme-vla", "lerobot"), "7 joint angles (rad), first finger (m)"),
     "": "7 joint angles (rad), 2 finger positions (m), end-effector pose (6 numbers)",
@@ -79,10 +80,11 @@ def make_sections(folder: Path) -> Sections:
     newest = (one for one in iterate_records(folder) if (one.slug, one.started_at) in kept)
     played, said = read_facts(newest)
     families = [*families_of(data)]
+    plans = (*filter(None, [plan]), *read_earlier_plans(folder))
     jobs = planned or [one.identity for one in results]
     return {
         "Terms": dict(_terms(jobs)),
-        "Horizon and control rate": dict(_horizon(results, plan, played)),
+        "Horizon and control rate": dict(_horizon(results, plans, played)),
         "Precision of inference": dict(_precision(results, played)),
         "Observations": dict(_observations(results, played)),
         "Instructions": dict(_instructions(results, played, said)),
@@ -105,7 +107,7 @@ def _terms(jobs: Sequence[Job]) -> Items:
         yield f"arm {arm}", ARMS[PARAPHRASE if paraphrase_number(arm) else arm]
 
 
-def _horizon(results: Sequence[Summary], plan: Plan | None, played: Played) -> Items:
+def _horizon(results: Sequence[Summary], plans: Sequence[Plan], played: Played) -> Items:
     limits = {one.max_steps for one in results}
     has_other = any(one.arm == OTHER_GOAL for one in results)
     both = " (arm other-goal: and that on the scene's own goal)" * has_other
@@ -118,12 +120,12 @@ def _horizon(results: Sequence[Summary], plan: Plan | None, played: Played) -> I
     )
     fields = {"call of the policy": "policy_timeout_s", "rollout": "episode_timeout_s"}
     waits = [
-        _limit(f"s per {what}", [getattr(plan, name)], Plan.model_fields[name].default)
+        _limit(f"s per {what}", {getattr(one, name) for one in plans}, default)
         for what, name in fields.items()
-        if plan
+        if (default := Plan.model_fields[name].default) and plans
     ]
     yield item(
-        "wall-clock limits of the run's last plan",
+        "wall-clock limits, in all plans of the run",
         *(waits or [f"{NOT_REPORTED}, as the run has no plan"]),
         "a rollout that exceeds one ends in an error",
     )
@@ -163,7 +165,9 @@ def _action_space(name: str) -> str:
 
 def _precision(results: Sequence[Summary], played: Played) -> Items:
     for name, facts in played.items():
-        place = "by its server" if facts.is_remote else "on the machine of the simulation"
+        place = "on the machine of the simulation"
+        if facts.is_remote:
+            place = f"by its server; {facts.labeled('policy')}"
         keys = ("dtype", "parameter_dtype", "device", "libraries", "python")
         version = f"{DECLARABLE['version']}: {_version(facts)}"
         yield item(name, f"computed {place}", version, *map(facts.labeled, keys))
@@ -185,18 +189,21 @@ def _version(facts: PlayedFacts) -> str:
 
 
 def _observations(results: Sequence[Summary], played: Played) -> Items:
+    scenes = {(one.task, one.split, one.episode): one.demonstration_steps > 0 for one in results}
     blind = all(facts.need("cameras") == "none" for facts in played.values())
     devices = distinct(one.render_device for one in results)
     version = distinct(one.environment_version for one in results)
     yield item(
         "source",
-        f"simulated by roboirg in SAPIEN, environment version {version}",
-        f"{distinct(one.meshes for one in results)} meshes",
+        f"simulated in SAPIEN by roboirg's own implementation of RoboMME's tasks, version {version}"
+        " of it",
+        f"meshes: {distinct(one.meshes for one in results)} (faithful: RoboMME's shapes)",
         "not rendered, as no policy has a camera" if blind else f"rendered on {devices}",
+        f"scenes with a video before the policy's turn: {sum(scenes.values())} of {len(scenes)}",
     )
     for name, facts in played.items():
         cameras = facts.need("cameras")
-        size = "" if cameras in ("none", NOT_RECORDED) else ", each 256 × 256 pixels as rendered"
+        size = "" if cameras in ("none", NOT_RECORDED) else _SIZE
         frames = facts.need("demonstration_frames")
         kind = ", the state of the robot without pictures" if cameras == "none" != frames else ""
         state = _STATES.get(facts.scheme or SERVER * facts.is_remote, f"{NOT_REPORTED} by roboirg")
@@ -205,7 +212,7 @@ def _observations(results: Sequence[Summary], played: Played) -> Items:
             f"cameras that it declares to need, and whose pictures it was given: {cameras}{size}",
             f"depth: {facts.need('depth')}",
             f"state of the robot given to it: {state}",
-            f"frames of the video before its turn, given to it: {frames}{kind}",
+            f"frames of that video which it takes: {frames}{kind}",
             f"reads the simulator's state: {'yes' if facts.is_privileged else 'no'}",
             facts.labeled("preprocessing"),
         )
@@ -218,13 +225,14 @@ def _instructions(results: Sequence[Summary], played: Played, said: ColumnTexts)
         splits = sorted({one.split for one in results if one.options.wordings == wordings})
         pools = [f"{pool_of(one, wordings)} pool for the split {one}" for one in splits]
         if wordings in (None, *POOLS):
-            listed = f"template set {versions}, written out by roboirg export instructions"
-            yield item(label, "English", listed, *pools)
+            listed = "the command `roboirg export instructions` writes each text and its templates"
+            yield item(label, "English", f"template set {versions}", listed, *pools)
         else:
             yield label, "commands of a file"
     used = {one.options.delivery for one in results}
     ways = OPTION_HELP["delivery"].rstrip(".").split("; ")
     yield item("delivery", *(way for way in ways if way.partition(":")[0] in used))
+    yield item("command templates", *_commands(said))
     for column in sorted(said, key=lambda one: (options_sort_key(one.options), one.arm)):
         yield column.label, _counts(said[column], is_fixed=column.arm in SILENT_TEXTS)
     for name, facts in played.items():
@@ -235,16 +243,23 @@ def _counts(said: SaidTexts, *, is_fixed: bool) -> str:
     texts = counted(len(said.texts), "distinct text")
     if not said.commands:
         return f"{texts}, " + ("fixed" if is_fixed else f"templates: {NOT_RECORDED}")
-    pools = {*POOLS} & {pool for _, pool in said.texts}
-    tasks = {task for task, _ in said.commands} & every_task().keys()
+    return (
+        f"{texts}; command templates: {len(said.commands)}; distinct wordings drawn apart from "
+        f"them (other utterances, single words, referring expressions): {len(said.choices)}"
+    )
+
+
+def _commands(said: ColumnTexts) -> Iterator[str]:
+    used = set().union(*(one.commands for one in said.values()))
+    pools = {*POOLS} & {pool for one in said.values() for _, pool in one.texts}
+    tasks = {task for task, _ in used} & every_task().keys()
     there = sum(
         len(every_task()[task].commands.wordings.of(pool)) for task in tasks for pool in pools
     )
-    return (
-        f"{texts}; command templates: {len(said.commands)} of the {there} in the pool for "
-        f"{counted(len(tasks), 'task')}; distinct random choices of other words and of referring "
-        f"expressions: {len(said.choices) or 'none'} used; possible: {NOT_REPORTED} by roboirg"
-    )
+    yield f"{len(used)} of the {there} in the pool for {counted(len(tasks), 'task')}, in the run"
+    yield "drawn by scene and number of colors in the goal, so that settings and arms share them"
+    yield "arms of paraphrases draw anew"
+    yield f"how many wordings apart from them could be drawn: {NOT_REPORTED} by roboirg"
 
 
 def _reading(facts: PlayedFacts) -> Iterator[str]:

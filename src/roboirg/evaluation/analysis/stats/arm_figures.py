@@ -194,8 +194,9 @@ CONTRASTS = (
 )
 MEANING = (
     "Language use: first the share of scenes in which each of two goals was reached when stated; "
-    "second that in which the same goal was pursued whichever of them was stated. Words' worth "
-    "and order's worth: success when told, against silence and against scrambled words. "
-    "Paraphrases: all of them succeed, against their mean. Repeat: another policy seed."
+    "second, that in which the same goal was reached in both rollouts, whichever was stated; told "
+    "ends at its verdict, so there the other goal counts if the first wrong act agrees with it. "
+    "Words' worth and order's worth: success when told, against silence and against scrambled "
+    "words. Paraphrases: all of them succeed, against their mean. Repeat: another policy seed."
 )
 """The two rates of each contrast."""
