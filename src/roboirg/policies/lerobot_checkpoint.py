@@ -18,19 +18,17 @@ _FILES = (_CONFIG, "model.safetensors", "policy_preprocessor.json", "policy_post
 _TRAINED = ("pretrained_model", "last/pretrained_model", "checkpoints/last/pretrained_model")
 """Where lerobot-train puts a checkpoint, seen from the folders around it."""
 _HUB_ID = re.compile(r"\w[\w.-]*/\w[\w.-]*")
-PictureSizes = Mapping[str, int | None]
-"""Width of square pictures by camera, pixels; None where a checkpoint takes none."""
 
 
 class CheckpointFacts(NamedTuple):
     """What a checkpoint takes.
 
     Attributes:
-        sizes: of its pictures.
+        sizes: width of its square pictures by camera, pixels; None where it declares no square.
         prompt_tokens: that it reads of a prompt; None if it says none.
     """
 
-    sizes: PictureSizes
+    sizes: Mapping[str, int | None]
     prompt_tokens: int | None = None
 
 
@@ -68,8 +66,8 @@ def read_facts(place: str) -> CheckpointFacts:
     )
 
 
-def picture_sizes(place: str, shapes: Mapping[str, object]) -> PictureSizes:
-    """Return the sizes of the pictures that a checkpoint takes.
+def picture_sizes(place: str, shapes: Mapping[str, object]) -> dict[str, int | None]:
+    """Return the width of the square pictures that a checkpoint takes, by camera; else None.
 
     Args:
         place: of the checkpoint.

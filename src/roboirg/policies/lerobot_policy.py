@@ -25,14 +25,8 @@ from pydantic import Field
 from roboirg.core.errors import InvalidValueError, MissingDependencyError
 from roboirg.core.observations import Demonstration, Observation
 from roboirg.policies.contract.policy_urls import UrlOptions, read_options, split_url
-from roboirg.policies.lerobot_checkpoint import (
-    PICTURE,
-    STATE,
-    PictureSizes,
-    picture_sizes,
-    read_facts,
-)
-from roboirg.policies.lerobot_features import SIZE, scaled_square
+from roboirg.policies.lerobot_checkpoint import PICTURE, STATE, picture_sizes, read_facts
+from roboirg.policies.lerobot_features import scaled_square
 
 _MAX_BRIGHTNESS = 255.0
 _BATCH = 8
@@ -77,7 +71,7 @@ class LoadedCheckpoint(NamedTuple):
         model: LeRobot's policy.
         before: turns a batch into the model's inputs.
         after: turns the model's outputs into actions.
-        sizes: of its pictures.
+        sizes: width of its square pictures by camera; None where it declares no square.
         noise: shape of the noise that the model takes for each episode; None if it takes none.
         is_noiseless: whether it is known to draw none either.
         steps: actions of a chunk that are executed; None for all.
@@ -88,7 +82,7 @@ class LoadedCheckpoint(NamedTuple):
     model: Any
     before: Callable[[dict[str, Any]], dict[str, Any]]
     after: Callable[[Any], Any]
-    sizes: PictureSizes
+    sizes: Mapping[str, int | None]
     noise: tuple[int, int] | None = None
     is_noiseless: bool = False
     steps: int | None = None
@@ -228,7 +222,9 @@ class LeRobotPolicy:
             options["noise"] = torch.stack(noise).to(self.options.device)
         return loaded.model.predict_action_chunk(batch, **options)[:, : loaded.steps]
 
-    def _batch(self, sizes: PictureSizes, observations: Sequence[Observation]) -> dict[str, Any]:
+    def _batch(
+        self, sizes: Mapping[str, int | None], observations: Sequence[Observation]
+    ) -> dict[str, Any]:
         """Return observations in LeRobot's form: pictures (n, 3, H, W) in [0, 1]."""
         import torch
 
@@ -327,7 +323,7 @@ def _load(place: str, device: str, execute: int | None) -> LoadedCheckpoint:
         is_noiseless=config.type in _NOISELESS and not is_single,
         steps=getattr(config, "n_action_steps", None),
         remembered=config.n_obs_steps if config.type in _QUEUED else None,
-        metadata=_describe(config, sizes, before, after),
+        metadata=_describe(config, _step_names(before), _step_names(after, of_actions=True)),
     )  # fmt: skip
 
 
@@ -352,29 +348,28 @@ def _set_steps(place: str, config: Any, execute: int | None) -> None:  # noqa: A
         config.temporal_ensemble_coeff = None
 
 
-def _describe(config: Any, sizes: PictureSizes, before: Any, after: Any) -> dict[str, Any]:  # noqa: ANN401
+def _describe(config: Any, before: Sequence[str], after: Sequence[str]) -> dict[str, Any]:  # noqa: ANN401
     """Return a checkpoint's metadata, from its configuration and the steps of its processors."""
-    steps, last = _step_names(before), _step_names(after, of_actions=True)
     inputs = [
         f"{name} {getattr(one, 'shape', '')}".strip()
         for name, one in (config.input_features or {}).items()
     ]
-    fed = ", ".join(f"{camera} {one or SIZE} × {one or SIZE}" for camera, one in sizes.items())
     found: dict[str, Any] = {
-        "preprocessing": f"the checkpoint declares the inputs {', '.join(inputs)}; pictures reach "
-        f"it at {fed or 'none'} pixels, resized by roboirg where rendered otherwise; whether "
-        "training resized likewise: not reported by the checkpoint; brightness is scaled to "
-        "[0, 1], the range in which LeRobot's datasets deliver pictures; the preprocessor that "
-        f"training saved is applied to all inputs, in the steps {', '.join(steps) or 'none'}; its "
-        f"postprocessor is applied to the actions, in the steps {', '.join(last) or 'none'}"
+        "preprocessing": f"the checkpoint declares the inputs {', '.join(inputs)}; roboirg resizes "
+        "pictures from 256 × 256 pixels to the declared height and width, if these are another "
+        "square (whether training did likewise: not reported by the checkpoint), and scales their "
+        "brightness to [0, 1], the range in which LeRobot's datasets deliver pictures; then the "
+        "preprocessor that training saved with it is applied to all inputs, in the steps "
+        f"{', '.join(before) or 'none'}; its postprocessor is applied to the actions, in the steps "
+        f"{', '.join(after) or 'none'}"
     }
-    tokenizers = [name for name in steps if "tokenizer" in name]
+    tokenizers = [name for name in before if "tokenizer" in name]
     if tokenizers:
         found |= {"reads_text": "yes", "text_normalization": ", ".join(tokenizers)}
     elif config.type in _WORDLESS:
         found["reads_text"] = f"no, a policy of type {config.type} has no input for text"
-    lengths = {"chunk": "chunk_size", "execute": "n_action_steps"}
-    return found | {key: vars(config)[one] for key, one in lengths.items() if one in vars(config)}
+    sizes = {"chunk": "chunk_size", "execute": "n_action_steps"}
+    return found | {key: vars(config)[one] for key, one in sizes.items() if one in vars(config)}
 
 
 def _step_names(processor: object, *, of_actions: bool = False) -> list[str]:

@@ -21,7 +21,7 @@ class OraclePolicy(ScriptedPolicy):
     listens: ClassVar[bool] = False
     metadata: ClassVar[Mapping[str, str]] = WORDLESS
 
-    def decide(self, env: RoboIRGEnv, instruction: str) -> Goal:  # noqa: ARG002
+    def decide(self, env: RoboIRGEnv, instruction: str) -> Goal | None:  # noqa: ARG002
         """Return the episode's goal; the instruction is ignored."""
         return env.episode.goal
 

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING
 
 from roboirg.core.episode import Goal
-from roboirg.policies.builtin.scripted import WORDLESS, ScriptedPolicy
+from roboirg.policies.builtin.oracle_policy import OraclePolicy
 from roboirg.tasks import get_task
 from roboirg.tasks.splits.splits import get_episode, split_size
 
@@ -14,28 +13,22 @@ if TYPE_CHECKING:
     from roboirg.envs.environment import RoboIRGEnv
 
 
-class HabitPolicy(ScriptedPolicy):
+class HabitPolicy(OraclePolicy):
     """Executes the scene's own goal whatever is said, as a policy that knows its scenes by heart.
 
     It succeeds in every arm but ``other-goal``.
     """
-
-    listens: ClassVar[bool] = False
-    metadata: ClassVar[Mapping[str, str]] = WORDLESS
 
     def decide(self, env: RoboIRGEnv, instruction: str) -> Goal:  # noqa: ARG002
         """Return the scene's own goal."""
         return (env.original or env.episode).goal
 
 
-class PreviousGoalPolicy(ScriptedPolicy):
+class PreviousGoalPolicy(OraclePolicy):
     """Executes the goal of the episode before, as if the words of that one were still there.
 
     If the scene does not have that goal, it holds still.
     """
-
-    listens: ClassVar[bool] = False
-    metadata: ClassVar[Mapping[str, str]] = WORDLESS
 
     def decide(self, env: RoboIRGEnv, instruction: str) -> Goal | None:  # noqa: ARG002
         """Return the goal of the split's episode before this one, of the last before the first."""

@@ -15,16 +15,9 @@ from roboirg.core.arms import ARMS, OTHER_GOAL, PARAPHRASE, SILENT_TEXTS, paraph
 from roboirg.core.instruction_options import OPTION_HELP
 from roboirg.core.plain_text import counted
 from roboirg.core.word_pools import POOLS, pool_of
-from roboirg.evaluation.analysis.methods.method_statistics import (
-    control_items,
-    error_items,
-    screening_items,
-    sensitivity_items,
-    statistics_items,
-)
+from roboirg.evaluation.analysis.methods import method_statistics
 from roboirg.evaluation.analysis.methods.method_text import Sections
 from roboirg.evaluation.analysis.methods.played_facts import (
-    DECLARABLE,
     FIXED,
     NO_NETWORK,
     NOT_RECORDED,
@@ -56,7 +49,6 @@ _POOL_NOTES: Mapping[str | None, str] = {
     None: f"{NOT_REPORTED} by roboirg, as the words are from a file",
 }
 
-_SIZE = "; rendered at 256 × 256 pixels and sent to it at that size"
 _STATES = {
     **dict.fromkeys(("openpi", "mme-vla", "lerobot"), "7 joint angles (rad), first finger (m)"),
     "": "7 joint angles (rad), 2 finger positions (m), end-effector pose (6 numbers)",
@@ -89,11 +81,11 @@ def make_sections(folder: Path) -> Sections:
         "Observations": dict(_observations(results, played)),
         "Instructions": dict(_instructions(results, played, said)),
         "Use of the words in training": dict(_training(played, said)),
-        "Screening of scenes": dict(screening_items(jobs)),
-        "Statistics": dict(statistics_items(data, families)),
-        "Sensitivity to analysis choices": dict(sensitivity_items(families)),
-        "Controls and floors": dict(control_items(data, jobs)),
-        "Seeds, retries and errors": dict(error_items(results, data, played)),
+        "Screening of scenes": dict(method_statistics.screening_items(jobs)),
+        "Statistics": dict(method_statistics.statistics_items(data, families)),
+        "Sensitivity to analysis choices": dict(method_statistics.sensitivity_items(families)),
+        "Controls and floors": dict(method_statistics.control_items(data, jobs)),
+        "Seeds, retries and errors": dict(method_statistics.error_items(results, data, played)),
     }
 
 
@@ -120,9 +112,9 @@ def _horizon(results: Sequence[Summary], plans: Sequence[Plan], played: Played) 
     )
     fields = {"call of the policy": "policy_timeout_s", "rollout": "episode_timeout_s"}
     waits = [
-        _limit(f"s per {what}", {getattr(one, name) for one in plans}, default)
-        for what, name in fields.items()
-        if (default := Plan.model_fields[name].default) and plans
+        _limit(f"s per {what}", {getattr(of, key) for of in plans}, Plan.model_fields[key].default)
+        for what, key in fields.items()
+        if plans
     ]
     yield item(
         "wall-clock limits, in all plans of the run",
@@ -165,11 +157,10 @@ def _action_space(name: str) -> str:
 
 def _precision(results: Sequence[Summary], played: Played) -> Items:
     for name, facts in played.items():
-        place = "on the machine of the simulation"
-        if facts.is_remote:
-            place = f"by its server; {facts.labeled('policy')}"
+        served = f"by its server; {facts.labeled('policy')}"
+        place = served if facts.is_remote else "on the machine of the simulation"
         keys = ("dtype", "parameter_dtype", "device", "libraries", "python")
-        version = f"{DECLARABLE['version']}: {_version(facts)}"
+        version = facts.labeled("version").replace(": built-in", ": that of roboirgbench, below")
         yield item(name, f"computed {place}", version, *map(facts.labeled, keys))
     yield item(
         "simulation",
@@ -180,14 +171,6 @@ def _precision(results: Sequence[Summary], played: Played) -> Items:
     )
 
 
-def _version(facts: PlayedFacts) -> str:
-    found = facts.know("version")
-    if found != "built-in":
-        return found
-    is_unknown = facts.is_remote and "roboirg" not in facts.know("libraries")
-    return "part of roboirg" + f", whose version is {NOT_REPORTED} by the server" * is_unknown
-
-
 def _observations(results: Sequence[Summary], played: Played) -> Items:
     scenes = {(one.task, one.split, one.episode): one.demonstration_steps > 0 for one in results}
     blind = all(facts.need("cameras") == "none" for facts in played.values())
@@ -195,15 +178,16 @@ def _observations(results: Sequence[Summary], played: Played) -> Items:
     version = distinct(one.environment_version for one in results)
     yield item(
         "source",
-        f"simulated in SAPIEN by roboirg's own implementation of RoboMME's tasks, version {version}"
-        " of it",
-        f"meshes: {distinct(one.meshes for one in results)} (faithful: RoboMME's shapes)",
+        f"simulated in SAPIEN by roboirg's implementation (version {version}) of RoboMME's tasks",
+        f"meshes: {distinct(one.meshes for one in results)} (faithful are RoboMME's)",
         "not rendered, as no policy has a camera" if blind else f"rendered on {devices}",
         f"scenes with a video before the policy's turn: {sum(scenes.values())} of {len(scenes)}",
     )
     for name, facts in played.items():
         cameras = facts.need("cameras")
-        size = "" if cameras in ("none", NOT_RECORDED) else _SIZE
+        size = (
+            "" if cameras in ("none", NOT_RECORDED) else "; rendered and sent at 256 × 256 pixels"
+        )
         frames = facts.need("demonstration_frames")
         kind = ", the state of the robot without pictures" if cameras == "none" != frames else ""
         state = _STATES.get(facts.scheme or SERVER * facts.is_remote, f"{NOT_REPORTED} by roboirg")
@@ -225,14 +209,15 @@ def _instructions(results: Sequence[Summary], played: Played, said: ColumnTexts)
         splits = sorted({one.split for one in results if one.options.wordings == wordings})
         pools = [f"{pool_of(one, wordings)} pool for the split {one}" for one in splits]
         if wordings in (None, *POOLS):
-            listed = "the command `roboirg export instructions` writes each text and its templates"
+            listed = "the command `roboirg export instructions` lists texts and templates"
             yield item(label, "English", f"template set {versions}", listed, *pools)
         else:
             yield label, "commands of a file"
     used = {one.options.delivery for one in results}
     ways = OPTION_HELP["delivery"].rstrip(".").split("; ")
     yield item("delivery", *(way for way in ways if way.partition(":")[0] in used))
-    yield item("command templates", *_commands(said))
+    if any(one.commands for one in said.values()):
+        yield item("command templates", *_commands(said))
     for column in sorted(said, key=lambda one: (options_sort_key(one.options), one.arm)):
         yield column.label, _counts(said[column], is_fixed=column.arm in SILENT_TEXTS)
     for name, facts in played.items():
@@ -257,8 +242,7 @@ def _commands(said: ColumnTexts) -> Iterator[str]:
         len(every_task()[task].commands.wordings.of(pool)) for task in tasks for pool in pools
     )
     yield f"{len(used)} of the {there} in the pool for {counted(len(tasks), 'task')}, in the run"
-    yield "drawn by scene and number of colors in the goal, so that settings and arms share them"
-    yield "arms of paraphrases draw anew"
+    yield "drawn by scene and number of colors in the goal: settings share them, paraphrases do not"
     yield f"how many wordings apart from them could be drawn: {NOT_REPORTED} by roboirg"
 
 

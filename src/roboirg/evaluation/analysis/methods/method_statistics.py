@@ -60,9 +60,7 @@ def screening_items(jobs: Sequence[Job]) -> Items:
     tasks = list(dict.fromkeys(one.task for one in jobs))
     absent = [name for name in all_tasks() if name not in tasks]
     reason = (f"not played: {', '.join(absent)}", _NO_REASON) if absent else ("all there are",)
-    lacking = (
-        f"RoboMME also has {', '.join(LEFT_OUT)}, whose instructions hold no variable to refer to"
-    )
+    lacking = f"RoboMME also has {', '.join(LEFT_OUT)}, whose words hold no variable to refer to"
     yield item("tasks", ", ".join(tasks), *reason, lacking)
     splits, numbers = {split for _, split, _ in scenes}, sorted({number for *_, number in scenes})
     span = f"{numbers[0]} to {numbers[-1]}" if len(numbers) > 1 else numbers[0]
@@ -96,9 +94,8 @@ def _rejections(scenes: set[SceneName]) -> Iterator[str]:
     published = {one for one in scenes if is_published(*one)}
     if published:
         yield (
-            f"{counted(len(published), 'scene')}: RoboMME's published one, unchanged; roboirg "
-            "rejected no candidate for it; RoboMME's criteria and rejections: "
-            f"{NOT_REPORTED} by RoboMME"
+            f"{counted(len(published), 'scene')}: each is RoboMME's published one, unchanged; roboirg "
+            f"rejected no candidate for it; RoboMME's criteria, rejections: {NOT_REPORTED} by RoboMME"
         )
     shipped = {one for one in scenes - published if one[0] in shipped_splits() and one[1] in SPLITS}
     if shipped:
@@ -160,10 +157,9 @@ def sensitivity_items(families: Sequence[Family]) -> Items:
     """Yield each verdict, and what other analyses make of it."""
     yield item(
         "other analyses",
-        "each repeats the exact test and Holm's correction over the same contrasts",
-        "a verdict holds if it is the same again: higher, lower or open",
-        "unit task or rollout: the test swaps the sides in whole tasks, or in single rollouts",
-        "equal weights: it swaps scenes that count by their weight",
+        "exact test and Holm's correction are repeated; a verdict holds if it is the same again",
+        "what swaps sides in the test is a scene, with equal weights one that counts by its weight",
+        "with unit task a whole task, with unit rollout a single rollout",
     )
     for policy, kind, contrasts in families:
         if not contrasts:

@@ -163,22 +163,17 @@ def offers_for(contrasts: Sequence[Contrast]) -> tuple[Offer, ...]:
     processors = Counter(one.processor for one in results).most_common()
     has_errors = any(one.outcome == "error" for one in results)
     by_seed = [AnalysisChoice(f"seed {one}", keep=_only("policy_seed", one)) for one in seeds]
-    without = [AnalysisChoice(f"without {one}", keep=_without_task(one)) for one in tasks]
+    without = [
+        AnalysisChoice(f"without {one}", keep=_only("task", one, has=False)) for one in tasks
+    ]
     usual = [AnalysisChoice("one processor", keep=_only("processor", of)) for of, _ in processors]
     return (
         Offer([_ERRORS_FAIL], has_errors, "identical here: no error among what is compared"),
         Offer([*by_seed, _BY_ROLLOUT], len(seeds) > 1, "identical here: one policy seed"),
         Offer([_BY_TASK, *without], len(tasks) > 1, "not possible: one task"),
-        *(Offer([one], _weighs_anew(contrasts, one), _SAME_WEIGHTS) for one in _WEIGHTED),
+        Offer([_EQUAL_SUITES], _reweighs(contrasts, "suite"), _SAME_WEIGHTS),
+        Offer([_EQUAL_DIFFICULTIES], _reweighs(contrasts, "difficulty"), _SAME_WEIGHTS),
         Offer(usual[:1], len(processors) > 1, "identical here: one kind of processor"),
-    )
-
-
-def _weighs_anew(contrasts: Iterable[Contrast], choice: AnalysisChoice) -> bool:
-    pairs = ([*_units(one.first, one.second, "episode")] for one in contrasts)
-    return any(
-        not np.allclose(_weights(each, choice.weights), _weights(each, USUAL.weights))
-        for each in pairs
     )
 
 
@@ -192,19 +187,18 @@ def _errors_as_failures(results: Results) -> Results:
 _ERRORS_FAIL = AnalysisChoice("errors as failures", keep=_errors_as_failures)
 _BY_ROLLOUT = AnalysisChoice("unit rollout", unit="rollout")
 _BY_TASK = AnalysisChoice("unit task", unit="task")
-_WEIGHTED = (
-    AnalysisChoice("equal weights of suites", weights="suite"),
-    AnalysisChoice("equal weights of difficulties", weights="difficulty"),
-)
+_EQUAL_SUITES = AnalysisChoice("equal weights of suites", weights="suite")
+_EQUAL_DIFFICULTIES = AnalysisChoice("equal weights of difficulties", weights="difficulty")
 _SAME_WEIGHTS = "identical here: the same weights of scenes"
 
 
-def _only(name: str, value: object) -> Callable[[Results], Results]:
-    return lambda results: [one for one in results if getattr(one, name) == value]
+def _only(name: str, value: object, *, has: bool = True) -> Callable[[Results], Results]:
+    return lambda results: [one for one in results if (getattr(one, name) == value) is has]
 
 
-def _without_task(task: str) -> Callable[[Results], Results]:
-    return lambda results: [one for one in results if one.task != task]
+def _reweighs(contrasts: Iterable[Contrast], weighting: Weighting) -> bool:
+    pairs = ([*_units(one.first, one.second, "episode")] for one in contrasts)
+    return any(not np.allclose(_weights(of, weighting), _weights(of, "task")) for of in pairs)
 
 
 def _suite(task: str) -> str:
