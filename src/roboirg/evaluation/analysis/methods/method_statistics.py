@@ -94,8 +94,8 @@ def _rejections(scenes: set[SceneName]) -> Iterator[str]:
     published = {one for one in scenes if is_published(*one)}
     if published:
         yield (
-            f"{counted(len(published), 'scene')}: each is RoboMME's published one, unchanged; roboirg "
-            f"rejected no candidate for it; RoboMME's criteria, rejections: {NOT_REPORTED} by RoboMME"
+            f"{counted(len(published), 'scene')}: each RoboMME's published one, unchanged; roboirg "
+            f"rejected no candidate for it; criteria and rejections: {NOT_REPORTED} by RoboMME"
         )
     shipped = {one for one in scenes - published if one[0] in shipped_splits() and one[1] in SPLITS}
     if shipped:
