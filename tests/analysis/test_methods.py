@@ -16,7 +16,7 @@ from typer.testing import CliRunner
 from roboirg.core.errors import UnknownNameError
 from roboirg.core.inference_facts import InferenceFacts, inference_facts
 from roboirg.evaluation.analysis.methods.method_sections import make_sections
-from roboirg.evaluation.analysis.methods.method_text import FORMATS, write_methods
+from roboirg.evaluation.analysis.methods.method_text import FORMATS
 from roboirg.evaluation.analysis.methods.played_facts import NO_NETWORK, NOT_REPORTED
 from roboirg.evaluation.plan.plan import Plan
 from roboirg.evaluation.plan.stored_plans import write_plan
@@ -29,7 +29,7 @@ from roboirg.policies.by_name.policy_classes import BUILTIN
 
 HORIZON = "Horizon and control rate"
 STEPS = "step limit of a rollout"
-SECONDS = "wall-clock limits of the run's last plan"
+SECONDS = "wall-clock limits, in all plans of the run"
 CONTROL = "positive control, another policy that reads the simulator's state"
 ITEMS = {
     "Terms",
@@ -63,7 +63,7 @@ def sections(folder: Path, *records: Record) -> dict[str, dict[str, str]]:
     with RecordStore(folder) as store:
         for one in records:
             store.append(one)
-    return json.loads(write_methods(make_sections(folder), "json"))
+    return json.loads(FORMATS["json"](make_sections(folder)))
 
 
 def test_every_item_is_there_and_what_is_unknown_is_not_reported(tmp_path: Path) -> None:
@@ -100,7 +100,7 @@ def test_what_a_policy_declares_and_its_process_reports_is_there(tmp_path: Path)
     for word in (computed, parameters, "cuda:0", "torch 2.9", "3.12.1"):
         assert word in found["Precision of inference"]["mine"]
     assert (
-        "and whose pictures it was given: front, each 256 × 256 pixels as rendered"
+        "and whose pictures it was given: front; rendered and sent at 256 × 256 pixels"
         in found["Observations"]["mine"]
     )
     assert "resized to 224" in found["Observations"]["mine"]
@@ -118,25 +118,19 @@ def test_a_server_speaks_for_its_own_process(tmp_path: Path) -> None:
     text = found["Precision of inference"]["mine"]
     assert "computed by its server" in text
     assert "number type of the computation: float16" in text
-    assert f"versions of libraries: {NOT_REPORTED} by the server" in text
+    assert f"not reported): {NOT_REPORTED} by the server" in text
     assert f"version of the policy: {NOT_REPORTED} by the server" in text
     assert "3.11" not in text
     assert f"length of a chunk, as declared: {NOT_REPORTED} by the server" in found[HORIZON]["mine"]
 
 
-@pytest.mark.parametrize(
-    ("libraries", "version"),
-    [
-        ({"numpy": "2"}, f"part of roboirg, whose version is {NOT_REPORTED} by the server;"),
-        ({"roboirg": "0.1.0"}, "part of roboirg;"),
-    ],
-)
-def test_a_built_in_policy_has_the_version_of_its_package(
-    tmp_path: Path, libraries: dict[str, str], version: str
+def test_a_built_in_policy_that_is_served_has_a_name_and_the_version_of_its_package(
+    tmp_path: Path,
 ) -> None:
-    server = {"server": "localhost:8000", "version": "built-in", "libraries": libraries}
+    server = {"server": "localhost:8000", "version": "built-in", "policy": "random"}
     found = sections(tmp_path, record(0, policy_metadata=server))
-    assert version in found["Precision of inference"]["mine"]
+    text = found["Precision of inference"]["mine"]
+    assert "policy served: random; version of the policy: that of roboirgbench, below;" in text
 
 
 def test_an_episode_that_was_played_again_counts_once(tmp_path: Path) -> None:
@@ -152,8 +146,8 @@ def test_built_in_policies_have_no_network(tmp_path: Path, name: str) -> None:
     found = sections(tmp_path, record(0, policy_metadata=metadata))
     assert NO_NETWORK in found["Precision of inference"]["mine"]
     assert NO_NETWORK in found["Observations"]["mine"]
-    assert "reads the text: " in found["Instructions"]["mine"]
-    assert f"reads the text: {NOT_REPORTED}" not in found["Instructions"]["mine"]
+    assert "understands the text: " in found["Instructions"]["mine"]
+    assert f"understands the text: {NOT_REPORTED}" not in found["Instructions"]["mine"]
 
 
 def test_the_policy_behind_a_planner_does_not_speak_for_the_planner(tmp_path: Path) -> None:
@@ -197,7 +191,7 @@ def test_each_other_analysis_has_a_verdict_or_a_reason(tmp_path: Path) -> None:
         for scope in ("single tasks", "suites", "all tasks")
     )
     found = found["Sensitivity to analysis choices"]
-    assert found["mine, direct less explicit"] == (
+    assert found["mine, direct minus explicit"] == (
         "open; 3 paired scenes, with which uncorrected p is at least 0.25, so the verdict is open; "
         "does not hold in 1 of 4: unit rollout (lower)"
     )

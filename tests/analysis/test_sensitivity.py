@@ -53,7 +53,7 @@ def test_a_large_gap_holds_in_all(result) -> None:
         )
     ]
     (found,) = gaps(results)
-    assert (found.label, found.verdict) == ("direct less explicit", "lower")
+    assert (found.label, found.verdict) == ("direct minus explicit", "lower")
     assert not found.exceptions
     assert found.sentence == "holds in all 8 other analyses"
 
@@ -110,6 +110,11 @@ def test_only_choices_that_can_change_anything_are_tried(result) -> None:
     one_task = [*play(result, "1111"), *play(result, "0000", setting="direct")]
     assert not gaps(one_task)[0].others
     assert all(not one.differs for one in offers_for(gap_contrasts(one_task)))
+    offers = {of.choices[0].label: of.reason for of in offers_for(gap_contrasts(one_task))}
+    assert offers["unit task"] == "not possible: one task"
+    each_suite = [*one_task, *play(result, "1", task="VideoUnmask")]
+    each_suite += play(result, "0", task="VideoUnmask", setting="direct")
+    assert "equal weights of suites" not in [one.label for one in gaps(each_suite)[0].others]
     mixed = play(result, "1111", processor="a") + play(
         result, "0000", setting="direct", processor="a"
     )
@@ -156,7 +161,7 @@ def test_the_table_names_what_changes_a_verdict(result) -> None:
     table = make_sensitivity_table(RunData.of([("run", results)]))
     (row,) = table.rows
     words = dict(zip((one.name for one in table.columns), row.entries, strict=True))
-    assert row.name == "direct less explicit"
+    assert row.name == "direct minus explicit"
     assert words["verdict"].word == "lower"
     assert words["in other analyses"].word == (
         "does not hold in 2 of 3: unit task (open), without PickXtimes (open)"

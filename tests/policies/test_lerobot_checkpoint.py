@@ -15,7 +15,7 @@ def test_a_checkpoint_asks_for_its_own_cameras_and_sizes(tmp_path):
     one = write_checkpoint(tmp_path / "one", pictures(front=SQUARE), tokenizer_max_length=48)
     both = write_checkpoint(tmp_path / "both", pictures(wrist=[3, 256, 256], front=SQUARE))
     none = write_checkpoint(tmp_path / "none")
-    assert read_facts(str(one)) == ({"front": (96, 96)}, 48)
+    assert read_facts(str(one)) == ({"front": 96}, 48)
     assert policy_needs(f"lerobot://{one}").cameras == ("front",)
     assert policy_needs(f"lerobot://{both}").cameras == ("front", "wrist")
     assert policy_needs(f"lerobot://{none}").cameras == ()

@@ -84,10 +84,10 @@ def report(
 
 def _print_methods(folder: Path, name: str) -> None:
     from roboirg.evaluation.analysis.methods.method_sections import make_sections
-    from roboirg.evaluation.analysis.methods.method_text import FORMATS, write_methods
+    from roboirg.evaluation.analysis.methods.method_text import FORMATS
 
     known_names("format of a methods section", name, tuple(FORMATS))
-    typer.echo(write_methods(make_sections(folder), name), nl=False)
+    typer.echo(FORMATS[name](make_sections(folder)), nl=False)
 
 
 def _serve(folder: Path, port: int, against: str | None) -> None:

@@ -16,7 +16,7 @@ Word = Annotated[str, msgspec.Meta(max_length=100)]
 Words = Annotated[tuple[Word, ...], msgspec.Meta(max_length=20)]
 
 LIBRARIES = (
-    "roboirg",
+    "roboirgbench",
     "numpy",
     "torch",
     "jax",
@@ -29,7 +29,7 @@ LIBRARIES = (
 )
 """Distributions whose version is reported if the process has imported them."""
 
-_MODULES = {"google-genai": "google.genai"}
+_MODULES = {"google-genai": "google.genai", "roboirgbench": "roboirg"}
 _DEPTH = 5
 _MOST_OBJECTS = 200
 

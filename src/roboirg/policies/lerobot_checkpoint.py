@@ -17,8 +17,6 @@ _CONFIG = "config.json"
 _FILES = (_CONFIG, "model.safetensors", "policy_preprocessor.json", "policy_postprocessor.json")
 _TRAINED = ("pretrained_model", "last/pretrained_model", "checkpoints/last/pretrained_model")
 """Where lerobot-train puts a checkpoint, seen from the folders around it."""
-_AXES = 3
-"""Of a picture's shape: colors, height, width."""
 _HUB_ID = re.compile(r"\w[\w.-]*/\w[\w.-]*")
 
 
@@ -26,11 +24,11 @@ class CheckpointFacts(NamedTuple):
     """What a checkpoint takes.
 
     Attributes:
-        sizes: height and width of its pictures by camera, pixels; None where it says none.
+        sizes: width of its square pictures by camera, pixels; None where it declares no square.
         prompt_tokens: that it reads of a prompt; None if it says none.
     """
 
-    sizes: Mapping[str, tuple[int, int] | None]
+    sizes: Mapping[str, int | None]
     prompt_tokens: int | None = None
 
 
@@ -68,8 +66,8 @@ def read_facts(place: str) -> CheckpointFacts:
     )
 
 
-def picture_sizes(place: str, shapes: Mapping[str, object]) -> dict[str, tuple[int, int] | None]:
-    """Return height and width of the pictures that a checkpoint takes, by camera.
+def picture_sizes(place: str, shapes: Mapping[str, object]) -> dict[str, int | None]:
+    """Return the width of the square pictures that a checkpoint takes, by camera; else None.
 
     Args:
         place: of the checkpoint.
@@ -84,20 +82,15 @@ def picture_sizes(place: str, shapes: Mapping[str, object]) -> dict[str, tuple[i
             raise InvalidValueError(
                 f"The checkpoint {place!r} needs {name!r}; there are {', '.join((STATE, *names))}."
             )
-    found: dict[str, tuple[int, int] | None] = {}
-    for name, camera in names.items():
-        if name in shapes:
-            found[camera] = _picture_size(shapes[name])
-    return found
+    return {camera: _width(shapes[name]) for name, camera in names.items() if name in shapes}
 
 
-def _picture_size(shape: object) -> tuple[int, int] | None:
-    """Return height and width of a picture's shape (3, height, width), or None."""
-    if not isinstance(shape, list | tuple) or len(shape) != _AXES:
-        return None
-    _, height, width = shape
-    is_size = all(isinstance(one, int) and one > 0 for one in (height, width))
-    return (height, width) if is_size else None
+def _width(shape: object) -> int | None:
+    """Return the width of a square picture's shape (3, width, width), or None."""
+    match shape:
+        case [_, int(height), int(width)] if height == width > 0:
+            return width
+    return None
 
 
 def _local_config(place: str) -> Path | None:

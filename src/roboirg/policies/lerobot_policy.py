@@ -71,7 +71,7 @@ class LoadedCheckpoint(NamedTuple):
         model: LeRobot's policy.
         before: turns a batch into the model's inputs.
         after: turns the model's outputs into actions.
-        sizes: height and width of its pictures by camera; None where it says none.
+        sizes: width of its square pictures by camera; None where it declares no square.
         noise: shape of the noise that the model takes for each episode; None if it takes none.
         is_noiseless: whether it is known to draw none either.
         steps: actions of a chunk that are executed; None for all.
@@ -82,7 +82,7 @@ class LoadedCheckpoint(NamedTuple):
     model: Any
     before: Callable[[dict[str, Any]], dict[str, Any]]
     after: Callable[[Any], Any]
-    sizes: Mapping[str, tuple[int, int] | None]
+    sizes: Mapping[str, int | None]
     noise: tuple[int, int] | None = None
     is_noiseless: bool = False
     steps: int | None = None
@@ -223,7 +223,7 @@ class LeRobotPolicy:
         return loaded.model.predict_action_chunk(batch, **options)[:, : loaded.steps]
 
     def _batch(
-        self, sizes: Mapping[str, tuple[int, int] | None], observations: Sequence[Observation]
+        self, sizes: Mapping[str, int | None], observations: Sequence[Observation]
     ) -> dict[str, Any]:
         """Return observations in LeRobot's form: pictures (n, 3, H, W) in [0, 1]."""
         import torch
@@ -265,11 +265,9 @@ def _queue_length(model: Any) -> int:  # noqa: ANN401
     return len(queues.get("action", getattr(model, "_action_queue", ())))
 
 
-def _fit(picture: NDArray[np.uint8], size: tuple[int, int] | None) -> NDArray[np.uint8]:
+def _fit(picture: NDArray[np.uint8], width: int | None) -> NDArray[np.uint8]:
     """Return a picture in the size that a checkpoint says; as it is, if that is no square."""
-    if size is None or size[0] != size[1] or size == picture.shape[:2]:
-        return picture
-    return scaled_square(picture, size[0])
+    return picture if width in (None, len(picture)) else scaled_square(picture, width)
 
 
 @functools.cache
@@ -357,11 +355,13 @@ def _describe(config: Any, before: Sequence[str], after: Sequence[str]) -> dict[
         for name, one in (config.input_features or {}).items()
     ]
     found: dict[str, Any] = {
-        "preprocessing": f"the checkpoint declares the inputs {', '.join(inputs)}; of the pictures "
-        "given it is fed these alone, by roboirg resized to a declared square and scaled in "
-        "brightness to [0, 1], as in LeRobot's datasets; then the preprocessor that training "
-        f"saved with it is applied to all inputs, in the steps {', '.join(before) or 'none'}; its "
-        f"postprocessor is applied to the actions, in the steps {', '.join(after) or 'none'}"
+        "preprocessing": f"the checkpoint declares the inputs {', '.join(inputs)}; roboirg resizes "
+        "pictures from 256 × 256 pixels to the declared height and width, if these are another "
+        "square (whether training did likewise: not reported by the checkpoint), and scales their "
+        "brightness to [0, 1], the range in which LeRobot's datasets deliver pictures; then the "
+        "preprocessor that training saved with it is applied to all inputs, in the steps "
+        f"{', '.join(before) or 'none'}; its postprocessor is applied to the actions, in the steps "
+        f"{', '.join(after) or 'none'}"
     }
     tokenizers = [name for name in before if "tokenizer" in name]
     if tokenizers:

@@ -23,7 +23,7 @@ class OraclePolicy(ScriptedPolicy):
     listens: ClassVar[bool] = False
     metadata: ClassVar[Mapping[str, str]] = WORDLESS
 
-    def decide(self, env: RoboIRGEnv, instruction: str) -> Goal:  # noqa: ARG002
+    def decide(self, env: RoboIRGEnv, instruction: str) -> Goal | None:  # noqa: ARG002
         """Return the episode's goal; the instruction is ignored."""
         return env.episode.goal
 
@@ -42,28 +42,22 @@ class VariedOraclePolicy(OraclePolicy):
         return VariedPrimitives(env.session.world, MotionVariation.draw(rng), rng)
 
 
-class HabitPolicy(ScriptedPolicy):
+class HabitPolicy(OraclePolicy):
     """Executes the scene's own goal whatever is said, as a policy that knows its scenes by heart.
 
     It succeeds in every arm but ``other-goal``.
     """
-
-    listens: ClassVar[bool] = False
-    metadata: ClassVar[Mapping[str, str]] = WORDLESS
 
     def decide(self, env: RoboIRGEnv, instruction: str) -> Goal:  # noqa: ARG002
         """Return the scene's own goal."""
         return (env.original or env.episode).goal
 
 
-class PreviousGoalPolicy(ScriptedPolicy):
+class PreviousGoalPolicy(OraclePolicy):
     """Executes the goal of the episode before, as if the words of that one were still there.
 
     If the scene does not have that goal, it holds still.
     """
-
-    listens: ClassVar[bool] = False
-    metadata: ClassVar[Mapping[str, str]] = WORDLESS
 
     def decide(self, env: RoboIRGEnv, instruction: str) -> Goal | None:  # noqa: ARG002
         """Return the goal of the split's episode before this one, of the last before the first."""

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from roboirg.core.actions import ARM_JOINTS, JOINT_HIGH, JOINT_LOW
 from roboirg.core.observations import Demonstration, Observation
+from roboirg.policies.builtin.scripted import WORDLESS
 
 CHUNK = 16
 MAX_STEP = 0.045
@@ -22,8 +23,8 @@ class RandomPolicy:
 
     cameras: ClassVar[tuple[str, ...]] = ()
     metadata: ClassVar[Mapping[str, str]] = {
-        "network": "none",
-        "reads_text": "no, the text only seeds its random choices",
+        **WORDLESS,
+        "reads_text": "no, but the text and the policy seed start its random numbers",
     }
 
     def __init__(self, seed: int = 0) -> None:

@@ -29,10 +29,16 @@ LISTENING_STEPS = 5
 MAX_RETRIES = 3
 """Retries of failed primitives per episode."""
 
-WORDLESS: Mapping[str, str] = {"network": "none", "reads_text": "no"}
+WORDLESS: Mapping[str, str] = {
+    "network": "none",
+    "device": "processor of the machine of the simulation",
+    "trained_on": "none",
+    "reads_text": "no",
+}
 """Metadata of policies without networks that ignore what is said."""
 READING: Mapping[str, str] = {
-    "network": "none",
+    **WORDLESS,
+    "trained_on": "its rules are written for the words of both pools, train and test",
     "reads_text": "yes",
     "text_normalization": "lower case, split into words and punctuation",
 }

@@ -105,7 +105,7 @@ class WaypointExpert(OraclePolicy):
         self._primitives = _WaypointPrimitives(env.session.world)
         return self._primitives
 
-    def decide(self, env: RoboIRGEnv, instruction: str) -> Goal:
+    def decide(self, env: RoboIRGEnv, instruction: str) -> Goal | None:
         """Return the episode's goal; the instruction is ignored."""
         self._gripper, self._stalled, self._missed, self._waits = OPEN, None, None, 0
         self._rng = np.random.default_rng((env.episode.seed, self.seed))

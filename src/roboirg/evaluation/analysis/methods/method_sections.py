@@ -15,16 +15,9 @@ from roboirg.core.arms import ARMS, OTHER_GOAL, PARAPHRASE, SILENT_TEXTS, paraph
 from roboirg.core.instruction_options import OPTION_HELP
 from roboirg.core.plain_text import counted
 from roboirg.core.word_pools import POOLS, pool_of
-from roboirg.evaluation.analysis.methods.method_statistics import (
-    control_items,
-    error_items,
-    screening_items,
-    sensitivity_items,
-    statistics_items,
-)
+from roboirg.evaluation.analysis.methods import method_statistics
 from roboirg.evaluation.analysis.methods.method_text import Sections
 from roboirg.evaluation.analysis.methods.played_facts import (
-    DECLARABLE,
     FIXED,
     NO_NETWORK,
     NOT_RECORDED,
@@ -41,7 +34,7 @@ from roboirg.evaluation.analysis.stats.option_labels import options_sort_key
 from roboirg.evaluation.analysis.stats.run_data import RunData
 from roboirg.evaluation.analysis.stats.sensitivity import families_of
 from roboirg.evaluation.plan.plan import Plan
-from roboirg.evaluation.plan.stored_plans import read_plan
+from roboirg.evaluation.plan.stored_plans import read_earlier_plans, read_plan
 from roboirg.evaluation.policy_calls import SERVER
 from roboirg.evaluation.records.record import DEFAULT_MAX_STEPS, Job, Summary
 from roboirg.evaluation.records.store import iterate_records, read_results
@@ -79,19 +72,20 @@ def make_sections(folder: Path) -> Sections:
     newest = (one for one in iterate_records(folder) if (one.slug, one.started_at) in kept)
     played, said = read_facts(newest)
     families = [*families_of(data)]
+    plans = (*filter(None, [plan]), *read_earlier_plans(folder))
     jobs = planned or [one.identity for one in results]
     return {
         "Terms": dict(_terms(jobs)),
-        "Horizon and control rate": dict(_horizon(results, plan, played)),
+        "Horizon and control rate": dict(_horizon(results, plans, played)),
         "Precision of inference": dict(_precision(results, played)),
         "Observations": dict(_observations(results, played)),
         "Instructions": dict(_instructions(results, played, said)),
         "Use of the words in training": dict(_training(played, said)),
-        "Screening of scenes": dict(screening_items(jobs)),
-        "Statistics": dict(statistics_items(data, families)),
-        "Sensitivity to analysis choices": dict(sensitivity_items(families)),
-        "Controls and floors": dict(control_items(data, jobs)),
-        "Seeds, retries and errors": dict(error_items(results, data, played)),
+        "Screening of scenes": dict(method_statistics.screening_items(jobs)),
+        "Statistics": dict(method_statistics.statistics_items(data, families)),
+        "Sensitivity to analysis choices": dict(method_statistics.sensitivity_items(families)),
+        "Controls and floors": dict(method_statistics.control_items(data, jobs)),
+        "Seeds, retries and errors": dict(method_statistics.error_items(results, data, played)),
     }
 
 
@@ -105,7 +99,7 @@ def _terms(jobs: Sequence[Job]) -> Items:
         yield f"arm {arm}", ARMS[PARAPHRASE if paraphrase_number(arm) else arm]
 
 
-def _horizon(results: Sequence[Summary], plan: Plan | None, played: Played) -> Items:
+def _horizon(results: Sequence[Summary], plans: Sequence[Plan], played: Played) -> Items:
     limits = {one.max_steps for one in results}
     has_other = any(one.arm == OTHER_GOAL for one in results)
     both = " (arm other-goal: and that on the scene's own goal)" * has_other
@@ -118,12 +112,12 @@ def _horizon(results: Sequence[Summary], plan: Plan | None, played: Played) -> I
     )
     fields = {"call of the policy": "policy_timeout_s", "rollout": "episode_timeout_s"}
     waits = [
-        _limit(f"s per {what}", [getattr(plan, name)], Plan.model_fields[name].default)
-        for what, name in fields.items()
-        if plan
+        _limit(f"s per {what}", {getattr(of, key) for of in plans}, Plan.model_fields[key].default)
+        for what, key in fields.items()
+        if plans
     ]
     yield item(
-        "wall-clock limits of the run's last plan",
+        "wall-clock limits, in all plans of the run",
         *(waits or [f"{NOT_REPORTED}, as the run has no plan"]),
         "a rollout that exceeds one ends in an error",
     )
@@ -163,9 +157,10 @@ def _action_space(name: str) -> str:
 
 def _precision(results: Sequence[Summary], played: Played) -> Items:
     for name, facts in played.items():
-        place = "by its server" if facts.is_remote else "on the machine of the simulation"
+        served = f"by its server; {facts.labeled('policy')}"
+        place = served if facts.is_remote else "on the machine of the simulation"
         keys = ("dtype", "parameter_dtype", "device", "libraries", "python")
-        version = f"{DECLARABLE['version']}: {_version(facts)}"
+        version = facts.labeled("version").replace(": built-in", ": that of roboirgbench, below")
         yield item(name, f"computed {place}", version, *map(facts.labeled, keys))
     yield item(
         "simulation",
@@ -176,27 +171,23 @@ def _precision(results: Sequence[Summary], played: Played) -> Items:
     )
 
 
-def _version(facts: PlayedFacts) -> str:
-    found = facts.know("version")
-    if found != "built-in":
-        return found
-    is_unknown = facts.is_remote and "roboirg" not in facts.know("libraries")
-    return "part of roboirg" + f", whose version is {NOT_REPORTED} by the server" * is_unknown
-
-
 def _observations(results: Sequence[Summary], played: Played) -> Items:
+    scenes = {(one.task, one.split, one.episode): one.demonstration_steps > 0 for one in results}
     blind = all(facts.need("cameras") == "none" for facts in played.values())
     devices = distinct(one.render_device for one in results)
     version = distinct(one.environment_version for one in results)
     yield item(
         "source",
-        f"simulated by roboirg in SAPIEN, environment version {version}",
-        f"{distinct(one.meshes for one in results)} meshes",
+        f"simulated in SAPIEN by roboirg's implementation (version {version}) of RoboMME's tasks",
+        f"meshes: {distinct(one.meshes for one in results)} (faithful are RoboMME's)",
         "not rendered, as no policy has a camera" if blind else f"rendered on {devices}",
+        f"scenes with a video before the policy's turn: {sum(scenes.values())} of {len(scenes)}",
     )
     for name, facts in played.items():
         cameras = facts.need("cameras")
-        size = "" if cameras in ("none", NOT_RECORDED) else ", each 256 × 256 pixels as rendered"
+        size = (
+            "" if cameras in ("none", NOT_RECORDED) else "; rendered and sent at 256 × 256 pixels"
+        )
         frames = facts.need("demonstration_frames")
         kind = ", the state of the robot without pictures" if cameras == "none" != frames else ""
         state = _STATES.get(facts.scheme or SERVER * facts.is_remote, f"{NOT_REPORTED} by roboirg")
@@ -205,7 +196,7 @@ def _observations(results: Sequence[Summary], played: Played) -> Items:
             f"cameras that it declares to need, and whose pictures it was given: {cameras}{size}",
             f"depth: {facts.need('depth')}",
             f"state of the robot given to it: {state}",
-            f"frames of the video before its turn, given to it: {frames}{kind}",
+            f"frames of that video which it takes: {frames}{kind}",
             f"reads the simulator's state: {'yes' if facts.is_privileged else 'no'}",
             facts.labeled("preprocessing"),
         )
@@ -218,13 +209,15 @@ def _instructions(results: Sequence[Summary], played: Played, said: ColumnTexts)
         splits = sorted({one.split for one in results if one.options.wordings == wordings})
         pools = [f"{pool_of(one, wordings)} pool for the split {one}" for one in splits]
         if wordings in (None, *POOLS):
-            listed = f"template set {versions}, written out by roboirg export instructions"
-            yield item(label, "English", listed, *pools)
+            listed = "the command `roboirg export instructions` lists texts and templates"
+            yield item(label, "English", f"template set {versions}", listed, *pools)
         else:
             yield label, "commands of a file"
     used = {one.options.delivery for one in results}
     ways = OPTION_HELP["delivery"].rstrip(".").split("; ")
     yield item("delivery", *(way for way in ways if way.partition(":")[0] in used))
+    if any(one.commands for one in said.values()):
+        yield item("command templates", *_commands(said))
     for column in sorted(said, key=lambda one: (options_sort_key(one.options), one.arm)):
         yield column.label, _counts(said[column], is_fixed=column.arm in SILENT_TEXTS)
     for name, facts in played.items():
@@ -235,16 +228,22 @@ def _counts(said: SaidTexts, *, is_fixed: bool) -> str:
     texts = counted(len(said.texts), "distinct text")
     if not said.commands:
         return f"{texts}, " + ("fixed" if is_fixed else f"templates: {NOT_RECORDED}")
-    pools = {*POOLS} & {pool for _, pool in said.texts}
-    tasks = {task for task, _ in said.commands} & every_task().keys()
+    return (
+        f"{texts}; command templates: {len(said.commands)}; distinct wordings drawn apart from "
+        f"them (other utterances, single words, referring expressions): {len(said.choices)}"
+    )
+
+
+def _commands(said: ColumnTexts) -> Iterator[str]:
+    used = set().union(*(one.commands for one in said.values()))
+    pools = {*POOLS} & {pool for one in said.values() for _, pool in one.texts}
+    tasks = {task for task, _ in used} & every_task().keys()
     there = sum(
         len(every_task()[task].commands.wordings.of(pool)) for task in tasks for pool in pools
     )
-    return (
-        f"{texts}; command templates: {len(said.commands)} of the {there} in the pool for "
-        f"{counted(len(tasks), 'task')}; distinct random choices of other words and of referring "
-        f"expressions: {len(said.choices) or 'none'} used; possible: {NOT_REPORTED} by roboirg"
-    )
+    yield f"{len(used)} of the {there} in the pool for {counted(len(tasks), 'task')}, in the run"
+    yield "drawn by scene and number of colors in the goal: settings share them, paraphrases do not"
+    yield f"how many wordings apart from them could be drawn: {NOT_REPORTED} by roboirg"
 
 
 def _reading(facts: PlayedFacts) -> Iterator[str]:

@@ -35,7 +35,7 @@ from roboirg.evaluation.analysis.stats.sensitivity import (
 )
 from roboirg.evaluation.records.record import Job, Summary
 from roboirg.language import settings_of
-from roboirg.tasks import all_tasks, every_task
+from roboirg.tasks import LEFT_OUT, all_tasks, every_task
 from roboirg.tasks.splits.published_episodes import is_published
 from roboirg.tasks.splits.splits import SIZES, shipped_splits
 
@@ -44,8 +44,8 @@ SceneName = tuple[str, str, int]
 
 _NO_REASON = f"reason for this selection: {NOT_REPORTED} by the user who chose it"
 _GUESS = (
-    "success expected of a policy that moves perfectly but picks at random among the goals "
-    "compatible with the last utterance, or with the candidates named before it, if any"
+    "success expected of a policy that moves perfectly but picks at random among the goals that "
+    "fit the last utterance and, where candidates were named before it, are among them"
 )
 _FEW_SCENES = 2
 """Of a task; over so few a bootstrap means nothing."""
@@ -60,7 +60,8 @@ def screening_items(jobs: Sequence[Job]) -> Items:
     tasks = list(dict.fromkeys(one.task for one in jobs))
     absent = [name for name in all_tasks() if name not in tasks]
     reason = (f"not played: {', '.join(absent)}", _NO_REASON) if absent else ("all there are",)
-    yield item("tasks", ", ".join(tasks), *reason)
+    lacking = f"RoboMME also has {', '.join(LEFT_OUT)}, whose words hold no variable to refer to"
+    yield item("tasks", ", ".join(tasks), *reason, lacking)
     splits, numbers = {split for _, split, _ in scenes}, sorted({number for *_, number in scenes})
     span = f"{numbers[0]} to {numbers[-1]}" if len(numbers) > 1 else numbers[0]
     whole = len(tasks) * sum(SIZES[split] for split in SPLITS if split in splits)
@@ -93,8 +94,8 @@ def _rejections(scenes: set[SceneName]) -> Iterator[str]:
     published = {one for one in scenes if is_published(*one)}
     if published:
         yield (
-            f"{counted(len(published), 'scene')} published by RoboMME and used unchanged, none "
-            f"rejected by roboirg; RoboMME's criteria and rejections: {NOT_REPORTED} by RoboMME"
+            f"{counted(len(published), 'scene')}: each RoboMME's published one, unchanged; roboirg "
+            f"rejected no candidate for it; criteria and rejections: {NOT_REPORTED} by RoboMME"
         )
     shipped = {one for one in scenes - published if one[0] in shipped_splits() and one[1] in SPLITS}
     if shipped:
@@ -128,7 +129,7 @@ def statistics_items(data: RunData, families: Sequence[Family]) -> Items:
         f"disregard the bootstrap, for too few scenes, in: {', '.join(few) or 'no task'}",
     )
     yield item(
-        "differences to explicit",
+        f"{EXPLICIT_GAPS}, in arm told only",
         f"paired by scene, {test}, two-sided",
         f"verdict higher or lower than explicit if the corrected p is at most {ALPHA}; else open",
     )
@@ -154,6 +155,12 @@ def statistics_items(data: RunData, families: Sequence[Family]) -> Items:
 
 def sensitivity_items(families: Sequence[Family]) -> Items:
     """Yield each verdict, and what other analyses make of it."""
+    yield item(
+        "other analyses",
+        "exact test and Holm's correction are repeated; a verdict holds if it is the same again",
+        "what swaps sides in the test is a scene, with equal weights one that counts by its weight",
+        "with unit task a whole task, with unit rollout a single rollout",
+    )
     for policy, kind, contrasts in families:
         if not contrasts:
             yield f"{policy}, {kind}", "none played"
@@ -173,7 +180,7 @@ def sensitivity_items(families: Sequence[Family]) -> Items:
         yield item(
             f"{policy}, other analyses of {kind}",
             f"tried: {', '.join(tried) or 'none'}",
-            f"not tried, being identical here: {', '.join(rest) or 'none'}",
+            f"not tried: {', '.join(rest) or 'none'}",
         )
 
 

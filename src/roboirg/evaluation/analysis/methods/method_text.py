@@ -12,11 +12,6 @@ Sections = Mapping[str, Mapping[str, str]]
 """By heading, what is known of each item."""
 
 
-def write_methods(sections: Sections, name: str) -> str:
-    """Return the sections in one of `FORMATS`."""
-    return FORMATS[name](sections)
-
-
 def _markdown(sections: Sections) -> str:
     lines = ["# Methods"]
     for title, facts in sections.items():

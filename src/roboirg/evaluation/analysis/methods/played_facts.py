@@ -20,16 +20,17 @@ NO_NETWORK = "not applicable, as there is no neural network"
 
 DECLARABLE = {
     "network": "network",
+    "policy": "name of the policy served",
     "version": "version of the policy",
     "chunk": "length of a chunk, as declared",
     "execute": "actions returned of each chunk",
     "dtype": "number type of the computation",
     "parameter_dtype": "number type of the parameters",
     "device": "device of inference",
-    "libraries": "versions of libraries",
+    "libraries": "versions of libraries that its process had loaded (of any other: not reported)",
     "python": "version of Python",
     "preprocessing": "preprocessing, relative to training, as declared",
-    "reads_text": "reads the text",
+    "reads_text": "understands the text",
     "text_normalization": "what it does to the text",
     "trained_on": "words of the benchmark that it was trained on, or written for",
 }
@@ -183,10 +184,11 @@ def _tables(metadata: Mapping[str, Any]) -> Iterator[Mapping[str, Any]]:
 
     What a planner has for a network is not known from the policy behind it.
     """
-    yield metadata
-    behind = metadata.get("policy")
-    if isinstance(behind, Mapping):
+    own = dict(metadata)
+    if isinstance(behind := own.get("policy"), Mapping):
+        del own["policy"]
         yield {key: value for key, value in behind.items() if key != "network"}
+    yield own
 
 
 def _listed(values: Iterable[str]) -> str:

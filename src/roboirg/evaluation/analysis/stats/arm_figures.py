@@ -193,9 +193,10 @@ CONTRASTS = (
     ArmContrast("repeat", TOLD, AGAIN, _against(AGAIN)),
 )
 MEANING = (
-    "Language use: first, the share of scenes in which each of two goals was reached when "
-    "stated; second, the share in which the same goal was pursued whichever was stated. Words' "
-    "worth: success when told, then in silence. Order's worth: success when told, then with "
+    "Language use: first, the share of scenes in which each of two goals was reached when stated; "
+    "second, that in which the same goal was reached in both rollouts, whichever was stated; told "
+    "ends at its verdict, so there the other goal counts if the first wrong act agrees with it. "
+    "Words' worth: success when told, then in silence. Order's worth: success when told, then with "
     "scrambled words. Paraphrases: success in all of them, then their mean. Repeat: success when "
     "told, then with another policy seed."
 )

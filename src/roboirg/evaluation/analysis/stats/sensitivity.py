@@ -1,6 +1,6 @@
 """Whether a verdict depends on how results are analyzed.
 
-Each difference between two sides (a setting less explicit, one policy less another) is tested as
+Each difference between two sides (a setting minus explicit, one policy minus another) is tested as
 everywhere, and again under each other choice that an analyst could have made: what an error counts
 as, which seeds and machines, what a unit is, how tasks weigh. A verdict that changes rests on the
 choice.
@@ -159,20 +159,21 @@ def offers_for(contrasts: Sequence[Contrast]) -> tuple[Offer, ...]:
     """Return all choices other than the usual one that an analyst of these contrasts has."""
     results = [one for each in contrasts for side in (each.first, each.second) for one in side]
     tasks = task_order({one.task for one in results})
-    suites, difficulties = {_suite(task) for task in tasks}, {one.difficulty for one in results}
     seeds = sorted({one.policy_seed for one in results})
     processors = Counter(one.processor for one in results).most_common()
     has_errors = any(one.outcome == "error" for one in results)
     by_seed = [AnalysisChoice(f"seed {one}", keep=_only("policy_seed", one)) for one in seeds]
-    without = [AnalysisChoice(f"without {one}", keep=_without_task(one)) for one in tasks]
+    without = [
+        AnalysisChoice(f"without {one}", keep=_only("task", one, has=False)) for one in tasks
+    ]
     usual = [AnalysisChoice("one processor", keep=_only("processor", of)) for of, _ in processors]
     return (
-        Offer([_ERRORS_FAIL], has_errors, "no error among what is compared"),
-        Offer([*by_seed, _BY_ROLLOUT], len(seeds) > 1, "one policy seed"),
-        Offer([_BY_TASK, *without], len(tasks) > 1, "one task"),
-        Offer([_EQUAL_SUITES], len(suites) > 1, "one suite"),
-        Offer([_EQUAL_DIFFICULTIES], len(difficulties) > 1, "one difficulty"),
-        Offer(usual[:1], len(processors) > 1, "one kind of processor simulated all"),
+        Offer([_ERRORS_FAIL], has_errors, "identical here: no error among what is compared"),
+        Offer([*by_seed, _BY_ROLLOUT], len(seeds) > 1, "identical here: one policy seed"),
+        Offer([_BY_TASK, *without], len(tasks) > 1, "not possible: one task"),
+        Offer([_EQUAL_SUITES], _reweighs(contrasts, "suite"), _SAME_WEIGHTS),
+        Offer([_EQUAL_DIFFICULTIES], _reweighs(contrasts, "difficulty"), _SAME_WEIGHTS),
+        Offer(usual[:1], len(processors) > 1, "identical here: one kind of processor"),
     )
 
 
@@ -188,14 +189,16 @@ _BY_ROLLOUT = AnalysisChoice("unit rollout", unit="rollout")
 _BY_TASK = AnalysisChoice("unit task", unit="task")
 _EQUAL_SUITES = AnalysisChoice("equal weights of suites", weights="suite")
 _EQUAL_DIFFICULTIES = AnalysisChoice("equal weights of difficulties", weights="difficulty")
+_SAME_WEIGHTS = "identical here: the same weights of scenes"
 
 
-def _only(name: str, value: object) -> Callable[[Results], Results]:
-    return lambda results: [one for one in results if getattr(one, name) == value]
+def _only(name: str, value: object, *, has: bool = True) -> Callable[[Results], Results]:
+    return lambda results: [one for one in results if (getattr(one, name) == value) is has]
 
 
-def _without_task(task: str) -> Callable[[Results], Results]:
-    return lambda results: [one for one in results if one.task != task]
+def _reweighs(contrasts: Iterable[Contrast], weighting: Weighting) -> bool:
+    pairs = ([*_units(one.first, one.second, "episode")] for one in contrasts)
+    return any(not np.allclose(_weights(of, weighting), _weights(of, "task")) for of in pairs)
 
 
 def _suite(task: str) -> str:
@@ -325,7 +328,7 @@ def gap_contrasts(results: Results) -> tuple[Contrast, ...]:
     by_options = _by_options(results)
     explicit = by_options.pop(REFERENCE, [])
     return tuple(
-        Contrast(f"{options_label(options)} less explicit", by_options[options], explicit)
+        Contrast(f"{options_label(options)} minus explicit", by_options[options], explicit)
         for options in sorted(by_options, key=options_sort_key)
         if explicit
     )
