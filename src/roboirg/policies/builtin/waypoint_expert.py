@@ -218,7 +218,7 @@ class JointWaypointExpert(WaypointExpert):
 
     actions: ClassVar[str] = JOINT_ANGLE.name
 
-    def decide(self, env: RoboIRGEnv, instruction: str) -> Goal:
+    def decide(self, env: RoboIRGEnv, instruction: str) -> Goal | None:
         """Return the episode's goal; the instruction is ignored."""
         self._controller = WaypointController(env.session.world.robot)
         self._moves: Iterator[JointTrajectory] = iter(())
