@@ -14,24 +14,25 @@ setup: ## make .venv and a Vulkan driver, for playing and results; quick when no
 dev: ## the same, and what tests, lint and documentation need
 	@scripts/setup dev
 
-lint: style types ## ruff and mypy
+lint: style ## ruff and mypy
+	$(PYTHON) -m mypy
 
 style: dev
 	$(PYTHON) -m ruff check .
 	$(PYTHON) -m ruff format --check .
 
-types: dev
-	$(PYTHON) -m mypy
-
-# Two workers: every one that renders takes a core and 0.5 GiB. What the tests of a file make for
-# all of them is made once. tests/conftest.py has the order of the files; scripts/test_costs.py
-# reads the report.
-PYTEST = $(PYTHON) -m pytest -n 2 --dist loadfile --no-loadscope-reorder --junitxml build/$@.xml
+# More workers than cores, as many tests wait for processes; each has 0.5 GiB. What the tests of a
+# file make for all of them is made once. tests/conftest.py has the order of the files;
+# scripts/test_costs.py reads the report.
+PYTEST = $(PYTHON) -m pytest -n 3 --dist loadfile --no-loadscope-reorder --junitxml build/$@.xml
 
 test: style ## lint, and every test but the slow ones
 	@$(MAKE) --no-print-directory --jobs 2 types fast-tests
 
-fast-tests: dev
+types:
+	$(PYTHON) -m mypy
+
+fast-tests:
 	$(PYTEST) -m "not slow"
 
 test-slow: dev ## the slow tests alone

@@ -137,7 +137,7 @@ def test_the_command_prints_it_on_request(run: Path) -> None:
     assert "silent" not in said.output
     words = ["tables", str(run), "--which", "heard", "--floors", "chance"]
     refused = CliRunner().invoke(main.app, words)
-    assert "--which heard goes without --published" in str(refused.exception)
+    assert "--which heard excludes --published" in str(refused.exception)
 
 
 def test_the_page_says_what_was_cut() -> None:

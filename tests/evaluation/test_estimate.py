@@ -139,4 +139,4 @@ def test_calls_of_an_own_planner_are_not_known_and_a_sentence_says_why(tmp_path:
     specs = ("planner:not_there:Planner", "privileged:planner:not_there:Other", "not_there:Policy")
     own = [replace(one, policy=spec, spec=spec) for spec in specs for one in plan.jobs()]
     assert not model_costs(own, own, tmp_path)
-    assert [sentence.split(": calls")[0] for sentence in unknown_costs(own)] == list(specs[:2])
+    assert [sentence.split(": the number")[0] for sentence in unknown_costs(own)] == list(specs[:2])

@@ -52,5 +52,6 @@ def test_a_table_holds_every_field_of_every_record(tmp_path: Path) -> None:
 
 
 def test_a_file_that_cannot_be_written_is_one_sentence(tmp_path: Path) -> None:
+    (tmp_path / "file").touch()
     with pytest.raises(InvalidValueError, match="Cannot write"):
-        write_parquet([], tmp_path / "nowhere" / "x.parquet")
+        write_parquet([], tmp_path / "file" / "x.parquet")

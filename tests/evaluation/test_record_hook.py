@@ -102,7 +102,9 @@ def test_a_function_that_raises_is_called_no_more(tmp_path: Path) -> None:
     summary, warnings = play(tmp_path, hook)
     assert len(seen) == 2
     assert summary.played == summary.total > 2
-    assert [("KeyError" in one, "no more of this run" in one) for one in warnings] == [(True, True)]
+    assert [("KeyError" in one, "no more records of this run" in one) for one in warnings] == [
+        (True, True)
+    ]
 
 
 @pytest.mark.parametrize("text", ["", "no-such-program-here --x", "python 'open"])

@@ -162,7 +162,7 @@ def test_a_goal_or_task_without_a_command_is_told(tmp_path):
         ('name = "a"\n[StopCube]\ncommands = [{}]', "has a command with the text None"),
         ('name = "a"\n' + UNMASK, "has no phrases for the field {colors.0}"),
         ('name = "a"\n' + UNMASK.replace("colors.0", "colour"), "'colour'; known: color, "),
-        ('name = "a"\n' + UNMASK.replace("lift {", "lift {{"), "has a bracket that is no field"),
+        ('name = "a"\n' + UNMASK.replace("lift {", "lift {{"), "has a bracket that is not a field"),
         (
             'name = "a"\n'
             + UNMASK.replace("lift", "{visit} {visit}")

@@ -34,9 +34,9 @@ def test_a_taught_word_is_read_as_the_known_one() -> None:
 @pytest.mark.parametrize(
     ("word", "meaning", "sentence"),
     [
-        ("lift", "put", "knows the word 'lift' already"),
-        ("block", "box", "knows the word 'block' already"),
-        ("two", "three", "knows the word 'two' already"),
+        ("lift", "put", "already knows the word 'lift'"),
+        ("block", "box", "already knows the word 'block'"),
+        ("two", "three", "already knows the word 'two'"),
         ("hoist", "elevate", "'hoist' is to be read as 'elevate', a word that"),
     ],
 )

@@ -380,9 +380,9 @@ def test_answers_of_vlmevalkit_are_read(tmp_path):
         ('{"answer": {}}', 'an object with the "id"'),
         ('{"id": "g1", "answer": {}}', "no item 'g1'"),
         ('{"id": "ID"}', "has no reply and none of answer, choice, points"),
-        ('{"id": "ID", "kind": "poem", "reply": ""}', "kind is 'poem'; it is slots"),
+        ('{"id": "ID", "kind": "poem", "reply": ""}', "kind is 'poem'; it must be one of slots"),
         ('{"id": "ID", "choice": "A"}\n{"id": "ID", "choice": "B"}', "line 2: choice of item"),
-        ("", "there are none"),
+        ("", "the file holds no answers"),
     ],
 )
 def test_bad_files_are_one_sentence(tmp_path, line, words):

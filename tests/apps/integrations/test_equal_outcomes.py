@@ -14,7 +14,7 @@ from replay_table import (
     in_batches_of,
 )
 
-from roboirg.apps.integrations.lerobot.env_config import make_batch
+from roboirg.apps.integrations.lerobot.vector import make_batch
 from roboirg.evaluation.records.store import read_records
 
 pytestmark = pytest.mark.sim

@@ -160,7 +160,7 @@ def test_wrong_files_are_refused_in_a_sentence(tmp_path):
         import_results("inspect", tmp_path / "none.json", tmp_path / "run", OPTIONS)
     with pytest.raises(InvalidValueError, match="inspect log convert"):
         import_results("inspect", tmp_path / "a.eval", tmp_path / "run", OPTIONS)
-    with pytest.raises(InvalidValueError, match="'pusht' is not one of our groups"):
+    with pytest.raises(InvalidValueError, match="'pusht' is not a task group of this benchmark"):
         import_results("lerobot", lerobot_file(tmp_path, group="pusht"), tmp_path / "r", OPTIONS)
     many = lerobot_file(tmp_path, [True] * 51)
     with pytest.raises(InvalidValueError, match="VideoUnmask, test 0, more than once"):

@@ -125,8 +125,9 @@ def test_pandas_reads_it(tmp_path):
 
 
 def test_a_file_that_cannot_be_written_is_one_sentence(tmp_path):
+    (tmp_path / "file").touch()
     with pytest.raises(InvalidValueError, match="Cannot write"):
-        instruction_export.write_rows(rows()[:1], tmp_path / "nowhere" / "file.jsonl", "jsonl")
+        instruction_export.write_rows(rows()[:1], tmp_path / "file" / "file.jsonl", "jsonl")
 
 
 def test_without_pyarrow_one_sentence_says_what_to_do(monkeypatch):

@@ -148,7 +148,7 @@ def test_statuses_of_packs(tmp_path: Path) -> None:
     assert (packs / CHECKS_FILE).is_file()
     page = re.sub("<[^>]+>", "", render_board(found))
     assert "broken is not ranked: " in page
-    assert "empty-handed is not ranked: 1 record that belong to no plan in the pack" in page
+    assert "empty-handed is not ranked: 1 record outside every plan in the pack" in page
     run = run_of("p", 3, episodes=4)._replace(check=checks["empty-handed"])
     assert re.search(r'<b class="refuted">refuted</b>', render_board([run]))
 

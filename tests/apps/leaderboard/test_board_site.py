@@ -86,7 +86,7 @@ def test_a_page_shows_rates_floors_audit_verification_and_how_to_reproduce(site:
 
 def test_a_page_of_a_run_that_is_not_ranked_gives_the_reason_as_text(site: Path) -> None:
     page = (site / "entries" / "part.html").read_text()
-    assert "no: 1 record that belong to no plan in the pack" in page
+    assert "no: 1 record outside every plan in the pack" in page
     assert "<b>p</b>" not in page
 
 

@@ -92,7 +92,7 @@ class KeepsQueue(OneByOne):
         return self.queue.popleft()
 
 
-@planted("turns", "must be in the object", FAIL)
+@planted("turns", "keep what belongs to an episode in the object", FAIL)
 class KeepsInClass(Honest):
     count: ClassVar[list[int]] = []
 
@@ -118,7 +118,7 @@ class RemembersExplicitCommand(Honest):
         self.instruction = self.commands.get(self.memory, instruction)
 
 
-@planted("constant", "are the same one")
+@planted("constant", "actions of two episodes are the same")
 class ReadsPlaceholder(Honest):
     def act(self, observation):
         return np.tile(np.append(REST, 1.0), (ROWS, 1))
@@ -165,13 +165,13 @@ class CutsPromptAndDeclaresMore(Honest):
     prompt_tokens = 200
 
 
-@planted("pictures", "Other pictures of front and wrist have the same actions")
+@planted("pictures", "Other pictures of front and wrist lead to the same actions")
 class Blind(Honest):
     def see(self, observation):
         return pixels(np.zeros((256, 256, 3)), np.zeros((256, 256, 3)))
 
 
-@planted("pictures", "Other pictures of wrist have the same actions")
+@planted("pictures", "Other pictures of wrist lead to the same actions")
 class SeesFrontTwice(Honest):
     def see(self, observation):
         return pixels(observation["front_rgb"], observation["front_rgb"])
@@ -224,7 +224,7 @@ class TakesBytesForFloats(Honest):
         return pixels(*(255 * np.asarray(observation[name], float) for name in names))
 
 
-@planted("joint units", "if they are degrees", FAIL)
+@planted("joint units", "if read as degrees", FAIL)
 class AnswersInDegrees(Honest):
     def act(self, observation):
         actions = super().act(observation)
@@ -255,7 +255,7 @@ class AnswersChangesOfRows(Honest):
         return np.column_stack([np.diff(joints, axis=0), actions[:, 7]])
 
 
-@planted("jumps", "normalized form")
+@planted("jumps", "normalized targets were not scaled back")
 class ForgetsToDenormalize(Honest):
     def act(self, observation):
         actions = super().act(observation)

@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from functools import partial
 from typing import Any
 
-from gymnasium.vector import AsyncVectorEnv, AutoresetMode, SyncVectorEnv, VectorEnv
+from gymnasium.vector import VectorEnv
 from lerobot.configs import FeatureType, PolicyFeature
 from lerobot.envs.configs import EnvConfig
 from lerobot.envs.utils import _LazyAsyncVectorEnv
 
 from roboirg.apps.integrations.lerobot.sub_environment import STATE_SIZE, LeRobotSubEnvironment
+from roboirg.apps.integrations.lerobot.vector import make_batch, sub_environments
 from roboirg.core.actions import find_action_space
 from roboirg.core.errors import InvalidValueError
 from roboirg.core.instruction_options import (
@@ -23,8 +22,6 @@ from roboirg.core.instruction_options import (
 from roboirg.core.observations import CAMERAS
 from roboirg.envs.env_settings import MAX_STEPS
 from roboirg.policies.lerobot_features import SIZE
-
-MakeSubEnvironment = Callable[[], LeRobotSubEnvironment]
 
 
 @EnvConfig.register_subclass("roboirg")
@@ -119,33 +116,3 @@ class RoboIRGEnvConfig(EnvConfig):  # type: ignore[misc] # LeRobot has no types
 
 def _split(names: str) -> tuple[str, ...]:
     return tuple(name.strip() for name in names.split(",") if name.strip())
-
-
-def make_batch(
-    task: str, n_envs: int, use_async_envs: bool, options: Mapping[str, Any]
-) -> VectorEnv[Any, Any, Any]:
-    """Return a vector environment of one task, in processes of their own if `use_async_envs`.
-
-    Args:
-        task: name of the task.
-        n_envs: number of sub-environments.
-        use_async_envs: whether each has a process.
-        options: keyword arguments of `LeRobotSubEnvironment`.
-    """
-    makers = sub_environments(task, n_envs, options)
-    # LeRobot 0.4 reads successes from ``final_info`` alone, which no other mode has.
-    mode = AutoresetMode.SAME_STEP
-    if not use_async_envs or n_envs == 1:
-        return SyncVectorEnv(makers, autoreset_mode=mode)
-    # Spawned, because the threads of the renderer do not survive a fork.
-    vector = AsyncVectorEnv(makers, context="spawn", autoreset_mode=mode)
-    # LeRobot 0.4 looks at the first one for what it may ask all of them.
-    vector.envs = (makers[0](),) * n_envs  # type: ignore[attr-defined]
-    return vector
-
-
-def sub_environments(
-    task: str, n_envs: int, options: Mapping[str, Any]
-) -> list[MakeSubEnvironment]:
-    """Return functions that make the sub-environments."""
-    return [partial(LeRobotSubEnvironment, task, **options)] * n_envs
