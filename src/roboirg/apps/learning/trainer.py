@@ -106,7 +106,11 @@ class Trainer(Generic[One]):
             score: how good the network is now.
             kept: where the training is kept.
         """
-        parts = {"net": self._net, "optimizer": self._optimizer, "schedule": self._schedule}
+        parts: dict[str, Any] = {
+            "net": self._net,
+            "optimizer": self._optimizer,
+            "schedule": self._schedule,
+        }
         state = None if kept is None else load_unfinished(kept.path, kept.made_of)
         found: list[dict[str, float]] = []
         if state is not None and "found" in state:
