@@ -113,8 +113,8 @@ def part_options(
         changes: other options of `make_plan`; tasks do not change parts with tasks of their own.
     """
     given = read_plan_file(PARTS[part])
-    given |= {"forms": f"implicit,{RESOLVED}" if part == RESOLVED else "implicit"}
-    given |= {"policy_seeds": "0"}
+    given["forms"] = f"implicit,{RESOLVED}" if part == RESOLVED else "implicit"
+    given["policy_seeds"] = "0"
     if experiment.played and part != "context":
         given["settings"] = ",".join(experiment.played)
     if part in OWN_TASKS:

@@ -22,8 +22,7 @@ from roboirg.apps.learning.policy.paper_experiment import (
 )
 from roboirg.evaluation.analysis.published import TRIALS, PublishedRow, published_rows
 from roboirg.evaluation.analysis.stats.cells import Cells, gather
-from roboirg.evaluation.analysis.stats.intervals import SEED, Z_95, Interval
-from roboirg.evaluation.analysis.stats.option_labels import options_label
+from roboirg.evaluation.analysis.stats.intervals import ALPHA, SEED, Z_95, Interval
 from roboirg.evaluation.analysis.stats.paired_tests import Gap, Pairs, holm, measure_gap
 from roboirg.evaluation.analysis.stats.run_summary import ALL, SummaryRow, summarize
 from roboirg.evaluation.analysis.tables.paper_tables import Which, is_informative, make_table
@@ -31,6 +30,7 @@ from roboirg.evaluation.analysis.tables.rendering.markdown import markdown
 from roboirg.evaluation.records.record import Summary
 from roboirg.evaluation.records.store import read_results
 from roboirg.language.settings import EXPLICIT, plain_settings
+from roboirg.util.atomic_write import write_atomically
 
 PAGE = "paper.md"
 TABLES: tuple[Which, ...] = ("main", "context", "planner")
@@ -72,7 +72,7 @@ def write_paper_page(folder: Path) -> Path:
         if run.exists()
     }
     page = folder / PAGE
-    page.write_text(paper_text(found), encoding="utf-8")
+    write_atomically(page, paper_text(found))
     return page
 
 
@@ -127,18 +127,24 @@ def _table(
     """Return a table of differences; a star marks p at most 0.05 with Holm's correction by row."""
     columns = [{**ours(name), **published(name)} for name in settings]
     rows = list(dict.fromkeys(row for column in columns for row in column))
-    lines = [f"| row | {' | '.join(settings)} |", f"| --- |{' --- |' * len(settings)}"]
+    cells = {}
     for row in rows:
         own = [column.get(row) for column in columns]
         adjusted = iter(holm([one.p_value for one in own if one is not None]))
-        cells = ["–" if one is None else _difference_text(one, next(adjusted)) for one in own]
-        lines.append(f"| {row} | {' | '.join(cells)} |")
+        cells[row] = ["–" if one is None else _difference_text(one, next(adjusted)) for one in own]
     note = "\\* p ≤ 0.05 with Holm's correction over the row. In parentheses: 95 % intervals."
-    return "\n".join(lines) + f"\n\n{note}"
+    return f"{_grid(settings, cells)}\n\n{note}"
+
+
+def _grid(settings: Sequence[str], cells: Mapping[str, Sequence[str]]) -> str:
+    """Return a Markdown table of the cells of each row."""
+    lines = [f"| row | {' | '.join(settings)} |", f"| --- |{' --- |' * len(settings)}"]
+    lines += [f"| {row} | {' | '.join(own)} |" for row, own in cells.items()]
+    return "\n".join(lines)
 
 
 def _difference_text(one: Difference, p_value: float) -> str:
-    star = "\\*" if p_value <= 0.05 else ""  # noqa: PLR2004
+    star = "\\*" if p_value <= ALPHA else ""
     ends = "" if one.interval is None else " ({:+.0f} to {:+.0f})".format(*_percent(one.interval))
     return f"{100 * one.value:+.1f}{star}{ends}"
 
@@ -231,7 +237,7 @@ def _retention(averages: Sequence[SummaryRow], settings: Sequence[str]) -> str:
             ends = one.gap.retention_interval
             shown = "" if ends is None else " ({:.0f} to {:.0f})".format(*_percent(ends))
             text = f"{100 * one.gap.retention:.0f}{shown}"
-            kept.setdefault(one.policy_run.policy, {})[options_label(one.options)] = text
+            kept.setdefault(one.policy_run.policy, {})[one.options.setting] = text
     rows = {(one.model, one.options.setting): one for one in published_rows("main")}
     for system in SYSTEMS.values():
         for setting in settings:
@@ -240,9 +246,6 @@ def _retention(averages: Sequence[SummaryRow], settings: Sequence[str]) -> str:
             whole = explicit.average_over(tasks)
             if whole:
                 kept.setdefault(system, {})[setting] = f"{100 * own.average / whole:.0f}"
-    lines = [f"| row | {' | '.join(settings)} |", f"| --- |{' --- |' * len(settings)}"]
-    lines += [
-        f"| {row} | {' | '.join(own.get(name, '–') for name in settings)} |"
-        for row, own in kept.items()
-    ]
-    return "\n".join(lines)
+    return _grid(
+        settings, {row: [own.get(name, "–") for name in settings] for row, own in kept.items()}
+    )
