@@ -10,11 +10,13 @@ from roboirg.apps.learning.policy.paper_experiment import (
     PARTS,
     SYSTEMS,
     ExperimentPlan,
+    check_experiment,
     part_options,
     row_name,
     row_of,
 )
 from roboirg.apps.learning.policy.paper_page import paper_text
+from roboirg.core.errors import InvalidValueError
 from roboirg.evaluation.analysis.stats.cells import gather
 from roboirg.evaluation.plan.plan_maker import make_plan
 
@@ -92,3 +94,17 @@ def test_resolved_forms_are_compared_with_references(published_like):
     recovered = values(paper_text({"main": found}).split("\n## ")[-1], "small-none")
     lost = [100 - 21.2, 100 - 13.6, 100 - 17.3, 100 - 12.4]
     assert recovered == pytest.approx(lost, abs=0.2)
+
+
+@pytest.mark.parametrize(
+    ("changes", "named"),
+    [
+        ({"memories": ("perceptual",)}, "perceptual"),
+        ({"parts": ("side",)}, "side"),
+        ({"played": ("implied",)}, "implied"),
+        ({"memories": ("none", "framesamp")}, "memories are none, framesamp"),
+    ],
+)
+def test_a_wrong_name_ends_it_before_training(changes, named):
+    with pytest.raises(InvalidValueError, match=named):
+        check_experiment(ExperimentPlan(**changes))

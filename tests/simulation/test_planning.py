@@ -2,6 +2,8 @@
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from roboirg.core.actions import JOINT_HIGH, JOINT_LOW
@@ -128,6 +130,25 @@ def test_what_no_straight_line_reaches_is_reached_by_way_of_home(planner):
 
 def test_a_move_to_where_one_is_takes_no_time():
     assert time_parameterize(np.stack([HOME, HOME])).shape == (1, 7)
+
+
+@given(
+    exponent=st.floats(-7.0, -2.0),
+    direction=st.lists(st.floats(-1.0, 1.0), min_size=7, max_size=7).filter(any),
+)
+def test_every_short_move_has_a_timing(exponent, direction):
+    way = np.array(direction) / np.linalg.norm(direction) * 10.0**exponent
+    path = time_parameterize(np.stack([HOME, HOME + way]))
+    assert path[0] == pytest.approx(HOME)
+    assert path[-1] == pytest.approx(HOME + way, abs=1e-6)
+
+
+@pytest.mark.parametrize("tilt", [0.0, 1e-6, 1e-4])
+def test_to_stay_is_no_way_home(planner, tilt):
+    start = planner.plan_straight(HOME, ToolPose(np.array([-0.1, 0.0, 0.2]), DOWN))[-1]
+    place = planner.forward_kinematics(start)
+    goal = ToolPose(place.position + tilt, place.rotation)
+    assert len(planner.plan_move(start, goal)) <= 2
 
 
 @pytest.mark.parametrize(

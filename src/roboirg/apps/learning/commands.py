@@ -196,23 +196,18 @@ def learn_policy(
 
 def _play_paper(plan: PolicyPlan, words: PolicyWords, out: Path, workers: int) -> None:
     from roboirg.apps.learning.policy.paper_experiment import (
-        PARTS,
         ExperimentPlan,
+        check_experiment,
         part_options,
         run_of,
         train_rows,
     )
     from roboirg.apps.learning.policy.paper_page import write_paper_page
-    from roboirg.apps.learning.policy.policy_plan import MEMORY_NAMES
-    from roboirg.cli.names import known_name
     from roboirg.evaluation.api.python_run import play_plan
     from roboirg.evaluation.plan.plan_maker import make_plan
 
     experiment = ExperimentPlan(**words.choices(ExperimentPlan))
-    for memory in experiment.memories:
-        known_name("memory", memory, MEMORY_NAMES)
-    for part in experiment.parts:
-        known_name("part", part, tuple(PARTS))
+    check_experiment(experiment)
     files = train_rows(experiment, plan, out, workers, _print_tenths())
     changes = {"tasks": ",".join(plan.tasks)}
     changes |= {name: words.fields[name] for name in PLAYED if name in words.fields}

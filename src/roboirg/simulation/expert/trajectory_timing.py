@@ -28,6 +28,9 @@ WAYPOINT_SPACING = 0.1
 SMALLEST_JOINT_STEP = 1e-6
 GRID_INTERVALS = 10
 """Grid intervals between two waypoints."""
+PARAMETER_LENGTHS = (1.0, 0.1, 0.01, 0.001)
+"""Lengths of the spline's parameter, tried in turn: TOPP-RA finds no timing for many paths that are
+short compared with it, as those of a tool that stays where it is."""
 
 
 def time_parameterize(points: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -47,18 +50,21 @@ def time_parameterize(points: NDArray[np.float64]) -> NDArray[np.float64]:
         return points
     toppra = _toppra()
     limits = np.ones(ARM_JOINTS)
-    path = toppra.SplineInterpolator(np.linspace(0.0, 1.0, len(points)), points)
     constraints = [
         toppra.constraint.JointVelocityConstraint(limits * JOINT_SPEED_LIMIT),
         toppra.constraint.JointAccelerationConstraint(limits * JOINT_ACCELERATION_LIMIT),
     ]
-    # Limits hold at the grid points: every waypoint and nine points in between.
-    grid = np.linspace(0.0, 1.0, GRID_INTERVALS * (len(points) - 1) + 1)
-    solver = toppra.algorithm.TOPPRA(
-        constraints, path, gridpoints=grid, parametrizer="ParametrizeConstAccel"
-    )
-    trajectory = solver.compute_trajectory()
-    if trajectory is None:
+    for length in PARAMETER_LENGTHS:
+        path = toppra.SplineInterpolator(np.linspace(0.0, length, len(points)), points)
+        # Limits hold at the grid points: every waypoint and nine points in between.
+        grid = np.linspace(0.0, length, GRID_INTERVALS * (len(points) - 1) + 1)
+        solver = toppra.algorithm.TOPPRA(
+            constraints, path, gridpoints=grid, parametrizer="ParametrizeConstAccel"
+        )
+        trajectory = solver.compute_trajectory()
+        if trajectory is not None:
+            break
+    else:
         raise MotionPlanningError("No timing within the joint limits was found.")
     count = max(int(trajectory.duration / CONTROL_PERIOD), 2)
     return np.asarray(trajectory(np.linspace(0.0, trajectory.duration, count)))

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from pydantic import PositiveInt
 
-from roboirg.apps.learning.policy.policy_plan import PLANNERS, PolicyPlan
+from roboirg.apps.learning.policy.policy_plan import MEMORY_NAMES, PLANNERS, PolicyPlan
+from roboirg.cli.names import known_name, known_settings
 from roboirg.core.errors import InvalidValueError
 from roboirg.evaluation.plan.plan_file import read_plan_file
 
@@ -23,17 +24,17 @@ SYSTEMS: Mapping[str, str] = {
     "keyframes": "MemER",
 }
 """The paper's system with the mechanism of each memory."""
-MAIN, RESOLVED = "main", "resolved"
+MAIN, RESOLVED, PLANNER = "main", "resolved", "planner"
 PARTS: Mapping[str, str] = {
     MAIN: "paper",
     RESOLVED: "paper",
     "context": "paper-context",
-    "planner": "paper-planners",
+    PLANNER: "paper-planners",
 }
 """The packaged plan that each part of the experiment changes. Resolved forms join the main run."""
 HELD_OUT = "test"
 """The pool of words that is spoken in every split: that of the packaged plans' split."""
-OWN_TASKS = ("context", "planner")
+OWN_TASKS = ("context", PLANNER)
 """Parts with three tasks of their own."""
 SEED_MARK = "-seed"
 """Between the name of a row and a training seed other than 0."""
@@ -56,6 +57,24 @@ class ExperimentPlan(NamedTuple):
     seeds: PositiveInt = 1
     parts: tuple[str, ...] = tuple(PARTS)
     played: tuple[str, ...] = ()
+
+
+def check_experiment(experiment: ExperimentPlan) -> None:
+    """Check the names of an experiment, before hours are spent on it.
+
+    Raises:
+        InvalidValueError: there is no memory, part or setting of a name, or a part has no rows.
+    """
+    for memory in experiment.memories:
+        known_name("memory", memory, MEMORY_NAMES)
+    for part in experiment.parts:
+        known_name("part", part, tuple(PARTS))
+    known_settings(",".join(experiment.played) or "all")
+    if PLANNER in experiment.parts and not set(experiment.memories) & set(PLANNERS):
+        raise InvalidValueError(
+            f"The part 'planner' needs a memory with a planner ({' or '.join(PLANNERS)}), but the "
+            f"memories are {', '.join(experiment.memories)}; name one, or parts without 'planner'."
+        )
 
 
 def row_name(memory: str, seed: int = 0, change: str = "") -> str:
@@ -121,7 +140,7 @@ def part_options(
         changes = {name: one for name, one in changes.items() if name != "tasks"}
     if changes.get("split", given["split"]) != given["split"]:
         given["wordings"] = HELD_OUT
-    policies = _with_planners(experiment, files) if part == "planner" else _rows(files)
+    policies = _with_planners(experiment, files) if part == PLANNER else _rows(files)
     named = [f"{name}={spec}" for name, spec in policies.items()]
     return {**given, **changes, "policies": named}
 
