@@ -77,7 +77,7 @@ def test_a_page_shows_rates_floors_audit_verification_and_how_to_reproduce(site:
         assert f"<h2>{title}</h2>" in page
     words = " ".join(re.sub(r"<[^>]+>", " ", page).split())
     assert "ranked yes" in words
-    assert "unchecked: not checked" in words
+    assert "unchecked: not played again yet" in words
     assert "StopCube" in words
     assert "85.45" in words  # 16 of 110 are errors, which count as failures as on the board
     assert "prompt_tokens=N does" in words  # why there is no audit

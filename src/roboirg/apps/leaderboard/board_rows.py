@@ -224,7 +224,7 @@ def _by_policy_run(cells: Cells) -> dict[PolicyRun, dict[str, ScopeResults]]:
 
 def _status(check: PackCheck | None, *, needs_salt: bool) -> tuple[Status, str]:
     if check is None:
-        return "unchecked", "not checked" + ("; its salt is needed" if needs_salt else "")
+        return "unchecked", "not played again yet" + ("; its salt is needed" if needs_salt else "")
     if check.problem:
         return "refuted", f"does not hold: {check.problem}"
     if not check.played:

@@ -39,12 +39,13 @@ def entry_facts(run: PackedRun) -> list[tuple[str, str]]:
             continue
         shown = row if row.rates or row.private is None else row.private
         mark = " (privileged: reads the simulator's state)" if row.is_privileged else ""
-        facts += [
+        found = [
             ("policy", row.policy + mark),
             ("verification", f"{row.status}: {row.status_text}"),
             ("conditions", shown.conditions),
             ("episodes", f"{counted(shown.episodes, 'episode')}, {counted(row.seeds, 'seed')}"),
         ]
+        facts += [one for one in found if one not in facts]
     if run.check is not None:
         facts += [("pack, SHA-256", run.check.pack), ("checked with", run.check.versions)]
     return facts
