@@ -90,7 +90,7 @@ def instruct(
 def instruct_with(episode: Episode, options: InstructionOptions, variant: int = 0) -> Instruction:
     """Return the instruction of an episode; like `instruct`, with all options in one value.
 
-    Each `variant` draws its words anew; 0 is the one that is told.
+    Each `variant` draws its words anew; 0 is the usual one.
     """
     setting = get_setting(options.setting, get_task(episode.task))
     request = _request(episode, options, variant)

@@ -48,7 +48,7 @@ class TemplateSampler:
 
 
 def sampler_of(episode: Episode, variant: int = 0) -> TemplateSampler:
-    """Return the sampler of an episode; each variant draws its words anew, 0 is what is told."""
+    """Return the sampler of an episode; each variant draws its words anew, 0 is the usual one."""
     key = f"{DRAWS}|{episode.task}|{episode.seed}"
     return TemplateSampler(f"{key}|{variant}" if variant else key)
 

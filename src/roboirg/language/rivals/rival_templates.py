@@ -2,7 +2,7 @@
 
 A remark that chooses has a field for the value that is meant, ``{yes}``, and for the one that is
 not, ``{no}``. Within a kind and a pool as many remarks name the one first as the other, and equally
-many of both have *not* or *no*: then no single word, and no first or last pointer, tells which of
+many of both have *not* or *no*: then no single word, and no first or last pointer, shows which of
 the two is meant.
 """
 

@@ -32,7 +32,7 @@ _TIME = re.compile(r" now\b")
 """Said of the first of two things, it goes for both."""
 NO_LANDMARK = "no landmark singles out a target"
 LONGEST = {1: 12, 2: 6, 3: 5}
-"""The length that a landmark should have beside others, in `_length`; see `templates`."""
+"""The length that a landmark should have next to others, in `_length`; see `templates`."""
 
 
 def usable(

@@ -87,7 +87,7 @@ def names_of(record: Record) -> Mapping[str, str]:
 
 @functools.lru_cache(maxsize=1024)
 def _object_names(task: str, split: str, episode: int) -> Mapping[str, str]:
-    """Return words for each object; the end of its name tells those apart that sound alike."""
+    """Return words for each object; where two have the same, the end of their names is added."""
     scene = get_episode(task, split, episode).scene
     words = {
         one.name: _KINDS.get(one.kind) or describe_object(one.name, scene) for one in scene.objects

@@ -19,7 +19,7 @@ LONGEST_PAUSE_S = 60.0
 
 
 class PaidModel:
-    """Asks a model, unless the run has stored its reply; waits where the service says so.
+    """Asks a model, unless the run has stored its reply; waits when the service asks for it.
 
     Args:
         model: the connection.
