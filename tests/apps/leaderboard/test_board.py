@@ -16,7 +16,6 @@ from roboirg.apps.leaderboard.board_page import read_packs, render_board, write_
 from roboirg.apps.leaderboard.board_rows import BoardRow, PackedRun, board_rows
 from roboirg.apps.leaderboard.pack_checks import CHECKS_FILE, PackCheck, check_pack
 from roboirg.apps.leaderboard.packing import pack_run
-from roboirg.core.errors import InvalidValueError
 from roboirg.evaluation.analysis.published import published_rows
 from roboirg.language.settings import EXPLICIT
 from roboirg.tasks import ALL, find_tasks
@@ -117,11 +116,11 @@ def test_packs_of_private_episodes_are_checked_with_their_salt(
     made = record("p", "StopCube", 0, won=True, split=private)
     pack_run(store(tmp_path / "run", [made]), tmp_path / "p.roboirg.zip")
     monkeypatch.setenv(SALT_VARIABLE, "")
-    (found,) = read_packs(tmp_path, sample=0.0)
+    (found,) = read_packs(tmp_path, tmp_path / "site", sample=0.0)
     assert found.check is None
-    assert not (tmp_path / CHECKS_FILE).exists()
+    assert not (tmp_path / "site" / CHECKS_FILE).exists()
     use_salt("salt of the board's tests")
-    (found,) = read_packs(tmp_path, sample=0.0)
+    (found,) = read_packs(tmp_path, tmp_path / "site", sample=0.0)
     assert found.check is not None
 
 
@@ -139,13 +138,13 @@ def test_statuses_of_packs(tmp_path: Path) -> None:
     pack_run(run, packs / "empty-handed.roboirg.zip")
     (packs / "broken.roboirg.zip").write_bytes(b"no zip")
     with pytest.raises(Exception, match="not a packed run"):
-        read_packs(packs)
-    found = read_packs(packs, sample=1.0)
+        read_packs(packs, tmp_path / "site")
+    found = read_packs(packs, tmp_path / "site", sample=1.0)
     checks = {one.name: one.check for one in found}
     assert all(check is not None for check in checks.values())
     assert "not a packed run" in str(checks["broken"])
     assert "actions were not kept" in str(checks["empty-handed"])
-    assert (packs / CHECKS_FILE).is_file()
+    assert (tmp_path / "site" / CHECKS_FILE).is_file()
     page = re.sub("<[^>]+>", "", render_board(found))
     assert "broken is not ranked: " in page
     assert "empty-handed is not ranked: 1 record outside every plan in the pack" in page
@@ -158,17 +157,23 @@ def test_checks_are_remembered_until_the_pack_changes(
 ) -> None:
     pack = tmp_path / "a.roboirg.zip"
     pack_run(store(tmp_path / "a", [record("p", "StopCube", 0, won=True)]), pack)
-    first = check_pack(pack, sample=0.0, workers=0)
+    first = check_pack(pack, tmp_path / "site", sample=0.0, workers=0)
     monkeypatch.setattr("roboirg.apps.leaderboard.pack_checks.verify_run", None)
-    assert check_pack(pack, sample=0.0, workers=0) == first
+    assert check_pack(pack, tmp_path / "site", sample=0.0, workers=0) == first
     pack_run(store(tmp_path / "b", [record("q", "StopCube", 0, won=True)]), pack)
     with pytest.raises(TypeError):
-        check_pack(pack, sample=0.0, workers=0)
+        check_pack(pack, tmp_path / "site", sample=0.0, workers=0)
 
 
-def test_a_folder_without_packs_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(InvalidValueError, match="roboirg leaderboard pack"):
-        read_packs(tmp_path)
+def test_a_board_may_begin_with_the_published_rows_alone(tmp_path: Path) -> None:
+    assert "FrameS-Modul" in render_board(read_packs(tmp_path, tmp_path / "site"))
+
+
+@pytest.mark.parametrize(("played", "status"), [(6, "verified"), (5, "sampled"), (0, "unchecked")])
+def test_a_row_shows_whether_all_episodes_were_played_again(played: int, status: str) -> None:
+    run = run_of("a", 6)._replace(check=PackCheck("", "", 6, played))
+    (row,) = own(board_rows([run]))
+    assert row.status == status
 
 
 def test_what_a_pack_says_is_text() -> None:
@@ -227,7 +232,9 @@ def test_the_page_of_thirty_runs_sorts_and_filters_without_network(
 
 def packs_of(tmp_path: Path, run: Path) -> PackedRun:
     pack_run(run, tmp_path / "packs" / f"{run.name}.roboirg.zip")
-    return next(one for one in read_packs(tmp_path / "packs") if one.name == run.name)
+    return next(
+        one for one in read_packs(tmp_path / "packs", tmp_path / "site") if one.name == run.name
+    )
 
 
 def reword(run: Path, wordings: str) -> Path:

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import json
 import os
 import re
 import shutil
 import subprocess
 import sys
+from hashlib import sha256
 from html.parser import HTMLParser
 from pathlib import Path
 from typing import Any
@@ -20,13 +22,17 @@ from typer.testing import CliRunner, Result
 
 from roboirg.apps.leaderboard.board_page import read_packs, write_board
 from roboirg.apps.leaderboard.commands import add_commands
+from roboirg.apps.leaderboard.pack_checks import CHECKS_FILE, PackCheck
 from roboirg.apps.leaderboard.packing import pack_run
 from roboirg.apps.leaderboard.run_verification import Verification
+from roboirg.core.episode import ENVIRONMENT_VERSION
 from roboirg.core.errors import InvalidValueError
 from roboirg.evaluation.plan.plan_file import named_plans
+from roboirg.language import LANGUAGE_VERSION
 
 pytest.importorskip("jinja2")
 
+VERSIONS = f"environment {ENVIRONMENT_VERSION}, language {LANGUAGE_VERSION}"
 WORKFLOW = Path(__file__).parents[3] / ".github" / "workflows" / "submissions.yml"
 
 
@@ -55,7 +61,7 @@ def packs(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture(scope="module")
 def site(packs: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("site") / "new"
-    assert write_board(read_packs(packs), folder) == folder / "index.html"
+    assert write_board(read_packs(packs, folder), folder) == folder / "index.html"
     return folder
 
 
@@ -118,6 +124,8 @@ def test_a_submission_must_hold_and_be_ranked(packs: Path, monkeypatch: pytest.M
     assert (good.exit_code, good.output.splitlines()[-1]) == (0, "The board ranks it.")
     bad = verified(monkeypatch, whole, "--submission", missing=("an episode",))
     assert bad.exit_code == 2
+    assert "The board does not accept it" in bad.output
+    assert "ranks" not in bad.output
     unranked = verified(monkeypatch, part, "--submission")
     assert unranked.exit_code == 2
     assert "The board does not rank it: 1 record outside every plan" in unranked.output
@@ -150,10 +158,21 @@ def test_the_workflow_checks_what_a_pull_request_adds_and_builds_the_board(
     added = run("check new packs")
     assert added.returncode == 2, added.stderr
     assert "submission/packs/part.roboirg.zip" in added.stdout
-    assert "The board does not rank it" in added.stdout
+    assert "The board does not accept it" in added.stdout
     assert "whole" not in added.stdout
+    site = "board"
+    # What a submission says of its own verification is not read.
+    pack = tmp_path / "submission" / "packs" / "part.roboirg.zip"
+    forged = PackCheck(sha256(pack.read_bytes()).hexdigest(), VERSIONS, 1, 1)._asdict()
+    for place in (pack.parent, pack.parent / "site"):
+        place.mkdir(exist_ok=True)
+        (place / CHECKS_FILE).write_text(json.dumps({pack.name: forged}))
     assert run("build the board").returncode == 0
-    assert (tmp_path / "board" / "entries" / "part.html").is_file()
+    assert sorted(one.name for one in (tmp_path / site / "entries").iterdir()) == ["part.html"]
+    page = (tmp_path / site / "entries" / "part.html").read_text()
+    assert "all hold" not in page
+    (check,) = json.loads((tmp_path / site / CHECKS_FILE).read_text()).values()
+    assert "actions were not kept" in check["problem"]
 
 
 def test_the_workflow_runs_the_base_s_code_with_read_rights_only() -> None:

@@ -531,7 +531,7 @@ def test_a_board_names_what_is_no_pack(
     make: Callable[[Path], object], says: str, tmp_path: Path
 ) -> None:
     make(tmp_path / f"odd{PACK_SUFFIX}")
-    message = refusal(read_packs, tmp_path)
+    message = refusal(lambda path: read_packs(path, path / "site"), tmp_path)
     assert says in message
     assert f"odd{PACK_SUFFIX}" in message
 
@@ -542,7 +542,7 @@ def test_names_of_packs_do_not_get_into_the_page_as_they_are(name: bytes, run: P
     folder = run.parent / "packs"
     folder.mkdir()
     shutil.move(pack(run), os.fsencode(folder) + b"/" + name + PACK_SUFFIX.encode())
-    page = render_board(read_packs(folder))
+    page = render_board(read_packs(folder, folder / "site"))
     assert "\x1b" not in page
     assert "<script>alert(1)" not in page
     assert page.encode()
@@ -557,8 +557,10 @@ def test_remembered_checks_that_cannot_be_read_are_forgotten(
     make: Callable[[Path], object], run: Path
 ) -> None:
     path = pack(run)
-    make(path.parent / "checks.json")
-    (read,) = read_packs(path.parent)
+    site = path.parent / "site"
+    site.mkdir()
+    make(site / "checks.json")
+    (read,) = read_packs(path.parent, site)
     assert read.check is None
 
 

@@ -170,7 +170,7 @@ def cli() -> CliRunner:
 def test_the_command_tells_what_does_not_hold(honest: Path, tmp_path: Path, cli: CliRunner) -> None:
     good = cli.invoke(app, ["leaderboard", "verify", str(honest), "--sample", "10%"])
     assert good.exit_code == 0, good.output
-    assert "Everything holds." in good.output
+    assert "All that was checked holds." in good.output
     forged = tmp_path / "forged"
     shutil.copytree(honest, forged)
     assert forge(forged, FORGERIES["failure to success"], random.Random(0))
@@ -180,8 +180,11 @@ def test_the_command_tells_what_does_not_hold(honest: Path, tmp_path: Path, cli:
     assert json.loads(lines[0])["schema_version"] == 4
     assert "outcome: the record says 'success'; it should be 'failure'" in bad.output
     assert "1 thing does not hold." in bad.output
-    wrong = cli.invoke(app, ["leaderboard", "verify", str(honest), "--sample", "many"])
-    assert wrong.exit_code != 0
+    assert "the record says success, but not that the goal was reached" in bad.output
+    for share in ("many", "5", "0%", "101%", "nan"):
+        wrong = cli.invoke(app, ["leaderboard", "verify", str(honest), "--sample", share])
+        assert wrong.exit_code != 0
+        assert f"{share!r}; give one such as 5%" in str(wrong.exception)
 
 
 def test_a_repeated_run_shows_no_flip(honest: Path, tmp_path: Path, cli: CliRunner) -> None:

@@ -11,7 +11,6 @@ from roboirg.apps.leaderboard.board_rows import BoardRate, BoardRow, PackedRun, 
 from roboirg.apps.leaderboard.entry_tables import entry_facts, entry_tables
 from roboirg.apps.leaderboard.pack_checks import check_pack, read_check
 from roboirg.apps.leaderboard.packing import PACK_SUFFIX, opened_run
-from roboirg.core.errors import InvalidValueError
 from roboirg.core.plain_text import printable
 from roboirg.core.version import __version__
 from roboirg.evaluation.analysis.page.report import check_report_support
@@ -24,7 +23,6 @@ from roboirg.util.web.page_templates import template_environment
 
 BOARD_FILE = "index.html"
 ENTRIES = "entries"
-SITE = "site"
 
 
 class _Cell(NamedTuple):
@@ -39,6 +37,7 @@ class _Cell(NamedTuple):
 
 def read_packs(
     folder: Path,
+    site: Path,
     *,
     sample: float | None = None,
     workers: int = 0,
@@ -48,26 +47,21 @@ def read_packs(
 
     Args:
         folder: of the packs.
+        site: of the board, which keeps what was checked before.
         sample: share of the episodes to play again where that was not done before; None to check
             nothing.
         workers: number of processes that play.
         progress: is called with the number of packs that were read, and of all.
 
     Raises:
-        InvalidValueError: there are none.
         StoreError: one of them cannot be read, and nothing was to be checked.
     """
     paths = sorted(folder.glob(f"*{PACK_SUFFIX}"))
-    if not paths:
-        raise InvalidValueError(
-            f"There are no packed runs (*{PACK_SUFFIX}) in {folder}; make them with "
-            "`roboirg leaderboard pack`."
-        )
     packs = []
     for count, path in enumerate(paths, start=1):
-        check = read_check(path)
+        check = read_check(path, site)
         if sample is not None:
-            check = check_pack(path, sample=sample, workers=workers)
+            check = check_pack(path, site, sample=sample, workers=workers)
         if check is None or check.records:  # else it could not even be opened
             with opened_run(path) as run:
                 results, plans, why = read_results(run), read_plans(run), find_refusal(run)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -56,8 +57,10 @@ def verify(
         )
         refusal = find_refusal(folder) if submission else ""
     _print(found)
-    if submission:
+    if submission and found.holds:
         typer.echo(f"The board does not rank it: {refusal}." if refusal else "The board ranks it.")
+    elif submission:
+        typer.echo("The board does not accept it: what it says does not hold.")
     if refusal or not found.holds:
         sys.exit(USAGE_ERROR)
 
@@ -82,20 +85,20 @@ def pack(
 
 def board(
     folder: Annotated[str, typer.Argument(help="Folder of packed runs.", metavar="DIR")],
-    out: Annotated[Path | None, typer.Option(help="Folder to write.  (DIR/site)")] = None,
+    out: Annotated[Path, typer.Option(help="Folder to write; it also keeps what was verified.")],
     verify_share: Annotated[
         str | None,
         typer.Option(
             "--verify",
-            help="Share of the episodes to play again, such as 5%, of packs not verified yet.",
+            help="Share of the episodes to play again, such as 5%, of packs of which fewer were.",
         ),
     ] = None,
 ) -> None:
     """Make a static site of packed runs: the board, a page for each run, and the rules.
 
-    Example: roboirg leaderboard board packs --verify 5%
+    Example: roboirg leaderboard board packs --out site --verify 5%
     """
-    from roboirg.apps.leaderboard.board_page import SITE, read_packs, write_board
+    from roboirg.apps.leaderboard.board_page import read_packs, write_board
     from roboirg.evaluation.analysis.page.report import check_report_support
     from roboirg.util.processor import worker_count
 
@@ -104,21 +107,23 @@ def board(
     with progress_bar("packed runs") as show:
         packs = read_packs(
             path,
+            out,
             sample=None if verify_share is None else _share(verify_share),
             workers=worker_count(),
             progress=show,
         )
-    page = write_board(packs, out or path / SITE)
+    page = write_board(packs, out)
     typer.echo(f"{counted(len(packs), 'packed run')}: {page}")
 
 
 def _share(text: str) -> float:
     """Return a share such as 5% or 0.05."""
     number = text.strip().removesuffix("%")
-    try:
-        return float(number) / (100 if "%" in text else 1)
-    except ValueError:
-        raise InvalidValueError(f"--sample is {text!r}; give a share such as 5%.") from None
+    with contextlib.suppress(ValueError):
+        share = float(number) / (100 if "%" in text else 1)
+        if 0 < share <= 1:
+            return share
+    raise InvalidValueError(f"The share of episodes is {text!r}; give one such as 5%.")
 
 
 def _print(found: Verification) -> None:
@@ -151,7 +156,8 @@ def _print(found: Verification) -> None:
         typer.echo(f"… and {counted(len(found.checks) - _MOST_SHOWN, 'more record')}.")
     wrong = len(found.checks) + len(found.missing) + len(found.doubled)
     fails = f"{counted(wrong, 'thing')} {verb_for(wrong, 'do')} not hold."
-    typer.echo("Everything holds." if found.holds else fails)
+    all_hold = "Everything holds." if played == found.records else "All that was checked holds."
+    typer.echo(all_hold if found.holds else fails)
 
 
 def _print_some(what: str, slugs: tuple[str, ...]) -> None:

@@ -1,4 +1,4 @@
-"""Verify packed runs, and remember the result next to them."""
+"""Verify packed runs, and remember the result in the site, where no submission can put one."""
 
 from __future__ import annotations
 
@@ -42,18 +42,19 @@ class PackCheck(NamedTuple):
     problem: str = ""
 
 
-def check_pack(path: Path, *, sample: float, workers: int) -> PackCheck | None:
+def check_pack(path: Path, site: Path, *, sample: float, workers: int) -> PackCheck | None:
     """Verify a packed run, unless an equal or larger sample of the same file was checked before.
 
     None if it has private episodes whose salt is not known.
 
     Args:
-        path: of the file; the result is kept in `CHECKS_FILE` next to it.
+        path: of the file.
+        site: folder of the board, which keeps the result in `CHECKS_FILE`.
         sample: share of the episodes whose actions are played, 0 to 1.
         workers: number of processes; 0 uses this one only.
     """
     digest = _digest(path)
-    known = read_check(path, digest)
+    known = read_check(path, site, digest)
     if known is not None and (known.problem or known.played >= round(sample * known.records)):
         return known
     try:
@@ -63,13 +64,13 @@ def check_pack(path: Path, *, sample: float, workers: int) -> PackCheck | None:
         return None
     except RoboIRGError as error:
         found = PackCheck(digest, _versions(), 0, 0, str(error))
-    _remember(path, found)
+    _remember(path, site, found)
     return found
 
 
-def read_check(path: Path, digest: str | None = None) -> PackCheck | None:
-    """Return the remembered check of a packed run by these versions; None without one."""
-    kept = _kept(path.parent).get(path.name)
+def read_check(path: Path, site: Path, digest: str | None = None) -> PackCheck | None:
+    """Return the check of a packed run by these versions that a site keeps; None without one."""
+    kept = _kept(site).get(path.name)
     current = kept is not None and kept.versions == _versions()
     return kept if current and kept and kept.pack == (digest or _digest(path)) else None
 
@@ -101,10 +102,10 @@ def _kept(folder: Path) -> dict[str, PackCheck]:
     return {}
 
 
-def _remember(path: Path, found: PackCheck) -> None:
-    kept = {**_kept(path.parent), path.name: found}
+def _remember(path: Path, site: Path, found: PackCheck) -> None:
+    kept = {**_kept(site), path.name: found}
     text = json.dumps({name: kept[name]._asdict() for name in sorted(kept)}, indent=1)
-    write_atomically(path.parent / CHECKS_FILE, text + "\n")
+    write_atomically(site / CHECKS_FILE, text + "\n")
 
 
 def _digest(path: Path) -> str:

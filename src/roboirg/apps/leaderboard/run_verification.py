@@ -6,7 +6,7 @@ import functools
 import random
 from collections import Counter, defaultdict
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from roboirg.apps.leaderboard.record_check import (
@@ -18,6 +18,7 @@ from roboirg.apps.leaderboard.record_check import (
 from roboirg.core.errors import InvalidValueError, RoboIRGError
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.core.plain_text import counted
+from roboirg.evaluation.analysis.stats.option_labels import options_label
 from roboirg.evaluation.plan.stored_plans import kept_fingerprints, read_plans
 from roboirg.evaluation.records.record import Summary
 from roboirg.evaluation.records.record_codec import identity_key
@@ -133,11 +134,11 @@ def _completeness(
 ) -> tuple[tuple[str, ...], tuple[str, ...]]:
     """Return which episodes are missing, and notes about the plan."""
     plans = read_plans(folder)
-    missing = set(_holes(entries))
     made_by = {one.plan for one in entries if one.plan is not None}
     unknown = made_by - kept_fingerprints(folder)
-    missing |= {f"the plan {one}, by which episodes were played" for one in unknown}
+    missing = {f"the plan {one}, by which episodes were played" for one in unknown}
     jobs = {identity_key(job): job.slug for plan in plans for job in plan.jobs()}
+    missing |= set(_holes(one for one in entries if identity_key(one) not in jobs))
     there = {identity_key(one) for one in entries}
     missing |= {slug for key, slug in jobs.items() if key not in there}
     notes = []
@@ -174,7 +175,7 @@ def _holes_of_plan(entries: Iterable[Summary]) -> Iterator[str]:
             if not lacking or not _is_expressible(task, split, episode, options, arm):
                 continue
             for seed in sorted(lacking):
-                words = " ".join(map(str, (*asdict(options).values(), arm)))
+                words = f"{options_label(options)}, {arm}"
                 yield f"{policy} {task} {split}/{episode} ({words}), policy seed {seed}"
 
 
