@@ -12,6 +12,7 @@ import pytest
 import roboirg
 from roboirg.core.actions import check_chunk
 from roboirg.evaluation.analysis.published import published_rows
+from roboirg.evaluation.records.record import Record
 from roboirg.policies import Policy
 
 ROOT = Path(__file__).parent.parent
@@ -31,6 +32,12 @@ def test_links_lead_somewhere(page):
     for target in re.findall(r"\]\(([^)#]+)[^)]*\)", page.read_text()):
         if "://" not in target:
             assert (page.parent / target).exists(), target
+
+
+def test_the_page_of_the_record_names_every_key():
+    table = (ROOT / "docs" / "record.md").read_text().split("## In Python")[0]
+    keys = " ".join(line.split("|")[1] for line in table.splitlines() if line.startswith("| "))
+    assert set(re.findall(r"`(\w+)`", keys)) == {*Record.__struct_fields__, "schema_version"}
 
 
 def test_every_dependency_is_explained_once():
