@@ -51,7 +51,7 @@ docs: dev ## the documentation site, in build/site; a warning or dead link is an
 
 demo: setup ## the main job: three policies, every task and setting; ends with a table and a page
 	.venv/bin/roboirg run --plan demo --out runs/demo
-	.venv/bin/roboirg report runs/demo
+	@.venv/bin/roboirg report runs/demo >/dev/null && echo runs/demo/report.html
 
 card: dev ## write docs/language-card.md anew, after a change of words or episodes
 	$(PYTHON) scripts/write_language_card.py

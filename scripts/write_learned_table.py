@@ -24,6 +24,8 @@ ROOT = Path(__file__).parent.parent
 PAGE = ROOT / "docs" / "learned-policy.md"
 PACK = ROOT / "results" / "learned-policy-val.roboirg.zip"
 TABLE = re.compile(r"(?<=<!-- learned -->\n\n).*?(?=\n\n<!-- end of learned -->)", re.DOTALL)
+SMALLEST_P = 0.001
+"""Smaller ones are not printed."""
 MEMORY, WITHOUT = "small-recurrent", "small-none"
 
 
@@ -50,7 +52,7 @@ def table() -> str:
         alone = f"{one.overlap.only_first} : {one.overlap.only_second}"
         episodes = sorted({trial.episode for trial in cells[MEMORY, task].verdicts})
         guess = np.mean([silent_chance(task, "val", episode) for episode in episodes])
-        shown = "< 0.001" if p_value < 0.001 else f"{p_value:.3f}"
+        shown = "< 0.001" if p_value < SMALLEST_P else f"{p_value:.3f}"
         lines.append(f"| {task} | {first} | {second} | {alone} | {shown} | {100 * guess:.0f} |")
     sums = [sum((cells[row, task] for task in tasks), start=_Sum()) for row in (MEMORY, WITHOUT)]
     return "\n".join([*lines, f"| all | {sums[0]} | {sums[1]} | | | |"])

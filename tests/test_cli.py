@@ -313,7 +313,7 @@ def test_an_episode_is_shown(roboirg, tmp_path: Path, monkeypatch: pytest.Monkey
     said = roboirg("show", "VideoPlaceButton", "3", "--split", "val")
     assert (said.code, said.err) == (0, "")
     path = "VideoPlaceButton-val-3.png"
-    assert said.out.splitlines()[-2:] == ["the oracle explicit direct reasoning contextual", path]
+    assert said.out.splitlines()[-2:] == ["oracle: explicit direct reasoning contextual", path]
     words = " ".join(said.out.split())
     for told in ("VideoPlaceButton/val/3 hard, seed", "target_3", "change places", "that is: cube_",
                  "relation", "contextual", "resolved"):  # fmt: skip
@@ -325,7 +325,7 @@ def test_an_episode_is_shown(roboirg, tmp_path: Path, monkeypatch: pytest.Monkey
 def test_a_shown_episode_is_a_picture(roboirg, tmp_path: Path) -> None:
     said = roboirg("show", "PickXtimes", "0", "--out", tmp_path / "sheet.png")
     assert (said.code, said.err) == (0, "")
-    assert "the oracle success after " in said.out
+    assert "oracle: success after " in said.out
     for name in ("sheet.png", "sheet-dark.png"):
         assert (tmp_path / name).read_bytes().startswith(b"\x89PNG")
         assert str(tmp_path / name) in said.out

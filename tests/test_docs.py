@@ -11,9 +11,13 @@ import pytest
 
 import roboirg
 from roboirg.core.actions import check_chunk
+from roboirg.core.instruction_options import InstructionOptions
 from roboirg.evaluation.analysis.published import published_rows
-from roboirg.evaluation.records.record import Record
+from roboirg.evaluation.analysis.stats.chance import floor_level
+from roboirg.evaluation.records.record import Job, Record
+from roboirg.language import settings_of
 from roboirg.policies import Policy
+from roboirg.tasks import find_tasks, get_task
 
 ROOT = Path(__file__).parent.parent
 PAGES = sorted([*ROOT.glob("*.md"), *ROOT.glob("docs/*.md")])
@@ -90,14 +94,16 @@ def row_of(name: str, page: str = README) -> str:
 
 
 def test_readme_repeats_the_published_averages():
-    averages = {
-        row.options.setting: row.average
-        for row in published_rows("main")
-        if row.model == "FrameS-Modul"
-    }
+    rows = [row for row in published_rows("main") if row.model == "FrameS-Modul"]
+    averages = {row.options.setting: row.average for row in rows}
+    explicit = next(row for row in rows if row.options.setting == "explicit")
     kept = {name: float(one / averages["explicit"]) for name, one in averages.items()}
     assert f"succeeds in {averages['explicit']:.0f} %" in README
     assert f"{averages['reasoning']:.0f} % is left with reasoning" in README
+    spatial = next(row for row in rows if row.options.setting == "spatial")
+    same = explicit.average_over([name for name, rate in spatial.rates.items() if rate is not None])
+    assert f"covers 7 tasks: {spatial.average:.0f} %, next to {same:.0f} % explicit" in README
+    kept["spatial"] = float(spatial.average / same)
     assert 0.6 < kept.pop("direct") < 0.7
     assert all(share < 0.5 for name, share in kept.items() if name != "explicit")
 
@@ -129,6 +135,34 @@ def test_readme_s_results_are_those_of_their_pages():
         r"direct and contextual ([\d.]+), reasoning ([\d.]+), spatial ([\d.]+)", statistics
     ).groups()
     assert f"100 | {direct} | {reasoning} | {direct} | {spatial} |" in row_of("`forgetful` hears")
-    surface = row_of("`surface`", (ROOT / "docs" / "grounding.md").read_text())
-    rule = [float(one) for one in row_of("surface rule").strip("| ").split(" | ")[1:]]
-    assert rule == [float(one) for one in surface.strip("| ").split(" | ")[1:]]
+
+
+@pytest.mark.parametrize(
+    ("row", "floor"), [("surface rule", "surface"), ("`forgetful` h", "chance")]
+)
+def test_readme_s_exact_rates_are_the_program_s(row, floor):
+    rates = []
+    for setting in ("explicit", "direct", "reasoning", "contextual", "spatial"):
+        options = InstructionOptions(setting)
+        levels = [
+            floor_level(
+                floor,
+                (
+                    Job(policy="", task=name, split="test", episode=number, options=options)
+                    for number in range(50)
+                ),
+            )
+            for name in find_tasks(["all"])
+            if setting in settings_of(get_task(name))
+        ]
+        rates.append(round(100 * float(sum(levels) / len(levels)), 1))
+    assert [float(one) for one in row_of(row).strip("| ").split(" | ")[1:]] == rates
+
+
+def test_the_tasks_that_need_no_video_are_those_of_their_page():
+    page = (ROOT / "docs" / "own-checkpoint.md").read_text()
+    listed = re.search(r"Six are left: ([\w,\s]+)\.", page)[1]
+    rows = re.findall(
+        r"^\|[^|]*\| (\w+) \|[^|]*\| no \|$", (ROOT / "docs" / "tasks.md").read_text(), re.M
+    )
+    assert set(re.findall(r"[A-Z]\w+", listed)) == set(rows) & {*find_tasks(["all"])}

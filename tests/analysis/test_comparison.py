@@ -58,7 +58,7 @@ def test_an_open_comparison_says_what_it_would_take(result) -> None:
     words = text(play(result, GOOD, first), play(result, POOR, second))
     assert "explicit: no clear difference, −15.0 points" in words
     # mcnemar_power(5 unlike of 20): not even all 5 to one side are found in 4 of 5 cases.
-    assert "This many episodes show no gap in 80 % of cases" in words
+    assert "With so few episodes, no gap can be detected with 80 % power" in words
     needed = int(re.search(r"this size needs about (\d+)\.", words)[1])
     assert 80 <= needed <= 110  # by the normal approximation 7.85 · 0.25 / 0.15² = 87
 

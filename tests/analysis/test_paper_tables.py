@@ -162,12 +162,15 @@ def test_other_options_are_in_no_cell_and_named(result) -> None:
 def test_only_informative_tables_are_wanted(result) -> None:
     cells = gather([("run", whole(result, settings=("explicit", "contextual")))])
     assert is_informative("main", cells)
-    assert is_informative("coverage", cells)
-    assert not any(is_informative(one, cells) for one in ("planner", "context", "real"))
+    unwanted = ("coverage", "planner", "context", "real")
+    assert not any(is_informative(one, cells) for one in unwanted)
     short = whole(result, settings=("contextual",), stages=(1, 5))
     both = gather([("run", [*whole(result, settings=("contextual",)), *short])])
     assert is_informative("context", both)
-    assert is_informative("planner", gather([("run", [*whole(result), *whole(result, "b")])]))
+    two = [*whole(result), *whole(result, "b")]
+    assert not is_informative("planner", gather([("run", two)]))
+    two[0] = replace(two[0], policy_version="planner + scripted hands")
+    assert is_informative("planner", gather([("run", two)]))
     real = gather([("run", [result(task="PutInBox")])])
     assert is_informative("real", real)
     assert entries(make_table("real", real), "explicit")["Avg"].marks == "*"

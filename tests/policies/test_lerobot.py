@@ -37,7 +37,7 @@ def test_a_url_is_checked_without_loading(tmp_path):
 def test_without_lerobot_one_sentence_says_so(monkeypatch):
     monkeypatch.setitem(sys.modules, "lerobot", None)
     load.cache_clear()
-    with pytest.raises(MissingDependencyError, match="pip install lerobot"):
+    with pytest.raises(MissingDependencyError, match=r"Python 3\.12: see docs/training.md"):
         load("x/y", "cpu")
 
 

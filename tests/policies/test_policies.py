@@ -62,6 +62,13 @@ class Needy(Silent):
         self.weights, self.seed = weights, seed
 
 
+class OldReset(Silent):
+    """Has another signature."""
+
+    def reset(self):
+        pass
+
+
 class Numb(Silent):
     """Cannot be asked to act."""
 
@@ -83,6 +90,13 @@ def test_an_edited_policy_has_another_version(tmp_path, monkeypatch):
     assert policy_version("no_such_module:It") == "unknown"
 
 
+def test_a_missing_library_of_a_policy_comes_with_a_way_out(tmp_path, monkeypatch):
+    (tmp_path / "needing_policy.py").write_text("import no_such_library\n")
+    monkeypatch.syspath_prepend(tmp_path)
+    with pytest.raises(InvalidValueError, match="-m pip install no_such_library"):
+        load_policy_class("needing_policy:It")
+
+
 def test_own_policies_are_named_by_import_path():
     assert isinstance(make_policy(f"{__name__}:Silent", 0), Silent)
 
@@ -91,7 +105,14 @@ def test_own_policies_are_named_by_import_path():
     ("spec", "error", "words"),
     [
         ("orcale", UnknownNameError, "Did you mean 'oracle'"),
-        ("no_such_package.policy:It", InvalidValueError, "cannot be imported"),
+        ("no_such_package.policy:It", InvalidValueError, "cannot be imported .* modules in '"),
+        (f"{__name__}.Silent", InvalidValueError, f"name {__name__}:Silent"),
+        (f"{__name__}:Silnet", InvalidValueError, r"no class 'Silnet'; it has .*Silent"),
+        (
+            f"{__name__}:OldReset",
+            InvalidValueError,
+            r"OldReset\.reset\(self\) must take instruction and demonstration",
+        ),
         ("roboirg.policies.builtin.random_policy:Missing", InvalidValueError, "no class 'Missing'"),
         (f"{__name__}:Deaf", InvalidValueError, r"no method act\(\)"),
         ("roboirg.policies.builtin.random_policy:", InvalidValueError, "no class ''"),

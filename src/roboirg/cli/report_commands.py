@@ -265,23 +265,20 @@ def compare(
 
 
 def _tables(which: str, cells: Cells, *, published: bool, floors: str | None) -> list[Table]:
-    from roboirg.evaluation.analysis.published import RATE_TABLES
     from roboirg.evaluation.analysis.stats.chance import FLOORS
     from roboirg.evaluation.analysis.tables.diagnostic_tables import DIAGNOSTIC_TABLES, SUBGOALS
     from roboirg.evaluation.analysis.tables.paper_tables import WHICH, is_informative, make_table
 
     if which == _ALL:
         wanted: list[str] = [
-            one for one in WHICH if is_informative(one, cells) or (published and one in RATE_TABLES)
+            one for one in WHICH if is_informative(one, cells) or (published and one != "other")
         ]
     elif which in WHICH:
         wanted = [which]
     else:
         raise UnknownNameError("table", which, (*WHICH, *DIAGNOSTIC_TABLES, SUBGOALS, _ALL))
-    if which not in (_ALL, "coverage") and not published and not cells:
-        raise InvalidValueError(
-            f"The table {which!r} needs a run; give its folder, or --published."
-        )
+    if which != "coverage" and not published and not cells:
+        raise InvalidValueError("Tables need a run; give its folder, or --published.")
     added = () if floors is None else known_names("floor", floors, FLOORS)
     found = [make_table(one, cells, published=published, floors=added) for one in wanted]
     if which not in (_ALL, "coverage") and not found[0].rows:
@@ -406,4 +403,5 @@ def _split(text: str) -> tuple[str, str | None]:
     for place, sign in enumerate(text):
         if sign == ":" and Path(text[:place]).is_dir():
             return text[:place], text[place + 1 :]
-    return text, None
+    folder, _, policy = text.partition(":")
+    return folder, policy or None

@@ -32,7 +32,10 @@ Tasks = Annotated[
 ]
 Settings = Annotated[
     str | None,
-    _episodes(help="Settings, separated by commas; all for every setting of each task.  (all)"),
+    _episodes(
+        help="Settings, separated by commas; all for the five main ones, every for the "
+        "harder ones too.  (all)"
+    ),
 ]
 Forms = Annotated[
     str | None, _episodes(help="implicit, resolved, or both separated by a comma.  (implicit)")

@@ -16,6 +16,7 @@ import functools
 import inspect
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
@@ -286,8 +287,10 @@ def load(place: str, device: str, execute: int | None = None) -> LoadedCheckpoin
     try:
         return _load(place, device, execute)
     except ImportError as error:
+        kind = "" if Path(place).is_dir() else " (no folder here, so an id of the Hub)"
         raise MissingDependencyError(
-            f"lerobot:// needs LeRobot with PyTorch; run pip install lerobot ({error})."
+            f"{place!r}{kind} needs LeRobot 0.6 in an environment of its own with Python 3.12: see "
+            f"docs/training.md ({error})."
         ) from error
     except (OSError, ValueError) as error:
         if isinstance(error, InvalidValueError):

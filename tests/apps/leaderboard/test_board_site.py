@@ -20,6 +20,7 @@ import yaml
 from pack_runs import record, store, whole_run
 from typer.testing import CliRunner, Result
 
+from roboirg.apps.leaderboard.admission import ranked_plans
 from roboirg.apps.leaderboard.board_page import read_packs, write_board
 from roboirg.apps.leaderboard.commands import add_commands
 from roboirg.apps.leaderboard.pack_checks import CHECKS_FILE, PackCheck
@@ -27,7 +28,6 @@ from roboirg.apps.leaderboard.packing import pack_run
 from roboirg.apps.leaderboard.run_verification import Verification
 from roboirg.core.episode import ENVIRONMENT_VERSION
 from roboirg.core.errors import InvalidValueError
-from roboirg.evaluation.plan.plan_file import named_plans
 from roboirg.language import LANGUAGE_VERSION
 
 pytest.importorskip("jinja2")
@@ -104,7 +104,8 @@ def test_a_site_that_cannot_be_written_is_one_sentence(tmp_path: Path) -> None:
 
 def test_the_rules_name_every_plan(site: Path) -> None:
     page = (site / "rules.html").read_text()
-    assert all(name in page for name in named_plans())
+    assert all(name in page for name in ranked_plans())
+    assert not {"demo", "quick"} & {*ranked_plans()}
 
 
 def verified(monkeypatch: pytest.MonkeyPatch, *words: str, **found: Any) -> Result:

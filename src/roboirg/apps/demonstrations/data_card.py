@@ -117,6 +117,9 @@ def _count_lines(
 
 
 def _histogram(rows: NDArray[np.int64]) -> Iterator[str]:
+    if rows.min() == rows.max():
+        yield f"Each has {rows[0]} frames."
+        return
     counts, edges = np.histogram(rows, bins=_BINS)
     for count, low, high in zip(counts, edges, edges[1:], strict=False):
         bar = "#" * round(_BAR * count / counts.max())

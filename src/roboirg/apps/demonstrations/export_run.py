@@ -91,7 +91,7 @@ class ExportSummary(NamedTuple):
 
 def check_support(plan: ExportPlan) -> None:
     """Check early that the plan's format can be written."""
-    check_parquet_support()
+    check_parquet_support("demonstrations")
     if plan.format == "robomme-hdf5":
         check_hdf5_support()
 

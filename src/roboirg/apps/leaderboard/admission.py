@@ -43,6 +43,11 @@ class NamedEpisodes(NamedTuple):
     in_robommes_words: bool
 
 
+def ranked_plans() -> tuple[str, ...]:
+    """Return the names of the plans that the board ranks: all but those of a few episodes."""
+    return tuple(name for name in named_plans() if name not in ("demo", "quick"))
+
+
 def find_refusal(folder: Path) -> str:
     """Return why the board does not rank a run; empty if it does."""
     return refusal(read_results(folder), kept_fingerprints(folder))
@@ -82,12 +87,12 @@ def _run_refusal(played: Sequence[Summary]) -> str:
     parts = [f"{missing:,} missing"] * bool(missing) + [f"{more:,} not in it"] * bool(more)
     return (
         f"the episodes of {first.policy} do not make up a whole plan of "
-        f"{', '.join(named_plans())}; nearest is {name}: {' and '.join(parts)}"
+        f"{', '.join(ranked_plans())}; nearest is {name}: {' and '.join(parts)}"
     )
 
 
 def _plans(split: str, wordings: str | None) -> Iterator[tuple[str, NamedEpisodes]]:
-    for name in named_plans():
+    for name in ranked_plans():
         plan = _named(name, split)
         if is_robomme(wordings) if plan.in_robommes_words else wordings is None:
             yield name, plan

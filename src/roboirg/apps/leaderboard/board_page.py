@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
-from roboirg.apps.leaderboard.admission import find_refusal
+from roboirg.apps.leaderboard.admission import find_refusal, ranked_plans
 from roboirg.apps.leaderboard.board_rows import BoardRate, BoardRow, PackedRun, board_rows
 from roboirg.apps.leaderboard.entry_tables import entry_facts, entry_tables
 from roboirg.apps.leaderboard.pack_checks import check_pack, read_check
@@ -15,7 +15,6 @@ from roboirg.core.plain_text import printable
 from roboirg.core.version import __version__
 from roboirg.evaluation.analysis.page.report import check_report_support
 from roboirg.evaluation.analysis.stats.option_labels import setting_sort_key
-from roboirg.evaluation.plan.plan_file import named_plans
 from roboirg.evaluation.plan.stored_plans import read_plans
 from roboirg.evaluation.records.store import read_results
 from roboirg.util.atomic_write import write_atomically
@@ -78,7 +77,7 @@ def write_board(runs: Sequence[PackedRun], folder: Path) -> Path:
     """Write the site of packed runs into a folder; return its first page."""
     for run in runs:
         write_atomically(folder / ENTRIES / f"{run.name}.html", render_entry(run))
-    write_atomically(folder / "rules.html", _render("rules", plans=named_plans()))
+    write_atomically(folder / "rules.html", _render("rules", plans=ranked_plans()))
     write_atomically(folder / BOARD_FILE, render_board(runs))
     return folder / BOARD_FILE
 

@@ -132,7 +132,7 @@ def _print(found: Verification) -> None:
     played = found.records - found.verdicts[ReplayVerdict.NOT_REPLAYED]
     verb = verb_for(played, "were")
     typer.echo(
-        f"{counted(found.records, 'record')}; the actions of {played:,} {verb} played again."
+        f"{counted(found.records, 'record')}; {played:,} {verb} played again from stored actions."
     )
     typer.echo(f"End states equal bit for bit: {found.verdicts[ReplayVerdict.EXACT]:,}.")
     if tolerant := found.verdicts[ReplayVerdict.TOLERANT]:

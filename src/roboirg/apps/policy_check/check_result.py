@@ -20,7 +20,7 @@ class CheckResult(NamedTuple):
 
     Attributes:
         check: its name.
-        verdict: pass; fail for what is certainly wrong; warn for what a sound policy hardly does;
+        verdict: pass; fail for what is certainly wrong; warn for what a correct policy rarely does;
             note for what is allowed but worth knowing.
         message: what was seen, what it usually means, and what to change.
     """

@@ -31,6 +31,7 @@ from roboirg.core.errors import MissingDependencyError, RoboIRGError
 from roboirg.core.plain_text import counted, verb_for
 from roboirg.policies.by_name.loading import needs_host, planner_alone
 from roboirg.policies.contract.base import tell_policy
+from roboirg.policies.contract.batch_policy import BatchedEpisode
 from roboirg.policies.contract.policy_needs import PolicyNeeds
 
 
@@ -49,7 +50,8 @@ def check_loading(player: PolicyPlayer) -> Iterator[CheckResult]:
         raise CheckAbortedError(
             "loads", NOTE, "It is privileged: it needs a simulator, which is not available here."
         )
-    yield CheckResult("loads", PASS, f"{type(policy).__name__} was made with seed {player.seed}.")
+    name = player.source if isinstance(policy, BatchedEpisode) else type(policy).__name__
+    yield CheckResult("loads", PASS, f"{name} was made with seed {player.seed}.")
 
 
 def check_requirements(player: PolicyPlayer) -> Iterator[CheckResult]:

@@ -144,7 +144,11 @@ class PolicyPlayer:
                 seconds = time.perf_counter() - start
                 chunk = check_chunk(actions, self.space)
             except Exception as error:
-                raise CheckAbortedError(check, FAIL, f"act(): {describe_error(error)}") from error
+                keys = f" Observations have {', '.join(sorted(observation))}."
+                hint = keys if isinstance(error, KeyError) else ""
+                raise CheckAbortedError(
+                    check, FAIL, f"act(): {describe_error(error)}{hint}"
+                ) from error
             # A copy: a policy may reuse its array.
             rollout.chunks.append(chunk.copy())
             rollout.seconds.append(seconds)

@@ -98,7 +98,7 @@ def _draw(
         if not find_refusal(episode, one)
     ]
     verdict, paths = write_strip(episode, said, path)
-    console.print(f"[bold]the oracle[/] {verdict}", highlight=False)
+    console.print(f"[bold]oracle:[/] {verdict}", highlight=False)
     for one in paths:
         typer.echo(one)
 

@@ -181,7 +181,7 @@ class Results:
         return "\n".join(lines)
 
     def _repr_markdown_(self) -> str:
-        shown = [one for one in WHICH if one != "coverage" and is_informative(one, self.cells)]
+        shown = [one for one in WHICH if is_informative(one, self.cells)]
         return "\n".join(self.table(one, "markdown") for one in shown[:1]) or repr(self)
 
     @functools.cached_property

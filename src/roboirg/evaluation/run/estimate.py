@@ -77,7 +77,8 @@ def estimate_text(
         return tuple(lines)
     times = [_format_duration(seconds) for seconds in (found.least, found.most)]
     where = f"on {counted(workers, 'worker')}"
-    others = f"Playing the other {found.episodes:,} takes about"
+    which = "the other" if found.episodes < planned else "all"
+    others = f"Playing {which} {found.episodes:,} takes about"
     if not found.unknown:
         return (*lines, f"{others} {times[0]} {where}, as long as the stored ones.")
     basis = "measured just now" if speed.is_measured else "assumed, as nothing can be played here"
@@ -87,7 +88,7 @@ def estimate_text(
     )
     lines.append(
         f"A control step of the world takes {1000 * speed.step_s:.1f} ms ({basis}); policies and "
-        "videos take time in addition."
+        "videos take more. Policies were not run; roboirg check-policy checks their actions."
     )
     return tuple(lines)
 

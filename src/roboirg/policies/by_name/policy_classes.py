@@ -7,7 +7,8 @@ import importlib
 import importlib.util
 import inspect
 import pkgutil
-from collections.abc import Mapping
+import sys
+from collections.abc import Callable, Mapping
 from pathlib import Path, PurePath
 from types import ModuleType
 from typing import Any
@@ -22,7 +23,7 @@ from roboirg.policies.remote.protocols import protocols_by_scheme
 from roboirg.util.discovery import entry_names
 from roboirg.util.short_hash import short_hash
 
-_MAX_SHOWN = 3
+_MAX_SHOWN, _MAX_NAMED = 3, 20
 
 BUILTIN: Mapping[str, str] = {
     "oracle": "roboirg.policies.builtin.oracle_policy:OraclePolicy",
@@ -81,6 +82,11 @@ def _import_class(spec: str, methods: tuple[str, ...]) -> type[Any]:
     if spec not in BUILTIN and ":" not in spec:
         if (hint := _describe_module(spec)) is not None:
             raise InvalidValueError(f"Policy {spec!r} {hint}")
+        module_name, _, name = spec.rpartition(".")
+        if name.isidentifier() and module_name and _describe_module(module_name) is not None:
+            raise InvalidValueError(
+                f"Policy {spec!r} lacks the colon before its class; name {module_name}:{name}."
+            )
         raise UnknownNameError("policy", spec, [*BUILTIN, "package.module:Class", *_examples()])
     module_name, _, name = BUILTIN.get(spec, spec).partition(":")
     if module_name.endswith(".py") or "/" in module_name:
@@ -89,7 +95,11 @@ def _import_class(spec: str, methods: tuple[str, ...]) -> type[Any]:
         )
     module = _module(spec, module_name)
     if not hasattr(module, name):
-        raise InvalidValueError(f"Policy {spec!r}: module {module_name} has no class {name!r}.")
+        names = [key for key, one in vars(module).items() if inspect.isclass(one)]
+        raise InvalidValueError(
+            f"Policy {spec!r}: module {module_name} has no class {name!r}; "
+            f"it has {', '.join(names[:_MAX_NAMED]) or 'none'}."
+        )
     found = getattr(module, name)
     if not inspect.isclass(found):
         raise InvalidValueError(
@@ -136,6 +146,7 @@ def _check_class(spec: str, policy_class: type[Any], methods: tuple[str, ...]) -
             raise InvalidValueError(f"Policy {spec!r}: class {name} has no method {method}().")
         if not callable(getattr(policy_class, method)):
             raise InvalidValueError(f"Policy {spec!r}: {method} of class {name} is not a method.")
+        _check_arguments(spec, getattr(policy_class, method))
     if inspect.isabstract(policy_class):
         missing = sorted(policy_class.__abstractmethods__)
         raise InvalidValueError(
@@ -149,9 +160,23 @@ def _check_class(spec: str, policy_class: type[Any], methods: tuple[str, ...]) -
         if not optional and parameter.name != "seed":
             raise InvalidValueError(
                 f"Policy {spec!r}: {name}() is called with seed= at most, but needs "
-                f"{parameter.name!r}; give it a default."
+                f"{parameter.name!r}; give it a default, such as an environment variable's value."
             )
     _check_needs(spec, policy_class)
+
+
+def _check_arguments(spec: str, method: Callable[..., Any]) -> None:
+    """Raise for a method that cannot be called with the arguments that it gets."""
+    takes = ("instruction", "demonstration") if method.__name__ == "reset" else ("observation",)
+    try:
+        inspect.signature(method).bind(None, *takes)
+    except ValueError:  # a method written in C may have no signature
+        return
+    except TypeError as error:
+        raise InvalidValueError(
+            f"Policy {spec!r}: {method.__qualname__}{inspect.signature(method)} must take "
+            f"{' and '.join(takes)}."
+        ) from error
 
 
 def _check_needs(spec: str, policy: object) -> None:
@@ -218,7 +243,12 @@ def _module(spec: str, name: str) -> ModuleType:
     except MissingDependencyError:
         raise
     except (Exception, SystemExit) as error:
-        words = " ".join(f"{type(error).__name__}: {error}".split())
+        words, hint = " ".join(f"{type(error).__name__}: {error}".split()), ""
+        if isinstance(error, ModuleNotFoundError) and error.name == name.partition(".")[0]:
+            here = ", ".join(sorted(path.stem for path in Path.cwd().glob("*.py"))) or "none"
+            hint = f"; modules in {str(Path.cwd())!r}: {here}"
+        elif isinstance(error, ModuleNotFoundError):
+            hint = f"; install its package, such as by {sys.executable} -m pip install {error.name}"
         raise InvalidValueError(
-            f"Policy {spec!r}: module {name!r} cannot be imported ({words})."
+            f"Policy {spec!r}: module {name!r} cannot be imported ({words}){hint}."
         ) from error

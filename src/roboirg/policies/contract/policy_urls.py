@@ -87,5 +87,5 @@ def read_options(url: PolicyUrl, kind: type[Options]) -> Options:
     """
     for name in url.options:
         if name not in kind.model_fields:
-            raise UnknownNameError(f"option of {url.scheme}{_SEPARATOR}", name, kind.model_fields)
+            raise UnknownNameError(f"{url.scheme}{_SEPARATOR} option", name, kind.model_fields)
     return check_options(kind, url.options, f"Policy {url.text!r}")

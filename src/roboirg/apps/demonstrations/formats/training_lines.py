@@ -27,7 +27,7 @@ HORIZON = 20
 
 _LEROBOT = """\
 ```sh
-pip install 'lerobot[training]'   # for Diffusion Policy 'lerobot[training,diffusion]'
+# Needs the environment of docs/training.md, Install: Python 3.12 with LeRobot and roboirg.
 lerobot-train --dataset.repo_id=local/roboirg --dataset.root={root}{backend} \\
     --policy.type=act --policy.push_to_hub=false --policy.device=cuda \\
     --policy.pretrained_backbone_weights=null --dataset.use_imagenet_stats=false \\

@@ -92,7 +92,7 @@ def _sections(found: Mapping[str, Cells]) -> Iterator[str]:
     yield _INTRODUCTION
     for which in TABLES:
         cells = found.get(which, {})
-        if cells and is_informative(which, cells):
+        if cells and (which == "planner" or is_informative(which, cells)):
             yield markdown(make_table(which, cells, published=True)).rstrip()
     if MAIN in found:
         yield from _questions(found[MAIN])

@@ -35,6 +35,7 @@ from roboirg.evaluation.analysis.stats.sensitivity import (
 )
 from roboirg.evaluation.records.record import Job, Summary
 from roboirg.language import settings_of
+from roboirg.policies.by_name.policy_classes import BUILTIN
 from roboirg.tasks import LEFT_OUT, all_tasks, every_task
 from roboirg.tasks.splits.published_episodes import is_published
 from roboirg.tasks.splits.splits import SIZES, shipped_splits
@@ -45,8 +46,10 @@ SceneName = tuple[str, str, int]
 _NO_REASON = f"reason for this selection: {NOT_REPORTED} by the user who chose it"
 _GUESS = (
     "success expected of a policy that moves perfectly but picks at random among the goals that "
-    "fit the last utterance and, where candidates were named before it, are among them"
+    "fit the last utterance. Where candidates were named before it, it picks only among these"
 )
+_ABLE = {"oracle", "listener"}
+"""Built-in policies that succeed."""
 _FEW_SCENES = 2
 """Of a task; over so few a bootstrap means nothing."""
 
@@ -197,7 +200,9 @@ def control_items(data: RunData, jobs: Sequence[Job]) -> Items:
             f"success without any words: {floor}",
         )
     told = data.told()
-    listed = _rates(told, [one for one in told.names if one.is_privileged], settings)
+    floors = {one.policy for one in jobs if one.policy_spec in BUILTIN.keys() - _ABLE}
+    able = [one for one in told.names if one.is_privileged and one.policy not in floors]
+    listed = _rates(told, able, settings)
     if len(told.names) == 1:
         listed = f"none, as {next(iter(told.names.values()))} is the only policy"
     yield "positive control, another policy that reads the simulator's state", listed or "none"

@@ -108,9 +108,10 @@ def _is_surprising(result: ComparisonResult) -> bool:
 def _outlook(result: ComparisonResult) -> str:
     """Say which gaps these episodes show, and how many episodes would show this gap."""
     least = result.detectable
-    detectable = "no gap" if least is None else f"gaps of {100 * least:.1f} points or more"
-    this_many = "This episode shows" if result.gap.episodes == 1 else "This many episodes show"
-    words = f" {this_many} {detectable} in {POWER:.0%} of cases".replace("%", " %")
+    words = " With so few episodes, no gap can be detected"
+    if least is not None:
+        words = f" These episodes can show gaps of {100 * least:.1f} points or more"
+    words += f" with {POWER:.0%} power".replace("%", " %")
     if result.gap.value == 0:
         return f"{words}; the two did equally well."
     needed = result.needed

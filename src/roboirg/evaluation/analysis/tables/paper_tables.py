@@ -105,12 +105,16 @@ def make_table(
 
 
 def is_informative(which: Which, cells: Cells) -> bool:
-    """Return whether a run has rows for a table; context and planners need several."""
+    """Return whether a run has rows for a table; context needs several, planners one of these."""
     if which == "coverage":
-        return True
+        return False
     rows = list(_positions(which, only_told(cells)))
     if which == "planner":
-        return len({policy_run for policy_run, _ in rows}) > 1
+        runs = {policy_run for policy_run, _ in rows}
+        return len(runs) > 1 and any(
+            one.versions and " + " in one.versions.policy  # a planner's and its policy's
+            for one in runs
+        )
     if which == "context":
         return len({position.options for _, position in rows}) > 1
     return bool(rows)

@@ -42,6 +42,12 @@ from roboirg.tasks import every_task
 RATES_NOTE = (
     "Success rate in percent, the mean over policy seeds; averages are unweighted means over tasks."
 )
+_FLOORS_NOTE = (
+    "Rows without a policy are expected success. chance: a guess among the goals that fit the "
+    "command; first-mention, last-mention, elimination (a value that is not named), surface (key "
+    "words): rules for the words alone; text-only, scene-only: learners that see the words or the "
+    "scene alone; union: for each value the better of these two (docs/floors.md)."
+)
 TWIN_MARK = " (twin)"
 
 
@@ -71,6 +77,7 @@ def notes_of(
         *(headline_notes(cells, labels(cells)) if which == "main" else ()),
         *_absent_notes({key.task for key in shown}),
         *_twin_notes(rows),
+        *[_FLOORS_NOTE][: any(row.source == "chance" for row in rows)],
         *_published_notes(which, rows),
         *comparison_notes(
             {key: one for key, one in differences.items() if key in shown}, labels(cells)

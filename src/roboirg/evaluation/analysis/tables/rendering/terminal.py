@@ -40,15 +40,19 @@ def plain(table: Table) -> str:
 
 
 def _parts(table: Table, width: int) -> list[list[int]]:
-    """Return the columns of each part."""
+    """Return the columns of each part; those without a result in any row are left out."""
     labels = [(group, *table.names(row)) for group, rows in table.groups().items() for row in rows]
     heads = sum(max(map(len, words)) + BORDERS for words in zip(table.heads, *labels, strict=True))
-    widths = [
-        max(len(column.name), *(len(_cell(row, row.entries[index])) for row in table.rows), 0)
+    widths = {
+        index: max(len(column.name), *(len(_cell(row, row.entries[index])) for row in table.rows))
         + BORDERS
         for index, column in enumerate(table.columns)
-    ]
-    return split_columns([one.group for one in table.columns], widths, width - heads - 1)
+        if any(entry.percent is not None or entry.word or entry.signs
+               for entry in (row.entries[index] for row in table.rows))
+    }  # fmt: skip
+    groups, shown = [table.columns[index].group for index in widths], list(widths)
+    parts = split_columns(groups, list(widths.values()), width - heads - 1)
+    return [[shown[place] for place in part] for part in parts]
 
 
 def _title(table: Table, indices: Sequence[int]) -> str:
