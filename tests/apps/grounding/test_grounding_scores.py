@@ -350,12 +350,13 @@ def test_answers_are_read_in_every_form(tmp_path):
         {"id": first.id, "answer": json.loads(first.answer), "choice": first.choice},
         {"id": second.id, "reply": f"It is {second.answer}"},
         {"id": third.id, "kind": "choice", "reply": third.choice},
+        {"id": third.id, "answer": third.answer},
         {"id": third.id, "points": [{"x": 10, "y": 40}, {"x": 30, "y": 40}]},
     ]
     path.write_text("\n".join(map(json.dumps, lines)) + "\n\n")
     found = read_answers(path, items())
     known = {item.id: item for item in items()}
-    assert len(found) == 5
+    assert len(found) == 6
     assert all(judge_reply(known[one.id], one.kind, one.reply).right for one in found)
     again = tmp_path / "again.jsonl"
     write_answers(again, found)

@@ -14,7 +14,7 @@ from roboirg.core.plain_text import counted
 from roboirg.language.settings import plain_settings
 from roboirg.tasks import every_task
 
-HARDER = "hard"
+HARDER = "harder"
 """Column of the harder settings, such as direct-rival."""
 NONE = "–"
 """Cell of a task that lacks the setting."""
