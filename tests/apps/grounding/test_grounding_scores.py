@@ -3,6 +3,7 @@
 import functools
 import json
 import math
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -34,8 +35,10 @@ from roboirg.evaluation.grounding_items.verdicts import guess_chance, judge_repl
 from roboirg.evaluation.records.record import Job
 from roboirg.language import plain_settings
 from roboirg.main import app
+from roboirg.tasks import all_tasks
 from roboirg.tasks.splits.splits import get_episode
 
+ROOT = Path(__file__).parents[3]
 TASKS = ("PickXtimes", "BinFill", "VideoUnmask", "VideoPlaceButton", "StopCube")
 
 
@@ -443,3 +446,17 @@ def test_right_replies_are_right():
         for item in items()
         for kind in QUESTION_KINDS
     )
+
+
+@pytest.mark.slow
+def test_the_documentation_has_the_choices_of_floors():
+    page = (ROOT / "docs" / "grounding.md").read_text(encoding="utf-8")
+    dataset = items(tuple(all_tasks()), 50)
+    settings = plain_settings()
+    for name in ("chance", "command", "surface"):
+        answers = [one for one in floor_answers(name, dataset) if one.kind == "choice"]
+        rights = {setting: [] for setting in settings}
+        for item, answer in zip(dataset, answers, strict=True):
+            rights[item.setting].append(judge_reply(item, "choice", answer.reply).right)
+        cells = " | ".join(f"{100 * np.mean(rights[setting]):.1f}" for setting in settings)
+        assert f"| `{name}` | {cells} |" in page
