@@ -449,14 +449,14 @@ def test_right_replies_are_right():
 
 
 @pytest.mark.slow
-def test_the_documentation_has_the_choices_of_floors():
+def test_the_documentation_has_what_floors_get_right():
     page = (ROOT / "docs" / "grounding.md").read_text(encoding="utf-8")
     dataset = items(tuple(all_tasks()), 50)
     settings = plain_settings()
-    for name in ("chance", "command", "surface"):
-        answers = [one for one in floor_answers(name, dataset) if one.kind == "choice"]
+    for name, kind in (("command", "choice"), ("surface", "choice"), ("surface", "slots")):
+        answers = [one for one in floor_answers(name, dataset) if one.kind == kind]
         rights = {setting: [] for setting in settings}
         for item, answer in zip(dataset, answers, strict=True):
-            rights[item.setting].append(judge_reply(item, "choice", answer.reply).right)
+            rights[item.setting].append(judge_reply(item, kind, answer.reply).right)
         cells = " | ".join(f"{100 * np.mean(rights[setting]):.1f}" for setting in settings)
         assert f"| `{name}` | {cells} |" in page

@@ -157,8 +157,9 @@ def _settings(text: str) -> tuple[str, ...] | SettingsName:
         word.lower() if word.lower() in SETTING_GROUPS else word
         for word in parse_names("setting", text)
     )
-    find_settings(words)
-    return next((name for name in SETTINGS_NAMES if words == (name,)), words)
+    found = {*find_settings(words)}
+    same = (name for name in SETTINGS_NAMES if name in words and {*find_settings([name])} == found)
+    return next(same, words)
 
 
 def _task_names(text: str) -> tuple[str, ...]:
