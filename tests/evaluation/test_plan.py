@@ -246,3 +246,14 @@ def test_a_policy_may_have_a_name_of_its_own() -> None:
         make_plan(["a=oracle", "a=random"])
     with pytest.raises(UnknownNameError, match="Did you mean 'listener'"):
         make_plan(["mine=listner"])
+
+
+def test_a_name_next_to_all_is_added_and_tasks_may_lack_it() -> None:
+    plan = make_plan(
+        ["random"], tasks="StopCube,VideoUnmask", settings="grounded,All", episodes="2"
+    )
+    assert plan.setting_names == (*plain_settings(), "grounded")
+    played = {(job.task, job.options.setting) for job in plan.jobs()}
+    assert ("VideoUnmask", "grounded") in played
+    assert ("StopCube", "direct") in played
+    assert ("StopCube", "grounded") not in played

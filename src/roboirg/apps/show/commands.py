@@ -63,10 +63,12 @@ def _print_words(episode: Episode, settings: Sequence[str], options: Instruction
     from roboirg.language.generator import find_refusal, instruct_with
     from roboirg.language.token_counts import count_tokens
 
-    for name in settings:
-        chosen = replace(options, setting=name)
-        refusal = find_refusal(episode, chosen) if len(settings) > 1 else None
-        if refusal is not None:
+    told = {name: replace(options, setting=name) for name in settings}
+    refusals = {name: find_refusal(episode, one) for name, one in told.items()}
+    for name, chosen in told.items():
+        refusal = refusals[name]
+        # Where nothing can be said, the first refusal is an error.
+        if refusal is not None and None in refusals.values():
             typer.echo(f"{typer.style(name, bold=True)} cannot express the episode: {refusal}")
             continue
         instruction = instruct_with(episode, chosen)
