@@ -161,7 +161,9 @@ def test_episodes_without_a_rival_are_left_out() -> None:
     told = [job.episode for job in jobs if job.setting == "direct-rival"]
     assert 0 < len(told) < 8
     assert [job.episode for job in jobs if job.setting == "explicit"] == list(range(8))
-    with pytest.raises(InvalidValueError, match="nothing to play: reasoning-open cannot"):
+    with pytest.raises(InvalidValueError, match="nothing to play: grounded cannot"):
+        make_plan(["random"], tasks="PickXtimes", settings="grounded", episodes="1").checked()
+    with pytest.raises(InvalidValueError, match="PutInBox has no reasoning-open setting"):
         make_plan(["random"], tasks="PutInBox", settings="reasoning-open").checked()
 
 
