@@ -17,6 +17,7 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from roboirg.core.instruction_options import InstructionOptions
+from roboirg.core.plain_text import counted
 from roboirg.evaluation.analysis.stats import measured_floors as stored
 from roboirg.evaluation.analysis.stats.measured_floors import FloorKey, Floors
 from roboirg.language.settings import all_settings
@@ -27,6 +28,7 @@ from roboirg.shortcuts.shortcut_scores import counted_slots
 from roboirg.shortcuts.shortcut_tables import (
     LEARNING_SCENES,
     MARGIN,
+    Excess,
     Group,
     ShortcutRow,
     excess_text,
@@ -100,7 +102,7 @@ def _by_setting(floors: Floors) -> str:
     for key in keys:
         one, test = floors[key], floors[key._replace(split=stored.TEST)]
         cells = (f"{_percent(one, name)} ({_percent(test, name)})" for name in stored.NAMES)
-        excess = excess_text(one.excess, len(keys))
+        excess = _excess(one.excess, len(keys))
         lines.append(f"| `{key.setting}` | {one.count:,} | {' | '.join(cells)} | {excess} |")
     return "\n".join(lines)
 
@@ -130,6 +132,15 @@ def _percent(row: ShortcutRow, name: str) -> str:
     return f"{100 * (row.shares[name].slots or 0):.0f}"
 
 
+def _excess(excess: Excess | None, count: int) -> str:
+    """Return it with its interval; with one more digit where rounding hides that it is above."""
+    text = excess_text(excess, count)
+    least = f"{100 * MARGIN:+.1f}"
+    if excess is None or excess.value <= MARGIN or not text.startswith(f"{least} "):
+        return text
+    return text.replace(least, f"{100 * excess.value:+.2f}", 1)
+
+
 def _claims(floors: Floors) -> str:
     """Return which settings count for the headline, and in how many slots they exceed chance."""
     counting = stored.settings_at_chance(floors)
@@ -141,11 +152,12 @@ def _claims(floors: Floors) -> str:
             where = f"{key.task} {key.slot} in `{key.setting}`, {key.split}"
             above.append(f"{where}: {excess_text(one.excess, len(tested))}")
     listed = f": {'; '.join(above)}" if above else ""
+    exceed = f"{len(above) or 'none'} {'exceeds' if len(above) < 2 else 'exceed'}"  # noqa: PLR2004
     return (
         f"Words alone are at most {100 * MARGIN:.0f} points above chance in "
-        f"{names or 'no setting'}, over all tasks. With an interval corrected for the "
-        f"{len(tested)} slots of their tasks, on random scenes and on the test split, "
-        f"{len(above)} are above that{listed}."
+        f"{names or 'no setting'}, over all tasks. After correction for the "
+        f"{counted(len(tested), 'slot')} of their tasks, on random scenes and on the test split, "
+        f"{exceed} this threshold{listed}."
     )
 
 

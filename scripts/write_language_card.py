@@ -76,7 +76,11 @@ def _phrases() -> str:
     lines = [
         "## Phrases of the paper",
         "",
-        "Commands of the test split that have a phrase that the paper quotes or lists.",
+        (
+            "Commands of the test split that have a phrase that the paper quotes or lists. *it* "
+            "counts, too, where it stands for a thing that the same command names, which is no "
+            "mention."
+        ),
         "",
         "| setting | phrase | texts |",
         "| --- | --- | --- |",

@@ -50,6 +50,17 @@ def played(result, task, setting, *won, wordings=None, **fields):
     ]
 
 
+def enough(result, **fields):
+    """As many episodes as an interval needs, the outcomes by turns."""
+    wins = [one % 2 for one in range(20)]
+    tried = {"explicit": [1] * 20, "reasoning": wins, "spatial": wins}
+    return [
+        one
+        for setting, won in tried.items()
+        for one in played(result, "PickXtimes", setting, *won, **fields)
+    ]
+
+
 def by_hand(result, **fields):
     """PickXtimes has both settings, StopCube reasoning alone."""
     return [
@@ -106,20 +117,27 @@ def test_it_needs_every_setting_and_explicit(result) -> None:
 
 
 def test_errors_make_it_incomplete(result, two_settings) -> None:
-    results = [*by_hand(result), result("error", 5, options=InstructionOptions("spatial"))]
+    results = [*enough(result), result("error", 20, options=InstructionOptions("spatial"))]
     cells = gather([("run", results)])
     (found,) = headlines_of(cells)
     assert not found.is_complete
     (note,) = headline_notes(cells, labels(cells))
-    assert note.endswith("6 episodes, incomplete.")
+    assert note.endswith("20 episodes, incomplete.")
+
+
+def test_few_episodes_have_no_headline_number(result, two_settings) -> None:
+    cells = gather([("run", by_hand(result))])
+    assert list(headline_notes(cells, labels(cells))) == [
+        "listener has no headline number: 6 episodes cannot give it an interval; play more."
+    ]
 
 
 def test_it_stands_next_to_every_table(result, two_settings) -> None:
-    results = by_hand(result)
+    results = enough(result)
     cells = gather([("run", results)])
     (note,) = headline_notes(cells, labels(cells))
-    assert note.startswith("Headline of listener: −68.8 points to explicit (95 % interval ")
-    assert "reasoning, spatial; 6 episodes" in note
+    assert note.startswith("Headline of listener: −50.0 points to explicit (95 % interval ")
+    assert "reasoning, spatial; 20 episodes" in note
     assert note in make_table("main", cells).notes
     (table,) = make_run_tables(results)
     assert table.notes == (note,)

@@ -161,7 +161,9 @@ def test_episodes_without_a_rival_are_left_out() -> None:
     told = [job.episode for job in jobs if job.setting == "direct-rival"]
     assert 0 < len(told) < 8
     assert [job.episode for job in jobs if job.setting == "explicit"] == list(range(8))
-    with pytest.raises(InvalidValueError, match="nothing to play: reasoning-open cannot"):
+    with pytest.raises(InvalidValueError, match="nothing to play: grounded cannot"):
+        make_plan(["random"], tasks="PickXtimes", settings="grounded", episodes="1").checked()
+    with pytest.raises(InvalidValueError, match="PutInBox has no reasoning-open setting"):
         make_plan(["random"], tasks="PutInBox", settings="reasoning-open").checked()
 
 
@@ -246,3 +248,14 @@ def test_a_policy_may_have_a_name_of_its_own() -> None:
         make_plan(["a=oracle", "a=random"])
     with pytest.raises(UnknownNameError, match="Did you mean 'listener'"):
         make_plan(["mine=listner"])
+
+
+def test_a_name_next_to_all_is_added_and_tasks_may_lack_it() -> None:
+    plan = make_plan(
+        ["random"], tasks="StopCube,VideoUnmask", settings="grounded,All", episodes="2"
+    )
+    assert plan.setting_names == (*plain_settings(), "grounded")
+    played = {(job.task, job.options.setting) for job in plan.jobs()}
+    assert ("VideoUnmask", "grounded") in played
+    assert ("StopCube", "direct") in played
+    assert ("StopCube", "grounded") not in played

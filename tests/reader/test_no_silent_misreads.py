@@ -142,3 +142,20 @@ def test_a_second_value_is_never_read_in_silence(case, data):
     at = data.draw(st.integers(1, len(words)))
     found = interpret(" ".join([*words[:at], word, *words[at:]]), episode.scene, task)
     assert found.goals in ((), (episode.goal,)) or found.not_understood
+
+
+@pytest.mark.parametrize("words", ["a different one", "some other cube", "another",
+                                   "any other one", "the different cube"])  # fmt: skip
+def test_another_one_is_none_of_those_introduced(words):
+    end = f"Take {words} and put it on the target."
+    assert read("PickXtimes", f"I like the red and green cubes. {end}") == ([("blue", 1)], "")
+    goals, complaint = read("PickXtimes", f"Tom took the red cube. {end}")
+    assert goals == [("blue", 1), ("green", 1)]
+    assert complaint == "leaves color open: it can be blue or green"
+
+
+@pytest.mark.parametrize("words", ["another one", "another cube", "anything but that one"])
+def test_other_words_for_another_one_are_named(words):
+    goals, complaint = read("PickXtimes", f"Tom took the red cube. Take {words}.")
+    assert not goals
+    assert words.removesuffix(" one") in complaint

@@ -3,9 +3,12 @@
 import measure_floors
 import pytest
 
+from roboirg.core.instruction_options import InstructionOptions
 from roboirg.evaluation.analysis.stats import measured_floors as stored
 from roboirg.evaluation.analysis.stats.measured_floors import FloorKey, read_floors
 from roboirg.language.templates import LANGUAGE_VERSION
+from roboirg.shortcuts.shortcut_tables import shortcut_rows
+from roboirg.tasks import all_tasks
 
 AGAIN = "measure them anew: python scripts/measure_floors.py"
 
@@ -46,3 +49,35 @@ def test_lines_are_read_as_they_were_written():
         for name in ("chance", "majority", "text-only", "scene-only", "union"):
             assert one.shares[name] == pytest.approx(row.shares[name], abs=1e-4)
     assert next(iter(found)) == FloorKey("random", "direct")
+
+
+def rule_table(by):
+    """The cells of a table of docs/floors.md, by row and column."""
+    lines = measure_floors.PAGE.read_text(encoding="utf-8").splitlines()
+    start = next(place for place, line in enumerate(lines) if line.startswith(f"| | {by} |"))
+    heads, _, *rows = [
+        [cell.strip(" `") for cell in line.strip("|").split("|")]
+        for line in lines[start : lines.index("", start)]
+    ]
+    return {(row[0], head): cell for row in rows for head, cell in zip(heads, row, strict=True)}
+
+
+@pytest.mark.parametrize(
+    ("by", "settings", "options"),
+    [
+        ("direct", ("direct", "contextual", "reasoning", "spatial"), {}),
+        ("direct", ("contextual",), {"distractor": "competing"}),
+        ("color exclusion", ("reasoning",), {}),
+    ],
+)
+def test_the_rules_are_those_of_the_documentation(by, settings, options):
+    table = rule_table(by)
+    grouping = "pattern" if by == "color exclusion" else None
+    names = {row for row, _ in table} & {"chance", *measure_floors.SURFACE_RULES}
+    assert {"chance", "surface"} <= names
+    chosen = InstructionOptions(**options)
+    for row in shortcut_rows(tuple(all_tasks()), ("test",), settings, chosen, by=grouping):
+        column = row.group[-1] + (", competing" if options else "")
+        for name in names:
+            share = row.shares[name]
+            assert table[name, column] == f"{100 * share.slots:.0f} / {100 * share.goals:.0f}"

@@ -25,10 +25,10 @@ def known_tasks(text: str, wordings: str | None = None) -> tuple[str, ...]:
 
 def known_settings(text: str) -> tuple[str, ...]:
     """Return the settings that were typed."""
-    from roboirg.evaluation.plan.option_parsing import means_all
-    from roboirg.language import plain_settings, setting_names
+    from roboirg.evaluation.plan.option_parsing import parse_names
+    from roboirg.language.settings import find_settings
 
-    return plain_settings() if means_all(text) else known_names("setting", text, setting_names())
+    return find_settings(parse_names("setting", text))
 
 
 def known_name(kind: str, name: str, known: Sequence[Name]) -> Name:

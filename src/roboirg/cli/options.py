@@ -22,7 +22,9 @@ Tasks = Annotated[
 ]
 Settings = Annotated[
     str,
-    typer.Option(help="Settings, separated by commas; all but the harder ones."),
+    typer.Option(
+        help="Comma-separated settings; all means the five main ones, every adds the rest."
+    ),
 ]
 Forms = Annotated[str, typer.Option(help="implicit, resolved, or both separated by a comma.")]
 Split = Annotated[str, typer.Option(help="train, val, test or random.")]

@@ -155,10 +155,10 @@ def tables(
     which: Annotated[
         str,
         typer.Option(
-            help="main, planner, context, real, other, coverage, or all that apply; or of runs "
-            "alone: forms, failures, subgoals (of planners), heard (how many prompts were cut), "
-            "arms (what control arms show), sensitivity (whether gaps depend on how they are "
-            "analyzed)."
+            help="main, planner, context, real, harder, other, coverage, or all that apply; or of "
+            "runs alone: forms, failures, subgoals (of planners), heard (how many prompts were "
+            "cut), arms (what control arms show), sensitivity (whether gaps depend on how they "
+            "are analyzed)."
         ),
     ] = _ALL,
     format: Annotated[  # noqa: A002

@@ -321,8 +321,8 @@ def _print_model_costs(
         table.add_row(one.policy, one.setting, *(f"{size:,.0f}" for size in one.sizes), cost)
         measured += one.measured
     table.caption = (
-        "for a model that names the right subgoals, with one call each or as its planner asks; "
-        "tokens "
+        "for a model that names the right subgoals, with one call each or as many as its planner "
+        "makes; tokens "
         + (
             "estimated from the stored answers"
             if measured

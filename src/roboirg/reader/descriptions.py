@@ -91,6 +91,8 @@ _THAN = Phrases(
         "a cube of another color":
             "(?:another|(?:a|an|some|any) (?:different|other|new|distinct|alternative|separate))"
             " color",
+        "a different one": r"(?:(?:a|any|some|the) (?:different|distinct|alternative)"
+            rf"|(?:any|some) other)(?= (?:{THING}|one)\b)|another(?: and)?$",
     },
     before=r"\b",
     after=r"\b",

@@ -3,6 +3,7 @@
 import functools
 import json
 import math
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -34,8 +35,10 @@ from roboirg.evaluation.grounding_items.verdicts import guess_chance, judge_repl
 from roboirg.evaluation.records.record import Job
 from roboirg.language import plain_settings
 from roboirg.main import app
+from roboirg.tasks import all_tasks
 from roboirg.tasks.splits.splits import get_episode
 
+ROOT = Path(__file__).parents[3]
 TASKS = ("PickXtimes", "BinFill", "VideoUnmask", "VideoPlaceButton", "StopCube")
 
 
@@ -350,12 +353,13 @@ def test_answers_are_read_in_every_form(tmp_path):
         {"id": first.id, "answer": json.loads(first.answer), "choice": first.choice},
         {"id": second.id, "reply": f"It is {second.answer}"},
         {"id": third.id, "kind": "choice", "reply": third.choice},
+        {"id": third.id, "answer": third.answer},
         {"id": third.id, "points": [{"x": 10, "y": 40}, {"x": 30, "y": 40}]},
     ]
     path.write_text("\n".join(map(json.dumps, lines)) + "\n\n")
     found = read_answers(path, items())
     known = {item.id: item for item in items()}
-    assert len(found) == 5
+    assert len(found) == 6
     assert all(judge_reply(known[one.id], one.kind, one.reply).right for one in found)
     again = tmp_path / "again.jsonl"
     write_answers(again, found)
@@ -442,3 +446,17 @@ def test_right_replies_are_right():
         for item in items()
         for kind in QUESTION_KINDS
     )
+
+
+@pytest.mark.slow
+def test_the_documentation_has_what_floors_get_right():
+    page = (ROOT / "docs" / "grounding.md").read_text(encoding="utf-8")
+    dataset = items(tuple(all_tasks()), 50)
+    settings = plain_settings()
+    for name, kind in (("command", "choice"), ("surface", "choice"), ("surface", "slots")):
+        answers = [one for one in floor_answers(name, dataset) if one.kind == kind]
+        rights = {setting: [] for setting in settings}
+        for item, answer in zip(dataset, answers, strict=True):
+            rights[item.setting].append(judge_reply(item, kind, answer.reply).right)
+        cells = " | ".join(f"{100 * np.mean(rights[setting]):.1f}" for setting in settings)
+        assert f"| `{name}` | {cells} |" in page

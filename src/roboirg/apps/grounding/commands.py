@@ -51,7 +51,7 @@ def export_grounding(
     settings: Settings = "all",
     words: GroundingWords = NO_WORDS,
 ) -> None:
-    """Export questions of grounding with pictures: Parquet, JSON lines, VLMEvalKit's TSV.
+    """Export grounding questions with pictures: Parquet, JSON lines, VLMEvalKit's TSV.
 
     A plan may have, under `grounding`: every_variant, frames, frames_every.
 

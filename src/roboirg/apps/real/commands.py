@@ -48,13 +48,14 @@ def plan(
     Example: roboirg real plan --policy my_policy:MyPolicy --out study
     """
     from roboirg.apps.real.study.study_plan import make_study
-    from roboirg.evaluation.plan.option_parsing import means_all, parse_names
+    from roboirg.cli.names import known_settings
+    from roboirg.evaluation.plan.option_parsing import ALL, parse_names
     from roboirg.tasks import find_tasks
 
     made = make_study(
         policy,
         tasks=find_tasks(parse_names("task", tasks)),
-        settings=None if means_all(settings) else parse_names("setting", settings),
+        settings=None if settings.strip().lower() == ALL else known_settings(settings),
         trials=trials,
         demonstrations=demonstrations,
         seed=seed,

@@ -60,11 +60,18 @@ def show(
 
 def _print_words(episode: Episode, settings: Sequence[str], options: InstructionOptions) -> None:
     """Print what is said in each setting, and how many tokens it needs."""
-    from roboirg.language.generator import instruct_with
+    from roboirg.language.generator import find_refusal, instruct_with
     from roboirg.language.token_counts import count_tokens
 
-    for name in settings:
-        instruction = instruct_with(episode, replace(options, setting=name))
+    told = {name: replace(options, setting=name) for name in settings}
+    refusals = {name: find_refusal(episode, one) for name, one in told.items()}
+    for name, chosen in told.items():
+        refusal = refusals[name]
+        # Where nothing can be said, the first refusal is an error.
+        if refusal is not None and None in refusals.values():
+            typer.echo(f"{typer.style(name, bold=True)} cannot express the episode: {refusal}")
+            continue
+        instruction = instruct_with(episode, chosen)
         length = counted(count_tokens(instruction.text), "token")
         typer.echo(f"{typer.style(name, bold=True)} ({length}):")
         for utterance in instruction.utterances:

@@ -15,8 +15,9 @@ from roboirg.core.instruction_options import InstructionOptions
 from roboirg.evaluation.analysis.stats.option_labels import options_label, staged_options
 from roboirg.evaluation.analysis.stats.rates import DIGITS, mean_percent
 
-RateTable = Literal["main", "planner", "context", "real", "other"]
-"""The tables of success rates; ``other`` holds the tasks that the paper does not have."""
+RateTable = Literal["main", "planner", "context", "real", "harder", "other"]
+"""The tables of success rates; ``other`` holds the tasks that the paper does not have, ``harder``
+the settings."""
 RATE_TABLES: tuple[RateTable, ...] = ("main", "planner", "context", "real")
 """Those of the paper."""
 

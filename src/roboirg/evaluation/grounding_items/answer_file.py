@@ -39,10 +39,10 @@ class Answer(NamedTuple):
 def read_answers(path: Path, items: Sequence[GroundingItem]) -> list[Answer]:
     """Return the answers of a file, each for a question of the items.
 
-    A line of JSON has the ``id`` of an item and any of ``answer`` (an object of slots), ``choice``
-    (a letter) and ``points`` (a list of objects with x and y); or a ``reply``, the model's text,
-    and the ``kind`` of question, by default slots. A TSV file has columns ``id`` and
-    ``prediction``, replies to the choice question.
+    A line of JSON has the ``id`` of an item and any of ``answer`` (an object of slots, or its
+    text), ``choice`` (a letter) and ``points`` (a list of objects with x and y); or a ``reply``,
+    the model's text, and the ``kind`` of question, by default slots. A TSV file has columns ``id``
+    and ``prediction``, replies to the choice question.
 
     Raises:
         InvalidValueError: the file cannot be read, a line is none of these, names an unknown item,
@@ -112,7 +112,7 @@ def _answers_of(row: Any) -> Iterator[Answer | str]:  # noqa: ANN401 - whatever 
 
 
 def _as_reply(field: str, value: Any) -> str:  # noqa: ANN401 - whatever JSON holds
-    if field == "choice":
+    if field == "choice" or isinstance(value, str):
         return value if isinstance(value, str) else ""
     return json.dumps({"points": value} if field == "points" else value)
 

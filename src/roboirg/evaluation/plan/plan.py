@@ -54,7 +54,7 @@ from roboirg.evaluation.records.record import (
 )
 from roboirg.evaluation.records.record_codec import RecordKey, identity_key
 from roboirg.language.generator import check_options, find_refusal
-from roboirg.language.settings import EXPLICIT, all_settings, plain_settings
+from roboirg.language.settings import EXPLICIT, SETTING_GROUPS, all_settings, expand_settings
 from roboirg.language.wordings.wording_store import open_wordings
 from roboirg.tasks.splits import splits
 from roboirg.tasks.splits.private_splits import MissingSaltError, is_private
@@ -93,7 +93,7 @@ class Plan(BaseModel):
     """Tasks or suites; all for the whole benchmark."""
     settings: tuple[str, ...] | SettingsName = "all"
     """Settings; all for every setting that can express the episode, except the harder ones; every
-    adds these."""
+    adds these. Next to names, tasks may lack any of them: all,grounded."""
     in_turns: tuple[str, ...] = ()
     """Settings that are also played with the utterances one after another."""
     forms: tuple[str, ...] = ("implicit",)
@@ -227,9 +227,16 @@ class Plan(BaseModel):
     @property
     def setting_names(self) -> tuple[str, ...]:
         """The settings that may be played."""
-        if self.settings == "all":
-            return plain_settings()
-        return tuple(all_settings()) if self.settings == "every" else self.settings
+        return expand_settings(self._setting_words)
+
+    @property
+    def _setting_words(self) -> tuple[str, ...]:
+        return (self.settings,) if isinstance(self.settings, str) else self.settings
+
+    @property
+    def _has_groups(self) -> bool:
+        """Whether tasks and episodes may lack a setting, because a word stands for several."""
+        return not SETTING_GROUPS.keys().isdisjoint(self._setting_words)
 
     @property
     def hosting(self) -> HostSettings | None:
@@ -282,7 +289,7 @@ class Plan(BaseModel):
             instruct_job(job)  # raises if the options cannot express the episode
         if not jobs:
             raise InvalidValueError(
-                f"There is nothing to play: {', '.join(self.settings)} cannot express any of "
+                f"There is nothing to play: {', '.join(self._setting_words)} cannot express any of "
                 "these episodes."
             )
         return self
@@ -331,13 +338,14 @@ class Plan(BaseModel):
         known = tuple(name for name in self.tasks if name in tasks.every_task())
         settings = self.settings
         if not isinstance(settings, str):
-            settings = tuple(name for name in settings if name in all_settings())
+            known_words = {*all_settings(), *SETTING_GROUPS}
+            settings = tuple(name for name in settings if name in known_words)
         return self.model_copy(update={"tasks": known, "settings": settings}).jobs()
 
     def settings_of(self, task: str, episode: int) -> tuple[str, ...]:
         """Return the settings in which an episode is played."""
-        if not isinstance(self.settings, str):
-            return self.settings
+        if not self._has_groups:
+            return self.setting_names
         found = language.expressible(splits.get_episode(task, self.split, episode))
         return tuple(name for name in found if name in self.setting_names)
 
@@ -405,11 +413,7 @@ class Plan(BaseModel):
     def _instruction_jobs(self) -> Iterator[Job]:
         """Yield one job for each instruction that the language may not be able to express."""
         # All settings with the default frame are only those that can express the episode.
-        usual = (
-            isinstance(self.settings, str)
-            and self.options.frame == DEFAULT_FRAME
-            and self.wordings is None
-        )
+        usual = self._has_groups and self.options.frame == DEFAULT_FRAME and self.wordings is None
         for task in self.tasks:
             for episode in self.episodes[:1] if usual else self.episodes:
                 settings = self.settings_of(task, episode)
@@ -441,7 +445,7 @@ class Plan(BaseModel):
 
     def _check_settings(self, task: str) -> None:
         has = language.settings_of(tasks.get_task(task))
-        for setting in () if isinstance(self.settings, str) else self.settings:
+        for setting in () if self._has_groups else self.setting_names:
             check_names("setting", (setting,), language.setting_names())
             if setting not in has:
                 raise InvalidValueError(

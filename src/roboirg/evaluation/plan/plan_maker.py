@@ -35,6 +35,7 @@ from roboirg.evaluation.plan.plan import (
 from roboirg.evaluation.records.film import VIDEO_MODES
 from roboirg.evaluation.records.record import ERROR_KINDS, ErrorKind
 from roboirg.language import FORMS
+from roboirg.language.settings import SETTING_GROUPS, find_settings
 
 
 def make_plan(
@@ -57,8 +58,8 @@ def make_plan(
     Args:
         policies: names or addresses; names may be separated by commas.
         tasks: names separated by commas; ``all`` anywhere selects all.
-        settings: names separated by commas; ``all`` anywhere selects all but the harder ones, and
-            ``every`` these, too.
+        settings: names separated by commas; ``all`` stands for all but the harder ones, ``every``
+            for these, too.
         forms: names separated by commas.
         episodes: ``4`` for the first four, a list such as ``0,3,5-9``, or difficulties: ``hard``.
         policy_seeds: a list of numbers.
@@ -152,10 +153,13 @@ def _explain(error: ValidationError) -> InvalidValueError:
 
 
 def _settings(text: str) -> tuple[str, ...] | SettingsName:
-    names = parse_names("setting", text)
-    typed = {name.lower() for name in names}
-    # Names of several settings: the longest list of them.
-    return next((name for name in reversed(SETTINGS_NAMES) if name in typed), names)
+    words = tuple(
+        word.lower() if word.lower() in SETTING_GROUPS else word
+        for word in parse_names("setting", text)
+    )
+    found = {*find_settings(words)}
+    same = (name for name in SETTINGS_NAMES if name in words and {*find_settings([name])} == found)
+    return next(same, words)
 
 
 def _task_names(text: str) -> tuple[str, ...]:

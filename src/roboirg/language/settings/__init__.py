@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import functools
 import sys
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 
 from roboirg.core.errors import InvalidValueError, UnknownNameError
 from roboirg.language.settings.setting import Setting
@@ -14,7 +14,10 @@ from roboirg.util.discovery import discover
 __all__ = [
     "ACCEPTANCE_SETTINGS",
     "EXPLICIT",
+    "SETTING_GROUPS",
     "all_settings",
+    "expand_settings",
+    "find_settings",
     "get_setting",
     "plain_settings",
     "setting_names",
@@ -48,6 +51,30 @@ def plain_settings(task: Task | None = None) -> tuple[str, ...]:
     """Return the names that ``all`` means: of every setting, or a task's, but the harder ones."""
     names = setting_names() if task is None else settings_of(task)
     return tuple(name for name in names if all_settings()[name].plain is None)
+
+
+SETTING_GROUPS = {"all": plain_settings, "every": setting_names}
+"""Words for several settings, and what gives their names."""
+
+
+def expand_settings(words: Iterable[str]) -> tuple[str, ...]:
+    """Return words with those of `SETTING_GROUPS` replaced, each once, the replaced ones first."""
+    in_turn = sorted(words, key=lambda word: word.lower() not in SETTING_GROUPS)
+    groups = (SETTING_GROUPS.get(word.lower(), lambda word=word: (word,)) for word in in_turn)
+    return tuple(dict.fromkeys(name for group in groups for name in group()))
+
+
+def find_settings(words: Iterable[str]) -> tuple[str, ...]:
+    """Return the settings meant by names and by words of `SETTING_GROUPS`.
+
+    Raises:
+        UnknownNameError: a word is neither.
+    """
+    names = expand_settings(words)
+    for name in names:
+        if name not in all_settings():
+            raise UnknownNameError("setting", name, (*all_settings(), *SETTING_GROUPS))
+    return names
 
 
 def settings_of(task: Task) -> tuple[str, ...]:

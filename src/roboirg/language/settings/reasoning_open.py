@@ -6,6 +6,7 @@ from roboirg.language.open_reasoning import OPEN_PATTERNS
 from roboirg.language.request import InstructionRequest, InstructionSpec
 from roboirg.language.settings import reasoning
 from roboirg.language.settings.setting import Setting
+from roboirg.tasks import Task
 
 
 def refusal(request: InstructionRequest) -> str | None:
@@ -23,12 +24,18 @@ def say(request: InstructionRequest) -> InstructionSpec:
     return reasoning.say_pattern(request, *reasoning.turn_of(request, possible))
 
 
+def _applies_to(task: Task) -> bool:
+    """Return whether a task has an open pattern; excluding one of PutInBox's boxes leaves one."""
+    return task.name != "PutInBox"
+
+
 SETTING = Setting(
     name="reasoning-open",
     order=reasoning.SETTING.order,
     summary="reasoning, from patterns that no single word gives away",
     color="#E69F00",
     say=say,
+    applies_to=_applies_to,
     refusal=refusal,
     reads=reasoning.SETTING.reads,
     example=3,

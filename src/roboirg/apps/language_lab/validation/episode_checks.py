@@ -21,7 +21,7 @@ from roboirg.core.episode import Episode, Goal
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.language.generator import expressible, find_refusal, instruct_with
 from roboirg.language.instruction import Instruction, Mention, hidden_slots
-from roboirg.language.settings import ACCEPTANCE_SETTINGS, all_settings, settings_of
+from roboirg.language.settings import ACCEPTANCE_SETTINGS, EXPLICIT, all_settings, settings_of
 from roboirg.language.settings.setting import Instruct, Setting
 from roboirg.language.variants import expressible_options
 from roboirg.reader import Interpretation, interpret
@@ -66,8 +66,11 @@ def check_episode(
         _add_violations(results, episode, setting, violations)
     for setting, words in unpaired(episode, expressible(episode, wordings=wordings), wordings):
         _add_violations(results, episode, setting, [("pairing", words)])
+    said = find_refusal(episode, InstructionOptions(EXPLICIT, wordings=wordings)) is None
     for setting in settings_of(get_task(episode.task)):
-        _count_refusals(all_settings()[setting], episode, results)
+        # What has no command at all counts once.
+        if all_settings()[setting].may_refuse if said else setting == EXPLICIT:
+            _count_refusals(all_settings()[setting], episode, wordings, results)
         reason = find_refusal(episode, InstructionOptions(setting))
         if reason is not None and must_be_expressible and setting in ACCEPTANCE_SETTINGS:
             _add_violations(results, episode, setting, [("expressible", reason)])
@@ -131,16 +134,19 @@ def _count_command(
     results.exceptions[group] += exception
 
 
-def _count_refusals(setting: Setting, episode: Episode, results: ValidationResults) -> None:
-    if not setting.may_refuse:
-        return
+def _count_refusals(
+    setting: Setting, episode: Episode, wordings: str | None, results: ValidationResults
+) -> None:
     for changes in setting.variants:
         variant = ", ".join(str(value) for value in changes.values())
         group = SceneGroup(episode.task, setting.name, variant, episode.difficulty)
-        reason = find_refusal(episode, replace(InstructionOptions(setting.name), **changes))
+        options = replace(InstructionOptions(setting.name, wordings=wordings), **changes)
+        reason = find_refusal(episode, options)
         results.scenes[group] += 1
         results.refused[group] += reason is not None
         if reason is not None:
+            # The goal is reason enough: episodes with the same one count together.
+            reason = reason.replace(f" of episode {episode.key}", "")
             results.reasons[Refusal(setting.name, reason)] += 1
 
 

@@ -78,7 +78,8 @@ class ValidationResults:
         texts: prompts read, by task and setting.
         commands: episodes whose implicit command was read alone.
         exceptions: those of them whose scene leaves a single candidate.
-        scenes: scenes of the settings that may refuse.
+        scenes: scenes of the settings that may refuse; and those
+            for which wordings have no command, in explicit.
         refused: those of them that were refused.
         reasons: how often each reason was given.
         failures: all violations of rules.

@@ -14,7 +14,7 @@ from roboirg.core.plain_text import counted
 from roboirg.language.settings import plain_settings
 from roboirg.tasks import every_task
 
-HARDER = "hard"
+HARDER = "harder"
 """Column of the harder settings, such as direct-rival."""
 NONE = "–"
 """Cell of a task that lacks the setting."""
@@ -36,7 +36,7 @@ def _texts(results: ValidationResults) -> Table:
     for failure in results.failures:
         broken[failure.task, failure.setting if failure.setting in names else HARDER] += 1
     columns = (*names, HARDER)
-    table = _table("Texts read back, and rules broken", ("task",), (*columns, "broken"))
+    table = _table("Texts read back, and rules broken", ("task",), (*columns, "bad"))
     tasks = _tasks(task for task, _ in texts)
     for task in tasks:
         cells = [_count(texts, broken, (task, setting)) for setting in columns]

@@ -82,6 +82,11 @@ def headline_notes(cells: Cells, names: Mapping[PolicyRun, str]) -> Iterator[str
                 f"{name} has no headline number: no floors were measured for its language version "
                 f"{policy_run.versions.language}."
             )
+        elif found.interval is None or not np.isfinite(found.interval).all():
+            yield (
+                f"{name} has no headline number: {counted(found.episodes, 'episode')} cannot give "
+                "it an interval; play more."
+            )
         else:
             yield f"Headline of {name}: {found.text}."
 

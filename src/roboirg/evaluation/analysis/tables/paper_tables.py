@@ -56,7 +56,7 @@ from roboirg.evaluation.records.record import Job
 from roboirg.language.settings import EXPLICIT, all_settings, settings_of
 from roboirg.tasks import all_tasks, every_task
 
-Which = Literal["main", "planner", "context", "real", "other", "coverage"]
+Which = Literal["main", "planner", "context", "real", "harder", "other", "coverage"]
 WHICH: tuple[Which, ...] = get_args(Which)
 
 OVERALL = AVERAGE
@@ -67,6 +67,7 @@ TITLES: Mapping[Which, str] = {
     "planner": "High-level planners",
     "context": "Stages of the contextual setting",
     "real": "Real world",
+    "harder": "Harder settings",
     "other": "Tasks outside the paper",
     "coverage": "Implicit references in benchmarks",
 }
@@ -90,7 +91,7 @@ def make_table(
     """Make one of the paper's tables.
 
     Args:
-        which: main, planner, context, real, other or coverage.
+        which: main, planner, context, real, harder, other or coverage.
         cells: as `gather` makes them; may be empty if published rows are shown.
         published: whether to add the paper's rows, and to say which rates can be compared.
         floors: those of `FLOORS` whose expected success is added below the policies.
@@ -117,7 +118,8 @@ def is_informative(which: Which, cells: Cells) -> bool:
         )
     if which == "context":
         return len({position.options for _, position in rows}) > 1
-    return bool(rows)
+    # Explicit alone is a reference, but nothing to read.
+    return any(which != "harder" or one.options.setting != EXPLICIT for _, one in rows)
 
 
 def _rate_table(which: RateTable, cells: Cells, *, published: bool, floors: Sequence[str]) -> Table:
@@ -161,7 +163,7 @@ def _heads(which: RateTable) -> tuple[str, ...]:
 def _tasks(which: RateTable, cells: Cells) -> tuple[str, ...]:
     """Return the tasks of a table: the paper's, or all others that were played."""
     if which != "other":
-        return published_tasks(which)
+        return published_tasks("main" if which == "harder" else which)
     known = {*published_tasks("main"), *published_tasks("real")}
     installed = [*every_task()]
     played = {key.task for key in cells} - known
@@ -169,8 +171,8 @@ def _tasks(which: RateTable, cells: Cells) -> tuple[str, ...]:
 
 
 def _columns(which: RateTable, tasks: Sequence[str]) -> tuple[Column, ...]:
-    """Return the tasks, in the main table by suite with its average; the overall average last."""
-    if which != "main":
+    """Return the tasks, of the main tasks by suite with its average; the overall average last."""
+    if which not in ("main", "harder"):
         return (*(Column(task) for task in tasks), Column(OVERALL, averages=tuple(tasks)))
     registry = all_tasks()
     suites: dict[str, list[str]] = {}

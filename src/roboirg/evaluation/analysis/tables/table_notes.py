@@ -20,6 +20,7 @@ from roboirg.evaluation.analysis.stats.cells import (
 from roboirg.evaluation.analysis.stats.headline import headline_notes
 from roboirg.evaluation.analysis.stats.intervals import wilson_interval
 from roboirg.evaluation.analysis.stats.option_labels import (
+    REFERENCE,
     has_default_options,
     options_label,
     options_sort_key,
@@ -87,6 +88,9 @@ def notes_of(
 
 def is_shown(which: RateTable, options: InstructionOptions) -> bool:
     """Return whether a table has rows for these instruction options."""
+    if which == "harder":
+        usual = InstructionOptions(options.setting)
+        return options == usual and (options == REFERENCE or not has_default_options(usual))
     return options in staged_options() if which == "context" else has_default_options(options)
 
 
@@ -255,8 +259,10 @@ def _omission_notes(which: RateTable, cells: Cells, tasks: Sequence[str]) -> lis
     notes = []
     if other_tasks:
         notes.append(f"Not in this table: the results of {', '.join(other_tasks)}.")
-    if other_options:
-        notes.append(f"Not in this table: {'; '.join(map(options_label, other_options))}.")
+    for is_harder, where in ((True, "In the table harder"), (False, "Not in this table")):
+        found = [one for one in other_options if is_shown("harder", one) == is_harder]
+        if found:
+            notes.append(f"{where}: {'; '.join(map(options_label, found))}.")
     return notes
 
 
