@@ -6,7 +6,7 @@ python scripts/write_learned_table.py
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -24,6 +24,7 @@ ROOT = Path(__file__).parent.parent
 PAGE = ROOT / "docs" / "learned-policy.md"
 PACK = ROOT / "results" / "learned-policy-val.roboirg.zip"
 TABLE = re.compile(r"(?<=<!-- learned -->\n\n).*?(?=\n\n<!-- end of learned -->)", re.DOTALL)
+SUMMED = ("successes", "trials")
 SMALLEST_P = 0.001
 """Smaller ones are not printed."""
 MEMORY, WITHOUT = "small-recurrent", "small-none"
@@ -54,21 +55,13 @@ def table() -> str:
         guess = np.mean([silent_chance(task, "val", episode) for episode in episodes])
         shown = "< 0.001" if p_value < SMALLEST_P else f"{p_value:.3f}"
         lines.append(f"| {task} | {first} | {second} | {alone} | {shown} | {100 * guess:.0f} |")
-    sums = [sum((cells[row, task] for task in tasks), start=_Sum()) for row in (MEMORY, WITHOUT)]
+    sums = [_sum([cells[row, task] for task in tasks]) for row in (MEMORY, WITHOUT)]
     return "\n".join([*lines, f"| all | {sums[0]} | {sums[1]} | | | |"])
 
 
-class _Sum:
-    """Successes and trials of several cells."""
-
-    def __init__(self, successes: int = 0, trials: int = 0) -> None:
-        self.successes, self.trials = successes, trials
-
-    def __add__(self, cell: CellResults) -> _Sum:
-        return _Sum(self.successes + cell.successes, self.trials + cell.trials)
-
-    def __str__(self) -> str:
-        return f"{self.successes:,} of {self.trials:,} ({self.successes / self.trials:.0%})"
+def _sum(cells: Sequence[CellResults]) -> str:
+    successes, trials = (sum(getattr(one, name) for one in cells) for name in SUMMED)
+    return f"{successes:,} of {trials:,} ({successes / trials:.0%})"
 
 
 def _rate(cell: CellResults) -> str:

@@ -37,7 +37,11 @@ def told(task, split="test", count=40):
             yield episode, instruct_with(episode, OPEN)
 
 
-@given(st.sampled_from(TASKS), st.integers(0, 10_000), st.sampled_from(POOLS))
+@given(
+    st.sampled_from([task for task in TASKS if task != "PutInBox"]),
+    st.integers(0, 10_000),
+    st.sampled_from(POOLS),
+)
 @settings(max_examples=150, deadline=None)
 def test_random_episodes_are_read_back(task, index, pool):
     episode = get_episode(task, "random", index)
@@ -54,18 +58,14 @@ def test_random_episodes_are_read_back(task, index, pool):
     assert interpret(resolved.command, episode.scene, task).goals == (episode.goal,)
 
 
-@pytest.mark.parametrize(
-    ("task", "index", "reason"),
-    [
-        ("PutInBox", 0, "no open pattern singles out the goal"),
-        ("BinFill", 3, "one number of cubes or one color, and the goal has several"),
-    ],
-)
-def test_what_no_open_pattern_derives_is_refused_by_name(task, index, reason):
+def test_what_no_open_pattern_derives_is_refused_by_name():
+    reason = "one number of cubes or one color, and the goal has several"
     with pytest.raises(
         InvalidValueError, match=f"The reasoning-open setting cannot express .*{reason}"
     ):
-        instruct(get_episode(task, "test", index), "reasoning-open")
+        instruct(get_episode("BinFill", "test", 3), "reasoning-open")
+    with pytest.raises(InvalidValueError, match="PutInBox has no reasoning-open setting"):
+        instruct(get_episode("PutInBox", "test", 0), "reasoning-open")
 
 
 def test_every_pattern_and_step_occurs():

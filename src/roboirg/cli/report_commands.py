@@ -265,14 +265,14 @@ def compare(
 
 
 def _tables(which: str, cells: Cells, *, published: bool, floors: str | None) -> list[Table]:
+    from roboirg.evaluation.analysis.published import RATE_TABLES
     from roboirg.evaluation.analysis.stats.chance import FLOORS
     from roboirg.evaluation.analysis.tables.diagnostic_tables import DIAGNOSTIC_TABLES, SUBGOALS
     from roboirg.evaluation.analysis.tables.paper_tables import WHICH, is_informative, make_table
 
     if which == _ALL:
-        wanted: list[str] = [
-            one for one in WHICH if is_informative(one, cells) or (published and one != "other")
-        ]
+        shown = (*RATE_TABLES, "coverage") if published else ()
+        wanted: list[str] = [one for one in WHICH if one in shown or is_informative(one, cells)]
     elif which in WHICH:
         wanted = [which]
     else:

@@ -24,6 +24,12 @@ from roboirg.util.discovery import entry_names
 from roboirg.util.short_hash import short_hash
 
 _MAX_SHOWN, _MAX_NAMED = 3, 20
+ARGUMENTS: Mapping[str, tuple[str, ...]] = {
+    "reset": ("instruction", "demonstration"),
+    "act": ("observation",),
+    "plan": ("observation", "step"),
+}
+"""What the methods of a policy or a planner are called with."""
 
 BUILTIN: Mapping[str, str] = {
     "oracle": "roboirg.policies.builtin.oracle_policy:OraclePolicy",
@@ -146,7 +152,8 @@ def _check_class(spec: str, policy_class: type[Any], methods: tuple[str, ...]) -
             raise InvalidValueError(f"Policy {spec!r}: class {name} has no method {method}().")
         if not callable(getattr(policy_class, method)):
             raise InvalidValueError(f"Policy {spec!r}: {method} of class {name} is not a method.")
-        _check_arguments(spec, getattr(policy_class, method))
+        if method in ARGUMENTS:
+            _check_arguments(spec, getattr(policy_class, method), ARGUMENTS[method])
     if inspect.isabstract(policy_class):
         missing = sorted(policy_class.__abstractmethods__)
         raise InvalidValueError(
@@ -165,9 +172,8 @@ def _check_class(spec: str, policy_class: type[Any], methods: tuple[str, ...]) -
     _check_needs(spec, policy_class)
 
 
-def _check_arguments(spec: str, method: Callable[..., Any]) -> None:
+def _check_arguments(spec: str, method: Callable[..., Any], takes: tuple[str, ...]) -> None:
     """Raise for a method that cannot be called with the arguments that it gets."""
-    takes = ("instruction", "demonstration") if method.__name__ == "reset" else ("observation",)
     try:
         inspect.signature(method).bind(None, *takes)
     except ValueError:  # a method written in C may have no signature
