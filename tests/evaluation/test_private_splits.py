@@ -177,7 +177,7 @@ def test_results_are_read_without_the_salt(tmp_path: Path) -> None:
     os.environ[SALT_VARIABLE] = ""
     for command in (
         ["tables", str(run)],
-        ["leaderboard", "board", str(tmp_path), "--out", str(tmp_path / "site")],
+        ["leaderboard", "board", str(tmp_path), "--out", f"{tmp_path}-site"],
     ):
         done = cli.invoke(app, command)
         assert done.exit_code == 0, done.output

@@ -137,8 +137,8 @@ def test_statuses_of_packs(tmp_path: Path) -> None:
     packs.mkdir()
     pack_run(run, packs / "empty-handed.roboirg.zip")
     (packs / "broken.roboirg.zip").write_bytes(b"no zip")
-    with pytest.raises(Exception, match="not a packed run"):
-        read_packs(packs, tmp_path / "site")
+    unread = {one.name: one.why_unranked for one in read_packs(packs, tmp_path / "site")}
+    assert "not a packed run" in unread["broken"]
     found = read_packs(packs, tmp_path / "site", sample=1.0)
     checks = {one.name: one.check for one in found}
     assert all(check is not None for check in checks.values())
@@ -263,6 +263,7 @@ def drop(run: Path, wanted: Callable[[dict[str, Any]], bool], **changes: Any) ->
         (lambda run: drop(run, lambda one: True, plan=None), "110 records outside every plan"),
         (lambda run: drop(run, lambda one: one["task"] != "StopCube"), "10 missing"),
         (lambda run: reword(run, "mine@1a2b3c4d"), "match no named plan"),
+        (lambda run: drop(run, lambda one: True, arm="silent"), "played control arms alone"),
         (lambda run: drop(run, lambda one: True, max_steps=3000), "110 not in it"),
         (lambda run: drop(run, lambda one: True, policy_seed=5), "110 not in it"),
     ],
@@ -276,6 +277,38 @@ def test_only_whole_runs_of_named_plans_are_ranked(
     assert bool(reason) == bool(found.refusal)
     rows = own(board_rows([found]))
     assert len(rows) == (0 if reason else 1)
+
+
+@pytest.mark.parametrize("split", ["train", "val"])
+def test_another_split_than_the_plan_s_is_not_ranked(tmp_path: Path, split: str) -> None:
+    (tmp_path / "packs").mkdir()
+    found = packs_of(tmp_path, whole_run(tmp_path / "run", split=split, episodes="0-9"))
+    assert "the split of random match no named plan" in found.refusal
+
+
+@pytest.mark.parametrize("name", [".hidden", "Run", "a b", "a\\x1b", "é", "a,b"])
+def test_a_name_that_may_stand_for_another_is_not_ranked(tmp_path: Path, name: str) -> None:
+    run = store(tmp_path / "run", [record("p", "StopCube", 0, won=True)])
+    (tmp_path / "packs").mkdir()
+    pack_run(run, tmp_path / "packs" / f"{name}.roboirg.zip")
+    (found,) = read_packs(tmp_path / "packs", tmp_path / "site")
+    assert "its name has small letters" in found.why_unranked
+
+
+def test_a_pack_that_cannot_be_read_does_not_stop_the_board(
+    tmp_path: Path, private: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    packs = tmp_path / "packs"
+    packs.mkdir()
+    pack_run(whole_run(tmp_path / "run"), packs / "run.roboirg.zip")
+    pack_run(whole_run(tmp_path / "own", split=private), packs / "own.roboirg.zip")
+    (packs / "folder.roboirg.zip").mkdir()
+    (packs / "link.roboirg.zip").symlink_to("nowhere")
+    monkeypatch.setenv(SALT_VARIABLE, "")
+    found = {one.name: one.why_unranked for one in read_packs(packs, tmp_path / "site")}
+    assert found.pop("run") == ""
+    assert all(found.values())
+    assert "salt" in found["own"]
 
 
 def test_a_run_of_a_plan_of_ones_own_is_not_ranked(tmp_path: Path) -> None:

@@ -50,7 +50,7 @@ class Links(HTMLParser):
 def packs(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A folder with a whole run, part of one, and a file that is no pack."""
     folder = tmp_path_factory.mktemp("packs")
-    pack_run(whole_run(folder / "whole"), folder / "my whole #1.roboirg.zip")
+    pack_run(whole_run(folder / "whole"), folder / "my-whole-1.roboirg.zip")
     part = store(folder / "part", [record("<b>p</b>", "StopCube", 0, won=True)])
     pack_run(part, folder / "part.roboirg.zip")
     for run in ("whole", "part"):
@@ -67,18 +67,18 @@ def site(packs: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def test_every_pack_has_a_page_and_every_link_leads_somewhere(site: Path) -> None:
     pages = sorted(path.relative_to(site).as_posix() for path in site.rglob("*.html"))
-    assert pages == ["entries/my whole #1.html", "entries/part.html", "index.html", "rules.html"]
+    assert pages == ["entries/my-whole-1.html", "entries/part.html", "index.html", "rules.html"]
     for path in site.rglob("*.html"):
         links = Links(path).found
         assert links
         for link in links:
             assert (path.parent / unquote(link)).is_file(), link
     linked = {unquote(one) for one in Links(site / "index.html").found}
-    assert {"entries/my whole #1.html", "entries/part.html", "rules.html"} <= linked
+    assert {"entries/my-whole-1.html", "entries/part.html", "rules.html"} <= linked
 
 
 def test_a_page_shows_rates_floors_audit_verification_and_how_to_reproduce(site: Path) -> None:
-    page = (site / "entries" / "my whole #1.html").read_text()
+    page = (site / "entries" / "my-whole-1.html").read_text()
     for title in ("Rates", "Gaps", "Floors", "Controls", "Prompt audit", "How to reproduce"):
         assert f"<h2>{title}</h2>" in page
     words = " ".join(re.sub(r"<[^>]+>", " ", page).split())
@@ -87,7 +87,7 @@ def test_a_page_shows_rates_floors_audit_verification_and_how_to_reproduce(site:
     assert "StopCube" in words
     assert "85.45" in words  # 16 of 110 are errors, which count as failures as on the board
     assert "prompt_tokens=N does" in words  # why there is no audit
-    assert "roboirg leaderboard verify my whole #1.roboirg.zip --submission" in words
+    assert "roboirg leaderboard verify my-whole-1.roboirg.zip --submission" in words
 
 
 def test_a_page_of_a_run_that_is_not_ranked_gives_the_reason_as_text(site: Path) -> None:
@@ -120,7 +120,7 @@ def verified(monkeypatch: pytest.MonkeyPatch, *words: str, **found: Any) -> Resu
 
 
 def test_a_submission_must_hold_and_be_ranked(packs: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    whole, part = (str(packs / f"{name}.roboirg.zip") for name in ("my whole #1", "part"))
+    whole, part = (str(packs / f"{name}.roboirg.zip") for name in ("my-whole-1", "part"))
     good = verified(monkeypatch, whole, "--submission")
     assert (good.exit_code, good.output.splitlines()[-1]) == (0, "The board ranks it.")
     bad = verified(monkeypatch, whole, "--submission", missing=("an episode",))
@@ -144,7 +144,7 @@ def test_the_workflow_checks_what_a_pull_request_adds_and_builds_the_board(
     """Its own commands, run as it runs them."""
     for place in ("packs", "submission/packs"):
         (tmp_path / place).mkdir(parents=True)
-        shutil.copy(packs / "my whole #1.roboirg.zip", tmp_path / place)
+        shutil.copy(packs / "my-whole-1.roboirg.zip", tmp_path / place)
 
     def run(name: str) -> subprocess.CompletedProcess[str]:
         path = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
@@ -174,6 +174,33 @@ def test_the_workflow_checks_what_a_pull_request_adds_and_builds_the_board(
     assert "all hold" not in page
     (check,) = json.loads((tmp_path / site / CHECKS_FILE).read_text()).values()
     assert "actions were not kept" in check["problem"]
+
+
+@pytest.mark.parametrize("name", [".hidden.roboirg.zip", "x.txt", "sub/x.roboirg.zip", "link"])
+def test_the_workflow_refuses_what_its_loop_would_pass_over(
+    packs: Path, tmp_path: Path, name: str
+) -> None:
+    place = tmp_path / "submission" / "packs"
+    place.mkdir(parents=True)
+    (tmp_path / "packs").mkdir()
+    if name == "link":
+        (place / "part.roboirg.zip").symlink_to(packs / "part.roboirg.zip")
+    else:
+        (place / name).parent.mkdir(exist_ok=True)
+        (place / name).write_bytes(b"junk")
+    done = subprocess.run(
+        ["bash", "-e", "-c", step("check new packs")], cwd=tmp_path, capture_output=True, text=True,
+        check=False,
+    )  # fmt: skip
+    assert done.returncode == 2, done.stderr
+    assert "is no pack, or has an odd name" in done.stdout
+
+
+def test_what_a_site_in_the_folder_of_packs_keeps_is_not_trusted(packs: Path) -> None:
+    app = typer.Typer()
+    add_commands(app)
+    words = ["leaderboard", "board", str(packs), "--out", str(packs / "new" / ".." / "site")]
+    assert "give a folder outside" in str(CliRunner().invoke(app, words).exception)
 
 
 def test_the_workflow_runs_the_base_s_code_with_read_rights_only() -> None:

@@ -25,6 +25,7 @@ from roboirg.evaluation.plan.plan_maker import make_plan
 from roboirg.evaluation.plan.stored_plans import kept_fingerprints
 from roboirg.evaluation.records.record import IDENTITY, Summary
 from roboirg.evaluation.records.store import read_results
+from roboirg.tasks.splits.private_splits import is_private
 
 _CHOSEN = {"policy", "actions", "demonstration_frames", "observe_every", "options"}
 """What a named plan leaves to the policy; words are compared apart."""
@@ -64,13 +65,15 @@ def refusal(results: Sequence[Summary], known: Collection[str]) -> str:
         return f"{counted(stray, 'record')} outside every plan in the pack"
     by_run: dict[PolicyRun, list[Summary]] = defaultdict(list)
     for one in results:
-        if one.arm == TOLD:
-            by_run[PolicyRun.of(one)].append(one)
+        by_run[PolicyRun.of(one)].append(one)
     return next(filter(None, map(_run_refusal, by_run.values())), "")
 
 
-def _run_refusal(played: Sequence[Summary]) -> str:
+def _run_refusal(records: Sequence[Summary]) -> str:
     """Return why one policy's episodes are no whole named plan; empty if they are one."""
+    played = [one for one in records if one.arm == TOLD]
+    if not played:
+        return f"{records[0].policy} played control arms alone"
     first = played[0]
     keys = frozenset(map(_key, played))
     if all(one.outcome == "error" for one in played):
@@ -82,7 +85,7 @@ def _run_refusal(played: Sequence[Summary]) -> str:
     if (0, 0) in differences.values():
         return ""
     if not differences:
-        return f"the words of {first.policy} match no named plan"
+        return f"the words or the split of {first.policy} match no named plan"
     name, (missing, more) = min(differences.items(), key=lambda one: sum(one[1]))
     parts = [f"{missing:,} missing"] * bool(missing) + [f"{more:,} not in it"] * bool(more)
     return (
@@ -93,6 +96,8 @@ def _run_refusal(played: Sequence[Summary]) -> str:
 
 def _plans(split: str, wordings: str | None) -> Iterator[tuple[str, NamedEpisodes]]:
     for name in ranked_plans():
+        if not is_private(split) and split != read_plan_file(name).get("split", split):
+            continue
         plan = _named(name, split)
         if is_robomme(wordings) if plan.in_robommes_words else wordings is None:
             yield name, plan

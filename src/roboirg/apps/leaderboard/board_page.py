@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import NamedTuple
@@ -11,6 +12,7 @@ from roboirg.apps.leaderboard.board_rows import BoardRate, BoardRow, PackedRun, 
 from roboirg.apps.leaderboard.entry_tables import entry_facts, entry_tables
 from roboirg.apps.leaderboard.pack_checks import check_pack, read_check
 from roboirg.apps.leaderboard.packing import PACK_SUFFIX, opened_run
+from roboirg.core.errors import InvalidValueError, RoboIRGError
 from roboirg.core.plain_text import printable
 from roboirg.core.version import __version__
 from roboirg.evaluation.analysis.page.report import check_report_support
@@ -22,6 +24,8 @@ from roboirg.util.web.page_templates import template_environment
 
 BOARD_FILE = "index.html"
 ENTRIES = "entries"
+_NAME = re.compile(rf"[a-z0-9][a-z0-9_.-]*{re.escape(PACK_SUFFIX)}")
+"""Of a pack's file: no two names look alike, or differ in case alone."""
 
 
 class _Cell(NamedTuple):
@@ -42,7 +46,7 @@ def read_packs(
     workers: int = 0,
     progress: Callable[[int, int], object] | None = None,
 ) -> tuple[PackedRun, ...]:
-    """Read all packed runs of a folder.
+    """Read all packed runs of a folder; what cannot be read, or has an odd name, is not ranked.
 
     Args:
         folder: of the packs.
@@ -51,26 +55,40 @@ def read_packs(
             nothing.
         workers: number of processes that play.
         progress: is called with the number of packs that were read, and of all.
-
-    Raises:
-        StoreError: one of them cannot be read, and nothing was to be checked.
     """
     paths = sorted(folder.glob(f"*{PACK_SUFFIX}"))
     packs = []
     for count, path in enumerate(paths, start=1):
-        check = read_check(path, site)
-        if sample is not None:
-            check = check_pack(path, site, sample=sample, workers=workers)
-        if check is None or check.records:  # else it could not even be opened
-            with opened_run(path) as run:
-                results, plans, why = read_results(run), read_plans(run), find_refusal(run)
-            planned = [job for plan in plans for job in plan.drawable_jobs()]
-            packs.append(PackedRun(_name(path), results, planned, check, why))
-        else:
-            packs.append(PackedRun(_name(path), (), (), check))
+        try:
+            packs.append(_read_pack(path, site, sample, workers))
+        except RoboIRGError as error:
+            packs.append(PackedRun(_name(path), (), (), None, str(error)))
         if progress is not None:
             progress(count, len(paths))
     return tuple(packs)
+
+
+def _read_pack(path: Path, site: Path, sample: float | None, workers: int) -> PackedRun:
+    """Read one pack.
+
+    Raises:
+        RoboIRGError: it cannot be read, or its name is refused.
+    """
+    if not _NAME.fullmatch(path.name) or path.is_symlink():
+        raise InvalidValueError(
+            "a pack is a file, not a link, and its name has small letters, digits, dots, hyphens "
+            "and underscores alone"
+        )
+    if sample is None:
+        check = read_check(path, site)
+    else:
+        check = check_pack(path, site, sample=sample, workers=workers)
+    if check is not None and not check.records:  # it could not even be opened
+        return PackedRun(_name(path), (), (), check)
+    with opened_run(path) as run:
+        results, plans, why = read_results(run), read_plans(run), find_refusal(run)
+    planned = [job for plan in plans for job in plan.drawable_jobs()]
+    return PackedRun(_name(path), results, planned, check, why)
 
 
 def write_board(runs: Sequence[PackedRun], folder: Path) -> Path:

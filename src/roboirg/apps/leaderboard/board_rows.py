@@ -11,13 +11,13 @@ import numpy as np
 
 from roboirg.apps.leaderboard.admission import with_failures
 from roboirg.apps.leaderboard.pack_checks import PackCheck
+from roboirg.core.arms import TOLD
 from roboirg.evaluation.analysis.published import MAX_STEPS, published_rows
 from roboirg.evaluation.analysis.stats.cells import (
     Cells,
     PolicyRun,
     clustered_interval,
     gather,
-    only_told,
 )
 from roboirg.evaluation.analysis.stats.intervals import SEED
 from roboirg.evaluation.analysis.stats.option_labels import (
@@ -184,8 +184,8 @@ def _without_split(policy_run: PolicyRun | None) -> PolicyRun | None:
 
 
 def _rows_of(run: PackedRun) -> Iterable[BoardRow]:
-    results = with_failures(run.results)
-    cells = only_told(gather([(run.name, results)], run.planned))
+    results = [one for one in with_failures(run.results) if one.arm == TOLD]
+    cells = gather([(run.name, results)], [job for job in run.planned if job.arm == TOLD])
     rng = np.random.default_rng(SEED)
     by_policy_run = _by_policy_run(cells)
     for policy_run in sorted(by_policy_run, key=repr):

@@ -104,6 +104,11 @@ def board(
 
     check_report_support()
     path = folder_of(folder)
+    if out.resolve().is_relative_to(path.resolve()):
+        raise InvalidValueError(
+            f"--out is {str(out)!r}, in the folder of the packs, where a submission could put what "
+            "the board trusts; give a folder outside."
+        )
     with progress_bar("packed runs") as show:
         packs = read_packs(
             path,
