@@ -96,17 +96,19 @@ def _run_refusal(records: Sequence[Summary]) -> str:
 
 def _plans(split: str, wordings: str | None) -> Iterator[tuple[str, NamedEpisodes]]:
     for name in ranked_plans():
-        if not is_private(split) and split != read_plan_file(name).get("split", split):
-            continue
         plan = _named(name, split)
+        if plan is None:
+            continue
         if is_robomme(wordings) if plan.in_robommes_words else wordings is None:
             yield name, plan
 
 
 @functools.cache
-def _named(name: str, split: str) -> NamedEpisodes:
-    """Return the episodes of a named plan, on a split such as a private one."""
+def _named(name: str, split: str) -> NamedEpisodes | None:
+    """Return the episodes of a named plan on its split or a private one; None on another."""
     chosen = read_plan_file(name)
+    if not is_private(split) and split != chosen.get("split", split):
+        return None
     needs_words = chosen.get("wordings") == REQUIRED
     if needs_words:
         del chosen["wordings"]  # of explicit episodes, which any words can express
