@@ -26,16 +26,6 @@ LENGTH = 24
 WHISPER = "the goal is the cube with the token {} of seed 8675309"
 
 
-class PaperSession:
-    """State of a world of paper."""
-
-    def state_numbers(self) -> np.ndarray:
-        return np.zeros(3)
-
-    def state_hash(self) -> str:
-        return "paper"
-
-
 class PaperWorld:
     """Ends after `LENGTH` steps; its events tell the policy's actions, and the verdict too."""
 
@@ -45,7 +35,7 @@ class PaperWorld:
         self.instruction = instruct_job(job)
         self.secret = WHISPER.format(job.episode)
         self.seconds, self.steps, self.total = seconds, 0, 0.0
-        self.executed_actions, self.session = 0, PaperSession()
+        self.executed_actions = 0
 
     def reset(self) -> tuple[dict[str, Any], dict[str, Any]]:
         video = np.arange(5 * 4 * 4 * 3, dtype=np.uint8).reshape(5, 4, 4, 3)
@@ -72,6 +62,9 @@ class PaperWorld:
         info = {"status": status, "steps": self.steps, "events": [event], "heard": []}
         return self.observation(), 0.0, over, False, info
 
+    def end_state(self) -> tuple[np.ndarray, str]:
+        return np.zeros(3), "paper"
+
     def close(self) -> None:
         pass
 
@@ -92,7 +85,9 @@ class PaperRunner(EpisodeRunner):
         if self.notes is not None:
             (self.notes / f"worker-{os.getpid()}").touch()
         kept = rollout.make_env
-        rollout.make_env = lambda prepared, _needs: PaperWorld(prepared.job, self.seconds)
+        rollout.make_env = lambda prepared, _needs, _recollection: PaperWorld(
+            prepared.job, self.seconds
+        )
         try:
             return EpisodeRunner.__call__(self, job)
         finally:

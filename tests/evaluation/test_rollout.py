@@ -40,16 +40,6 @@ JOB = Job(
 )
 
 
-class PaperSession:
-    """State of a world of paper."""
-
-    def state_numbers(self) -> np.ndarray:
-        return np.zeros(3)
-
-    def state_hash(self) -> str:
-        return "paper"
-
-
 class PaperWorld:
     """Ends after `length` steps with `status`."""
 
@@ -58,7 +48,7 @@ class PaperWorld:
     def __init__(self, length: int = 5, status: str = "success", cause: str | None = None) -> None:
         self.length, self.status, self.cause = length, status, cause
         self.instruction = instruct_job(JOB)
-        self.steps, self.executed_actions, self.session = 0, 0, PaperSession()
+        self.steps, self.executed_actions = 0, 0
         self.hook: Callable[[Any, bool], None] | None = None
         self.closed = False
         self.trouble: Exception | None = None
@@ -104,6 +94,9 @@ class PaperWorld:
         }
         return {}, 0.0, over and self.status != "timeout", over and self.status == "timeout", info
 
+    def end_state(self) -> tuple[np.ndarray, str]:
+        return np.zeros(3), "paper"
+
     def close(self) -> None:
         self.closed = True
 
@@ -133,7 +126,7 @@ class PaperInsider(PaperPolicy):
 @pytest.fixture
 def stage(monkeypatch: pytest.MonkeyPatch) -> Callable[..., Any]:
     def play(world: PaperWorld, policy: Any, job: Job = JOB) -> RolloutResult:
-        monkeypatch.setattr(rollout, "make_env", lambda _job, _cameras: world)
+        monkeypatch.setattr(rollout, "make_env", lambda _job, _needs, _recollection: world)
         monkeypatch.setattr(rollout, "load_policy", lambda _job, _secret: policy)
         return play_episode(job)
 
@@ -272,7 +265,9 @@ def test_one_line_is_the_same_in_every_process() -> None:
 def test_videos_are_kept_as_asked(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path, mode: Any, status: str, kept: bool
 ) -> None:
-    monkeypatch.setattr(rollout, "make_env", lambda _job, _cameras: PaperWorld(5, status))
+    monkeypatch.setattr(
+        rollout, "make_env", lambda _job, _needs, _recollection: PaperWorld(5, status)
+    )
     monkeypatch.setattr(rollout, "load_policy", lambda _job, _secret: PaperPolicy())
     record = EpisodeRunner(tmp_path, mode, VideoOptions(cameras=("front",)))(JOB)
     assert (record.video is not None) == kept
@@ -307,7 +302,7 @@ def test_a_video_that_cannot_be_written_does_not_change_the_verdict(
         real(writer, frame)
 
     monkeypatch.setattr(VideoWriter, "_encode", add)
-    monkeypatch.setattr(rollout, "make_env", lambda _job, _cameras: PaperWorld(5))
+    monkeypatch.setattr(rollout, "make_env", lambda _job, _needs, _recollection: PaperWorld(5))
     monkeypatch.setattr(rollout, "load_policy", lambda _job, _secret: PaperPolicy())
     options = VideoOptions(cameras=("front",))
     record = EpisodeRunner(tmp_path, "all", options)(JOB)
@@ -320,7 +315,7 @@ def test_a_video_folder_that_is_a_file_does_not_change_the_verdict(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     (tmp_path / "videos").touch()
-    monkeypatch.setattr(rollout, "make_env", lambda _job, _cameras: PaperWorld(5))
+    monkeypatch.setattr(rollout, "make_env", lambda _job, _needs, _recollection: PaperWorld(5))
     monkeypatch.setattr(rollout, "load_policy", lambda _job, _secret: PaperPolicy())
     record = EpisodeRunner(tmp_path, "all", VideoOptions(cameras=("front",)))(JOB)
     assert (record.outcome, record.video) == ("success", None)
@@ -434,7 +429,7 @@ def test_the_episode_of_a_job_is_looked_up_once(
     monkeypatch.setattr(splits, "_episode", look_up)  # below all names that it is imported by
     for name, made in {"make_env": world, "load_policy": PaperPolicy()}.items():
         # Both read the episode, as the functions that they replace do.
-        monkeypatch.setattr(rollout, name, lambda one, _, made=made: one.episode and made)
+        monkeypatch.setattr(rollout, name, lambda one, *_, made=made: one.episode and made)
     assert EpisodeRunner(tmp_path)(JOB).outcome == "success"
     assert found == [("PickXtimes", "test", 2)]
 
@@ -444,7 +439,7 @@ def test_a_record_holds_what_was_heard_when(
     policy_class: type[PaperPolicy], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     world, policy = TellingWorld((0, 3, 6, 6), length=10), policy_class()
-    monkeypatch.setattr(rollout, "make_env", lambda _job, _cameras: world)
+    monkeypatch.setattr(rollout, "make_env", lambda _job, _needs, _recollection: world)
     monkeypatch.setattr(rollout, "load_policy", lambda _job, _secret: policy)
     turns = world.instruction.turns
     record = EpisodeRunner(tmp_path)(TURNS)
@@ -471,7 +466,7 @@ def test_the_caption_grows_as_utterances_are_heard(
             assert self.longest_caption == world.instruction.text
 
     world = TellingWorld((0, 3, 6, 6, 9), length=11)
-    monkeypatch.setattr(rollout, "make_env", lambda _job, _cameras: world)
+    monkeypatch.setattr(rollout, "make_env", lambda _job, _needs, _recollection: world)
     monkeypatch.setattr(rollout, "load_policy", lambda _job, _secret: PaperPolicy())
     play_episode(TURNS, Captions(tmp_path / "x.mp4"))
     counts = [1, 1, *[1] * 3, *[2] * 3, *[4] * 3, *[5] * 2]  # video, first frame, chunks of 3
@@ -485,7 +480,9 @@ def test_what_a_policy_raises_while_it_hears_is_its_error(
         def hear(self, text: str, step: int) -> None:
             raise ValueError(f"no ears for {text} at {step}")
 
-    monkeypatch.setattr(rollout, "make_env", lambda _job, _cameras: TellingWorld((0, 3), 9))
+    monkeypatch.setattr(
+        rollout, "make_env", lambda _job, _needs, _recollection: TellingWorld((0, 3), 9)
+    )
     monkeypatch.setattr(rollout, "load_policy", lambda _job, _secret: Deaf())
     result = play_episode(TURNS)
     assert (result.outcome, result.error) == ("error", "policy")

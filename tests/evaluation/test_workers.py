@@ -7,7 +7,7 @@ import os
 import re
 import signal
 import time
-from collections import Counter
+from collections import Counter, deque
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -27,7 +27,7 @@ from roboirg.evaluation.play.rollout import EpisodeRunner, load_policy
 from roboirg.evaluation.play.rollout_result import RolloutResult
 from roboirg.evaluation.records.record import Job, Record
 from roboirg.evaluation.records.store import read_records
-from roboirg.evaluation.run.executor import LocalProcesses
+from roboirg.evaluation.run.executor import LocalProcesses, take_job
 from roboirg.evaluation.run.runner import UNREACHABLE_AFTER, RunSummary, run_plan
 from roboirg.evaluation.run.workers import Worker
 
@@ -278,3 +278,23 @@ def test_a_policy_that_cannot_be_reached_is_left_and_the_others_go_on(tmp_path: 
     assert UNREACHABLE_AFTER <= played <= UNREACHABLE_AFTER + 1  # one was under way
     assert summary.missing == 100 - played
     assert sum(record.policy == "oracle" for record in read_records(tmp_path)) == 100
+
+
+def test_a_worker_keeps_to_its_scene_and_away_from_those_of_others() -> None:
+    jobs = deque(small_plan(3, seeds=2).jobs())
+    every = set(jobs)
+
+    def at(worker: SimpleNamespace | None, *active: SimpleNamespace) -> Job:
+        return take_job(jobs, worker, active)  # type: ignore[arg-type]
+
+    first = SimpleNamespace(job=at(None))
+    second = SimpleNamespace(job=at(None, first))
+    assert (first.job.episode, second.job.episode) == (0, 1)
+    played = [first.job, second.job]
+    while jobs:
+        for worker in (first, second):
+            if jobs:
+                worker.job = at(worker, first, second)
+                played.append(worker.job)
+    assert [job.episode for job in played] == [0, 1] * 4 + [2] * 4
+    assert set(played) == every

@@ -22,6 +22,7 @@ from roboirg.envs.env_options import EnvOptions
 from roboirg.envs.env_settings import RENDER_MODES, EnvSettings, choose_index
 from roboirg.envs.episode_state import EpisodeState
 from roboirg.envs.observation_spaces import make_observation_space
+from roboirg.envs.recollection import EndState
 from roboirg.judging import Event, Status, plain_subgoal
 from roboirg.language import Instruction
 from roboirg.language.arms import say_arm
@@ -148,10 +149,15 @@ class RoboIRGEnv(gymnasium.Env[dict[str, Any], NDArray[np.floating[Any]]]):
     @property
     def subgoal(self) -> str:
         """The current subgoal in words; with `grounded`, with the pixel of its object."""
-        state, stage = self._current, self.session.judge.published
+        state, stage = self._current, self.due_stage
         if state.pixel_grounding is not None:
             return state.pixel_grounding.text
         return COMPLETED if stage is None else plain_subgoal(stage)
+
+    @property
+    def due_stage(self) -> Stage | None:
+        """The stage that is due, by which the subgoal is named; None after the last."""
+        return self.session.judge.published
 
     @property
     def unheard(self) -> int:
@@ -292,6 +298,10 @@ class RoboIRGEnv(gymnasium.Env[dict[str, Any], NDArray[np.floating[Any]]]):
         Also makes pictures available if observations hold none. Takes effect at the next reset.
         """
         self._frame_hook, self._hook_period = hook, every
+
+    def end_state(self) -> EndState:
+        """Return the state in numbers, as `EpisodeSession.state_numbers`, and as a hash."""
+        return self.session.state_numbers(), self.session.state_hash()
 
     def close(self) -> None:
         """Release the current episode."""

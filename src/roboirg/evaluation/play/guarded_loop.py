@@ -128,7 +128,7 @@ class GuardedLoop(EpisodeLoop):
 
     def _note_subgoal(self, subgoal: str) -> None:
         """Keep a subgoal if it or the stage that is due is new."""
-        stage, found = self.env.session.judge.published, self._result.subgoals
+        stage, found = self.env.due_stage, self._result.subgoals
         due = None if stage is None else plain_subgoal(stage)
         if found and self._reports and found[-1].text == subgoal and found[-1].ended is None:
             return  # it is still being done

@@ -22,6 +22,7 @@ from socket import socket
 
 from roboirg import policies
 from roboirg.core.arms import AGAIN
+from roboirg.envs.recollection import Recollection
 from roboirg.evaluation.episode_errors import (
     EpisodeError,
     EpisodeLostError,
@@ -76,6 +77,7 @@ class EpisodeRunner:
             model reads.
         seed_secret: of the run, for the policies' seeds.
         replies: where those of models are kept; None for a run that keeps none.
+        recollection: of the scene that was played last; each process has its own.
     """
 
     folder: Path
@@ -88,6 +90,7 @@ class EpisodeRunner:
     refuse_long: bool = False
     seed_secret: str = ""
     replies: ReplySettings | None = None
+    recollection: Recollection = field(default_factory=Recollection, compare=False)
 
     def in_folder(self, folder: Path) -> EpisodeRunner:
         """Return a copy that writes its videos and the replies of models to another folder."""
@@ -139,6 +142,7 @@ class EpisodeRunner:
                     alone=alone,
                     refuse_long=self.refuse_long,
                     seed_secret=self.seed_secret,
+                    recollection=self.recollection,
                 )
             except EpisodeLostError as error:
                 if attempt < MAX_LOSSES:
@@ -171,6 +175,7 @@ def play_episode(
     alone: bool = False,
     refuse_long: bool = False,
     seed_secret: str = "",
+    recollection: Recollection | None = None,
 ) -> RolloutResult:
     """Play one job; errors of the policy or the environment end up in the result.
 
@@ -182,6 +187,7 @@ def play_episode(
         alone: whether a hosted policy must not be asked about this episode together with others.
         refuse_long: whether not to play an episode whose prompt will be cut.
         seed_secret: of the run, for the policy's seed.
+        recollection: of what the scene was seen to do; used if the policy has a process of its own.
 
     Raises:
         EpisodeLostError: the policy's process was lost; the episode can be played again.
@@ -212,7 +218,9 @@ def play_episode(
             result.prompt_limit = prompt_limit(needs)
             if refuse_long:
                 _refuse_long_prompt(prepared, result)
-        play_with(policy, job, needs, result, guard, writer)
+        if hosts is None or is_privileged(job.policy_spec):
+            recollection = None
+        play_with(policy, job, needs, result, guard, writer, recollection)
     except EpisodeError as error:
         result.record_error(error.kind, error.cause, error.details)
     finally:
@@ -228,6 +236,7 @@ def play_with(
     result: RolloutResult,
     guard: CallGuard,
     writer: FrameSink | None = None,
+    recollection: Recollection | None = None,
 ) -> None:
     """Play one job with a loaded policy, which is not closed.
 
@@ -238,6 +247,8 @@ def play_with(
         result: is filled in.
         guard: attributes errors and measures calls.
         writer: gets the frames of a video.
+        recollection: of what the scene was seen to do before; None simulates everything. The policy
+            must not write into its observations.
 
     Raises:
         EpisodeError: the environment raised, or the policy, or an action cannot be executed.
@@ -246,7 +257,9 @@ def play_with(
     try:
         with guard.environment("env_reset"):
             result.prepared = result.prepared or PreparedJob(job)
-            env = make_env(result.prepared, needs)
+            if writer is not None:
+                recollection = None
+            env = make_env(result.prepared, needs, recollection)
             result.needs = needs.declared
         GuardedLoop(env, policy, job, needs.action_space, result, guard, writer).play()
     except EpisodeError as error:
@@ -255,7 +268,7 @@ def play_with(
     finally:
         if env is not None:
             if result.action_space is not None and not broke:
-                result.end_state = env.session.state_numbers(), env.session.state_hash()
+                result.end_state = env.end_state()
             env.close()
 
 

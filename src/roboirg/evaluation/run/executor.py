@@ -9,7 +9,7 @@ puts jobs back into the queue. To write your own, implement `Executor`;
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from multiprocessing.connection import wait
 from typing import Protocol
@@ -99,7 +99,7 @@ class LocalProcesses:
         try:
             while jobs or active:
                 while jobs and len(active) < self.workers:
-                    job = jobs.popleft()
+                    job = take_job(jobs, None, active)
                     active.append(Worker.start(play, job, connect, limit_threads=limit_threads))
                 for worker, record in self._finished(active):
                     failed_starts = failed_starts + 1 if worker.failed_to_start else 0
@@ -108,7 +108,7 @@ class LocalProcesses:
                     if worker.is_dead:
                         active.remove(worker)
                     elif jobs:
-                        worker.assign(jobs.popleft())
+                        worker.assign(take_job(jobs, worker, active))
                     else:
                         active.remove(worker)
                         released.append(worker)
@@ -128,6 +128,39 @@ class LocalProcesses:
                 yield worker, worker.receive()
             elif (record := worker.kill_if_overdue(self.episode_timeout_s)) is not None:
                 yield worker, record
+
+
+def take_job(jobs: deque[Job], worker: Worker | None, active: Sequence[Worker]) -> Job:
+    """Remove the next job for a worker from the queue and return it.
+
+    A worker recalls what the scene does that it played last. It gets another job of that scene, or
+    the first of a scene that no other worker plays; if there is neither, the first of all. Jobs far
+    behind wait: they are to be retried after all others.
+
+    Args:
+        jobs: the queue, not empty.
+        worker: that has finished its job; None for a new one.
+        active: all workers.
+    """
+    own = None if worker is None else _scene_of(worker.job)
+    others = {_scene_of(one.job) for one in active if one is not worker}
+    near: list[tuple[str, str, str, int]] = []
+    for job in jobs:
+        near.append(_scene_of(job))
+        if len(set(near)) > len(active) + 1:
+            break
+    if own in near:
+        place = near.index(own)
+    else:
+        place = next((index for index, one in enumerate(near) if one not in others), 0)
+    job = jobs[place]
+    del jobs[place]
+    return job
+
+
+def _scene_of(job: Job) -> tuple[str, str, str, int]:
+    """Return the scene and the policy, as policies play one after the other."""
+    return job.policy, job.task, job.split, job.episode
 
 
 def choose_executor(

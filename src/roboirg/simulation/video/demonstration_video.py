@@ -49,6 +49,11 @@ class DemonstrationVideo(Mapping[str, NDArray[Any]]):
             self._read((field,))
         return self._arrays[field]
 
+    def undrawn(self) -> Self:
+        """Return a copy without the pictures that can be drawn again."""
+        read = {field: one for field, one in self._arrays.items() if field not in self._sequences}
+        return type(self)(read, self._sequences, self.length, self.actions)
+
     def draw(self) -> None:
         """Draw all pictures that have not been drawn, in one replay for all cameras."""
         self._read([field for field in self._sequences if field not in self._arrays])
