@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -73,10 +74,17 @@ def make_learned(
 
 def _load(path: Path) -> tuple[PolicyModel, str]:
     check_learn_support()
+    version = file_version(path, "policy")
+    return _model(path, version), version
+
+
+@functools.lru_cache(maxsize=4)
+def _model(path: Path, version: str) -> PolicyModel:
+    """Return what a file of that version holds; episodes change nothing in it."""
+    del version
     from roboirg.apps.learning.policy.policy_model import load_policy
 
-    version = file_version(path, "policy")
-    return load_policy(path), version
+    return load_policy(path)
 
 
 KIND = PolicyKind("trained", _trained, has_weights=True)
