@@ -1,4 +1,4 @@
-"""Write the table of docs/learned-policy.md from the pack that holds its episodes.
+"""Write the tables of docs/learned-policy.md from the pack that holds their episodes.
 
 python scripts/write_learned_table.py
 """
@@ -6,70 +6,131 @@ python scripts/write_learned_table.py
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from roboirg.apps.leaderboard.packing import opened_run
+from roboirg.apps.learning.listener.study_report import TrainedRate, trained_rate
 from roboirg.apps.learning.policy.paper_experiment import row_of
 from roboirg.evaluation.analysis.stats.cells import CellResults, gather
 from roboirg.evaluation.analysis.stats.chance import silent_chance
-from roboirg.evaluation.analysis.stats.intervals import wilson_interval
-from roboirg.evaluation.analysis.stats.paired_tests import Pairs, holm, sign_flip_test
+from roboirg.evaluation.analysis.stats.paired_tests import holm, sign_flip_test
 from roboirg.evaluation.records.store import read_results
+from roboirg.language.settings import EXPLICIT, plain_settings
 from roboirg.tasks import all_tasks
 
 ROOT = Path(__file__).parent.parent
 PAGE = ROOT / "docs" / "learned-policy.md"
 PACK = ROOT / "results" / "learned-policy-val.roboirg.zip"
-TABLE = re.compile(r"(?<=<!-- learned -->\n\n).*?(?=\n\n<!-- end of learned -->)", re.DOTALL)
 SMALLEST_P = 0.001
 """Smaller ones are not printed."""
 MEMORY, WITHOUT = "small-recurrent", "small-none"
+WORDS = {
+    MEMORY: "explicit",
+    "small-recurrent-all-words": "all five settings",
+    "small-recurrent-no-words": "no words",
+}
+"""What each row's reader was trained on; the body is the same."""
+
+Cells = Mapping[tuple[str, str], Mapping[str, Mapping[int, CellResults]]]
+"""By row and setting, then by task, then by training seed."""
+Verdicts = NDArray[np.int64]
+"""1 where an episode is solved, else 0; shape (training seeds, episodes)."""
 
 
-def played() -> Mapping[tuple[str, str], CellResults]:
-    """Return the episodes of the pack, by row and task."""
+def played() -> Cells:
+    """Return the episodes of the pack."""
     with opened_run(PACK) as run:
         cells = gather([("val", read_results(run))])
-    return {(row_of(key.policy_run.policy)[0], key.task): cell for key, cell in cells.items()}
+    found: dict[tuple[str, str], dict[str, dict[int, CellResults]]] = {}
+    for key, cell in cells.items():
+        row, seed = row_of(key.policy_run.policy)
+        by_task = found.setdefault((row, key.options.setting), {})
+        by_task.setdefault(key.task, {})[seed] = cell
+    return found
 
 
-def table() -> str:
-    """Return the table: success by task with memory and without, and the paired test."""
-    cells = played()
-    tasks = [task for task in all_tasks() if (MEMORY, task) in cells]
-    pairs = {task: Pairs.of(cells[MEMORY, task], cells[WITHOUT, task]) for task in tasks}
-    p_values = holm([sign_flip_test(one.differences) for one in pairs.values()])
-    lines = [
-        "| task | `recurrent` | `none` | only one of them | p (Holm) | a blind guess |",
-        "| --- | ---: | ---: | ---: | ---: | ---: |",
+def verdicts(trained: Mapping[int, CellResults]) -> Verdicts:
+    """Return the verdicts of each training seed on the same episodes."""
+    by_seed = [
+        {trial.episode: won for trial, won in cell.verdicts.items()}
+        for _, cell in sorted(trained.items())
     ]
-    for (task, one), p_value in zip(pairs.items(), p_values, strict=True):
-        first, second = (_rate(cells[row, task]) for row in (MEMORY, WITHOUT))
-        alone = f"{one.overlap.only_first} : {one.overlap.only_second}"
-        episodes = sorted({trial.episode for trial in cells[MEMORY, task].verdicts})
-        guess = np.mean([silent_chance(task, "val", episode) for episode in episodes])
-        shown = "< 0.001" if p_value < SMALLEST_P else f"{p_value:.3f}"
-        lines.append(f"| {task} | {first} | {second} | {alone} | {shown} | {100 * guess:.0f} |")
-    sums = [_sum([cells[row, task] for task in tasks]) for row in (MEMORY, WITHOUT)]
-    return "\n".join([*lines, f"| all | {sums[0]} | {sums[1]} | | | |"])
+    return np.array([[one[at] for at in sorted(by_seed[0])] for one in by_seed], np.int64)
 
 
-def _sum(cells: Sequence[CellResults]) -> str:
-    successes, trials = sum(one.successes for one in cells), sum(one.trials for one in cells)
-    return f"{successes:,} of {trials:,} ({successes / trials:.0%})"
+def memory_table(cells: Cells) -> str:
+    """Return success by task with memory and without, in explicit words, and the paired test."""
+    with_memory, without = cells[MEMORY, EXPLICIT], cells[WITHOUT, EXPLICIT]
+    tasks = [task for task in all_tasks() if task in with_memory]
+    pairs = [(verdicts(with_memory[task]), verdicts(without[task])) for task in tasks]
+    p_values = holm([sign_flip_test(one.sum(axis=0) - other.sum(axis=0)) for one, other in pairs])
+    lines = [
+        "| task | `recurrent` | each seed | `none` | each seed | p (Holm) | a blind guess |",
+        "| --- | ---: | --- | ---: | --- | ---: | ---: |",
+    ]
+    for task, pair, p_value in zip(tasks, pairs, p_values, strict=True):
+        shown = [_with_seeds(trained_rate([one.astype(float)])) for one in pair]
+        episodes = sorted({trial.episode for trial in with_memory[task][0].verdicts})
+        guess = 100 * np.mean([silent_chance(task, "val", episode) for episode in episodes])
+        p_shown = "< 0.001" if p_value < SMALLEST_P else f"{p_value:.3f}"
+        lines.append(f"| {task} | {' | '.join(shown)} | {p_shown} | {guess:.0f} |")
+    means = [_with_seeds(trained_rate([one[at].astype(float) for one in pairs])) for at in (0, 1)]
+    return "\n".join([*lines, f"| mean | {' | '.join(means)} | | |"])
 
 
-def _rate(cell: CellResults) -> str:
-    low, high = wilson_interval(cell.successes, cell.trials)
-    return f"{100 * cell.successes / cell.trials:.0f} ({100 * low:.0f} to {100 * high:.0f})"
+def words_table(cells: Cells) -> str:
+    """Return success by setting for each kind of words that were learned, mean over tasks."""
+    settings = plain_settings()
+    lines = [
+        f"| trained on | {' | '.join(f'`{one}`' for one in settings)} |",
+        "| --- " + "| ---: " * len(settings) + "|",
+    ]
+    for row, words in WORDS.items():
+        rates = [trained_rate(list(_tasks_of(cells[row, one]))) for one in settings]
+        lines.append(f"| {words} | {' | '.join(map(_rate, rates))} |")
+    return "\n".join(lines)
+
+
+def _tasks_of(by_task: Mapping[str, Mapping[int, CellResults]]) -> Iterator[NDArray[np.float64]]:
+    """Yield the verdicts of the first training seed for each task."""
+    for trained in by_task.values():
+        yield verdicts({0: trained[0]}).astype(float)
+
+
+def _rate(one: TrainedRate) -> str:
+    low, high = (100 * end for end in one.interval)
+    return f"{100 * one.rate:.0f} ({low:.0f} to {high:.0f})"
+
+
+def _with_seeds(one: TrainedRate) -> str:
+    return f"{_rate(one)} | {', '.join(f'{100 * rate:.0f}' for rate in one.by_seed)}"
+
+
+TABLES = {"memory": memory_table, "words": words_table}
+
+
+def table_of(page: str, name: str) -> str | None:
+    """Return a table as a page has it; None if there is none."""
+    found = _place(name).search(page)
+    return None if found is None else found[0]
 
 
 def page_text() -> str:
-    """Return the page with the table of the pack."""
-    return TABLE.sub(lambda _: table(), PAGE.read_text(encoding="utf-8"), count=1)
+    """Return the page with the tables of the pack."""
+    page, cells = PAGE.read_text(encoding="utf-8"), played()
+    for name, table in TABLES.items():
+        text = table(cells)
+        page = _place(name).sub(lambda _, text=text: text, page, count=1)
+    return page
+
+
+def _place(name: str) -> re.Pattern[str]:
+    begin, end = f"<!-- learned {name} -->\n\n", f"\n\n<!-- end of learned {name} -->"
+    return re.compile(f"(?<={re.escape(begin)}).*?(?={re.escape(end)})", re.DOTALL)
 
 
 if __name__ == "__main__":

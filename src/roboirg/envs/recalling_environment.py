@@ -111,6 +111,11 @@ class RecallingEnv(RoboIRGEnv):
             self._moment.objects[point] = super().objects_at(point)
         return self._moment.objects[point]
 
+    def close(self) -> None:
+        """Release the current episode."""
+        super().close()
+        self._moment = None
+
     @property
     def _current(self) -> EpisodeState:
         if self._state is None and self._moment is not None:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from roboirg.core.episode import Stage
 from roboirg.core.subgoal_text import Point
 
-MOST_BYTES = 300 * 2**20
+MOST_BYTES = 128 * 2**20
 """Of observations that are kept of a scene; what follows later is simulated each time."""
 
 EndState = tuple[NDArray[np.float64], str]

@@ -146,7 +146,7 @@ def part_options(
 
 
 def _rows(files: Mapping[str, Path]) -> dict[str, str]:
-    return {name: f"trained:{path.absolute()}" for name, path in files.items()}
+    return {name: f"trained:{path}" for name, path in files.items()}
 
 
 def _with_planners(experiment: ExperimentPlan, files: Mapping[str, Path]) -> dict[str, str]:
@@ -158,7 +158,7 @@ def _with_planners(experiment: ExperimentPlan, files: Mapping[str, Path]) -> dic
     for seed in range(experiment.seeds):
         for memory in (one for one in experiment.memories if one in PLANNERS):
             name = row_name(memory, seed)
-            own = f"trained:{files[name].absolute()}"
+            own = f"trained:{files[name]}"
             found[name] = own
             found[row_name(memory, seed, "-interpreter")] = f"planner:listener?hands={own}"
             found[row_name(memory, seed, "-scripted-hands")] = f"{own}?hands=scripted"
