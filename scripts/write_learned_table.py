@@ -62,12 +62,17 @@ def verdicts(trained: Mapping[int, CellResults]) -> Verdicts:
     return np.array([[one[at] for at in sorted(by_seed[0])] for one in by_seed], np.int64)
 
 
+def differences(one: Verdicts, other: Verdicts) -> NDArray[np.int64]:
+    """Return how much oftener each episode is solved, of as many trainings of both."""
+    return one.sum(axis=0) * len(other) - other.sum(axis=0) * len(one)
+
+
 def memory_table(cells: Cells) -> str:
     """Return success by task with memory and without, in explicit words, and the paired test."""
     with_memory, without = cells[MEMORY, EXPLICIT], cells[WITHOUT, EXPLICIT]
     tasks = [task for task in all_tasks() if task in with_memory]
     pairs = [(verdicts(with_memory[task]), verdicts(without[task])) for task in tasks]
-    p_values = holm([sign_flip_test(one.sum(axis=0) - other.sum(axis=0)) for one, other in pairs])
+    p_values = holm([sign_flip_test(differences(one, other)) for one, other in pairs])
     lines = [
         "| task | `recurrent` | each seed | `none` | each seed | p (Holm) | a blind guess |",
         "| --- | ---: | --- | ---: | --- | ---: | ---: |",
