@@ -64,7 +64,8 @@ def verdicts(trained: Mapping[int, CellResults]) -> Verdicts:
 
 def differences(one: Verdicts, other: Verdicts) -> NDArray[np.int64]:
     """Return how much oftener each episode is solved, of as many trainings of both."""
-    return one.sum(axis=0) * len(other) - other.sum(axis=0) * len(one)
+    oftener: NDArray[np.int64] = one.sum(axis=0) * len(other) - other.sum(axis=0) * len(one)
+    return oftener
 
 
 def memory_table(cells: Cells) -> str:
@@ -128,8 +129,7 @@ def page_text() -> str:
     """Return the page with the tables of the pack."""
     page, cells = PAGE.read_text(encoding="utf-8"), played()
     for name, table in TABLES.items():
-        text = table(cells)
-        page = _place(name).sub(lambda _, text=text: text, page, count=1)
+        page = _place(name).sub(table(cells).replace("\\", r"\\"), page, count=1)
     return page
 
 

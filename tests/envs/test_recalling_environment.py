@@ -1,4 +1,4 @@
-"""Equal actions in a scene are simulated once, and nobody can see a difference."""
+"""Equal actions in a scene are simulated once, and what is returned is the same."""
 
 import numpy as np
 import pytest
@@ -116,6 +116,42 @@ def test_any_order_of_actions_gives_what_the_simulator_gives(plays):
         ("explicit", "direct", "reasoning", "contextual"), plays, strict=False
     ):
         play_both(environments(recollection, setting, "PickXtimes", **BLIND), moves)
+
+
+def test_the_words_of_a_reset_stay_when_the_simulator_catches_up():
+    recollection = Recollection()
+    for changed in ({"setting": "direct"}, {"arm": "silent"}, {"setting": "reasoning"}):
+        ours, plain = environments(recollection, "explicit", **SEEN)
+        for env in (ours, plain):
+            env.reset(options=changed)
+        for move in (0, 0, 1):
+            assert_equal(ours.step_chunk(MOVES[move]), plain.step_chunk(MOVES[move]))
+            assert ours.objects_at((128, 100 + move)) == plain.objects_at((128, 100 + move))
+
+
+def test_arms_with_another_goal_alternate_with_the_told_one(started):
+    recollection = Recollection()
+    for arm in ("told", "other-goal"):
+        play_both(environments(recollection, "explicit", arm=arm, **SEEN), (0, 1))
+    before = len(started)
+    for arm in ("told", "other-goal"):
+        ours, plain = environments(recollection, "direct", arm=arm, **SEEN)
+        assert ours.reset()[0]["instruction"] == plain.instruction.text
+        for move in (0, 1):
+            ours.step_chunk(MOVES[move])
+    assert len(started) == before
+
+
+def test_what_is_known_stays_known_when_a_new_point_needs_the_simulator(started):
+    recollection = Recollection()
+    for column, worlds in ((100, 1), (101, 1), (100, 0), (101, 0)):
+        before = len(started)
+        ours, _ = environments(recollection, "explicit", **SEEN)
+        ours.reset()
+        ours.step_chunk(MOVES[0])
+        ours.objects_at((128, column))
+        ours.step_chunk(MOVES[1])
+        assert len(started) - before == worlds
 
 
 def test_another_scene_is_another_matter():

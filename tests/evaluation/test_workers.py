@@ -14,6 +14,8 @@ from types import SimpleNamespace
 import chaos_policy
 import pytest
 from evaluation_fakes import FakePlay, WaitingPlay, comparable, small_plan
+from hypothesis import given
+from hypothesis import strategies as st
 from msgspec.structs import replace
 
 from roboirg.core.errors import RoboIRGError
@@ -280,21 +282,41 @@ def test_a_policy_that_cannot_be_reached_is_left_and_the_others_go_on(tmp_path: 
     assert sum(record.policy == "oracle" for record in read_records(tmp_path)) == 100
 
 
+def hand_out(jobs: deque[Job], workers: int) -> list[Job]:
+    """Return the jobs as workers that take turns get them."""
+    active: list[SimpleNamespace] = []
+    played = []
+    while jobs:
+        if len(active) < workers:
+            job = take_job(jobs, None, active)  # type: ignore[arg-type]
+            active.append(SimpleNamespace(job=job))
+        else:
+            active.append(active.pop(0))
+            active[-1].job = job = take_job(jobs, active[-1], active)  # type: ignore[arg-type]
+        played.append(job)
+    return played
+
+
 def test_a_worker_keeps_to_its_scene_and_away_from_those_of_others() -> None:
     jobs = deque(small_plan(3, seeds=2).jobs())
     every = set(jobs)
-
-    def at(worker: SimpleNamespace | None, *active: SimpleNamespace) -> Job:
-        return take_job(jobs, worker, active)  # type: ignore[arg-type]
-
-    first = SimpleNamespace(job=at(None))
-    second = SimpleNamespace(job=at(None, first))
-    assert (first.job.episode, second.job.episode) == (0, 1)
-    played = [first.job, second.job]
-    while jobs:
-        for worker in (first, second):
-            if jobs:
-                worker.job = at(worker, first, second)
-                played.append(worker.job)
+    played = hand_out(jobs, 2)
     assert [job.episode for job in played] == [0, 1] * 4 + [2] * 4
     assert set(played) == every
+
+
+@given(st.integers(1, 4), st.integers(1, 3), st.integers(1, 5))
+def test_policies_play_one_after_the_other(episodes: int, seeds: int, workers: int) -> None:
+    jobs = deque(small_plan(episodes, ("random", "oracle"), seeds).jobs())
+    every = list(jobs)
+    played = hand_out(jobs, workers)
+    assert len(played) == len(every)
+    assert set(played) == set(every)
+    names = [job.policy for job in played]
+    assert names == [job.policy for job in every]
+
+
+def test_a_retry_waits_for_all_others() -> None:
+    first, *others = small_plan(3).jobs()
+    assert hand_out(deque([*others, first]), 1) == [*others, first]
+    assert hand_out(deque([first, *others]), 1) == [first, *others]

@@ -289,8 +289,10 @@ class RoboIRGEnv(gymnasium.Env[dict[str, Any], NDArray[np.floating[Any]]]):
         Args:
             point: row and column.
         """
+        if not self._renders:
+            return None
         world = self.session.world
-        return objects_at(world.bodies, world.cameras, point) if self._renders else None
+        return objects_at(world.bodies, world.cameras, point)
 
     def set_frame_hook(self, hook: FrameHook, every: int = 1) -> None:
         """Call ``hook(env, is_demonstration)`` after every n-th control step and at the end.

@@ -5,7 +5,8 @@ A policy that reads two instructions alike moves alike, and the simulator gives 
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import contextlib
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from typing import Any, Unpack
 
@@ -43,40 +44,48 @@ class RecallingEnv(RoboIRGEnv):
         self._recollection = recollection
         self._moment: Moment | None = None
         self._recalled: list[NDArray[np.float64]] = []
+        self._started: dict[str, Any] = {}
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[dict[str, Any], dict[str, Any]]:
         """Start the episode, without the simulator if its beginning is known."""
         self._choose_episode(seed, options or {})
-        self._state, self._recalled = None, []
+        self._state, self._moment, self._recalled = None, None, []
+        self._started = {"seed": seed, "options": options}
         settings = replace(self._settings, words=EXPLICIT_WORDS, arm=TOLD)
-        self._moment = self._recollection.start_of(self.episode, self.original, settings)
-        if self._moment is None:
+        goal = self.episode.goal, self.original is None
+        known = self._recollection.start_of(goal, self.original or self.episode, settings)
+        if known is None:
             observation, info = super().reset(seed=seed, options=options)
             kept = {**info, "demonstration": info["demonstration"].undrawn()}
-            self._keep((observation, 0.0, False, False, kept), None, b"")
+            self._moment = self._simulated((observation, 0.0, False, False, kept))
+            self._recollection.keep_start(goal, self._moment)
             return observation, info
+        self._moment = known
         spoken = SpokenInstruction(self.instruction.turns, self.delivery)
-        observation, *_, info = self._moment.in_words(spoken.prompt)
+        observation, *_, info = known.in_words(spoken.prompt)
         heard = [one._asdict() for one in spoken.heard]
-        return observation, {
-            **info,
-            "heard": heard,
-            "demonstration": info["demonstration"].undrawn(),
-        }
+        video = info["demonstration"].undrawn()
+        return observation, {**info, "heard": heard, "demonstration": video}
 
     def step_chunk(self, actions: ArrayLike) -> StepResult:
         """Execute several actions, or recall what followed from them."""
         chunk = check_chunk(actions, self._space)
         before, key = self._moment, chunk.tobytes()
-        known = None if before is None or self._state is not None else before.following.get(key)
-        if known is None:
+        known = None if before is None else before.following.get(key)
+        if before is None or known is None:
             result = super().step_chunk(chunk)
-            self._keep(result, before, key)
+            self._moment = self._simulated(result)
+            if before is not None:
+                self._recollection.keep(self._moment, before, key)
             return result
+        if self._state is None:
+            self._recalled.append(chunk)
+        else:
+            with self._unseen():
+                super().step_chunk(chunk)
         self._moment = known
-        self._recalled.append(chunk)
         return known.in_words(SpokenInstruction(self.instruction.turns, self.delivery).prompt)
 
     @property
@@ -126,20 +135,26 @@ class RecallingEnv(RoboIRGEnv):
         """Bring the simulator to the present moment."""
         moment, self._moment = self._moment, None
         recalled, self._recalled = self._recalled, []
-        draws, self.draws = self.draws, False
-        try:
-            super().reset()
+        with self._unseen():
+            super().reset(**self._started)
             for chunk in recalled:
                 super().step_chunk(chunk)
+        self._moment = moment
+
+    @contextlib.contextmanager
+    def _unseen(self) -> Iterator[None]:
+        """Draw nothing of what has been seen before."""
+        draws, self.draws = self.draws, False
+        try:
+            yield
         finally:
-            self.draws, self._moment = draws, moment
+            self.draws = draws
 
     def _record_history(self) -> None:
-        if self.draws:  # else it has been seen
+        if self.draws:
             super()._record_history()
 
-    def _keep(self, result: StepResult, before: Moment | None, actions: bytes) -> None:
-        self._moment = None  # what is read now is the simulator's
-        moment = Moment(result, self.executed_actions, self.due_stage)
-        self._moment = moment
-        self._recollection.keep(moment, before, actions)
+    def _simulated(self, result: StepResult) -> Moment:
+        """Return the present moment, as the simulator has it."""
+        self._moment = None
+        return Moment(result, self.executed_actions, self.due_stage)

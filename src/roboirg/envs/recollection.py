@@ -13,7 +13,9 @@ from roboirg.core.episode import Stage
 from roboirg.core.subgoal_text import Point
 
 MOST_BYTES = 128 * 2**20
-"""Of observations that are kept of a scene; what follows later is simulated each time."""
+"""Of what is kept of a scene; what follows later is simulated each time."""
+MOMENT_BYTES = 2000
+"""Of a moment without its arrays, about."""
 
 EndState = tuple[NDArray[np.float64], str]
 """The state of a world in numbers, (m,), and as a SHA-256."""
@@ -55,28 +57,29 @@ class Recollection:
 
     def __init__(self) -> None:
         self._of: tuple[object, ...] = ()
-        self._start: Moment | None = None
+        self._starts: dict[object, Moment] = {}
         self._bytes = 0
 
-    def start_of(self, *what: object) -> Moment | None:
-        """Return the moment after the reset of what is played now; forgets everything else."""
-        if what != self._of:
-            self._of, self._start, self._bytes = what, None, 0
-        return self._start
+    def start_of(self, goal: object, *scene: object) -> Moment | None:
+        """Return the moment after the reset of a scene with a goal; forgets all other scenes."""
+        if scene != self._of:
+            self._of, self._starts, self._bytes = scene, {}, 0
+        return self._starts.get(goal)
 
-    def keep(self, moment: Moment, before: Moment | None, actions: bytes) -> None:
-        """Keep a moment that follows another one, or a reset, if there is room."""
+    def keep_start(self, goal: object, moment: Moment) -> None:
+        """Keep the moment after the reset of the scene with a goal."""
         self._bytes += _size(moment.result[0])
-        if self._bytes > MOST_BYTES:
-            return
-        if before is None:
-            self._start = moment
-        else:
+        self._starts[goal] = moment
+
+    def keep(self, moment: Moment, before: Moment, actions: bytes) -> None:
+        """Keep a moment that follows another one, if there is room."""
+        self._bytes += _size(moment.result[0]) + len(actions)
+        if self._bytes <= MOST_BYTES:
             before.following[actions] = moment
 
 
 def _size(observation: Mapping[str, Any]) -> int:
-    """Return the bytes of the arrays of an observation and its history."""
+    """Return the bytes of a moment with an observation and its history."""
     past = observation.get("history", ())
     arrays = (one for part in (observation, *past) for one in part.values())
-    return sum(one.nbytes for one in arrays if isinstance(one, np.ndarray))
+    return MOMENT_BYTES + sum(one.nbytes for one in arrays if isinstance(one, np.ndarray))

@@ -14,6 +14,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
@@ -253,7 +254,7 @@ def play_with(
     Raises:
         EpisodeError: the environment raised, or the policy, or an action cannot be executed.
     """
-    env, broke = None, False
+    env, stands = None, False
     try:
         with guard.environment("env_reset"):
             result.prepared = result.prepared or PreparedJob(job)
@@ -262,14 +263,15 @@ def play_with(
             env = make_env(result.prepared, needs, recollection)
             result.needs = needs.declared
         GuardedLoop(env, policy, job, needs.action_space, result, guard, writer).play()
+        stands = True
     except EpisodeError as error:
-        broke = error.kind == "environment"
+        stands = error.kind != "environment"
         raise
     finally:
         if env is not None:
-            if result.action_space is not None and not broke:
-                result.end_state = env.end_state()
-            env.close()
+            with contextlib.closing(env), guard.environment("env_step"):
+                if result.action_space is not None and stands:
+                    result.end_state = env.end_state()
 
 
 def _refuse_long_prompt(prepared: PreparedJob, result: RolloutResult) -> None:

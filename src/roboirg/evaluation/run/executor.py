@@ -133,33 +133,28 @@ class LocalProcesses:
 def take_job(jobs: deque[Job], worker: Worker | None, active: Sequence[Worker]) -> Job:
     """Remove the next job for a worker from the queue and return it.
 
-    A worker recalls what the scene does that it played last. It gets another job of that scene, or
-    the first of a scene that no other worker plays; if there is neither, the first of all. Jobs far
-    behind wait: they are to be retried after all others.
+    It is the first one of a scene that no other worker plays with the same policy, so that a worker
+    stays with its scene, and recalls what it does there. If there is none, it is the first of all.
 
     Args:
-        jobs: the queue, not empty.
+        jobs: the queue, not empty; the jobs of a scene are next to each other.
         worker: that has finished its job; None for a new one.
         active: all workers.
     """
-    own = None if worker is None else _scene_of(worker.job)
     others = {_scene_of(one.job) for one in active if one is not worker}
-    near: list[tuple[str, str, str, int]] = []
-    for job in jobs:
-        near.append(_scene_of(job))
-        if len(set(near)) > len(active) + 1:
+    policy, place = jobs[0].policy, 0
+    for index, job in enumerate(jobs):
+        if job.policy != policy:
+            break  # policies play one after the other
+        if _scene_of(job) not in others:
+            place = index
             break
-    if own in near:
-        place = near.index(own)
-    else:
-        place = next((index for index, one in enumerate(near) if one not in others), 0)
     job = jobs[place]
     del jobs[place]
     return job
 
 
 def _scene_of(job: Job) -> tuple[str, str, str, int]:
-    """Return the scene and the policy, as policies play one after the other."""
     return job.policy, job.task, job.split, job.episode
 
 
