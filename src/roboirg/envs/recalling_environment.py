@@ -44,7 +44,7 @@ class RecallingEnv(RoboIRGEnv):
         self._recollection = recollection
         self._moment: Moment | None = None
         self._recalled: list[NDArray[np.float64]] = []
-        self._started: dict[str, Any] = {}
+        self._reset_arguments: dict[str, Any] = {}
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -52,7 +52,7 @@ class RecallingEnv(RoboIRGEnv):
         """Start the episode, without the simulator if its beginning is known."""
         self._choose_episode(seed, options or {})
         self._state, self._moment, self._recalled = None, None, []
-        self._started = {"seed": seed, "options": options}
+        self._reset_arguments = {"seed": seed, "options": options}
         settings = replace(self._settings, words=EXPLICIT_WORDS, arm=TOLD)
         goal = self.episode.goal, self.original is None
         known = self._recollection.start_of(goal, self.original or self.episode, settings)
@@ -136,7 +136,7 @@ class RecallingEnv(RoboIRGEnv):
         moment, self._moment = self._moment, None
         recalled, self._recalled = self._recalled, []
         with self._unseen():
-            super().reset(**self._started)
+            super().reset(**self._reset_arguments)
             for chunk in recalled:
                 super().step_chunk(chunk)
         self._moment = moment
