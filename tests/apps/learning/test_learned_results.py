@@ -8,7 +8,7 @@ import write_learned_table as tables
 
 from roboirg.apps.leaderboard.packing import opened_run
 from roboirg.apps.leaderboard.run_verification import verify_run
-from roboirg.language.settings import EXPLICIT, get_setting, plain_settings
+from roboirg.language.settings import EXPLICIT, plain_settings, settings_of
 from roboirg.tasks import all_tasks, get_task
 
 
@@ -38,7 +38,7 @@ def test_the_pack_has_whole_rows_without_errors():
     wanted |= {(row, EXPLICIT) for row in (tables.WITHOUT, tables.WORDLESS)}
     assert cells.keys() == wanted
     for (row, setting), by_task in cells.items():
-        tasks = [task for task in all_tasks() if get_setting(setting).applies_to(get_task(task))]
+        tasks = [task for task in all_tasks() if setting in settings_of(get_task(task))]
         assert sorted(by_task) == sorted(tasks), (row, setting)
         for trained in by_task.values():
             assert not any(one.errors or one.missing for one in trained.values())
