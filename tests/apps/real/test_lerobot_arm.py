@@ -42,8 +42,8 @@ def test_a_trial_waits_for_its_operator_and_the_arm_holds(tmp_path):
     assert TrialLog.read(plan, tmp_path).state(plan.trials[0].name) == "waiting"
     assert (record.steps, record.outcome) == (30, "error")
     assert not arm.is_connected
-    # The policy asked for joint 1 to go on by 0.01 in each step of a chunk, from what it saw; a busy
-    # machine shows it an older state.
+    # The policy asked for joint 1 to go on by 0.01 in each step of a chunk, from what it saw; on a
+    # busy machine, that is older.
     first = [action["joint_1.pos"] for _, action in arm.sent]
     assert 0.1 <= max(first) <= 0.32
     # At the end the arm holds.
