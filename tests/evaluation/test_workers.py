@@ -288,11 +288,11 @@ def hand_out(jobs: deque[Job], workers: int) -> list[Job]:
     played = []
     while jobs:
         if len(active) < workers:
-            job = take_job(jobs, None, active)  # type: ignore[arg-type]
+            job = take_job(jobs, active)  # type: ignore[arg-type]
             active.append(SimpleNamespace(job=job))
         else:
             active.append(active.pop(0))
-            active[-1].job = job = take_job(jobs, active[-1], active)  # type: ignore[arg-type]
+            active[-1].job = job = take_job(jobs, active[:-1])  # type: ignore[arg-type]
         played.append(job)
     return played
 

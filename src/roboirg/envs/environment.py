@@ -350,6 +350,10 @@ class RoboIRGEnv(gymnasium.Env[dict[str, Any], NDArray[np.floating[Any]]]):
 
         return state.session.play_demonstration(record_step, recording)
 
+    def _spoken(self) -> SpokenInstruction:
+        """Return the instruction of which nothing but the beginning has been heard."""
+        return SpokenInstruction(self.instruction.turns, self.delivery)
+
     def _start_episode(self) -> EpisodeState:
         session = EpisodeSession(
             self.episode,
@@ -360,7 +364,7 @@ class RoboIRGEnv(gymnasium.Env[dict[str, Any], NDArray[np.floating[Any]]]):
         world = session.world
         return EpisodeState(
             session,
-            SpokenInstruction(self.instruction.turns, self.delivery),
+            self._spoken(),
             ObservationBuilder(world, self._spec),
             make_controller(self._space, world, self.choices),
             PixelGrounding(world.bodies, world.cameras) if self.grounded else None,

@@ -15,7 +15,6 @@ from numpy.typing import ArrayLike, NDArray
 
 from roboirg.core.actions import check_chunk
 from roboirg.core.arms import TOLD
-from roboirg.core.delivery import SpokenInstruction
 from roboirg.core.episode import Episode, Stage
 from roboirg.core.subgoal_text import Point
 from roboirg.envs.env_options import EnvOptions
@@ -63,7 +62,7 @@ class RecallingEnv(RoboIRGEnv):
             self._recollection.keep_start(goal, self._moment)
             return observation, info
         self._moment = known
-        spoken = SpokenInstruction(self.instruction.turns, self.delivery)
+        spoken = self._spoken()
         observation, *_, info = known.in_words(spoken.prompt)
         heard = [one._asdict() for one in spoken.heard]
         video = info["demonstration"].undrawn()
@@ -86,7 +85,7 @@ class RecallingEnv(RoboIRGEnv):
             with self._unseen():
                 super().step_chunk(chunk)
         self._moment = known
-        return known.in_words(SpokenInstruction(self.instruction.turns, self.delivery).prompt)
+        return known.in_words(self._spoken().prompt)
 
     @property
     def executed_actions(self) -> int:

@@ -188,7 +188,7 @@ def play_episode(
         alone: whether a hosted policy must not be asked about this episode together with others.
         refuse_long: whether not to play an episode whose prompt will be cut.
         seed_secret: of the run, for the policy's seed.
-        recollection: of what the scene was seen to do; used if the policy has a process of its own.
+        recollection: of the scene; used if the policy is hosted and nothing is filmed.
 
     Raises:
         EpisodeLostError: the policy's process was lost; the episode can be played again.
@@ -219,7 +219,7 @@ def play_episode(
             result.prompt_limit = prompt_limit(needs)
             if refuse_long:
                 _refuse_long_prompt(prepared, result)
-        if hosts is None or is_privileged(job.policy_spec):
+        if hosts is None or writer is not None or is_privileged(job.policy_spec):
             recollection = None
         play_with(policy, job, needs, result, guard, writer, recollection)
     except EpisodeError as error:
@@ -249,7 +249,7 @@ def play_with(
         guard: attributes errors and measures calls.
         writer: gets the frames of a video.
         recollection: of what the scene was seen to do before; None simulates everything. The policy
-            must not write into its observations.
+            must not write into its observations, and there is no writer.
 
     Raises:
         EpisodeError: the environment raised, or the policy, or an action cannot be executed.
@@ -258,8 +258,6 @@ def play_with(
     try:
         with guard.environment("env_reset"):
             result.prepared = result.prepared or PreparedJob(job)
-            if writer is not None:
-                recollection = None
             env = make_env(result.prepared, needs, recollection)
             result.needs = needs.declared
         GuardedLoop(env, policy, job, needs.action_space, result, guard, writer).play()

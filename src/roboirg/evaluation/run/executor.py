@@ -9,7 +9,7 @@ puts jobs back into the queue. To write your own, implement `Executor`;
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from multiprocessing.connection import wait
 from typing import Protocol
@@ -99,7 +99,7 @@ class LocalProcesses:
         try:
             while jobs or active:
                 while jobs and len(active) < self.workers:
-                    job = take_job(jobs, None, active)
+                    job = take_job(jobs, active)
                     active.append(Worker.start(play, job, connect, limit_threads=limit_threads))
                 for worker, record in self._finished(active):
                     failed_starts = failed_starts + 1 if worker.failed_to_start else 0
@@ -108,7 +108,7 @@ class LocalProcesses:
                     if worker.is_dead:
                         active.remove(worker)
                     elif jobs:
-                        worker.assign(take_job(jobs, worker, active))
+                        worker.assign(take_job(jobs, [one for one in active if one is not worker]))
                     else:
                         active.remove(worker)
                         released.append(worker)
@@ -130,7 +130,7 @@ class LocalProcesses:
                 yield worker, record
 
 
-def take_job(jobs: deque[Job], worker: Worker | None, active: Sequence[Worker]) -> Job:
+def take_job(jobs: deque[Job], others: Iterable[Worker]) -> Job:
     """Remove the next job for a worker from the queue and return it.
 
     It is the first one of a scene that no other worker plays with the same policy, so that a worker
@@ -138,15 +138,14 @@ def take_job(jobs: deque[Job], worker: Worker | None, active: Sequence[Worker]) 
 
     Args:
         jobs: the queue, not empty; the jobs of a scene are next to each other.
-        worker: that has finished its job; None for a new one.
-        active: all workers.
+        others: all workers but the one that the job is for.
     """
-    others = {_scene_of(one.job) for one in active if one is not worker}
+    played = {_scene_of(one.job) for one in others}
     policy, place = jobs[0].policy, 0
     for index, job in enumerate(jobs):
         if job.policy != policy:
             break  # policies play one after the other
-        if _scene_of(job) not in others:
+        if _scene_of(job) not in played:
             place = index
             break
     job = jobs[place]
