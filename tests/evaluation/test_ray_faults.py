@@ -47,8 +47,6 @@ def cluster(monkeypatch: pytest.MonkeyPatch) -> Iterator[Any]:
     from ray.cluster_utils import Cluster
 
     monkeypatch.syspath_prepend(Path(ray_fakes.__file__).parent)
-    # On a busy machine Ray would end this process before the run has noticed the loss of the head.
-    monkeypatch.setenv("RAY_gcs_rpc_server_reconnect_timeout_s", "600")
     nodes = Cluster(initialize_head=True, head_node_args={"num_cpus": 1})
     yield nodes
     ray.shutdown()

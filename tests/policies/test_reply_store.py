@@ -181,7 +181,8 @@ CHILD = textwrap.dedent(
             for number in range(int(calls)):
                 words = f"<{episode} {number}"
                 reply = model.answer(ModelQuery("system", (ChatTurn("user", (words,)),)))
-                print(reply.text, flush=True)
+                # At once: a kill between a line and its end would join it with the next.
+                os.write(1, f"{reply.text}\\n".encode())
 
     for line in iter(sys.stdin.readline, ""):
         process = os.fork()

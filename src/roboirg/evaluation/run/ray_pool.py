@@ -200,7 +200,7 @@ class RayPool:
     def _look_for_machines(self, versions: MachineVersions) -> None:
         """Start the check of machines that have joined."""
         now = time.monotonic()
-        if now - self._looked < LOOK_S:
+        if now - self._looked < LOOK_S or not self._is_reachable():
             return
         self._looked = now
         alive = {node["NodeID"]: node for node in self._ray.nodes() if node["Alive"]}
