@@ -148,9 +148,11 @@ class FastWeightMemory(LookMemory):
             tokens.new_zeros(batch, 0, count, WIDTH),
         )
         found = []
-        for now in range(length):
-            fast = fast.after(keys[:, now], values[:, now], rates[:, now], norm)
-            found.append(fast.read(queries[:, now], norm))
+        for query, key, value, rate in zip(
+            *(one.unbind(1) for one in (queries, keys, values, rates)), strict=True
+        ):
+            fast = fast.after(key, value, rate, norm)
+            found.append(fast.read(query, norm))
         given = functional.pad(given, (0, 0, 0, count - given.shape[2]))
         if found:
             new = torch.stack(found, 1).transpose(2, 3).reshape(batch, length, count, WIDTH)

@@ -94,9 +94,8 @@ class Modulation(nn.Module):
             there: (B, T, m).
             chosen: (B, D, frames) looks to attend to; -1 for none.
         """
-        # Queries have four heads, keys and values one.
         found, there = at_frames(self.keyed(self.norm(tokens)), there, chosen)
-        keys, values = found[:, None].expand(-1, HEADS, -1, -1).chunk(2, -1)
+        keys, values = found[:, None].chunk(2, -1)
         return ModulationJoin(self, keys, values, there[:, None, None])
 
 
@@ -109,9 +108,11 @@ class ModulationJoin(Join):
     def modulated(self, normed: Tensor) -> Tensor:
         """Return the input of the feed-forward network, scaled and shifted."""
         queries = split_heads(self._own.query(normed))
+        # Queries have four heads, keys and values one, which all of them share.
         found = functional.scaled_dot_product_attention(
-            queries, self._keys, self._values, self._there
+            queries.flatten(1, 2)[:, None], self._keys, self._values, self._there
         )
-        scale, shift = self._own.scale_shift(self._own.out(join_heads(found))).chunk(2, -1)
+        joined = join_heads(found.reshape(queries.shape))
+        scale, shift = self._own.scale_shift(self._own.out(joined)).chunk(2, -1)
         after: Tensor = normed * (1.0 + scale) + shift
         return after
