@@ -11,10 +11,11 @@ from __future__ import annotations
 import argparse
 import csv
 import io
-import re
 import time
 from collections.abc import Iterator, Sequence
 from pathlib import Path
+
+from written_parts import with_part
 
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.core.plain_text import counted
@@ -38,7 +39,6 @@ from roboirg.shortcuts.shortcut_tables import (
 from roboirg.tasks import all_tasks
 
 PAGE = Path(__file__).parent.parent / "docs" / "floors.md"
-TABLES = re.compile(r"(?<=<!-- floors -->\n\n).*?(?=\n\n<!-- end of floors -->)", re.DOTALL)
 SCENES = 400
 """Random scenes of each task that are tested."""
 
@@ -164,7 +164,7 @@ def _claims(floors: Floors) -> str:
 def page_text() -> str:
     """Return the page with the tables of the stored floors."""
     floors = stored.measured_floors(LANGUAGE_VERSION) or {}
-    return TABLES.sub(lambda _: tables(floors), PAGE.read_text(encoding="utf-8"), count=1)
+    return with_part(PAGE.read_text(encoding="utf-8"), "floors", tables(floors))
 
 
 def main() -> None:

@@ -5,19 +5,28 @@ python scripts/write_learned_table.py
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
+from written_parts import with_part
 
 from roboirg.apps.leaderboard.packing import opened_run
 from roboirg.apps.learning.listener.study_report import TrainedRate, trained_rate
 from roboirg.apps.learning.policy.paper_experiment import row_of
-from roboirg.evaluation.analysis.stats.cells import CellResults, gather
+from roboirg.evaluation.analysis.stats.arm_figures import (
+    LANGUAGE_USE,
+    ORDERS_WORTH,
+    WORDS_WORTH,
+    ArmFigure,
+    arm_figures,
+)
+from roboirg.evaluation.analysis.stats.cells import CellResults, only_told
 from roboirg.evaluation.analysis.stats.chance import silent_chance
+from roboirg.evaluation.analysis.stats.intervals import ALPHA
 from roboirg.evaluation.analysis.stats.paired_tests import holm, sign_flip_test
+from roboirg.evaluation.analysis.stats.run_data import RunData
 from roboirg.evaluation.records.store import read_results
 from roboirg.language.settings import EXPLICIT, plain_settings
 from roboirg.tasks import all_tasks
@@ -39,12 +48,16 @@ Verdicts = NDArray[np.int64]
 """1 where an episode is solved, else 0; shape (training seeds, episodes)."""
 
 
-def played() -> Cells:
+def played() -> RunData:
     """Return the episodes of the pack."""
     with opened_run(PACK) as run:
-        cells = gather([("val", read_results(run))])
+        return RunData.of([("val", read_results(run))])
+
+
+def told(data: RunData) -> Cells:
+    """Return the episodes without control arms."""
     found: dict[tuple[str, str], dict[str, dict[int, CellResults]]] = {}
-    for key, cell in cells.items():
+    for key, cell in only_told(data.cells).items():
         row, seed = row_of(key.policy_run.policy)
         by_task = found.setdefault((row, key.options.setting), {})
         by_task.setdefault(key.task, {})[seed] = cell
@@ -66,8 +79,9 @@ def differences(one: Verdicts, other: Verdicts) -> NDArray[np.int64]:
     return oftener
 
 
-def memory_table(cells: Cells) -> str:
+def memory_table(data: RunData) -> str:
     """Return success by task with memory and without, in explicit words, and the paired test."""
+    cells = told(data)
     with_memory, without = cells[MEMORY, EXPLICIT], cells[WITHOUT, EXPLICIT]
     tasks = [task for task in all_tasks() if task in with_memory]
     pairs = [(verdicts(with_memory[task]), verdicts(without[task])) for task in tasks]
@@ -86,8 +100,9 @@ def memory_table(cells: Cells) -> str:
     return "\n".join([*lines, f"| mean | {' | '.join(means)} | | |"])
 
 
-def words_table(cells: Cells) -> str:
+def words_table(data: RunData) -> str:
     """Return success by setting for each kind of words that were learned, mean over tasks."""
+    cells = told(data)
     settings = plain_settings()
     lines = [
         f"| trained on | {' | '.join(f'`{one}`' for one in settings)} |",
@@ -102,6 +117,30 @@ def words_table(cells: Cells) -> str:
         for one in settings
     ]
     return "\n".join([*lines, f"| no words | {' | '.join(map(_rate, unheard))} |"])
+
+
+def arms_table(data: RunData) -> str:
+    """Return what control arms show: both rates of each figure, by kind of words and setting."""
+    found = {
+        (one.policy_run.policy, one.contrast.name, one.options.setting): one
+        for one in arm_figures(data)
+    }
+    settings = plain_settings()
+    lines = [
+        f"| trained on | figure | {' | '.join(f'`{one}`' for one in settings)} |",
+        "| --- | --- " + "| ---: " * len(settings) + "|",
+    ]
+    for row, words in WORDS.items():
+        for figure in (LANGUAGE_USE, WORDS_WORTH, ORDERS_WORTH):
+            rates = [_both_rates(found[row, figure, one]) for one in settings]
+            lines.append(f"| {words} | {figure} | {' | '.join(rates)} |")
+    return "\n".join(lines)
+
+
+def _both_rates(one: ArmFigure) -> str:
+    first, second = (100 * rate for rate in one.rates)
+    star = "\\*" if one.p_holm <= ALPHA else ""
+    return f"{first:.0f} / {second:.0f}{star}"
 
 
 def _tasks_of(by_task: Mapping[str, Mapping[int, CellResults]]) -> Iterator[NDArray[np.float64]]:
@@ -119,26 +158,15 @@ def _with_seeds(one: TrainedRate) -> str:
     return f"{_rate(one)} | {', '.join(f'{100 * rate:.0f}' for rate in one.by_seed)}"
 
 
-TABLES = {"memory": memory_table, "words": words_table}
-
-
-def table_of(page: str, name: str) -> str | None:
-    """Return a table as a page has it; None if there is none."""
-    found = _place(name).search(page)
-    return None if found is None else found[0]
+TABLES = {"memory": memory_table, "words": words_table, "arms": arms_table}
 
 
 def page_text() -> str:
     """Return the page with the tables of the pack."""
-    page, cells = PAGE.read_text(encoding="utf-8"), played()
+    page, data = PAGE.read_text(encoding="utf-8"), played()
     for name, table in TABLES.items():
-        page = _place(name).sub(table(cells).replace("\\", r"\\"), page, count=1)
+        page = with_part(page, f"learned {name}", table(data))
     return page
-
-
-def _place(name: str) -> re.Pattern[str]:
-    begin, end = f"<!-- learned {name} -->\n\n", f"\n\n<!-- end of learned {name} -->"
-    return re.compile(f"(?<={re.escape(begin)}).*?(?={re.escape(end)})", re.DOTALL)
 
 
 if __name__ == "__main__":

@@ -15,7 +15,7 @@ from roboirg.apps.learning.policy.paper_experiment import (
     row_name,
     row_of,
 )
-from roboirg.apps.learning.policy.paper_page import paper_text
+from roboirg.apps.learning.policy.paper_page import results_text
 from roboirg.core.errors import InvalidValueError
 from roboirg.evaluation.analysis.stats.cells import gather
 from roboirg.evaluation.plan.plan_maker import make_plan
@@ -69,7 +69,7 @@ def test_the_same_questions_have_the_same_answers_for_equal_rates(published_like
         for one in published_like("main")
         if one.policy in ROW_OF
     ]
-    text = paper_text({"main": gather([("main", results)])})
+    text = results_text({"main": gather([("main", results)])})
     carried, apart, kept = text.split("\n## ")[1:]
     for system, row in ROW_OF.items():
         assert values(carried, row) == pytest.approx(values(carried, system), abs=0.11)
@@ -91,9 +91,42 @@ def test_resolved_forms_are_compared_with_references(published_like):
         if one.options.setting != "explicit"
     ]
     found = gather([("main", [*results, *better])])
-    recovered = values(paper_text({"main": found}).split("\n## ")[-1], "small-none")
+    recovered = values(results_text({"main": found}).split("\n## ")[-1], "small-none")
     lost = [100 - 21.2, 100 - 13.6, 100 - 17.3, 100 - 12.4]
     assert recovered == pytest.approx(lost, abs=0.2)
+
+
+def test_stages_are_compared_with_the_fewest(published_like):
+    results = [
+        msgspec.structs.replace(one, policy=ROW_OF[one.policy])
+        for one in published_like("context")
+        if one.policy in ROW_OF
+    ]
+    section = results_text({"context": gather([("context", results)])}).split("\n## ")[-1]
+    for system in ("FrameS-Modul", "GroundSG-QwenVL"):
+        published = values(section, system)
+        assert values(section, ROW_OF[system]) == pytest.approx(published, abs=0.11)
+    assert values(section, "FrameS-Modul")[-1] == pytest.approx(24.44 - 29.11, abs=0.1)
+
+
+def test_other_forms_are_not_compared_with_the_row_without_memory(published_like):
+    results = [
+        msgspec.structs.replace(one, policy=ROW_OF[one.policy])
+        for one in published_like("main")
+        if one.policy in ("pi0.5", "TTT-Expert")
+    ]
+    resolved = [
+        msgspec.structs.replace(
+            one, outcome="success", options=replace(one.options, form="resolved")
+        )
+        for one in results
+        if one.options.setting != "explicit"
+    ]
+    alone, both = (
+        results_text({"main": gather([("main", found)])}).split("\n## ")[2]
+        for found in (results, [*results, *resolved])
+    )
+    assert values(alone, "small-ttt") == values(both, "small-ttt")
 
 
 @pytest.mark.parametrize(

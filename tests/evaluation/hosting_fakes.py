@@ -107,7 +107,10 @@ class PatientRunner(PaperRunner):
     def __call__(self, job: Job) -> Record:
         assert self.notes is not None
         (self.notes / f"worker-{os.getpid()}").touch()
+        deadline = time.monotonic() + 300
         while len(list(self.notes.glob("worker-*"))) < self.wanted:
+            if time.monotonic() > deadline:
+                raise RuntimeError("The other processes did not come.")
             time.sleep(0.05)
         return super().__call__(job)
 

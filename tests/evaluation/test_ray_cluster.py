@@ -77,7 +77,7 @@ def test_records_are_those_of_one_process_even_if_a_node_is_killed_half_way(
     summary = run_plan(
         PLAN.model_copy(update={"tries": 3}), tmp_path, FakePlayer(tmp_path, 0.5), RayCluster()
     )
-    killer.join(30)
+    killer.join(300)
     assert killed.is_set()
     assert (summary.errors, summary.missing) == ((), 0)
     # The episode that it had in hand was tried again.

@@ -22,7 +22,7 @@ from roboirg.evaluation.run.executor import InProcess, LocalProcesses, choose_ex
 from roboirg.evaluation.run.progress import SilentReporter
 from roboirg.evaluation.run.runner import RunSummary, run_plan
 
-WAIT_S = 20.0
+WAIT_S = 300.0
 
 
 def all_comparable(records: tuple[Record, ...]) -> list[dict[str, object]]:
@@ -43,8 +43,10 @@ def line_count(folder: Path) -> int:
 
 def begin(folder: Path) -> subprocess.Popen[bytes]:
     """The run of `evaluation_fakes` in a process of its own, until three episodes have ended."""
-    child = subprocess.Popen([sys.executable, evaluation_fakes.__file__, folder])
-    wait_until(lambda: line_count(folder) >= 3)
+    words = ["8", "1", "0.5"]  # episodes, seeds, and seconds of each, so that some are left
+    child = subprocess.Popen([sys.executable, evaluation_fakes.__file__, folder, *words])
+    wait_until(lambda: line_count(folder) >= 3 or child.poll() is not None)
+    assert child.poll() is None
     return child
 
 

@@ -162,7 +162,7 @@ def all_comparable(folder: Path) -> list[dict[str, object]]:
 def kill_in_the_middle(folder: Path, *words: str) -> None:
     """Begin the small run and SIGKILL it when two of its eight records are there."""
     child = subprocess.Popen([sys.executable, "-m", "roboirg", *words], stdout=subprocess.DEVNULL)
-    path, deadline = folder / RECORDS_FILE, time.monotonic() + 60
+    path, deadline = folder / RECORDS_FILE, time.monotonic() + 300
     while not path.exists() or path.read_bytes().count(b"\n") < 2:
         assert child.poll() is None
         assert time.monotonic() < deadline

@@ -59,7 +59,8 @@ def record_of(fault, index):
     if replies is None:
         return None
     with fake_vlm(replies) as server:
-        model = f"base_url={server.url}/v1&model=stub&timeout_s=1&retries=0"
+        seconds = 1 if fault in ("never", "late") else 60
+        model = f"base_url={server.url}/v1&model=stub&timeout_s={seconds}&retries=0"
         spec = f"planner:stateless?{model}&observe_every=400"  # few pictures are drawn
         job = Job(policy=spec, task=TASK, split="test", episode=index,
                   options=InstructionOptions("explicit"))  # fmt: skip

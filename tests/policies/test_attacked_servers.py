@@ -107,9 +107,9 @@ def test_a_body_is_asked_for_only_with_the_key(shared):
 def test_metadata_need_no_key_over_http_as_the_challenges_client_sends_none(shared):
     server = locked(shared, "challenge+http")
     address = f"http://127.0.0.1:{server.port}"
-    found = httpx.get(f"{address}/metadata", trust_env=False)
+    found = httpx.get(f"{address}/metadata", trust_env=False, timeout=300)
     assert unpack(found.content)["policy"] == "random"
-    assert httpx.post(f"{address}/reset", trust_env=False).status_code == 401
+    assert httpx.post(f"{address}/reset", trust_env=False, timeout=300).status_code == 401
 
 
 @pytest.mark.parametrize("scheme", ALL_SCHEMES)

@@ -97,13 +97,13 @@ def test_a_reset_has_to_be_confirmed(protocol):
 
 @pytest.mark.parametrize("protocol", PROTOCOLS)
 def test_a_server_that_answers_late_is_not_waited_for(protocol):
-    with PROTOCOLS[protocol](faults=[None] * before_inference(protocol) + [1.0]) as server:
-        policy = make_policy(f"{protocol}://{server.place}?timeout=0.3", 0)
+    with PROTOCOLS[protocol](faults=[None] * before_inference(protocol) + [5.0]) as server:
+        policy = make_policy(f"{protocol}://{server.place}?timeout=2", 0)
         start = time.monotonic()
-        with pytest.raises(PolicyTimeoutError, match=r"within 0\.3 s"):
+        with pytest.raises(PolicyTimeoutError, match="within 2 s"):
             episode(policy)
-        assert time.monotonic() - start < 30  # and not for ever
-        time.sleep(1)
+        assert time.monotonic() - start < 300  # and not for ever
+        time.sleep(3)
         # The late answer must not become the next one's.
         following = make_policy(f"{protocol}://{server.place}", 0)
         first = episode(following)[0]
@@ -175,8 +175,8 @@ def _accept_and_wait(listener, over):
 def test_a_server_that_says_nothing_at_first():
     with WireServer() as server:
         server.silent.set()
-        policy = make_policy(f"openpi://{server.place}?connect=0.3", 0)
-        with pytest.raises(PolicyTimeoutError, match=r"did not send its metadata within 0\.3 s"):
+        policy = make_policy(f"openpi://{server.place}?connect=2", 0)
+        with pytest.raises(PolicyTimeoutError, match="did not send its metadata within 2 s"):
             policy.reset(INSTRUCTION, {})
         server.silent.clear()
         episode(policy)
@@ -250,7 +250,7 @@ def test_connections_are_closed_and_none_is_left_over():
             episode(policy)
             policy.close()
             policy.close()
-        deadline = time.monotonic() + 5
+        deadline = time.monotonic() + 300
         while server.open and time.monotonic() < deadline:
             time.sleep(0.01)
         assert (server.connections, server.open) == (3, 0)

@@ -34,7 +34,7 @@ def holder(tmp_path):
     ready = SPAWN.Event()
     process = SPAWN.Process(target=hold, args=(tmp_path, ONE, ready, 60))
     process.start()
-    assert ready.wait(30)
+    assert ready.wait(300)
     yield process
     process.kill()
     process.join()

@@ -247,7 +247,7 @@ def test_what_a_policy_raises_is_the_clients_error(protocol):
 def test_health_and_keys(protocol, monkeypatch):
     with served(HERE, protocol, key="sesame") as url:
         place = url.split("://")[1]
-        health = httpx.get(f"http://{place}/healthz", trust_env=False)
+        health = httpx.get(f"http://{place}/healthz", trust_env=False, timeout=300)
         assert (health.status_code, health.text) == (200, "OK\n")
         monkeypatch.setenv("KEY", "sesam")
         for query in ("", "?api_key_env=KEY"):
@@ -262,7 +262,7 @@ def test_health_and_keys(protocol, monkeypatch):
 def test_the_http_interface_tells_what_is_wrong():
     with served(HERE, "challenge+http") as url:
         base = url.replace("challenge+http", "http")
-        with httpx.Client(base_url=base, trust_env=False) as client:
+        with httpx.Client(base_url=base, trust_env=False, timeout=300) as client:
             assert client.post("/infer").status_code == 400
             assert client.post("/elsewhere", content=b"x").status_code == 404
             failed = client.post("/infer", content=pack({"task_goal": "go"}))
@@ -308,7 +308,7 @@ def test_the_command_serves_until_it_is_stopped(number, code):
         client.reset(INSTRUCTION, video(2))
         assert client.act(moment(2, history=())).shape == (16, 8)
         process.send_signal(number)
-        assert process.wait(10) == code
+        assert process.wait(300) == code
     finally:
         process.kill()
         process.wait()

@@ -2,10 +2,10 @@
 
 import os
 import signal
-import socket
 import subprocess
 import sys
 from contextlib import contextmanager
+from urllib.parse import urlsplit
 
 import pytest
 from study_fakes import Serving, make_study
@@ -22,12 +22,6 @@ pytestmark = [pytest.mark.browser, pytest.mark.sim]
 
 TASKS = "PickXtimes,StopCube,SwingXtimes,BinFill,VideoUnmask,ButtonUnmask,VideoRepick,PutInBox"
 NARROW = {"width": 390, "height": 780}
-
-
-def free_port():
-    with socket.socket() as one:
-        one.bind(("127.0.0.1", 0))
-        return one.getsockname()[1]
 
 
 @contextmanager
@@ -93,7 +87,7 @@ class Person:
 
 @pytest.mark.slow
 def test_forty_questions_with_a_kill_and_a_closed_browser(tmp_path, monkeypatch, browser, wait_s):
-    folder, port = tmp_path / "study", free_port()
+    folder = tmp_path / "study"
     study = make_study(folder, monkeypatch, tasks=TASKS, episodes="5", people=2)
     asked = study.questions(0)
     assert sum(one.kind == "item" for one in asked) == 40
@@ -105,7 +99,8 @@ def test_forty_questions_with_a_kill_and_a_closed_browser(tmp_path, monkeypatch,
         return context, page
 
     context, page = new_page()
-    with serving(folder, port) as (child, url):
+    with serving(folder, 0) as (child, url):
+        port = urlsplit(url).port
         page.goto(url)
         page.check("#agreed")
         page.click("text=Begin")

@@ -241,18 +241,21 @@ def test_a_robot_that_raises_is_stopped():
 
 def test_in_real_time_too_a_killed_policy_stops_the_arm_long_before_the_watchdog():
     worker, robot = PolicyProcess(), Watched(RealClock())
-    killed = []
+    killed, over = [], threading.Event()
 
     def kill():
         while not any(kind == "command" for _, kind, _ in robot.log):
-            time.sleep(0.005)
+            if over.wait(0.005):
+                return
         time.sleep(0.72)
         os.kill(worker.pid, signal.SIGKILL)
         killed.append(robot.clock.now() - robot._started_at)
 
-    killer = threading.Thread(target=kill)
+    killer = threading.Thread(target=kill, daemon=True)
     killer.start()
-    result, _, _ = play("Still", robot, worker=worker, limits=Limits(watchdog_timeout_s=2.0))
+    limits = Limits(watchdog_timeout_s=2.0, policy_timeout_s=60.0)
+    result, _, _ = play("Still", robot, worker=worker, limits=limits)
+    over.set()
     killer.join()
     assert result.cause == "infrastructure: the process died of signal 9"
     # A period, and what a busy machine needs to notice a dead process; half the watchdog's time.

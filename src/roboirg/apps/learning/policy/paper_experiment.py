@@ -24,17 +24,17 @@ SYSTEMS: Mapping[str, str] = {
     "keyframes": "MemER",
 }
 """The paper's system with the mechanism of each memory."""
-MAIN, RESOLVED, PLANNER = "main", "resolved", "planner"
+MAIN, RESOLVED, CONTEXT, PLANNER = "main", "resolved", "context", "planner"
 PARTS: Mapping[str, str] = {
     MAIN: "paper",
     RESOLVED: "paper",
-    "context": "paper-context",
+    CONTEXT: "paper-context",
     PLANNER: "paper-planners",
 }
 """The packaged plan that each part of the experiment changes. Resolved forms join the main run."""
 HELD_OUT = "test"
 """The pool of words that is spoken in every split: that of the packaged plans' split."""
-OWN_TASKS = ("context", PLANNER)
+OWN_TASKS = (CONTEXT, PLANNER)
 """Parts with three tasks of their own."""
 SEED_MARK = "-seed"
 """Between the name of a row and a training seed other than 0."""
@@ -134,7 +134,7 @@ def part_options(
     given = read_plan_file(PARTS[part])
     given["forms"] = f"implicit,{RESOLVED}" if part == RESOLVED else "implicit"
     given["policy_seeds"] = "0"
-    if experiment.played and part != "context":
+    if experiment.played and part != CONTEXT:
         given["settings"] = ",".join(experiment.played)
     if part in OWN_TASKS:
         changes = {name: one for name, one in changes.items() if name != "tasks"}

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from decimal import Decimal
 from pathlib import Path
 from typing import NamedTuple
@@ -12,6 +13,7 @@ import msgspec
 import numpy as np
 
 from roboirg.apps.learning.policy.paper_experiment import (
+    CONTEXT,
     MAIN,
     PARTS,
     RESOLVED,
@@ -20,9 +22,11 @@ from roboirg.apps.learning.policy.paper_experiment import (
     row_of,
     run_of,
 )
+from roboirg.core.instruction_options import InstructionOptions
 from roboirg.evaluation.analysis.published import TRIALS, PublishedRow, published_rows
-from roboirg.evaluation.analysis.stats.cells import Cells, gather
+from roboirg.evaluation.analysis.stats.cells import CellKey, CellResults, Cells, gather
 from roboirg.evaluation.analysis.stats.intervals import ALPHA, SEED, Z_95, Interval
+from roboirg.evaluation.analysis.stats.option_labels import staged_options
 from roboirg.evaluation.analysis.stats.paired_tests import Gap, Pairs, holm, measure_gap
 from roboirg.evaluation.analysis.stats.run_summary import ALL, SummaryRow, summarize
 from roboirg.evaluation.analysis.tables.paper_tables import Which, is_informative, make_table
@@ -66,19 +70,20 @@ Column = Mapping[str, Difference]
 def write_paper_page(folder: Path) -> Path:
     """Write the page of the runs that were played, and return its path."""
     runs = {part: run_of(folder, part) for part in PARTS if part != RESOLVED}
-    found = {
-        part: gather([(part, [_of_row(one) for one in read_results(run)])])
-        for part, run in runs.items()
-        if run.exists()
-    }
+    found = {part: played_cells(part, run) for part, run in runs.items() if run.exists()}
     page = folder / PAGE
-    write_atomically(page, paper_text(found))
+    write_atomically(page, f"{_TITLE}\n\n{_INTRODUCTION}\n\n{results_text(found)}\n")
     return page
 
 
-def paper_text(found: Mapping[str, Cells]) -> str:
-    """Return the page in Markdown; policies of each part's cells are rows."""
-    return "\n\n".join(_sections(found)) + "\n"
+def played_cells(part: str, run: Path) -> Cells:
+    """Return the cells of the run of a part."""
+    return gather([(part, [_of_row(one) for one in read_results(run)])])
+
+
+def results_text(found: Mapping[str, Cells]) -> str:
+    """Return tables and answers in Markdown; policies of each part's cells are rows."""
+    return "\n\n".join(_sections(found))
 
 
 def _of_row(result: Summary) -> Summary:
@@ -88,14 +93,14 @@ def _of_row(result: Summary) -> Summary:
 
 
 def _sections(found: Mapping[str, Cells]) -> Iterator[str]:
-    yield _TITLE
-    yield _INTRODUCTION
     for which in TABLES:
         cells = found.get(which, {})
         if cells and (which == "planner" or is_informative(which, cells)):
             yield markdown(make_table(which, cells, published=True)).rstrip()
     if MAIN in found:
         yield from _questions(found[MAIN])
+    if CONTEXT in found:
+        yield from _stage_question(found[CONTEXT])
 
 
 def _questions(main: Cells) -> Iterator[str]:
@@ -119,26 +124,42 @@ def _questions(main: Cells) -> Iterator[str]:
         yield _table(settings, lambda one: _own_form_gaps(averages, one), lambda _: {})
 
 
+def _stage_question(context: Cells) -> Iterator[str]:
+    shortest, *longer = staged_options()
+    named = {_stages(one): one for one in longer}
+    yield "## Does success fall with each stage of the context?"
+    yield f"Success less that with the stages {_stages(shortest)} alone, in points."
+    yield _table(
+        list(named),
+        lambda one: _own_longer(context, named[one], shortest),
+        lambda one: _published_longer(named[one], shortest),
+    )
+
+
+def _stages(options: InstructionOptions) -> str:
+    return ", ".join(map(str, options.stages))
+
+
 def _table(
-    settings: Sequence[str],
+    columns: Sequence[str],
     ours: Callable[[str], Column],
     published: Callable[[str], Column],
 ) -> str:
     """Return a table of differences; a star marks p at most 0.05 with Holm's correction by row."""
-    columns = [{**ours(name), **published(name)} for name in settings]
-    rows = list(dict.fromkeys(row for column in columns for row in column))
+    found = [{**ours(name), **published(name)} for name in columns]
+    rows = list(dict.fromkeys(row for column in found for row in column))
     cells = {}
     for row in rows:
-        own = [column.get(row) for column in columns]
+        own = [column.get(row) for column in found]
         adjusted = iter(holm([one.p_value for one in own if one is not None]))
         cells[row] = ["–" if one is None else _difference_text(one, next(adjusted)) for one in own]
     note = "\\* p ≤ 0.05 with Holm's correction over the row. In parentheses: 95 % intervals."
-    return f"{_grid(settings, cells)}\n\n{note}"
+    return f"{_grid(columns, cells)}\n\n{note}"
 
 
-def _grid(settings: Sequence[str], cells: Mapping[str, Sequence[str]]) -> str:
+def _grid(columns: Sequence[str], cells: Mapping[str, Sequence[str]]) -> str:
     """Return a Markdown table of the cells of each row."""
-    lines = [f"| row | {' | '.join(settings)} |", f"| --- |{' --- |' * len(settings)}"]
+    lines = [f"| row | {' | '.join(columns)} |", f"| --- |{' --- |' * len(columns)}"]
     lines += [f"| {row} | {' | '.join(own)} |" for row, own in cells.items()]
     return "\n".join(lines)
 
@@ -184,21 +205,42 @@ def _as_difference(gap: Gap) -> Difference:
 
 def _own_against(cells: Cells, setting: str) -> dict[str, Difference]:
     """Return each row less the first one on the same episodes, averaged over tasks."""
-    own = {key: cell for key, cell in cells.items() if key.options.setting == setting}
+    own = {
+        key: cell
+        for key, cell in cells.items()
+        if key.options.setting == setting and key.options.form == "implicit"
+    }
     first = {
         key.task: cell for key, cell in own.items() if key.policy_run.policy == row_name(FIRST)
     }
-    found = {}
-    for policy in dict.fromkeys(key.policy_run.policy for key in own):
-        pairs = [
-            Pairs.of(cell, first[key.task])
-            for key, cell in own.items()
-            if key.policy_run.policy == policy and key.task in first
-        ]
-        gap = measure_gap(pairs, np.random.default_rng(SEED))
-        if gap is not None and policy != row_name(FIRST):
-            found[policy] = _as_difference(gap)
-    return found
+    others = {key: cell for key, cell in own.items() if key.policy_run.policy != row_name(FIRST)}
+    return _paired((key, cell, first.get(key.task)) for key, cell in others.items())
+
+
+def _own_longer(
+    cells: Cells, options: InstructionOptions, shortest: InstructionOptions
+) -> dict[str, Difference]:
+    """Return success with some stages less that with the fewest, averaged over tasks."""
+    return _paired(
+        (key, cell, cells.get(key._replace(options=replace(key.options, stages=shortest.stages))))
+        for key, cell in cells.items()
+        if key.options.stages == options.stages
+    )
+
+
+def _paired(
+    found: Iterable[tuple[CellKey, CellResults, CellResults | None]],
+) -> dict[str, Difference]:
+    """Return the difference of the cells of each policy to others on the same episodes."""
+    by_policy: dict[str, list[Pairs]] = {}
+    for key, cell, other in found:
+        if other is not None:
+            by_policy.setdefault(key.policy_run.policy, []).append(Pairs.of(cell, other))
+    gaps = {
+        policy: measure_gap(pairs, np.random.default_rng(SEED))
+        for policy, pairs in by_policy.items()
+    }
+    return {policy: _as_difference(gap) for policy, gap in gaps.items() if gap is not None}
 
 
 def _published(setting: str, reference: str | None) -> dict[str, Difference]:
@@ -213,6 +255,17 @@ def _published(setting: str, reference: str | None) -> dict[str, Difference]:
         if other != (system, setting):
             found[system] = _independent(rows[system, setting], rows[other])
     return found
+
+
+def _published_longer(
+    options: InstructionOptions, shortest: InstructionOptions
+) -> dict[str, Difference]:
+    """Return published rates with some stages less those with the fewest."""
+    rows = {(one.model, one.options): one for one in published_rows("context")}
+    systems = dict.fromkeys(model for model, _ in rows)
+    return {
+        system: _independent(rows[system, options], rows[system, shortest]) for system in systems
+    }
 
 
 def _independent(first: PublishedRow, second: PublishedRow) -> Difference:

@@ -34,7 +34,7 @@ from roboirg.evaluation.analysis.stats.paired_tests import Gap, Pairs, holm, mea
 from roboirg.evaluation.analysis.stats.run_data import RunData
 from roboirg.evaluation.records.record import Summary
 
-LANGUAGE_USE, WORDS_WORTH = "language use", "words' worth"
+LANGUAGE_USE, WORDS_WORTH, ORDERS_WORTH = "language use", "words' worth", "order's worth"
 
 Arms = Mapping[str, Summary]
 """The results of one trial by arm."""
@@ -188,7 +188,7 @@ def _paraphrases(arms: Arms) -> Sides | None:
 CONTRASTS = (
     ArmContrast(LANGUAGE_USE, "each reached when stated", "same pursued", _language_use),
     ArmContrast(WORDS_WORTH, TOLD, SILENT, _against(SILENT, SILENT_EMPTY)),
-    ArmContrast("order's worth", TOLD, SCRAMBLED, _against(SCRAMBLED)),
+    ArmContrast(ORDERS_WORTH, TOLD, SCRAMBLED, _against(SCRAMBLED)),
     ArmContrast("paraphrases", "all", "mean", _paraphrases),
     ArmContrast("repeat", TOLD, AGAIN, _against(AGAIN)),
 )
