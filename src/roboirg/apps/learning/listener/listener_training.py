@@ -50,7 +50,7 @@ class TrainingPlan(NamedTuple):
             express the episode.
         words: the pool of words.
         scenes: random scenes of each task beyond the train split.
-        goals: goals of each scene with an instruction by place, where there is the most to learn.
+        goals: goals of each scene with an implicit instruction.
             In other settings only the episode's own is.
         detector_epochs: passes over all pictures of the train split.
         reader_epochs: passes over all instructions.

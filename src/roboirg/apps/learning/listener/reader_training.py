@@ -24,7 +24,7 @@ from roboirg.core.instruction_options import InstructionOptions
 from roboirg.core.word_pools import PoolName
 from roboirg.language import FORMS
 from roboirg.language.instruction import Instruction
-from roboirg.language.settings import all_settings
+from roboirg.language.settings import EXPLICIT, all_settings
 from roboirg.language.variants import instructions
 from roboirg.policies.vlm.goal_schema import goal_schema
 from roboirg.tasks import goals_of, with_goal
@@ -37,25 +37,23 @@ FORGOTTEN_WORDS = 0.05
 def said(
     episodes: Sequence[Episode], settings: Sequence[str], words: PoolName, goals: int, seed: int
 ) -> Iterator[tuple[Episode, Instruction]]:
-    """Yield the instructions of episodes, and of more goals of each scene where that teaches most.
+    """Yield the instructions of episodes, and of more goals of each scene.
 
     Args:
         episodes: the episodes.
         settings: names; harder ones are left out where they cannot express an episode.
         words: the pool of words.
-        goals: of each scene with an instruction by place; other settings have its own only.
+        goals: of each scene with an implicit instruction, which hangs on what is there and on what
+            was said before; explicit and harder settings have the scene's own only.
         seed: draws the goals.
     """
     options = InstructionOptions(wordings=words)
     known = all_settings()
-    harder = [name for name in settings if known[name].plain is not None]
-    plain = [name for name in settings if name not in harder]
-    by_place = [name for name in plain if "frame" in known[name].reads]
-    others = [name for name in plain if name not in by_place]
-    yield from instructions(episodes, others, FORMS[:1], options)
+    of_one = [name for name in settings if name == EXPLICIT or known[name].plain is not None]
+    of_more = [name for name in settings if name not in of_one]
+    yield from instructions(episodes, of_one, FORMS[:1], options)
     more = list(with_more_goals(episodes, goals, seed))
-    yield from instructions(more, by_place, FORMS[:1], options)
-    yield from instructions(episodes, harder, FORMS[:1], options)
+    yield from instructions(more, of_more, FORMS[:1], options)
 
 
 def with_more_goals(episodes: Iterable[Episode], goals: int, seed: int) -> Iterator[Episode]:

@@ -35,7 +35,7 @@ class PolicyPlan(NamedTuple):
         memory: what it remembers; a name of `MEMORY_NAMES`.
         scenes: random scenes of each task in which the disturbed expert is recorded.
         drawn: those of them of which pictures are drawn, for the detector.
-        goals: goals of each scene that the reader of words hears by place.
+        goals: goals of each scene that the reader of words hears in implicit settings.
         detector_epochs: passes over all pictures.
         body_epochs: passes over all episodes.
         reader_epochs: passes over all instructions.
