@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import logging
 import threading
 from collections.abc import Callable, Mapping
@@ -22,6 +23,8 @@ _LAST = {"Connection": "close"}
 """Header of a response after which nothing more is read, such as the rest of a body."""
 _STOP_S = 1
 """Seconds that requests have to end when the server stops."""
+_SMALL_BODY, _DISCARD_S = 65536, 1.0
+"""Bytes of a refused request that are read, and seconds in which they must have arrived."""
 
 
 class AppServer:
@@ -127,7 +130,19 @@ class RequestGuard:
         refusal = self._refuse(Request(scope))
         if refusal is not None:
             refusal.headers.update(_LAST)
+            await _discard_small_body(Request(scope, receive))
         await (refusal or self._app)(scope, receive, send_with_headers)
+
+
+async def _discard_small_body(request: Request) -> None:
+    """Read a small body, as closing a connection with unread bytes also discards the response.
+
+    A client that waits to be asked for its body sends none.
+    """
+    if "expect" in request.headers:
+        return
+    with contextlib.suppress(HTTPException):
+        await read_body(request, _SMALL_BODY, _DISCARD_S)
 
 
 async def read_body(request: Request, limit: int, timeout_s: float = TIMEOUT_S) -> bytes:
