@@ -1,4 +1,4 @@
-"""Write the tables of docs/learned-policy.md from the pack that holds their episodes.
+"""Write the tables of docs/learned-policy-results.md from the pack that holds their episodes.
 
 python scripts/write_learned_table.py
 """
@@ -32,7 +32,7 @@ from roboirg.language.settings import EXPLICIT, plain_settings
 from roboirg.tasks import all_tasks
 
 ROOT = Path(__file__).parent.parent
-PAGE = ROOT / "docs" / "learned-policy.md"
+PAGE = ROOT / "docs" / "learned-policy-results.md"
 PACK = ROOT / "results" / "learned-policy-val.roboirg.zip"
 SMALLEST_P = 0.001
 """Smaller ones are not printed."""
