@@ -5,6 +5,7 @@ python scripts/write_learned_table.py
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 
@@ -48,6 +49,7 @@ Verdicts = NDArray[np.int64]
 """1 where an episode is solved, else 0; shape (training seeds, episodes)."""
 
 
+@functools.cache
 def played() -> RunData:
     """Return the episodes of the pack."""
     with opened_run(PACK) as run:

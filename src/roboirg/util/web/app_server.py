@@ -127,10 +127,11 @@ class RequestGuard:
                     headers.setdefault(name, value)
             await send(message)
 
-        refusal = self._refuse(Request(scope))
+        request = Request(scope, receive)
+        refusal = self._refuse(request)
         if refusal is not None:
             refusal.headers.update(_LAST)
-            await _discard_small_body(Request(scope, receive))
+            await _discard_small_body(request)
         await (refusal or self._app)(scope, receive, send_with_headers)
 
 

@@ -70,13 +70,13 @@ Column = Mapping[str, Difference]
 def write_paper_page(folder: Path) -> Path:
     """Write the page of the runs that were played, and return its path."""
     runs = {part: run_of(folder, part) for part in PARTS if part != RESOLVED}
-    found = {part: played_cells(part, run) for part, run in runs.items() if run.exists()}
+    found = {part: _played_cells(part, run) for part, run in runs.items() if run.exists()}
     page = folder / PAGE
     write_atomically(page, f"{_TITLE}\n\n{_INTRODUCTION}\n\n{results_text(found)}\n")
     return page
 
 
-def played_cells(part: str, run: Path) -> Cells:
+def _played_cells(part: str, run: Path) -> Cells:
     """Return the cells of the run of a part."""
     return gather([(part, [_of_row(one) for one in read_results(run)])])
 
@@ -210,11 +210,13 @@ def _own_against(cells: Cells, setting: str) -> dict[str, Difference]:
         for key, cell in cells.items()
         if key.options.setting == setting and key.options.form == "implicit"
     }
-    first = {
-        key.task: cell for key, cell in own.items() if key.policy_run.policy == row_name(FIRST)
-    }
-    others = {key: cell for key, cell in own.items() if key.policy_run.policy != row_name(FIRST)}
-    return _paired((key, cell, first.get(key.task)) for key, cell in others.items())
+    name = row_name(FIRST)
+    first = {key.task: cell for key, cell in own.items() if key.policy_run.policy == name}
+    return _paired(
+        (key, cell, first.get(key.task))
+        for key, cell in own.items()
+        if key.policy_run.policy != name
+    )
 
 
 def _own_longer(
