@@ -24,7 +24,7 @@ from roboirg.apps.learning.policy.paper_experiment import (
 )
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.evaluation.analysis.published import TRIALS, PublishedRow, published_rows
-from roboirg.evaluation.analysis.stats.cells import CellKey, CellResults, Cells, gather
+from roboirg.evaluation.analysis.stats.cells import CellKey, CellResults, Cells, gather, only_told
 from roboirg.evaluation.analysis.stats.intervals import ALPHA, SEED, Z_95, Interval
 from roboirg.evaluation.analysis.stats.option_labels import staged_options
 from roboirg.evaluation.analysis.stats.paired_tests import Gap, Pairs, holm, measure_gap
@@ -70,37 +70,43 @@ Column = Mapping[str, Difference]
 def write_paper_page(folder: Path) -> Path:
     """Write the page of the runs that were played, and return its path."""
     runs = {part: run_of(folder, part) for part in PARTS if part != RESOLVED}
-    found = {part: _played_cells(part, run) for part, run in runs.items() if run.exists()}
+    found = {part: row_cells(part, read_results(run)) for part, run in runs.items() if run.exists()}
     page = folder / PAGE
     write_atomically(page, f"{_TITLE}\n\n{_INTRODUCTION}\n\n{results_text(found)}\n")
     return page
 
 
-def _played_cells(part: str, run: Path) -> Cells:
-    """Return the cells of the run of a part."""
-    return gather([(part, [_of_row(one) for one in read_results(run)])])
+def row_cells(part: str, results: Iterable[Summary]) -> Cells:
+    """Return the cells of a part's results, without control arms; policies are rows."""
+    return only_told(gather([(part, [_of_row(one) for one in results])]))
 
 
 def results_text(found: Mapping[str, Cells]) -> str:
     """Return tables and answers in Markdown; policies of each part's cells are rows."""
-    return "\n\n".join(_sections(found))
+    return "\n\n".join(part for part in (tables_text(found), answers_text(found)) if part)
+
+
+def tables_text(found: Mapping[str, Cells]) -> str:
+    """Return the paper's tables of the parts, with its rates."""
+    shown = [
+        markdown(make_table(which, found[which], published=True)).rstrip()
+        for which in TABLES
+        if which in found and (which == "planner" or is_informative(which, found[which]))
+    ]
+    return "\n\n".join(shown)
+
+
+def answers_text(found: Mapping[str, Cells]) -> str:
+    """Return the paper's questions with the answers of the parts and of its rates."""
+    main = _questions(found[MAIN]) if MAIN in found else ()
+    context = _stage_question(found[CONTEXT]) if CONTEXT in found else ()
+    return "\n\n".join([*main, *context])
 
 
 def _of_row(result: Summary) -> Summary:
     """Return the result of a policy as one of its row: a training seed counts as a policy seed."""
     row, seed = row_of(result.policy)
     return msgspec.structs.replace(result, policy=row, policy_seed=seed, policy_version="trained")
-
-
-def _sections(found: Mapping[str, Cells]) -> Iterator[str]:
-    for which in TABLES:
-        cells = found.get(which, {})
-        if cells and (which == "planner" or is_informative(which, cells)):
-            yield markdown(make_table(which, cells, published=True)).rstrip()
-    if MAIN in found:
-        yield from _questions(found[MAIN])
-    if CONTEXT in found:
-        yield from _stage_question(found[CONTEXT])
 
 
 def _questions(main: Cells) -> Iterator[str]:

@@ -1,0 +1,93 @@
+"""Write the pages of the paper's experiment with small policies from the packs of its episodes.
+
+python scripts/write_paper_results.py
+"""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+from written_parts import with_part
+
+from roboirg.apps.leaderboard.packing import opened_run
+from roboirg.apps.learning.policy.paper_experiment import CONTEXT, MAIN, PLANNER, SYSTEMS, row_name
+from roboirg.apps.learning.policy.paper_page import answers_text, row_cells, tables_text
+from roboirg.apps.learning.policy.policy_plan import PLANNERS
+from roboirg.evaluation.analysis.published import published_rows
+from roboirg.evaluation.analysis.stats.cells import Cells
+from roboirg.evaluation.analysis.stats.intervals import SEED
+from roboirg.evaluation.analysis.stats.run_summary import ALL, SummaryRow, summarize
+from roboirg.evaluation.plan.plan_file import read_plan_file
+from roboirg.evaluation.records.record import Summary
+from roboirg.evaluation.records.store import read_results
+from roboirg.language.settings import plain_settings
+
+ROOT = Path(__file__).parent.parent
+ANSWERS, TABLES = ROOT / "docs" / "paper-results.md", ROOT / "docs" / "paper-tables.md"
+PACKS = {
+    part: ROOT / "results" / f"paper-{part}-test.roboirg.zip" for part in (MAIN, CONTEXT, PLANNER)
+}
+
+
+@functools.cache
+def played() -> Mapping[str, Cells]:
+    """Return the cells of each part of the experiment."""
+    results: dict[str, list[Summary]] = {}
+    for part, pack in PACKS.items():
+        with opened_run(pack) as run:
+            results[part] = list(read_results(run))
+    # Rows with planners stand next to their changed selves, and were played once.
+    tasks = read_plan_file("paper-planners")["tasks"].split(",")
+    rows = {row_name(memory) for memory in PLANNERS}
+    results[PLANNER] += [
+        one
+        for one in results[MAIN]
+        if one.policy in rows and one.task in tasks and one.options.form == "implicit"
+    ]
+    return {part: row_cells(part, found) for part, found in results.items()}
+
+
+def rates_table(main: Cells) -> str:
+    """Return success in each setting as mean over tasks, next to the published rates."""
+    settings = plain_settings()
+    lines = [f"| row | {' | '.join(settings)} |", "| --- " + "| ---: " * len(settings) + "|"]
+    found = {
+        (one.policy_run.policy, one.options.setting): one
+        for one in summarize(main, np.random.default_rng(SEED))
+        if one.scope == ALL and one.options.form == "implicit"
+    }
+    published = {(one.model, one.options.setting): one for one in published_rows("main")}
+    for memory, system in SYSTEMS.items():
+        own = [_rate(found[row_name(memory), name]) for name in settings]
+        theirs = [f"{published[system, name].average:.0f}" for name in settings]
+        lines += [f"| {row_name(memory)} | {' | '.join(own)} |"]
+        lines += [f"| {system} (published) | {' | '.join(theirs)} |"]
+    return "\n".join(lines)
+
+
+def _rate(row: SummaryRow) -> str:
+    shown = f"{100 * row.rate:.0f}"
+    if row.interval is None:
+        return shown
+    return f"{shown} ({100 * row.interval.low:.0f} to {100 * row.interval.high:.0f})"
+
+
+def answers_page() -> str:
+    """Return the page of answers with the rates and answers of the packs."""
+    page = with_part(
+        ANSWERS.read_text(encoding="utf-8"), "paper rates", rates_table(played()[MAIN])
+    )
+    return with_part(page, "paper answers", answers_text(played()))
+
+
+def tables_page() -> str:
+    """Return the page of tables with those of the packs."""
+    return with_part(TABLES.read_text(encoding="utf-8"), "paper tables", tables_text(played()))
+
+
+if __name__ == "__main__":
+    ANSWERS.write_text(answers_page(), encoding="utf-8")
+    TABLES.write_text(tables_page(), encoding="utf-8")

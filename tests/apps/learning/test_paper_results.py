@@ -1,0 +1,58 @@
+"""The pages of the paper's experiment show its episodes, which can be played again."""
+
+import pytest
+import write_paper_results as written
+
+from roboirg.apps.leaderboard.packing import opened_run
+from roboirg.apps.leaderboard.run_verification import verify_run
+from roboirg.apps.learning.policy.paper_experiment import CONTEXT, MAIN, SYSTEMS, row_name
+from roboirg.evaluation.analysis.stats.option_labels import staged_options
+from roboirg.language.settings import plain_settings, settings_of
+from roboirg.tasks import all_tasks, get_task
+
+EPISODES = 50
+HINT = "python scripts/write_paper_results.py"
+
+
+def test_the_pages_have_the_tables_of_the_packs():
+    assert written.ANSWERS.read_text(encoding="utf-8") == written.answers_page(), HINT
+    assert written.TABLES.read_text(encoding="utf-8") == written.tables_page(), HINT
+
+
+def test_the_main_table_is_whole():
+    found = {
+        (key.policy_run.policy, key.task, key.options.setting)
+        for key in written.played()[MAIN]
+        if key.options.form == "implicit"
+    }
+    assert found == {
+        (row_name(memory), task, setting)
+        for memory in SYSTEMS
+        for task in all_tasks()
+        for setting in plain_settings()
+        if setting in settings_of(get_task(task))
+    }
+
+
+def test_the_context_has_all_stages():
+    stages = {one.stages for one in staged_options()}
+    by_row: dict[str, set] = {}
+    for key in written.played()[CONTEXT]:
+        by_row.setdefault(key.policy_run.policy, set()).add(key.options.stages)
+    assert len(by_row) > 1
+    assert all(found == stages for found in by_row.values())
+
+
+@pytest.mark.parametrize("part", written.PACKS)
+def test_no_episode_is_missing(part):
+    for key, cell in written.played()[part].items():
+        assert (cell.trials, cell.errors, cell.missing) == (EPISODES, 0, 0), key
+
+
+@pytest.mark.sim
+@pytest.mark.slow
+@pytest.mark.parametrize("part", written.PACKS)
+def test_a_pack_holds_when_some_of_it_is_played_again(part):
+    with opened_run(written.PACKS[part]) as run:
+        found = verify_run(run, sample=0.002)
+    assert found.holds, (found.checks, found.missing, found.doubled)
