@@ -19,7 +19,7 @@ def run_module(*arguments: str, **environment: str) -> subprocess.CompletedProce
         capture_output=True,
         text=True,
         check=False,
-        timeout=150,
+        timeout=600,
     )
 
 

@@ -21,6 +21,9 @@ from roboirg.evaluation.records.record import NON_DETERMINISTIC_FIELDS, EventRec
 from roboirg.evaluation.run.executor import LocalProcesses
 from roboirg.evaluation.run.runner import run_plan
 
+RELEASED = "released"
+"""File that ends what waits for it."""
+
 
 @dataclass(frozen=True)
 class FakePlay:
@@ -32,6 +35,7 @@ class FakePlay:
         deadly: the episode in which the worker kills itself.
         deaths: how often it does so.
         fatal: the episode in which the graphics turn out to be missing.
+        endless: from this episode on none ends before there is a file `released` in the folder.
     """
 
     folder: Path | None = None
@@ -39,6 +43,7 @@ class FakePlay:
     deadly: int | None = None
     deaths: int = 99
     fatal: int | None = None
+    endless: int | None = None
 
     def __call__(self, job: Job) -> Record:
         started_at = str(time.time())
@@ -50,6 +55,7 @@ class FakePlay:
         if job.episode == self.deadly and self._dies(job):
             os.kill(os.getpid(), signal.SIGKILL)
         time.sleep(self.seconds)
+        wait_for_release(job, self.endless, self.folder)
         return make_record(job, fake_result(job), started_at=started_at, duration_s=self.seconds)
 
     def _dies(self, job: Job) -> bool:
@@ -63,11 +69,13 @@ class FakePlayer:
     folder: Path
     seconds: float = 0.0
     fatal: int | None = None
+    endless: int | None = None
 
     def in_folder(self, folder: Path) -> FakePlayer:
         return replace(self, folder=folder)
 
     def __call__(self, job: Job) -> Record:
+        wait_for_release(job, self.endless, self.folder)
         record = FakePlay(seconds=self.seconds, fatal=self.fatal)(job)
         video = self.folder / "videos" / f"{job.slug}.mp4"
         video.parent.mkdir(exist_ok=True)
@@ -98,6 +106,14 @@ class WaitingPlay:
         with watched("policy's act()", self.limit_s), waiting("the reply of openpi://there:8000"):
             time.sleep(3600)
         raise AssertionError("it was not killed")
+
+
+def wait_for_release(job: Job, endless: int | None, folder: Path | None) -> None:
+    """Wait for the file, for ever without a folder, if the episode is one of the endless ones."""
+    while endless is not None and job.episode >= endless:
+        if folder is not None and (folder / RELEASED).exists():
+            return
+        time.sleep(0.05)
 
 
 def fake_result(job: Job) -> RolloutResult:
@@ -146,6 +162,6 @@ if __name__ == "__main__":
     episodes = int(sys.argv[2]) if len(sys.argv) > 2 else 8
     seeds = int(sys.argv[3]) if len(sys.argv) > 3 else 1
     seconds = float(sys.argv[4]) if len(sys.argv) > 4 else 0.15
-    run_plan(
-        small_plan(episodes, seeds=seeds), folder, FakePlay(folder, seconds), LocalProcesses(2)
-    )
+    endless = int(sys.argv[5]) if len(sys.argv) > 5 else None
+    play = FakePlay(folder, seconds, endless=endless)
+    run_plan(small_plan(episodes, seeds=seeds), folder, play, LocalProcesses(2))

@@ -18,6 +18,7 @@ from typing import Any, ClassVar, NoReturn
 import numpy as np
 from msgspec.msgpack import Ext, encode
 
+from roboirg.evaluation.hosting import host_process
 from roboirg.evaluation.hosting.messages import receive_calls, send
 
 NEEDLE = "9035768"
@@ -376,7 +377,13 @@ class Quitter(Hostile):
         note = Path(os.environ["HOSTILE_NOTES"], "quit")
         if not note.exists():
             note.touch()
-            threading.Timer(0.5, os._exit, (3,)).start()
+            reply = host_process.send
+
+            def reply_and_quit(*arguments: Any) -> None:
+                reply(*arguments)
+                os._exit(3)
+
+            host_process.send = reply_and_quit
         return -np.ones((12, 8))
 
 

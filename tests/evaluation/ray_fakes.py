@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import os
-import time
 from collections.abc import Callable
-from dataclasses import dataclass
 from pathlib import Path
 
 from evaluation_fakes import FakePlayer
@@ -22,18 +20,6 @@ class WithoutVulkan(FakePlayer):
     def __call__(self, job: Job) -> Record:
         if os.environ.get(BAD_MACHINE):
             raise RenderDeviceError("No Vulkan device can render; install one.")
-        return super().__call__(job)
-
-
-@dataclass(frozen=True)
-class UntilReleased(FakePlayer):
-    """Does not end the plan's last episodes before the file `gate` exists."""
-
-    gate: Path = Path()
-
-    def __call__(self, job: Job) -> Record:
-        while job.episode == 7 and not self.gate.exists():
-            time.sleep(0.1)
         return super().__call__(job)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import random
 import signal
@@ -52,7 +53,7 @@ def pool() -> Iterator[HostPool]:
 
 
 def write_policy(folder: Path, monkeypatch: pytest.MonkeyPatch, name: str, text: str) -> str:
-    (folder / f"{name}.py").write_text("import os, sys, time\nimport numpy as np\n" + text)
+    (folder / f"{name}.py").write_text("import os, pathlib, sys, time\nimport numpy as np\n" + text)
     monkeypatch.syspath_prepend(folder)
     return f"{name}:It"
 
@@ -280,10 +281,16 @@ class It:
     def reset(self, instruction, demonstration):
         self.metadata = {"device": os.environ["CUDA_VISIBLE_DEVICES"], "process": os.getpid()}
     def act(self, observation):
-        time.sleep(0.2)
+        folder = pathlib.Path(os.environ["ROBOIRG_TEST_DEVICES"])
+        (folder / os.environ["CUDA_VISIBLE_DEVICES"]).touch()
+        while len(list(folder.iterdir())) < 2:
+            time.sleep(0.05)
         return np.ones((24, 8))
 """,
     )
+    # An episode ends only when there is one on each device.
+    (tmp_path / "devices").mkdir()
+    monkeypatch.setenv("ROBOIRG_TEST_DEVICES", str(tmp_path / "devices"))
     plan = paper_plan(spec, 6, devices=("0", "3"))
     play(plan, tmp_path / "run", LocalProcesses(2))
     found = {
@@ -457,8 +464,9 @@ def test_killed_hosts_worlds_and_supervisors_lose_and_double_nothing(
             "supervisor": [child.pid],
         }[rng.choice(["host", "world", "supervisor"])]
         for victim in victims[:1]:
-            struck += 1
-            os.kill(victim, signal.SIGKILL)
+            with contextlib.suppress(ProcessLookupError):  # it has just ended
+                os.kill(victim, signal.SIGKILL)
+                struck += 1
             if victim == child.pid:
                 child.wait()
         contents = read_contents(folder / RECORDS_FILE)

@@ -12,7 +12,7 @@ from typing import Any
 
 import hosting_fakes
 import pytest
-from evaluation_fakes import FakePlayer, comparable, is_alive, small_plan, worker_pids
+from evaluation_fakes import RELEASED, FakePlayer, comparable, is_alive, small_plan, worker_pids
 from hosting_fakes import PatientRunner, paper_plan, paper_runner
 
 from roboirg.core.errors import InvalidValueError, RoboIRGError
@@ -67,15 +67,20 @@ def test_records_are_those_of_one_process_even_if_a_node_is_killed_half_way(
     killed = threading.Event()
 
     def kill() -> None:
-        while lines(tmp_path) < 5:
+        while lines(tmp_path) < 8:
             time.sleep(0.05)
+        time.sleep(3)  # until each machine has one of the endless episodes in hand
         cluster.remove_node(doomed, allow_graceful=False)
+        (tmp_path / RELEASED).touch()
         killed.set()
 
     killer = threading.Thread(target=kill, daemon=True)
     killer.start()
     summary = run_plan(
-        PLAN.model_copy(update={"tries": 3}), tmp_path, FakePlayer(tmp_path, 0.5), RayCluster()
+        PLAN.model_copy(update={"tries": 3}),
+        tmp_path,
+        FakePlayer(tmp_path, endless=2),
+        RayCluster(),
     )
     killer.join(300)
     assert killed.is_set()

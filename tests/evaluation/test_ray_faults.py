@@ -15,7 +15,7 @@ from typing import Any
 import pytest
 import ray_fakes
 from evaluation_fakes import FakePlayer, small_plan
-from ray_fakes import BAD_MACHINE, NotingPlace, UntilReleased, WithoutModule, WithoutVulkan
+from ray_fakes import BAD_MACHINE, NotingPlace, WithoutModule, WithoutVulkan
 
 from roboirg.core.errors import InvalidValueError, RoboIRGError
 from roboirg.evaluation.plan.worker_needs import WorkerNeeds
@@ -121,7 +121,7 @@ def test_what_is_frozen_is_noticed_and_its_episode_played_elsewhere(
         monkeypatch.setattr(ray_pool, "SILENCE_S", 20.0)
         os.kill(frozen[0], signal.SIGSTOP)
 
-    play = UntilReleased(tmp_path, 0.5, gate=tmp_path / "released")
+    play = FakePlayer(tmp_path, 0.5, endless=7)
     run = threading.Thread(
         target=run_plan, args=(PLAN, tmp_path, play, RayCluster(address=cluster.address))
     )
@@ -202,11 +202,14 @@ def test_the_loss_of_the_head_is_one_sentence(
     def kill() -> None:
         # A call under way for the machines would wait until Ray ends this process.
         monkeypatch.setattr(ray_pool, "LOOK_S", 3600.0)
-        time.sleep(2)
+        # The one that is under way has ended when two more episodes are stored.
+        deadline, known = time.monotonic() + 60, lines(tmp_path)
+        while lines(tmp_path) < known + 2 and time.monotonic() < deadline:
+            time.sleep(0.05)
         os.kill(gcs, signal.SIGKILL)
 
     after(tmp_path, 4, kill)
-    play = FakePlayer(tmp_path, 0.5)
+    play = FakePlayer(tmp_path, 0.5, endless=4)
     with pytest.raises(RoboIRGError, match=r"head of the Ray cluster .* same command again"):
         run_plan(PLAN, tmp_path, play, RayCluster(address=cluster.address))
     assert 4 <= lines(tmp_path) == len(list(read_records(tmp_path)))
@@ -221,7 +224,7 @@ from roboirg.evaluation.episode_errors import Terminated
 from roboirg.evaluation.run.runner import run_plan
 folder = Path(sys.argv[1])
 try:
-    run_plan(small_plan(8), folder, FakePlayer(folder, 0.5), RayCluster(address=sys.argv[2]))
+    run_plan(small_plan(8), folder, FakePlayer(folder, endless=2), RayCluster(address=sys.argv[2]))
 except Terminated:
     sys.exit(143)
 """

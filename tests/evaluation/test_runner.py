@@ -43,7 +43,7 @@ def line_count(folder: Path) -> int:
 
 def begin(folder: Path) -> subprocess.Popen[bytes]:
     """The run of `evaluation_fakes` in a process of its own, until three episodes have ended."""
-    words = ["8", "1", "0.5"]  # episodes, seeds, and seconds of each, so that some are left
+    words = ["8", "1", "0", "2"]  # episodes, seeds, seconds of each; from 2 on they never end
     child = subprocess.Popen([sys.executable, evaluation_fakes.__file__, folder, *words])
     wait_until(lambda: line_count(folder) >= 3 or child.poll() is not None)
     assert child.poll() is None

@@ -182,7 +182,7 @@ def test_workers_and_kills_leave_no_trace_in_the_records(tmp_path: Path) -> None
         for number, folder in enumerate(folders, start=1)
     ]
     kill_in_the_middle(folders[2], *words[2])
-    assert 2 <= len(read_records(folders[2])) < 8
+    assert 2 <= len(read_records(folders[2])) <= 8  # a busy machine may be done before the kill
     for run in words:
         said = command(*run, cwd=tmp_path)
         assert said.returncode == 0, said.stderr

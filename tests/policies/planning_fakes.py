@@ -181,7 +181,7 @@ def fake_vlm(answer: Callable | list | Path):
 def model_options(server, provider="openai", **more):
     url = f"{server.url}/v1" if provider == "openai" else server.url
     never = {"retries": 0, "patience_s": 0}
-    settings = {"model": "fake", "base_url": url, "timeout_s": 10.0, **never, **more}
+    settings = {"model": "fake", "base_url": url, "timeout_s": 300.0, **never, **more}
     return ModelOptions(provider=provider, **settings)
 
 

@@ -18,6 +18,7 @@ from typer.testing import CliRunner
 from wire_episode import INSTRUCTION, moment, video
 from wire_servers import unpack
 
+from roboirg.core.errors import PolicyConnectionError
 from roboirg.main import app
 from roboirg.policies import make_policy, policy_server
 from roboirg.policies.policy_server import PolicyServer, open_server
@@ -142,10 +143,19 @@ def test_a_silent_connection_ends_and_the_others_play_on(scheme):
     with serving(scheme, "--timeout-s", "2") as server:
         with server.connect(opening(scheme)) as raw:
             read_all(raw)  # ends
-        policy = begin(server.url)
-        go_on(policy)
-        policy.close()
+        _play_on(server.url)
         assert server.is_healthy()
+
+
+def _play_on(url):
+    """Play; a busy machine may be silent itself for two seconds, which ends its connection."""
+    for _ in range(20):
+        with contextlib.suppress(PolicyConnectionError):
+            policy = begin(url)
+            go_on(policy)
+            policy.close()
+            return
+    pytest.fail("the others cannot play on")
 
 
 class Costly:

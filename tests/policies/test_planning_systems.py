@@ -240,7 +240,7 @@ def test_every_system_plays_a_whole_episode(name):
     remembers = name in {"TTT-Expert", "FrameS-Modul"}
     server = MmeVlaServer() if remembers else NoMemory()
     with server, fake_vlm([vlm_answers.get(name, "")]) as vlm:
-        overrides = {"server": server.place, "policy.timeout": "20"}
+        overrides = {"server": server.place, "policy.timeout": "300"}
         if name in vlm_answers:
             overrides["vlm"] = vlm.url
         policy = load_system(name, overrides)

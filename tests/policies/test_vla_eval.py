@@ -189,10 +189,15 @@ def test_errors_of_the_server_are_named_also_when_an_episode_cannot_begin():
 def test_a_server_that_stalls_is_not_waited_for():
     with VlaEvalServer(faults=["stall"]) as server:
         client = client_of(server, "?timeout=2")
-        client.reset(INSTRUCTION, video(0))
-        with pytest.raises(PolicyTimeoutError, match=r"did not send a reply within 2 s"):
-            client.act(moment(0))
+        # A busy machine may be late with the first words already.
+        with pytest.raises(PolicyTimeoutError, match=r"within 2 s"):
+            _begin_and_act(client)
         client.close()
+
+
+def _begin_and_act(client):
+    client.reset(INSTRUCTION, video(0))
+    client.act(moment(0))
 
 
 def test_two_episodes_at_once_have_a_connection_each():

@@ -73,7 +73,7 @@ class WireServer:
 
     def __exit__(self, *_):
         self._loop.call_soon_threadsafe(self._stop.set)
-        self._thread.join(10)
+        self._thread.join(300)
 
     @property
     def place(self):

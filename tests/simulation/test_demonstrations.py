@@ -354,7 +354,7 @@ def test_two_processes_may_fill_the_cache_at_once(cache):
     for process in processes:
         process.stdin.write("\n")
         process.stdin.flush()
-    outputs = [process.communicate(timeout=120) for process in processes]
+    outputs = [process.communicate(timeout=600) for process in processes]
     assert [errors for _, errors in outputs] == ["", ""]
     assert len({line for lines, _ in outputs for line in lines.splitlines()}) == 1
     for kind in ("actions", "frames"):

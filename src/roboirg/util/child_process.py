@@ -18,8 +18,8 @@ from typing import Any, NamedTuple, Self, cast
 
 from roboirg.util.process_guard import begin
 
-GRACE_S = 2.0
-"""How long a child may take to exit once its channel is closed."""
+GRACE_S = 30.0
+"""How long a child may take to exit once its channel is closed: seconds on a busy machine."""
 _SAFE_PATH = "PYTHONSAFEPATH"
 """Variable that keeps the working directory, where a policy may lie, from the import path."""
 _starting = threading.Lock()

@@ -23,15 +23,16 @@ class DeadlineWatch:
 
     def __init__(self, act: Callable[[], None]) -> None:
         self._act = act
-        self._finished = threading.Event()
+        self._finished, self._setting = threading.Event(), threading.Lock()
         self._began, self._deadline = 0.0, float("inf")
         self.acted_after: float | None = None
         self._thread = threading.Thread(target=self._watch, name="deadlines", daemon=True)
 
     def begin(self, limit_s: float | None) -> None:
         """Set the deadline to `limit_s` seconds from now, or remove it."""
-        self._began = time.monotonic()
-        self._deadline = float("inf") if limit_s is None else self._began + limit_s
+        with self._setting:
+            self._began = time.monotonic()
+            self._deadline = float("inf") if limit_s is None else self._began + limit_s
 
     def __enter__(self) -> Self:
         self._thread.start()
@@ -43,7 +44,11 @@ class DeadlineWatch:
 
     def _watch(self) -> None:
         while not self._finished.wait(min(max(self._deadline - time.monotonic(), 0.0), _POLL_S)):
-            now = time.monotonic()
-            if now >= self._deadline:
-                self._deadline, self.acted_after = float("inf"), now - self._began
+            # A deadline that is set meanwhile must not be taken for the one that passed.
+            with self._setting:
+                now = time.monotonic()
+                has_passed = now >= self._deadline
+                if has_passed:
+                    self._deadline, self.acted_after = float("inf"), now - self._began
+            if has_passed:
                 self._act()

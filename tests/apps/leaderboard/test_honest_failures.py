@@ -36,7 +36,7 @@ def test_runs_of_policies_that_fail_in_this_process_hold(tmp_path: Path) -> None
 
 @pytest.mark.slow
 def test_runs_of_policies_whose_process_ends_hold(tmp_path: Path) -> None:
-    play(tmp_path, HOSTED, LocalProcesses(1), policy_timeout_s=5.0)
+    play(tmp_path, HOSTED, LocalProcesses(1), policy_timeout_s=30.0)
     records = read_records(tmp_path)
     assert {one.error for one in records} == {"policy", "infrastructure", "timeout"}
     found = verify_run(tmp_path)

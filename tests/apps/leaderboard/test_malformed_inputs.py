@@ -48,7 +48,7 @@ from roboirg.language.wordings.wording_file import read_wordings
 
 CANARY = "canary of another folder"
 LONGEST_MESSAGE = 1_500
-PATIENCE_S = 60
+PATIENCE_S = 600
 """Far more than any of these takes; a reader that blocks on a pipe would never end."""
 
 Change = Callable[[Path], object]

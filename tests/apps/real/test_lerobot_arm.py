@@ -1,5 +1,7 @@
 """A robot with LeRobot's interface, in real time: a stand-in object that has it."""
 
+import re
+
 import lab_arm
 import numpy as np
 import pytest
@@ -22,7 +24,7 @@ from roboirg.policies.lerobot_features import scaled_square
 
 WATCHING, STILL = "faulty_policies:Watcher", "faulty_policies:Still"
 # A busy machine is slow: what is tested here is not how quick it is.
-PATIENT = Limits(picture_age_s=0.5, watchdog_timeout_s=5.0, policy_timeout_s=10.0)
+PATIENT = Limits(picture_age_s=300.0, watchdog_timeout_s=300.0, policy_timeout_s=300.0)
 
 
 def study_of(tmp_path, policies, arm, **options):
@@ -81,7 +83,7 @@ def test_units_and_names_are_options(tmp_path):
 @pytest.mark.parametrize(
     ("fault", "cause"),
     [
-        ("blind_after", "environment: no new picture from the front camera for 0."),
+        ("blind_after", r"environment: no new picture from the front camera for \d"),
         ("breaks_after", "environment: ConnectionError: OSError: cable"),
     ],
 )
@@ -89,9 +91,11 @@ def test_hardware_that_fails_stops_and_is_an_error(tmp_path, fault, cause, capsy
     arm = lab_arm.LabArm()
     setattr(arm, fault, 10)
     _, study, _ = study_of(tmp_path, (WATCHING,), arm)
+    if fault == "blind_after":
+        study.limits = PATIENT.model_copy(update={"picture_age_s": 0.5})
     (record,) = study.run()
     assert record.error == "environment"
-    assert record.cause.startswith(cause)
+    assert re.match(cause, record.cause)
     assert record.steps < 30
     held = [action for _, action in arm.sent[-2:]]
     assert held[-1]["joint_1.pos"] == pytest.approx(held[0]["joint_1.pos"], abs=0.03)

@@ -29,7 +29,7 @@ OPTIONS = ("--policy", "listener", "--policy", "forgetful", "--settings", ",".jo
 
 def finished(*words):
     process = start(*words)
-    text, _ = process.communicate(timeout=300)
+    text, _ = process.communicate(timeout=600)
     assert process.returncode == 0, text
     return text
 
@@ -48,7 +48,7 @@ def study(tmp_path_factory):
     play = ("run", folder, "--score", "operator", "--limits", limits)
     process = start(*play)
     records = folder / "records.jsonl"
-    deadline = time.monotonic() + 120
+    deadline = time.monotonic() + 600
     while not (records.exists() and records.read_text().count("\n") >= 4):
         assert time.monotonic() < deadline
         time.sleep(0.05)
@@ -139,7 +139,7 @@ def test_two_loops_do_not_share_a_robot(study):
 
     with lock_robot(study):
         process = start("run", study)
-        text, _ = process.communicate(timeout=120)
+        text, _ = process.communicate(timeout=600)
     assert process.returncode != 0
     assert "Another process plays the study" in text
 
@@ -147,7 +147,7 @@ def test_two_loops_do_not_share_a_robot(study):
 @pytest.mark.slow
 def test_a_policy_outside_the_plan_is_refused(study):
     process = start("run", study, "--policy", "oracle")
-    text, _ = process.communicate(timeout=120)
+    text, _ = process.communicate(timeout=600)
     assert "There is no policy in the plan 'oracle'" in text
 
 
@@ -176,7 +176,7 @@ def test_a_signal_ends_the_run_also_where_python_drops_the_exception(sign, monke
 
 @pytest.mark.parametrize("sign", slow_but([signal.SIGTERM], [signal.SIGINT, signal.SIGTERM]))
 def test_a_run_that_is_told_to_end_keeps_what_was_played(sign, tmp_path):
-    finished("plan", *OPTIONS, "--trials", 1, "--demonstrations", 0, "--out", tmp_path)
+    finished("plan", *OPTIONS, "--trials", 8, "--demonstrations", 0, "--out", tmp_path)
     process = start("run", tmp_path)
     assert process.stdout.readline().startswith("1. ")
     process.send_signal(sign)

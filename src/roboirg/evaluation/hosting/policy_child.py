@@ -46,7 +46,7 @@ MAX_OUTPUT = 256 * 2**10
 """Bytes that are kept of what a policy process prints in one call; the rest is read and dropped."""
 MAX_WORDS = 300
 DRAIN_S = 1.0
-"""How long to wait for the end of what was printed; a thread of the policy may print for ever."""
+"""How long to wait for the end of what a living process printed; a thread may print for ever."""
 
 
 class PolicyChild:
@@ -104,15 +104,23 @@ class PolicyChild:
             words = f"the process sent no valid reply ({error})"
             raise EpisodeLostError("policy", words[:MAX_WORDS], alone=False) from None
 
-    def loss(self) -> EpisodeLostError | None:
-        """Return how the process died; None while it is alive."""
-        code = self._guard.poll()
+    def loss(self, patience_s: float = 0.0) -> EpisodeLostError | None:
+        """Return how the process died; None while it is alive.
+
+        Args:
+            patience_s: how long to wait for the guard of a process whose end of the line is closed.
+        """
+        code = self._wait(patience_s if self._has_hung_up() else 0.0)
         return None if code is None else _explain(ChildExit(code))
 
-    def take_output(self) -> bytes:
-        """Return what it printed, and forget it. Called when it waits or has ended."""
+    def take_output(self, patience_s: float = DRAIN_S) -> bytes:
+        """Return what it printed, and forget it. Called when it waits or has ended.
+
+        Args:
+            patience_s: how long to wait for the end of what was printed.
+        """
         with self._changed:
-            self._changed.wait_for(self._is_drained, DRAIN_S)
+            self._changed.wait_for(self._is_drained, patience_s)
             output, dropped = bytes(self._kept), self._dropped
             self._kept.clear()
             self._dropped = 0
@@ -147,6 +155,15 @@ class PolicyChild:
         with contextlib.suppress(subprocess.TimeoutExpired):
             self._guard.wait(seconds)
         return self._guard.poll()
+
+    def _has_hung_up(self) -> bool:
+        """Return whether the other end of the line is closed, and nothing of it is unread."""
+        try:
+            return not self._line.recv(1, socket.MSG_PEEK | socket.MSG_DONTWAIT)
+        except BlockingIOError:
+            return False
+        except OSError:
+            return True
 
     def _hang_up(self) -> None:
         """Close the line when the process has ended, even if others have its other end, too."""

@@ -27,6 +27,7 @@ from roboirg.evaluation.hosting.messages import (
     send,
 )
 from roboirg.evaluation.hosting.policy_child import PolicyChild
+from roboirg.util.child_process import GRACE_S
 from roboirg.util.deadline_watch import DeadlineWatch
 
 GATHER_S = 0.003
@@ -157,7 +158,7 @@ class PolicyHost:
 
     def _carry_out(self, sessions: Sequence[HostSession]) -> list[Reply]:
         """Carry out the calls of sessions that are asked about together, mostly one."""
-        if self.child is not None and (loss := self.child.loss()) is not None:
+        if self.child is not None and (loss := self.child.loss(GRACE_S)) is not None:
             self._forget_child(loss)
         first = sessions[0]
         method = first.call.method
@@ -225,7 +226,7 @@ class PolicyHost:
         printed = b""
         if self.child is not None:
             self.child.kill()
-            printed = self.child.take_output()
+            printed = self.child.take_output(GRACE_S)
         self._forget_child(loss)
         phase = PHASES[sessions[0].call.method]
         if len(sessions) > 1 or self._is_stopped:

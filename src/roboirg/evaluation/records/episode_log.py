@@ -27,6 +27,8 @@ MAX_LOG_BYTES = 262_144
 _HEAD_SHARE, _TAIL_SHARE = 0.5, 0.25
 _PERIOD_S = 0.25
 """How often the size is checked while a log is written."""
+_TRIES = 10
+"""How often the end is read again because something was printed meanwhile, which would be lost."""
 _STREAMS = (1, 2)
 """Descriptors of stdout and stderr."""
 
@@ -81,11 +83,14 @@ class EpisodeLog:
 
     def trim(self) -> None:
         """Replace the middle of a log that is too long by a line that says how much it was."""
-        size = os.fstat(self.descriptor).st_size
-        if size <= self._limit:
-            return
         head, length = int(self._limit * _HEAD_SHARE), int(self._limit * _TAIL_SHARE)
-        tail = os.pread(self.descriptor, length, size - length)
+        for _ in range(_TRIES):
+            size = os.fstat(self.descriptor).st_size
+            if size <= self._limit:
+                return
+            tail = os.pread(self.descriptor, length, size - length)
+            if os.fstat(self.descriptor).st_size == size:
+                break
         self._left_out += size - head - len(tail) - self._note_size
         note = (
             f"\n[roboirg: {self._left_out:,} bytes are left out here; a log has at most "

@@ -34,7 +34,7 @@ from roboirg.policies.contract.policy_urls import parse_query
 from roboirg.policies.lerobot_features import FINGER_RANGE, LeRobotFeatures, scaled_square
 
 PREFIX = "lerobot:"
-FIRST_OBSERVATION_TIMEOUT_S = 10.0
+FIRST_OBSERVATION_TIMEOUT_S = 60.0
 METHODS = ("connect", "disconnect", "get_observation", "send_action")
 
 
