@@ -21,9 +21,6 @@ from roboirg.evaluation.records.record import NON_DETERMINISTIC_FIELDS, EventRec
 from roboirg.evaluation.run.executor import LocalProcesses
 from roboirg.evaluation.run.runner import run_plan
 
-RELEASED = "released"
-"""File that ends what waits for it."""
-
 
 @dataclass(frozen=True)
 class FakePlay:
@@ -35,7 +32,7 @@ class FakePlay:
         deadly: the episode in which the worker kills itself.
         deaths: how often it does so.
         fatal: the episode in which the graphics turn out to be missing.
-        endless: from this episode on none ends before there is a file `released` in the folder.
+        endless: from this episode on none ends.
     """
 
     folder: Path | None = None
@@ -55,7 +52,8 @@ class FakePlay:
         if job.episode == self.deadly and self._dies(job):
             os.kill(os.getpid(), signal.SIGKILL)
         time.sleep(self.seconds)
-        wait_for_release(job, self.endless, self.folder)
+        while self.endless is not None and job.episode >= self.endless:
+            time.sleep(1.0)
         return make_record(job, fake_result(job), started_at=started_at, duration_s=self.seconds)
 
     def _dies(self, job: Job) -> bool:
@@ -64,18 +62,24 @@ class FakePlay:
 
 @dataclass(frozen=True)
 class FakePlayer:
-    """Plays nothing and writes a video of it."""
+    """Plays nothing and writes a video of it.
+
+    Attributes:
+        gate: a file without which the episodes from `closed` on do not end.
+    """
 
     folder: Path
     seconds: float = 0.0
     fatal: int | None = None
-    endless: int | None = None
+    gate: Path | None = None
+    closed: int = 0
 
     def in_folder(self, folder: Path) -> FakePlayer:
         return replace(self, folder=folder)
 
     def __call__(self, job: Job) -> Record:
-        wait_for_release(job, self.endless, self.folder)
+        while self.gate is not None and job.episode >= self.closed and not self.gate.exists():
+            time.sleep(0.05)
         record = FakePlay(seconds=self.seconds, fatal=self.fatal)(job)
         video = self.folder / "videos" / f"{job.slug}.mp4"
         video.parent.mkdir(exist_ok=True)
@@ -106,14 +110,6 @@ class WaitingPlay:
         with watched("policy's act()", self.limit_s), waiting("the reply of openpi://there:8000"):
             time.sleep(3600)
         raise AssertionError("it was not killed")
-
-
-def wait_for_release(job: Job, endless: int | None, folder: Path | None) -> None:
-    """Wait for the file, for ever without a folder, if the episode is one of the endless ones."""
-    while endless is not None and job.episode >= endless:
-        if folder is not None and (folder / RELEASED).exists():
-            return
-        time.sleep(0.05)
 
 
 def fake_result(job: Job) -> RolloutResult:

@@ -12,7 +12,7 @@ from typing import Any
 
 import hosting_fakes
 import pytest
-from evaluation_fakes import RELEASED, FakePlayer, comparable, is_alive, small_plan, worker_pids
+from evaluation_fakes import FakePlayer, comparable, is_alive, small_plan, worker_pids
 from hosting_fakes import PatientRunner, paper_plan, paper_runner
 
 from roboirg.core.errors import InvalidValueError, RoboIRGError
@@ -71,7 +71,7 @@ def test_records_are_those_of_one_process_even_if_a_node_is_killed_half_way(
             time.sleep(0.05)
         time.sleep(3)  # until each machine has one of the endless episodes in hand
         cluster.remove_node(doomed, allow_graceful=False)
-        (tmp_path / RELEASED).touch()
+        (tmp_path / "gate").touch()
         killed.set()
 
     killer = threading.Thread(target=kill, daemon=True)
@@ -79,7 +79,7 @@ def test_records_are_those_of_one_process_even_if_a_node_is_killed_half_way(
     summary = run_plan(
         PLAN.model_copy(update={"tries": 3}),
         tmp_path,
-        FakePlayer(tmp_path, endless=2),
+        FakePlayer(tmp_path, gate=tmp_path / "gate", closed=2),
         RayCluster(),
     )
     killer.join(300)

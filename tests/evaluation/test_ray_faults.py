@@ -121,7 +121,7 @@ def test_what_is_frozen_is_noticed_and_its_episode_played_elsewhere(
         monkeypatch.setattr(ray_pool, "SILENCE_S", 20.0)
         os.kill(frozen[0], signal.SIGSTOP)
 
-    play = FakePlayer(tmp_path, 0.5, endless=7)
+    play = FakePlayer(tmp_path, 0.5, gate=tmp_path / "gate", closed=7)
     run = threading.Thread(
         target=run_plan, args=(PLAN, tmp_path, play, RayCluster(address=cluster.address))
     )
@@ -132,7 +132,7 @@ def test_what_is_frozen_is_noticed_and_its_episode_played_elsewhere(
         if time.monotonic() > deadline:
             break
         time.sleep(0.1)
-    play.gate.touch()
+    (tmp_path / "gate").touch()
     run.join()
     assert frozen, "the run ended before anything was frozen"
     assert not Path(f"/proc/{frozen[0]}").exists()
@@ -209,7 +209,7 @@ def test_the_loss_of_the_head_is_one_sentence(
         os.kill(gcs, signal.SIGKILL)
 
     after(tmp_path, 4, kill)
-    play = FakePlayer(tmp_path, 0.5, endless=4)
+    play = FakePlayer(tmp_path, 0.5, gate=tmp_path / "gate", closed=4)
     with pytest.raises(RoboIRGError, match=r"head of the Ray cluster .* same command again"):
         run_plan(PLAN, tmp_path, play, RayCluster(address=cluster.address))
     assert 4 <= lines(tmp_path) == len(list(read_records(tmp_path)))
@@ -224,7 +224,8 @@ from roboirg.evaluation.episode_errors import Terminated
 from roboirg.evaluation.run.runner import run_plan
 folder = Path(sys.argv[1])
 try:
-    run_plan(small_plan(8), folder, FakePlayer(folder, endless=2), RayCluster(address=sys.argv[2]))
+    play = FakePlayer(folder, gate=folder / "gate", closed=2)
+    run_plan(small_plan(8), folder, play, RayCluster(address=sys.argv[2]))
 except Terminated:
     sys.exit(143)
 """
