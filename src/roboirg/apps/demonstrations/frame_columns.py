@@ -5,16 +5,15 @@ from __future__ import annotations
 import zipfile
 from collections.abc import Mapping
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from roboirg.apps.demonstrations.export_plan import ExportPlan, TaskText
-from roboirg.apps.demonstrations.feature_stats import FeatureStats, gather_vectors, picture_stats
+from roboirg.apps.demonstrations.feature_stats import FeatureStats, picture_stats, vector_stats
 from roboirg.apps.demonstrations.picture_coding import FRAME_RATE, video_format
-from roboirg.apps.demonstrations.trajectory import PictureFile, Trajectory, TrajectoryFacts
+from roboirg.apps.demonstrations.trajectory import Trajectory, TrajectoryFacts, picture_name
 from roboirg.apps.demonstrations.trajectory_recorder import video_name
 
 JOINTS = [f"joint_{number}" for number in range(1, 8)]
@@ -184,9 +183,8 @@ class FrameColumns:
         """Return the columns of PNGs."""
         rows = self.rows(trajectory.facts)
         with zipfile.ZipFile(trajectory.path) as archive:
-            file = PictureFile(archive)
             return {
-                self.keys[camera]: [file.encoded(camera, row) for row in rows]
+                self.keys[camera]: [archive.read(picture_name(camera, row)) for row in rows]
                 for camera in self.cameras
             }
 
@@ -208,13 +206,8 @@ class FrameColumns:
     ) -> dict[str, FeatureStats]:
         """Return the statistics of all columns but texts."""
         found = {name: picture_stats(one, self.plan.size**2) for name, one in counts.items()}
-        return found | {name: gather_vectors(parts) for name, parts in numbers.items()}
+        return found | {name: vector_stats(np.concatenate(one)) for name, one in numbers.items()}
 
 
 def _feature(dtype: str, names: list[str]) -> dict[str, Any]:
     return {"dtype": dtype, "shape": [len(names)], "names": names}
-
-
-def video_path(root: Path, key: str, chunk: int, file: int) -> Path:
-    """Return the path of a video in version 3 of the format."""
-    return root / "videos" / key / f"chunk-{chunk:03d}" / f"file-{file:03d}.mp4"

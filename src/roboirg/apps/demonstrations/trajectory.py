@@ -195,27 +195,15 @@ def _read_array(archive: zipfile.ZipFile, name: str) -> NDArray[Any]:
     return array
 
 
-class TrajectoryFile:
-    """Writes one trajectory; pictures go to the disk as they come.
-
-    Args:
-        archive: the open archive.
-    """
-
-    def __init__(self, archive: zipfile.ZipFile) -> None:
-        self._archive = archive
-
-    def add_file(self, name: str, content: bytes) -> None:
-        """Add an encoded picture or a video under its name."""
-        self._archive.writestr(name, content)
-
-    def finish(self, facts: TrajectoryFacts, arrays: Mapping[str, NDArray[Any]]) -> None:
-        """Add the arrays and the facts."""
-        for name, array in arrays.items():
-            file = io.BytesIO()
-            np.save(file, array, allow_pickle=False)
-            self._archive.writestr(name + _ARRAY, file.getvalue())
-        self._archive.writestr(_FACTS, json.dumps(asdict(facts)))
+def write_arrays(
+    archive: zipfile.ZipFile, facts: TrajectoryFacts, arrays: Mapping[str, NDArray[Any]]
+) -> None:
+    """Complete the open file of a trajectory, which has its pictures already."""
+    for name, array in arrays.items():
+        file = io.BytesIO()
+        np.save(file, array, allow_pickle=False)
+        archive.writestr(name + _ARRAY, file.getvalue())
+    archive.writestr(_FACTS, json.dumps(asdict(facts)))
 
 
 def picture_name(track: str, row: int) -> str:
@@ -223,32 +211,16 @@ def picture_name(track: str, row: int) -> str:
     return f"{track}/{row:06d}.png"
 
 
-class PictureFile:
-    """The pictures of one trajectory, read from its open file.
+def read_picture(archive: zipfile.ZipFile, camera: str, row: int) -> NDArray[np.uint8]:
+    """Return a row's picture from a trajectory's open file, RGB, (size, size, 3)."""
+    return decode_png(archive.read(picture_name(camera, row)))
 
-    Args:
-        archive: the open archive.
-    """
 
-    def __init__(self, archive: zipfile.ZipFile) -> None:
-        self._archive = archive
-
-    def encoded(self, track: str, row: int) -> bytes:
-        """Return the PNG of a row of a track: a camera, or ``CAMERA_depth``."""
-        return self._archive.read(picture_name(track, row))
-
-    def picture(self, camera: str, row: int) -> NDArray[np.uint8]:
-        """Return a row's picture, RGB, (size, size, 3)."""
-        return decode_png(self.encoded(camera, row))
-
-    def depth(self, camera: str, row: int) -> NDArray[np.int16]:
-        """Return a row's depth, mm, (256, 256, 1)."""
-        data = np.frombuffer(self.encoded(f"{camera}_depth", row), np.uint8)
-        found = cv2.imdecode(data, cv2.IMREAD_UNCHANGED)
-        return np.asarray(found).astype(np.int16)[..., None]
-
-    def video(self, name: str) -> bytes:
-        return self._archive.read(name)
+def read_depth(archive: zipfile.ZipFile, camera: str, row: int) -> NDArray[np.int16]:
+    """Return a row's depth from a trajectory's open file, mm, (256, 256, 1)."""
+    data = np.frombuffer(archive.read(picture_name(f"{camera}_depth", row)), np.uint8)
+    found = cv2.imdecode(data, cv2.IMREAD_UNCHANGED)
+    return np.asarray(found).astype(np.int16)[..., None]
 
 
 def drop_pictures(path: Path) -> None:

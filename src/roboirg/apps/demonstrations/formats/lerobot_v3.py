@@ -5,7 +5,8 @@ from __future__ import annotations
 import json
 import zipfile
 from collections import defaultdict
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -26,7 +27,7 @@ from roboirg.apps.demonstrations.dataset_part import (
 )
 from roboirg.apps.demonstrations.export_plan import ExportPlan
 from roboirg.apps.demonstrations.feature_stats import FeatureStats, vector_stats
-from roboirg.apps.demonstrations.frame_columns import FrameColumns, PlacedText, video_path
+from roboirg.apps.demonstrations.frame_columns import FrameColumns, PlacedText
 from roboirg.apps.demonstrations.parquet_tables import (
     number_column,
     picture_column,
@@ -35,8 +36,8 @@ from roboirg.apps.demonstrations.parquet_tables import (
     write_rows,
 )
 from roboirg.apps.demonstrations.picture_coding import FRAME_RATE
-from roboirg.apps.demonstrations.trajectory import PictureFile, Trajectory, load_trajectory
-from roboirg.util.atomic_write import write_atomically
+from roboirg.apps.demonstrations.trajectory import Trajectory, load_trajectory
+from roboirg.util.atomic_write import replacing, write_atomically
 
 INFO = "meta/info.json"
 ROBOT = "panda"
@@ -61,11 +62,7 @@ def write_part(part: DatasetPart) -> None:
     trajectory = load_trajectory(episode.path)
     chunk, file = part.place
     if columns.has_videos:
-        with zipfile.ZipFile(trajectory.path) as archive:
-            for camera in columns.cameras:
-                path = video_path(part.root, columns.keys[camera], chunk, file)
-                path.parent.mkdir(parents=True, exist_ok=True)
-                write_atomically(path, PictureFile(archive).video(columns.video(camera)))
+        write_videos(part, partial(_VIDEO.format, chunk_index=chunk, file_index=file))
     shared = frame_columns(columns, trajectory)
     length = len(columns.rows(trajectory.facts))
     own = [own_columns(columns, trajectory, placed, length) for placed in episode.texts]
@@ -73,6 +70,14 @@ def write_part(part: DatasetPart) -> None:
     order = [name for name in info_features(columns) if name in shared or name in own[0]]
     path = part.root / _DATA.format(chunk_index=chunk, file_index=file)
     write_frames(path, order, shared, own, pictures)
+
+
+def write_videos(part: DatasetPart, name_of: Callable[..., str]) -> None:
+    """Write the videos of a part's one trajectory; `name_of` gets the column, `video_key`."""
+    with zipfile.ZipFile(part.episodes[0].path) as archive:
+        for camera in part.columns.cameras:
+            path = part.root / name_of(video_key=part.columns.keys[camera])
+            write_atomically(path, archive.read(part.columns.video(camera)))
 
 
 def frame_columns(columns: FrameColumns, trajectory: Trajectory) -> dict[str, Any]:
@@ -108,7 +113,7 @@ def finish(plan: ExportPlan, root: Path, parts: Sequence[DatasetPart]) -> None:
     """Write the metadata; ``info.json``, without which nothing reads the dataset, comes last."""
     del plan
     columns = parts[0].columns
-    stats = _StatsCollector(columns)
+    stats = StatsCollector(columns)
     episodes, facts = [], []
     for part, episode, trajectory in read_episodes(parts):
         for placed in episode.texts:
@@ -124,7 +129,7 @@ def finish(plan: ExportPlan, root: Path, parts: Sequence[DatasetPart]) -> None:
     write_json(root / INFO, _info(columns, parts, texts))
 
 
-class _StatsCollector:
+class StatsCollector:
     """Collects the statistics of single episodes and of all."""
 
     def __init__(self, columns: FrameColumns) -> None:
@@ -151,22 +156,6 @@ class _StatsCollector:
     def result(self) -> dict[str, FeatureStats]:
         """Return the statistics of all episodes."""
         return self._columns.stats(self._numbers, self._counts)
-
-
-def episode_stats(
-    columns: FrameColumns, trajectory: Trajectory, placed: PlacedText
-) -> dict[str, FeatureStats]:
-    """Return the statistics of one episode."""
-    return _StatsCollector(columns).add(trajectory, placed)
-
-
-def total_stats(parts: Sequence[DatasetPart]) -> dict[str, FeatureStats]:
-    """Return the statistics of all frames."""
-    collector = _StatsCollector(parts[0].columns)
-    for _, episode, trajectory in read_episodes(parts):
-        for placed in episode.texts:
-            collector.add(trajectory, placed)
-    return collector.result()
 
 
 def _episode_entry(part: DatasetPart, placed: PlacedText, length: int) -> dict[str, Any]:
@@ -201,8 +190,6 @@ def _write_tasks(path: Path, texts: Sequence[str]) -> None:
     import pyarrow as pa
     from pyarrow import parquet
 
-    from roboirg.util.atomic_write import replacing
-
     table = pa.table({"task_index": pa.array(range(len(texts)), pa.int64()), "task": list(texts)})
     described = {
         "index_columns": ["task"],
@@ -235,7 +222,6 @@ def _write_tasks(path: Path, texts: Sequence[str]) -> None:
         "pandas_version": "2.0.0",
     }
     table = table.replace_schema_metadata({"pandas": json.dumps(described)})
-    path.parent.mkdir(parents=True, exist_ok=True)
     with replacing(path) as part:
         parquet.write_table(table, part)
 
@@ -271,5 +257,4 @@ def count_frames(columns: FrameColumns, last: RecordedEpisode) -> tuple[int, int
 
 def write_json(path: Path, content: object) -> None:
     """Write JSON, atomically."""
-    path.parent.mkdir(parents=True, exist_ok=True)
     write_atomically(path, json.dumps(content, indent=2) + "\n")

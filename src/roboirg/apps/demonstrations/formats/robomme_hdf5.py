@@ -27,7 +27,12 @@ from roboirg.apps.demonstrations.dataset_part import (
 from roboirg.apps.demonstrations.export_plan import ExportPlan, TaskText
 from roboirg.apps.demonstrations.frame_columns import FrameColumns, PlacedText
 from roboirg.apps.demonstrations.parquet_tables import write_rows
-from roboirg.apps.demonstrations.trajectory import PictureFile, Trajectory, load_trajectory
+from roboirg.apps.demonstrations.trajectory import (
+    Trajectory,
+    load_trajectory,
+    read_depth,
+    read_picture,
+)
 from roboirg.core.extras import extra_needed
 from roboirg.core.observations import CAMERAS
 from roboirg.util.atomic_write import replacing
@@ -78,12 +83,10 @@ def write_part(part: DatasetPart) -> None:
     words = dict.fromkeys(words_of(one.words) for ep in part.episodes for one in ep.texts)
     is_shared = len(words) > 1
     home = part.root / SHARED_FOLDER if is_shared else part.root
-    home.mkdir(parents=True, exist_ok=True)
     with replacing(home / name) as path, h5py.File(path, "w") as file:
         for episode in part.episodes:
             _write_episode(file, episode)
     for folder in words if is_shared else ():
-        (part.root / folder).mkdir(parents=True, exist_ok=True)
         with replacing(part.root / folder / name) as path, h5py.File(path, "w") as file:
             for episode in part.episodes:
                 _link_episode(file, episode, folder, f"../{SHARED_FOLDER}/{name}")
@@ -94,9 +97,8 @@ def _write_episode(file: Any, episode: RecordedEpisode) -> None:  # noqa: ANN401
     group = file.create_group(f"episode_{trajectory.facts.episode}")
     _write_setup(group, trajectory, episode.texts[0])
     with zipfile.ZipFile(episode.path) as archive:
-        pictures = PictureFile(archive)
         for step, row in enumerate(time_steps(trajectory)):
-            _write_step(group.create_group(f"timestep_{step}"), trajectory, row, pictures)
+            _write_step(group.create_group(f"timestep_{step}"), trajectory, row, archive)
 
 
 def _link_episode(file: Any, episode: RecordedEpisode, folder: str, home: str) -> None:  # noqa: ANN401
@@ -137,15 +139,15 @@ def _write_step(
     group: Any,  # noqa: ANN401
     trajectory: Trajectory,
     row: int,
-    pictures: PictureFile,
+    archive: zipfile.ZipFile,
 ) -> None:
     seen = group.create_group("obs")
     for camera in CAMERAS:
         options = {"compression": "gzip", "compression_opts": 1}
-        seen.create_dataset(f"{camera}_rgb", data=pictures.picture(camera, row), **options)
+        seen.create_dataset(f"{camera}_rgb", data=read_picture(archive, camera, row), **options)
         if not trajectory.facts.depth:
             continue
-        seen.create_dataset(f"{camera}_depth", data=pictures.depth(camera, row), **options)
+        seen.create_dataset(f"{camera}_depth", data=read_depth(archive, camera, row), **options)
         extrinsic = trajectory.calibration[f"{camera}_extrinsic"][row]
         seen[f"{camera}_camera_extrinsic"] = extrinsic
     seen["joint_state"] = trajectory.joint_positions[row]
