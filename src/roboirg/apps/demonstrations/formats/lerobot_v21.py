@@ -16,7 +16,6 @@ from roboirg.apps.demonstrations.dataset_part import (
     episode_row,
     read_episodes,
 )
-from roboirg.apps.demonstrations.export_plan import ExportPlan
 from roboirg.apps.demonstrations.formats.lerobot_v3 import (
     INFO,
     ROBOT,
@@ -61,9 +60,8 @@ def _place(episode_index: int) -> dict[str, int]:
     return {"episode_chunk": episode_index // CHUNK_SIZE, "episode_index": episode_index}
 
 
-def finish(plan: ExportPlan, root: Path, parts: Sequence[DatasetPart]) -> None:
+def finish(root: Path, parts: Sequence[DatasetPart]) -> None:
     """Write the metadata; ``info.json``, without which nothing reads the dataset, comes last."""
-    del plan
     columns = parts[0].columns
     collector = StatsCollector(columns)
     episodes, stats, facts = [], [], []

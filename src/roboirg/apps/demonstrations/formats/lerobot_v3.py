@@ -109,9 +109,8 @@ def info_features(columns: FrameColumns) -> dict[str, dict[str, Any]]:
     return found
 
 
-def finish(plan: ExportPlan, root: Path, parts: Sequence[DatasetPart]) -> None:
+def finish(root: Path, parts: Sequence[DatasetPart]) -> None:
     """Write the metadata; ``info.json``, without which nothing reads the dataset, comes last."""
-    del plan
     columns = parts[0].columns
     stats = StatsCollector(columns)
     episodes, facts = [], []

@@ -177,9 +177,8 @@ def _is_boundary(trajectory: Trajectory, row: int) -> bool:
     return is_first or bool(trajectory.subgoals[row] != trajectory.subgoals[before])
 
 
-def finish(plan: ExportPlan, root: Path, parts: Sequence[DatasetPart]) -> None:
+def finish(root: Path, parts: Sequence[DatasetPart]) -> None:
     """Write the table of facts."""
-    del plan
     rows = []
     for part, episode, trajectory in read_episodes(parts):
         length = len(part.columns.rows(trajectory.facts))
