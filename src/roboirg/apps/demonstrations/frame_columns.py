@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from roboirg.apps.demonstrations.export_plan import ExportPlan, TaskText
 from roboirg.apps.demonstrations.feature_stats import FeatureStats, picture_stats, vector_stats
-from roboirg.apps.demonstrations.picture_coding import FRAME_RATE, video_format
+from roboirg.apps.demonstrations.picture_coding import FRAME_RATE, STORED_FORMATS
 from roboirg.apps.demonstrations.trajectory import Trajectory, TrajectoryFacts, picture_name
 from roboirg.apps.demonstrations.trajectory_recorder import video_name
 
@@ -126,7 +126,7 @@ class FrameColumns:
             feature["info"] = {
                 "video.fps": FRAME_RATE,
                 "video.codec": "h264",
-                "video.pix_fmt": video_format(self.plan.pictures),
+                "video.pix_fmt": STORED_FORMATS[self.plan.pictures],
                 "video.height": self.plan.size,
                 "video.width": self.plan.size,
                 "video.channels": 3,

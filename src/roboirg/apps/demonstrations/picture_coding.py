@@ -34,7 +34,8 @@ _CODECS: dict[str, tuple[str, str, dict[str, str]]] = {
     "lossless-video": ("libx264rgb", "rgb24", {"crf": "0"}),
     "lossy-video": ("libx264", "yuv420p", {"crf": str(LOSSY_QUALITY)}),
 }
-_STORED_FORMATS = {"lossless-video": "gbrp", "lossy-video": "yuv420p"}
+STORED_FORMATS = {"lossless-video": "gbrp", "lossy-video": "yuv420p"}
+"""The pixel format that a stored video has."""
 _MAX_VALUE = 255.0
 
 
@@ -148,11 +149,6 @@ class _PictureLoss:
             "largest": float(self.largest),
             "psnr": psnr,
         }
-
-
-def video_format(coding: PictureCoding) -> str:
-    """Return the pixel format that a stored video has."""
-    return _STORED_FORMATS[coding]
 
 
 def count_values(picture: Picture) -> NDArray[np.int64]:

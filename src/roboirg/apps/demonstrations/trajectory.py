@@ -6,10 +6,11 @@ and the pictures as ``CAMERA/000000.png`` or ``CAMERA.mp4``. It appears whole or
 
 from __future__ import annotations
 
+import contextlib
 import io
 import json
 import zipfile
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
@@ -150,16 +151,13 @@ def load_trajectory(path: Path) -> Trajectory:
     Raises:
         InvalidValueError: the file is missing or damaged, or of another version.
     """
-    try:
-        with zipfile.ZipFile(path) as archive:
-            facts = _read_facts(archive, path)
-            arrays = {
-                name.removesuffix(_ARRAY): _read_array(archive, name)
-                for name in archive.namelist()
-                if name.endswith(_ARRAY)
-            }
-    except (OSError, zipfile.BadZipFile, ValueError, KeyError) as error:
-        raise InvalidValueError(f"The trajectory {str(path)!r} cannot be read: {error}.") from error
+    with _opened(path) as archive:
+        facts = _read_facts(archive, path)
+        arrays = {
+            name.removesuffix(_ARRAY): _read_array(archive, name)
+            for name in archive.namelist()
+            if name.endswith(_ARRAY)
+        }
     counted = [one for one in CAMERAS if f"{one}_histogram" in arrays]
     histograms = {one: arrays.pop(f"{one}_histogram") for one in counted}
     matrices = [name for name in arrays if name.endswith(("_extrinsic", "_intrinsic"))]
@@ -173,9 +171,15 @@ def load_facts(path: Path) -> TrajectoryFacts:
     Raises:
         InvalidValueError: the file is missing or damaged, or of another version.
     """
+    with _opened(path) as archive:
+        return _read_facts(archive, path)
+
+
+@contextlib.contextmanager
+def _opened(path: Path) -> Iterator[zipfile.ZipFile]:
     try:
         with zipfile.ZipFile(path) as archive:
-            return _read_facts(archive, path)
+            yield archive
     except (OSError, zipfile.BadZipFile, ValueError, KeyError) as error:
         raise InvalidValueError(f"The trajectory {str(path)!r} cannot be read: {error}.") from error
 
