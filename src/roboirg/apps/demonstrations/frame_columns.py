@@ -12,9 +12,10 @@ from numpy.typing import NDArray
 
 from roboirg.apps.demonstrations.export_plan import ExportPlan, TaskText
 from roboirg.apps.demonstrations.feature_stats import FeatureStats, picture_stats, vector_stats
-from roboirg.apps.demonstrations.picture_coding import FRAME_RATE, STORED_FORMATS
+from roboirg.apps.demonstrations.picture_coding import STORED_FORMATS
 from roboirg.apps.demonstrations.trajectory import Trajectory, TrajectoryFacts, picture_name
 from roboirg.apps.demonstrations.trajectory_recorder import video_name
+from roboirg.util.media import CONTROL_RATE
 
 JOINTS = [f"joint_{number}" for number in range(1, 8)]
 _POSE = ["x", "y", "z", "roll", "pitch", "yaw", "gripper"]
@@ -124,7 +125,7 @@ class FrameColumns:
         }
         if self.has_videos:
             feature["info"] = {
-                "video.fps": FRAME_RATE,
+                "video.fps": CONTROL_RATE,
                 "video.codec": "h264",
                 "video.pix_fmt": STORED_FORMATS[self.plan.pictures],
                 "video.height": self.plan.size,
@@ -158,7 +159,7 @@ class FrameColumns:
         columns["next.success"] = is_success[:, None]
         columns["is_video_demo"] = (rows < facts.video_length)[:, None]
         frames = np.arange(len(rows), dtype=np.int64)
-        columns["timestamp"] = (frames / FRAME_RATE).astype(np.float32)[:, None]
+        columns["timestamp"] = (frames / CONTROL_RATE).astype(np.float32)[:, None]
         columns["frame_index"] = frames[:, None]
         return columns
 

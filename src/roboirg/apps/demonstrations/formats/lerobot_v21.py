@@ -29,9 +29,9 @@ from roboirg.apps.demonstrations.formats.lerobot_v3 import (
 )
 from roboirg.apps.demonstrations.frame_columns import FrameColumns
 from roboirg.apps.demonstrations.parquet_tables import write_frames, write_rows
-from roboirg.apps.demonstrations.picture_coding import FRAME_RATE
 from roboirg.apps.demonstrations.trajectory import load_trajectory
 from roboirg.util.atomic_write import write_atomically
+from roboirg.util.media import CONTROL_RATE
 
 __all__ = ["finish", "make_parts", "write_part"]
 
@@ -113,7 +113,7 @@ def _info(columns: FrameColumns, parts: Sequence[DatasetPart], texts: int) -> di
         "total_videos": count * len(columns.cameras) if columns.has_videos else 0,
         "total_chunks": (count - 1) // CHUNK_SIZE + 1,
         "chunks_size": CHUNK_SIZE,
-        "fps": FRAME_RATE,
+        "fps": CONTROL_RATE,
         "splits": {"train": f"0:{count}"},
         "data_path": _DATA,
         "video_path": _VIDEO if columns.has_videos else None,

@@ -35,9 +35,9 @@ from roboirg.apps.demonstrations.parquet_tables import (
     write_frames,
     write_rows,
 )
-from roboirg.apps.demonstrations.picture_coding import FRAME_RATE
 from roboirg.apps.demonstrations.trajectory import Trajectory, load_trajectory
 from roboirg.util.atomic_write import replacing, write_atomically
+from roboirg.util.media import CONTROL_RATE
 
 INFO = "meta/info.json"
 ROBOT = "panda"
@@ -172,7 +172,7 @@ def _episode_entry(part: DatasetPart, placed: PlacedText, length: int) -> dict[s
         key = f"videos/{part.columns.keys[camera]}"
         entry[f"{key}/chunk_index"], entry[f"{key}/file_index"] = chunk, file
         entry[f"{key}/from_timestamp"] = 0.0
-        entry[f"{key}/to_timestamp"] = length / FRAME_RATE
+        entry[f"{key}/to_timestamp"] = length / CONTROL_RATE
     return entry | {"meta/episodes/chunk_index": 0, "meta/episodes/file_index": 0}
 
 
@@ -239,7 +239,7 @@ def _info(
         "chunks_size": CHUNK_SIZE,
         "data_files_size_in_mb": 100,
         "video_files_size_in_mb": 200,
-        "fps": FRAME_RATE,
+        "fps": CONTROL_RATE,
         "splits": {"train": f"0:{count}"},
         "data_path": _DATA,
         "video_path": _VIDEO if columns.has_videos else None,
