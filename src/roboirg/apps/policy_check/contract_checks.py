@@ -127,7 +127,7 @@ def check_inputs(player: PolicyPlayer) -> Iterator[CheckResult]:
     """Check that what the policy is given stays as it is."""
     episode = player.with_video
     given = copy.deepcopy(episode)
-    player.play_in_place("inputs unchanged", given)
+    player.play("inputs unchanged", given, in_place=True)
     changed = _first_difference(
         (episode.demonstration, episode.first), (given.demonstration, given.first)
     )

@@ -107,6 +107,7 @@ class PolicyPlayer:
         fresh: bool = True,
         changed: Sequence[str] = (),
         calls: int = CALLS,
+        in_place: bool = False,
     ) -> SyntheticRollout:
         """Play some calls of a copy of an episode, which the policy may change.
 
@@ -116,24 +117,12 @@ class PolicyPlayer:
             fresh: whether to make the policy anew, if it is a spec.
             changed: fields of later observations that are drawn differently.
             calls: of `act`.
+            in_place: whether to play the episode itself.
 
         Raises:
             CheckAbortedError: the policy raised, or gave no actions.
         """
-        return self.play_in_place(
-            check, copy.deepcopy(episode), fresh=fresh, changed=changed, calls=calls
-        )
-
-    def play_in_place(
-        self,
-        check: str,
-        episode: SyntheticEpisode,
-        *,
-        fresh: bool = True,
-        changed: Sequence[str] = (),
-        calls: int = CALLS,
-    ) -> SyntheticRollout:
-        """Play some calls of an episode itself; see `play`."""
+        episode = episode if in_place else copy.deepcopy(episode)
         policy = self.reset(check, episode, fresh=fresh)
         episodes, observation = self.make_episodes(changed=changed), episode.first
         rollout = SyntheticRollout([], [], "")

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from roboirg.apps.policy_check.policy_player import CALLS
 from roboirg.apps.policy_check.synthetic_episodes import SyntheticEpisode
 from roboirg.core.actions import check_chunk
 from roboirg.policies.by_name.loading import make_policy
@@ -16,7 +17,6 @@ from roboirg.policies.contract.base import close_policy
 from roboirg.policies.contract.policy_needs import PolicyNeeds
 from roboirg.policies.contract.random_state import RandomState
 
-CALLS = 3
 Chunks = list[NDArray[np.float64]]
 
 
