@@ -11,7 +11,7 @@ from typing import Any, Generic, NamedTuple, Protocol, TypeVar
 import torch
 from torch import nn
 
-from roboirg.apps.learning.trained_file import load_unfinished, save_unfinished
+from roboirg.apps.learning.trained_file import load_unfinished, save_trained
 
 BATCH = 32
 One = TypeVar("One")
@@ -36,9 +36,9 @@ class KeptTraining(NamedTuple):
     made_of: object
 
 
-def batch_count(lessons: Sequence[object], size: int = BATCH) -> int:
+def batch_count(lessons: Sequence[object]) -> int:
     """Return the number of batches of lessons."""
-    return math.ceil(len(lessons) / size)
+    return math.ceil(len(lessons) / BATCH)
 
 
 def batches(lessons: Sequence[One], rng: random.Random, size: int = BATCH) -> Iterator[list[One]]:
@@ -126,7 +126,7 @@ class Trainer(Generic[One]):
             if kept is not None:
                 state = {name: part.state_dict() for name, part in parts.items()}
                 state |= {"random": torch.get_rng_state(), "found": found}
-                save_unfinished(state, kept.made_of, kept.path)
+                save_trained({**state, "made_of": kept.made_of}, kept.path)
             note = ", ".join(f"{name} {value:.3f}" for name, value in found[-1].items())
             show(number + 1, passes, note)
         self._net.eval()

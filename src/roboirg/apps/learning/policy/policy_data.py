@@ -10,7 +10,7 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
-from roboirg.apps.learning.policy.body_net import TOOL_NUMBERS, EpisodeBatch
+from roboirg.apps.learning.policy.body_net import EpisodeBatch
 from roboirg.apps.learning.policy.moves import ExpertDecision
 from roboirg.apps.learning.policy.planner_history import PlannedNumbers
 from roboirg.apps.learning.policy.recording import LOOK_EVERY, ExpertRecording
@@ -97,10 +97,7 @@ class LookHistory:
 def _tool_numbers(tool: NDArray[np.floating[Any]], *, is_video: bool) -> NDArray[np.float32]:
     x, y, z, _, _, yaw, finger = tool
     turn = math.cos(2 * yaw), math.sin(2 * yaw)
-    found = np.array([x, y, z * 5.0, *turn, finger * 25.0, is_video], np.float32)
-    if len(found) != TOOL_NUMBERS:
-        raise RuntimeError(f"The tool has {len(found)} numbers, not {TOOL_NUMBERS}.")
-    return found
+    return np.array([x, y, z * 5.0, *turn, finger * 25.0, is_video], np.float32)
 
 
 def to_numbers(
