@@ -17,7 +17,7 @@ from roboirg.core.errors import InvalidValueError, UnknownNameError
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.core.observations import CAMERAS, check_cameras
 from roboirg.core.word_pools import pool_of
-from roboirg.language import FORMS, LANGUAGE_VERSION
+from roboirg.language import LANGUAGE_VERSION
 from roboirg.language.generator import instruct_with
 from roboirg.language.instruction_row import row
 from roboirg.language.settings import all_settings
@@ -33,11 +33,7 @@ ExtraAction = Literal["delta", "pose"]
 Outcomes = Literal["successes", "all"]
 
 FORMATS: tuple[FormatName, ...] = get_args(FormatName)
-VIDEO_TREATMENTS: tuple[VideoTreatment, ...] = get_args(VideoTreatment)
-KEY_NAMES: tuple[KeyNames, ...] = get_args(KeyNames)
-EXTRA_ACTIONS: tuple[ExtraAction, ...] = get_args(ExtraAction)
 PICTURE_CODINGS: tuple[PictureCoding, ...] = get_args(PictureCoding)
-OUTCOMES: tuple[Outcomes, ...] = get_args(Outcomes)
 ORACLE = "oracle"
 SMALLEST = 16
 """Width and height of the smallest pictures that are exported, pixels."""
@@ -101,11 +97,6 @@ class ExportPlan:
         for kind, value, known in (
             ("format", self.format, FORMATS),
             ("way to store pictures", self.pictures, PICTURE_CODINGS),
-            ("way to treat the video", self.video, VIDEO_TREATMENTS),
-            ("set of names", self.names, KEY_NAMES),
-            ("choice of outcomes", self.outcomes, OUTCOMES),
-            *(("form", form, FORMS) for form in self.forms),
-            *(("description of actions", one, EXTRA_ACTIONS) for one in self.extra_actions),
         ):
             if value not in known:
                 raise UnknownNameError(kind, value, known)
