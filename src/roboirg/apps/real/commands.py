@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from roboirg.cli.run_commands import INTERRUPTED, USAGE_ERROR
 from roboirg.core.plain_text import counted
 
 if TYPE_CHECKING:
@@ -16,8 +17,6 @@ if TYPE_CHECKING:
     from roboirg.apps.real.study.study_run import Study
 
 # Heavy modules are imported inside the commands, so that --help is fast.
-
-USAGE_ERROR, INTERRUPTED = 2, 130
 
 real_app = typer.Typer(
     name="real",

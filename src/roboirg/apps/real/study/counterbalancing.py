@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections import defaultdict
 from itertools import product
-from typing import NamedTuple
+from typing import NamedTuple, cast
 
 from roboirg.core.episode import Color, Episode, ObjectKind
 from roboirg.core.errors import InvalidValueError
@@ -57,10 +57,7 @@ def read_arrangement(episode: Episode) -> Arrangement:
     """Return the factors of an episode of a real robot's task."""
     goal = episode.goal.as_mapping()
     left, _ = left_to_right(episode.scene, target_kind(episode.task))
-    target = next(one.color for one in episode.scene.objects if one.color == goal["color"])
-    if target is None:  # the goals of a task are colors of its objects
-        raise InvalidValueError(f"{episode.key} has no object of the color {goal['color']!r}.")
-    return _arrangement(target, left, goal.get("repeats"))
+    return _arrangement(cast("Color", goal["color"]), left, goal.get("repeats"))
 
 
 def counterbalanced_order(task: str) -> tuple[Arrangement, ...]:

@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Literal, get_args
+from typing import Literal, cast, get_args
 
 import msgspec
 
@@ -205,16 +205,13 @@ def select_scorer(name: str, robot: Robot) -> Scorer:
     has_judge = isinstance(robot, JudgingRobot)
     if not name:
         return "judge" if has_judge else "operator"
-    for scorer in get_args(Scorer):
-        if name == scorer:
-            if scorer == "judge" and not has_judge:
-                raise InvalidValueError(
-                    f"The robot {robot.name!r} cannot judge; score its trials with "
-                    "roboirg real score."
-                )
-            found: Scorer = scorer
-            return found
-    raise UnknownNameError("scorer", name, get_args(Scorer))
+    if name not in get_args(Scorer):
+        raise UnknownNameError("scorer", name, get_args(Scorer))
+    if name == "judge" and not has_judge:
+        raise InvalidValueError(
+            f"The robot {robot.name!r} cannot judge; score its trials with roboirg real score."
+        )
+    return cast("Scorer", name)
 
 
 def _check_versions(trial_log: TrialLog, policies: Mapping[str, str | None]) -> None:
