@@ -12,8 +12,9 @@ from typing import Any, Literal, NamedTuple, get_args
 from roboirg.apps.demonstrations.picture_coding import PictureCoding
 from roboirg.apps.demonstrations.trajectory import SUFFIX, TRAJECTORY_VERSION
 from roboirg.apps.demonstrations.trajectory_recorder import RecordingSpec
+from roboirg.cli.names import known_name
 from roboirg.core.episode import ENVIRONMENT_VERSION, Episode
-from roboirg.core.errors import InvalidValueError, UnknownNameError
+from roboirg.core.errors import InvalidValueError
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.core.observations import CAMERAS, check_cameras
 from roboirg.core.word_pools import pool_of
@@ -32,8 +33,6 @@ KeyNames = Literal["lerobot", "openpi"]
 ExtraAction = Literal["delta", "pose"]
 Outcomes = Literal["successes", "all"]
 
-FORMATS: tuple[FormatName, ...] = get_args(FormatName)
-PICTURE_CODINGS: tuple[PictureCoding, ...] = get_args(PictureCoding)
 ORACLE = "oracle"
 SMALLEST = 16
 """Width and height of the smallest pictures that are exported, pixels."""
@@ -94,12 +93,8 @@ class ExportPlan:
             UnknownNameError: a name does not exist.
             InvalidValueError: a value or a combination is not possible.
         """
-        for kind, value, known in (
-            ("format", self.format, FORMATS),
-            ("way to store pictures", self.pictures, PICTURE_CODINGS),
-        ):
-            if value not in known:
-                raise UnknownNameError(kind, value, known)
+        known_name("format", self.format, get_args(FormatName))
+        known_name("way to store pictures", self.pictures, get_args(PictureCoding))
         if self.variations < 1:
             raise InvalidValueError(f"variations is {self.variations}; it must be at least 1.")
         if self.variations > 1 and self.policy != ORACLE:

@@ -88,13 +88,6 @@ class ExportSummary(NamedTuple):
     size: int
 
 
-def check_support(plan: ExportPlan) -> None:
-    """Check early that the plan's format can be written."""
-    check_parquet_support("demonstrations")
-    if plan.format == "robomme-hdf5":
-        check_hdf5_support()
-
-
 def run_export(
     plan: ExportPlan,
     out: Path,
@@ -119,7 +112,9 @@ def run_export(
             trajectory can be exported.
         MissingDependencyError: a package is not installed.
     """
-    check_support(plan)
+    check_parquet_support("demonstrations")
+    if plan.format == "robomme-hdf5":
+        check_hdf5_support()
     jobs, record = source or _played(plan)
     with _opened(plan, out) as work:
         folder = work / "trajectories" if trajectories is None else trajectories

@@ -53,7 +53,7 @@ def export_recording(
         dataset: the recording.
         takes: the demonstration of each of its episodes.
         out: folder of the new dataset.
-        data_format: one of `FORMATS`.
+        data_format: its name, as in a plan.
         workers: processes; 0 uses this one.
         report: called with the progress.
     """

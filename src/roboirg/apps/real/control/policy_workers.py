@@ -87,7 +87,7 @@ class PolicyDispatcher:
 
     def __init__(self, load: LoadPolicy) -> None:
         self._load = load
-        self._policy: Policy | None = None
+        self._policy: Any = None  # the loop makes one before anything else
         self._scene_lock: contextlib.AbstractContextManager[object] = contextlib.nullcontext()
 
     def handle(self, method: str, *args: Any) -> PolicyReply:  # noqa: ANN401
@@ -112,25 +112,20 @@ class PolicyDispatcher:
             self._policy.attach(env)
 
     def _reset(self, instruction: str, demonstration: dict[str, Any]) -> PolicyFacts:
-        policy = self._require_policy()
+        policy = self._policy
         policy.reset(instruction, demonstration)
         needs = PolicyNeeds.of(policy).declared
         return PolicyFacts(policy_metadata(policy), needs, inference_facts(policy))
 
     def _act(self, observation: Any) -> Any:  # noqa: ANN401
         with self._scene_lock:  # the scene must not change while a policy plans in it
-            return self._require_policy().act(observation)
+            return self._policy.act(observation)
 
     def _close(self) -> dict[str, float]:
         policy, self._policy = self._policy, None
         usage: Mapping[str, float] = getattr(policy, "usage", dict)()
         getattr(policy, "close", lambda: None)()
         return {str(name): float(cost) for name, cost in usage.items()}
-
-    def _require_policy(self) -> Policy:
-        if self._policy is None:
-            raise RuntimeError("no policy has been made")
-        return self._policy
 
 
 class PolicyThread:

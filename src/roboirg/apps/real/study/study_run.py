@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Literal, cast, get_args
+from typing import Literal, get_args
 
 import msgspec
 
@@ -19,6 +19,7 @@ from roboirg.apps.real.control.policy_workers import PolicyProcess, PolicyThread
 from roboirg.apps.real.control.robot import HORIZON, JudgingRobot, Robot
 from roboirg.apps.real.study.study_plan import PlannedTrial, StudyPlan
 from roboirg.apps.real.study.trial_log import UNSCORED, TrialLog
+from roboirg.cli.names import known_name
 from roboirg.core.actions import JOINT_ANGLE
 from roboirg.core.episode import ENVIRONMENT_VERSION
 from roboirg.core.errors import InvalidValueError, UnknownNameError
@@ -205,13 +206,12 @@ def select_scorer(name: str, robot: Robot) -> Scorer:
     has_judge = isinstance(robot, JudgingRobot)
     if not name:
         return "judge" if has_judge else "operator"
-    if name not in get_args(Scorer):
-        raise UnknownNameError("scorer", name, get_args(Scorer))
-    if name == "judge" and not has_judge:
+    scorer: Scorer = known_name("scorer", name, get_args(Scorer))
+    if scorer == "judge" and not has_judge:
         raise InvalidValueError(
             f"The robot {robot.name!r} cannot judge; score its trials with roboirg real score."
         )
-    return cast("Scorer", name)
+    return scorer
 
 
 def _check_versions(trial_log: TrialLog, policies: Mapping[str, str | None]) -> None:
