@@ -90,8 +90,8 @@ def train_body(
         plan.body_epochs,
         mixed,
         partial(progress, "body"),
-        lambda: dict(zip(SHOWN, score(body, shown[::HELD_BACK]), strict=True)),
         KeptTraining(path, _made_of(plan, recorded, moves, sight, vocabulary)),
+        lambda: dict(zip(SHOWN, score(body, shown[::HELD_BACK]), strict=True)),
     )
     scores = [BodyScore(epoch, **one) for epoch, one in enumerate(found, 1)]
     save_curve(scores, path)
