@@ -306,7 +306,8 @@ class _Recorder(EpisodeLoop):
     ) -> None:
         rows = self._rows
         self._tracks.add(observation, is_video=False)
-        kept = {key: value for key, value in observation.items() if not _is_picture(key)}
+        pictures = ("_rgb", "_depth")
+        kept = {key: value for key, value in observation.items() if not key.endswith(pictures)}
         rows.observations.append(kept)
         rows.actions.append(action)
         rows.labels.append(label)
@@ -377,10 +378,6 @@ class _Recorder(EpisodeLoop):
         angles = np.unwrap([pose.rotation.as_euler("xyz") for pose in poses], axis=0)
         positions = np.stack([pose.position for pose in poses])
         return np.column_stack([positions, angles, actions[:, ARM_JOINTS]])
-
-
-def _is_picture(key: str) -> bool:
-    return key.endswith(("_rgb", "_depth"))
 
 
 def without_pixel(subgoal: str) -> str:

@@ -121,6 +121,7 @@ def run(
 
     Example: roboirg real run study --robot twin
     """
+    from roboirg.apps.real.control.control_loop import never
     from roboirg.apps.real.control.limits import read_limits
     from roboirg.apps.real.control.robot import JudgingRobot
     from roboirg.apps.real.control.robot_loading import make_robot
@@ -138,7 +139,7 @@ def run(
         device,
         read_limits(limits),
         select_scorer(score, device),
-        (lambda: False) if isinstance(device, JudgingRobot) else console.stop_requested,
+        never if isinstance(device, JudgingRobot) else console.stop_requested,
         console.report,
     )
     _play(study, console, policy or [], retry=retry_errors)

@@ -49,10 +49,6 @@ def check_hdf5_support() -> None:
         import h5py  # noqa: F401
 
 
-def file_name(task: str) -> str:
-    return f"record_dataset_{task}.h5"
-
-
 def words_of(words: TaskText) -> str:
     """Return the name of the folder of a setting and form."""
     return f"{words.options.setting}-{words.options.form}"
@@ -79,7 +75,7 @@ def write_part(part: DatasetPart) -> None:
     """Write the files of one task: one, or one for each setting and form that share its steps."""
     import h5py
 
-    name = file_name(_task(part.episodes[0]))
+    name = f"record_dataset_{_task(part.episodes[0])}.h5"
     words = dict.fromkeys(words_of(one.words) for ep in part.episodes for one in ep.texts)
     is_shared = len(words) > 1
     home = part.root / SHARED_FOLDER if is_shared else part.root

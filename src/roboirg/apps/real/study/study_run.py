@@ -13,7 +13,7 @@ from typing import Literal, get_args
 
 import msgspec
 
-from roboirg.apps.real.control.control_loop import ControlLoop
+from roboirg.apps.real.control.control_loop import ControlLoop, never
 from roboirg.apps.real.control.limits import Limits
 from roboirg.apps.real.control.policy_workers import PolicyProcess, PolicyThread
 from roboirg.apps.real.control.robot import HORIZON, JudgingRobot, Robot
@@ -42,10 +42,6 @@ Scorer = Literal["judge", "operator"]
 _SCHEME, _OPTION = "mme-vla", "execute"
 
 
-def _never() -> bool:
-    return False
-
-
 @dataclass
 class Study:
     """Plays the trials of a plan.
@@ -65,7 +61,7 @@ class Study:
     robot: Robot
     limits: Limits = field(default_factory=Limits)
     scorer: Scorer = "operator"
-    stop_requested: Callable[[], bool] = _never
+    stop_requested: Callable[[], bool] = never
     on_record: Callable[[PlannedTrial, Record], None] = lambda _trial, _record: None
     _workers: dict[str, PolicyThread] = field(default_factory=dict)
 
