@@ -42,7 +42,6 @@ from roboirg.apps.learning.policy.recording import (
 )
 from roboirg.apps.learning.policy.sight import (
     Sight,
-    SightNoise,
     labeled_looks,
     points_of,
     sight_of,
@@ -249,7 +248,7 @@ def first_looks(
 ) -> list[LookTokens]:
     """Return what the reader of words sees of an episode."""
     wanted = FIRST_LOOKS if recorded.is_video[0] else FIRST_LOOKS[:1]
-    looks = enumerate(labeled_looks(recorded, sight, SightNoise(), rng))
+    looks = enumerate(labeled_looks(recorded, sight, rng))
     return [tokens for look, (tokens, _) in looks if look in wanted]
 
 
