@@ -10,11 +10,10 @@ from dataclasses import replace
 
 from roboirg.apps.language_lab.validation.leaks import find_leaks
 from roboirg.apps.language_lab.validation.validation_results import (
-    CommandGroup,
+    EpisodeGroup,
     Refusal,
     Rule,
     RuleViolation,
-    SceneGroup,
     ValidationResults,
 )
 from roboirg.core.episode import Episode, Goal
@@ -117,13 +116,8 @@ def leaking(instruction: Instruction, episode: Episode) -> Iterator[Violation]:
 def _count_command(
     instruction: Instruction, episode: Episode, results: ValidationResults, *, exception: bool
 ) -> None:
-    pattern = instruction.metadata["pattern"]
-    group = CommandGroup(
-        task=episode.task,
-        setting=instruction.setting,
-        pattern=None if pattern is None else str(pattern),
-        difficulty=episode.difficulty,
-    )
+    pattern = str(instruction.metadata["pattern"] or "")
+    group = EpisodeGroup(episode.task, instruction.setting, pattern, episode.difficulty)
     results.commands[group] += 1
     results.exceptions[group] += exception
 
@@ -133,7 +127,7 @@ def _count_refusals(
 ) -> None:
     for changes in setting.variants:
         variant = ", ".join(str(value) for value in changes.values())
-        group = SceneGroup(episode.task, setting.name, variant, episode.difficulty)
+        group = EpisodeGroup(episode.task, setting.name, variant, episode.difficulty)
         options = replace(InstructionOptions(setting.name, wordings=wordings), **changes)
         reason = find_refusal(episode, options)
         results.scenes[group] += 1
