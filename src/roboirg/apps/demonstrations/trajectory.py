@@ -229,12 +229,15 @@ def read_depth(archive: zipfile.ZipFile, camera: str, row: int) -> NDArray[np.in
 
 def drop_pictures(path: Path) -> None:
     """Replace a trajectory's file by one without pictures; does nothing if it has none."""
-    with zipfile.ZipFile(path) as archive:
-        kept = [name for name in archive.namelist() if name.endswith(_ARRAY) or name == _FACTS]
-        if len(kept) == len(archive.namelist()):
-            return
-        with replacing(path) as part, zipfile.ZipFile(part, "w") as smaller:
-            for name in kept:
+    if not has_pictures(path):
+        return
+    with (
+        zipfile.ZipFile(path) as archive,
+        replacing(path) as part,
+        zipfile.ZipFile(part, "w") as smaller,
+    ):
+        for name in archive.namelist():
+            if name.endswith((_ARRAY, _FACTS)):
                 smaller.writestr(name, archive.read(name))
 
 

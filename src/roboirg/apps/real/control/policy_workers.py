@@ -62,14 +62,6 @@ class PolicyReply(NamedTuple):
         return self.value
 
 
-class PolicyFacts(NamedTuple):
-    """What a policy says about itself once it has been reset; the fields are those of a record."""
-
-    metadata: dict[str, Any]
-    needs: dict[str, Any]
-    inference: InferenceFacts
-
-
 LoadPolicy = Callable[[str, int], Policy]
 
 
@@ -111,11 +103,14 @@ class PolicyDispatcher:
         if isinstance(self._policy, PrivilegedPolicy):
             self._policy.attach(env)
 
-    def _reset(self, instruction: str, demonstration: dict[str, Any]) -> PolicyFacts:
+    def _reset(
+        self, instruction: str, demonstration: dict[str, Any]
+    ) -> tuple[dict[str, Any], dict[str, Any], InferenceFacts]:
+        """Return what the policy then says of itself for records: metadata, needs, inference."""
         policy = self._policy
         policy.reset(instruction, demonstration)
         needs = PolicyNeeds.of(policy).declared
-        return PolicyFacts(policy_metadata(policy), needs, inference_facts(policy))
+        return policy_metadata(policy), needs, inference_facts(policy)
 
     def _act(self, observation: Any) -> Any:  # noqa: ANN401
         with self._scene_lock:  # the scene must not change while a policy plans in it
@@ -183,12 +178,6 @@ class PolicyProcess(PolicyThread):
     def __init__(self) -> None:
         self._hosts = HostPool(HostSettings(batch=1))
         super().__init__(functools.partial(HostedPolicy, self._hosts.connect()))
-
-    @property
-    def pid(self) -> int:
-        """The process id of the policy's process, which has been made."""
-        (pid,) = self._hosts.pids
-        return pid
 
     def loss(self) -> EpisodeLostError | None:
         """Return how the policy's process died; None while it is alive."""
