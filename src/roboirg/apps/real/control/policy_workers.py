@@ -180,7 +180,6 @@ class PolicyProcess(PolicyThread):
         super().__init__(functools.partial(HostedPolicy, self._hosts.connect()))
 
     def loss(self) -> EpisodeLostError | None:
-        """Return how the policy's process died; None while it is alive."""
         return self._hosts.loss()
 
     def close(self) -> None:
