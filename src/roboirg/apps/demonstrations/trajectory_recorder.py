@@ -220,7 +220,6 @@ class _Recorder(EpisodeLoop):
         self._spec, self._archive = spec, archive
         self._tracks = PictureTracks(archive, spec)
         self._rows = _Rows()
-        self._video: list[Mapping[str, Any]] = []
         self._video_session: object = None
         self._is_waypoint = env.actions == WAYPOINT.name
 

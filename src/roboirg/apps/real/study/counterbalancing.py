@@ -16,7 +16,6 @@ from roboirg.tasks.shared.real_table import left_to_right
 from roboirg.tasks.splits.splits import SIZES, check_fixed_split, get_episode
 
 REAL_SUITE = "real"
-KINDS: dict[str, ObjectKind] = {"box": "box", "tape": "tape"}
 
 
 class Arrangement(NamedTuple):
@@ -50,7 +49,7 @@ def target_kind(task: str) -> ObjectKind:
         raise InvalidValueError(
             f"{found.name} is not a task for a real robot; those are in the suite {REAL_SUITE!r}."
         )
-    return KINDS[found.commands.thing]
+    return cast("ObjectKind", found.commands.thing)
 
 
 def read_arrangement(episode: Episode) -> Arrangement:
