@@ -72,23 +72,25 @@ class DrivingSession:
         encoded = {name: encode_jpeg(pixels) for name, pixels in pictures.items()}
         with self._news:
             self._pictures = encoded
-            self._tell(pictures=self._shown["pictures"] + 1)
+            self.tell(pictures=self._shown["pictures"] + 1)
 
     def begin(self, words: str, video: bytes | None) -> None:
         """Show the first words, and the video that comes before the policy's turn."""
         with self._news:
             self._video = video
-            self._tell(heard=[words], video=video is not None)
+            self.tell(heard=[words], video=video is not None)
 
     def say(self, text: str) -> None:
         """Show what has just been said."""
         with self._news:
-            self._tell(heard=[*self._shown["heard"], text])
+            self.tell(heard=[*self._shown["heard"], text])
 
     def tell(self, **shown: object) -> None:
         """Show something else: a message, the gripper, the height."""
         with self._news:
-            self._tell(**shown)
+            self._shown.update(shown)
+            self._version += 1
+            self._news.notify_all()
 
     def finish(self, record: Record) -> None:
         """Show the verdict, why, and what was meant."""
@@ -100,13 +102,11 @@ class DrivingSession:
             "meant": record.command,
             "steps": record.steps,
         }
-        with self._news:
-            self._tell(phase="over", verdict=verdict, message=None)
+        self.tell(phase="over", verdict=verdict, message=None)
 
     def fail(self, message: str) -> None:
         """Show that the episode cannot be played."""
-        with self._news:
-            self._tell(phase="failed", message=message)
+        self.tell(phase="failed", message=message)
 
     def stop(self) -> None:
         """End the episode without a verdict."""
@@ -120,7 +120,7 @@ class DrivingSession:
             if self._shown["phase"] != "driving":
                 return False
             self._command = wanted
-            self._tell(phase="moving", message=None)
+            self.tell(phase="moving", message=None)
             return True
 
     def wait_command(self) -> Mapping[str, Any]:
@@ -130,7 +130,7 @@ class DrivingSession:
             DrivingStoppedError: nothing more, ever.
         """
         with self._news:
-            self._tell(phase="driving")
+            self.tell(phase="driving")
             self._news.wait_for(lambda: self._command is not None or self._stopped)
             if self._stopped or self._command is None:
                 raise DrivingStoppedError
@@ -152,8 +152,3 @@ class DrivingSession:
     def video(self) -> bytes | None:
         """The video, an MP4 file; None without one."""
         return self._video
-
-    def _tell(self, **shown: object) -> None:
-        self._shown.update(shown)
-        self._version += 1
-        self._news.notify_all()
