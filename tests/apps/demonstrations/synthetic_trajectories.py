@@ -4,7 +4,7 @@ import zipfile
 
 import numpy as np
 
-from roboirg.apps.demonstrations.trajectory import TrajectoryFacts, stack_texts, write_arrays
+from roboirg.apps.demonstrations.trajectory import TrajectoryFacts, write_arrays
 from roboirg.apps.demonstrations.trajectory_recorder import PictureTracks
 from roboirg.core.episode import ENVIRONMENT_VERSION
 from roboirg.core.observations import CAMERAS
@@ -37,10 +37,10 @@ def arrays_of(episode, rows, video_length, *, has_depth, disturbed=False):
         "end_effector": rng.normal(size=(rows, 6)),
         "actions": actions,
         "pose_actions": rng.normal(size=(rows, 7)),
-        "subgoals": stack_texts(labels),
-        "online_subgoals": stack_texts(labels),
-        "grounded_subgoals": stack_texts(grounded),
-        "grounded_online_subgoals": stack_texts(grounded),
+        "subgoals": np.array(labels, np.str_),
+        "online_subgoals": np.array(labels, np.str_),
+        "grounded_subgoals": np.array(grounded, np.str_),
+        "grounded_online_subgoals": np.array(grounded, np.str_),
     }
     if disturbed:
         arrays["labels"] = actions + 1.0

@@ -10,7 +10,7 @@ import contextlib
 import io
 import json
 import zipfile
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
@@ -245,8 +245,3 @@ def has_pictures(path: Path) -> bool:
     """Return whether a trajectory's file holds pictures."""
     with zipfile.ZipFile(path) as archive:
         return any(not name.endswith((_ARRAY, _FACTS)) for name in archive.namelist())
-
-
-def stack_texts(texts: Sequence[str]) -> NDArray[np.str_]:
-    """Return texts as an array that needs no pickle."""
-    return np.array(texts, dtype=np.str_)

@@ -21,7 +21,6 @@ from roboirg.apps.demonstrations.picture_coding import (
 from roboirg.apps.demonstrations.trajectory import (
     TrajectoryFacts,
     picture_name,
-    stack_texts,
     write_arrays,
 )
 from roboirg.core.actions import (
@@ -360,10 +359,9 @@ class _Recorder(EpisodeLoop):
         seen = list(info["demonstration_subgoals"][:length])
         online = [*seen, *rows.online]
         doing = [*seen, *_with_pixels(rows.subgoals, rows.online)]
-        arrays["grounded_online_subgoals"] = stack_texts(online)
-        arrays["online_subgoals"] = stack_texts([without_pixel(text) for text in online])
-        arrays["grounded_subgoals"] = stack_texts(doing)
-        arrays["subgoals"] = stack_texts([without_pixel(text) for text in doing])
+        for name, texts in (("online_subgoals", online), ("subgoals", doing)):
+            arrays[f"grounded_{name}"] = np.array(texts, np.str_)
+            arrays[name] = np.array([without_pixel(text) for text in texts], np.str_)
         for camera, counts in self._tracks.histograms.items():
             arrays[f"{camera}_histogram"] = counts
         return arrays

@@ -38,6 +38,7 @@ class DrivingSession:
         caption: what was said so far; unused, as `say` gets it.
         longest_caption, point: unused.
         env: the environment, once it is there.
+        video: an MP4 file; None without one.
     """
 
     phase: str = "loading"
@@ -55,7 +56,7 @@ class DrivingSession:
             "steps": 0, "gripper": "open", "height_cm": None, "pictures": 0,
         }  # fmt: skip
         self._pictures: dict[str, bytes] = {}
-        self._video: bytes | None = None
+        self.video: bytes | None = None
         self._command: Mapping[str, Any] | None = None
         self._stopped = False
 
@@ -77,7 +78,7 @@ class DrivingSession:
     def begin(self, words: str, video: bytes | None) -> None:
         """Show the first words, and the video that comes before the policy's turn."""
         with self._news:
-            self._video = video
+            self.video = video
             self.tell(heard=[words], video=video is not None)
 
     def say(self, text: str) -> None:
@@ -147,8 +148,3 @@ class DrivingSession:
         """Return the newest picture of a camera, a JPEG file."""
         with self._news:
             return self._pictures.get(camera)
-
-    @property
-    def video(self) -> bytes | None:
-        """The video, an MP4 file; None without one."""
-        return self._video

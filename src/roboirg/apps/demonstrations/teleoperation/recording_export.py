@@ -26,7 +26,7 @@ from roboirg.apps.demonstrations.export_run import (
 )
 from roboirg.apps.demonstrations.teleoperation.recording_check import PlannedTake
 from roboirg.apps.demonstrations.teleoperation.teleop_dataset import ACTION, STATE, TeleopDataset
-from roboirg.apps.demonstrations.trajectory import TrajectoryFacts, stack_texts, write_arrays
+from roboirg.apps.demonstrations.trajectory import TrajectoryFacts, write_arrays
 from roboirg.apps.demonstrations.trajectory_recorder import PictureTracks, RecordingSpec
 from roboirg.core.actions import ARM_JOINTS
 from roboirg.core.episode import ENVIRONMENT_VERSION, Episode
@@ -134,7 +134,7 @@ def _arrays(dataset: TeleopDataset, index: int) -> dict[str, NDArray[Any]]:
         "actions": actions.astype(np.float64),
         "pose_actions": np.column_stack([_poses(actions[:, :ARM_JOINTS]), actions[:, ARM_JOINTS]]),
     }
-    nothing = stack_texts([""] * len(joints))
+    nothing = np.full(len(joints), "")
     kinds = ("", "online_", "grounded_", "grounded_online_")
     return found | {f"{kind}subgoals": nothing for kind in kinds}
 
