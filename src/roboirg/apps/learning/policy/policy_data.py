@@ -149,7 +149,12 @@ def to_batch(episodes: Sequence[EpisodeNumbers]) -> EpisodeBatch:
     """Return episodes padded to the longest."""
     looks = [one.looks for one in episodes]
     return EpisodeBatch(
-        *(_pad(arrays, 0) for arrays in zip(*looks, strict=True)),
+        _pad([one.classes for one in looks], 0),
+        _pad([one.places for one in looks], 0),
+        _pad([one.turns for one in looks], 0),
+        _pad([one.seen for one in looks], 0),
+        _pad([one.known for one in looks], 0),
+        _pad([one.tool for one in looks], 0),
         _pad([np.ones(len(one.tool), bool) for one in looks], 0),
         torch.from_numpy(np.stack([one.goal for one in episodes])),
         _pad([one.decisions for one in episodes], 0),

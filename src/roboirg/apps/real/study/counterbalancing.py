@@ -49,7 +49,7 @@ def target_kind(task: str) -> ObjectKind:
         raise InvalidValueError(
             f"{found.name} is not a task for a real robot; those are in the suite {REAL_SUITE!r}."
         )
-    return cast("ObjectKind", found.commands.thing)
+    return found.commands.thing
 
 
 def read_arrangement(episode: Episode) -> Arrangement:
