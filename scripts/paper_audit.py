@@ -26,7 +26,7 @@ from roboirg.apps.demonstrations.formats.training_lines import HORIZON as PREDIC
 from roboirg.apps.demonstrations.formats.training_lines import ON_ROBOT, training_text
 from roboirg.apps.language_lab.corpus_statistics import (
     PAPER_PHRASES,
-    pattern_counts,
+    metadata_counts,
     phrase_counts,
 )
 from roboirg.apps.real.control.robot import HORIZON
@@ -313,7 +313,8 @@ def _() -> str:
 
 @item("patterns", "contextual logic in every task, color exclusion where cubes have colors")
 def _() -> str:
-    counts = pattern_counts(one for one in _told("implicit") if one.setting == "reasoning")
+    told = (one for one in _told("implicit") if one.setting == "reasoning")
+    counts = metadata_counts(told, "pattern")
     found = {task: set(by_pattern) for task, by_pattern in counts.items()}
     same({task for task, names in found.items() if "contextual logic" not in names}, set())
     colorless = {task for task, names in found.items() if "color exclusion" not in names}

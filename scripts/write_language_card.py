@@ -11,7 +11,7 @@ from pathlib import Path
 
 from roboirg.apps.language_lab.corpus_statistics import (
     PAPER_PHRASES,
-    pattern_counts,
+    metadata_counts,
     phrase_counts,
 )
 from roboirg.core.episode import Episode
@@ -56,7 +56,7 @@ def language_card() -> str:
 
 def _patterns_by_task() -> str:
     """Return how many test episodes of each task have each reasoning pattern."""
-    counts = pattern_counts(_told("reasoning"))
+    counts = metadata_counts(_told("reasoning"), "pattern")
     lines = [
         "## Reasoning patterns by task",
         "",

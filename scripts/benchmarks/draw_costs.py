@@ -11,7 +11,6 @@ from pathlib import Path
 from roboirg.apps.bench.reset_times import cache_folder, reset_time
 from roboirg.apps.bench.step_times import CHUNK, Action, Workload, median_time
 from roboirg.apps.demonstrations.picture_coding import PictureCoding
-from roboirg.apps.demonstrations.trajectory import TrajectoryFile
 from roboirg.apps.demonstrations.trajectory_recorder import PictureTracks, RecordingSpec
 from roboirg.core.episode import Episode
 from roboirg.core.observations import CAMERAS
@@ -47,7 +46,7 @@ def exported_step(workload: Workload, coding: PictureCoding) -> float:
         tempfile.TemporaryDirectory() as folder,
         zipfile.ZipFile(Path(folder) / "trajectory.zip", "w") as archive,
     ):
-        tracks = PictureTracks(TrajectoryFile(archive), RecordingSpec(coding))
+        tracks = PictureTracks(archive, RecordingSpec(coding))
         for action in workload.actions:
             start = time.perf_counter()
             session.step(action)

@@ -13,12 +13,9 @@ from rich.console import Console
 from seed_selection import EpisodeSlot, check_words
 
 from roboirg.apps.language_lab import statistics_tables
-from roboirg.apps.language_lab.validation import (
-    Batch,
-    check_episode,
-    episode_checks,
-    validate_batch,
-)
+from roboirg.apps.language_lab.validation import episode_checks
+from roboirg.apps.language_lab.validation.episode_checks import check_episode
+from roboirg.apps.language_lab.validation.validation_run import Batch, validate_batch
 from roboirg.apps.language_lab.validation.validation_tables import validation_tables
 from roboirg.apps.show.episode_text import instructions_table
 from roboirg.core.errors import InvalidValueError

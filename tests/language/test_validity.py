@@ -9,7 +9,8 @@ import pytest
 from language_variants import SPATIAL_TASKS, TASKS, random_episodes
 from selection import slow_but
 
-from roboirg.apps.language_lab.validation import Batch, ValidationResults, validate_batch
+from roboirg.apps.language_lab.validation.validation_results import ValidationResults
+from roboirg.apps.language_lab.validation.validation_run import Batch, validate_batch
 from roboirg.language import expressible, instruct
 from roboirg.language.settings import settings_of
 from roboirg.reader import interpret

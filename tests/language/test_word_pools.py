@@ -13,7 +13,7 @@ from selection import slow_but
 from typer.testing import CliRunner
 
 from roboirg import main as cli
-from roboirg.apps.language_lab.validation import Batch, validate_batch
+from roboirg.apps.language_lab.validation.validation_run import Batch, validate_batch
 from roboirg.core.episode import SPLITS
 from roboirg.core.word_pools import POOLS, Pools, pool_of
 from roboirg.evaluation.plan.plan_maker import make_plan

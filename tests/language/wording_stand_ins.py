@@ -38,7 +38,7 @@ def sentence(style: str, task: str, goal: Goal, difficulty: str = "hard") -> str
     assert spec.loader is not None
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
-    stand_in = goal_sentences.StandIn(goal_sentences.attributes_of(goal, difficulty))
+    stand_in = goal_sentences.stand_in(goal, difficulty)
     return str(module.get_language_goal(stand_in, task)[0])
 
 

@@ -10,7 +10,7 @@ import pytest
 
 import roboirg
 from roboirg import tasks
-from roboirg.apps.language_lab.validation import check_episode
+from roboirg.apps.language_lab.validation.episode_checks import check_episode
 from roboirg.core.conditions import Fact
 from roboirg.core.episode import Goal, Primitive, Scene, SceneObject, Stage
 from roboirg.core.errors import RoboIRGError

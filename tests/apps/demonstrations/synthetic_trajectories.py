@@ -4,8 +4,8 @@ import zipfile
 
 import numpy as np
 
-from roboirg.apps.demonstrations.trajectory import TrajectoryFacts, TrajectoryFile, stack_texts
-from roboirg.apps.demonstrations.trajectory_recorder import PictureTracks, _keep_facts
+from roboirg.apps.demonstrations.trajectory import TrajectoryFacts, write_arrays
+from roboirg.apps.demonstrations.trajectory_recorder import PictureTracks
 from roboirg.core.episode import ENVIRONMENT_VERSION
 from roboirg.core.observations import CAMERAS
 from roboirg.util.atomic_write import replacing
@@ -37,10 +37,10 @@ def arrays_of(episode, rows, video_length, *, has_depth, disturbed=False):
         "end_effector": rng.normal(size=(rows, 6)),
         "actions": actions,
         "pose_actions": rng.normal(size=(rows, 7)),
-        "subgoals": stack_texts(labels),
-        "online_subgoals": stack_texts(labels),
-        "grounded_subgoals": stack_texts(grounded),
-        "grounded_online_subgoals": stack_texts(grounded),
+        "subgoals": np.array(labels, np.str_),
+        "online_subgoals": np.array(labels, np.str_),
+        "grounded_subgoals": np.array(grounded, np.str_),
+        "grounded_online_subgoals": np.array(grounded, np.str_),
     }
     if disturbed:
         arrays["labels"] = actions + 1.0
@@ -69,8 +69,7 @@ def record(
     rows = video_length + 1 + steps + variation
     with replacing(path) as part:
         with zipfile.ZipFile(part, "w") as archive:
-            file = TrajectoryFile(archive)
-            tracks = PictureTracks(file, spec)
+            tracks = PictureTracks(archive, spec)
             for row in range(rows):
                 seen = {f"{one}_rgb": picture(one, episode.seed, row) for one in CAMERAS}
                 seen |= {f"{one}_depth": depth(episode.seed, row) for one in CAMERAS}
@@ -99,7 +98,8 @@ def record(
                 episode, rows, video_length, has_depth=spec.depth, disturbed=spec.disturbed
             )
             counts = {f"{one}_histogram": tracks.histograms[one] for one in spec.cameras}
-            file.finish(facts, arrays | counts)
+            write_arrays(archive, facts, arrays | counts)
         if only_successes and status != "success":
-            _keep_facts(part, facts)
+            with zipfile.ZipFile(part, "w") as archive:
+                write_arrays(archive, facts, {})
     return facts

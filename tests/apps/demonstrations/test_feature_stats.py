@@ -8,7 +8,6 @@ from hypothesis.extra.numpy import arrays
 
 from roboirg.apps.demonstrations.feature_stats import (
     QUANTILES,
-    gather_vectors,
     picture_stats,
     vector_stats,
 )
@@ -28,11 +27,6 @@ def test_vectors_agree_with_numpy(values):
     for name, share in QUANTILES.items():
         assert np.allclose(stats[name], np.quantile(exact, share, axis=0))
     assert stats["count"] == [len(values)]
-
-
-def test_parts_are_one_whole():
-    parts = [np.arange(6.0).reshape(3, 2), np.arange(8.0).reshape(4, 2)]
-    assert gather_vectors(parts) == vector_stats(np.concatenate(parts))
 
 
 @settings(max_examples=30)

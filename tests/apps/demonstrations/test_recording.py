@@ -11,7 +11,7 @@ from roboirg.apps.demonstrations.dataset_reading import read_dataset
 from roboirg.apps.demonstrations.dataset_replay import replay
 from roboirg.apps.demonstrations.export_plan import RecordingJob
 from roboirg.apps.demonstrations.policy_choice import find_variation
-from roboirg.apps.demonstrations.trajectory import PictureFile, load_trajectory
+from roboirg.apps.demonstrations.trajectory import load_trajectory, read_depth, read_picture
 from roboirg.apps.demonstrations.trajectory_recorder import RecordingSpec, record_trajectory
 from roboirg.envs.factory import make
 from roboirg.policies import make_policy, play
@@ -38,10 +38,9 @@ def test_pictures_are_the_simulators_bit_for_bit_and_actions_replay(tmp_path):
     assert first == shown.length > 0
     assert np.array_equal(recorded.actions[:first].astype(np.float32), shown.actions.astype("f4"))
     with zipfile.ZipFile(path) as archive:
-        pictures = PictureFile(archive)
         for row in range(0, first, 9):
             for camera in ("front", "wrist"):
-                found = pictures.picture(camera, row)
+                found = read_picture(archive, camera, row)
                 assert np.array_equal(found, shown[f"{camera}_rgb"][row])
         for row in range(first, facts.rows):
             if row > first:
@@ -51,10 +50,10 @@ def test_pictures_are_the_simulators_bit_for_bit_and_actions_replay(tmp_path):
             if row % 9 == 0 or row == facts.rows - 1:
                 for camera in ("front", "wrist"):
                     assert np.array_equal(
-                        pictures.picture(camera, row), observation[f"{camera}_rgb"]
+                        read_picture(archive, camera, row), observation[f"{camera}_rgb"]
                     )
                     assert np.array_equal(
-                        pictures.depth(camera, row), observation[f"{camera}_depth"]
+                        read_depth(archive, camera, row), observation[f"{camera}_depth"]
                     )
     assert env.status == "success"
     assert recorded.grounded_online_subgoals[-1] == env.subgoal
@@ -72,7 +71,7 @@ def test_small_pictures_are_the_simulators_scaled(tmp_path):
         assert {name.partition("/")[0] for name in names} == {"wrist"}
         seen, _ = env.reset()
         for row in range(0, 30, 10):
-            found = PictureFile(archive).picture("wrist", row)
+            found = read_picture(archive, "wrist", row)
             assert np.array_equal(found, scaled_square(seen["wrist_rgb"], 64))
             seen, *_ = env.step_chunk(recorded.actions[row + 1 : row + 11])
     env.close()

@@ -10,11 +10,12 @@ import synthetic_trajectories as synthetic
 
 from roboirg.apps.demonstrations.picture_coding import VideoEncoder, encode_depth, encode_png
 from roboirg.apps.demonstrations.trajectory import (
-    PictureFile,
     drop_pictures,
     has_pictures,
     load_facts,
     load_trajectory,
+    read_depth,
+    read_picture,
 )
 from roboirg.apps.demonstrations.trajectory_recorder import RecordingSpec, _with_pixels
 from roboirg.core.errors import InvalidValueError
@@ -38,13 +39,12 @@ def test_a_trajectory_is_read_as_it_was_written(tmp_path):
         f"{camera}_{kind}" for camera in ("front", "wrist") for kind in ("extrinsic", "intrinsic")
     }
     with zipfile.ZipFile(path) as archive:
-        pictures = PictureFile(archive)
         for row in range(facts.rows):
             for camera in ("front", "wrist"):
                 expected = synthetic.picture(camera, episode.seed, row)
-                assert np.array_equal(pictures.picture(camera, row), expected)
+                assert np.array_equal(read_picture(archive, camera, row), expected)
                 assert np.array_equal(
-                    pictures.depth(camera, row), synthetic.depth(episode.seed, row)
+                    read_depth(archive, camera, row), synthetic.depth(episode.seed, row)
                 )
 
 
@@ -77,8 +77,8 @@ def test_png_and_depth_are_lossless():
         archive.writestr("front/000000.png", encode_png(noise))
         archive.writestr("front_depth/000000.png", encode_depth(far))
     with zipfile.ZipFile(file) as archive:
-        assert np.array_equal(PictureFile(archive).picture("front", 0), noise)
-        assert np.array_equal(PictureFile(archive).depth("front", 0), far)
+        assert np.array_equal(read_picture(archive, "front", 0), noise)
+        assert np.array_equal(read_depth(archive, "front", 0), far)
 
 
 def test_a_lossless_video_holds_the_same_bits():

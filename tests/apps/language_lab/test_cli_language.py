@@ -12,7 +12,7 @@ from plan_files import plan_file
 from typer.testing import CliRunner
 
 from roboirg import main as cli
-from roboirg.apps.language_lab.validation import RuleViolation, ValidationResults
+from roboirg.apps.language_lab.validation.validation_results import RuleViolation, ValidationResults
 from roboirg.core.errors import InvalidValueError, RoboIRGError, UnknownNameError
 
 HEAVY = ("sapien", "torch", "gymnasium", "toppra", "mani_skill", "cv2", "av")

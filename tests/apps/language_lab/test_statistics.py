@@ -49,16 +49,20 @@ def test_lengths_patterns_relations_and_landmarks():
     lengths = corpus_statistics.word_counts(said())
     assert lengths["explicit"].mean < lengths["direct"].mean < lengths["contextual"].mean
     assert all(one.shortest <= one.mean <= one.longest for one in lengths.values())
-    patterns = corpus_statistics.pattern_counts(said())
+    patterns = corpus_statistics.metadata_counts(said(), "pattern")
     assert patterns["PickXtimes"] == {
         "color exclusion": 17, "number deduction": 17, "contextual logic": 16,
     }  # fmt: skip
-    assert sum(corpus_statistics.relation_counts(said())["PickXtimes"].values()) == 17
-    assert set(corpus_statistics.relation_counts(said())["VideoPlaceOrder"]) >= {
+    assert sum(corpus_statistics.metadata_counts(said(), "relation")["PickXtimes"].values()) == 17
+    assert set(corpus_statistics.metadata_counts(said(), "relation")["VideoPlaceOrder"]) >= {
         "right after",
         "neighbor",
     }
-    assert set(corpus_statistics.landmark_counts(said())["VideoUnmask"]) >= {"1", "2", "3"}
+    assert set(corpus_statistics.metadata_counts(said(), "landmark_classes")["VideoUnmask"]) >= {
+        "1",
+        "2",
+        "3",
+    }
 
 
 def test_the_tables_hold_the_counts():
@@ -71,7 +75,7 @@ def test_the_tables_hold_the_counts():
         line for line in text.splitlines() if line.startswith("│ spatial") and "." not in line
     )
     assert str(counts["spatial"]["there"]) in row
-    relations = corpus_statistics.relation_counts(said())
+    relations = corpus_statistics.metadata_counts(said(), "relation")
     for name in {name for by_task in relations.values() for name in by_task}:
         assert name in text
     assert list(

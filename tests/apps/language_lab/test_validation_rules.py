@@ -7,31 +7,25 @@ import pytest
 from language_variants import SPATIAL_TASKS, without_landmark
 from rich.console import Console
 
-from roboirg.apps.language_lab.validation import (
-    Batch,
-    RuleViolation,
-    ValidationResults,
-    batches,
-    check_episode,
-    episode_checks,
-    validate,
-    validate_batch,
-)
+from roboirg.apps.language_lab.validation import episode_checks
 from roboirg.apps.language_lab.validation.episode_checks import (
+    check_episode,
     leaking,
+    misread,
     not_needed,
-    not_read_back,
-    not_self_contained,
 )
+from roboirg.apps.language_lab.validation.validation_results import RuleViolation, ValidationResults
+from roboirg.apps.language_lab.validation.validation_run import Batch, batches, validate_batch
 from roboirg.apps.language_lab.validation.validation_tables import validation_tables
 from roboirg.core.episode import SPLITS
 from roboirg.core.errors import InvalidValueError
 from roboirg.core.plain_text import counted
-from roboirg.language import Utterance, expressible, instruct, instruct_with
+from roboirg.language import FORMS, Utterance, expressible, instruct, instruct_with
 from roboirg.language.settings import plain_settings
 from roboirg.reader import interpret
 from roboirg.tasks import all_tasks, every_task, get_task
 from roboirg.tasks.splits.splits import SIZES, get_episode, slot_seed
+from roboirg.util.parallel_map import parallel_map
 
 EPISODE = get_episode("PickXtimes", "test", 3)
 
@@ -55,20 +49,20 @@ def another_goal():
 
 def test_another_goal_is_not_read_back():
     said = instruct(EPISODE, "direct")
-    assert not list(not_read_back(said, EPISODE, read))
+    assert not list(misread("read back", said.text, EPISODE, read))
     other = dataclasses.replace(EPISODE, goal=another_goal())
-    assert list(not_read_back(said, other, read)) == [("read back", said.text)]
+    assert list(misread("read back", said.text, other, read)) == [("read back", said.text)]
 
 
 def test_what_is_not_understood_is_not_read_back():
-    said = instruct(EPISODE, "direct")
-    assert list(not_read_back(commanding(said, "Hello there."), EPISODE, read))
+    said = commanding(instruct(EPISODE, "direct"), "Hello there.")
+    assert list(misread("read back", said.text, EPISODE, read))
 
 
 def test_an_implicit_command_is_not_self_contained():
-    said = instruct(EPISODE, "direct")
-    assert list(not_self_contained(said, EPISODE, read))
-    assert not list(not_self_contained(instruct(EPISODE, "direct", "resolved"), EPISODE, read))
+    implicit, resolved = (instruct(EPISODE, "direct", form).command for form in FORMS)
+    assert list(misread("self-contained", implicit, EPISODE, read))
+    assert not list(misread("self-contained", resolved, EPISODE, read))
 
 
 def test_a_command_that_says_all_does_not_need_its_introduction():
@@ -162,7 +156,7 @@ def test_processes_find_what_one_finds():
     found = []
     for workers in (0, 2):
         total = ValidationResults()
-        for _, evidence in validate(work, workers):
+        for _, evidence in parallel_map(validate_batch, work, workers):
             total.add(evidence)
         found.append(total)
     assert found[0] == found[1]
@@ -179,7 +173,7 @@ def test_batches_cover_everything_once():
         with pytest.raises(InvalidValueError):
             batches(("PickXtimes",), (), seeds)
     with pytest.raises(InvalidValueError, match="workers"):
-        list(validate(work, -1))
+        list(parallel_map(validate_batch, work, -1))
 
 
 def test_the_tables_count_what_failed():

@@ -445,7 +445,7 @@ def test_a_verb_may_depend_on_the_count():
     told = [goal for goal in train_goals("BinFill") if found.find(goal) is not None]
     assert told
     for goal in told:
-        wanted = say(goal_sentences.StandIn(goal_sentences.attributes_of(goal, "hard")))
+        wanted = say(goal_sentences.stand_in(goal, "hard"))
         assert found.find(goal).state(goal) == read.find(goal).state(goal) == wanted
 
 

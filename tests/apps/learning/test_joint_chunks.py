@@ -21,7 +21,7 @@ class Rehearsed(LearnedPolicy):
         self.waypoints, self.pictures, self.tools = waypoints, [], []
 
     def reset(self, instruction, demonstration):
-        self.left, self.demonstration, self._seen = [*self.waypoints], demonstration, self
+        self.left, self.demonstration, self.seen = [*self.waypoints], demonstration, self
 
     def look(self, pictures, tools, *, is_video):
         self.pictures += pictures

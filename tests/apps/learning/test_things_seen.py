@@ -79,7 +79,7 @@ def test_a_grasp_takes_the_side_that_needs_the_shortest_turn(now, angle):
     move = Move(True, 0.0, 0.0, 0.02, "align", -1.0)
     tool = np.array([0.3, 0.3, 0.15, math.pi, 0.0, now, 0.04])
     turn = np.array([math.cos(4 * angle), math.sin(4 * angle)])
-    found = waypoint(move, tool, np.array([0.1, -0.1]), turn, (math.pi, 0.0, 0.0))
+    found = waypoint(move, tool, np.array([0.1, -0.1]), turn)
     assert found[[0, 1, 2, 6]].tolist() == [0.1, -0.1, 0.02, -1.0]
     assert abs(found[5] - now) <= math.pi / 4 + 1e-9
     quarters = (found[5] - angle) / (math.pi / 2)
@@ -89,7 +89,7 @@ def test_a_grasp_takes_the_side_that_needs_the_shortest_turn(now, angle):
 def test_a_move_from_the_tool_keeps_its_angle():
     move = Move(False, -0.1, 0.0, 0.2, "keep", 0.0)
     tool = np.array([0.3, 0.2, 0.15, math.pi, 0.0, 1.0, 0.04])
-    found = waypoint(move, tool, np.zeros(2), np.array([1.0, 0.0]), (math.pi, 0.0, 0.0))
+    found = waypoint(move, tool, np.zeros(2), np.array([1.0, 0.0]))
     np.testing.assert_allclose(found, [0.2, 0.2, 0.2, math.pi, 0.0, 1.0, 0.0])
 
 

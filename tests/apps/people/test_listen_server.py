@@ -1,5 +1,6 @@
 """The server of a study over real sockets: who is let in, what is sent, what is stored."""
 
+import contextlib
 import json
 import os
 import re
@@ -231,13 +232,13 @@ def test_a_study_without_pictures_is_not_served(study):
 
 
 def test_a_torn_line_is_put_aside(study):
-    with AnswerLog(study) as log:
+    with contextlib.closing(AnswerLog(study)) as log:
         log.append(PersonJoined(person=1, code="abc", consent="c", at="now"))
     path = study / ANSWERS_FILE
     whole = path.read_bytes()
     path.write_bytes(whole + b'{"event":"answered","person":1,"num')
     assert len(read_events(study)) == 1
-    with AnswerLog(study) as log:
+    with contextlib.closing(AnswerLog(study)) as log:
         assert [one.code for one in log.events] == ["abc"]
         log.append(PersonJoined(person=2, code="def", consent="c", at="now"))
     assert len(read_events(study)) == 2
@@ -251,11 +252,11 @@ KILLED = """
 import os, signal, sys
 from pathlib import Path
 from roboirg.apps.people.listener_answers import AnswerLog, PersonJoined
-with AnswerLog(Path(sys.argv[1])) as log:
-    for number in range(1, 100):
-        log.append(PersonJoined(person=number, code=str(number), consent="", at=""))
-        if number == 37:
-            os.kill(os.getpid(), signal.SIGKILL)
+log = AnswerLog(Path(sys.argv[1]))
+for number in range(1, 100):
+    log.append(PersonJoined(person=number, code=str(number), consent="", at=""))
+    if number == 37:
+        os.kill(os.getpid(), signal.SIGKILL)
 """
 
 

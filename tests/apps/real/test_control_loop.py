@@ -197,7 +197,7 @@ def test_a_policy_that_is_killed_while_the_arm_moves_stops_it():
         def command(self, command):
             super().command(command)
             if len(self.log) == 30:
-                os.kill(worker.pid, signal.SIGKILL)
+                os.kill(*worker._hosts.pids, signal.SIGKILL)
                 while worker.loss() is None:
                     time.sleep(0.001)
 
@@ -248,7 +248,7 @@ def test_in_real_time_too_a_killed_policy_stops_the_arm_long_before_the_watchdog
         while not any(kind == "command" for _, kind, _ in robot.log):
             if over.wait(0.005):
                 return
-        os.kill(worker.pid, signal.SIGKILL)
+        os.kill(*worker._hosts.pids, signal.SIGKILL)
         killed.append(robot.clock.now() - robot._started_at)
 
     killer = threading.Thread(target=kill, daemon=True)

@@ -85,8 +85,10 @@ def export_demonstrations(
 
     chosen = words.choices(ExportPlan)
     load_policy_class(chosen.get("policy", ExportPlan.policy))
-    chosen.setdefault("video", _default_video(format))
-    chosen.setdefault("names", _default_names(format, pictures))
+    chosen.setdefault("video", "prefix" if format == "robomme-hdf5" else "none")
+    # Pictures in the tables of this format are read by openpi alone.
+    openpi = (format, pictures) == ("lerobot-v2.1", "png")
+    chosen.setdefault("names", "openpi" if openpi else "lerobot")
     # `validated` checks the names that are cast.
     names_of_tasks = find_tasks(parse_names("task", tasks))
     plan = ExportPlan(
@@ -163,16 +165,6 @@ def export_recordings(
             lambda work, done, total, _: show(work, done, total, ""),
         )  # fmt: skip
     typer.echo(f"{counted(summary.episodes, 'episode')}, {size_text(summary.size)}: {out}")
-
-
-def _default_video(format_name: str) -> str:
-    """Return how the video is treated by default."""
-    return "prefix" if format_name == "robomme-hdf5" else "none"
-
-
-def _default_names(format_name: str, pictures: str) -> str:
-    """Return openpi's names for the format with pictures in tables that only openpi reads."""
-    return "openpi" if (format_name, pictures) == ("lerobot-v2.1", "png") else "lerobot"
 
 
 def _print_estimate(plan: ExportPlan) -> None:

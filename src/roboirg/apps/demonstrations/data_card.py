@@ -12,12 +12,13 @@ from numpy.typing import NDArray
 from roboirg.apps.demonstrations.dataset_part import DatasetPart
 from roboirg.apps.demonstrations.export_plan import ExportPlan
 from roboirg.apps.demonstrations.formats.training_lines import training_text
-from roboirg.apps.demonstrations.picture_coding import FRAME_RATE, LOSSY_QUALITY
+from roboirg.apps.demonstrations.picture_coding import LOSSY_QUALITY
 from roboirg.apps.demonstrations.trajectory import TrajectoryFacts, load_facts
 from roboirg.core.episode import ENVIRONMENT_VERSION
 from roboirg.core.version import __version__
 from roboirg.core.word_pools import pool_of
 from roboirg.language import LANGUAGE_VERSION
+from roboirg.util.media import CONTROL_RATE
 
 _BAR = 40
 _BINS = 12
@@ -74,9 +75,9 @@ def card_text(
 
 def _head_line(plan: ExportPlan) -> str:
     pool = pool_of(plan.split, plan.options.wordings)
-    rate = f"{FRAME_RATE} frames per second, one per control step."
+    rate = f"{CONTROL_RATE} frames per second, one per control step."
     if plan.actions == "waypoint":
-        rate = f"A frame per waypoint; time stamps count frames, {FRAME_RATE} to the second."
+        rate = f"A frame per waypoint; time stamps count frames, {CONTROL_RATE} to the second."
     return (
         f"Split {plan.split}, format {plan.format}, written by roboirg {__version__} (environment "
         f"{ENVIRONMENT_VERSION}, language {LANGUAGE_VERSION}, wordings of the pool {pool!r}). "

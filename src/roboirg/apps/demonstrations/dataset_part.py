@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple, Protocol
 
@@ -15,6 +15,7 @@ from roboirg.apps.demonstrations.trajectory import (
     load_facts,
     load_trajectory,
 )
+from roboirg.core.instruction_options import InstructionOptions
 
 CHUNK_SIZE = 1000
 """Files in a folder."""
@@ -70,7 +71,7 @@ class DatasetWriter(Protocol):
     def write_part(self, part: DatasetPart) -> None:
         """Write the frames of a part; runs in a worker process."""
 
-    def finish(self, plan: ExportPlan, root: Path, parts: Sequence[DatasetPart]) -> None:
+    def finish(self, root: Path, parts: Sequence[DatasetPart]) -> None:
         """Write what describes all parts; its last file makes the dataset readable."""
 
 
@@ -123,7 +124,6 @@ def episode_row(trajectory: Trajectory, placed: PlacedText, length: int) -> dict
     """Return the row of an episode in the table of facts next to the dataset."""
     facts = trajectory.facts
     words = placed.words
-    options = asdict(words.options) | {"stages": list(words.options.stages)}
     return {
         "episode_index": placed.episode_index,
         "from_index": placed.first_index,
@@ -136,25 +136,23 @@ def episode_row(trajectory: Trajectory, placed: PlacedText, length: int) -> dict
         "variation": facts.variation,
         "actions": facts.actions,
         "disturbed": facts.disturbed,
-        "trajectory": _trajectory_name(facts, options),
+        "trajectory": _trajectory_name(facts, words.options),
         "final_state": [
             *trajectory.joint_positions[-1].tolist(),
             *trajectory.gripper[-1].tolist(),
         ],
         "demonstration_source": facts.demonstration_source,
         "environment_version": facts.environment_version,
-        **{key: value for key, value in options.items() if key in _OPTIONS},
+        "delivery": words.options.delivery,
         **words.facts,
     }
 
 
-def _trajectory_name(facts: TrajectoryFacts, options: Mapping[str, Any]) -> str:
+def _trajectory_name(facts: TrajectoryFacts, options: InstructionOptions) -> str:
     """Return a name that all instructions of a trajectory share; only the oracle's has several."""
     name = f"{facts.task}/{facts.split}/{facts.episode}/{facts.variation}"
-    return name if facts.policy == ORACLE else f"{name}/{options['setting']}-{options['form']}"
+    return name if facts.policy == ORACLE else f"{name}/{options.setting}-{options.form}"
 
 
-_OPTIONS = ("delivery",)
-"""Options that a row of the instructions lacks."""
 EPISODE_TABLE = "meta/demonstrations.parquet"
 """Path of the table of facts in a dataset."""

@@ -142,8 +142,7 @@ def _read_hdf5(files: list[Path]) -> Iterator[ReplayableTrajectory]:
     import h5py
 
     for path in files:
-        found = _HDF5_NAME.fullmatch(path.name)
-        task = found[1] if found else ""
+        task = path.stem.removeprefix("record_dataset_")
         with h5py.File(path, "r") as file:
             for name in sorted(file, key=_number):
                 yield _read_hdf5_episode(file[name], task, name)

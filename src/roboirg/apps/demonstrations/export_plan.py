@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import hashlib
+import itertools
 import json
-from collections.abc import Iterator
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any, Literal, NamedTuple, get_args
@@ -12,12 +12,13 @@ from typing import Any, Literal, NamedTuple, get_args
 from roboirg.apps.demonstrations.picture_coding import PictureCoding
 from roboirg.apps.demonstrations.trajectory import SUFFIX, TRAJECTORY_VERSION
 from roboirg.apps.demonstrations.trajectory_recorder import RecordingSpec
+from roboirg.cli.names import known_name
 from roboirg.core.episode import ENVIRONMENT_VERSION, Episode
-from roboirg.core.errors import InvalidValueError, UnknownNameError
+from roboirg.core.errors import InvalidValueError
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.core.observations import CAMERAS, check_cameras
 from roboirg.core.word_pools import pool_of
-from roboirg.language import FORMS, LANGUAGE_VERSION
+from roboirg.language import LANGUAGE_VERSION
 from roboirg.language.generator import instruct_with
 from roboirg.language.instruction_row import row
 from roboirg.language.settings import all_settings
@@ -32,12 +33,6 @@ KeyNames = Literal["lerobot", "openpi"]
 ExtraAction = Literal["delta", "pose"]
 Outcomes = Literal["successes", "all"]
 
-FORMATS: tuple[FormatName, ...] = get_args(FormatName)
-VIDEO_TREATMENTS: tuple[VideoTreatment, ...] = get_args(VideoTreatment)
-KEY_NAMES: tuple[KeyNames, ...] = get_args(KeyNames)
-EXTRA_ACTIONS: tuple[ExtraAction, ...] = get_args(ExtraAction)
-PICTURE_CODINGS: tuple[PictureCoding, ...] = get_args(PictureCoding)
-OUTCOMES: tuple[Outcomes, ...] = get_args(Outcomes)
 ORACLE = "oracle"
 SMALLEST = 16
 """Width and height of the smallest pictures that are exported, pixels."""
@@ -98,17 +93,8 @@ class ExportPlan:
             UnknownNameError: a name does not exist.
             InvalidValueError: a value or a combination is not possible.
         """
-        for kind, value, known in (
-            ("format", self.format, FORMATS),
-            ("way to store pictures", self.pictures, PICTURE_CODINGS),
-            ("way to treat the video", self.video, VIDEO_TREATMENTS),
-            ("set of names", self.names, KEY_NAMES),
-            ("choice of outcomes", self.outcomes, OUTCOMES),
-            *(("form", form, FORMS) for form in self.forms),
-            *(("description of actions", one, EXTRA_ACTIONS) for one in self.extra_actions),
-        ):
-            if value not in known:
-                raise UnknownNameError(kind, value, known)
+        known_name("format", self.format, get_args(FormatName))
+        known_name("way to store pictures", self.pictures, get_args(PictureCoding))
         if self.variations < 1:
             raise InvalidValueError(f"variations is {self.variations}; it must be at least 1.")
         if self.variations > 1 and self.policy != ORACLE:
@@ -233,9 +219,8 @@ class RecordingJob(NamedTuple):
     def episode(self) -> Episode:
         return get_episode(self.task, self.split, self.number)
 
-    @property
-    def file_name(self) -> str:
-        """Name of the trajectory's file, with all that it depends on."""
+    def path(self, folder: Path) -> Path:
+        """Return the path of the trajectory's file, whose name has all that it depends on."""
         said = ""
         if self.options is not None:
             said = f"-{short_hash(self.policy)}-{self.options.setting}-{self.options.form}"
@@ -247,11 +232,7 @@ class RecordingJob(NamedTuple):
         spec += [self.spec.actions] * (self.spec.actions != ExportPlan.actions)
         spec += ["disturbed"] * self.spec.disturbed
         name = f"{self.task}-{self.split}-{self.number:05d}-{self.variation:03d}{said}"
-        return f"{name}-{'-'.join(spec)}{SUFFIX}"
-
-    def path(self, folder: Path) -> Path:
-        """Return the path of the trajectory's file."""
-        return folder / self.file_name
+        return folder / f"{name}-{'-'.join(spec)}{SUFFIX}"
 
 
 def training_words(split: str, options: InstructionOptions) -> InstructionOptions:
@@ -261,13 +242,6 @@ def training_words(split: str, options: InstructionOptions) -> InstructionOption
     return options
 
 
-def plan_episodes(plan: ExportPlan) -> Iterator[Episode]:
-    """Yield the episodes of a plan, in order."""
-    for task in plan.tasks:
-        for index in plan.episodes:
-            yield get_episode(task, plan.split, index)
-
-
 def recording_jobs(plan: ExportPlan) -> list[tuple[RecordingJob, tuple[TaskText, ...]]]:
     """Return the trajectories of a plan in the order of the dataset, with their instructions.
 
@@ -275,7 +249,8 @@ def recording_jobs(plan: ExportPlan) -> list[tuple[RecordingJob, tuple[TaskText,
         InvalidValueError: no setting can express any of the episodes.
     """
     jobs: list[tuple[RecordingJob, tuple[TaskText, ...]]] = []
-    for episode in plan_episodes(plan):
+    for task, index in itertools.product(plan.tasks, plan.episodes):
+        episode = get_episode(task, plan.split, index)
         said = texts_of(plan, episode)
         if not said:
             continue
@@ -294,7 +269,7 @@ def recording_jobs(plan: ExportPlan) -> list[tuple[RecordingJob, tuple[TaskText,
 def texts_of(plan: ExportPlan, episode: Episode) -> tuple[TaskText, ...]:
     """Return the instructions of an episode; an explicit one is its own resolved form."""
     found = instructions([episode], plan.settings, plan.forms, plan.options)
-    explicit = instruct_with(episode, _explicit_words(plan.options)).text
+    explicit = instruct_with(episode, InstructionOptions(wordings=plan.options.wordings)).text
     said = []
     for _, one in found:
         is_repeated = one.form == "resolved" and "implicit" in plan.forms
@@ -303,8 +278,3 @@ def texts_of(plan: ExportPlan, episode: Episode) -> tuple[TaskText, ...]:
         options = replace(plan.options, setting=one.setting, form=one.form)
         said.append(TaskText(options, one.text, row(episode, one) | {"explicit": explicit}))
     return tuple(said)
-
-
-def _explicit_words(options: InstructionOptions) -> InstructionOptions:
-    """Return options for the explicit instruction in the same wordings."""
-    return InstructionOptions(wordings=options.wordings)

@@ -14,7 +14,6 @@ import os
 import shutil
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
 
@@ -89,13 +88,6 @@ class ExportSummary(NamedTuple):
     size: int
 
 
-def check_support(plan: ExportPlan) -> None:
-    """Check early that the plan's format can be written."""
-    check_parquet_support("demonstrations")
-    if plan.format == "robomme-hdf5":
-        check_hdf5_support()
-
-
 def run_export(
     plan: ExportPlan,
     out: Path,
@@ -120,7 +112,9 @@ def run_export(
             trajectory can be exported.
         MissingDependencyError: a package is not installed.
     """
-    check_support(plan)
+    check_parquet_support("demonstrations")
+    if plan.format == "robomme-hdf5":
+        check_hdf5_support()
     jobs, record = source or _played(plan)
     with _opened(plan, out) as work:
         folder = work / "trajectories" if trajectories is None else trajectories
@@ -144,7 +138,8 @@ def run_export(
                 f"None of the {len(jobs)} trajectories is a success; ask for `outcomes: all`."
             )
         datasets = _datasets(plan, out, kept)
-        _write_parts(datasets, parts_folder, workers, report, keep=trajectories is not None)
+        every = [part for parts in datasets for part in parts]
+        _write_parts(every, parts_folder, workers, report, keep=trajectories is not None)
         episodes = _finish(plan, out, datasets, facts)
     statuses = Counter(one.status for one in facts)
     return ExportSummary(len(missing), statuses, episodes, folder_size(out))
@@ -178,7 +173,8 @@ def _opened(plan: ExportPlan, out: Path) -> Iterator[Path]:
                 "give the same ones, or choose another folder."
             )
         write_atomically(started, json.dumps({"fingerprint": plan.fingerprint()}))
-        _remove_partial_files(out)
+        for path in out.rglob(".*.part"):  # what a killed export left
+            path.unlink(missing_ok=True)
         yield work
         shutil.rmtree(work)
     finally:
@@ -190,12 +186,6 @@ def _read_fingerprint(path: Path) -> str | None:
         return str(json.loads(path.read_text(encoding="utf-8"))["fingerprint"])
     except (OSError, ValueError, KeyError):
         return None
-
-
-def _remove_partial_files(out: Path) -> None:
-    """Delete what a killed export left under temporary names."""
-    for path in out.rglob(".*.part"):
-        path.unlink(missing_ok=True)
 
 
 def _played(plan: ExportPlan) -> TrajectorySource:
@@ -259,29 +249,22 @@ def _is_wanted(plan: ExportPlan, facts: TrajectoryFacts) -> bool:
     return plan.outcomes == "all" or facts.status == "success"
 
 
-@dataclass(frozen=True)
-class _Dataset:
-    """One dataset of an export: the main one, or that of the videos' frames."""
-
-    root: Path
-    parts: Sequence[DatasetPart]
-
-
-def _datasets(plan: ExportPlan, out: Path, kept: Sequence[RecordedTexts]) -> list[_Dataset]:
+def _datasets(
+    plan: ExportPlan, out: Path, kept: Sequence[RecordedTexts]
+) -> list[list[DatasetPart]]:
+    """Return the parts of each dataset of an export: of the videos' frames, then the main one."""
     make = WRITERS[plan.format].make_parts
     found = []
     if plan.video == "sidecar":
-        root = out / VIDEO_DATASET
-        found.append(_Dataset(root, make(plan, root, kept, is_video=True)))
-    found.append(_Dataset(out, make(plan, out, kept)))
-    return [one for one in found if one.parts]
+        found.append(make(plan, out / VIDEO_DATASET, kept, is_video=True))
+    found.append(make(plan, out, kept))
+    return [parts for parts in found if parts]
 
 
 def _write_parts(
-    datasets: Sequence[_Dataset], folder: Path, workers: int, report: Report, *, keep: bool
+    parts: Sequence[DatasetPart], folder: Path, workers: int, report: Report, *, keep: bool
 ) -> None:
     """Write the parts that are missing; pictures that are no longer needed are deleted."""
-    parts = [part for dataset in datasets for part in dataset.parts]
     folder.mkdir(exist_ok=True)
     missing = [part for part in parts if not _mark(folder, part).exists()]
     done = len(parts) - len(missing)
@@ -310,17 +293,17 @@ def _write_part(part: DatasetPart) -> None:
 def _finish(
     plan: ExportPlan,
     out: Path,
-    datasets: Sequence[_Dataset],
+    datasets: Sequence[Sequence[DatasetPart]],
     facts: Sequence[TrajectoryFacts],
 ) -> int:
     """Write what describes the datasets, the main one last. Returns its number of episodes."""
-    for dataset in datasets:
-        card = data_card.card_text(plan, dataset.parts, facts, dataset.root)
-        write_atomically(dataset.root / "README.md", card)
-        WRITERS[plan.format].finish(plan, dataset.root, dataset.parts)
+    for parts in datasets:
+        root = parts[0].root
+        write_atomically(root / "README.md", data_card.card_text(plan, parts, facts, root))
+        WRITERS[plan.format].finish(root, parts)
     content = {"fingerprint": plan.fingerprint(), "roboirg": __version__, "format": plan.format}
     write_atomically(out / EXPORT_FILE, json.dumps(content, indent=2) + "\n")
-    return sum(len(one.texts) for part in datasets[-1].parts for one in part.episodes)
+    return sum(len(one.texts) for part in datasets[-1] for one in part.episodes)
 
 
 def folder_size(folder: Path) -> int:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -74,8 +74,3 @@ def _quantile(counts: NDArray[np.int64], share: float) -> float:
     below = int(np.floor(place))
     low, high = np.searchsorted(ends, [below, min(below + 1, int(ends[-1]) - 1)], side="right")
     return float(low + (place - below) * (high - low))
-
-
-def gather_vectors(parts: Sequence[NDArray[Any]]) -> FeatureStats:
-    """Return the statistics of a feature over the frames of several arrays (frames, size)."""
-    return vector_stats(np.concatenate(parts))

@@ -5,17 +5,17 @@ from __future__ import annotations
 import zipfile
 from collections.abc import Mapping
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from roboirg.apps.demonstrations.export_plan import ExportPlan, TaskText
-from roboirg.apps.demonstrations.feature_stats import FeatureStats, gather_vectors, picture_stats
-from roboirg.apps.demonstrations.picture_coding import FRAME_RATE, video_format
-from roboirg.apps.demonstrations.trajectory import PictureFile, Trajectory, TrajectoryFacts
+from roboirg.apps.demonstrations.feature_stats import FeatureStats, picture_stats, vector_stats
+from roboirg.apps.demonstrations.picture_coding import STORED_FORMATS
+from roboirg.apps.demonstrations.trajectory import Trajectory, TrajectoryFacts, picture_name
 from roboirg.apps.demonstrations.trajectory_recorder import video_name
+from roboirg.util.media import CONTROL_RATE
 
 JOINTS = [f"joint_{number}" for number in range(1, 8)]
 _POSE = ["x", "y", "z", "roll", "pitch", "yaw", "gripper"]
@@ -125,9 +125,9 @@ class FrameColumns:
         }
         if self.has_videos:
             feature["info"] = {
-                "video.fps": FRAME_RATE,
+                "video.fps": CONTROL_RATE,
                 "video.codec": "h264",
-                "video.pix_fmt": video_format(self.plan.pictures),
+                "video.pix_fmt": STORED_FORMATS[self.plan.pictures],
                 "video.height": self.plan.size,
                 "video.width": self.plan.size,
                 "video.channels": 3,
@@ -159,7 +159,7 @@ class FrameColumns:
         columns["next.success"] = is_success[:, None]
         columns["is_video_demo"] = (rows < facts.video_length)[:, None]
         frames = np.arange(len(rows), dtype=np.int64)
-        columns["timestamp"] = (frames / FRAME_RATE).astype(np.float32)[:, None]
+        columns["timestamp"] = (frames / CONTROL_RATE).astype(np.float32)[:, None]
         columns["frame_index"] = frames[:, None]
         return columns
 
@@ -184,9 +184,8 @@ class FrameColumns:
         """Return the columns of PNGs."""
         rows = self.rows(trajectory.facts)
         with zipfile.ZipFile(trajectory.path) as archive:
-            file = PictureFile(archive)
             return {
-                self.keys[camera]: [file.encoded(camera, row) for row in rows]
+                self.keys[camera]: [archive.read(picture_name(camera, row)) for row in rows]
                 for camera in self.cameras
             }
 
@@ -208,13 +207,8 @@ class FrameColumns:
     ) -> dict[str, FeatureStats]:
         """Return the statistics of all columns but texts."""
         found = {name: picture_stats(one, self.plan.size**2) for name, one in counts.items()}
-        return found | {name: gather_vectors(parts) for name, parts in numbers.items()}
+        return found | {name: vector_stats(np.concatenate(one)) for name, one in numbers.items()}
 
 
 def _feature(dtype: str, names: list[str]) -> dict[str, Any]:
     return {"dtype": dtype, "shape": [len(names)], "names": names}
-
-
-def video_path(root: Path, key: str, chunk: int, file: int) -> Path:
-    """Return the path of a video in version 3 of the format."""
-    return root / "videos" / key / f"chunk-{chunk:03d}" / f"file-{file:03d}.mp4"

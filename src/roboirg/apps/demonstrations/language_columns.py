@@ -7,10 +7,10 @@ from collections.abc import Iterator
 from typing import Any
 
 from roboirg.apps.demonstrations.frame_columns import FrameColumns, PlacedText
-from roboirg.apps.demonstrations.picture_coding import FRAME_RATE
 from roboirg.apps.demonstrations.trajectory import Trajectory
 from roboirg.core.delivery import utterance_steps
 from roboirg.core.instruction_options import DEFAULT_DELIVERY
+from roboirg.util.media import CONTROL_RATE
 
 PERSISTENT, EVENTS = "language_persistent", "language_events"
 LANGUAGE_FEATURES: dict[str, dict[str, Any]] = {
@@ -58,7 +58,7 @@ def _persistent(
         yield _entry("user", words.facts["explicit"], "task_aug", 0.0)
     frame = 0
     for subgoal, group in itertools.groupby(columns.texts(trajectory)["subgoal"]):
-        yield _entry("assistant", subgoal, "subtask", frame / FRAME_RATE)
+        yield _entry("assistant", subgoal, "subtask", frame / CONTROL_RATE)
         frame += len(list(group))
 
 

@@ -71,7 +71,6 @@ def write_frames(
         table = table.replace_schema_metadata({"huggingface": described})
     repeated = [f"{name}.bytes" for name in pictures] if len(own) > 1 else []
     texts = [name for name in order if pa.types.is_string(table.schema.field(name).type)]
-    path.parent.mkdir(parents=True, exist_ok=True)
     with replacing(path) as part:
         parquet.write_table(
             table,
@@ -102,7 +101,6 @@ def write_rows(path: Path, rows: Sequence[Mapping[str, Any]]) -> None:
     import pyarrow as pa
     from pyarrow import parquet
 
-    path.parent.mkdir(parents=True, exist_ok=True)
     with replacing(path) as part:
         parquet.write_table(pa.Table.from_pylist([dict(one) for one in rows]), part)
 

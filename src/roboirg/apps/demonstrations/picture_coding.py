@@ -13,12 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from roboirg.core.errors import RoboIRGError
+from roboirg.util.media import CONTROL_RATE, Pixels
 
-Picture = NDArray[np.uint8]
 PictureCoding = Literal["png", "lossless-video", "lossy-video", "none"]
 
-FRAME_RATE = 20
-"""Control steps, and so pictures, per second."""
 KEY_FRAMES = 10
 """Pictures from one that decodes alone to the next: half a second."""
 LOSSY_QUALITY = 18
@@ -34,11 +32,12 @@ _CODECS: dict[str, tuple[str, str, dict[str, str]]] = {
     "lossless-video": ("libx264rgb", "rgb24", {"crf": "0"}),
     "lossy-video": ("libx264", "yuv420p", {"crf": str(LOSSY_QUALITY)}),
 }
-_STORED_FORMATS = {"lossless-video": "gbrp", "lossy-video": "yuv420p"}
+STORED_FORMATS = {"lossless-video": "gbrp", "lossy-video": "yuv420p"}
+"""The pixel format that a stored video has."""
 _MAX_VALUE = 255.0
 
 
-def encode_png(picture: Picture) -> bytes:
+def encode_png(picture: Pixels) -> bytes:
     """Return a picture, RGB (height, width, 3), as PNG."""
     return _png(np.asarray(cv2.cvtColor(picture, cv2.COLOR_RGB2BGR)))
 
@@ -66,16 +65,16 @@ class VideoEncoder:
         codec, pixels, quality = _CODECS[coding]
         self._coding, self._file = coding, io.BytesIO()
         self._container = av.open(self._file, "w", format="mp4")
-        stream: Any = self._container.add_stream(codec, rate=Fraction(FRAME_RATE))
+        stream: Any = self._container.add_stream(codec, rate=Fraction(CONTROL_RATE))
         stream.pix_fmt = pixels
         stream.options = {**quality, "preset": "veryfast", "g": str(KEY_FRAMES), "bf": "0"}
         stream.codec_context.thread_count = 1
         self._stream = stream
         self._decoder: Any = None
-        self._waiting: deque[Picture] = deque()
+        self._waiting: deque[Pixels] = deque()
         self._loss = _PictureLoss()
 
-    def add(self, picture: Picture) -> None:
+    def add(self, picture: Pixels) -> None:
         """Encode a picture, RGB (height, width, 3); all have the same, even size."""
         import av
 
@@ -133,7 +132,7 @@ class _PictureLoss:
         self.largest = 0
         self._absolute = self._squared = self._count = 0
 
-    def add(self, original: Picture, decoded: Picture) -> None:
+    def add(self, original: Pixels, decoded: Pixels) -> None:
         difference = np.abs(original.astype(np.int32) - decoded)
         self.largest = max(self.largest, int(difference.max()))
         self._absolute += int(difference.sum())
@@ -150,12 +149,7 @@ class _PictureLoss:
         }
 
 
-def video_format(coding: PictureCoding) -> str:
-    """Return the pixel format that a stored video has."""
-    return _STORED_FORMATS[coding]
-
-
-def count_values(picture: Picture) -> NDArray[np.int64]:
+def count_values(picture: Pixels) -> NDArray[np.int64]:
     """Return how often each value occurs in each channel of a picture, (3, 256)."""
     found = [cv2.calcHist([picture], [one], None, [256], [0, 256]) for one in range(3)]
     # A vector or a column, by OpenCV's version.

@@ -6,10 +6,11 @@ and the pictures as ``CAMERA/000000.png`` or ``CAMERA.mp4``. It appears whole or
 
 from __future__ import annotations
 
+import contextlib
 import io
 import json
 import zipfile
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
@@ -150,16 +151,13 @@ def load_trajectory(path: Path) -> Trajectory:
     Raises:
         InvalidValueError: the file is missing or damaged, or of another version.
     """
-    try:
-        with zipfile.ZipFile(path) as archive:
-            facts = _read_facts(archive, path)
-            arrays = {
-                name.removesuffix(_ARRAY): _read_array(archive, name)
-                for name in archive.namelist()
-                if name.endswith(_ARRAY)
-            }
-    except (OSError, zipfile.BadZipFile, ValueError, KeyError) as error:
-        raise InvalidValueError(f"The trajectory {str(path)!r} cannot be read: {error}.") from error
+    with _opened(path) as archive:
+        facts = _read_facts(archive, path)
+        arrays = {
+            name.removesuffix(_ARRAY): _read_array(archive, name)
+            for name in archive.namelist()
+            if name.endswith(_ARRAY)
+        }
     counted = [one for one in CAMERAS if f"{one}_histogram" in arrays]
     histograms = {one: arrays.pop(f"{one}_histogram") for one in counted}
     matrices = [name for name in arrays if name.endswith(("_extrinsic", "_intrinsic"))]
@@ -173,9 +171,15 @@ def load_facts(path: Path) -> TrajectoryFacts:
     Raises:
         InvalidValueError: the file is missing or damaged, or of another version.
     """
+    with _opened(path) as archive:
+        return _read_facts(archive, path)
+
+
+@contextlib.contextmanager
+def _opened(path: Path) -> Iterator[zipfile.ZipFile]:
     try:
         with zipfile.ZipFile(path) as archive:
-            return _read_facts(archive, path)
+            yield archive
     except (OSError, zipfile.BadZipFile, ValueError, KeyError) as error:
         raise InvalidValueError(f"The trajectory {str(path)!r} cannot be read: {error}.") from error
 
@@ -195,27 +199,15 @@ def _read_array(archive: zipfile.ZipFile, name: str) -> NDArray[Any]:
     return array
 
 
-class TrajectoryFile:
-    """Writes one trajectory; pictures go to the disk as they come.
-
-    Args:
-        archive: the open archive.
-    """
-
-    def __init__(self, archive: zipfile.ZipFile) -> None:
-        self._archive = archive
-
-    def add_file(self, name: str, content: bytes) -> None:
-        """Add an encoded picture or a video under its name."""
-        self._archive.writestr(name, content)
-
-    def finish(self, facts: TrajectoryFacts, arrays: Mapping[str, NDArray[Any]]) -> None:
-        """Add the arrays and the facts."""
-        for name, array in arrays.items():
-            file = io.BytesIO()
-            np.save(file, array, allow_pickle=False)
-            self._archive.writestr(name + _ARRAY, file.getvalue())
-        self._archive.writestr(_FACTS, json.dumps(asdict(facts)))
+def write_arrays(
+    archive: zipfile.ZipFile, facts: TrajectoryFacts, arrays: Mapping[str, NDArray[Any]]
+) -> None:
+    """Complete the open file of a trajectory, which has its pictures already."""
+    for name, array in arrays.items():
+        file = io.BytesIO()
+        np.save(file, array, allow_pickle=False)
+        archive.writestr(name + _ARRAY, file.getvalue())
+    archive.writestr(_FACTS, json.dumps(asdict(facts)))
 
 
 def picture_name(track: str, row: int) -> str:
@@ -223,42 +215,29 @@ def picture_name(track: str, row: int) -> str:
     return f"{track}/{row:06d}.png"
 
 
-class PictureFile:
-    """The pictures of one trajectory, read from its open file.
+def read_picture(archive: zipfile.ZipFile, camera: str, row: int) -> NDArray[np.uint8]:
+    """Return a row's picture from a trajectory's open file, RGB, (size, size, 3)."""
+    return decode_png(archive.read(picture_name(camera, row)))
 
-    Args:
-        archive: the open archive.
-    """
 
-    def __init__(self, archive: zipfile.ZipFile) -> None:
-        self._archive = archive
-
-    def encoded(self, track: str, row: int) -> bytes:
-        """Return the PNG of a row of a track: a camera, or ``CAMERA_depth``."""
-        return self._archive.read(picture_name(track, row))
-
-    def picture(self, camera: str, row: int) -> NDArray[np.uint8]:
-        """Return a row's picture, RGB, (size, size, 3)."""
-        return decode_png(self.encoded(camera, row))
-
-    def depth(self, camera: str, row: int) -> NDArray[np.int16]:
-        """Return a row's depth, mm, (256, 256, 1)."""
-        data = np.frombuffer(self.encoded(f"{camera}_depth", row), np.uint8)
-        found = cv2.imdecode(data, cv2.IMREAD_UNCHANGED)
-        return np.asarray(found).astype(np.int16)[..., None]
-
-    def video(self, name: str) -> bytes:
-        return self._archive.read(name)
+def read_depth(archive: zipfile.ZipFile, camera: str, row: int) -> NDArray[np.int16]:
+    """Return a row's depth from a trajectory's open file, mm, (256, 256, 1)."""
+    data = np.frombuffer(archive.read(picture_name(f"{camera}_depth", row)), np.uint8)
+    found = cv2.imdecode(data, cv2.IMREAD_UNCHANGED)
+    return np.asarray(found).astype(np.int16)[..., None]
 
 
 def drop_pictures(path: Path) -> None:
     """Replace a trajectory's file by one without pictures; does nothing if it has none."""
-    with zipfile.ZipFile(path) as archive:
-        kept = [name for name in archive.namelist() if name.endswith(_ARRAY) or name == _FACTS]
-        if len(kept) == len(archive.namelist()):
-            return
-        with replacing(path) as part, zipfile.ZipFile(part, "w") as smaller:
-            for name in kept:
+    if not has_pictures(path):
+        return
+    with (
+        zipfile.ZipFile(path) as archive,
+        replacing(path) as part,
+        zipfile.ZipFile(part, "w") as smaller,
+    ):
+        for name in archive.namelist():
+            if name.endswith((_ARRAY, _FACTS)):
                 smaller.writestr(name, archive.read(name))
 
 
@@ -266,8 +245,3 @@ def has_pictures(path: Path) -> bool:
     """Return whether a trajectory's file holds pictures."""
     with zipfile.ZipFile(path) as archive:
         return any(not name.endswith((_ARRAY, _FACTS)) for name in archive.namelist())
-
-
-def stack_texts(texts: Sequence[str]) -> NDArray[np.str_]:
-    """Return texts as an array that needs no pickle."""
-    return np.array(texts, dtype=np.str_)

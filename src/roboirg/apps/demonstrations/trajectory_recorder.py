@@ -20,9 +20,8 @@ from roboirg.apps.demonstrations.picture_coding import (
 )
 from roboirg.apps.demonstrations.trajectory import (
     TrajectoryFacts,
-    TrajectoryFile,
     picture_name,
-    stack_texts,
+    write_arrays,
 )
 from roboirg.core.actions import (
     ARM_JOINTS,
@@ -86,10 +85,10 @@ class _Rows:
 
 
 class PictureTracks:
-    """Encodes the pictures of the cameras in the order of rows."""
+    """Encodes the pictures of the cameras in the order of rows, into a trajectory's open file."""
 
-    def __init__(self, file: TrajectoryFile, spec: RecordingSpec) -> None:
-        self._file, self._spec = file, spec
+    def __init__(self, archive: zipfile.ZipFile, spec: RecordingSpec) -> None:
+        self._archive, self._spec = archive, spec
         self._rows = 0
         self._encoders: dict[tuple[str, str], VideoEncoder] = {}
         self.histograms = {camera: np.zeros((2, 3, 256), np.int64) for camera in spec.cameras}
@@ -110,7 +109,7 @@ class PictureTracks:
             part = "demonstration" if is_video else "policy"
         for camera, picture in small.items():
             if self._spec.coding == "png":
-                self._file.add_file(picture_name(camera, self._rows), encode_png(picture))
+                self._archive.writestr(picture_name(camera, self._rows), encode_png(picture))
             else:
                 key = camera, part
                 if key not in self._encoders:
@@ -118,7 +117,7 @@ class PictureTracks:
                 self._encoders[key].add(picture)
             if self._spec.depth:
                 name = picture_name(f"{camera}_depth", self._rows)
-                self._file.add_file(name, encode_depth(pictures[f"{camera}_depth"]))
+                self._archive.writestr(name, encode_depth(pictures[f"{camera}_depth"]))
         self._rows += 1
 
     def _count_last(self) -> None:
@@ -136,7 +135,7 @@ class PictureTracks:
         errors = {}
         for (camera, part), encoder in self._encoders.items():
             name = video_name(camera, part)
-            self._file.add_file(name, encoder.finish())
+            self._archive.writestr(name, encoder.finish())
             if self._spec.coding == "lossy-video":
                 errors[name] = encoder.error
         return errors
@@ -196,18 +195,14 @@ def record_trajectory(
     try:
         with replacing(path) as part:
             with zipfile.ZipFile(part, "w") as archive:
-                recorder = _Recorder(env, policy, spec, TrajectoryFile(archive))
+                recorder = _Recorder(env, policy, spec, archive)
                 facts = recorder.record(policy_name, variation)
             if only_successes and facts.status != "success":
-                _keep_facts(part, facts)
+                with zipfile.ZipFile(part, "w") as archive:
+                    write_arrays(archive, facts, {})
     finally:
         env.close()
     return facts
-
-
-def _keep_facts(part: Path, facts: TrajectoryFacts) -> None:
-    with zipfile.ZipFile(part, "w") as archive:
-        TrajectoryFile(archive).finish(facts, {})
 
 
 class _GivenUpError(Exception):
@@ -218,13 +213,12 @@ class _Recorder(EpisodeLoop):
     """Plays one episode and records it."""
 
     def __init__(
-        self, env: RoboIRGEnv, policy: Policy, spec: RecordingSpec, file: TrajectoryFile
+        self, env: RoboIRGEnv, policy: Policy, spec: RecordingSpec, archive: zipfile.ZipFile
     ) -> None:
         super().__init__(env, policy)
-        self._spec, self._file = spec, file
-        self._tracks = PictureTracks(file, spec)
+        self._spec, self._archive = spec, archive
+        self._tracks = PictureTracks(archive, spec)
         self._rows = _Rows()
-        self._video: list[Mapping[str, Any]] = []
         self._video_session: object = None
         self._is_waypoint = env.actions == WAYPOINT.name
 
@@ -238,7 +232,7 @@ class _Recorder(EpisodeLoop):
         except _GivenUpError as error:
             cause = str(error)
         facts = self._facts(policy_name, variation, info, cause)
-        self._file.finish(facts, self._arrays(info))
+        write_arrays(self._archive, facts, self._arrays(info))
         return facts
 
     def _see_video(self, env: RoboIRGEnv, is_demonstration: bool) -> None:
@@ -310,7 +304,8 @@ class _Recorder(EpisodeLoop):
     ) -> None:
         rows = self._rows
         self._tracks.add(observation, is_video=False)
-        kept = {key: value for key, value in observation.items() if not _is_picture(key)}
+        pictures = ("_rgb", "_depth")
+        kept = {key: value for key, value in observation.items() if not key.endswith(pictures)}
         rows.observations.append(kept)
         rows.actions.append(action)
         rows.labels.append(label)
@@ -364,10 +359,9 @@ class _Recorder(EpisodeLoop):
         seen = list(info["demonstration_subgoals"][:length])
         online = [*seen, *rows.online]
         doing = [*seen, *_with_pixels(rows.subgoals, rows.online)]
-        arrays["grounded_online_subgoals"] = stack_texts(online)
-        arrays["online_subgoals"] = stack_texts([without_pixel(text) for text in online])
-        arrays["grounded_subgoals"] = stack_texts(doing)
-        arrays["subgoals"] = stack_texts([without_pixel(text) for text in doing])
+        for name, texts in (("online_subgoals", online), ("subgoals", doing)):
+            arrays[f"grounded_{name}"] = np.array(texts, np.str_)
+            arrays[name] = np.array([without_pixel(text) for text in texts], np.str_)
         for camera, counts in self._tracks.histograms.items():
             arrays[f"{camera}_histogram"] = counts
         return arrays
@@ -381,10 +375,6 @@ class _Recorder(EpisodeLoop):
         angles = np.unwrap([pose.rotation.as_euler("xyz") for pose in poses], axis=0)
         positions = np.stack([pose.position for pose in poses])
         return np.column_stack([positions, angles, actions[:, ARM_JOINTS]])
-
-
-def _is_picture(key: str) -> bool:
-    return key.endswith(("_rgb", "_depth"))
 
 
 def without_pixel(subgoal: str) -> str:

@@ -9,8 +9,8 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 
 import numpy as np
 
+from roboirg.cli.names import known_name
 from roboirg.core.episode import Episode, Goal
-from roboirg.core.errors import UnknownNameError
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.evaluation.grounding_items.answer_file import Answer
 from roboirg.evaluation.grounding_items.grounding_item import LETTERS, GroundingItem
@@ -46,8 +46,7 @@ def floor_answers(name: str, items: Sequence[GroundingItem], seed: int = 0) -> I
         UnknownNameError: there is no such floor.
         MissingDependencyError: a learned floor is wanted, and scikit-learn is not installed.
     """
-    if name not in FLOORS:
-        raise UnknownNameError("floor", name, FLOORS)
+    known_name("floor", name, FLOORS)
     learned = _learn(items) if name == TEXT_ONLY else {}
     for item in items:
         rng = np.random.default_rng([seed, zlib.crc32(f"{name} {item.id}".encode())])

@@ -7,6 +7,7 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import NamedTuple, Self
 
+from roboirg.apps.grounding.dataset_tables import TSV_FOLDER
 from roboirg.core.version import __version__
 from roboirg.evaluation.grounding_items.grounding_item import ITEMS_FILE, GroundingItem
 from roboirg.language.settings import setting_names
@@ -30,7 +31,6 @@ class DatasetFacts(NamedTuple):
         sha256: of `items.jsonl`, in hexadecimal; it names every picture by its content.
         size: of all files, bytes.
         splits: names of the splits.
-        tsv_folder: name of the folder with the TSV files.
         versions: of the language and of the environment.
     """
 
@@ -43,7 +43,6 @@ class DatasetFacts(NamedTuple):
     sha256: str
     size: int
     splits: tuple[str, ...]
-    tsv_folder: str
     versions: tuple[str, int]
 
     @classmethod
@@ -53,7 +52,6 @@ class DatasetFacts(NamedTuple):
         sha256: str,
         size: int,
         splits: tuple[str, ...],
-        tsv_folder: str,
     ) -> Self:
         """Count items."""
         by_task: dict[str, Counter[str]] = {}
@@ -69,7 +67,6 @@ class DatasetFacts(NamedTuple):
             sha256=sha256,
             size=size,
             splits=splits,
-            tsv_folder=tsv_folder,
             versions=(items[0].language_version, items[0].environment_version),
         )
 
@@ -153,6 +150,6 @@ def _usage(facts: DatasetFacts) -> Iterator[str]:
     yield "```"
     yield ""
     yield (
-        f"Score answers with `roboirg score grounding ANSWERS --data .`; `{facts.tsv_folder}/` has "
+        f"Score answers with `roboirg score grounding ANSWERS --data .`; `{TSV_FOLDER}/` has "
         "the choice questions for VLMEvalKit."
     )

@@ -6,7 +6,7 @@ import hashlib
 from pathlib import Path
 
 from roboirg.apps.grounding.dataset_card import CARD, DatasetFacts, write_card
-from roboirg.apps.grounding.dataset_tables import TSV_FOLDER, write_parquet, write_tsv
+from roboirg.apps.grounding.dataset_tables import write_parquet, write_tsv
 from roboirg.evaluation.grounding_items.grounding_item import GroundingItem, write_items
 from roboirg.evaluation.grounding_items.question_set import (
     PARTS,
@@ -43,9 +43,7 @@ def _write_files(folder: Path, items: list[GroundingItem], request: ExportReques
         own = [one for one in items if one.split == split]
         write_parquet(own, folder, split)
         write_tsv(own, folder, split)
-    facts = DatasetFacts.of(
-        items, hashlib.sha256(content).hexdigest(), _size(folder), splits, TSV_FOLDER
-    )
+    facts = DatasetFacts.of(items, hashlib.sha256(content).hexdigest(), _size(folder), splits)
     write_card(folder, facts, request.frames, request.frames_every)
     return facts
 

@@ -30,7 +30,7 @@ _TEXT_LISTS = (
 )  # fmt: skip
 
 
-def write_parquet(items: Sequence[GroundingItem], folder: Path, split: str) -> Path:
+def write_parquet(items: Sequence[GroundingItem], folder: Path, split: str) -> None:
     """Write the items of a split with their pictures inside, for pandas and `datasets`.
 
     Pictures are columns of the type Image of `datasets`, which loads the file without options.
@@ -56,10 +56,9 @@ def write_parquet(items: Sequence[GroundingItem], folder: Path, split: str) -> P
         for start in range(0, len(items), ROWS_PER_GROUP):
             rows = [_row(one, folder, contents) for one in items[start : start + ROWS_PER_GROUP]]
             writer.write_table(pa.Table.from_pylist(rows, schema=schema))
-    return path
 
 
-def write_tsv(items: Sequence[GroundingItem], folder: Path, split: str) -> Path:
+def write_tsv(items: Sequence[GroundingItem], folder: Path, split: str) -> None:
     """Write the choice questions of a split as VLMEvalKit reads them.
 
     An item with the pictures of an earlier one names that one in their place, as the format allows.
@@ -99,7 +98,6 @@ def write_tsv(items: Sequence[GroundingItem], folder: Path, split: str) -> Path:
             }
         )
     write_atomically(path, text.getvalue())
-    return path
 
 
 def _pictures_note(frames: int, shown: str) -> str:

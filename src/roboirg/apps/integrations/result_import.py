@@ -172,7 +172,8 @@ def _read_inspect(path: Path, options: ImportOptions) -> Iterator[Record]:
         found = next((one["metadata"]["record"] for one in scores.values()), None)
         if found is not None:
             record = read_record(json.dumps(found).encode(), path, number)
-            yield _with_fields(record, {**options.fields, "policy": options.policy})
+            told = {**msgspec.to_builtins(record), **options.fields, "policy": options.policy}
+            yield msgspec.convert(with_nested_options(told), Record, strict=False)
             continue
         told = {**sample["metadata"]["job"], "policy": options.policy}
         job = _job(options, **told.pop("options", {}), **told)
@@ -203,14 +204,6 @@ def _job(options: ImportOptions, **fields: Any) -> Job:  # noqa: ANN401 - values
     if unknown := named.keys() - set(_FIELDS):
         raise UnknownNameError("field of an episode", min(unknown), _FIELDS)
     return msgspec.convert(with_nested_options({**named, **options.fields}), Job, strict=False)
-
-
-def _with_fields(record: Record, fields: Mapping[str, Any]) -> Record:
-    words = {name: value for name, value in fields.items() if name in OPTION_NAMES}
-    others = {name: value for name, value in fields.items() if name not in words}
-    found = msgspec.to_builtins(record)
-    changed = {**found, **others, "options": {**found["options"], **words}}
-    return msgspec.convert(changed, Record, strict=False)
 
 
 def _verdict(success: bool, job: Job) -> RolloutResult:

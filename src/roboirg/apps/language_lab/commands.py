@@ -26,7 +26,8 @@ from roboirg.core.plain_text import counted
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from roboirg.apps.language_lab.validation import Batch, ValidationResults
+    from roboirg.apps.language_lab.validation.validation_results import ValidationResults
+    from roboirg.apps.language_lab.validation.validation_run import Batch
 
 # Heavy modules are imported inside the commands, so that --help is fast.
 
@@ -56,13 +57,14 @@ def export_instructions(
     from roboirg.apps.language_lab.instruction_export import (
         EXPORT_FORMATS,
         check_export_support,
-        write_rows,
+        encode,
     )
     from roboirg.evaluation.plan.option_parsing import parse_splits
     from roboirg.language import FORMS
     from roboirg.language.instruction_row import row
     from roboirg.language.variants import instructions
     from roboirg.tasks.splits.splits import split_episodes
+    from roboirg.util.atomic_write import write_atomically
 
     check_output_file(out)
     kind = known_name("format", out.suffix.removeprefix("."), EXPORT_FORMATS)
@@ -74,7 +76,7 @@ def export_instructions(
     rows = [row(episode, instruction) for episode, instruction in said]
     if not rows:
         raise InvalidValueError(f"None of these tasks has the setting {', '.join(chosen)}.")
-    write_rows(rows, out, kind)
+    write_atomically(out, encode(rows, kind))
     typer.echo(f"{counted(len(rows), 'instruction')} of {counted(len(episodes), 'episode')}: {out}")
 
 
@@ -131,10 +133,12 @@ def validate_instructions(
 
     Example: roboirg language validate --seeds 10
     """
-    from roboirg.apps.language_lab.validation import ValidationResults, batches, validate
+    from roboirg.apps.language_lab.validation.validation_results import ValidationResults
+    from roboirg.apps.language_lab.validation.validation_run import batches, validate_batch
     from roboirg.apps.language_lab.validation.validation_tables import validation_tables
     from roboirg.evaluation.plan.option_parsing import parse_splits
     from roboirg.language.wordings.wording_store import open_wordings
+    from roboirg.util.parallel_map import parallel_map
     from roboirg.util.processor import worker_count
 
     names = known_tasks(tasks, open_wordings(wordings))
@@ -142,7 +146,7 @@ def validate_instructions(
     work = batches(names, wanted, seeds, wordings)
     count = worker_count()
     found = ValidationResults()
-    for results in _with_progress(validate(work, count), work):
+    for results in _with_progress(parallel_map(validate_batch, work, count), work):
         found.add(results)
     console = _console()
     for table in validation_tables(found):

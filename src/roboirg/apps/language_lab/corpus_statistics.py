@@ -5,8 +5,8 @@ from __future__ import annotations
 import re
 import statistics
 from collections import Counter
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from typing import NamedTuple, cast
+from collections.abc import Iterable, Mapping
+from typing import NamedTuple
 
 from roboirg.evaluation.analysis.figures.expressions import ClassCounts
 from roboirg.language.instruction import Instruction
@@ -105,38 +105,12 @@ def phrase_counts(instructions: Iterable[Instruction]) -> ClassCounts:
     return counts
 
 
-def pattern_counts(instructions: Iterable[Instruction]) -> ClassCounts:
-    """Count the instructions by task and main reasoning pattern."""
-    return _tally(instructions, lambda one: _texts(one.metadata.get("pattern")))
-
-
-def relation_counts(instructions: Iterable[Instruction]) -> ClassCounts:
-    """Count the instructions by task and relation to the reference."""
-    return _tally(instructions, lambda one: _texts(one.metadata.get("relation")))
-
-
-def landmark_counts(instructions: Iterable[Instruction]) -> ClassCounts:
-    """Count the targets by task and landmark class."""
-    return _tally(instructions, lambda one: _texts(one.metadata.get("landmark_classes")))
-
-
-def rival_counts(instructions: Iterable[Instruction]) -> ClassCounts:
-    """Count the instructions by task and the kind of words that single one of two values out."""
-    return _tally(instructions, lambda one: _texts(one.metadata.get("rival_reference")))
-
-
-def _tally(
-    instructions: Iterable[Instruction], values: Callable[[Instruction], Sequence[str]]
-) -> ClassCounts:
+def metadata_counts(instructions: Iterable[Instruction], name: str) -> ClassCounts:
+    """Count the values of an entry of the metadata by task; each value of a list counts."""
     counts: dict[str, Counter[str]] = {}
     for instruction in instructions:
-        for value in values(instruction):
-            counts.setdefault(instruction.task, Counter())[value] += 1
+        value = instruction.metadata.get(name)
+        for one in value if isinstance(value, list) else [value]:
+            if one is not None:
+                counts.setdefault(instruction.task, Counter())[str(one)] += 1
     return counts
-
-
-def _texts(value: object) -> Sequence[str]:
-    if value is None:
-        return ()
-    values = cast("list[object]", value) if isinstance(value, list) else [value]
-    return [str(one) for one in values]

@@ -8,24 +8,22 @@ from __future__ import annotations
 
 import io
 import json
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from pathlib import Path
-from typing import Any, Literal, get_args
+from collections.abc import Sequence
+from typing import Literal, get_args
 
 from roboirg.language.instruction_row import ExportRow
-from roboirg.util.atomic_write import write_atomically
 from roboirg.util.parquet_support import check_parquet_support
 
 ExportFormat = Literal["jsonl", "parquet"]
 EXPORT_FORMATS: tuple[ExportFormat, ...] = get_args(ExportFormat)
 
 
-def encode(rows: Iterable[ExportRow], kind: ExportFormat) -> bytes:
+def encode(rows: Sequence[ExportRow], kind: ExportFormat) -> bytes:
     """Return the content of a file with the rows; the same rows give the same bytes.
 
     In Parquet, the bytes also depend on the version of pyarrow.
     """
-    return _ENCODERS[kind](rows)
+    return _parquet(rows) if kind == "parquet" else _jsonl(rows)
 
 
 def check_export_support(kind: ExportFormat) -> None:
@@ -34,11 +32,11 @@ def check_export_support(kind: ExportFormat) -> None:
         check_parquet_support()
 
 
-def _jsonl(rows: Iterable[ExportRow]) -> bytes:
+def _jsonl(rows: Sequence[ExportRow]) -> bytes:
     return "".join(f"{json.dumps(one, ensure_ascii=False)}\n" for one in rows).encode()
 
 
-def _parquet(rows: Iterable[ExportRow]) -> bytes:
+def _parquet(rows: Sequence[ExportRow]) -> bytes:
     check_export_support("parquet")
     import pyarrow as pa
     from pyarrow import parquet
@@ -49,35 +47,18 @@ def _parquet(rows: Iterable[ExportRow]) -> bytes:
         **dict.fromkeys(("episode", "seed", "words", "tokens", "distractors"), number),
         **dict.fromkeys(("landmark_classes", "stages"), numbers),
         **dict.fromkeys(("patterns", "references", "landmarks", "templates"), texts),
-        "turns": pa.list_(_struct(("stage", text), ("start", number), ("text", text))),
+        "turns": pa.list_(pa.struct([("stage", text), ("start", number), ("text", text)])),
         "mentions": pa.list_(
-            _struct(
-                *((name, number) for name in ("turn", "start", "end")),
-                *((name, text) for name in ("text", "role", "expression", "slot", "value")),
+            pa.struct(
+                [
+                    *((name, number) for name in ("turn", "start", "end")),
+                    *((name, text) for name in ("text", "role", "expression", "slot", "value")),
+                ]
             )
         ),
     }
-    collected = list(rows)
-    names: Sequence[str] = list(collected[0]) if collected else []
-    schema = pa.schema([(name, special.get(name, text)) for name in names])
+    schema = pa.schema([(name, special.get(name, text)) for name in rows[0]])
     file = io.BytesIO()
-    table = pa.Table.from_pylist(collected, schema=schema)
+    table = pa.Table.from_pylist(list(rows), schema=schema)
     parquet.write_table(table, file, compression="zstd")
     return file.getvalue()
-
-
-def _struct(*fields: tuple[str, Any]) -> Any:  # noqa: ANN401 - pyarrow ships no types
-    import pyarrow as pa
-
-    return pa.struct(list(fields))
-
-
-_ENCODERS: Mapping[ExportFormat, Callable[[Iterable[ExportRow]], bytes]] = {
-    "jsonl": _jsonl,
-    "parquet": _parquet,
-}
-
-
-def write_rows(rows: Iterable[ExportRow], path: Path, kind: ExportFormat) -> None:
-    """Write the rows to a file, atomically."""
-    write_atomically(path, encode(rows, kind))

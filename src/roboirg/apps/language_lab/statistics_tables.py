@@ -27,13 +27,13 @@ def overview_tables(instructions: Sequence[Instruction]) -> Iterator[Table]:
     yield expression_table(expression_counts(instructions))
     yield from phrase_tables(corpus_statistics.phrase_counts(instructions))
     by_task = (
-        ("Reasoning patterns (scenes)", corpus_statistics.pattern_counts(instructions), None),
-        ("Relations (scenes)", corpus_statistics.relation_counts(instructions), _RELATIONS),
-        ("Landmark classes (targets)", corpus_statistics.landmark_counts(instructions), None),
-        ("Rivals (scenes), by reference", corpus_statistics.rival_counts(instructions), None),
+        ("Reasoning patterns (scenes)", "pattern", None),
+        ("Relations (scenes)", "relation", _RELATIONS),
+        ("Landmark classes (targets)", "landmark_classes", None),
+        ("Rivals (scenes), by reference", "rival_reference", None),
     )
-    for title, counts, order in by_task:
-        if counts:
+    for title, name, order in by_task:
+        if counts := corpus_statistics.metadata_counts(instructions, name):
             yield _count_table(title, "task", counts, [*every_task()], order or _found(counts))
 
 

@@ -10,6 +10,7 @@ import functools
 import operator
 from collections import defaultdict
 from collections.abc import Collection, Iterable, Iterator, Sequence
+from functools import partial
 from pathlib import Path
 from typing import NamedTuple
 
@@ -118,8 +119,5 @@ def _named(name: str, split: str) -> NamedEpisodes | None:
 
 def with_failures(results: Iterable[Summary]) -> list[Summary]:
     """Return results in which errors are failures: what a policy broke, it did not do."""
-    return [_as_failure(one) if one.outcome == "error" else one for one in results]
-
-
-def _as_failure(result: Summary) -> Summary:
-    return msgspec.structs.replace(result, outcome="failure", error=None, attribution=None)
+    failed = partial(msgspec.structs.replace, outcome="failure", error=None, attribution=None)
+    return [failed(one) if one.outcome == "error" else one for one in results]

@@ -19,7 +19,7 @@ from roboirg.evaluation.analysis.stats.cells import (
     clustered_interval,
     gather,
 )
-from roboirg.evaluation.analysis.stats.intervals import SEED
+from roboirg.evaluation.analysis.stats.intervals import ALPHA, SEED
 from roboirg.evaluation.analysis.stats.option_labels import (
     has_default_options,
     setting_sort_key,
@@ -35,7 +35,6 @@ from roboirg.tasks.splits.private_splits import is_private
 
 Status = Literal["verified", "sampled", "unchecked", "refuted", "published"]
 STATUSES: tuple[Status, ...] = get_args(Status)
-SIGNIFICANT = 0.05
 
 
 class BoardRate(NamedTuple):
@@ -279,7 +278,7 @@ def _top(rows: Sequence[BoardRow], members: Sequence[int], setting: str) -> list
     best = max(whole, key=lambda index: rows[index].rates[setting].percent)
     others = [index for index in whole if index != best]
     p_values = holm([_p_value(rows[best], rows[index], setting) for index in others])
-    tied = [index for index, p in zip(others, p_values, strict=True) if p >= SIGNIFICANT]
+    tied = [index for index, p in zip(others, p_values, strict=True) if p >= ALPHA]
     return [best, *tied]
 
 

@@ -3,21 +3,20 @@
 from __future__ import annotations
 
 import contextlib
-import hashlib
 import json
 from pathlib import Path
 from typing import NamedTuple
 
-from roboirg.apps.leaderboard.packing import opened_run
+from roboirg.apps.leaderboard.packing import file_hash, opened_run
 from roboirg.apps.leaderboard.record_check import ReplayVerdict
 from roboirg.apps.leaderboard.run_verification import Verification, verify_run
 from roboirg.core.episode import ENVIRONMENT_VERSION
-from roboirg.core.errors import InvalidValueError, RoboIRGError
+from roboirg.core.errors import RoboIRGError
 from roboirg.core.plain_text import counted
 from roboirg.language import LANGUAGE_VERSION
 from roboirg.tasks.splits.private_splits import MissingSaltError
 from roboirg.util.atomic_write import write_atomically
-from roboirg.util.regular_file import open_regular, read_regular
+from roboirg.util.regular_file import read_regular
 
 CHECKS_FILE = "checks.json"
 _MOST_BYTES = 64_000_000
@@ -53,7 +52,7 @@ def check_pack(path: Path, site: Path, *, sample: float, workers: int) -> PackCh
         sample: share of the episodes whose actions are played, 0 to 1.
         workers: number of processes; 0 uses this one only.
     """
-    digest = _digest(path)
+    digest = file_hash(path)
     known = read_check(path, site, digest)
     if known is not None and (known.problem or known.played >= round(sample * known.records)):
         return known
@@ -72,7 +71,7 @@ def read_check(path: Path, site: Path, digest: str | None = None) -> PackCheck |
     """Return the check of a packed run by these versions that a site keeps; None without one."""
     kept = _kept(site).get(path.name)
     current = kept is not None and kept.versions == _versions()
-    return kept if current and kept and kept.pack == (digest or _digest(path)) else None
+    return kept if current and kept and kept.pack == (digest or file_hash(path)) else None
 
 
 def _summary(digest: str, found: Verification) -> PackCheck:
@@ -106,11 +105,3 @@ def _remember(path: Path, site: Path, found: PackCheck) -> None:
     kept = {**_kept(site), path.name: found}
     text = json.dumps({name: kept[name]._asdict() for name in sorted(kept)}, indent=1)
     write_atomically(site / CHECKS_FILE, text + "\n")
-
-
-def _digest(path: Path) -> str:
-    try:
-        with open_regular(path) as file:
-            return hashlib.file_digest(file, "sha256").hexdigest()
-    except OSError as error:
-        raise InvalidValueError(f"Cannot read {path}: {error.strerror}.") from error

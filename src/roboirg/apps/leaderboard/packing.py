@@ -10,6 +10,7 @@ import contextlib
 import hashlib
 import os
 import re
+import shutil
 import tempfile
 import zipfile
 from collections.abc import Iterator, Mapping
@@ -92,7 +93,7 @@ def pack_run(folder: Path, out: Path, *, videos: bool = False, logs: bool = Fals
         package_version=__version__,
         records=len(entries),
         policies=tuple(sorted({one.policy for one in entries})),
-        files={name: _hash(path) for name, path in paths.items()},
+        files={name: file_hash(path) for name, path in paths.items()},
     )
     with replacing(out) as part, zipfile.ZipFile(part, "w", zipfile.ZIP_DEFLATED) as archive:
         archive.writestr(zipfile.ZipInfo(MANIFEST, _EPOCH), manifest.model_dump_json(indent=1))
@@ -101,8 +102,8 @@ def pack_run(folder: Path, out: Path, *, videos: bool = False, logs: bool = Fals
             # Actions and videos are compressed already.
             packed = name.endswith((".npz", ".mp4", ".jpg"))
             entry.compress_type = zipfile.ZIP_STORED if packed else zipfile.ZIP_DEFLATED
-            with archive.open(entry, "w", force_zip64=True) as target:
-                target.writelines(_blocks(path))
+            with path.open("rb") as file, archive.open(entry, "w", force_zip64=True) as target:
+                shutil.copyfileobj(file, target, _BLOCK)
     return manifest
 
 
@@ -179,17 +180,14 @@ def _safe(name: str, path: Path) -> str:
     return name
 
 
-def _hash(path: Path) -> str:
-    digest = hashlib.sha256()
-    for block in _blocks(path):
-        digest.update(block)
-    return digest.hexdigest()
+def file_hash(path: Path) -> str:
+    """Return the SHA-256 of a file, in hexadecimal.
 
-
-def _blocks(path: Path) -> Iterator[bytes]:
+    Raises:
+        InvalidValueError: it cannot be read.
+    """
     try:
-        with path.open("rb") as file:
-            while block := file.read(_BLOCK):
-                yield block
+        with open_regular(path) as file:
+            return hashlib.file_digest(file, "sha256").hexdigest()
     except OSError as error:
         raise InvalidValueError(f"Cannot read {path}: {error.strerror}.") from error

@@ -28,11 +28,6 @@ def save_trained(content: Mapping[str, Any], path: Path) -> None:
         raise InvalidValueError(f"Cannot write {path}: {error}.") from error
 
 
-def save_unfinished(content: Mapping[str, Any], made_of: object, path: Path) -> None:
-    """Write what was learned on the way, with what it was made of."""
-    save_trained({**content, "made_of": made_of}, path)
-
-
 def load_unfinished(path: Path, made_of: object) -> dict[str, Any] | None:
     """Return what was learned on the way; None unless it was made of the same."""
     try:

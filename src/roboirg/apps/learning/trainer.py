@@ -11,7 +11,7 @@ from typing import Any, Generic, NamedTuple, Protocol, TypeVar
 import torch
 from torch import nn
 
-from roboirg.apps.learning.trained_file import load_unfinished, save_unfinished
+from roboirg.apps.learning.trained_file import load_unfinished, save_trained
 
 BATCH = 32
 One = TypeVar("One")
@@ -36,9 +36,9 @@ class KeptTraining(NamedTuple):
     made_of: object
 
 
-def batch_count(lessons: Sequence[object], size: int = BATCH) -> int:
+def batch_count(lessons: Sequence[object]) -> int:
     """Return the number of batches of lessons."""
-    return math.ceil(len(lessons) / size)
+    return math.ceil(len(lessons) / BATCH)
 
 
 def batches(lessons: Sequence[One], rng: random.Random, size: int = BATCH) -> Iterator[list[One]]:
@@ -92,8 +92,8 @@ class Trainer(Generic[One]):
         passes: int,
         batches: Callable[[int], Iterable[Sequence[One]]],
         show: Callable[[int, int, str], None],
+        kept: KeptTraining,
         score: Callable[[], Mapping[str, float]] = dict,
-        kept: KeptTraining | None = None,
     ) -> list[dict[str, float]]:
         """Learn in several passes, or go on where a training that was kept ended.
 
@@ -103,15 +103,15 @@ class Trainer(Generic[One]):
             passes: how many.
             batches: of a pass, by its number from 0.
             show: called after each pass with its number from 1, with all, and how well it goes.
-            score: how good the network is now.
             kept: where the training is kept.
+            score: how good the network is now.
         """
         parts: dict[str, Any] = {
             "net": self._net,
             "optimizer": self._optimizer,
             "schedule": self._schedule,
         }
-        state = None if kept is None else load_unfinished(kept.path, kept.made_of)
+        state = load_unfinished(kept.path, kept.made_of)
         found: list[dict[str, float]] = []
         if state is not None and "found" in state:
             for name, part in parts.items():
@@ -123,10 +123,9 @@ class Trainer(Generic[One]):
             self._net.eval()
             with torch.no_grad():
                 found.append({"loss": loss, **score()})
-            if kept is not None:
-                state = {name: part.state_dict() for name, part in parts.items()}
-                state |= {"random": torch.get_rng_state(), "found": found}
-                save_unfinished(state, kept.made_of, kept.path)
+            state = {name: part.state_dict() for name, part in parts.items()}
+            state |= {"random": torch.get_rng_state(), "found": found, "made_of": kept.made_of}
+            save_trained(state, kept.path)
             note = ", ".join(f"{name} {value:.3f}" for name, value in found[-1].items())
             show(number + 1, passes, note)
         self._net.eval()

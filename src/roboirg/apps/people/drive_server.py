@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import functools
 import secrets
 import threading
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import msgspec
 from starlette.exceptions import HTTPException
@@ -16,14 +15,11 @@ from starlette.routing import Route
 
 from roboirg.apps.people.driving_run import drive_episode, next_seed
 from roboirg.apps.people.driving_session import DrivingSession
-from roboirg.apps.people.listen_server import PACKAGE
+from roboirg.apps.people.listen_server import people_template
 from roboirg.evaluation.records.record import Job
 from roboirg.util.web.keyed_pages import KeyedPageServer, json_endpoint, page_response
-from roboirg.util.web.page_templates import check_page_support, template_environment
+from roboirg.util.web.page_templates import check_page_support
 from roboirg.util.web.request_origin import LOOPBACK
-
-if TYPE_CHECKING:
-    import jinja2
 
 STYLES = ("base", "people", "drive")
 
@@ -122,10 +118,5 @@ def _media(content: bytes | None, content_type: str) -> Response:
     return Response(content, media_type=content_type)
 
 
-@functools.cache
-def _template() -> jinja2.Template:
-    return template_environment(PACKAGE).get_template("drive.html.j2")
-
-
 def _render(nonce: str) -> str:
-    return _template().render(nonce=nonce, styles=STYLES)
+    return people_template("drive.html.j2").render(nonce=nonce, styles=STYLES)

@@ -50,7 +50,6 @@ class DrivingPolicy:
     def __init__(self, session: DrivingSession) -> None:
         self._session = session
         self._pose: NDArray[np.float64] | None = None
-        self._seen: Observation | None = None
 
     def reset(self, instruction: str, demonstration: Demonstration) -> None:
         """Show the video and the first words."""
@@ -70,7 +69,6 @@ class DrivingPolicy:
         Raises:
             DrivingStoppedError: the person, or the server, has stopped.
         """
-        self._seen = observation
         if self._pose is None:
             self._pose = np.array(observation["end_effector"], dtype=np.float64)
         self._session.show_pictures({one: observation[f"{one}_rgb"] for one in CAMERAS})  # type: ignore[literal-required]
@@ -78,7 +76,7 @@ class DrivingPolicy:
             self._session.tell(height_cm=round(100 * float(self._pose[2]), 1))
             wanted = self._session.wait_command()
             try:
-                rows = self._rows(wanted)
+                rows = self._rows(wanted, self._pose.copy(), observation)
                 self._check_reach(rows[-1])
             except (InvalidValueError, MotionPlanningError) as error:
                 self._session.tell(message=f"Nothing moved: {error}")
@@ -88,19 +86,20 @@ class DrivingPolicy:
                 self._session.tell(gripper="open" if wanted["grip"] == "open" else "closed")
             return rows
 
-    def _rows(self, wanted: Mapping[str, Any]) -> NDArray[np.float64]:
-        """Return the way points of a command."""
-        pose = self._known_pose().copy()
+    def _rows(
+        self, wanted: Mapping[str, Any], pose: NDArray[np.float64], seen: Observation
+    ) -> NDArray[np.float64]:
+        """Return the way points of a command, given at a pose, which changes to the commanded."""
         grip, count = LEAVE, 1
         match wanted:
             case {"move": [x, y, z]}:
                 pose[:3] += [_number(one, MOST_STEP) for one in (x, y, z)]
             case {"turn": angle}:
-                pose[5] = _wrapped(pose[5] + _number(angle, math.pi))
+                pose[5] = math.remainder(pose[5] + _number(angle, math.pi), 2 * math.pi)
             case {"height": meters}:
                 pose[2] = _number(meters, HIGHEST)
             case {"point": [x, y]}:
-                pose[:2] = self._point_below(_number(x, 255), _number(y, 255))[:2]
+                pose[:2] = _point_below(seen, _number(x, 255), _number(y, 255))[:2]
                 pose[2] = CARRY
             case {"grip": "open" | "close" as how}:
                 grip = GRIPS[how]
@@ -110,19 +109,6 @@ class DrivingPolicy:
                 raise InvalidValueError("there is no such command.")
         pose[2] = min(max(pose[2], LOWEST), HIGHEST)
         return np.tile(np.append(pose, grip), (count, 1))
-
-    def _point_below(self, x: float, y: float) -> NDArray[np.float64]:
-        """Return the point of the world that a pixel of the front picture shows, m."""
-        seen = self._seen
-        if seen is None:
-            raise RuntimeError("There is no observation.")
-        depth = float(seen["front_depth"][int(y), int(x), 0]) / 1000
-        if depth <= 0:
-            raise InvalidValueError("there is nothing to point at.")
-        direction = np.linalg.solve(seen["front_intrinsic"], [int(x) + 0.5, int(y) + 0.5, 1.0])
-        matrix = np.asarray(seen["front_extrinsic"], dtype=np.float64)
-        point = matrix[:, :3].T @ (depth * direction - matrix[:, 3])
-        return np.asarray(point, dtype=np.float64)
 
     def _check_reach(self, row: NDArray[np.float64]) -> None:
         """Raise if the arm does not get there: the episode would fail."""
@@ -140,10 +126,16 @@ class DrivingPolicy:
         except MotionPlanningError as error:
             raise InvalidValueError("the arm cannot reach that pose.") from error
 
-    def _known_pose(self) -> NDArray[np.float64]:
-        if self._pose is None:
-            raise RuntimeError("The pose is known once there is an observation.")
-        return self._pose
+
+def _point_below(seen: Observation, x: float, y: float) -> NDArray[np.float64]:
+    """Return the point of the world that a pixel of the front picture shows, m."""
+    depth = float(seen["front_depth"][int(y), int(x), 0]) / 1000
+    if depth <= 0:
+        raise InvalidValueError("there is nothing to point at.")
+    direction = np.linalg.solve(seen["front_intrinsic"], [int(x) + 0.5, int(y) + 0.5, 1.0])
+    matrix = np.asarray(seen["front_extrinsic"], dtype=np.float64)
+    point = matrix[:, :3].T @ (depth * direction - matrix[:, 3])
+    return np.asarray(point, dtype=np.float64)
 
 
 def _number(value: object, most: float) -> float:
@@ -151,8 +143,3 @@ def _number(value: object, most: float) -> float:
     if isinstance(value, bool) or not isinstance(value, int | float) or not abs(value) <= most:
         raise InvalidValueError(f"{value!r} is not a number up to {most:g}.")
     return float(value)
-
-
-def _wrapped(angle: float) -> float:
-    """Return an angle between minus pi and pi."""
-    return math.remainder(angle, 2 * math.pi)

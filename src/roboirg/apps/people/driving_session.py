@@ -38,6 +38,7 @@ class DrivingSession:
         caption: what was said so far; unused, as `say` gets it.
         longest_caption, point: unused.
         env: the environment, once it is there.
+        video: an MP4 file; None without one.
     """
 
     phase: str = "loading"
@@ -55,7 +56,7 @@ class DrivingSession:
             "steps": 0, "gripper": "open", "height_cm": None, "pictures": 0,
         }  # fmt: skip
         self._pictures: dict[str, bytes] = {}
-        self._video: bytes | None = None
+        self.video: bytes | None = None
         self._command: Mapping[str, Any] | None = None
         self._stopped = False
 
@@ -72,23 +73,25 @@ class DrivingSession:
         encoded = {name: encode_jpeg(pixels) for name, pixels in pictures.items()}
         with self._news:
             self._pictures = encoded
-            self._tell(pictures=self._shown["pictures"] + 1)
+            self.tell(pictures=self._shown["pictures"] + 1)
 
     def begin(self, words: str, video: bytes | None) -> None:
         """Show the first words, and the video that comes before the policy's turn."""
         with self._news:
-            self._video = video
-            self._tell(heard=[words], video=video is not None)
+            self.video = video
+            self.tell(heard=[words], video=video is not None)
 
     def say(self, text: str) -> None:
         """Show what has just been said."""
         with self._news:
-            self._tell(heard=[*self._shown["heard"], text])
+            self.tell(heard=[*self._shown["heard"], text])
 
     def tell(self, **shown: object) -> None:
         """Show something else: a message, the gripper, the height."""
         with self._news:
-            self._tell(**shown)
+            self._shown.update(shown)
+            self._version += 1
+            self._news.notify_all()
 
     def finish(self, record: Record) -> None:
         """Show the verdict, why, and what was meant."""
@@ -100,13 +103,11 @@ class DrivingSession:
             "meant": record.command,
             "steps": record.steps,
         }
-        with self._news:
-            self._tell(phase="over", verdict=verdict, message=None)
+        self.tell(phase="over", verdict=verdict, message=None)
 
     def fail(self, message: str) -> None:
         """Show that the episode cannot be played."""
-        with self._news:
-            self._tell(phase="failed", message=message)
+        self.tell(phase="failed", message=message)
 
     def stop(self) -> None:
         """End the episode without a verdict."""
@@ -120,7 +121,7 @@ class DrivingSession:
             if self._shown["phase"] != "driving":
                 return False
             self._command = wanted
-            self._tell(phase="moving", message=None)
+            self.tell(phase="moving", message=None)
             return True
 
     def wait_command(self) -> Mapping[str, Any]:
@@ -130,7 +131,7 @@ class DrivingSession:
             DrivingStoppedError: nothing more, ever.
         """
         with self._news:
-            self._tell(phase="driving")
+            self.tell(phase="driving")
             self._news.wait_for(lambda: self._command is not None or self._stopped)
             if self._stopped or self._command is None:
                 raise DrivingStoppedError
@@ -147,13 +148,3 @@ class DrivingSession:
         """Return the newest picture of a camera, a JPEG file."""
         with self._news:
             return self._pictures.get(camera)
-
-    @property
-    def video(self) -> bytes | None:
-        """The video, an MP4 file; None without one."""
-        return self._video
-
-    def _tell(self, **shown: object) -> None:
-        self._shown.update(shown)
-        self._version += 1
-        self._news.notify_all()

@@ -22,7 +22,6 @@ from roboirg.util.web.request_origin import LOOPBACK
 if TYPE_CHECKING:
     import jinja2
 
-PACKAGE = "roboirg.apps.people"
 STYLES = ("base", "people")
 
 
@@ -111,9 +110,10 @@ def _number(body: dict[str, Any]) -> int:
 
 
 @functools.cache
-def _template() -> jinja2.Template:
-    return template_environment(PACKAGE).get_template("listen.html.j2")
+def people_template(name: str) -> jinja2.Template:
+    """Return a template of a page for people."""
+    return template_environment("roboirg.apps.people").get_template(name)
 
 
 def _render(consent: Sequence[str], nonce: str) -> str:
-    return _template().render(nonce=nonce, consent=consent, styles=STYLES)
+    return people_template("listen.html.j2").render(nonce=nonce, consent=consent, styles=STYLES)

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from pathlib import Path
-from typing import Self
 
 import msgspec
 
@@ -94,7 +93,7 @@ _decoder = msgspec.json.Decoder(ListenerEvent)
 
 
 class AnswerLog:
-    """The answers of a study, open for appending by this process only; a context manager.
+    """The answers of a study, open for appending by this process only.
 
     Args:
         folder: of the study.
@@ -126,12 +125,6 @@ class AnswerLog:
 
     def close(self) -> None:
         self._file.close()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *_exception: object) -> None:
-        self.close()
 
 
 def person_name(number: int) -> str:

@@ -19,7 +19,7 @@ import msgspec
 import numpy as np
 from pydantic import BaseModel, ConfigDict, ValidationError
 
-from roboirg.apps.people.people_listener import STUDY_FILE
+from roboirg.apps.people.people_listener import STUDY_FILE, study_content
 from roboirg.core.errors import InvalidValueError
 from roboirg.core.instruction_options import DEFAULT_DELIVERY, InstructionOptions
 from roboirg.evaluation.grounding_items.question_set import EpisodeName, ExportRequest
@@ -231,16 +231,12 @@ def read_listening_study(folder: Path) -> ListeningStudy:
     Raises:
         InvalidValueError: there is none, or it is of another version.
     """
-    path = folder / STUDY_FILE
     try:
-        return ListeningStudy.model_validate_json(path.read_bytes())
-    except OSError as error:
-        raise InvalidValueError(
-            f"{str(folder)!r} holds no study of listeners ({error.strerror}: {path}); make one "
-            "with: roboirg listen plan."
-        ) from error
+        return ListeningStudy.model_validate_json(study_content(folder))
     except ValidationError as error:
-        raise InvalidValueError(f"{path} is not a study of this version ({error}).") from error
+        raise InvalidValueError(
+            f"{folder / STUDY_FILE} is not a study of this version ({error})."
+        ) from error
 
 
 @functools.cache

@@ -44,7 +44,7 @@ class PeopleListener(ScriptedPolicy):
 
     def __init__(self, folder: Path, seed: int = 0) -> None:
         super().__init__(seed)
-        self.version = study_version(folder)
+        self.version = f"study {short_hash(study_content(folder))}"
         self._folder = folder
         self._answer: PersonAnswered | None = None
         self._person = 0
@@ -87,15 +87,15 @@ class PeopleListener(ScriptedPolicy):
         )
 
 
-def study_version(folder: Path) -> str:
-    """Return a fingerprint of a study.
+def study_content(folder: Path) -> bytes:
+    """Return the file of a study.
 
     Raises:
         InvalidValueError: the folder holds none.
     """
     path = folder / STUDY_FILE
     try:
-        return f"study {short_hash(path.read_bytes())}"
+        return path.read_bytes()
     except OSError as error:
         raise InvalidValueError(
             f"{str(folder)!r} holds no study of listeners ({error.strerror}: {path}); make one "

@@ -24,8 +24,9 @@ from roboirg.apps.policy_check.policy_player import (
     SyntheticRollout,
     are_equal,
     describe_difference,
+    largest_difference,
 )
-from roboirg.apps.policy_check.turn_check import largest_difference, play_in_turns
+from roboirg.apps.policy_check.turn_check import play_in_turns
 from roboirg.core.actions import check_chunk
 from roboirg.core.errors import MissingDependencyError, RoboIRGError
 from roboirg.core.plain_text import counted, verb_for
@@ -127,7 +128,7 @@ def check_inputs(player: PolicyPlayer) -> Iterator[CheckResult]:
     """Check that what the policy is given stays as it is."""
     episode = player.with_video
     given = copy.deepcopy(episode)
-    player.play_in_place("inputs unchanged", given)
+    player.play("inputs unchanged", given, in_place=True)
     changed = _first_difference(
         (episode.demonstration, episode.first), (given.demonstration, given.first)
     )
@@ -201,7 +202,7 @@ def check_turns(player: PolicyPlayer) -> Iterator[CheckResult]:
             shared = play_in_turns(spec, player.seed, episodes, together=together)
         except Exception as error:
             raise CheckAbortedError(check, FAIL, describe_error(error)) from error
-        difference = largest_difference(alone, shared)
+        difference = max(map(largest_difference, alone, shared))
         if difference == 0:
             yield CheckResult(
                 check, PASS, f"Two episodes {how} have the same actions as each alone."

@@ -23,6 +23,7 @@ from roboirg.policies.contract.policy_urls import is_url
 CALLS = 3
 """Calls of `act` in a synthetic episode."""
 VIDEO_STEPS = 40
+Chunks = list[NDArray[np.float64]]
 FIRST, SECOND = "Put the red cube on the target.", "Press the second button from the left."
 
 
@@ -35,7 +36,7 @@ class SyntheticRollout(NamedTuple):
         dtype: of the last answer.
     """
 
-    chunks: list[NDArray[np.float64]]
+    chunks: Chunks
     seconds: list[float]
     dtype: str
 
@@ -107,6 +108,7 @@ class PolicyPlayer:
         fresh: bool = True,
         changed: Sequence[str] = (),
         calls: int = CALLS,
+        in_place: bool = False,
     ) -> SyntheticRollout:
         """Play some calls of a copy of an episode, which the policy may change.
 
@@ -116,24 +118,12 @@ class PolicyPlayer:
             fresh: whether to make the policy anew, if it is a spec.
             changed: fields of later observations that are drawn differently.
             calls: of `act`.
+            in_place: whether to play the episode itself.
 
         Raises:
             CheckAbortedError: the policy raised, or gave no actions.
         """
-        return self.play_in_place(
-            check, copy.deepcopy(episode), fresh=fresh, changed=changed, calls=calls
-        )
-
-    def play_in_place(
-        self,
-        check: str,
-        episode: SyntheticEpisode,
-        *,
-        fresh: bool = True,
-        changed: Sequence[str] = (),
-        calls: int = CALLS,
-    ) -> SyntheticRollout:
-        """Play some calls of an episode itself; see `play`."""
+        episode = episode if in_place else copy.deepcopy(episode)
         policy = self.reset(check, episode, fresh=fresh)
         episodes, observation = self.make_episodes(changed=changed), episode.first
         rollout = SyntheticRollout([], [], "")
@@ -158,7 +148,7 @@ class PolicyPlayer:
 
     def ask(
         self, instruction: str, demonstration: Demonstration, observations: Sequence[Observation]
-    ) -> list[NDArray[np.float64]]:
+    ) -> Chunks:
         """Return a fresh policy's answers to given observations; its errors are not caught."""
         policy = self.make_fresh()
         policy.reset(instruction, demonstration)
@@ -199,9 +189,15 @@ def are_equal(one: SyntheticRollout, other: SyntheticRollout) -> bool:
     )
 
 
+def largest_difference(one: Chunks, other: Chunks) -> float:
+    """Return the largest difference of actions; infinite if their number differs."""
+    pairs = list(zip(one, other, strict=True))
+    if any(first.shape != second.shape for first, second in pairs):
+        return np.inf
+    return max(float(np.abs(first - second).max()) for first, second in pairs)
+
+
 def describe_difference(one: SyntheticRollout, other: SyntheticRollout) -> str:
     """Return the largest difference of two rollouts, in words."""
-    pairs = list(zip(one.chunks, other.chunks, strict=True))
-    if any(first.shape != second.shape for first, second in pairs):
-        return "the number of actions"
-    return f"{max(float(np.abs(first - second).max()) for first, second in pairs):.3g}"
+    difference = largest_difference(one.chunks, other.chunks)
+    return "the number of actions" if difference == np.inf else f"{difference:.3g}"

@@ -28,13 +28,11 @@ class SyntheticEpisode(NamedTuple):
         instruction: the text.
         demonstration: the video, T steps.
         first: the first observation.
-        size: control steps in the video.
     """
 
     instruction: str
     demonstration: dict[str, Any]
     first: Observation
-    size: int
 
 
 class SyntheticEpisodes:
@@ -70,7 +68,7 @@ class SyntheticEpisodes:
         first = self._observation(instruction)
         if self._every is not None:
             first["history"] = ()
-        return SyntheticEpisode(instruction, video, cast("Observation", first), size)
+        return SyntheticEpisode(instruction, video, cast("Observation", first))
 
     def after(self, episode: SyntheticEpisode, steps: int) -> Observation:
         """Return an observation `steps` control steps later."""

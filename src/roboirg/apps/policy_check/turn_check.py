@@ -6,18 +6,13 @@ import copy
 from collections.abc import Sequence
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
+from roboirg.apps.policy_check.policy_player import CALLS, Chunks
 from roboirg.apps.policy_check.synthetic_episodes import SyntheticEpisode
 from roboirg.core.actions import check_chunk
 from roboirg.policies.by_name.loading import make_policy
 from roboirg.policies.contract.base import close_policy
 from roboirg.policies.contract.policy_needs import PolicyNeeds
 from roboirg.policies.contract.random_state import RandomState
-
-CALLS = 3
-Chunks = list[NDArray[np.float64]]
 
 
 def play_in_turns(
@@ -53,15 +48,3 @@ def play_in_turns(
     finally:
         for policy in policies:
             close_policy(policy)
-
-
-def largest_difference(one: Sequence[Chunks], other: Sequence[Chunks]) -> float:
-    """Return the largest difference of actions; infinite if their number differs."""
-    pairs = [
-        (first, second)
-        for a, b in zip(one, other, strict=True)
-        for first, second in zip(a, b, strict=True)
-    ]
-    if any(first.shape != second.shape for first, second in pairs):
-        return np.inf
-    return max(float(np.abs(first - second).max()) for first, second in pairs)

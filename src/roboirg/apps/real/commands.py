@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from roboirg.cli.run_commands import INTERRUPTED, USAGE_ERROR
 from roboirg.core.plain_text import counted
 
 if TYPE_CHECKING:
@@ -16,8 +17,6 @@ if TYPE_CHECKING:
     from roboirg.apps.real.study.study_run import Study
 
 # Heavy modules are imported inside the commands, so that --help is fast.
-
-USAGE_ERROR, INTERRUPTED = 2, 130
 
 real_app = typer.Typer(
     name="real",
@@ -122,6 +121,7 @@ def run(
 
     Example: roboirg real run study --robot twin
     """
+    from roboirg.apps.real.control.control_loop import never
     from roboirg.apps.real.control.limits import read_limits
     from roboirg.apps.real.control.robot import JudgingRobot
     from roboirg.apps.real.control.robot_loading import make_robot
@@ -139,7 +139,7 @@ def run(
         device,
         read_limits(limits),
         select_scorer(score, device),
-        (lambda: False) if isinstance(device, JudgingRobot) else console.stop_requested,
+        never if isinstance(device, JudgingRobot) else console.stop_requested,
         console.report,
     )
     _play(study, console, policy or [], retry=retry_errors)

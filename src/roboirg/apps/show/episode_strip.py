@@ -12,13 +12,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from roboirg.evaluation.analysis.figures.figure_style import PAGE_INCHES
+from roboirg.util.media import CONTROL_RATE
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 PER_ROW = 6
 """Moments per row."""
-STEPS_PER_SECOND = 20
 
 _EDGE, _GAP = 0.08, 0.06
 _TITLE, _LINE = 0.26, 0.135
@@ -102,7 +102,7 @@ def draw_strip(title: str, said: Sequence[SpokenSetting], moments: Sequence[Stri
             axes.text(0.03, 0.04, "robot's right", transform=axes.transAxes, **_SIDE)
             axes.text(0.97, 0.04, "robot's left", transform=axes.transAxes, ha="right", **_SIDE)
         y += size + _GAP
-        when = f"{moment.step / STEPS_PER_SECOND:.1f} s"
+        when = f"{moment.step / CONTROL_RATE:.1f} s"
         when += ", video" if moment.is_demonstration else ""
         color = _VIDEO if moment.is_demonstration else _PALE
         write(x, y, when, fontsize=6, color=color, fontweight="bold")

@@ -23,8 +23,6 @@ from roboirg.reader import interpret
 MINIMUM_WIDTH = 100
 """Columns if the output is not a terminal."""
 
-_RELATIONS = {"placed": "placed on", "binned": "in", "stopped": "stopped on", "hovering": "over"}
-
 
 def print_episode(
     episode: Episode, settings: Sequence[str], options: InstructionOptions, console: Console

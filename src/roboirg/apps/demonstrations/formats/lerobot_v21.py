@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import json
-import zipfile
 from collections.abc import Iterable, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -16,23 +16,22 @@ from roboirg.apps.demonstrations.dataset_part import (
     episode_row,
     read_episodes,
 )
-from roboirg.apps.demonstrations.export_plan import ExportPlan
 from roboirg.apps.demonstrations.formats.lerobot_v3 import (
     INFO,
     ROBOT,
+    StatsCollector,
     count_frames,
-    episode_stats,
     frame_columns,
     make_parts,
     own_columns,
-    total_stats,
     write_json,
+    write_videos,
 )
 from roboirg.apps.demonstrations.frame_columns import FrameColumns
 from roboirg.apps.demonstrations.parquet_tables import write_frames, write_rows
-from roboirg.apps.demonstrations.picture_coding import FRAME_RATE
-from roboirg.apps.demonstrations.trajectory import PictureFile, load_trajectory
+from roboirg.apps.demonstrations.trajectory import load_trajectory
 from roboirg.util.atomic_write import write_atomically
+from roboirg.util.media import CONTROL_RATE
 
 __all__ = ["finish", "make_parts", "write_part"]
 
@@ -50,30 +49,21 @@ def write_part(part: DatasetPart) -> None:
     pictures = [] if columns.has_videos else [columns.keys[one] for one in columns.cameras]
     for placed in episode.texts:
         if columns.has_videos:
-            _write_videos(part, placed.episode_index)
+            write_videos(part, partial(_VIDEO.format, **_place(placed.episode_index)))
         own = own_columns(columns, trajectory, placed, length)
         order = [name for name in columns.features() if name in shared or name in own]
         path = part.root / _DATA.format(**_place(placed.episode_index))
         write_frames(path, order, shared, [own], pictures, columns.features())
 
 
-def _write_videos(part: DatasetPart, episode_index: int) -> None:
-    with zipfile.ZipFile(part.episodes[0].path) as archive:
-        for camera in part.columns.cameras:
-            key = part.columns.keys[camera]
-            path = part.root / _VIDEO.format(video_key=key, **_place(episode_index))
-            path.parent.mkdir(parents=True, exist_ok=True)
-            write_atomically(path, PictureFile(archive).video(part.columns.video(camera)))
-
-
 def _place(episode_index: int) -> dict[str, int]:
     return {"episode_chunk": episode_index // CHUNK_SIZE, "episode_index": episode_index}
 
 
-def finish(plan: ExportPlan, root: Path, parts: Sequence[DatasetPart]) -> None:
+def finish(root: Path, parts: Sequence[DatasetPart]) -> None:
     """Write the metadata; ``info.json``, without which nothing reads the dataset, comes last."""
-    del plan
     columns = parts[0].columns
+    collector = StatsCollector(columns)
     episodes, stats, facts = [], [], []
     for _, episode, trajectory in read_episodes(parts):
         length = len(columns.rows(trajectory.facts))
@@ -81,7 +71,7 @@ def finish(plan: ExportPlan, root: Path, parts: Sequence[DatasetPart]) -> None:
             index = placed.episode_index
             tasks = [placed.words.text]
             episodes.append({"episode_index": index, "tasks": tasks, "length": length})
-            own = episode_stats(columns, trajectory, placed)
+            own = collector.add(trajectory, placed)
             stats.append({"episode_index": index, "stats": own})
             facts.append(episode_row(trajectory, placed, length))
     texts = all_texts(parts)
@@ -90,7 +80,7 @@ def finish(plan: ExportPlan, root: Path, parts: Sequence[DatasetPart]) -> None:
     _write_lines(root / "meta/episodes.jsonl", episodes)
     _write_lines(root / "meta/episodes_stats.jsonl", stats)
     _write_lines(root / "meta/tasks.jsonl", tasks_lines)
-    write_json(root / "meta/stats.json", total_stats(parts))
+    write_json(root / "meta/stats.json", collector.result())
     write_json(root / "meta/modality.json", modality(columns))
     write_json(root / INFO, _info(columns, parts, len(texts)))
 
@@ -123,7 +113,7 @@ def _info(columns: FrameColumns, parts: Sequence[DatasetPart], texts: int) -> di
         "total_videos": count * len(columns.cameras) if columns.has_videos else 0,
         "total_chunks": (count - 1) // CHUNK_SIZE + 1,
         "chunks_size": CHUNK_SIZE,
-        "fps": FRAME_RATE,
+        "fps": CONTROL_RATE,
         "splits": {"train": f"0:{count}"},
         "data_path": _DATA,
         "video_path": _VIDEO if columns.has_videos else None,
@@ -132,5 +122,4 @@ def _info(columns: FrameColumns, parts: Sequence[DatasetPart], texts: int) -> di
 
 
 def _write_lines(path: Path, lines: Iterable[object]) -> None:
-    path.parent.mkdir(parents=True, exist_ok=True)
     write_atomically(path, "".join(f"{json.dumps(one)}\n" for one in lines))

@@ -5,7 +5,8 @@ from __future__ import annotations
 import json
 import zipfile
 from collections import defaultdict
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -26,7 +27,7 @@ from roboirg.apps.demonstrations.dataset_part import (
 )
 from roboirg.apps.demonstrations.export_plan import ExportPlan
 from roboirg.apps.demonstrations.feature_stats import FeatureStats, vector_stats
-from roboirg.apps.demonstrations.frame_columns import FrameColumns, PlacedText, video_path
+from roboirg.apps.demonstrations.frame_columns import FrameColumns, PlacedText
 from roboirg.apps.demonstrations.parquet_tables import (
     number_column,
     picture_column,
@@ -34,9 +35,9 @@ from roboirg.apps.demonstrations.parquet_tables import (
     write_frames,
     write_rows,
 )
-from roboirg.apps.demonstrations.picture_coding import FRAME_RATE
-from roboirg.apps.demonstrations.trajectory import PictureFile, Trajectory, load_trajectory
-from roboirg.util.atomic_write import write_atomically
+from roboirg.apps.demonstrations.trajectory import Trajectory, load_trajectory
+from roboirg.util.atomic_write import replacing, write_atomically
+from roboirg.util.media import CONTROL_RATE
 
 INFO = "meta/info.json"
 ROBOT = "panda"
@@ -61,11 +62,7 @@ def write_part(part: DatasetPart) -> None:
     trajectory = load_trajectory(episode.path)
     chunk, file = part.place
     if columns.has_videos:
-        with zipfile.ZipFile(trajectory.path) as archive:
-            for camera in columns.cameras:
-                path = video_path(part.root, columns.keys[camera], chunk, file)
-                path.parent.mkdir(parents=True, exist_ok=True)
-                write_atomically(path, PictureFile(archive).video(columns.video(camera)))
+        write_videos(part, partial(_VIDEO.format, chunk_index=chunk, file_index=file))
     shared = frame_columns(columns, trajectory)
     length = len(columns.rows(trajectory.facts))
     own = [own_columns(columns, trajectory, placed, length) for placed in episode.texts]
@@ -73,6 +70,14 @@ def write_part(part: DatasetPart) -> None:
     order = [name for name in info_features(columns) if name in shared or name in own[0]]
     path = part.root / _DATA.format(chunk_index=chunk, file_index=file)
     write_frames(path, order, shared, own, pictures)
+
+
+def write_videos(part: DatasetPart, name_of: Callable[..., str]) -> None:
+    """Write the videos of a part's one trajectory; `name_of` gets the column, `video_key`."""
+    with zipfile.ZipFile(part.episodes[0].path) as archive:
+        for camera in part.columns.cameras:
+            path = part.root / name_of(video_key=part.columns.keys[camera])
+            write_atomically(path, archive.read(part.columns.video(camera)))
 
 
 def frame_columns(columns: FrameColumns, trajectory: Trajectory) -> dict[str, Any]:
@@ -104,11 +109,10 @@ def info_features(columns: FrameColumns) -> dict[str, dict[str, Any]]:
     return found
 
 
-def finish(plan: ExportPlan, root: Path, parts: Sequence[DatasetPart]) -> None:
+def finish(root: Path, parts: Sequence[DatasetPart]) -> None:
     """Write the metadata; ``info.json``, without which nothing reads the dataset, comes last."""
-    del plan
     columns = parts[0].columns
-    stats = _StatsCollector(columns)
+    stats = StatsCollector(columns)
     episodes, facts = [], []
     for part, episode, trajectory in read_episodes(parts):
         for placed in episode.texts:
@@ -124,7 +128,7 @@ def finish(plan: ExportPlan, root: Path, parts: Sequence[DatasetPart]) -> None:
     write_json(root / INFO, _info(columns, parts, texts))
 
 
-class _StatsCollector:
+class StatsCollector:
     """Collects the statistics of single episodes and of all."""
 
     def __init__(self, columns: FrameColumns) -> None:
@@ -153,22 +157,6 @@ class _StatsCollector:
         return self._columns.stats(self._numbers, self._counts)
 
 
-def episode_stats(
-    columns: FrameColumns, trajectory: Trajectory, placed: PlacedText
-) -> dict[str, FeatureStats]:
-    """Return the statistics of one episode."""
-    return _StatsCollector(columns).add(trajectory, placed)
-
-
-def total_stats(parts: Sequence[DatasetPart]) -> dict[str, FeatureStats]:
-    """Return the statistics of all frames."""
-    collector = _StatsCollector(parts[0].columns)
-    for _, episode, trajectory in read_episodes(parts):
-        for placed in episode.texts:
-            collector.add(trajectory, placed)
-    return collector.result()
-
-
 def _episode_entry(part: DatasetPart, placed: PlacedText, length: int) -> dict[str, Any]:
     chunk, file = part.place
     entry: dict[str, Any] = {
@@ -184,7 +172,7 @@ def _episode_entry(part: DatasetPart, placed: PlacedText, length: int) -> dict[s
         key = f"videos/{part.columns.keys[camera]}"
         entry[f"{key}/chunk_index"], entry[f"{key}/file_index"] = chunk, file
         entry[f"{key}/from_timestamp"] = 0.0
-        entry[f"{key}/to_timestamp"] = length / FRAME_RATE
+        entry[f"{key}/to_timestamp"] = length / CONTROL_RATE
     return entry | {"meta/episodes/chunk_index": 0, "meta/episodes/file_index": 0}
 
 
@@ -200,8 +188,6 @@ def _write_tasks(path: Path, texts: Sequence[str]) -> None:
     """Write the texts as pandas does with them as the index, which LeRobot expects."""
     import pyarrow as pa
     from pyarrow import parquet
-
-    from roboirg.util.atomic_write import replacing
 
     table = pa.table({"task_index": pa.array(range(len(texts)), pa.int64()), "task": list(texts)})
     described = {
@@ -235,7 +221,6 @@ def _write_tasks(path: Path, texts: Sequence[str]) -> None:
         "pandas_version": "2.0.0",
     }
     table = table.replace_schema_metadata({"pandas": json.dumps(described)})
-    path.parent.mkdir(parents=True, exist_ok=True)
     with replacing(path) as part:
         parquet.write_table(table, part)
 
@@ -254,7 +239,7 @@ def _info(
         "chunks_size": CHUNK_SIZE,
         "data_files_size_in_mb": 100,
         "video_files_size_in_mb": 200,
-        "fps": FRAME_RATE,
+        "fps": CONTROL_RATE,
         "splits": {"train": f"0:{count}"},
         "data_path": _DATA,
         "video_path": _VIDEO if columns.has_videos else None,
@@ -271,5 +256,4 @@ def count_frames(columns: FrameColumns, last: RecordedEpisode) -> tuple[int, int
 
 def write_json(path: Path, content: object) -> None:
     """Write JSON, atomically."""
-    path.parent.mkdir(parents=True, exist_ok=True)
     write_atomically(path, json.dumps(content, indent=2) + "\n")

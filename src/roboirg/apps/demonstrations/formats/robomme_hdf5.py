@@ -27,7 +27,12 @@ from roboirg.apps.demonstrations.dataset_part import (
 from roboirg.apps.demonstrations.export_plan import ExportPlan, TaskText
 from roboirg.apps.demonstrations.frame_columns import FrameColumns, PlacedText
 from roboirg.apps.demonstrations.parquet_tables import write_rows
-from roboirg.apps.demonstrations.trajectory import PictureFile, Trajectory, load_trajectory
+from roboirg.apps.demonstrations.trajectory import (
+    Trajectory,
+    load_trajectory,
+    read_depth,
+    read_picture,
+)
 from roboirg.core.extras import extra_needed
 from roboirg.core.observations import CAMERAS
 from roboirg.util.atomic_write import replacing
@@ -42,10 +47,6 @@ def check_hdf5_support() -> None:
     """Check early that HDF5 files can be written and read."""
     with extra_needed("RoboMME's format needs h5py", "demonstrations"):
         import h5py  # noqa: F401
-
-
-def file_name(task: str) -> str:
-    return f"record_dataset_{task}.h5"
 
 
 def words_of(words: TaskText) -> str:
@@ -74,16 +75,14 @@ def write_part(part: DatasetPart) -> None:
     """Write the files of one task: one, or one for each setting and form that share its steps."""
     import h5py
 
-    name = file_name(_task(part.episodes[0]))
+    name = f"record_dataset_{_task(part.episodes[0])}.h5"
     words = dict.fromkeys(words_of(one.words) for ep in part.episodes for one in ep.texts)
     is_shared = len(words) > 1
     home = part.root / SHARED_FOLDER if is_shared else part.root
-    home.mkdir(parents=True, exist_ok=True)
     with replacing(home / name) as path, h5py.File(path, "w") as file:
         for episode in part.episodes:
             _write_episode(file, episode)
     for folder in words if is_shared else ():
-        (part.root / folder).mkdir(parents=True, exist_ok=True)
         with replacing(part.root / folder / name) as path, h5py.File(path, "w") as file:
             for episode in part.episodes:
                 _link_episode(file, episode, folder, f"../{SHARED_FOLDER}/{name}")
@@ -94,9 +93,8 @@ def _write_episode(file: Any, episode: RecordedEpisode) -> None:  # noqa: ANN401
     group = file.create_group(f"episode_{trajectory.facts.episode}")
     _write_setup(group, trajectory, episode.texts[0])
     with zipfile.ZipFile(episode.path) as archive:
-        pictures = PictureFile(archive)
         for step, row in enumerate(time_steps(trajectory)):
-            _write_step(group.create_group(f"timestep_{step}"), trajectory, row, pictures)
+            _write_step(group.create_group(f"timestep_{step}"), trajectory, row, archive)
 
 
 def _link_episode(file: Any, episode: RecordedEpisode, folder: str, home: str) -> None:  # noqa: ANN401
@@ -137,15 +135,15 @@ def _write_step(
     group: Any,  # noqa: ANN401
     trajectory: Trajectory,
     row: int,
-    pictures: PictureFile,
+    archive: zipfile.ZipFile,
 ) -> None:
     seen = group.create_group("obs")
     for camera in CAMERAS:
         options = {"compression": "gzip", "compression_opts": 1}
-        seen.create_dataset(f"{camera}_rgb", data=pictures.picture(camera, row), **options)
+        seen.create_dataset(f"{camera}_rgb", data=read_picture(archive, camera, row), **options)
         if not trajectory.facts.depth:
             continue
-        seen.create_dataset(f"{camera}_depth", data=pictures.depth(camera, row), **options)
+        seen.create_dataset(f"{camera}_depth", data=read_depth(archive, camera, row), **options)
         extrinsic = trajectory.calibration[f"{camera}_extrinsic"][row]
         seen[f"{camera}_camera_extrinsic"] = extrinsic
     seen["joint_state"] = trajectory.joint_positions[row]
@@ -175,9 +173,8 @@ def _is_boundary(trajectory: Trajectory, row: int) -> bool:
     return is_first or bool(trajectory.subgoals[row] != trajectory.subgoals[before])
 
 
-def finish(plan: ExportPlan, root: Path, parts: Sequence[DatasetPart]) -> None:
+def finish(root: Path, parts: Sequence[DatasetPart]) -> None:
     """Write the table of facts."""
-    del plan
     rows = []
     for part, episode, trajectory in read_episodes(parts):
         length = len(part.columns.rows(trajectory.facts))

@@ -12,10 +12,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from roboirg.apps.demonstrations.picture_coding import FRAME_RATE
 from roboirg.apps.demonstrations.teleoperation.teleop_dataset import ACTION, STATE, TeleopDataset
 from roboirg.core.errors import InvalidValueError
 from roboirg.core.observations import CAMERAS
+from roboirg.util.media import CONTROL_RATE
 
 PLAN_FILE = "demonstrations.csv"
 FACTORS = ("target_color", "repeats")
@@ -95,8 +95,8 @@ def _matched(texts: Sequence[str], planned: Sequence[PlannedTake]) -> tuple[Plan
 def _form_problems(dataset: TeleopDataset) -> Iterator[str]:
     """Yield what is wrong with rate, cameras and names."""
     rate, root = dataset.info["fps"], dataset.root
-    if rate != FRAME_RATE:
-        yield f"The rate is {rate} frames per second, but the study plays {FRAME_RATE}."
+    if rate != CONTROL_RATE:
+        yield f"The rate is {rate} frames per second, but the study plays {CONTROL_RATE}."
     for camera in CAMERAS:
         if (name := getattr(dataset.names, camera)) not in dataset.cameras:
             yield (

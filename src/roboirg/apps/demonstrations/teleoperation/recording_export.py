@@ -26,7 +26,7 @@ from roboirg.apps.demonstrations.export_run import (
 )
 from roboirg.apps.demonstrations.teleoperation.recording_check import PlannedTake
 from roboirg.apps.demonstrations.teleoperation.teleop_dataset import ACTION, STATE, TeleopDataset
-from roboirg.apps.demonstrations.trajectory import TrajectoryFacts, TrajectoryFile, stack_texts
+from roboirg.apps.demonstrations.trajectory import TrajectoryFacts, write_arrays
 from roboirg.apps.demonstrations.trajectory_recorder import PictureTracks, RecordingSpec
 from roboirg.core.actions import ARM_JOINTS
 from roboirg.core.episode import ENVIRONMENT_VERSION, Episode
@@ -53,7 +53,7 @@ def export_recording(
         dataset: the recording.
         takes: the demonstration of each of its episodes.
         out: folder of the new dataset.
-        data_format: one of `FORMATS`.
+        data_format: its name, as in a plan.
         workers: processes; 0 uses this one.
         report: called with the progress.
     """
@@ -98,15 +98,14 @@ def _convert(
     """
     index = numbers[job]
     with replacing(job.path(folder)) as part, zipfile.ZipFile(part, "w") as archive:
-        file = TrajectoryFile(archive)
-        tracks = PictureTracks(file, job.spec)
+        tracks = PictureTracks(archive, job.spec)
         streams = [dataset.pictures(index, getattr(dataset.names, one)) for one in CAMERAS]
         for front, wrist in zip(*streams, strict=True):
             seen = {"front_rgb": scaled_square(front), "wrist_rgb": scaled_square(wrist)}
             tracks.add(seen, is_video=False)
         arrays = _arrays(dataset, index)
         arrays |= {f"{one}_histogram": counts for one, counts in tracks.histograms.items()}
-        file.finish(_facts(job, len(arrays["actions"]) - 1), arrays)
+        write_arrays(archive, _facts(job, len(arrays["actions"]) - 1), arrays)
 
 
 def _facts(job: RecordingJob, steps: int) -> TrajectoryFacts:
@@ -135,7 +134,7 @@ def _arrays(dataset: TeleopDataset, index: int) -> dict[str, NDArray[Any]]:
         "actions": actions.astype(np.float64),
         "pose_actions": np.column_stack([_poses(actions[:, :ARM_JOINTS]), actions[:, ARM_JOINTS]]),
     }
-    nothing = stack_texts([""] * len(joints))
+    nothing = np.full(len(joints), "")
     kinds = ("", "online_", "grounded_", "grounded_online_")
     return found | {f"{kind}subgoals": nothing for kind in kinds}
 

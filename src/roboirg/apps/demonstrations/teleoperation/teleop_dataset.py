@@ -12,12 +12,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from roboirg.apps.demonstrations.parquet_tables import read_rows
-from roboirg.apps.demonstrations.picture_coding import Picture
 from roboirg.core.errors import InvalidValueError
 from roboirg.policies.contract.option_checking import check_options
 from roboirg.policies.contract.policy_urls import parse_query
 from roboirg.policies.lerobot_features import LeRobotFeatures
-from roboirg.util.media import decode_png
+from roboirg.util.media import Pixels, decode_png
 from roboirg.util.parquet_support import check_parquet_support
 
 STATE, ACTION, PICTURES = "observation.state", "action", "observation.images."
@@ -61,7 +60,7 @@ class TeleopDataset:
         order = [has.index(one) for one in self.names.vector]
         return np.array(self._column(index, feature), dtype=np.float64)[:, order]
 
-    def pictures(self, index: int, camera: str) -> Iterator[Picture]:
+    def pictures(self, index: int, camera: str) -> Iterator[Pixels]:
         """Yield the pictures of an episode, RGB.
 
         Raises:
@@ -86,13 +85,13 @@ class TeleopDataset:
         found: list[Any] = parquet.read_table(path, columns=[name], filters=own)[name].to_pylist()
         return self._whole(found, index, path)
 
-    def _video(self, index: int, feature: str) -> list[Picture]:
+    def _video(self, index: int, feature: str) -> list[Pixels]:
         import av
 
         kind = f"videos/{feature}"
         path = self._path(index, kind, "video_path", video_key=feature)
         start = self.episodes[index][f"{kind}/from_timestamp"]
-        found: list[Picture] = []
+        found: list[Pixels] = []
         try:
             with av.open(str(path)) as container:
                 stream: Any = container.streams.video[0]

@@ -28,7 +28,8 @@ from inspect_ai.model import (
 from inspect_ai.scorer import Score, Scorer, Target, accuracy, grouped, scorer, stderr
 from inspect_ai.solver import Generate, Solver, TaskState, solver
 
-from roboirg.core.errors import InvalidValueError, UnknownNameError
+from roboirg.cli.names import known_name
+from roboirg.core.errors import InvalidValueError
 from roboirg.evaluation.grounding_items.answer_file import Answer
 from roboirg.evaluation.grounding_items.grounding_item import (
     QUESTION_KINDS,
@@ -63,7 +64,7 @@ def roboirg_grounding(
         InvalidValueError: the folder holds no dataset, or none of its items is selected.
         UnknownNameError: there is no such question.
     """
-    kind, folder = _known_kind(question), Path(data)
+    kind, folder = known_name("question", question, QUESTION_KINDS), Path(data)
     chosen = [
         _sample(item, kind, folder)
         for item in _items(data).values()
@@ -105,7 +106,7 @@ def ask(data: str, question: str) -> Solver:
 @scorer(metrics=[accuracy(), stderr(cluster=EPISODE), grouped(accuracy(), "setting")])
 def right(data: str, question: str) -> Scorer:
     """Score replies as `roboirg score grounding` does."""
-    kind = _known_kind(question)
+    kind = known_name("question", question, QUESTION_KINDS)
 
     async def score(state: TaskState, target: Target) -> Score:
         item, reply = _items(data)[str(state.sample_id)], state.output.completion
@@ -122,7 +123,8 @@ def right(data: str, question: str) -> Scorer:
 
 def log_answers(log: EvalLog) -> list[Answer]:
     """Return the answers of a log, for `write_answers` and `roboirg score grounding`."""
-    kind = _known_kind(str((log.eval.metadata or {}).get("question")))
+    asked = str((log.eval.metadata or {}).get("question"))
+    kind = known_name("question", asked, QUESTION_KINDS)
     return [Answer(str(sample.id), kind, sample.output.completion) for sample in log.samples or ()]
 
 
@@ -164,10 +166,3 @@ def _items(data: str) -> Mapping[str, GroundingItem]:
 
 def _selects(names: str, name: str) -> bool:
     return means_all(names) or name in parse_names("name", names)
-
-
-def _known_kind(name: str) -> QuestionKind:
-    for kind in QUESTION_KINDS:
-        if name == kind:
-            return kind
-    raise UnknownNameError("question", name, QUESTION_KINDS)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Mapping
-from typing import Any, Literal, Unpack
+from typing import Any, Unpack
 
 import gymnasium
 import numpy as np
@@ -18,8 +18,7 @@ from roboirg.envs.env_settings import MAX_STEPS
 from roboirg.envs.factory import make
 from roboirg.policies.lerobot_features import SIZE, scaled_square
 
-VideoDelivery = Literal["none", "stream", "key"]
-VIDEO_DELIVERIES: tuple[VideoDelivery, ...] = ("none", "stream", "key")
+VIDEO_DELIVERIES = ("none", "stream", "key")
 NEW_ROLLOUT = "lerobot_new_rollout"
 """Option with which LeRobot, from 0.6.1 on, marks the resets that it means."""
 LONGEST_VIDEO = 2000

@@ -8,9 +8,9 @@ from __future__ import annotations
 
 import importlib.util
 import sys
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable
 from pathlib import Path
-from types import ModuleType
+from types import ModuleType, SimpleNamespace
 
 from roboirg.core.episode import COLORS, DIFFICULTIES, Goal
 from roboirg.core.errors import InvalidValueError
@@ -25,18 +25,6 @@ SentenceFunction = Callable[[object, str], object]
 
 class SentenceError(Exception):
     """RoboMME's function gives no usable sentence for a goal; says why."""
-
-
-class StandIn:
-    """An object with the given attributes, which is its own ``env`` and ``unwrapped``.
-
-    Args:
-        attributes: name → value.
-    """
-
-    def __init__(self, attributes: Mapping[str, object]) -> None:
-        self.__dict__.update(attributes)
-        self.env = self.unwrapped = self
 
 
 def load_function(root: Path) -> SentenceFunction:
@@ -101,7 +89,7 @@ def ask(function: SentenceFunction, task: str, goal: Goal, difficulties: Iterabl
 
 def _call(function: SentenceFunction, task: str, goal: Goal, difficulty: str) -> str:
     try:
-        said = function(StandIn(attributes_of(goal, difficulty)), task)
+        said = function(stand_in(goal, difficulty), task)
     except Exception as error:
         raise SentenceError(f"{FUNCTION} raised {type(error).__name__}: {error}") from error
     first = said[0] if isinstance(said, (list, tuple)) and said else said
@@ -110,8 +98,8 @@ def _call(function: SentenceFunction, task: str, goal: Goal, difficulty: str) ->
     return first
 
 
-def attributes_of(goal: Goal, difficulty: str) -> dict[str, object]:
-    """Return what RoboMME's function reads of a task, for a goal of ours."""
+def stand_in(goal: Goal, difficulty: str) -> SimpleNamespace:
+    """Return an object with what RoboMME's function reads of a task, for a goal of ours."""
     slots = goal.as_mapping()
     found: dict[str, object] = {"difficulty": difficulty}
     if "counts" in slots:
@@ -129,4 +117,7 @@ def attributes_of(goal: Goal, difficulty: str) -> dict[str, object]:
         "relation": "target_target_language",
         "placement": "which_in_subset",
     }
-    return found | {names[slot]: value for slot, value in slots.items() if slot in names}
+    found |= {names[slot]: value for slot, value in slots.items() if slot in names}
+    task = SimpleNamespace(**found)
+    task.env = task.unwrapped = task
+    return task

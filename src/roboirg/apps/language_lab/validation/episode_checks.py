@@ -10,11 +10,10 @@ from dataclasses import replace
 
 from roboirg.apps.language_lab.validation.leaks import find_leaks
 from roboirg.apps.language_lab.validation.validation_results import (
-    CommandGroup,
+    EpisodeGroup,
     Refusal,
     Rule,
     RuleViolation,
-    SceneGroup,
     ValidationResults,
 )
 from roboirg.core.episode import Episode, Goal
@@ -51,7 +50,7 @@ def check_episode(
         setting = options.setting
         instruction = instruct_with(episode, options)
         results.texts[episode.task, setting] += 1
-        violations = list(not_read_back(instruction, episode, read))
+        violations = list(misread("read back", instruction.text, episode, read))
         if options.form == "implicit" and all_settings()[setting].implicit:
             known = commands.setdefault(setting, set())
             if instruction.command not in known:
@@ -62,7 +61,7 @@ def check_episode(
                 violations += not_needed(instruction, episode, read, exception=exception)
                 violations += leaking(instruction, episode)
         else:
-            violations += not_self_contained(instruction, episode, read)
+            violations += misread("self-contained", instruction.command, episode, read)
         _add_violations(results, episode, setting, violations)
     for setting, words in unpaired(episode, expressible(episode, wordings=wordings), wordings):
         _add_violations(results, episode, setting, [("pairing", words)])
@@ -77,24 +76,18 @@ def check_episode(
     return results
 
 
-def not_read_back(instruction: Instruction, episode: Episode, read: Read) -> Iterator[Violation]:
-    """Yield the prompt unless it reads as exactly the goal and is understood to the end."""
-    found = read(instruction.text)
+def misread(rule: Rule, words: str, episode: Episode, read: Read) -> Iterator[Violation]:
+    """Yield words unless they read as exactly the goal and are understood to the end.
+
+    Args:
+        rule: "read back" of a prompt, "self-contained" of an explicit or resolved command.
+        words: the prompt, or the command on its own.
+        episode: its episode.
+        read: the interpreter.
+    """
+    found = read(words)
     if found.goals != (episode.goal,) or found.not_understood:
-        yield "read back", _with_cause(instruction.text, found)
-
-
-def not_self_contained(
-    instruction: Instruction, episode: Episode, read: Read
-) -> Iterator[Violation]:
-    """Yield an explicit or resolved command that does not read as the goal on its own."""
-    found = read(instruction.command)
-    if found.goals != (episode.goal,) or found.not_understood:
-        yield "self-contained", _with_cause(instruction.command, found)
-
-
-def _with_cause(words: str, found: Interpretation) -> str:
-    return "; the interpreter ".join([words, *found.not_understood])
+        yield rule, "; the interpreter ".join([words, *found.not_understood])
 
 
 def not_needed(
@@ -123,13 +116,8 @@ def leaking(instruction: Instruction, episode: Episode) -> Iterator[Violation]:
 def _count_command(
     instruction: Instruction, episode: Episode, results: ValidationResults, *, exception: bool
 ) -> None:
-    pattern = instruction.metadata["pattern"]
-    group = CommandGroup(
-        task=episode.task,
-        setting=instruction.setting,
-        pattern=None if pattern is None else str(pattern),
-        difficulty=episode.difficulty,
-    )
+    pattern = str(instruction.metadata["pattern"] or "")
+    group = EpisodeGroup(episode.task, instruction.setting, pattern, episode.difficulty)
     results.commands[group] += 1
     results.exceptions[group] += exception
 
@@ -139,7 +127,7 @@ def _count_refusals(
 ) -> None:
     for changes in setting.variants:
         variant = ", ".join(str(value) for value in changes.values())
-        group = SceneGroup(episode.task, setting.name, variant, episode.difficulty)
+        group = EpisodeGroup(episode.task, setting.name, variant, episode.difficulty)
         options = replace(InstructionOptions(setting.name, wordings=wordings), **changes)
         reason = find_refusal(episode, options)
         results.scenes[group] += 1

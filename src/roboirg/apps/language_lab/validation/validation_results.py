@@ -31,35 +31,20 @@ class RuleViolation(NamedTuple):
     words: str
 
 
-class CommandGroup(NamedTuple):
-    """Episodes with the same setting and pattern.
+class EpisodeGroup(NamedTuple):
+    """Episodes of a task in a setting.
 
     Attributes:
         task: name of the task.
         setting: name of the setting.
-        pattern: main reasoning pattern; None in the other settings.
+        detail: main reasoning pattern of their commands, or values of the setting's options, for
+            example ``camera``; may be empty.
         difficulty: of their scenes.
     """
 
     task: str
     setting: str
-    pattern: str | None
-    difficulty: Difficulty
-
-
-class SceneGroup(NamedTuple):
-    """Scenes that a setting may refuse.
-
-    Attributes:
-        task: name of the task.
-        setting: name of the setting.
-        variant: values of the setting's options, for example ``camera``; may be empty.
-        difficulty: of the scenes.
-    """
-
-    task: str
-    setting: str
-    variant: str
+    detail: str
     difficulty: Difficulty
 
 
@@ -86,10 +71,10 @@ class ValidationResults:
     """
 
     texts: Counter[tuple[str, str]] = field(default_factory=Counter)
-    commands: Counter[CommandGroup] = field(default_factory=Counter)
-    exceptions: Counter[CommandGroup] = field(default_factory=Counter)
-    scenes: Counter[SceneGroup] = field(default_factory=Counter)
-    refused: Counter[SceneGroup] = field(default_factory=Counter)
+    commands: Counter[EpisodeGroup] = field(default_factory=Counter)
+    exceptions: Counter[EpisodeGroup] = field(default_factory=Counter)
+    scenes: Counter[EpisodeGroup] = field(default_factory=Counter)
+    refused: Counter[EpisodeGroup] = field(default_factory=Counter)
     reasons: Counter[Refusal] = field(default_factory=Counter)
     failures: list[RuleViolation] = field(default_factory=list)
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from typing import NamedTuple
 
 from roboirg.apps.language_lab.validation.episode_checks import check_episode
@@ -11,7 +11,6 @@ from roboirg.core.episode import SPLITS, Split
 from roboirg.core.errors import InvalidValueError
 from roboirg.language.wordings.wording_store import open_wordings
 from roboirg.tasks.splits.splits import SIZES, get_episode
-from roboirg.util.parallel_map import parallel_map
 
 BATCH = 50
 """Maximum size of a batch, in episodes."""
@@ -73,17 +72,3 @@ def validate_batch(batch: Batch) -> ValidationResults:
         expected = batch.split in SPLITS
         results.add(check_episode(episode, must_be_expressible=expected, wordings=identity))
     return results
-
-
-def validate(work: Sequence[Batch], workers: int) -> Iterator[tuple[Batch, ValidationResults]]:
-    """Yield every batch with its results, in the order of completion.
-
-    Args:
-        work: the batches.
-        workers: number of processes; 0 for this one.
-
-    Raises:
-        InvalidValueError: the number of workers is negative.
-        RoboIRGError: a process died.
-    """
-    return parallel_map(validate_batch, work, workers)

@@ -8,7 +8,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from rich import box
 from rich.table import Table
 
-from roboirg.apps.language_lab.validation.validation_results import ValidationResults
+from roboirg.apps.language_lab.validation.validation_results import EpisodeGroup, ValidationResults
 from roboirg.core.episode import DIFFICULTIES, Difficulty
 from roboirg.core.plain_text import counted
 from roboirg.language.settings import plain_settings
@@ -63,25 +63,14 @@ def _count(
 
 def _exceptions(results: ValidationResults) -> Table:
     """Return the commands that give the goal alone, by task, setting and pattern."""
-    groups = Counter[tuple[str, str, Difficulty]]()
-    excepted = groups.copy()
-    for one, count in results.commands.items():
-        key = (one.task, ", ".join(filter(None, (one.setting, one.pattern))), one.difficulty)
-        groups[key] += count
-        excepted[key] += results.exceptions[one]
     title = "Commands that give the goal alone: the scene leaves one candidate"
-    return _shares(title, "setting, pattern", excepted, groups)
+    return _shares(title, "setting, pattern", results.exceptions, results.commands)
 
 
 def _refusals(results: ValidationResults) -> Table:
     """Return the scenes that settings refuse, by task and variant, with the reasons below."""
-    groups = Counter[tuple[str, str, Difficulty]]()
-    refused = groups.copy()
-    for one, count in results.scenes.items():
-        key = (one.task, ", ".join(filter(None, (one.setting, one.variant))), one.difficulty)
-        groups[key] += count
-        refused[key] += results.refused[one]
-    table = _shares("Scenes that a setting cannot express", "setting, options", refused, groups)
+    title = "Scenes that a setting cannot express"
+    table = _shares(title, "setting, options", results.refused, results.scenes)
     reasons = (
         f"{refusal.setting}: {refusal.reason}: {counted(count, 'refusal')}"
         for refusal, count in results.reasons.most_common()
@@ -91,12 +80,14 @@ def _refusals(results: ValidationResults) -> Table:
 
 
 def _shares(
-    title: str,
-    kind: str,
-    some: Mapping[tuple[str, str, Difficulty], int],
-    all_: Mapping[tuple[str, str, Difficulty], int],
+    title: str, kind: str, counts: Counter[EpisodeGroup], totals: Counter[EpisodeGroup]
 ) -> Table:
     """Return a row ``3 of 120`` by difficulty for each task and kind of which there are some."""
+    some, all_ = (Counter[tuple[str, str, Difficulty]]() for _ in range(2))
+    for one, total in totals.items():
+        key = (one.task, ", ".join(filter(None, (one.setting, one.detail))), one.difficulty)
+        all_[key] += total
+        some[key] += counts[one]
     table = _table(title, ("task", kind), DIFFICULTIES)
     rows = {key[:2] for key, count in some.items() if count}
     for task in _tasks(task for task, _ in rows):

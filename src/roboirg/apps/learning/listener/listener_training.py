@@ -172,8 +172,8 @@ def teach(scenes: SeenEpisodes, plan: TrainingPlan, kept: Path, progress: Progre
         for own in (told, asked)
     )
     reader = train_reader(
-        lessons, vocabulary, plan.reader_epochs, plan.seed, progress, plan.encoders, held_back,
-        KeptTraining(kept, plan.about),
+        lessons, vocabulary, plan.reader_epochs, plan.seed, progress, plan.encoders,
+        KeptTraining(kept, plan.about), held_back,
     )  # fmt: skip
     return LearnedModel(vocabulary, scenes.detector, scenes.plane, reader, plan.without, plan.about)
 
@@ -216,8 +216,8 @@ def _train_detector(
         epochs,
         lambda number: batches(shown, random.Random(f"{plan.seed}/{number}")),
         partial(progress, "detector"),
-        score,
         KeptTraining(folder / f"detector-{plan.seed}.pt", made_of),
+        score,
     )
     return detector
 

@@ -11,7 +11,7 @@ import torch
 from torch.nn import functional
 
 from roboirg.apps.learning.listener.listener_net import ListenerNet
-from roboirg.apps.learning.listener.vocabulary import USUAL_ENCODERS, ListenerInput, Vocabulary
+from roboirg.apps.learning.listener.vocabulary import ListenerInput, Vocabulary
 from roboirg.apps.learning.trainer import (
     KeptTraining,
     Progress,
@@ -86,9 +86,9 @@ def train_reader(
     epochs: int,
     seed: int,
     progress: Progress,
-    encoders: Mapping[str, Mapping[str, Any]] = USUAL_ENCODERS,
+    encoders: Mapping[str, Mapping[str, Any]],
+    kept: KeptTraining,
     held_back: Sequence[Lesson] = (),
-    kept: KeptTraining | None = None,
 ) -> ListenerNet:
     """Return a reader that has learned from instructions.
 
@@ -99,8 +99,8 @@ def train_reader(
         seed: of their order.
         progress: called after each pass.
         encoders: by name, with their settings.
-        held_back: what shows how training goes.
         kept: where the training is kept.
+        held_back: what shows how training goes.
     """
     reader = ListenerNet(vocabulary, encoders)
     trainer = Trainer[Lesson](
@@ -122,7 +122,7 @@ def train_reader(
         ]
         return {"held back right": sum(right) / len(right)} if right else {}
 
-    trainer.learn(epochs, mixed, partial(progress, "reader"), score, kept)
+    trainer.learn(epochs, mixed, partial(progress, "reader"), kept, score)
     return reader
 
 

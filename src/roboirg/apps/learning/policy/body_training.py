@@ -25,7 +25,7 @@ from roboirg.apps.learning.policy.policy_data import (
 )
 from roboirg.apps.learning.policy.policy_model import Kind, goal_numbers, make_body
 from roboirg.apps.learning.policy.policy_plan import PolicyPlan, Recorded
-from roboirg.apps.learning.policy.sight import Sight, SightNoise
+from roboirg.apps.learning.policy.sight import Sight
 from roboirg.apps.learning.policy.subgoal_training import with_planned
 from roboirg.apps.learning.policy.training_curve import SHOWN, BodyScore, save_curve
 from roboirg.apps.learning.trainer import KeptTraining, Progress, Trainer, even_batches
@@ -65,7 +65,7 @@ def train_body(
         rng = np.random.default_rng((plan.seed, times))
         found = []
         for one, own, goal in zip(recorded, decisions, goals, strict=True):
-            episode = to_numbers(one.recording, own, goal, sight, numbers, SightNoise(), rng)
+            episode = to_numbers(one.recording, own, goal, sight, numbers, rng)
             found.append(with_planned(plan.memory, one, episode, len(moves), sight, rng))
         return found
 
@@ -90,8 +90,8 @@ def train_body(
         plan.body_epochs,
         mixed,
         partial(progress, "body"),
-        lambda: dict(zip(SHOWN, score(body, shown[::HELD_BACK]), strict=True)),
         KeptTraining(path, _made_of(plan, recorded, moves, sight, vocabulary)),
+        lambda: dict(zip(SHOWN, score(body, shown[::HELD_BACK]), strict=True)),
     )
     scores = [BodyScore(epoch, **one) for epoch, one in enumerate(found, 1)]
     save_curve(scores, path)

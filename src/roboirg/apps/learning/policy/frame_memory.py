@@ -29,15 +29,15 @@ SMALL = 0.002
 """Standard deviation of the weights of scale and shift before anything is learned."""
 
 
-def even_frames(now: Tensor, count: int = FRAMES) -> Tensor:
-    """Return the numbers (…, count) of looks evenly spaced from 0 to `now` (…), both included.
+def even_frames(now: Tensor) -> Tensor:
+    """Return the numbers (…, FRAMES) of looks evenly spaced from 0 to `now` (…), both included.
 
     As long as there are fewer, it is all of them, and the rest is -1.
     """
-    spread = (now[..., None] * torch.linspace(0, 1, count)).round().long()
-    first = torch.arange(count)
+    spread = (now[..., None] * torch.linspace(0, 1, FRAMES)).round().long()
+    first = torch.arange(FRAMES)
     every = torch.where(first <= now[..., None], first, -1)
-    return torch.where(now[..., None] < count, every, spread)
+    return torch.where(now[..., None] < FRAMES, every, spread)
 
 
 class EvenFrameMemory(LookMemory):

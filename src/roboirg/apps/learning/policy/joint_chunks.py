@@ -43,7 +43,6 @@ class JointChunks:
 
     @property
     def metadata(self) -> dict[str, Any]:
-        """How it was trained."""
         return self.policy.metadata
 
     def reset(self, instruction: str, demonstration: Demonstration) -> None:
@@ -65,7 +64,6 @@ class JointChunks:
         self.policy.reset(instruction, video)
 
     def hear(self, text: str, step: int) -> None:
-        """Hear another utterance."""
         self.policy.hear(text, step)
 
     def act(self, observation: Observation) -> JointTrajectory:

@@ -25,8 +25,12 @@ class LearnedPolicy:
         model: what it has learned.
         version: of the file that holds it.
         seed: without effect, as nothing is random.
+
+    Attributes:
+        seen: the episode as it was seen so far; there is one after `reset`.
     """
 
+    seen: SeenEpisode
     cameras = (FRONT,)
     actions: ClassVar[str] = WAYPOINT.name
     demonstration_frames = LOOK_EVERY
@@ -35,7 +39,6 @@ class LearnedPolicy:
     def __init__(self, model: PolicyModel, version: str, seed: int = 0) -> None:
         self.seed, self.version = seed, version
         self.model = model
-        self._seen: SeenEpisode | None = None
         self._heard: list[str] = []
         self._goal: NDArray[np.float32] | None = None
 
@@ -49,14 +52,14 @@ class LearnedPolicy:
         from roboirg.apps.learning.policy.policy_model import SeenEpisode
 
         self._heard, self._goal = [instruction], None
-        self._seen = SeenEpisode(self.model)
+        self.seen = SeenEpisode(self.model)
         length = len(demonstration["joint_positions"])
         if length:
             poses, fingers = demonstration["end_effector"], demonstration["gripper"]
             tools = [
                 np.append(poses[time], fingers[time][0]) for time in range(0, length, LOOK_EVERY)
             ]
-            self._seen.look(list(demonstration["front_rgb"]), tools, is_video=True)
+            self.seen.look(list(demonstration["front_rgb"]), tools, is_video=True)
 
     def hear(self, text: str, step: int) -> None:  # noqa: ARG002
         """Hear another utterance; the goal is understood anew."""
@@ -68,13 +71,6 @@ class LearnedPolicy:
         seen = self.watch(observation)
         chosen = seen.decide(self.understand(), tool_of(observation))
         return np.asarray(chosen, np.float64)[None]
-
-    @property
-    def seen(self) -> SeenEpisode:
-        """The episode as it was seen so far."""
-        if self._seen is None:
-            raise RuntimeError(f"{type(self).__name__} needs reset() before it looks.")
-        return self._seen
 
     def understand(self) -> NDArray[np.float32]:
         """Return the goal that was heard, as `PolicyModel.understand` does."""

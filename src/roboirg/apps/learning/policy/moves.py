@@ -15,6 +15,8 @@ from roboirg.policies.builtin.waypoint_expert import LEAVE
 
 Z_GRID = 0.0025
 """Meters to which heights are rounded."""
+HOME = (math.pi, 0.0, 0.0)
+"""Roll, pitch and yaw of the tool at the beginning, rad."""
 STAY = "stay"
 """The turn of a tool that stays where it is while the gripper opens or closes."""
 XY_GRID = 0.1
@@ -99,7 +101,6 @@ def waypoint(
     tool: NDArray[np.floating],
     place: NDArray[np.floating],
     turn: NDArray[np.floating],
-    home: Sequence[float],
 ) -> NDArray[np.float64]:
     """Return the waypoint (7) of a kind.
 
@@ -108,12 +109,11 @@ def waypoint(
         tool: (6,) x, y, z, m, roll, pitch, yaw, rad, of the tool now.
         place: (2,) x and y of the thing, m.
         turn: (2,) cosine and sine of four times the angle of the thing.
-        home: (3,) roll, pitch, yaw of the tool at the beginning, rad.
     """
     if move.turn == STAY:
         return np.append(tool[:6], move.gripper)
     x, y = place if move.at_thing else tool[:2]
-    angles = np.array(home if move.turn != "keep" else tool[3:6], np.float64)
+    angles = np.array(HOME if move.turn != "keep" else tool[3:6], np.float64)
     if move.turn == "align":
         angles[2] = _nearest_side(math.atan2(turn[1], turn[0]) / 4.0, float(tool[5]))
     return np.array([x + move.x, y + move.y, move.z, *angles, move.gripper], np.float64)

@@ -10,11 +10,11 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
-from roboirg.apps.learning.policy.body_net import TOOL_NUMBERS, EpisodeBatch
+from roboirg.apps.learning.policy.body_net import EpisodeBatch
 from roboirg.apps.learning.policy.moves import ExpertDecision
 from roboirg.apps.learning.policy.planner_history import PlannedNumbers
 from roboirg.apps.learning.policy.recording import LOOK_EVERY, ExpertRecording
-from roboirg.apps.learning.policy.sight import GHOST, Sight, SightNoise, labeled_looks
+from roboirg.apps.learning.policy.sight import GHOST, Sight, labeled_looks
 from roboirg.apps.learning.policy.subgoal_net import PlannedBatch
 from roboirg.apps.learning.policy.subgoals import SubgoalDecision
 from roboirg.apps.learning.policy.tracks import LookTokens, Tracks
@@ -97,10 +97,7 @@ class LookHistory:
 def _tool_numbers(tool: NDArray[np.floating[Any]], *, is_video: bool) -> NDArray[np.float32]:
     x, y, z, _, _, yaw, finger = tool
     turn = math.cos(2 * yaw), math.sin(2 * yaw)
-    found = np.array([x, y, z * 5.0, *turn, finger * 25.0, is_video], np.float32)
-    if len(found) != TOOL_NUMBERS:
-        raise RuntimeError(f"The tool has {len(found)} numbers, not {TOOL_NUMBERS}.")
-    return found
+    return np.array([x, y, z * 5.0, *turn, finger * 25.0, is_video], np.float32)
 
 
 def to_numbers(
@@ -109,10 +106,9 @@ def to_numbers(
     goal: NDArray[np.float32],
     sight: Sight,
     moves: Mapping[Any, int],
-    noise: SightNoise,
     rng: np.random.Generator,
 ) -> EpisodeNumbers:
-    """Return a recorded episode as a detector with that noise would have seen it.
+    """Return a recorded episode as a detector would have seen it.
 
     Args:
         recorded: the episode.
@@ -120,8 +116,7 @@ def to_numbers(
         goal: (parts,) 1 for each part of its goal.
         sight: of the camera.
         moves: the number of each kind of waypoint, or of each form of subgoals.
-        noise: of the detector.
-        rng: draws the noise.
+        rng: draws the noise of the detector.
     """
     history = LookHistory()
     track_of: dict[int, int] = {}
@@ -131,7 +126,7 @@ def to_numbers(
     merged = set(recorded.looks.tolist()) - due.keys()
     acting = np.flatnonzero(~recorded.is_video)
     counted = set(rng.choice(acting, min(COUNTED_LOOKS, len(acting)), replace=False).tolist())
-    for look, (tokens, objects) in enumerate(labeled_looks(recorded, sight, noise, rng)):
+    for look, (tokens, objects) in enumerate(labeled_looks(recorded, sight, rng)):
         if look in merged and recorded.steps[look] % LOOK_EVERY:
             continue  # who opens or closes the gripper with the move before does not look here
         mine = history.add(tokens, recorded.tool[look], is_video=bool(recorded.is_video[look]))

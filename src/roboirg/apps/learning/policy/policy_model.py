@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -31,8 +30,6 @@ from roboirg.policies.vlm.goal_schema import goal_schema
 FORMAT = "roboirg-policy-2"
 FIRST_LOOKS = (0, 5)
 """Looks at which the reader of words sees a video, two seconds apart; else it sees the first."""
-HOME = (math.pi, 0.0, 0.0)
-"""Roll, pitch and yaw of the tool at the beginning, rad."""
 _BATCH = 32
 
 Kind = Move | SubgoalForm
@@ -223,8 +220,8 @@ class SeenEpisode:
         move, tracks = self._model.moves[chosen.kind], self._history.tracks
         if not move.at_thing or chosen.thing is None:
             here = np.asarray(tool[:2], np.float64)
-            return waypoint(move, tool, here, np.array([1.0, 0.0]), HOME)
-        return waypoint(move, tool, tracks.places[chosen.thing], tracks.turns[chosen.thing], HOME)
+            return waypoint(move, tool, here, np.array([1.0, 0.0]))
+        return waypoint(move, tool, tracks.places[chosen.thing], tracks.turns[chosen.thing])
 
 
 def save_policy(model: PolicyModel, path: Path) -> None:

@@ -42,7 +42,6 @@ from roboirg.apps.learning.policy.recording import (
 )
 from roboirg.apps.learning.policy.sight import (
     Sight,
-    SightNoise,
     labeled_looks,
     points_of,
     sight_of,
@@ -58,7 +57,6 @@ from roboirg.apps.learning.policy.thing_detector import (
 )
 from roboirg.apps.learning.policy.tracks import LookTokens
 from roboirg.apps.learning.trainer import KeptTraining, Progress, Trainer, batch_count, batches
-from roboirg.core.episode import Episode
 from roboirg.core.errors import InvalidValueError, MotionPlanningError
 from roboirg.language import LANGUAGE_VERSION
 from roboirg.policies.builtin.waypoint_expert import Disturbance
@@ -147,19 +145,13 @@ def record_all(plan: PolicyPlan, folder: Path, workers: int, progress: Progress)
     for task, number in jobs:
         recording = load_recording(_path(place, task, number))
         if recording.status == "success":
-            found.append(Recorded(find_episode(recording.key), recording))
+            found.append(Recorded(get_episode(task, RECORDED_SPLIT, number), recording))
     for task in plan.tasks:
         if not any(one.episode.task == task for one in found):
             raise InvalidValueError(
                 f"The expert succeeded in none of {plan.scenes} scenes of {task}; record more."
             )
     return found
-
-
-def find_episode(key: str) -> Episode:
-    """Return the episode of a key, such as ``PickXtimes/random/3``."""
-    task, split, number = key.split("/")
-    return get_episode(task, split, int(number))
 
 
 def _path(folder: Path, task: str, number: int) -> Path:
@@ -209,7 +201,7 @@ def _detector(
         plan.detector_epochs * math.ceil(count / DETECTOR_BATCH),
     )
     kept = KeptTraining(folder / "detector.pt", made_of)
-    trainer.learn(plan.detector_epochs, moved, partial(progress, "detector"), kept=kept)
+    trainer.learn(plan.detector_epochs, moved, partial(progress, "detector"), kept)
     return detector
 
 
@@ -256,7 +248,7 @@ def first_looks(
 ) -> list[LookTokens]:
     """Return what the reader of words sees of an episode."""
     wanted = FIRST_LOOKS if recorded.is_video[0] else FIRST_LOOKS[:1]
-    looks = enumerate(labeled_looks(recorded, sight, SightNoise(), rng))
+    looks = enumerate(labeled_looks(recorded, sight, rng))
     return [tokens for look, (tokens, _) in looks if look in wanted]
 
 
@@ -276,7 +268,7 @@ def _train_words(
     task_net = _train_tasks(plan, lessons, vocabulary, kept, progress)
     reader = train_reader(
         lessons, vocabulary, plan.reader_epochs, plan.seed, progress, plan.encoders,
-        kept=KeptTraining(folder / f"words-{name}", made_of),
+        KeptTraining(folder / f"words-{name}", made_of),
     )  # fmt: skip
     return task_net, reader
 
@@ -305,7 +297,7 @@ def _train_tasks(
         rng.seed(f"{plan.seed}/{number}")
         return batches(lessons, rng)
 
-    trainer.learn(TASK_EPOCHS, mixed, partial(progress, "tasks"), kept=kept)
+    trainer.learn(TASK_EPOCHS, mixed, partial(progress, "tasks"), kept)
     return task_net
 
 

@@ -17,30 +17,16 @@ ROWS = (32, 160)
 COLUMNS = SIZE
 NEAR_TOOL = 0.07
 """Meters in the plane from the tool within which the hand may hide a thing."""
-
-
 HIDDEN_LOOKS = 5
 """Looks for which a thing that is lost stays lost, and what is not there is found."""
 GHOST = -1
 """Number of the object where none is."""
-
-
-class SightNoise(NamedTuple):
-    """How labels differ from what a detector finds.
-
-    Attributes:
-        pixels: standard deviation of a place in the picture, pixels.
-        turn: of the angle, rad.
-        lost: mean probability that a thing is not found; some things are lost more often.
-        lost_near_tool: the same near the tool.
-        ghost: probability that something is found that is not there, where something else is.
-    """
-
-    pixels: float = 0.7
-    turn: float = 0.2
-    lost: float = 0.02
-    lost_near_tool: float = 0.15
-    ghost: float = 0.04
+PLACE_NOISE, TURN_NOISE = 0.7, 0.2
+"""Standard deviations of what a detector finds: of a place, pixels, and of the angle, rad."""
+LOST, LOST_NEAR_TOOL = 0.02, 0.15
+"""Mean probability that a thing is not found; some things are lost more often."""
+GHOST_RATE = 0.04
+"""Probability that something is found that is not there, where something else is."""
 
 
 class Sight(NamedTuple):
@@ -96,7 +82,7 @@ def sight_of(recorded: Iterable[ExpertRecording]) -> Sight:
 
 
 def labeled_looks(
-    recorded: ExpertRecording, sight: Sight, noise: SightNoise, rng: np.random.Generator
+    recorded: ExpertRecording, sight: Sight, rng: np.random.Generator
 ) -> Iterator[tuple[LookTokens, NDArray[np.intp]]]:
     """Yield what a detector might find at each look, and the numbers of the objects found.
 
@@ -105,7 +91,7 @@ def labeled_looks(
     kinds = sight.kinds(recorded.classes)
     positions = recorded.things[..., :3].astype(np.float64)
     away = np.hypot(*np.moveaxis(positions[..., :2] - recorded.tool[:, None, :2], -1, 0))
-    lost = np.where(away < NEAR_TOOL, noise.lost_near_tool, noise.lost)
+    lost = np.where(away < NEAR_TOOL, LOST_NEAR_TOOL, LOST)
     # A detector has trouble with the same thing again and again.
     lost = lost * rng.exponential(1.0, lost.shape[1])
     points = points_of(positions)
@@ -115,12 +101,12 @@ def labeled_looks(
     found = recorded.visible & (drawn >= lost) & (kinds >= 0)
     low, high = np.array([0, ROWS[0]]), np.array([COLUMNS, ROWS[1]])
     found &= ((points >= low) & (points < high)).all(axis=-1)
-    points += rng.normal(0.0, noise.pixels, points.shape)
+    points += rng.normal(0.0, PLACE_NOISE, points.shape)
     shape = points.shape[:2]
     every = np.broadcast_to(np.maximum(kinds, 0), shape).ravel()
     places = sight.places(every, points.reshape(-1, 2)).reshape(*shape, 2)
-    turns = turns_of(recorded.things[..., 3] + rng.normal(0.0, noise.turn, shape))
-    is_ghost = rng.random(blocks) < noise.ghost
+    turns = turns_of(recorded.things[..., 3] + rng.normal(0.0, TURN_NOISE, shape))
+    is_ghost = rng.random(blocks) < GHOST_RATE
     ghosts = rng.integers(0, len(sight.classes), blocks)
     hosts = rng.integers(0, shape[1], blocks)
     for look, shown in enumerate(found):

@@ -75,7 +75,6 @@ class LearnedHands(LearnedPolicy):
     _namer: SubgoalNamer | None = None
 
     def reset(self, instruction: str, demonstration: Demonstration) -> None:
-        """Begin an episode, and see the video."""
         super().reset(instruction, demonstration)
         self.subgoal, self._asked = None, None
         self._namer = SubgoalNamer(self.model, self.seen)
@@ -120,16 +119,13 @@ class LearnedPlanner:
 
     @property
     def metadata(self) -> dict[str, Any]:
-        """How it was trained."""
         return self._eyes.metadata
 
     def reset(self, instruction: str, demonstration: Demonstration) -> None:
-        """Begin an episode, and see the video."""
         self._eyes.reset(instruction, demonstration)
         self._namer = SubgoalNamer(self._eyes.model, self._eyes.seen)
 
     def hear(self, text: str, step: int) -> None:
-        """Hear another utterance."""
         self._eyes.hear(text, step)
 
     def plan(self, observation: Observation, step: int) -> str | None:  # noqa: ARG002

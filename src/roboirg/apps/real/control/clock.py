@@ -28,7 +28,6 @@ class RealClock:
     is_real = True
 
     def now(self) -> float:
-        """Return the time, seconds since an arbitrary start."""
         return time.monotonic()
 
     def wait_until(self, moment: float) -> None:
@@ -46,7 +45,6 @@ class VirtualClock:
         self._now = 0.0
 
     def now(self) -> float:
-        """Return the time, seconds since the start."""
         return self._now
 
     def wait_until(self, moment: float) -> None:

@@ -48,7 +48,8 @@ POLL_S = 0.25
 _SLACK = 1e-9
 
 
-def _never() -> bool:
+def never() -> bool:
+    """Ask for no stop."""
     return False
 
 
@@ -72,7 +73,7 @@ class ControlLoop:
     worker: PolicyThread
     limits: Limits
     cameras: Sequence[str] = ()
-    stop_requested: Callable[[], bool] = _never
+    stop_requested: Callable[[], bool] = never
     reply_timeout_s: float = REPLY_TIMEOUT_S
     held: int = 0
     overruns: int = 0
@@ -246,7 +247,7 @@ class ControlLoop:
         reply = self._receive(f"{method}()")
         return None if reply is None else reply.result()
 
-    def _receive(self, what: str, stopped: Callable[[], bool] = _never) -> PolicyReply | None:
+    def _receive(self, what: str, stopped: Callable[[], bool] = never) -> PolicyReply | None:
         """Wait for a reply in the machine's time; None if the operator ends the trial."""
         deadline = time.monotonic() + self.reply_timeout_s
         while (left := deadline - time.monotonic()) > 0:

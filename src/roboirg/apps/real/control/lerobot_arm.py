@@ -143,7 +143,6 @@ class LeRobotArm:
             self._robot.send_action(self._hold)
 
     def close(self) -> None:
-        """Stop and disconnect."""
         if self._reader is not None:
             with contextlib.suppress(Exception):  # the driver may fail; disconnect anyway
                 self.stop()

@@ -62,14 +62,6 @@ class PolicyReply(NamedTuple):
         return self.value
 
 
-class PolicyFacts(NamedTuple):
-    """What a policy says about itself once it has been reset; the fields are those of a record."""
-
-    metadata: dict[str, Any]
-    needs: dict[str, Any]
-    inference: InferenceFacts
-
-
 LoadPolicy = Callable[[str, int], Policy]
 
 
@@ -87,7 +79,7 @@ class PolicyDispatcher:
 
     def __init__(self, load: LoadPolicy) -> None:
         self._load = load
-        self._policy: Policy | None = None
+        self._policy: Any = None  # the loop makes one before anything else
         self._scene_lock: contextlib.AbstractContextManager[object] = contextlib.nullcontext()
 
     def handle(self, method: str, *args: Any) -> PolicyReply:  # noqa: ANN401
@@ -111,26 +103,24 @@ class PolicyDispatcher:
         if isinstance(self._policy, PrivilegedPolicy):
             self._policy.attach(env)
 
-    def _reset(self, instruction: str, demonstration: dict[str, Any]) -> PolicyFacts:
-        policy = self._require_policy()
+    def _reset(
+        self, instruction: str, demonstration: dict[str, Any]
+    ) -> tuple[dict[str, Any], dict[str, Any], InferenceFacts]:
+        """Return what the policy then says of itself for records: metadata, needs, inference."""
+        policy = self._policy
         policy.reset(instruction, demonstration)
         needs = PolicyNeeds.of(policy).declared
-        return PolicyFacts(policy_metadata(policy), needs, inference_facts(policy))
+        return policy_metadata(policy), needs, inference_facts(policy)
 
     def _act(self, observation: Any) -> Any:  # noqa: ANN401
         with self._scene_lock:  # the scene must not change while a policy plans in it
-            return self._require_policy().act(observation)
+            return self._policy.act(observation)
 
     def _close(self) -> dict[str, float]:
         policy, self._policy = self._policy, None
         usage: Mapping[str, float] = getattr(policy, "usage", dict)()
         getattr(policy, "close", lambda: None)()
         return {str(name): float(cost) for name, cost in usage.items()}
-
-    def _require_policy(self) -> Policy:
-        if self._policy is None:
-            raise RuntimeError("no policy has been made")
-        return self._policy
 
 
 class PolicyThread:
@@ -189,14 +179,7 @@ class PolicyProcess(PolicyThread):
         self._hosts = HostPool(HostSettings(batch=1))
         super().__init__(functools.partial(HostedPolicy, self._hosts.connect()))
 
-    @property
-    def pid(self) -> int:
-        """The process id of the policy's process, which has been made."""
-        (pid,) = self._hosts.pids
-        return pid
-
     def loss(self) -> EpisodeLostError | None:
-        """Return how the policy's process died; None while it is alive."""
         return self._hosts.loss()
 
     def close(self) -> None:

@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import functools
 from collections import Counter
-from collections.abc import Mapping
 from typing import TYPE_CHECKING, NamedTuple
-from urllib.parse import urlencode
 
 from roboirg.apps.real.pages.arrangement_svg import draw_svg
 from roboirg.apps.real.study.failure_choices import failure_choices
@@ -134,8 +132,3 @@ def _template() -> jinja2.Template:
     environment = template_environment("roboirg.apps.real.pages")
     environment.filters["svg"] = svg
     return environment.get_template(TEMPLATE)
-
-
-def page_address(query: Mapping[str, str]) -> str:
-    """Return the address of a trial's page."""
-    return "/?" + urlencode(query)

@@ -10,14 +10,14 @@ from __future__ import annotations
 import secrets
 import threading
 from pathlib import Path, PurePosixPath
-from urllib.parse import parse_qsl
+from urllib.parse import parse_qsl, urlencode
 
 from starlette.concurrency import run_in_threadpool
 from starlette.requests import Request
 from starlette.responses import RedirectResponse, Response
 from starlette.routing import Route
 
-from roboirg.apps.real.pages.score_page import page_address, render_trial
+from roboirg.apps.real.pages.score_page import render_trial
 from roboirg.apps.real.study.study_plan import PlannedTrial, StudyPlan
 from roboirg.apps.real.study.trial_log import TrialLog
 from roboirg.core.errors import InvalidValueError, RoboIRGError
@@ -117,7 +117,7 @@ class ScoreServer(KeyedPageServer):
         body = await read_body(request, MAX_BODY_BYTES)
         form = dict(parse_qsl(body.decode("utf-8", "replace"), keep_blank_values=True))
         shown = await run_in_threadpool(self._apply, request.url.path, form)
-        return RedirectResponse(page_address(shown), 303)
+        return RedirectResponse(f"/?{urlencode(shown)}", 303)
 
     def _apply(self, path: str, form: dict[str, str]) -> dict[str, str]:
         """Return what the page shows next."""

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections import defaultdict
 from itertools import product
-from typing import NamedTuple
+from typing import NamedTuple, cast
 
 from roboirg.core.episode import Color, Episode, ObjectKind
 from roboirg.core.errors import InvalidValueError
@@ -16,7 +16,6 @@ from roboirg.tasks.shared.real_table import left_to_right
 from roboirg.tasks.splits.splits import SIZES, check_fixed_split, get_episode
 
 REAL_SUITE = "real"
-KINDS: dict[str, ObjectKind] = {"box": "box", "tape": "tape"}
 
 
 class Arrangement(NamedTuple):
@@ -50,17 +49,14 @@ def target_kind(task: str) -> ObjectKind:
         raise InvalidValueError(
             f"{found.name} is not a task for a real robot; those are in the suite {REAL_SUITE!r}."
         )
-    return KINDS[found.commands.thing]
+    return found.commands.thing
 
 
 def read_arrangement(episode: Episode) -> Arrangement:
     """Return the factors of an episode of a real robot's task."""
     goal = episode.goal.as_mapping()
     left, _ = left_to_right(episode.scene, target_kind(episode.task))
-    target = next(one.color for one in episode.scene.objects if one.color == goal["color"])
-    if target is None:  # the goals of a task are colors of its objects
-        raise InvalidValueError(f"{episode.key} has no object of the color {goal['color']!r}.")
-    return _arrangement(target, left, goal.get("repeats"))
+    return _arrangement(cast("Color", goal["color"]), left, goal.get("repeats"))
 
 
 def counterbalanced_order(task: str) -> tuple[Arrangement, ...]:

@@ -11,7 +11,6 @@ from roboirg.apps.real.study.study_plan import PlannedDemonstration, PlannedTria
 from roboirg.apps.real.study.trial_text import describe_positions, spoken_turns
 
 TRIALS_FILE, DEMONSTRATIONS_FILE = "trials.csv", "demonstrations.csv"
-_ARRANGEMENT = ("target_color", "target_side", "left_color", "repeats")
 
 
 def trials_csv(plan: StudyPlan) -> str:
@@ -49,9 +48,11 @@ def demonstrations_csv(plan: StudyPlan) -> str:
 
 def _common_columns(planned: PlannedTrial | PlannedDemonstration) -> dict[str, object]:
     arrangement = read_arrangement(planned.episode)
-    factors = (arrangement.color, arrangement.side, arrangement.left, arrangement.repeats or "")
     return {
-        **dict(zip(_ARRANGEMENT, factors, strict=True)),
+        "target_color": arrangement.color,
+        "target_side": arrangement.side,
+        "left_color": arrangement.left,
+        "repeats": arrangement.repeats or "",
         "places": "; ".join(describe_positions(planned)),
         "instruction": " ".join(spoken_turns(planned)),
     }

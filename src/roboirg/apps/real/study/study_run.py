@@ -13,12 +13,13 @@ from typing import Literal, get_args
 
 import msgspec
 
-from roboirg.apps.real.control.control_loop import ControlLoop
+from roboirg.apps.real.control.control_loop import ControlLoop, never
 from roboirg.apps.real.control.limits import Limits
 from roboirg.apps.real.control.policy_workers import PolicyProcess, PolicyThread
 from roboirg.apps.real.control.robot import HORIZON, JudgingRobot, Robot
 from roboirg.apps.real.study.study_plan import PlannedTrial, StudyPlan
 from roboirg.apps.real.study.trial_log import UNSCORED, TrialLog
+from roboirg.cli.names import known_name
 from roboirg.core.actions import JOINT_ANGLE
 from roboirg.core.episode import ENVIRONMENT_VERSION
 from roboirg.core.errors import InvalidValueError, UnknownNameError
@@ -41,10 +42,6 @@ Scorer = Literal["judge", "operator"]
 _SCHEME, _OPTION = "mme-vla", "execute"
 
 
-def _never() -> bool:
-    return False
-
-
 @dataclass
 class Study:
     """Plays the trials of a plan.
@@ -64,7 +61,7 @@ class Study:
     robot: Robot
     limits: Limits = field(default_factory=Limits)
     scorer: Scorer = "operator"
-    stop_requested: Callable[[], bool] = _never
+    stop_requested: Callable[[], bool] = never
     on_record: Callable[[PlannedTrial, Record], None] = lambda _trial, _record: None
     _workers: dict[str, PolicyThread] = field(default_factory=dict)
 
@@ -205,16 +202,12 @@ def select_scorer(name: str, robot: Robot) -> Scorer:
     has_judge = isinstance(robot, JudgingRobot)
     if not name:
         return "judge" if has_judge else "operator"
-    for scorer in get_args(Scorer):
-        if name == scorer:
-            if scorer == "judge" and not has_judge:
-                raise InvalidValueError(
-                    f"The robot {robot.name!r} cannot judge; score its trials with "
-                    "roboirg real score."
-                )
-            found: Scorer = scorer
-            return found
-    raise UnknownNameError("scorer", name, get_args(Scorer))
+    scorer: Scorer = known_name("scorer", name, get_args(Scorer))
+    if scorer == "judge" and not has_judge:
+        raise InvalidValueError(
+            f"The robot {robot.name!r} cannot judge; score its trials with roboirg real score."
+        )
+    return scorer
 
 
 def _check_versions(trial_log: TrialLog, policies: Mapping[str, str | None]) -> None:
