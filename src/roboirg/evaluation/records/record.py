@@ -285,11 +285,6 @@ class PromptAudit(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
     reached: tuple[Whole, ...]
     lost: tuple[Whole, ...] = ()
 
-    @property
-    def sent(self) -> tuple[int, int]:
-        """Tokens of the longest message that the model reads, at least and at most."""
-        return min(self.needed[0], self.limit), min(self.needed[1], self.limit)
-
 
 REAL_TRIAL = "real_trial"
 """Key of a study's trial in a record's ``policy_metadata``."""

@@ -51,7 +51,6 @@ class RunSummary(NamedTuple):
         played: number of episodes played in this run, retries not counted.
         errors: records of the plan whose outcome is an error.
         missing: number of jobs of the plan without a record.
-        torn_bytes: length of an unfinished line that was moved to ``records.torn``.
         video_errors: why videos of new records could not be written.
         unreachable: policies skipped after too many connection errors.
     """
@@ -60,7 +59,6 @@ class RunSummary(NamedTuple):
     played: int
     errors: tuple[Summary, ...]
     missing: int
-    torn_bytes: int
     video_errors: tuple[str, ...]
     unreachable: tuple[str, ...]
 
@@ -117,7 +115,6 @@ def run_plan(
             played=len(loop.tries),
             errors=tuple(one for one in found if one is not None and one.outcome == "error"),
             missing=found.count(None),
-            torn_bytes=len(store.torn),
             video_errors=tuple(loop.video_errors),
             unreachable=tuple(loop.unreachable),
         )
