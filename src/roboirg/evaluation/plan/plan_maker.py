@@ -15,7 +15,6 @@ from roboirg.core.instruction_options import InstructionOptions
 from roboirg.evaluation.plan.option_parsing import (
     ALL,
     check_names,
-    means_all,
     parse_arms,
     parse_episodes,
     parse_names,
@@ -34,7 +33,6 @@ from roboirg.evaluation.plan.plan import (
 )
 from roboirg.evaluation.records.film import VIDEO_MODES
 from roboirg.evaluation.records.record import ERROR_KINDS, ErrorKind
-from roboirg.language import FORMS
 from roboirg.language.settings import SETTING_GROUPS, find_settings
 
 
@@ -118,17 +116,6 @@ def word_options(*, stages: str = "1-5", **options: object) -> InstructionOption
     except ValidationError as error:
         raise _explain(error) from error
     return replace(plan.options, stages=sets[0])
-
-
-def form_names(text: str) -> tuple[str, ...]:
-    """Return the forms that were typed.
-
-    Raises:
-        UnknownNameError: there is no such form.
-    """
-    names = FORMS if means_all(text) else parse_names("form", text)
-    check_names("form", names, FORMS)
-    return names
 
 
 def as_typed_field(name: str, kind: Any, value: object) -> Any:  # noqa: ANN401 - of that type
