@@ -18,7 +18,7 @@ from roboirg.core.extras import extra_needed
 from roboirg.core.observations import FRONT
 from roboirg.core.subgoal_text import Point
 from roboirg.evaluation.play.point_sheet import with_ring
-from roboirg.evaluation.records.film import LAST_FRAME_REPEATS, VideoOptions
+from roboirg.evaluation.records.film import LAST_FRAME_REPEATS, VideoOptions, poster_name
 from roboirg.util.media import draw_text, wrap_text
 
 if TYPE_CHECKING:
@@ -34,7 +34,6 @@ BORDER = 6
 GAP = 4
 """Pixels of the black line between two pictures; even, because H.264 needs an even width."""
 
-POSTER_SUFFIX = ".jpg"
 _PARTIAL_SUFFIX = ".part"
 
 _TEXT_SCALE, _TEXT_LINE, _TEXT_MARGIN = 0.4, 16, 6
@@ -182,7 +181,7 @@ class VideoWriter:
         """Complete the video. Returns False if it has no frame or could not be written."""
         if self._last is None:
             return False
-        poster = self.path.with_suffix(POSTER_SUFFIX)
+        poster = Path(poster_name(str(self.path)))
         try:
             for _ in range(LAST_FRAME_REPEATS):
                 self._encode(self._last)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from pathlib import Path
+from pathlib import Path, PurePosixPath
 from typing import Literal, get_args
 
 VideoMode = Literal["off", "failures", "all"]
@@ -30,6 +30,11 @@ class VideoOptions:
     rate: int = 10
     cameras: tuple[str, ...] = ("front", "wrist")
     quality: int = 28
+
+
+def poster_name(video: str) -> str:
+    """Return the path of the picture of a video's last frame."""
+    return str(PurePosixPath(video).with_suffix(".jpg"))
 
 
 def points_name(slug: str) -> str:
