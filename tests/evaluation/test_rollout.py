@@ -23,7 +23,7 @@ from roboirg.core.instruction_options import InstructionOptions
 from roboirg.evaluation.episode_errors import one_line
 from roboirg.evaluation.play import rollout
 from roboirg.evaluation.play.job_instruction import PreparedJob, instruct_job
-from roboirg.evaluation.play.rollout import EpisodeRunner, load_policy, play_episode
+from roboirg.evaluation.play.rollout import EpisodeRunner, load_policy
 from roboirg.evaluation.play.rollout_result import RolloutResult
 from roboirg.evaluation.play.video_writer import VideoWriter
 from roboirg.evaluation.records.film import VideoOptions
@@ -128,7 +128,7 @@ def stage(monkeypatch: pytest.MonkeyPatch) -> Callable[..., Any]:
     def play(world: PaperWorld, policy: Any, job: Job = JOB) -> RolloutResult:
         monkeypatch.setattr(rollout, "make_env", lambda _job, _needs, _recollection: world)
         monkeypatch.setattr(rollout, "load_policy", lambda _job, _secret: policy)
-        return play_episode(job)
+        return EpisodeRunner(Path()).play_once(job)
 
     return play
 
@@ -468,7 +468,7 @@ def test_the_caption_grows_as_utterances_are_heard(
     world = TellingWorld((0, 3, 6, 6, 9), length=11)
     monkeypatch.setattr(rollout, "make_env", lambda _job, _needs, _recollection: world)
     monkeypatch.setattr(rollout, "load_policy", lambda _job, _secret: PaperPolicy())
-    play_episode(TURNS, Captions(tmp_path / "x.mp4"))
+    EpisodeRunner(tmp_path).play_once(TURNS, Captions(tmp_path / "x.mp4"))
     counts = [1, 1, *[1] * 3, *[2] * 3, *[4] * 3, *[5] * 2]  # video, first frame, chunks of 3
     assert captions == [" ".join(world.instruction.turns[:count]) for count in counts]
 
@@ -484,6 +484,6 @@ def test_what_a_policy_raises_while_it_hears_is_its_error(
         rollout, "make_env", lambda _job, _needs, _recollection: TellingWorld((0, 3), 9)
     )
     monkeypatch.setattr(rollout, "load_policy", lambda _job, _secret: Deaf())
-    result = play_episode(TURNS)
+    result = EpisodeRunner(Path()).play_once(TURNS)
     assert (result.outcome, result.error) == ("error", "policy")
     assert "no ears for" in str(result.cause)
