@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import datetime as dt
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
@@ -15,7 +16,7 @@ from roboirg.evaluation.plan.stored_plans import with_secret
 from roboirg.evaluation.run.executor import choose_executor
 from roboirg.evaluation.run.progress import ConsoleReporter, SilentReporter
 from roboirg.evaluation.run.record_hook import CommandHook, HookedReporter, RecordFunction
-from roboirg.evaluation.run.runner import RunSummary, episode_runner, run_plan
+from roboirg.evaluation.run.runner import episode_runner, run_plan
 from roboirg.policies.by_name.local_policies import is_local, policy_name, spec_of
 from roboirg.util.console_width import progress_console
 
@@ -47,7 +48,7 @@ def play_plan(
     workers: int | None,
     progress: bool,
     on_record: str | RecordFunction | None,
-) -> tuple[Path, RunSummary]:
+) -> Path:
     """Play a plan and return the folder of its records.
 
     Args:
@@ -71,16 +72,9 @@ def play_plan(
     shown = ConsoleReporter(progress_console(stderr=True)) if progress else None
     hook = CommandHook(on_record) if isinstance(on_record, str) else on_record
     reporter = HookedReporter(shown or SilentReporter(), hook or (lambda _record: None))
-    try:
-        if shown is not None:
-            shown.__enter__()
-        with reporter:
-            return folder, run_plan(
-                plan, folder, episode_runner(plan, folder), executor, reporter=reporter
-            )
-    finally:
-        if shown is not None:
-            shown.__exit__()
+    with shown or contextlib.nullcontext(), reporter:
+        run_plan(plan, folder, episode_runner(plan, folder), executor, reporter=reporter)
+    return folder
 
 
 def _named(
