@@ -23,10 +23,9 @@ from roboirg.evaluation.analysis.stats.intervals import (
     DRAWS,
     Interval,
     Rows,
-    percentile_interval,
+    resampled_interval,
     resampled_rates,
     wilson_interval,
-    without_spread,
 )
 from roboirg.evaluation.analysis.stats.option_labels import options_sort_key, words_label
 from roboirg.evaluation.records.record import DEFAULT_MAX_STEPS, DEFAULT_MESHES, Job, Summary
@@ -222,11 +221,7 @@ def clustered_interval(
     sizes = [len(each) for each in rows]
     if not sizes or 0 in sizes:
         return None
-    values = resampled_rates(rows, rng, draws)[:, 0]
-    interval = percentile_interval(values, sizes)
-    if interval is not None and np.ptp(values) == 0:
-        return without_spread(float(values[0]), sum(sizes))
-    return interval
+    return resampled_interval(resampled_rates(rows, rng, draws)[:, 0], sizes)
 
 
 def cell_interval(cell: CellResults, rng: np.random.Generator) -> Interval | None:

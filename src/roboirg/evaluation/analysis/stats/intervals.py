@@ -95,6 +95,16 @@ def percentile_interval(values: NDArray[np.float64], sizes: Sequence[int]) -> In
     )
 
 
+def resampled_interval(
+    values: NDArray[np.float64], sizes: Sequence[int], least: float = 0.0
+) -> Interval | None:
+    """Return `percentile_interval`, or `without_spread` if all resamples have the same value."""
+    interval = percentile_interval(values, sizes)
+    if interval is not None and np.ptp(values) == 0:
+        return without_spread(float(values[0]), sum(sizes), least)
+    return interval
+
+
 def without_spread(value: float, episodes: int, least: float = 0.0) -> Interval:
     """Return the interval if all episodes have the same value, so that resampling has no spread.
 

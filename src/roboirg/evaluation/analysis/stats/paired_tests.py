@@ -15,6 +15,7 @@ from roboirg.evaluation.analysis.stats.intervals import (
     Interval,
     Rows,
     percentile_interval,
+    resampled_interval,
     resampled_rates,
     without_spread,
 )
@@ -134,7 +135,7 @@ def measure_gap(tasks: Sequence[Pairs], rng: np.random.Generator, draws: int = D
     drawn = resampled_rates(rows, rng, draws)
     return Gap(
         value=float(first - second),
-        interval=_gap_interval(drawn, sizes),
+        interval=resampled_interval(drawn[:, 0] - drawn[:, 1], sizes, least=-1.0),
         p_value=sign_flip_test(np.concatenate([pairs.differences for pairs in paired])),
         retention=float(first / second) if second else None,
         retention_interval=_retention_interval(drawn, sizes) if second else None,
@@ -170,14 +171,6 @@ def sign_flip_test(differences: NDArray[np.int64]) -> float:
     positive = int(sizes[differences[differences != 0] > 0].sum())
     as_far = np.abs(2 * np.arange(total + 1) - total) >= abs(2 * positive - total)
     return min(1.0, float(chances[as_far].sum()))
-
-
-def _gap_interval(drawn: NDArray[np.float64], sizes: Sequence[int]) -> Interval | None:
-    values = drawn[:, 0] - drawn[:, 1]
-    interval = percentile_interval(values, sizes)
-    if interval is not None and np.ptp(values) == 0:
-        return without_spread(float(values[0]), sum(sizes), least=-1.0)
-    return interval
 
 
 def _retention_interval(drawn: NDArray[np.float64], sizes: Sequence[int]) -> Interval | None:

@@ -85,9 +85,7 @@ def smallest_gap(episodes: int, discordance: float) -> float | None:
 
 
 @functools.lru_cache(maxsize=64)
-def _rejections(
-    episodes: int, discordance: float
-) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+def _rejections(episodes: int, discordance: float) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
     """Return numbers of discordant episodes and, for each, when the test rejects.
 
     Returns:
