@@ -206,10 +206,7 @@ def _job(options: ImportOptions, **fields: Any) -> Job:  # noqa: ANN401 - values
 
 
 def _with_fields(record: Record, fields: Mapping[str, Any]) -> Record:
-    words = {name: value for name, value in fields.items() if name in OPTION_NAMES}
-    others = {name: value for name, value in fields.items() if name not in words}
-    found = msgspec.to_builtins(record)
-    changed = {**found, **others, "options": {**found["options"], **words}}
+    changed = with_nested_options({**msgspec.to_builtins(record), **fields})
     return msgspec.convert(changed, Record, strict=False)
 
 
