@@ -170,18 +170,12 @@ def _copy_present(name: str, source: Path, target: Path) -> None:
     file, copy = run_file(source, name), run_file(target, name)
     if file.is_file() and not copy.exists():
         copy.parent.mkdir(parents=True, exist_ok=True)
-        _copy_file(file, copy)
+        try:
+            os.link(file.resolve(), copy)  # takes no space on the same disk
+        except OSError:
+            shutil.copyfile(file, copy)
 
 
 def _copy_log(source: Path, target: Path, name: str) -> None:
-    log, copy = run_file(source, name), run_file(target, name)
-    copy.parent.mkdir(parents=True, exist_ok=True)
-    copy.unlink(missing_ok=True)  # of an error that this record replaces
-    _copy_file(log, copy)
-
-
-def _copy_file(path: Path, copy: Path) -> None:
-    try:
-        os.link(path.resolve(), copy)  # takes no space on the same disk
-    except OSError:
-        shutil.copyfile(path, copy)
+    run_file(target, name).unlink(missing_ok=True)  # of an error that this record replaces
+    _copy_present(name, source, target)
