@@ -31,7 +31,8 @@ from roboirg.evaluation.records.record import (
     Record,
     UtteranceRecord,
 )
-from roboirg.evaluation.records.store import RecordStore, StoreError
+from roboirg.evaluation.records.record_codec import StoreError
+from roboirg.evaluation.records.store import RecordStore
 from roboirg.tasks.splits.splits import get_episode
 
 pytest.importorskip("jinja2")

@@ -13,11 +13,10 @@ from evaluation_fakes import FakePlay, small_plan
 from msgspec.structs import replace
 
 from roboirg.evaluation.records.record import Job, Summary
-from roboirg.evaluation.records.record_codec import encode, identity_key
+from roboirg.evaluation.records.record_codec import StoreError, encode, identity_key
 from roboirg.evaluation.records.store import (
     RECORDS_FILE,
     RecordStore,
-    StoreError,
     read_index,
     read_records,
     read_results,

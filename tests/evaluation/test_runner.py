@@ -17,11 +17,11 @@ from msgspec.structs import replace
 from roboirg.core.errors import InvalidValueError, RenderDeviceError
 from roboirg.evaluation.plan.stored_plans import read_plan
 from roboirg.evaluation.records.record import ErrorKind, Job, Record
+from roboirg.evaluation.records.record_codec import StoreError
 from roboirg.evaluation.records.store import (
     RECORDS_FILE,
     TORN_FILE,
     RecordStore,
-    StoreError,
     read_records,
 )
 from roboirg.evaluation.run.executor import InProcess, LocalProcesses, choose_executor

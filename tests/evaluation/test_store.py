@@ -15,12 +15,11 @@ from msgspec.structs import replace
 
 from roboirg.evaluation.play.rollout_result import make_record
 from roboirg.evaluation.records.record import EventRecord, Record
-from roboirg.evaluation.records.record_codec import encode, identity_key
+from roboirg.evaluation.records.record_codec import StoreError, encode, identity_key
 from roboirg.evaluation.records.store import (
     RECORDS_FILE,
     TORN_FILE,
     RecordStore,
-    StoreError,
     iterate_records,
     read_records,
 )
@@ -197,7 +196,7 @@ def test_a_full_disk_is_one_sentence_and_costs_no_record(tmp_path: Path) -> None
         "from evaluation_fakes import FakePlay, small_plan\n"
         "from roboirg.evaluation.run.executor import InProcess\n"
         "from roboirg.evaluation.run.runner import run_plan\n"
-        "from roboirg.evaluation.records.store import StoreError\n"
+        "from roboirg.evaluation.records.record_codec import StoreError\n"
         "def play(job):\n"
         "    return replace(FakePlay()(job), started_at='now')\n"
         f"resource.setrlimit(resource.RLIMIT_FSIZE, ({limit}, {limit}))\n"

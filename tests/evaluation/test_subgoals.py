@@ -23,8 +23,8 @@ from roboirg.evaluation.policy_calls import policy_subgoal
 from roboirg.evaluation.records.film import points_name
 from roboirg.evaluation.records.merging import merge_runs
 from roboirg.evaluation.records.record import Job, SubgoalRecord
-from roboirg.evaluation.records.record_codec import encode, read_record
-from roboirg.evaluation.records.store import RecordStore, StoreError
+from roboirg.evaluation.records.record_codec import StoreError, encode, read_record
+from roboirg.evaluation.records.store import RecordStore
 from roboirg.main import app
 
 JOB = Job(

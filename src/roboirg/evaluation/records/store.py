@@ -28,14 +28,6 @@ from roboirg.evaluation.records.record_codec import (
     read_summary,
 )
 
-__all__ = [
-    "RecordStore",
-    "StoreError",
-    "StoredRun",
-    "read_records",
-    "read_results",
-]
-
 RECORDS_FILE = "records.jsonl"
 TORN_FILE = "records.torn"
 

@@ -25,12 +25,11 @@ from roboirg.evaluation.play.rollout import EpisodeRunner, PlayJob
 from roboirg.evaluation.play.video_writer import check_video_support, without_unfinished_videos
 from roboirg.evaluation.records.film import VIDEO_FOLDER
 from roboirg.evaluation.records.record import Job, Record, Summary
-from roboirg.evaluation.records.record_codec import identity_key
+from roboirg.evaluation.records.record_codec import StoreError, identity_key
 from roboirg.evaluation.records.store import (
     RECORDS_FILE,
     TORN_FILE,
     RecordStore,
-    StoreError,
     read_index,
 )
 from roboirg.evaluation.run.executor import Executor, Warn

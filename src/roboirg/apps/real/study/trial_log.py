@@ -21,7 +21,8 @@ from roboirg.core.errors import InvalidValueError
 from roboirg.evaluation.episode_errors import format_cause
 from roboirg.evaluation.play.rollout_result import RolloutResult, make_record, utc_now
 from roboirg.evaluation.records.record import REAL_TRIAL, Record, real_robot
-from roboirg.evaluation.records.store import RecordStore, StoreError, iterate_records
+from roboirg.evaluation.records.record_codec import StoreError
+from roboirg.evaluation.records.store import RecordStore, iterate_records
 
 UNSCORED = format_cause("infrastructure", "played; waiting for the operator's verdict")
 WITHDRAWN = format_cause("infrastructure", "the operator undid the score")

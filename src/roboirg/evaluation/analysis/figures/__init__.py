@@ -14,8 +14,6 @@ from roboirg.util.figure_files import check_figure_support
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["FIGURES", "draw_figure", "write_figures"]
-
 FIGURES = ("gaps", "forms", "expressions", "context", "failures", "arms", "real", "strips")
 
 
