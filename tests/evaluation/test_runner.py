@@ -25,7 +25,7 @@ from roboirg.evaluation.records.store import (
     read_records,
 )
 from roboirg.evaluation.run.executor import InProcess, LocalProcesses, choose_executor
-from roboirg.evaluation.run.progress import SilentReporter
+from roboirg.evaluation.run.progress import Reporter
 from roboirg.evaluation.run.runner import RunSummary, run_plan
 
 WAIT_S = 300.0
@@ -193,7 +193,7 @@ def test_worlds_of_two_versions_are_not_mixed(
     assert read_plan(tmp_path) is None
 
 
-class Ears(SilentReporter):
+class Ears(Reporter):
     """Hears warnings, and how many episodes had been played before the last one."""
 
     def __init__(self) -> None:

@@ -33,7 +33,7 @@ from roboirg.evaluation.records.store import (
     read_index,
 )
 from roboirg.evaluation.run.executor import Executor, Warn
-from roboirg.evaluation.run.progress import Reporter, SilentReporter
+from roboirg.evaluation.run.progress import Reporter
 from roboirg.language import LANGUAGE_VERSION
 from roboirg.policies.vlm.models.reply_store import ReplySettings
 from roboirg.tasks.splits.splits import get_episode
@@ -91,7 +91,7 @@ def run_plan(
         RoboIRGError: an error that would end every episode (no Vulkan device, …).
         KeyboardInterrupt: Ctrl-C, or SIGTERM as `Terminated`; all finished episodes are stored.
     """
-    reporter = reporter or SilentReporter()
+    reporter = reporter or Reporter()
     jobs = plan.jobs()
     films = without_unfinished_videos(folder / VIDEO_FOLDER)
     with _sigterm_interrupts(), RecordStore(folder) as store, films:
