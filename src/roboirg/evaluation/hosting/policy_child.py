@@ -102,7 +102,7 @@ class PolicyChild:
         except (RoboIRGError, RecursionError, ValueError) as error:
             self.end()
             words = f"the process sent no valid reply ({error})"
-            raise EpisodeLostError("policy", words[:MAX_WORDS], alone=False) from None
+            raise EpisodeLostError("policy", words[:MAX_WORDS]) from None
 
     def loss(self) -> EpisodeLostError | None:
         """Return how the process died; None while it is alive."""
@@ -180,4 +180,4 @@ class PolicyChild:
 def _explain(ended: ChildExit) -> EpisodeLostError:
     """Return the loss of a process that ended so."""
     kind: ErrorKind = "infrastructure" if ended.was_killed else "policy"
-    return EpisodeLostError(kind, str(ended), alone=False)
+    return EpisodeLostError(kind, str(ended))
