@@ -184,8 +184,10 @@ class EpisodeRunner:
                     result.policy = PolicyDescription(policy.version, privileged)
                 needs = job_needs(policy, job)
                 result.prompt_limit = prompt_limit(needs)
-                if self.refuse_long:
-                    _refuse_long_prompt(prepared, result)
+                if self.refuse_long and result.prompt_limit is not None:
+                    audit = audit_job(job, result.prompt_limit, prepared.instruction)
+                    if message := too_long_text(*audit):
+                        raise EpisodeError("prompt", message, "")
             recalls = hosts is not None and writer is None and not is_privileged(job.policy_spec)
             recollection = self.recollection if recalls else None
             play_with(policy, job, needs, result, guard, writer, recollection)
@@ -247,15 +249,6 @@ def play_with(
             with contextlib.closing(env), guard.environment("env_step"):
                 if result.action_space is not None and stands:
                     result.end_state = env.end_state()
-
-
-def _refuse_long_prompt(prepared: PreparedJob, result: RolloutResult) -> None:
-    """Raise an `EpisodeError` if the instruction is longer than what the policy's model reads."""
-    if result.prompt_limit is None:
-        return
-    audit = audit_job(prepared.job, result.prompt_limit, prepared.instruction)
-    if message := too_long_text(*audit):
-        raise EpisodeError("prompt", message, "")
 
 
 def load_policy(prepared: PreparedJob, seed_secret: str = "") -> Policy:

@@ -56,9 +56,6 @@ from roboirg.policies.prompt_length.prompt_audit import PromptLimit
 from roboirg.util.processor import processor_family
 from roboirg.util.short_hash import DIGITS
 
-UNDECLARED: PromptVerdict = "unknown"
-"""Verdict on the prompts of a policy that declares no limit."""
-
 
 @dataclass
 class RolloutResult:
@@ -269,7 +266,7 @@ def _audit(
 ) -> tuple[PromptAudit | None, PromptVerdict]:
     """Return what of the instruction reached the policy's model, and the verdict."""
     if result.prompt_limit is None:
-        return None, UNDECLARED
+        return None, "unknown"
     steps = [one.step for one in utterances]
     try:
         if steps == [None] * len(steps):  # it ended before anything was said

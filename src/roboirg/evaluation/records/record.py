@@ -285,6 +285,12 @@ class PromptAudit(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
     reached: tuple[Whole, ...]
     lost: tuple[Whole, ...] = ()
 
+    @property
+    def needed_text(self) -> str:
+        """How many tokens are needed, between two bounds if they differ."""
+        low, high = self.needed
+        return f"{low}" if low == high else f"{low} to {high}"
+
 
 REAL_TRIAL = "real_trial"
 """Key of a study's trial in a record's ``policy_metadata``."""
