@@ -26,7 +26,6 @@ from roboirg.evaluation.play.job_instruction import PreparedJob, instruct_job
 from roboirg.evaluation.play.rollout import EpisodeRunner, load_policy
 from roboirg.evaluation.play.rollout_result import RolloutResult
 from roboirg.evaluation.play.video_writer import VideoWriter
-from roboirg.evaluation.records.film import VideoOptions
 from roboirg.evaluation.records.record import EventRecord, Job
 from roboirg.evaluation.records.record_codec import encode, read_record
 from roboirg.tasks.splits import splits
@@ -269,7 +268,7 @@ def test_videos_are_kept_as_asked(
         rollout, "make_env", lambda _job, _needs, _recollection: PaperWorld(5, status)
     )
     monkeypatch.setattr(rollout, "load_policy", lambda _job, _secret: PaperPolicy())
-    record = EpisodeRunner(tmp_path, mode, VideoOptions(cameras=("front",)))(JOB)
+    record = EpisodeRunner(tmp_path, mode)(JOB)
     assert (record.video is not None) == kept
     files = sorted(path.suffix for path in tmp_path.rglob("*") if path.is_file())
     files.remove(".npz")
@@ -304,8 +303,7 @@ def test_a_video_that_cannot_be_written_does_not_change_the_verdict(
     monkeypatch.setattr(VideoWriter, "_encode", add)
     monkeypatch.setattr(rollout, "make_env", lambda _job, _needs, _recollection: PaperWorld(5))
     monkeypatch.setattr(rollout, "load_policy", lambda _job, _secret: PaperPolicy())
-    options = VideoOptions(cameras=("front",))
-    record = EpisodeRunner(tmp_path, "all", options)(JOB)
+    record = EpisodeRunner(tmp_path, "all")(JOB)
     assert (record.outcome, record.steps, record.video) == ("success", 5, None)
     assert "No space left on device" in str(record.video_error)
     assert {path.suffix for path in tmp_path.rglob("*") if path.is_file()} == {".npz"}
@@ -317,7 +315,7 @@ def test_a_video_folder_that_is_a_file_does_not_change_the_verdict(
     (tmp_path / "videos").touch()
     monkeypatch.setattr(rollout, "make_env", lambda _job, _needs, _recollection: PaperWorld(5))
     monkeypatch.setattr(rollout, "load_policy", lambda _job, _secret: PaperPolicy())
-    record = EpisodeRunner(tmp_path, "all", VideoOptions(cameras=("front",)))(JOB)
+    record = EpisodeRunner(tmp_path, "all")(JOB)
     assert (record.outcome, record.video) == ("success", None)
     assert "FileExistsError" in str(record.video_error)
     assert "video_error" not in comparable(record)

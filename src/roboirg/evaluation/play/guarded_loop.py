@@ -79,7 +79,7 @@ class GuardedLoop(EpisodeLoop):
             first = SpokenInstruction(env.instruction.turns, self._job.options.delivery).prompt
             if writer is not None:
                 writer.caption, writer.longest_caption = first, env.instruction.text
-                env.set_frame_hook(writer.add_frame, every=writer.options.every)
+                env.set_frame_hook(writer.add_frame, every=writer.every)
             observation, info = env.reset()
             if writer is not None:
                 writer.add_frame(env)  # the policy's first observation

@@ -43,7 +43,7 @@ from roboirg.evaluation.play.rollout_result import RolloutResult, make_record, u
 from roboirg.evaluation.play.video_writer import FrameSink, VideoWriter
 from roboirg.evaluation.policy_calls import policy_usage
 from roboirg.evaluation.records.action_log import write_actions
-from roboirg.evaluation.records.film import VIDEO_FOLDER, VideoMode, VideoOptions, points_name
+from roboirg.evaluation.records.film import VIDEO_FOLDER, VideoMode, points_name
 from roboirg.evaluation.records.record import Job, Record
 from roboirg.language.wordings.wording_store import open_wordings
 from roboirg.policies.by_name.loading import is_privileged, needs_host, planner_alone
@@ -69,7 +69,6 @@ class EpisodeRunner:
     Attributes:
         folder: output folder of the run; videos and sheets of points go to ``videos/`` in it.
         video: which episodes get a video.
-        options: format of the videos.
         policy_timeout_s: seconds that one call of the policy may take, if a supervisor watches.
         plan: fingerprint of the plan, for the records.
         hosting: how policies get processes of their own; None for policies in the world's process.
@@ -84,7 +83,6 @@ class EpisodeRunner:
 
     folder: Path
     video: VideoMode = "off"
-    options: VideoOptions = field(default_factory=VideoOptions)
     policy_timeout_s: float | None = None
     plan: str | None = None
     hosting: HostSettings | None = None
@@ -134,7 +132,7 @@ class EpisodeRunner:
             attempt += 1
             writer = None
             if self.video != "off":
-                writer = VideoWriter(self.folder / VIDEO_FOLDER / f"{job.slug}.mp4", self.options)
+                writer = VideoWriter(self.folder / VIDEO_FOLDER / f"{job.slug}.mp4")
             try:
                 result = self.play_once(job, writer, alone=alone)
             except EpisodeLostError as error:

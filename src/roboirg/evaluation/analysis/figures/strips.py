@@ -17,7 +17,7 @@ from roboirg.evaluation.analysis.stats.option_labels import (
     options_label,
     options_sort_key,
 )
-from roboirg.evaluation.records.film import LAST_FRAME_REPEATS, VideoOptions
+from roboirg.evaluation.records.film import FRAME_STEPS, LAST_FRAME_REPEATS
 from roboirg.evaluation.records.record import Job, Record, Summary
 from roboirg.evaluation.records.run_files import run_file
 from roboirg.evaluation.records.store import iterate_records, read_results
@@ -138,7 +138,7 @@ def _pictures(path: Path, record: Record, steps: Sequence[int]) -> list[NDArray[
     if record.robot is not None:  # filmed by hand, from the first step to the last
         last, every = len(frames) - 1, max(record.steps, 1) / max(len(frames) - 1, 1)
     else:
-        last, every = len(frames) - 1 - LAST_FRAME_REPEATS, float(VideoOptions().every)
+        last, every = len(frames) - 1 - LAST_FRAME_REPEATS, float(FRAME_STEPS)
         frames = [frame[:PICTURE_PIXELS, :PICTURE_PIXELS] for frame in frames]
     places = (round(last - (record.steps - step) / every) for step in steps)
     return [frames[min(max(place, 0), len(frames) - 1)] for place in places]

@@ -23,7 +23,7 @@ from roboirg.evaluation.analysis.tables.arm_table import make_arm_table
 from roboirg.evaluation.analysis.tables.breakdown_table import make_breakdown_table
 from roboirg.evaluation.analysis.tables.table import Table
 from roboirg.evaluation.records.episode_log import logged_slugs
-from roboirg.evaluation.records.film import LAST_FRAME_REPEATS, VideoOptions
+from roboirg.evaluation.records.film import FRAME_RATE, FRAME_STEPS, LAST_FRAME_REPEATS
 from roboirg.evaluation.records.record import Job, Record
 from roboirg.evaluation.records.store import read_summaries
 from roboirg.language.settings import EXPLICIT, all_settings
@@ -31,8 +31,6 @@ from roboirg.util.atomic_write import write_atomically
 from roboirg.util.web.page_templates import check_page_support, template_environment
 
 REPORT_FILE = "report.html"
-FILMING = VideoOptions()
-"""As in `roboirg run`, so that the page finds the moment of an event in a video."""
 TEMPLATE = "report.html.j2"
 STYLES = ("base", "overview", "filters", "episodes", "pairs")
 SCRIPTS = (
@@ -148,7 +146,7 @@ def _data(entries: EpisodeEntries, columns: Columns) -> dict[str, Any]:
         "change": change,
         "reference": EXPLICIT,
         "framed": [name for name, one in all_settings().items() if "frame" in one.reads],
-        "film": {"every": FILMING.every, "rate": FILMING.rate, "repeats": LAST_FRAME_REPEATS},
+        "film": {"every": FRAME_STEPS, "rate": FRAME_RATE, "repeats": LAST_FRAME_REPEATS},
     }
 
 
