@@ -72,7 +72,8 @@ def make_plan(
         UnknownNameError: a name does not exist; the message suggests the nearest.
         InvalidValueError: a number or combination is out of range.
     """
-    split, names = str(options.get("split", "test")), _task_names(tasks)
+    split = str(options.get("split", "test"))
+    names = task_registry.find_tasks(parse_names("task", tasks))
     if options.get("wordings") == REQUIRED:
         raise InvalidValueError(
             "This plan needs RoboMME's sentences: make a wording file with `roboirg language "
@@ -147,10 +148,6 @@ def _settings(text: str) -> tuple[str, ...] | SettingsName:
     found = {*find_settings(words)}
     same = (name for name in SETTINGS_NAMES if name in words and {*find_settings([name])} == found)
     return next(same, words)
-
-
-def _task_names(text: str) -> tuple[str, ...]:
-    return task_registry.find_tasks(parse_names("task", text))
 
 
 def _error_kinds(text: str) -> tuple[ErrorKind, ...]:

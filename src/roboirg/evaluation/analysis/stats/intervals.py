@@ -33,13 +33,13 @@ class Interval(NamedTuple):
     high: float
 
 
-def wilson_interval(successes: int, trials: int, z: float = Z_95) -> Interval:
+def wilson_interval(successes: int, trials: int) -> Interval:
     """Return Wilson's score interval of a proportion, which assumes independent trials."""
     if not 0 <= successes <= trials or trials == 0:
         raise ValueError(f"{successes} successes of {trials} trials are not a proportion")
-    rate, weight = successes / trials, z * z / trials
+    rate, weight = successes / trials, Z_95 * Z_95 / trials
     center = (rate + weight / 2) / (1 + weight)
-    half = z * math.sqrt(rate * (1 - rate) / trials + weight / (4 * trials)) / (1 + weight)
+    half = Z_95 * math.sqrt(rate * (1 - rate) / trials + weight / (4 * trials)) / (1 + weight)
     # The formula gives exactly 0 and 1 at the ends; floating point may not.
     low = 0.0 if successes == 0 else center - half
     high = 1.0 if successes == trials else center + half
