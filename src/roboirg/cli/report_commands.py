@@ -134,8 +134,8 @@ def figures(
     Example: roboirg figures runs/first --out figures
     """
     from roboirg.evaluation.analysis.figures import FIGURES, write_figures
+    from roboirg.evaluation.analysis.figures.figure_style import check_figure_support
     from roboirg.evaluation.analysis.stats.run_data import RunData
-    from roboirg.util.figure_files import check_figure_support
 
     check_figure_support()
     if not runs and not published:

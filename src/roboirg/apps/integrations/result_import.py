@@ -206,7 +206,10 @@ def _job(options: ImportOptions, **fields: Any) -> Job:  # noqa: ANN401 - values
 
 
 def _with_fields(record: Record, fields: Mapping[str, Any]) -> Record:
-    changed = with_nested_options({**msgspec.to_builtins(record), **fields})
+    words = {name: value for name, value in fields.items() if name in OPTION_NAMES}
+    others = {name: value for name, value in fields.items() if name not in words}
+    found = msgspec.to_builtins(record)
+    changed = {**found, **others, "options": {**found["options"], **words}}
     return msgspec.convert(changed, Record, strict=False)
 
 
