@@ -14,12 +14,12 @@ import numpy as np
 import pytest
 import typer
 from msgspec.structs import replace
+from page_text import render
 from typer.testing import CliRunner
 
 from roboirg.cli.report_commands import compare as compare_command
 from roboirg.cli.report_commands import tables
 from roboirg.core.errors import InvalidValueError, UnknownNameError
-from roboirg.evaluation.analysis.page.report import render
 from roboirg.evaluation.analysis.stats.breakdown_rows import break_down
 from roboirg.evaluation.analysis.stats.breakdowns import (
     BREAKDOWNS,

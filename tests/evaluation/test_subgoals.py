@@ -9,13 +9,14 @@ import cv2
 import numpy as np
 import pytest
 from msgspec.structs import replace
+from page_text import render
 from typer.testing import CliRunner
 
 import roboirg
 from roboirg.core.errors import InvalidValueError
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.core.subgoal_text import split_point
-from roboirg.evaluation.analysis.page.report import make_view, render, write_report
+from roboirg.evaluation.analysis.page.report import make_view, write_report
 from roboirg.evaluation.play.point_sheet import Pointing, write_point_sheet
 from roboirg.evaluation.play.rollout import EpisodeRunner
 from roboirg.evaluation.play.rollout_result import RolloutResult, make_record
