@@ -142,8 +142,9 @@ def _as_typed(key: str, value: object) -> object:
 
 def plan_text(plan: Plan) -> str:
     """Return a plan as YAML that `read_plan_file` reads; the comments explain each field."""
+    comments = textwrap.TextWrapper(_WIDTH, initial_indent="# ", subsequent_indent="# ")
     return "\n".join(
-        f"{_comment(explanation)}\n{_line(name, value)}"
+        f"{comments.fill(explanation)}\n{_line(name, value)}"
         for name, value, explanation in _fields(plan)
     )
 
@@ -158,10 +159,6 @@ def _fields(plan: Plan) -> Iterator[tuple[str, object, str]]:
             yield name, _ranges(plan.episodes), str(field.description)
         else:
             yield name, getattr(plan, name), str(field.description)
-
-
-def _comment(text: str) -> str:
-    return textwrap.fill(text, _WIDTH, initial_indent="# ", subsequent_indent="# ")
 
 
 def _line(name: str, value: object) -> str:
