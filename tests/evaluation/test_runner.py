@@ -24,6 +24,7 @@ from roboirg.evaluation.records.store import (
     RecordStore,
     read_records,
 )
+from roboirg.evaluation.run import runner
 from roboirg.evaluation.run.executor import InProcess, LocalProcesses, choose_executor
 from roboirg.evaluation.run.progress import Reporter
 from roboirg.evaluation.run.runner import RunSummary, run_plan
@@ -164,7 +165,7 @@ def test_words_of_two_versions_are_not_mixed(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     run_plan(small_plan(1), tmp_path, FakePlay(), InProcess())
-    monkeypatch.setattr("roboirg.evaluation.run.runner.LANGUAGE_VERSION", "99.0")
+    monkeypatch.setitem(runner._OUR_VERSIONS, "language", "99.0")
     with pytest.raises(
         StoreError, match=r"language version .*, but this roboirg has version 99\.0"
     ):

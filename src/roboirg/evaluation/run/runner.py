@@ -41,6 +41,8 @@ from roboirg.tasks.splits.splits import get_episode
 UNREACHABLE_AFTER = 20
 """After this many consecutive connection errors, skip the rest of this policy."""
 
+_OUR_VERSIONS = {"language": LANGUAGE_VERSION, "environment": ENVIRONMENT_VERSION}
+
 
 class RunSummary(NamedTuple):
     """Result of a run.
@@ -103,7 +105,7 @@ def run_plan(
         todo = [
             job
             for job, key in zip(jobs, keys, strict=True)
-            if _should_play(store.stored.get(key), retry_errors=retry_errors)
+            if (one := store.stored.get(key)) is None or (retry_errors and one.outcome == "error")
         ]
         reporter.start(len(jobs), len(jobs) - len(todo))
         loop = _RunLoop(plan, store, reporter)
@@ -234,11 +236,8 @@ class _RunLoop:
 
 def _check_record_version(record: Record) -> None:
     """Refuse what a worker with another version of language or environment has played."""
-    for what, version, ours in (
-        ("language", record.language_version, LANGUAGE_VERSION),
-        ("environment", record.environment_version, ENVIRONMENT_VERSION),
-    ):
-        if version != ours:
+    for what, ours in _OUR_VERSIONS.items():
+        if (version := getattr(record, f"{what}_version")) != ours:
             raise StoreError(
                 f"A worker returned {record.slug} with {what} version {version}, but this roboirg "
                 f"has version {ours}; the record was not stored."
@@ -257,10 +256,6 @@ def _refuse_contradiction(record: Record) -> Record:
     return msgspec.structs.replace(record, **refused)
 
 
-def _should_play(stored: Summary | None, *, retry_errors: bool) -> bool:
-    return stored is None or (retry_errors and stored.outcome == "error")
-
-
 def _report_damage(store: RecordStore, reporter: Reporter) -> None:
     if store.torn:
         reporter.warn(
@@ -277,16 +272,12 @@ def _report_damage(store: RecordStore, reporter: Reporter) -> None:
 def _check_versions(records: Iterable[Summary], folder: Path) -> None:
     """Refuse records of another language or environment version: rates must not mix them."""
     records = tuple(records)
-    for language in {record.language_version for record in records} - {LANGUAGE_VERSION}:
-        raise StoreError(
-            f"{folder} holds episodes of language version {language}, but this roboirg has "
-            f"version {LANGUAGE_VERSION}; choose another --out."
-        )
-    for world in {record.environment_version for record in records} - {ENVIRONMENT_VERSION}:
-        raise StoreError(
-            f"{folder} holds episodes of environment version {world}, but this roboirg has "
-            f"version {ENVIRONMENT_VERSION}; choose another --out."
-        )
+    for what, ours in _OUR_VERSIONS.items():
+        for version in {getattr(record, f"{what}_version") for record in records} - {ours}:
+            raise StoreError(
+                f"{folder} holds episodes of {what} version {version}, but this roboirg has "
+                f"version {ours}; choose another --out."
+            )
     for task, split, episode, seed in {
         (record.task, record.split, record.episode, record.seed) for record in records
     }:
