@@ -95,7 +95,6 @@ def wanted_options(
 def make_items(
     episode: Episode, media: EpisodeMedia, wanted: Sequence[InstructionOptions]
 ) -> list[GroundingItem]:
-    """Return an item for each of the options."""
     listener, questions = load_prompts(PROMPTS), load_prompts(QUESTIONS)
     return [_make_item(episode, media, options, listener, questions) for options in wanted]
 

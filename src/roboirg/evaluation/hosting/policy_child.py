@@ -83,7 +83,6 @@ class PolicyChild:
 
     @property
     def pid(self) -> int:
-        """Its process id."""
         return next(iter(descendants(self._guard.pid)), self._guard.pid)
 
     def exchange(self, calls: Sequence[Call]) -> Question | list[Outcome]:

@@ -107,7 +107,6 @@ class Job(msgspec.Struct, frozen=True, kw_only=True, gc=False):
 
     @property
     def setting(self) -> str:
-        """Name of the setting."""
         return self.options.setting
 
     @property

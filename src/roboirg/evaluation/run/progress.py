@@ -49,7 +49,6 @@ class ProgressCounter:
         self._start = time.monotonic()
 
     def add(self, record: Record) -> None:
-        """Count one record."""
         self.played += 1
         if record.outcome == "error":
             self.errors += 1

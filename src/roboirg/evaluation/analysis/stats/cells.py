@@ -54,7 +54,6 @@ class EvalConditions(NamedTuple):
 
     @classmethod
     def of(cls, job: Job) -> EvalConditions:
-        """Return the conditions of a job."""
         return cls._make(_read_conditions(job))
 
     def text(self, name: str) -> str:
@@ -90,7 +89,6 @@ class Versions(NamedTuple):
 
     @classmethod
     def of(cls, result: Summary) -> Versions:
-        """Return the versions of a result."""
         policy, server = result.policy_version, result.server_version
         return cls(
             policy if server is None else f"{policy} (server {server})",
@@ -126,7 +124,6 @@ class PolicyRun(NamedTuple):
 
     @classmethod
     def of(cls, result: Summary, run: str = "") -> PolicyRun:
-        """Return the policy run of a result."""
         return cls(
             result.policy,
             EvalConditions.of(result),

@@ -61,7 +61,6 @@ class RunData:
         return RunData(results, cells, summaries, names)
 
     def owner(self, run: str, result: Summary) -> PolicyRun:
-        """Return the policy run of a result of a run."""
         return _owner(run, result, self.names)
 
     def is_complete(self, policy_run: PolicyRun) -> bool:

@@ -38,7 +38,6 @@ def make_breakdown_table(
     found: Labels,
     names: Mapping[PolicyRun, str] | None = None,
 ) -> Table:
-    """Make the table of one breakdown."""
     ordered = sort_cells(cells, list(names or policy_order(cells, ())))
     rows = break_down(ordered, found, np.random.default_rng(SEED))
     names = names or labels(ordered)
