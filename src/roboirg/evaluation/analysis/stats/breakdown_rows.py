@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -16,7 +15,7 @@ from roboirg.evaluation.analysis.stats.cells import (
 )
 from roboirg.evaluation.analysis.stats.intervals import Interval
 from roboirg.evaluation.analysis.stats.option_labels import REFERENCE, options_sort_key
-from roboirg.evaluation.analysis.stats.paired_tests import Gap, holm, measure_gap
+from roboirg.evaluation.analysis.stats.paired_tests import Gap, measure_gap, with_holm
 from roboirg.evaluation.analysis.stats.run_summary import ALL, ScopeResults, group_by_scope
 
 
@@ -62,7 +61,7 @@ def break_down(cells: Cells, labels: Labels, rng: np.random.Generator) -> tuple[
     runs = list(dict.fromkeys(key.policy_run for key in cells))
     # Stable: the labels of a setting stay in their order.
     found.sort(key=lambda pair: (runs.index(pair[1].policy_run), options_sort_key(pair[1].options)))
-    return _corrected([_row(label, one, rng) for label, one in found])
+    return with_holm([_row(label, one, rng) for label, one in found], lambda row: row.policy_run)
 
 
 def _row(label: str, results: ScopeResults, rng: np.random.Generator) -> BreakdownRow:
@@ -74,17 +73,3 @@ def _row(label: str, results: ScopeResults, rng: np.random.Generator) -> Breakdo
         cell_interval(judged[0], rng) if len(judged) == 1 else clustered_interval(judged, rng),
         measure_gap(results.explicit_pairs(), rng),
     )
-
-
-def _corrected(rows: Sequence[BreakdownRow]) -> tuple[BreakdownRow, ...]:
-    corrected = list(rows)
-    for policy_run in dict.fromkeys(row.policy_run for row in rows):
-        own = [
-            (place, row.gap.p_value)
-            for place, row in enumerate(rows)
-            if row.policy_run == policy_run and row.gap is not None
-        ]
-        adjusted = holm([p_value for _, p_value in own])
-        for (place, _), p_value in zip(own, adjusted, strict=True):
-            corrected[place] = replace(rows[place], p_holm=p_value)
-    return tuple(corrected)
