@@ -21,6 +21,7 @@ from roboirg.evaluation.records.film import FRAME_STEPS, LAST_FRAME_REPEATS
 from roboirg.evaluation.records.record import Job, Record, Summary
 from roboirg.evaluation.records.run_files import run_file
 from roboirg.evaluation.records.store import iterate_records, read_results
+from roboirg.util.media import CONTROL_RATE
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -28,7 +29,6 @@ if TYPE_CHECKING:
 PICTURES = 5
 MOMENT_COLOR = "#D62728"
 ROW_INCHES = 1.9
-STEPS_PER_SECOND = 20
 PICTURE_PIXELS = 256
 _SUBGOAL_LETTERS, _TITLE_LETTERS = 26, 118
 
@@ -114,7 +114,7 @@ def _draw_strip(place: Any, strip: Strip) -> None:  # noqa: ANN401 - a SubFigure
         is_moment = step == moment
         for spine in axes.spines.values():
             spine.set(color=MOMENT_COLOR if is_moment else GHOST, linewidth=2.5 * is_moment + 0.5)
-        text = f"{step / STEPS_PER_SECOND:.1f} s"
+        text = f"{step / CONTROL_RATE:.1f} s"
         if subgoal := _subgoal(record, step):
             text += "\n" + textwrap.fill(f"“{subgoal}”", _SUBGOAL_LETTERS)
         label = axes.set_xlabel(text, fontsize=6)

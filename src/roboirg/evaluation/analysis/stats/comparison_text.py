@@ -138,8 +138,12 @@ def _caveats(comparison: Comparison) -> Iterator[str]:
         verb = verb_for(unpaired, "are")
         yield f"{counted(unpaired, 'trial')} without a counterpart {verb} left out."
     if unjudged:
-        verb = verb_for(unjudged, "are")
-        yield (
-            f"Incomplete: {counted(unjudged, 'trial')} without a verdict (an error, or still to be "
-            f"played) {verb} left out."
-        )
+        yield incomplete_note(unjudged)
+
+
+def incomplete_note(trials: int) -> str:
+    """Return a sentence on trials that are left out, as they have no verdict."""
+    return (
+        f"Incomplete: {counted(trials, 'trial')} without a verdict (an error, or still to be "
+        f"played) {verb_for(trials, 'are')} left out."
+    )
