@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 from roboirg.core.instruction_options import InstructionOptions
@@ -87,7 +86,6 @@ def test_the_whole_report_follows(run: Path, tmp_path: Path) -> None:
     found = compare(
         *({key: one for key, one in content.cells.items() if key.policy_run == policy_run}
           for policy_run in (listener, forgetful)),
-        np.random.default_rng(0),
     )  # fmt: skip
     gaps = {result.key.options: result.gap.value for result in found.averages}
     resolved = InstructionOptions("direct", form="resolved")

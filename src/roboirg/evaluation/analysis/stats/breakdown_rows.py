@@ -13,7 +13,7 @@ from roboirg.evaluation.analysis.stats.cells import (
     cell_interval,
     clustered_interval,
 )
-from roboirg.evaluation.analysis.stats.intervals import Interval
+from roboirg.evaluation.analysis.stats.intervals import SEED, Interval
 from roboirg.evaluation.analysis.stats.option_labels import REFERENCE, options_sort_key
 from roboirg.evaluation.analysis.stats.paired_tests import Gap, measure_gap, with_holm
 from roboirg.evaluation.analysis.stats.run_summary import ALL, ScopeResults, group_by_scope
@@ -42,7 +42,7 @@ class BreakdownRow:
         return self.results.policy_run
 
 
-def break_down(cells: Cells, labels: Labels, rng: np.random.Generator) -> tuple[BreakdownRow, ...]:
+def break_down(cells: Cells, labels: Labels) -> tuple[BreakdownRow, ...]:
     """Return a row for each policy run, set of options and label, in the order of the cells.
 
     Gaps are paired by episode: those of a label are compared with explicit on the very same
@@ -61,6 +61,7 @@ def break_down(cells: Cells, labels: Labels, rng: np.random.Generator) -> tuple[
     runs = list(dict.fromkeys(key.policy_run for key in cells))
     # Stable: the labels of a setting stay in their order.
     found.sort(key=lambda pair: (runs.index(pair[1].policy_run), options_sort_key(pair[1].options)))
+    rng = np.random.default_rng(SEED)
     return with_holm([_row(label, one, rng) for label, one in found], lambda row: row.policy_run)
 
 

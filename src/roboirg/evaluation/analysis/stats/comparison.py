@@ -18,7 +18,7 @@ from roboirg.evaluation.analysis.stats.cells import (
     PolicyRun,
     only_told,
 )
-from roboirg.evaluation.analysis.stats.intervals import ALPHA
+from roboirg.evaluation.analysis.stats.intervals import ALPHA, SEED
 from roboirg.evaluation.analysis.stats.option_labels import REFERENCE, options_sort_key
 from roboirg.evaluation.analysis.stats.paired_tests import Gap, Pairs, measure_gap, with_holm
 from roboirg.evaluation.analysis.stats.power import episodes_needed, smallest_gap
@@ -103,24 +103,19 @@ class Comparison:
     parts: Mapping[str, tuple[ComparisonResult, ...]]
 
 
-def compare(
-    first: Cells,
-    second: Cells,
-    rng: np.random.Generator,
-    labels: Mapping[str, Labels] | None = None,
-) -> Comparison:
+def compare(first: Cells, second: Cells, labels: Mapping[str, Labels] | None = None) -> Comparison:
     """Compare two policies on the episodes that both played, in the arm ``told`` if both have it.
 
     Args:
         first: the cells of one policy run.
         second: the cells of the other.
-        rng: of the bootstrap.
         labels: of the instructions, by the title of each wanted breakdown.
 
     Raises:
         InvalidValueError: one side has several policies or versions, the two have different
             language or environment versions, or they share no episode.
     """
+    rng = np.random.default_rng(SEED)
     first, second = only_told(first), only_told(second)
     ours, theirs = _only_policy_run(first), _only_policy_run(second)
     _check_fair(ours, theirs)

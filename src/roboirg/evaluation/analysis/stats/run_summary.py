@@ -22,7 +22,7 @@ from roboirg.evaluation.analysis.stats.cells import (
     cell_interval,
     clustered_interval,
 )
-from roboirg.evaluation.analysis.stats.intervals import Interval
+from roboirg.evaluation.analysis.stats.intervals import SEED, Interval
 from roboirg.evaluation.analysis.stats.option_labels import REFERENCE
 from roboirg.evaluation.analysis.stats.paired_tests import (
     Gap,
@@ -184,8 +184,9 @@ def group_by_scope(cells: Cells) -> tuple[ScopeResults, ...]:
     )
 
 
-def summarize(cells: Cells, rng: np.random.Generator) -> tuple[SummaryRow, ...]:
+def summarize(cells: Cells) -> tuple[SummaryRow, ...]:
     """Group cells by scope and add intervals, gaps and corrected p-values."""
+    rng = np.random.default_rng(SEED)
     rows = [_with_statistics(one, rng) for one in group_by_scope(cells)]
     # What is read together: a policy run's tasks, suites, averages.
     return with_holm(

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 
-import numpy as np
-
 from roboirg.evaluation.analysis.stats.breakdown_rows import BreakdownRow, break_down
 from roboirg.evaluation.analysis.stats.breakdowns import UNKNOWN, Breakdown, Labels
 from roboirg.evaluation.analysis.stats.cells import (
@@ -16,7 +14,6 @@ from roboirg.evaluation.analysis.stats.cells import (
     sort_cells,
 )
 from roboirg.evaluation.analysis.stats.comparison_text import incomplete_note
-from roboirg.evaluation.analysis.stats.intervals import SEED
 from roboirg.evaluation.analysis.stats.option_labels import REFERENCE, options_label
 from roboirg.evaluation.analysis.stats.paired_tests import Gap
 from roboirg.evaluation.analysis.stats.rates import p_text, percent, points
@@ -39,7 +36,7 @@ def make_breakdown_table(
     names: Mapping[PolicyRun, str] | None = None,
 ) -> Table:
     ordered = sort_cells(cells, list(names or policy_order(cells, ())))
-    rows = break_down(ordered, found, np.random.default_rng(SEED))
+    rows = break_down(ordered, found)
     names = names or labels(ordered)
     return Table(
         key=f"by_{breakdown.name}",
