@@ -45,7 +45,6 @@ from roboirg.evaluation.policy_calls import policy_usage
 from roboirg.evaluation.records.action_log import write_actions
 from roboirg.evaluation.records.film import VIDEO_FOLDER, VideoMode, points_name
 from roboirg.evaluation.records.record import Job, Record
-from roboirg.language.wordings.wording_store import open_wordings
 from roboirg.policies.by_name.loading import is_privileged, needs_host, planner_alone
 from roboirg.policies.by_name.systems import SCRIPTED, make_hands
 from roboirg.policies.contract.base import Policy, close_policy
@@ -162,9 +161,8 @@ class EpisodeRunner:
             MissingDependencyError: a package has to be installed first.
             InvalidValueError: the job's wording file is missing or has changed.
         """
-        if job.options.wordings is not None:
-            open_wordings(job.wordings_file, job.options.wordings)
         prepared = PreparedJob(job)
+        prepared.open_wordings()
         result = RolloutResult(prepared=prepared)
         hosts = self.hosts if needs_host(job.policy_spec) else None
         guard = CallGuard(result, self.policy_timeout_s, is_hosted=hosts is not None)
