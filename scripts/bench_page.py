@@ -19,7 +19,8 @@ from typing import Any
 
 from msgspec.structs import replace
 
-from roboirg.evaluation.analysis.page.report import render
+from roboirg.evaluation.analysis.page.entries import Run
+from roboirg.evaluation.analysis.page.report import render_runs
 from roboirg.evaluation.records.record import Record
 from roboirg.evaluation.records.store import read_records
 
@@ -85,7 +86,7 @@ def main() -> None:
     arguments = parser.parse_args()
     records = repeated(read_records(arguments.run), arguments.episodes)
     start = time.perf_counter()
-    text = render(records)
+    text = render_runs([Run("", records)])
     print(f"{len(records)} episodes, {len(text) / 1e6:.1f} MB, created in "
           f"{time.perf_counter() - start:.1f} s")  # fmt: skip
     with tempfile.TemporaryDirectory() as folder, sync_playwright() as playwright:

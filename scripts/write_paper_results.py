@@ -9,7 +9,6 @@ import functools
 from collections.abc import Mapping
 from pathlib import Path
 
-import numpy as np
 from written_parts import with_part
 
 from roboirg.apps.leaderboard.packing import opened_run
@@ -18,7 +17,6 @@ from roboirg.apps.learning.policy.paper_page import answers_text, row_cells, tab
 from roboirg.apps.learning.policy.policy_plan import PLANNERS
 from roboirg.evaluation.analysis.published import published_rows
 from roboirg.evaluation.analysis.stats.cells import Cells
-from roboirg.evaluation.analysis.stats.intervals import SEED
 from roboirg.evaluation.analysis.stats.run_summary import ALL, SummaryRow, summarize
 from roboirg.evaluation.plan.plan_file import read_plan_file
 from roboirg.evaluation.records.record import Summary
@@ -56,7 +54,7 @@ def rates_table(main: Cells) -> str:
     lines = [f"| row | {' | '.join(settings)} |", "| --- " + "| ---: " * len(settings) + "|"]
     found = {
         (one.policy_run.policy, one.options.setting): one
-        for one in summarize(main, np.random.default_rng(SEED))
+        for one in summarize(main)
         if one.scope == ALL and one.options.form == "implicit"
     }
     published = {(one.model, one.options.setting): one for one in published_rows("main")}

@@ -423,7 +423,7 @@ def test_what_is_typed_goes_before_what_the_plan_says(
 
 @pytest.mark.parametrize(("missing", "verb"), [(1, "was"), (2, "were")])
 def test_one_episode_takes_a_singular_verb(capsys, missing: int, verb: str) -> None:
-    summary = RunSummary(9, 9 - missing, (), missing, 0, (), ())
+    summary = RunSummary(9, 9 - missing, (), missing, (), ())
     with pytest.raises(SystemExit):
         report_problems(summary, Path("out"))
     assert f"{missing} of 9 episodes {verb} not played" in capsys.readouterr().err

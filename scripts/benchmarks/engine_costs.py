@@ -17,7 +17,7 @@ from roboirg.evaluation.records.record import EventRecord, Job, Record
 from roboirg.evaluation.records.record_codec import encode
 from roboirg.evaluation.records.store import RECORDS_FILE, RecordStore
 from roboirg.evaluation.run.executor import LocalProcesses
-from roboirg.evaluation.run.progress import SilentReporter
+from roboirg.evaluation.run.progress import Reporter
 from roboirg.evaluation.run.runner import run_plan
 
 MANY_RECORDS = 100_000
@@ -57,7 +57,7 @@ def resume_time() -> float:
     return time.perf_counter() - start
 
 
-class _RecordClock(SilentReporter):
+class _RecordClock(Reporter):
     """Notes the time of each record."""
 
     def __init__(self) -> None:

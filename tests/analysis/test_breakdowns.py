@@ -14,12 +14,12 @@ import numpy as np
 import pytest
 import typer
 from msgspec.structs import replace
+from page_text import render
 from typer.testing import CliRunner
 
 from roboirg.cli.report_commands import compare as compare_command
 from roboirg.cli.report_commands import tables
 from roboirg.core.errors import InvalidValueError, UnknownNameError
-from roboirg.evaluation.analysis.page.report import render
 from roboirg.evaluation.analysis.stats.breakdown_rows import break_down
 from roboirg.evaluation.analysis.stats.breakdowns import (
     BREAKDOWNS,
@@ -35,7 +35,6 @@ from roboirg.evaluation.analysis.stats.breakdowns import (
 from roboirg.evaluation.analysis.stats.cells import CellResults, gather
 from roboirg.evaluation.analysis.stats.comparison import compare
 from roboirg.evaluation.analysis.stats.comparison_text import sentences
-from roboirg.evaluation.analysis.stats.intervals import SEED
 from roboirg.evaluation.analysis.stats.paired_tests import Pairs, measure_gap
 from roboirg.evaluation.analysis.tables.breakdown_table import make_breakdown_table
 from roboirg.evaluation.plan.plan import Plan
@@ -211,7 +210,7 @@ def test_rows_partition_the_trials_and_are_paired_with_explicit(
     cells = gather([("", records)])
     for name in ("pattern", "slots", "rival"):
         labels = label_instructions(find_breakdowns([name]), records)[name]
-        rows = break_down(cells, labels, np.random.default_rng(0))
+        rows = break_down(cells, labels)
         counted = Counter(
             (r.policy, r.setting, *BREAKDOWNS[name].labels(r))
             for r in records
@@ -240,7 +239,7 @@ def hand_made(result: Any) -> tuple[list[Any], dict[InstructionKey, tuple[str, .
 
 def test_gaps_are_those_of_the_very_same_episodes(result: Any) -> None:
     results, labels = hand_made(result)
-    rows = break_down(gather([("", results)]), labels, np.random.default_rng(0))
+    rows = break_down(gather([("", results)]), labels)
     assert [(row.label, row.results.episodes) for row in rows] == [("a", 6), ("b", 6), ("c", 6)]
     gaps = [row.gap for row in rows]
     # Even episodes: explicit 0, 2, 4 and direct 0, 2; odd ones: explicit 1, 3, 5 and direct 1.
@@ -265,7 +264,7 @@ def test_gaps_are_those_of_the_very_same_episodes(result: Any) -> None:
 def test_a_label_without_explicit_has_no_gap(result: Any) -> None:
     results, labels = hand_made(result)
     direct = [one for one in results if one.setting == "direct"]
-    rows = break_down(gather([("", direct)]), labels, np.random.default_rng(0))
+    rows = break_down(gather([("", direct)]), labels)
     assert {row.gap for row in rows} == {None}
     table = make_breakdown_table(BREAKDOWNS["slots"], gather([("", direct)]), labels)
     assert [entry.text for entry in table.rows[0].entries] == ["6", "33.33", "–", "–", "–"]
@@ -276,7 +275,7 @@ def test_trials_that_no_record_describes_are_unknown_and_last(result: Any) -> No
     results, labels = hand_made(result)
     some = {key: value for key, value in labels.items() if key.episode < 10}
     cells = gather([("", results)])
-    rows = break_down(cells, some, np.random.default_rng(0))
+    rows = break_down(cells, some)
     assert [(row.label, row.results.episodes) for row in rows][-1] == (UNKNOWN, 2)
     numbers = dict.fromkeys(labels, ("zebra", "10", "9", UNKNOWN, "2 b"))
     direct = {key: cell for key, cell in cells.items() if key.options.setting == "direct"}
@@ -357,7 +356,6 @@ def test_a_compared_label_is_the_difference_on_its_episodes(result: Any) -> None
     found = compare(
         gather([("", better)]),
         gather([("", direct)]),
-        np.random.default_rng(SEED),
         {"letter": labels},
     )
     parts = found.parts["letter"]
@@ -369,7 +367,6 @@ def test_a_compared_label_is_the_difference_on_its_episodes(result: Any) -> None
     empty = compare(
         gather([("", better)]),
         gather([("", direct)]),
-        np.random.default_rng(SEED),
         {"letter": dict.fromkeys(labels, ())},
     )
     assert "By letter: no instruction has one." in list(sentences(empty, "better", "listener"))

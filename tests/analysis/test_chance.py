@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from roboirg.core.instruction_options import InstructionOptions, split_options
-from roboirg.evaluation.analysis.stats.chance import FLOORS, chance_level, floor_level
+from roboirg.evaluation.analysis.stats.chance import CHANCE, FLOORS, floor_level
 from roboirg.evaluation.play.job_instruction import instruct_job
 from roboirg.evaluation.records.record import Job
 from roboirg.language.settings import settings_of
@@ -34,24 +34,24 @@ def job(task: str, setting: str, episode: int = 2, **fields: object) -> Job:
 
 @pytest.mark.parametrize("task", all_tasks())
 def test_explicit_commands_leave_nothing_to_chance(task: str) -> None:
-    assert chance_level(job(task, "explicit", episode) for episode in range(10)) == 1
+    assert floor_level(CHANCE, (job(task, "explicit", episode) for episode in range(10))) == 1
 
 
 @pytest.mark.parametrize("variant", all_variants(), ids="-".join)
 def test_implicit_commands_do(variant) -> None:
-    level = chance_level(job(*variant, episode) for episode in range(10))
+    level = floor_level(CHANCE, (job(*variant, episode) for episode in range(10)))
     assert 0 < level < 1
 
 
 @pytest.mark.parametrize(("setting", "form"), [("contextual", "resolved"), ("direct", "resolved")])
 def test_resolved_commands_leave_nothing_to_chance(setting: str, form: str) -> None:
-    assert chance_level([job("PickXtimes", setting, form=form)]) == 1
+    assert floor_level(CHANCE, [job("PickXtimes", setting, form=form)]) == 1
 
 
 def test_by_hand() -> None:
     """StopCube has the second to the fifth visit, VideoRepick one to three repeats."""
-    assert chance_level([job("StopCube", "direct")]) == Fraction(1, 4)
-    assert chance_level([job("VideoRepick", "direct")]) == Fraction(1, 3)
+    assert floor_level(CHANCE, [job("StopCube", "direct")]) == Fraction(1, 4)
+    assert floor_level(CHANCE, [job("VideoRepick", "direct")]) == Fraction(1, 3)
 
 
 @pytest.mark.parametrize(
@@ -64,7 +64,7 @@ def test_by_hand() -> None:
 )
 def test_the_docs_state_the_level_of_the_test_split(setting: str, text: str) -> None:
     levels = [
-        float(chance_level([job(task, setting, episode) for episode in range(50)]) or 0)
+        float(floor_level(CHANCE, [job(task, setting, episode) for episode in range(50)]) or 0)
         for task in all_tasks()
         if setting in settings_of(get_task(task))
     ]
@@ -89,7 +89,7 @@ def test_it_is_what_the_forgetful_listener_comes_to(task: str, setting: str) -> 
         get_task(task).stages(episode.scene, ForgetfulPolicy(seed=seed).decide(env, "")) == wanted  # type: ignore[arg-type]
         for seed in range(400)
     ]
-    level = float(chance_level([played]))
+    level = float(floor_level(CHANCE, [played]))
     assert np.mean(right) == pytest.approx(level, abs=0.01 + 3 * np.sqrt(level * (1 - level) / 400))
 
 
@@ -126,5 +126,5 @@ def test_floors_are_shares(variant) -> None:
 def test_who_plays_and_how_often_makes_no_difference() -> None:
     jobs = [job("StopCube", "reasoning", episode) for episode in range(4)]
     again = [msgspec.structs.replace(one, policy="else", policy_seed=3) for one in jobs[:1]]
-    assert chance_level(jobs + again * 5) == chance_level(jobs)
-    assert chance_level([]) is None
+    assert floor_level(CHANCE, jobs + again * 5) == floor_level(CHANCE, jobs)
+    assert floor_level(CHANCE, []) is None

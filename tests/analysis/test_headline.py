@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import numpy as np
 import pytest
 
 from roboirg.core.instruction_options import InstructionOptions
@@ -89,9 +88,7 @@ def test_of_one_setting_it_is_its_gap(result) -> None:
     cells = gather([("run", by_hand(result))])
     (found,) = headlines_of(cells, ("reasoning",))
     (row,) = (
-        one
-        for one in summarize(cells, np.random.default_rng(0))
-        if one.scope == ALL and one.options.setting == "reasoning"
+        one for one in summarize(cells) if one.scope == ALL and one.options.setting == "reasoning"
     )
     assert found.gap == pytest.approx(row.gap.value)
     assert found.interval == pytest.approx(row.gap.interval, abs=0.1)

@@ -13,10 +13,11 @@ from typing import Any
 import numpy as np
 import pytest
 from msgspec.structs import replace
+from page_text import render
 
 from roboirg.evaluation.analysis.page.entries import Run
 from roboirg.evaluation.analysis.page.page_server import PageServer
-from roboirg.evaluation.analysis.page.report import make_view, render, render_runs, write_report
+from roboirg.evaluation.analysis.page.report import make_view, render_runs, write_report
 from roboirg.evaluation.plan.plan import Plan
 from roboirg.evaluation.play.rollout_result import RolloutResult, make_record
 from roboirg.evaluation.play.video_writer import VideoWriter

@@ -5,13 +5,12 @@ from __future__ import annotations
 import math
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.evaluation.analysis.figures import write_figures
 from roboirg.evaluation.analysis.page.report import write_report
-from roboirg.evaluation.analysis.stats.chance import chance_level
+from roboirg.evaluation.analysis.stats.chance import CHANCE, floor_level
 from roboirg.evaluation.analysis.stats.comparison import compare
 from roboirg.evaluation.analysis.stats.run_data import RunData
 from roboirg.evaluation.analysis.stats.run_summary import ALL
@@ -67,7 +66,7 @@ def test_elsewhere_it_guesses_and_every_miss_is_one_of_grounding(run: Path) -> N
         for record in of(run, "forgetful")
         if record.setting != "explicit" and record.form == "implicit"
     ]
-    chances = [float(chance_level([record.identity])) for record in guessed]
+    chances = [float(floor_level(CHANCE, [record.identity])) for record in guessed]
     won = sum(record.outcome == "success" for record in guessed)
     deviation = math.sqrt(sum(chance * (1 - chance) for chance in chances))
     assert abs(won - sum(chances)) < MOST_DEVIATIONS * deviation
@@ -87,7 +86,6 @@ def test_the_whole_report_follows(run: Path, tmp_path: Path) -> None:
     found = compare(
         *({key: one for key, one in content.cells.items() if key.policy_run == policy_run}
           for policy_run in (listener, forgetful)),
-        np.random.default_rng(0),
     )  # fmt: skip
     gaps = {result.key.options: result.gap.value for result in found.averages}
     resolved = InstructionOptions("direct", form="resolved")

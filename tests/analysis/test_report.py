@@ -12,6 +12,7 @@ from typing import Any
 import pytest
 import typer
 from msgspec.structs import replace
+from page_text import render
 from typer.testing import CliRunner
 
 from roboirg.cli.report_commands import report
@@ -19,7 +20,7 @@ from roboirg.core.episode import ENVIRONMENT_VERSION
 from roboirg.evaluation.analysis.page import episode_videos
 from roboirg.evaluation.analysis.page.columns import UNATTRIBUTED
 from roboirg.evaluation.analysis.page.entries import Run
-from roboirg.evaluation.analysis.page.report import make_view, render, render_runs, write_report
+from roboirg.evaluation.analysis.page.report import make_view, render_runs, write_report
 from roboirg.evaluation.plan.plan import Plan
 from roboirg.evaluation.plan.stored_plans import write_plan
 from roboirg.evaluation.play.rollout_result import RolloutResult, make_record
@@ -31,7 +32,8 @@ from roboirg.evaluation.records.record import (
     Record,
     UtteranceRecord,
 )
-from roboirg.evaluation.records.store import RecordStore, StoreError
+from roboirg.evaluation.records.record_codec import StoreError
+from roboirg.evaluation.records.store import RecordStore
 from roboirg.tasks.splits.splits import get_episode
 
 pytest.importorskip("jinja2")

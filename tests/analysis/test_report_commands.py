@@ -13,7 +13,8 @@ from roboirg.core.errors import InvalidValueError, UnknownNameError
 from roboirg.evaluation.plan.plan_maker import make_plan
 from roboirg.evaluation.plan.stored_plans import write_plan
 from roboirg.evaluation.play.rollout_result import RolloutResult, make_record
-from roboirg.evaluation.records.store import RecordStore, StoreError
+from roboirg.evaluation.records.record_codec import StoreError
+from roboirg.evaluation.records.store import RecordStore
 
 app = typer.Typer()
 app.command()(tables)

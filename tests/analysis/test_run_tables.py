@@ -55,9 +55,9 @@ def printed(records: list[Record], planned: tuple[Job, ...] = ()) -> str:
     return " ".join(console.file.getvalue().split())  # type: ignore[attr-defined]
 
 
-def failures_text(records: list[Record], max_failures: int = 10) -> str:
+def failures_text(records: list[Record]) -> str:
     console = Console(file=io.StringIO(), width=40)
-    print_failures(records, console, max_failures)
+    print_failures(records, console)
     return console.file.getvalue()  # type: ignore[attr-defined,no-any-return]
 
 
@@ -182,10 +182,10 @@ def test_each_failure_is_listed_with_its_cause() -> None:
 
 
 def test_many_failures_are_counted_and_none_is_not_listed() -> None:
-    many = [record("failure", episode, cause="late") for episode in reversed(range(5))]
-    lines = failures_text(many, max_failures=2).splitlines()
-    assert [line.split()[1] for line in lines[1:3]] == ["test/0", "test/1"]
-    assert lines[3:] == ["  and 3 more"]
+    many = [record("failure", episode, cause="late") for episode in reversed(range(13))]
+    lines = failures_text(many).splitlines()
+    assert [line.split()[1] for line in lines[1:11]] == [f"test/{index}" for index in range(10)]
+    assert lines[11:] == ["  and 3 more"]
     assert failures_text([record("success")]) == ""
 
 

@@ -44,7 +44,7 @@ def film(path: Path, demonstration: int = 0) -> None:
     world = Clock()
     for _ in range(demonstration):
         writer.add_frame(world, is_demonstration=True)  # type: ignore[arg-type]
-    for step in range(0, STEPS + 1, writer.options.every):
+    for step in range(0, STEPS + 1, writer.every):
         world.step = step
         writer.add_frame(world)  # type: ignore[arg-type]
     assert writer.finish()

@@ -18,7 +18,7 @@ DIRECT = InstructionOptions("direct")
 
 def figures(results, planned=()):
     cells = gather([("run", results)], planned)
-    found = summarize(cells, np.random.default_rng(0))
+    found = summarize(cells)
     return {(one.policy_run.policy, one.scope, one.options): one for one in found}
 
 

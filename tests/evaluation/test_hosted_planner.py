@@ -13,7 +13,7 @@ from roboirg.core.errors import InvalidValueError
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.evaluation.hosting.host_pool import HostPool, HostSettings
 from roboirg.evaluation.hosting.policy_descriptions import describe_policy
-from roboirg.evaluation.play.rollout import play_episode
+from roboirg.evaluation.play.rollout import EpisodeRunner
 from roboirg.evaluation.play.rollout_result import RolloutResult
 from roboirg.evaluation.records.record import Job
 from roboirg.policies.by_name.loading import is_privileged, make_policy, needs_host
@@ -31,7 +31,7 @@ def job_of(spec: str) -> Job:
 
 def play(spec: str) -> RolloutResult:
     with HostPool(HostSettings()) as pool, pool.connect() as line:
-        return play_episode(job_of(spec), hosts=line)
+        return EpisodeRunner(Path(), hosts=line).play_once(job_of(spec))
 
 
 @pytest.mark.sim
@@ -68,7 +68,7 @@ def test_one_that_is_declared_runs_next_to_the_world() -> None:
     assert not needs_host(spec)
     assert play(spec).usage["process"] == os.getpid()
     # So does any in a run whose policies share the worker's process.
-    shared = play_episode(job_of("planner:own_planners:Pointer"))
+    shared = EpisodeRunner(Path()).play_once(job_of("planner:own_planners:Pointer"))
     assert (shared.usage["process"], len(shared.subgoals)) == (os.getpid(), 2)
     assert shared.policy is not None
     assert shared.policy.version == "mine-1 + scripted hands"

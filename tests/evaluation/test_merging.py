@@ -10,8 +10,8 @@ from roboirg.core.errors import InvalidValueError
 from roboirg.evaluation.records.episode_log import EpisodeLog, log_path
 from roboirg.evaluation.records.merging import merge_runs
 from roboirg.evaluation.records.record import Record
-from roboirg.evaluation.records.record_codec import identity_key
-from roboirg.evaluation.records.store import RecordStore, StoreError, read_records
+from roboirg.evaluation.records.record_codec import StoreError, identity_key
+from roboirg.evaluation.records.store import RecordStore, read_records
 from roboirg.evaluation.run.executor import InProcess
 from roboirg.evaluation.run.runner import run_plan
 

@@ -21,7 +21,7 @@ from roboirg.core.errors import InvalidValueError, RoboIRGError
 from roboirg.evaluation.plan.worker_needs import WorkerNeeds
 from roboirg.evaluation.records.store import RECORDS_FILE, read_records
 from roboirg.evaluation.run import ray_pool
-from roboirg.evaluation.run.progress import SilentReporter
+from roboirg.evaluation.run.progress import Reporter
 from roboirg.evaluation.run.ray_cluster import RayCluster
 from roboirg.evaluation.run.runner import run_plan
 
@@ -32,7 +32,7 @@ ray = pytest.importorskip("ray")
 PLAN = small_plan(8).model_copy(update={"tries": 3})
 
 
-class Warnings(SilentReporter):
+class Warnings(Reporter):
     """Keeps what the user would read."""
 
     def __init__(self) -> None:

@@ -13,12 +13,10 @@ from evaluation_fakes import FakePlay, small_plan
 from msgspec.structs import replace
 
 from roboirg.evaluation.records.record import Job, Summary
-from roboirg.evaluation.records.record_codec import encode, identity_key
+from roboirg.evaluation.records.record_codec import StoreError, encode, identity_key
 from roboirg.evaluation.records.store import (
     RECORDS_FILE,
     RecordStore,
-    StoreError,
-    read_contents,
     read_index,
     read_records,
     read_results,
@@ -63,8 +61,8 @@ def test_a_damaged_line_loses_only_its_episode(tmp_path: Path) -> None:
     run_plan(small_plan(), tmp_path, FakePlay(), InProcess())
     lines = (tmp_path / RECORDS_FILE).read_bytes().splitlines(keepends=True)
     write(tmp_path, *lines[:2], lines[2][:40] + b"\x00\xff\n", *lines[3:])
-    contents = read_contents(tmp_path / RECORDS_FILE)
-    assert (len(contents.records), contents.damaged, contents.torn) == (7, (3,), b"")
+    with RecordStore(tmp_path) as store:
+        assert (len(store.stored), store.damaged, store.torn) == (7, (3,), b"")
     summary = run_plan(small_plan(), tmp_path, FakePlay(), InProcess())
     assert summary.played == 1
     assert len(read_records(tmp_path)) == 8

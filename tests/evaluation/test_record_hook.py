@@ -16,12 +16,12 @@ from roboirg.evaluation.records.record_codec import encode
 from roboirg.evaluation.records.store import read_records
 from roboirg.evaluation.run import record_hook
 from roboirg.evaluation.run.executor import InProcess
-from roboirg.evaluation.run.progress import SilentReporter
+from roboirg.evaluation.run.progress import Reporter
 from roboirg.evaluation.run.record_hook import CommandHook, HookedReporter, RecordFunction
 from roboirg.evaluation.run.runner import RunSummary, run_plan
 
 
-class Listening(SilentReporter):
+class Listening(Reporter):
     def __init__(self) -> None:
         self.warnings: list[str] = []
 

@@ -23,10 +23,9 @@ from roboirg.core.instruction_options import InstructionOptions
 from roboirg.evaluation.episode_errors import one_line
 from roboirg.evaluation.play import rollout
 from roboirg.evaluation.play.job_instruction import PreparedJob, instruct_job
-from roboirg.evaluation.play.rollout import EpisodeRunner, load_policy, play_episode
+from roboirg.evaluation.play.rollout import EpisodeRunner, load_policy
 from roboirg.evaluation.play.rollout_result import RolloutResult
 from roboirg.evaluation.play.video_writer import VideoWriter
-from roboirg.evaluation.records.film import VideoOptions
 from roboirg.evaluation.records.record import EventRecord, Job
 from roboirg.evaluation.records.record_codec import encode, read_record
 from roboirg.tasks.splits import splits
@@ -128,7 +127,7 @@ def stage(monkeypatch: pytest.MonkeyPatch) -> Callable[..., Any]:
     def play(world: PaperWorld, policy: Any, job: Job = JOB) -> RolloutResult:
         monkeypatch.setattr(rollout, "make_env", lambda _job, _needs, _recollection: world)
         monkeypatch.setattr(rollout, "load_policy", lambda _job, _secret: policy)
-        return play_episode(job)
+        return EpisodeRunner(Path()).play_once(job)
 
     return play
 
@@ -269,7 +268,7 @@ def test_videos_are_kept_as_asked(
         rollout, "make_env", lambda _job, _needs, _recollection: PaperWorld(5, status)
     )
     monkeypatch.setattr(rollout, "load_policy", lambda _job, _secret: PaperPolicy())
-    record = EpisodeRunner(tmp_path, mode, VideoOptions(cameras=("front",)))(JOB)
+    record = EpisodeRunner(tmp_path, mode)(JOB)
     assert (record.video is not None) == kept
     files = sorted(path.suffix for path in tmp_path.rglob("*") if path.is_file())
     files.remove(".npz")
@@ -304,8 +303,7 @@ def test_a_video_that_cannot_be_written_does_not_change_the_verdict(
     monkeypatch.setattr(VideoWriter, "_encode", add)
     monkeypatch.setattr(rollout, "make_env", lambda _job, _needs, _recollection: PaperWorld(5))
     monkeypatch.setattr(rollout, "load_policy", lambda _job, _secret: PaperPolicy())
-    options = VideoOptions(cameras=("front",))
-    record = EpisodeRunner(tmp_path, "all", options)(JOB)
+    record = EpisodeRunner(tmp_path, "all")(JOB)
     assert (record.outcome, record.steps, record.video) == ("success", 5, None)
     assert "No space left on device" in str(record.video_error)
     assert {path.suffix for path in tmp_path.rglob("*") if path.is_file()} == {".npz"}
@@ -317,7 +315,7 @@ def test_a_video_folder_that_is_a_file_does_not_change_the_verdict(
     (tmp_path / "videos").touch()
     monkeypatch.setattr(rollout, "make_env", lambda _job, _needs, _recollection: PaperWorld(5))
     monkeypatch.setattr(rollout, "load_policy", lambda _job, _secret: PaperPolicy())
-    record = EpisodeRunner(tmp_path, "all", VideoOptions(cameras=("front",)))(JOB)
+    record = EpisodeRunner(tmp_path, "all")(JOB)
     assert (record.outcome, record.video) == ("success", None)
     assert "FileExistsError" in str(record.video_error)
     assert "video_error" not in comparable(record)
@@ -468,7 +466,7 @@ def test_the_caption_grows_as_utterances_are_heard(
     world = TellingWorld((0, 3, 6, 6, 9), length=11)
     monkeypatch.setattr(rollout, "make_env", lambda _job, _needs, _recollection: world)
     monkeypatch.setattr(rollout, "load_policy", lambda _job, _secret: PaperPolicy())
-    play_episode(TURNS, Captions(tmp_path / "x.mp4"))
+    EpisodeRunner(tmp_path).play_once(TURNS, Captions(tmp_path / "x.mp4"))
     counts = [1, 1, *[1] * 3, *[2] * 3, *[4] * 3, *[5] * 2]  # video, first frame, chunks of 3
     assert captions == [" ".join(world.instruction.turns[:count]) for count in counts]
 
@@ -484,6 +482,6 @@ def test_what_a_policy_raises_while_it_hears_is_its_error(
         rollout, "make_env", lambda _job, _needs, _recollection: TellingWorld((0, 3), 9)
     )
     monkeypatch.setattr(rollout, "load_policy", lambda _job, _secret: Deaf())
-    result = play_episode(TURNS)
+    result = EpisodeRunner(Path()).play_once(TURNS)
     assert (result.outcome, result.error) == ("error", "policy")
     assert "no ears for" in str(result.cause)

@@ -17,9 +17,16 @@ from msgspec.structs import replace
 from roboirg.core.errors import InvalidValueError, RenderDeviceError
 from roboirg.evaluation.plan.stored_plans import read_plan
 from roboirg.evaluation.records.record import ErrorKind, Job, Record
-from roboirg.evaluation.records.store import RECORDS_FILE, RecordStore, StoreError, read_records
+from roboirg.evaluation.records.record_codec import StoreError
+from roboirg.evaluation.records.store import (
+    RECORDS_FILE,
+    TORN_FILE,
+    RecordStore,
+    read_records,
+)
+from roboirg.evaluation.run import runner
 from roboirg.evaluation.run.executor import InProcess, LocalProcesses, choose_executor
-from roboirg.evaluation.run.progress import SilentReporter
+from roboirg.evaluation.run.progress import Reporter
 from roboirg.evaluation.run.runner import RunSummary, run_plan
 
 WAIT_S = 300.0
@@ -86,7 +93,7 @@ def test_after_sigkill_the_workers_are_gone_and_the_same_command_goes_on(
     summary = finish(tmp_path)
 
     assert summary.played == 16 - stored
-    assert summary.torn_bytes == 22
+    assert len((tmp_path / TORN_FILE).read_bytes().rstrip()) == 22
     assert all_comparable(read_records(tmp_path)) == uninterrupted
     assert line_count(tmp_path) == 16
 
@@ -158,7 +165,7 @@ def test_words_of_two_versions_are_not_mixed(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     run_plan(small_plan(1), tmp_path, FakePlay(), InProcess())
-    monkeypatch.setattr("roboirg.evaluation.run.runner.LANGUAGE_VERSION", "99.0")
+    monkeypatch.setitem(runner._OUR_VERSIONS, "language", "99.0")
     with pytest.raises(
         StoreError, match=r"language version .*, but this roboirg has version 99\.0"
     ):
@@ -187,7 +194,7 @@ def test_worlds_of_two_versions_are_not_mixed(
     assert read_plan(tmp_path) is None
 
 
-class Ears(SilentReporter):
+class Ears(Reporter):
     """Hears warnings, and how many episodes had been played before the last one."""
 
     def __init__(self) -> None:

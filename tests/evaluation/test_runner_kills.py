@@ -14,7 +14,9 @@ import evaluation_fakes
 import pytest
 from evaluation_fakes import FakePlay, comparable, is_alive, small_plan, worker_pids
 
-from roboirg.evaluation.records.store import RECORDS_FILE, read_contents, read_records
+from roboirg.evaluation.records.line_file import LineFile
+from roboirg.evaluation.records.record_codec import read_record
+from roboirg.evaluation.records.store import RECORDS_FILE, read_records
 from roboirg.evaluation.run.executor import InProcess
 from roboirg.evaluation.run.runner import run_plan
 
@@ -47,15 +49,18 @@ def test_after_any_number_of_sigkills_the_records_are_those_of_an_undisturbed_ru
         late += child.poll() is not None
         child.send_signal(signal.SIGKILL)
         child.wait()
-        contents = read_contents(folder / RECORDS_FILE)
+        lines = LineFile(folder / RECORDS_FILE)
+        records = list(lines.parse(read_record))
         # Nothing that was there is lost, nothing is doubled.
-        assert len(contents.records) >= seen
-        assert len({record.identity for record in contents.records}) == len(contents.records)
-        assert not contents.damaged
-        seen = len(contents.records)
+        assert len(records) >= seen
+        assert len({record.identity for record in records}) == len(records)
+        assert not lines.damaged
+        seen = len(records)
     assert subprocess.run(command, check=False).returncode == 0
     assert not any(map(is_alive, worker_pids(folder)))
     killed = {record.slug: comparable(record) for record in read_records(folder)}
     assert killed == {record.slug: comparable(record) for record in read_records(undisturbed)}
-    assert read_contents(folder / RECORDS_FILE).torn == b""
+    lines = LineFile(folder / RECORDS_FILE)
+    assert list(lines.parse(read_record))
+    assert lines.torn == b""
     assert late < KILLS  # a busy machine may let a run finish between two of them

@@ -53,7 +53,7 @@ def test_every_episode_of_its_plans_is_there(run: Path) -> None:
 def test_it_resumes_with_no_episode_played_again(
     run: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(runner, "LANGUAGE_VERSION", LANGUAGE_OF_RUN)
+    monkeypatch.setitem(runner._OUR_VERSIONS, "language", LANGUAGE_OF_RUN)
     before = (run / RECORDS_FILE).read_bytes()
     command("run", "--plan", str(run / "plan.json"), "--out", str(run), "--workers", "0")
     assert (run / RECORDS_FILE).read_bytes() == before

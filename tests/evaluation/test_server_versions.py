@@ -14,7 +14,8 @@ from roboirg.evaluation.plan.plan_maker import make_plan
 from roboirg.evaluation.play.rollout_result import RolloutResult, make_record
 from roboirg.evaluation.records.merging import merge_runs
 from roboirg.evaluation.records.record import Job, Record
-from roboirg.evaluation.records.store import RecordStore, StoreError, read_records, read_results
+from roboirg.evaluation.records.record_codec import StoreError
+from roboirg.evaluation.records.store import RecordStore, read_records, read_results
 from roboirg.evaluation.run.executor import InProcess
 from roboirg.evaluation.run.runner import run_plan
 from roboirg.policies import make_policy

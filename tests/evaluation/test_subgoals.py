@@ -9,22 +9,23 @@ import cv2
 import numpy as np
 import pytest
 from msgspec.structs import replace
+from page_text import render
 from typer.testing import CliRunner
 
 import roboirg
 from roboirg.core.errors import InvalidValueError
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.core.subgoal_text import split_point
-from roboirg.evaluation.analysis.page.report import make_view, render, write_report
+from roboirg.evaluation.analysis.page.report import make_view, write_report
 from roboirg.evaluation.play.point_sheet import Pointing, write_point_sheet
-from roboirg.evaluation.play.rollout import play_episode
+from roboirg.evaluation.play.rollout import EpisodeRunner
 from roboirg.evaluation.play.rollout_result import RolloutResult, make_record
 from roboirg.evaluation.policy_calls import policy_subgoal
 from roboirg.evaluation.records.film import points_name
 from roboirg.evaluation.records.merging import merge_runs
 from roboirg.evaluation.records.record import Job, SubgoalRecord
-from roboirg.evaluation.records.record_codec import encode, read_record
-from roboirg.evaluation.records.store import RecordStore, StoreError
+from roboirg.evaluation.records.record_codec import StoreError, encode, read_record
+from roboirg.evaluation.records.store import RecordStore
 from roboirg.main import app
 
 JOB = Job(
@@ -130,7 +131,7 @@ def test_a_played_episode_notes_what_is_new_with_the_stage_that_is_due(
     env.close()
     assert point is not None
     monkeypatch.setattr(Planning, "point", point)
-    result = play_episode(JOB)
+    result = EpisodeRunner(Path()).play_once(JOB)
     assert result.outcome == "failure", result.cause
     assert [(one.step, one.point) for one in result.pointings] == [(0, (0, 0)), (20, point)]
     words = "pick up the green cube for the first time"

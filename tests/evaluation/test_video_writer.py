@@ -14,7 +14,6 @@ from roboirg.evaluation.play.video_writer import (
     VideoWriter,
     compose_frame,
 )
-from roboirg.evaluation.records.film import VideoOptions
 
 av = pytest.importorskip("av")
 
@@ -46,7 +45,7 @@ def test_a_video_is_small_playable_and_appears_when_complete(tmp_path: Path) -> 
 
 
 def test_a_video_thrown_away_leaves_nothing(tmp_path: Path) -> None:
-    video = VideoWriter(tmp_path / "x.mp4", VideoOptions(cameras=("front",)))
+    video = VideoWriter(tmp_path / "x.mp4")
     video.add_frame(Grey())
     video.discard()
     assert not video.finish()
@@ -59,7 +58,7 @@ class Broken:
 
 
 def test_throwing_away_never_raises(tmp_path: Path) -> None:
-    video = VideoWriter(tmp_path / "x.mp4", VideoOptions(cameras=("front",)))
+    video = VideoWriter(tmp_path / "x.mp4")
     video._container = Broken()  # type: ignore[assignment]
     video.partial.mkdir()  # cannot be unlinked
     video.discard()

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, get_origin, get_type
 
 import typer
 
+from roboirg.cli.names import known_names
 from roboirg.core.errors import InvalidValueError, UnknownNameError
 
 if TYPE_CHECKING:
@@ -162,9 +163,9 @@ class PlanWords(OptionGroup):
 
     def forms(self, usual: Sequence[str] = ("implicit",)) -> tuple[str, ...]:
         """Return the plan's forms, or the usual ones if it has none."""
-        from roboirg.evaluation.plan.plan_maker import form_names
+        from roboirg.language import FORMS
 
-        return form_names(self.fields.get("forms", ",".join(usual)))
+        return known_names("form", self.fields.get("forms", ",".join(usual)), FORMS)
 
     def form(self) -> str:
         """Return the plan's only form."""

@@ -134,8 +134,8 @@ def figures(
     Example: roboirg figures runs/first --out figures
     """
     from roboirg.evaluation.analysis.figures import FIGURES, write_figures
+    from roboirg.evaluation.analysis.figures.figure_style import check_figure_support
     from roboirg.evaluation.analysis.stats.run_data import RunData
-    from roboirg.util.figure_files import check_figure_support
 
     check_figure_support()
     if not runs and not published:
@@ -220,7 +220,6 @@ def compare(
 
     Example: roboirg compare runs/first runs/second --by pattern
     """
-    import numpy as np
     from rich.console import Console
     from rich.text import Text
 
@@ -229,7 +228,6 @@ def compare(
     from roboirg.evaluation.analysis.stats.comparison_text import sentences
     from roboirg.evaluation.analysis.stats.flips import read_flips
     from roboirg.evaluation.analysis.stats.headline import headline_notes
-    from roboirg.evaluation.analysis.stats.intervals import SEED
     from roboirg.evaluation.analysis.stats.run_data import RunData
     from roboirg.evaluation.analysis.stats.sensitivity import policy_contrasts, try_choices
     from roboirg.evaluation.analysis.tables.arm_table import language_use_sentences
@@ -240,7 +238,7 @@ def compare(
     breakdowns = _breakdowns(by)
     labels = _labels(breakdowns, [_split(first)[0], _split(second)[0]])
     titled = {one.title: labels[one.name] for one in breakdowns}
-    found = compare_cells(ours, theirs, np.random.default_rng(SEED), titled)
+    found = compare_cells(ours, theirs, titled)
     names = [found.first.marked_policy, found.second.marked_policy]
     if names[0] == names[1]:
         names = [f"{names[0]} ({first})", f"{names[1]} ({second})"]

@@ -53,7 +53,7 @@ class EpisodeLostError(Exception):
         alone: whether the policy must be asked about this episode alone from now on.
     """
 
-    def __init__(self, kind: ErrorKind, message: str, *, alone: bool) -> None:
+    def __init__(self, kind: ErrorKind, message: str, *, alone: bool = False) -> None:
         super().__init__(message)
         self.kind, self.alone = kind, alone
 

@@ -13,7 +13,6 @@ from pydantic import JsonValue
 from roboirg.core.actions import ActionSpace, check_chunk
 from roboirg.core.errors import InvalidActionError, InvalidValueError
 from roboirg.core.field_types import SUBGOAL
-from roboirg.core.observations import Observation
 from roboirg.core.plain_text import clip_text, is_encodable
 from roboirg.core.subgoal_text import MOST_SUBGOAL_LETTERS
 from roboirg.evaluation.records.record import REAL_TRIAL
@@ -37,15 +36,6 @@ _METADATA = "the policy's metadata"
 
 MAX_COSTS = 64
 """Most entries of a policy's usage."""
-
-
-def next_actions(policy: Policy, observation: Any, space: ActionSpace) -> NDArray[np.float64]:  # noqa: ANN401
-    """Return the policy's next actions.
-
-    Raises:
-        InvalidActionError: an action is invalid, or there are too many.
-    """
-    return check_rows(policy.act(cast("Observation", observation)), space)
 
 
 def check_rows(rows: Any, space: ActionSpace) -> NDArray[np.float64]:  # noqa: ANN401

@@ -13,7 +13,7 @@ import numpy as np
 
 import roboirg
 from roboirg.core.instruction_options import InstructionOptions
-from roboirg.evaluation.play.rollout import play_episode
+from roboirg.evaluation.play.rollout import EpisodeRunner
 from roboirg.evaluation.records.record import Job
 from roboirg.policies import make_policy
 
@@ -129,7 +129,7 @@ def own_outcomes(spec, meshes=MESHES):
             meshes=meshes,
             options=InstructionOptions(SETTING),
         )
-        one = play_episode(job)
+        one = EpisodeRunner(Path()).play_once(job)
         assert one.outcome in ("success", "failure"), one
         played.append((task, episode, one.outcome == "success", one.steps))
     for task in PLAYED:

@@ -9,13 +9,12 @@ from rich.console import Console
 
 from roboirg.apps.language_lab import corpus_statistics, statistics_tables
 from roboirg.core.errors import InvalidValueError, MissingDependencyError
-from roboirg.evaluation.analysis.figures import expressions
+from roboirg.evaluation.analysis.figures import expressions, figure_style
 from roboirg.language import plain_settings
 from roboirg.language.settings import settings_of
 from roboirg.language.variants import instructions
 from roboirg.tasks import every_task
 from roboirg.tasks.splits.splits import split_episodes
-from roboirg.util import figure_files
 
 
 @functools.cache
@@ -109,4 +108,4 @@ def test_a_folder_that_cannot_be_is_one_sentence(tmp_path):
 def test_without_matplotlib_one_sentence_says_what_to_install(monkeypatch):
     monkeypatch.setitem(__import__("sys").modules, "matplotlib", None)
     with pytest.raises(MissingDependencyError, match=r"\[report\]"):
-        figure_files.check_figure_support()
+        figure_style.check_figure_support()

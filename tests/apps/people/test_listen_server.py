@@ -32,7 +32,7 @@ from roboirg.apps.people.question_view import view_question
 from roboirg.core.errors import InvalidValueError
 from roboirg.evaluation.grounding_items.grounding_item import read_items
 from roboirg.evaluation.grounding_items.item_builder import EpisodeMedia
-from roboirg.evaluation.records.store import StoreError
+from roboirg.evaluation.records.record_codec import StoreError
 from roboirg.language.settings import setting_names
 from roboirg.shortcuts.command_chance import is_right
 from roboirg.tasks import every_task, get_task

@@ -12,7 +12,8 @@ from roboirg.core.errors import InvalidValueError, UnknownNameError
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.evaluation.play.rollout import EpisodeRunner
 from roboirg.evaluation.records.record import Job
-from roboirg.evaluation.records.store import RecordStore, StoreError, read_records
+from roboirg.evaluation.records.record_codec import StoreError
+from roboirg.evaluation.records.store import RecordStore, read_records
 from roboirg.policies.by_name.loading import (
     is_privileged,
     load_policy_class,

@@ -3,11 +3,11 @@
 from pathlib import Path
 
 import pytest
+from page_text import render
 
 from roboirg.apps.real.study.failure_choices import failure_choices
 from roboirg.apps.real.study.trial_log import UNSCORED, VOID, WITHDRAWN, TrialLog, trial_metadata
 from roboirg.core.errors import InvalidValueError
-from roboirg.evaluation.analysis.page.report import render
 from roboirg.evaluation.analysis.stats.cells import gather
 from roboirg.evaluation.analysis.tables.paper_tables import make_table
 from roboirg.evaluation.play.rollout_result import RolloutResult, make_record

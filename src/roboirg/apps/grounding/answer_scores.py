@@ -21,7 +21,6 @@ from roboirg.evaluation.analysis.stats.cells import (
     Versions,
     sort_cells,
 )
-from roboirg.evaluation.analysis.stats.intervals import SEED
 from roboirg.evaluation.analysis.stats.run_summary import ALL, SummaryRow, summarize
 from roboirg.evaluation.grounding_items.answer_file import Answer
 from roboirg.evaluation.grounding_items.grounding_item import (
@@ -127,7 +126,7 @@ def score_answers(
 
 def score_rows(score: GroundingScore) -> tuple[ScoreRow, ...]:
     """Return a row for each set of options, with intervals and corrected tests."""
-    found = summarize(score.cells, np.random.default_rng(SEED))
+    found = summarize(score.cells)
     return tuple(_row(score, one) for one in found if one.scope == ALL)
 
 

@@ -11,8 +11,11 @@ from roboirg.core.plain_text import counted
 from roboirg.evaluation.analysis.stats.breakdowns import Breakdown, InstructionKey, Labels
 from roboirg.evaluation.analysis.stats.intervals import Interval
 from roboirg.evaluation.analysis.stats.option_labels import options_label
-from roboirg.evaluation.analysis.stats.rates import p_text, points
-from roboirg.evaluation.analysis.tables.breakdown_table import make_breakdown_table
+from roboirg.evaluation.analysis.stats.rates import points
+from roboirg.evaluation.analysis.tables.breakdown_table import (
+    corrected_p_text,
+    make_breakdown_table,
+)
 from roboirg.evaluation.analysis.tables.table import NOT_APPLICABLE, Column, Entry, Row, Table
 from roboirg.evaluation.grounding_items.grounding_item import GroundingItem
 
@@ -74,7 +77,7 @@ def _entries(row: ScoreRow) -> tuple[Entry, ...]:
         _percent(row.command_chance),
         _percent(row.hidden),
         NOT_APPLICABLE if gap is None else points(gap.value, 1),
-        NOT_APPLICABLE if p_holm is None else p_text(p_holm).removeprefix("p ").removeprefix("= "),
+        corrected_p_text(p_holm),
     )
     return tuple(Entry(word=word) for word in words)
 

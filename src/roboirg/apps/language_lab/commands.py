@@ -95,11 +95,11 @@ def stats(
     """
     from roboirg.apps.language_lab.statistics_tables import overview_tables
     from roboirg.evaluation.analysis.figures.expressions import write_figure
+    from roboirg.evaluation.analysis.figures.figure_style import check_figure_support
     from roboirg.evaluation.plan.option_parsing import parse_splits
     from roboirg.language import plain_settings
     from roboirg.language.variants import instructions
     from roboirg.tasks.splits.splits import split_episodes
-    from roboirg.util.figure_files import check_figure_support
 
     if out is not None:
         check_figure_support()

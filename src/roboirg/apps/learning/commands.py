@@ -79,7 +79,7 @@ def learn_listener(
 
 
 def _run_study(plan: TrainingPlan, out: Path, workers: int) -> None:
-    from roboirg.util.figure_files import check_figure_support
+    from roboirg.evaluation.analysis.figures.figure_style import check_figure_support
 
     if out.exists() and not out.is_dir():
         raise InvalidValueError(f"{str(out)!r} is a file; --study needs a folder as --out.")

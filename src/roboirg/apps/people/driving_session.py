@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, cast
 
 from roboirg.core.observations import CAMERAS
 from roboirg.core.subgoal_text import Point
 from roboirg.evaluation.play.video_writer import PictureSource
-from roboirg.evaluation.records.film import VideoOptions
 from roboirg.evaluation.records.record import Record
 from roboirg.util.media import encode_jpeg
 
@@ -34,7 +33,7 @@ class DrivingSession:
     Attributes:
         phase: at first; then idle, loading, driving (it waits for a command), moving, over or
             failed.
-        options: of the live pictures.
+        every: control steps between two live pictures.
         caption: what was said so far; unused, as `say` gets it.
         longest_caption, point: unused.
         env: the environment, once it is there.
@@ -42,7 +41,7 @@ class DrivingSession:
     """
 
     phase: str = "loading"
-    options: VideoOptions = field(default_factory=lambda: VideoOptions(every=3))
+    every: int = 3
     caption: str = ""
     longest_caption: str = ""
     point: Point | None = None

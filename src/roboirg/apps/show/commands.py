@@ -88,9 +88,9 @@ def _draw(
     from roboirg.apps.show.episode_text import print_episode
     from roboirg.apps.show.playthrough import write_strip
     from roboirg.envs.factory import check_simulator
+    from roboirg.evaluation.analysis.figures.figure_style import check_figure_support
     from roboirg.language.generator import find_refusal, instruct_with
     from roboirg.language.settings import all_settings
-    from roboirg.util.figure_files import check_figure_support
 
     if path.suffix.lower() != ".png" or path.is_dir():
         raise InvalidValueError(f"{str(path)!r} is not a valid picture file; it must end in .png.")

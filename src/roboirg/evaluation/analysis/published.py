@@ -8,7 +8,7 @@ from collections.abc import Collection, Mapping
 from dataclasses import replace
 from decimal import Decimal
 from importlib import resources
-from typing import Literal, NamedTuple, get_args
+from typing import Literal, NamedTuple
 
 from roboirg.core.errors import UnknownNameError
 from roboirg.core.instruction_options import InstructionOptions
@@ -20,8 +20,6 @@ RateTable = Literal["main", "planner", "context", "real", "harder", "other"]
 the settings."""
 RATE_TABLES: tuple[RateTable, ...] = ("main", "planner", "context", "real")
 """Those of the paper."""
-
-Covers = Literal["yes", "no", "partial"]
 
 AVERAGE = "Avg"
 TRIALS: Mapping[RateTable, tuple[int, int]] = {
@@ -68,12 +66,12 @@ class CoverageRow(NamedTuple):
     Attributes:
         benchmark: its name.
         kind: manipulation or memory.
-        covers: by setting.
+        covers: yes, no or partial, by setting.
     """
 
     benchmark: str
     kind: str
-    covers: Mapping[str, Covers]
+    covers: Mapping[str, str]
 
 
 @functools.cache
@@ -107,7 +105,7 @@ def published_coverage() -> tuple[CoverageRow, ...]:
     rows = []
     for line in _lines("coverage"):
         benchmark, kind = line.pop("benchmark"), line.pop("kind")
-        rows.append(CoverageRow(benchmark, kind, {name: _covers(line[name]) for name in line}))
+        rows.append(CoverageRow(benchmark, kind, line))
     return tuple(rows)
 
 
@@ -116,14 +114,6 @@ def _options(line: Mapping[str, str]) -> InstructionOptions:
         stages = tuple(map(int, line["stages"].split(",")))
         return replace(staged_options()[0], stages=stages)
     return InstructionOptions(line["setting"])
-
-
-def _covers(word: str) -> Covers:
-    for known in get_args(Covers):
-        if word == known:
-            covers: Covers = known
-            return covers
-    raise ValueError(f"coverage.csv says {word!r}")
 
 
 def _lines(name: str) -> list[dict[str, str]]:

@@ -77,5 +77,4 @@ def evaluate(
         video=video,
         **options,
     )
-    folder, _ = play_plan(plan, out, workers=workers, progress=progress, on_record=on_record)
-    return Results(folder)
+    return Results(play_plan(plan, out, workers=workers, progress=progress, on_record=on_record))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import datetime as dt
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
@@ -13,9 +14,9 @@ from roboirg.evaluation.plan.plan import Plan
 from roboirg.evaluation.plan.plan_maker import make_plan
 from roboirg.evaluation.plan.stored_plans import with_secret
 from roboirg.evaluation.run.executor import choose_executor
-from roboirg.evaluation.run.progress import ConsoleReporter, SilentReporter
+from roboirg.evaluation.run.progress import ConsoleReporter, Reporter
 from roboirg.evaluation.run.record_hook import CommandHook, HookedReporter, RecordFunction
-from roboirg.evaluation.run.runner import RunSummary, episode_runner, run_plan
+from roboirg.evaluation.run.runner import episode_runner, run_plan
 from roboirg.policies.by_name.local_policies import is_local, policy_name, spec_of
 from roboirg.util.console_width import progress_console
 
@@ -47,7 +48,7 @@ def play_plan(
     workers: int | None,
     progress: bool,
     on_record: str | RecordFunction | None,
-) -> tuple[Path, RunSummary]:
+) -> Path:
     """Play a plan and return the folder of its records.
 
     Args:
@@ -70,17 +71,10 @@ def play_plan(
     executor = choose_executor(workers, plan.episode_timeout_s)
     shown = ConsoleReporter(progress_console(stderr=True)) if progress else None
     hook = CommandHook(on_record) if isinstance(on_record, str) else on_record
-    reporter = HookedReporter(shown or SilentReporter(), hook or (lambda _record: None))
-    try:
-        if shown is not None:
-            shown.__enter__()
-        with reporter:
-            return folder, run_plan(
-                plan, folder, episode_runner(plan, folder), executor, reporter=reporter
-            )
-    finally:
-        if shown is not None:
-            shown.__exit__()
+    reporter = HookedReporter(shown or Reporter(), hook or (lambda _record: None))
+    with shown or contextlib.nullcontext(), reporter:
+        run_plan(plan, folder, episode_runner(plan, folder), executor, reporter=reporter)
+    return folder
 
 
 def _named(

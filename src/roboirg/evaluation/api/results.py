@@ -9,15 +9,12 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from roboirg.core.errors import InvalidValueError, MissingDependencyError, UnknownNameError
 from roboirg.core.plain_text import counted
 from roboirg.evaluation.analysis.figures import FIGURES, draw_figure
 from roboirg.evaluation.analysis.stats.cells import Cells, gather, only_told
 from roboirg.evaluation.analysis.stats.comparison import compare
 from roboirg.evaluation.analysis.stats.comparison_text import sentences
-from roboirg.evaluation.analysis.stats.intervals import SEED
 from roboirg.evaluation.analysis.stats.option_labels import options_label
 from roboirg.evaluation.analysis.stats.run_data import RunData
 from roboirg.evaluation.analysis.stats.run_summary import ALL, summarize
@@ -105,7 +102,7 @@ class Results:
         """Return the mean success over tasks, 0 to 1, by policy and setting (with options)."""
         return {
             (one.key.policy_run.policy, options_label(one.key.options)): float(one.rate)
-            for one in summarize(only_told(self.cells), np.random.default_rng(SEED))
+            for one in summarize(only_told(self.cells))
             if one.key.scope == ALL and one.rate is not None
         }
 
@@ -157,7 +154,7 @@ class Results:
             InvalidValueError: the two cannot be compared.
         """
         ours, theirs = self._cells_of(first), self._cells_of(second)
-        found = compare(ours, theirs, np.random.default_rng(SEED))
+        found = compare(ours, theirs)
         names = found.first.marked_policy, found.second.marked_policy
         return "\n".join(sentences(found, *names))
 

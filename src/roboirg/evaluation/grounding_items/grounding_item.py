@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import functools
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Literal, get_args
@@ -147,7 +146,7 @@ def decode_mask(counts: list[int], size: tuple[int, int]) -> Mask:
 
 def encode_items(items: list[GroundingItem]) -> bytes:
     """Return items as JSON lines."""
-    return b"".join(_encoder().encode(item) + b"\n" for item in items)
+    return b"".join(msgspec.json.encode(item) + b"\n" for item in items)
 
 
 def write_items(items: list[GroundingItem], folder: Path) -> bytes:
@@ -188,8 +187,3 @@ def read_items(folder: Path) -> list[GroundingItem]:
             "make one with: roboirg export grounding --out DIR."
         ) from error
     return list(decode_items(content, path))
-
-
-@functools.cache
-def _encoder() -> msgspec.json.Encoder:
-    return msgspec.json.Encoder()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import json
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, astuple, replace
 from typing import Any, NamedTuple
@@ -94,7 +95,6 @@ def wanted_options(
 def make_items(
     episode: Episode, media: EpisodeMedia, wanted: Sequence[InstructionOptions]
 ) -> list[GroundingItem]:
-    """Return an item for each of the options."""
     listener, questions = load_prompts(PROMPTS), load_prompts(QUESTIONS)
     return [_make_item(episode, media, options, listener, questions) for options in wanted]
 
@@ -141,7 +141,7 @@ def _make_item(
         slots_question=texts.question,
         choice_question=_choice_question(questions, commands),
         points_question=_points_question(questions, episode),
-        schema=_json(schema.schema()),
+        schema=json.dumps(schema.schema(), separators=(",", ":")),
         choices=commands,
         answer=answers[episode.goal],
         answers=[answers[goal] for goal in goals if is_right(goal, episode)],
@@ -153,7 +153,7 @@ def _make_item(
         command_chance=float(right_share(blind_goals(instruction, episode), episode)),
         hidden_slots=_hidden(episode, instruction),
         pattern=_text_or_none(instruction.metadata["pattern"]),
-        expressions=list(_expressions(instruction)),
+        expressions=_expressions(instruction),
         words_back=words_back(instruction),
         meters=media.meters,
         language_version=LANGUAGE_VERSION,
@@ -198,10 +198,10 @@ def _hidden(episode: Episode, instruction: Instruction) -> list[str]:
     return [] if instruction.form == "resolved" else list(hidden_slots((episode, instruction)))
 
 
-def _expressions(instruction: Instruction) -> Iterator[str]:
+def _expressions(instruction: Instruction) -> list[str]:
     last = len(instruction.utterances) - 1
     found = (one.expression for one in instruction.mentions if one.utterance == last)
-    yield from dict.fromkeys(one for one in found if one is not None)
+    return list(dict.fromkeys(one for one in found if one is not None))
 
 
 def _choice_question(questions: Prompts, commands: Sequence[str]) -> str:
@@ -227,9 +227,3 @@ def _option_fields(options: InstructionOptions) -> dict[str, Any]:
 
 def _text_or_none(value: object) -> str | None:
     return None if value is None else str(value)
-
-
-def _json(value: object) -> str:
-    import json
-
-    return json.dumps(value, separators=(",", ":"))

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Sequence
 from fractions import Fraction
 from pathlib import Path
 
@@ -15,7 +14,6 @@ from roboirg.util.media import (
     CONTROL_RATE,
     Clip,
     Picture,
-    Pixels,
     encode_jpeg,
     encode_mp4,
     encode_png,
@@ -41,9 +39,12 @@ def store_media(folder: Path, episode: Episode, every: int, most: int) -> Episod
     """
     seen = look_at_episode(episode, every)
     return EpisodeMedia(
-        picture=_store_picture(folder, seen.picture),
+        picture=store_content(folder, PICTURES, encode_png(Picture(seen.picture)), ".png"),
         video=_store_video(folder, seen, every),
-        frames=tuple(_store_frames(folder, sample_evenly(seen.frames, most))),
+        frames=tuple(
+            store_content(folder, PICTURES, encode_jpeg(pixels), ".jpg")
+            for pixels in sample_evenly(seen.frames, most)
+        ),
         steps=seen.steps,
         points=seen.points,
         meters=seen.meters,
@@ -58,14 +59,6 @@ def store_content(folder: Path, kind: str, content: bytes, suffix: str) -> str:
     if not path.exists():
         write_atomically(path, content)
     return f"{kind}/{path.name}"
-
-
-def _store_picture(folder: Path, pixels: Pixels) -> str:
-    return store_content(folder, PICTURES, encode_png(Picture(pixels)), ".png")
-
-
-def _store_frames(folder: Path, frames: Pixels) -> Sequence[str]:
-    return [store_content(folder, PICTURES, encode_jpeg(pixels), ".jpg") for pixels in frames]
 
 
 def _store_video(folder: Path, seen: SeenScene, every: int) -> str | None:

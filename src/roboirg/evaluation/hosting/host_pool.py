@@ -10,7 +10,6 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import Any, Self
 
-from roboirg.core.errors import InvalidValueError
 from roboirg.evaluation.episode_errors import EpisodeLostError
 from roboirg.evaluation.hosting.messages import receive_calls, send
 from roboirg.evaluation.hosting.policy_child import PolicyChild
@@ -30,18 +29,11 @@ class HostSettings:
         batch: most episodes that a policy is asked about together.
         devices: values of ``CUDA_VISIBLE_DEVICES``; each policy gets a process on each of them.
         policy_timeout_s: seconds that one call of a policy may take; None for no limit.
-
-    Raises:
-        InvalidValueError: the batch is less than 1.
     """
 
     batch: int = DEFAULT_BATCH
     devices: tuple[str, ...] = ()
     policy_timeout_s: float | None = None
-
-    def __post_init__(self) -> None:
-        if self.batch < 1:
-            raise InvalidValueError(f"batch is {self.batch}; it must be at least 1.")
 
 
 @contextlib.contextmanager

@@ -126,9 +126,7 @@ class HostedPolicy:
             reply, failure = self._exchange(call)
         except (EOFError, OSError) as error:
             self._is_open = False
-            raise EpisodeLostError(
-                "infrastructure", "the policy's host is gone", alone=False
-            ) from error
+            raise EpisodeLostError("infrastructure", "the policy's host is gone") from error
         _print(reply.output)
         self.waited_s += max(time.perf_counter() - start - reply.seconds, 0.0)
         self._is_open = self._is_open and reply.outcome is not None
@@ -144,9 +142,10 @@ class HostedPolicy:
         send(self._hosts, [call])
         while isinstance(reply := read_supervisor(receive(self._hosts)), Question):
             answer = Call("gone")
+            wanted = [field for field in self._demonstration if field in reply.fields]
             try:
                 with attribute_errors("environment"):
-                    answer = Call("answer", value=self._draw(reply.fields))
+                    answer = Call("answer", value=self._drawn(wanted))
             except Exception as error:  # noqa: BLE001 - raised once the policy has returned
                 failure = error
             send(self._hosts, [answer])
@@ -172,10 +171,6 @@ class HostedPolicy:
             self.metadata = read_metadata(found.metadata, is_ours=False)
         except (InvalidValueError, ValueError) as error:
             raise EpisodeError("policy", str(error), "") from error
-
-    def _draw(self, fields: Sequence[str]) -> dict[str, NDArray[Any]]:
-        """Return the fields of the video that a policy's process asks for, if there are such."""
-        return self._drawn([field for field in self._demonstration if field in fields])
 
     def _drawn(self, fields: Sequence[str]) -> dict[str, NDArray[Any]]:
         draw = getattr(self._demonstration, "draw", None)

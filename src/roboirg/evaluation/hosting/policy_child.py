@@ -83,7 +83,6 @@ class PolicyChild:
 
     @property
     def pid(self) -> int:
-        """Its process id."""
         return next(iter(descendants(self._guard.pid)), self._guard.pid)
 
     def exchange(self, calls: Sequence[Call]) -> Question | list[Outcome]:
@@ -102,7 +101,7 @@ class PolicyChild:
         except (RoboIRGError, RecursionError, ValueError) as error:
             self.end()
             words = f"the process sent no valid reply ({error})"
-            raise EpisodeLostError("policy", words[:MAX_WORDS], alone=False) from None
+            raise EpisodeLostError("policy", words[:MAX_WORDS]) from None
 
     def loss(self, patience_s: float = 0.0) -> EpisodeLostError | None:
         """Return how the process died; None while it is alive.
@@ -197,4 +196,4 @@ class PolicyChild:
 def _explain(ended: ChildExit) -> EpisodeLostError:
     """Return the loss of a process that ended so."""
     kind: ErrorKind = "infrastructure" if ended.was_killed else "policy"
-    return EpisodeLostError(kind, str(ended), alone=False)
+    return EpisodeLostError(kind, str(ended))

@@ -61,8 +61,7 @@ def describe_policy(spec: str, *, again: bool = False) -> PolicyDescription:
 
 def know_policy(spec: str) -> None:
     """Describe a policy in this process, as one that no other process can import."""
-    load_policy_class(spec)
-    _known[spec] = describe_here(spec)
+    _known[spec] = _describe_ours(spec)
 
 
 def describe_here(spec: str) -> PolicyDescription:

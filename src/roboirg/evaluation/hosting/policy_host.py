@@ -44,7 +44,7 @@ PHASES: Mapping[str, str] = {
     "usage": "policy's close()",
     "close": "policy's close()",
 }
-_ENDING = EpisodeLostError("infrastructure", "the run is ending", alone=False)
+_ENDING = EpisodeLostError("infrastructure", "the run is ending")
 _numbers = itertools.count(1)
 
 
@@ -173,7 +173,7 @@ class PolicyHost:
             return self._attribute(sessions, loss)
         printed = b"" if self.child is None else self.child.take_output()
         if len(sessions) > 1 and any(one.error is not None for one in outcomes):
-            failed = _lost("a call for several episodes failed")
+            failed = EpisodeLostError("policy", "a call for several episodes failed")
             return [_again(failed, alone=True)] * len(sessions)
         if method == "open" and outcomes[0].error is None:
             first.started, first.together = self._starts, outcomes[0].together
@@ -198,13 +198,15 @@ class PolicyHost:
                 spent_s += time.monotonic() - start
             if isinstance(reply, list):
                 if len(reply) != len(sessions):
-                    raise _lost("the process sent too few or too many results")
+                    raise EpisodeLostError("policy", "the process sent too few or too many results")
                 return reply, spent_s
             if reply.session not in by_number:
-                raise _lost("the process asked for the video of another episode")
+                raise EpisodeLostError(
+                    "policy", "the process asked for the video of another episode"
+                )
             # What the world takes to draw is not the policy's time.
             calls = [_ask(by_number[reply.session], reply)]
-        raise _lost("the process asked for the video again and again")
+        raise EpisodeLostError("policy", "the process asked for the video again and again")
 
     def _started_child(self) -> PolicyChild:
         if self.child is None:
@@ -245,10 +247,6 @@ def _ask(session: HostSession, question: Question) -> Call:
     except (EOFError, OSError):
         return Call("gone")
     return answer
-
-
-def _lost(message: str) -> EpisodeLostError:
-    return EpisodeLostError("policy", message, alone=False)
 
 
 def _again(loss: EpisodeLostError, *, alone: bool = False) -> Reply:

@@ -157,15 +157,13 @@ def _parse_ranges(kind: str, text: str, hint: str) -> list[range]:
     ranges = []
     for part in parse_names(kind, text):
         found = re.fullmatch(r"(\d+)(?:\s*-\s*(\d+))?", part)
-        first, last = (-1, -2) if found is None else _ends(kind, found[1], found[2])
+        first, last = -1, -2
+        if found is not None:
+            first, last = _number(kind, found[1]), _number(kind, found[2] or found[1])
         if last < first:
             raise InvalidValueError(f"{_shorten(part)!r} is not a valid {kind}; {hint}.")
         ranges.append(range(first, last + 1))
     return ranges
-
-
-def _ends(kind: str, first: str, last: str | None) -> tuple[int, int]:
-    return _number(kind, first), _number(kind, last or first)
 
 
 def _number(kind: str, digits: str) -> int:

@@ -52,7 +52,7 @@ from roboirg.evaluation.records.record import (
     ErrorKind,
     Job,
 )
-from roboirg.evaluation.records.record_codec import RecordKey, identity_key
+from roboirg.evaluation.records.record_codec import RecordKey, identity_key, with_nested_options
 from roboirg.language.generator import check_options, find_refusal
 from roboirg.language.settings import EXPLICIT, SETTING_GROUPS, all_settings, expand_settings
 from roboirg.language.wordings.wording_store import open_wordings
@@ -240,11 +240,7 @@ class Plan(BaseModel):
 
     @property
     def hosting(self) -> HostSettings | None:
-        """How policies are hosted; None if they run in the world's process.
-
-        Raises:
-            InvalidValueError: the batch is less than 1.
-        """
+        """How policies are hosted; None if they run in the world's process."""
         if self.policy_process == "shared":
             return None
         return HostSettings(self.batch, self.devices, self.policy_timeout_s)
@@ -427,11 +423,9 @@ class Plan(BaseModel):
             check_arm(arm)
         turned = [name for name, one in all_settings().items() if "delivery" in one.reads]
         check_names("setting in turns", self.in_turns, turned)
-        for name, least in (("max_steps", 1), ("tries", 1), ("batch", 1)):
-            if getattr(self, name) < least:
-                raise InvalidValueError(
-                    f"{name} is {getattr(self, name)}; it must be at least {least}."
-                )
+        for name in ("max_steps", "tries", "batch"):
+            if getattr(self, name) < 1:
+                raise InvalidValueError(f"{name} is {getattr(self, name)}; it must be at least 1.")
         for name in ("policy_timeout_s", "episode_timeout_s"):
             if not getattr(self, name) > 0:
                 raise InvalidValueError(
@@ -439,8 +433,6 @@ class Plan(BaseModel):
                 )
         if self.actions is not None:
             find_action_space(self.actions)
-        if self.demonstration_frames is not None:
-            check_demonstration_frames(self.demonstration_frames)
         check_observe_every(self.observe_every)
 
     def _check_settings(self, task: str) -> None:
@@ -473,6 +465,4 @@ def _names_the_goal(options: InstructionOptions) -> bool:
 
 def nest_options(fields: Mapping[str, Any]) -> dict[str, Any]:
     """Return the fields of a plan, with the options of instructions among them in `options`."""
-    nested = {name: value for name, value in fields.items() if name in SINGLE_OPTIONS}
-    others = {name: value for name, value in fields.items() if name not in SINGLE_OPTIONS}
-    return {**others, "options": {**others.get("options", {}), **nested}}
+    return with_nested_options(fields, SINGLE_OPTIONS)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib.resources
+import inspect
 import textwrap
 from collections.abc import Iterator, Mapping, Sequence
 from importlib.resources.abc import Traversable
@@ -15,6 +16,7 @@ import yaml
 from roboirg.core.errors import InvalidValueError, UnknownNameError
 from roboirg.core.instruction_options import OPTION_HELP
 from roboirg.evaluation.plan.plan import SINGLE_OPTIONS, Plan
+from roboirg.evaluation.plan.plan_maker import make_plan
 from roboirg.evaluation.plan.stored_plans import from_schema_3
 from roboirg.util.regular_file import read_regular
 
@@ -24,21 +26,7 @@ _MOST_BYTES = 4_000_000
 """Of a plan file; lists of 10,000 numbers, the longest that are played, have less than 0.2 MB."""
 _SUFFIXES = (".yaml", ".yml", ".json")
 """JSON is YAML, too: a run's plan.json can be played again."""
-_LISTS = frozenset(
-    {
-        "policies",
-        "tasks",
-        "settings",
-        "in_turns",
-        "forms",
-        "episodes",
-        "policy_seeds",
-        "arms",
-        "stages",
-        "retry_on",
-        "devices",
-    }
-)
+_LISTS = frozenset(inspect.signature(make_plan).parameters) - {"options"}
 """Keys whose values are lists on the command line."""
 _WIDTH = 100
 _END = "...\n"
@@ -154,8 +142,9 @@ def _as_typed(key: str, value: object) -> object:
 
 def plan_text(plan: Plan) -> str:
     """Return a plan as YAML that `read_plan_file` reads; the comments explain each field."""
+    comments = textwrap.TextWrapper(_WIDTH, initial_indent="# ", subsequent_indent="# ")
     return "\n".join(
-        f"{_comment(explanation)}\n{_line(name, value)}"
+        f"{comments.fill(explanation)}\n{_line(name, value)}"
         for name, value, explanation in _fields(plan)
     )
 
@@ -170,10 +159,6 @@ def _fields(plan: Plan) -> Iterator[tuple[str, object, str]]:
             yield name, _ranges(plan.episodes), str(field.description)
         else:
             yield name, getattr(plan, name), str(field.description)
-
-
-def _comment(text: str) -> str:
-    return textwrap.fill(text, _WIDTH, initial_indent="# ", subsequent_indent="# ")
 
 
 def _line(name: str, value: object) -> str:

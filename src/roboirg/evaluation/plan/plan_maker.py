@@ -15,7 +15,6 @@ from roboirg.core.instruction_options import InstructionOptions
 from roboirg.evaluation.plan.option_parsing import (
     ALL,
     check_names,
-    means_all,
     parse_arms,
     parse_episodes,
     parse_names,
@@ -34,7 +33,6 @@ from roboirg.evaluation.plan.plan import (
 )
 from roboirg.evaluation.records.film import VIDEO_MODES
 from roboirg.evaluation.records.record import ERROR_KINDS, ErrorKind
-from roboirg.language import FORMS
 from roboirg.language.settings import SETTING_GROUPS, find_settings
 
 
@@ -74,7 +72,8 @@ def make_plan(
         UnknownNameError: a name does not exist; the message suggests the nearest.
         InvalidValueError: a number or combination is out of range.
     """
-    split, names = str(options.get("split", "test")), _task_names(tasks)
+    split = str(options.get("split", "test"))
+    names = task_registry.find_tasks(parse_names("task", tasks))
     if options.get("wordings") == REQUIRED:
         raise InvalidValueError(
             "This plan needs RoboMME's sentences: make a wording file with `roboirg language "
@@ -120,17 +119,6 @@ def word_options(*, stages: str = "1-5", **options: object) -> InstructionOption
     return replace(plan.options, stages=sets[0])
 
 
-def form_names(text: str) -> tuple[str, ...]:
-    """Return the forms that were typed.
-
-    Raises:
-        UnknownNameError: there is no such form.
-    """
-    names = FORMS if means_all(text) else parse_names("form", text)
-    check_names("form", names, FORMS)
-    return names
-
-
 def as_typed_field(name: str, kind: Any, value: object) -> Any:  # noqa: ANN401 - of that type
     """Return a value from a file as a field of a type.
 
@@ -160,10 +148,6 @@ def _settings(text: str) -> tuple[str, ...] | SettingsName:
     found = {*find_settings(words)}
     same = (name for name in SETTINGS_NAMES if name in words and {*find_settings([name])} == found)
     return next(same, words)
-
-
-def _task_names(text: str) -> tuple[str, ...]:
-    return task_registry.find_tasks(parse_names("task", text))
 
 
 def _error_kinds(text: str) -> tuple[ErrorKind, ...]:

@@ -2,15 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import cast
 
+from roboirg.core.conditions import Fact
 from roboirg.core.episode import Episode
-from roboirg.evaluation.records.record import GoalOutcomes, OriginalStatus
+from roboirg.evaluation.records.record import EventRecord, GoalOutcomes, OriginalStatus
 from roboirg.judging import Event, FailureAttribution, Status
 from roboirg.judging.episode_replay import Decision, decide
 from roboirg.language.worded_command import describe_goal
 from roboirg.tasks import get_task, with_goal
+
+
+def judged_events(events: Iterable[EventRecord], start: int) -> list[Event]:
+    """Return recorded events as the judge sees them, for a policy's turn that began at a step."""
+    return [
+        Event(one.step + start, Fact(one.kind, one.subject, one.place), one.holds) for one in events
+    ]
 
 
 def find_goal_outcomes(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 from msgspec.structs import replace
@@ -12,13 +12,13 @@ from numpy.typing import ArrayLike, NDArray
 from roboirg.core.actions import ActionSpace
 from roboirg.core.delivery import SpokenInstruction
 from roboirg.core.inference_facts import inference_facts
-from roboirg.core.observations import FRONT, Demonstration
+from roboirg.core.observations import FRONT, Demonstration, Observation
 from roboirg.core.subgoal_text import split_point
 from roboirg.evaluation.play.call_guard import CallGuard
 from roboirg.evaluation.play.point_sheet import MOST_PICTURES, Pointing
 from roboirg.evaluation.play.rollout_result import RolloutResult
 from roboirg.evaluation.play.video_writer import FrameSink
-from roboirg.evaluation.policy_calls import next_actions, policy_metadata, policy_subgoal
+from roboirg.evaluation.policy_calls import check_rows, policy_metadata, policy_subgoal
 from roboirg.evaluation.records.record import Job, SubgoalRecord
 from roboirg.judging import judge_subgoal, plain_subgoal
 from roboirg.policies.by_name.loading import is_foreign, is_privileged, planner_alone
@@ -79,7 +79,7 @@ class GuardedLoop(EpisodeLoop):
             first = SpokenInstruction(env.instruction.turns, self._job.options.delivery).prompt
             if writer is not None:
                 writer.caption, writer.longest_caption = first, env.instruction.text
-                env.set_frame_hook(writer.add_frame, every=writer.options.every)
+                env.set_frame_hook(writer.add_frame, every=writer.every)
             observation, info = env.reset()
             if writer is not None:
                 writer.add_frame(env)  # the policy's first observation
@@ -107,7 +107,7 @@ class GuardedLoop(EpisodeLoop):
     def act(self, observation: dict[str, Any]) -> NDArray[np.float64]:
         """Return the policy's next actions, checked."""
         with self._guard.policy("policy's act()", "policy_act"):
-            rows = next_actions(self.policy, observation, self._space)
+            rows = check_rows(self.policy.act(cast("Observation", observation)), self._space)
             subgoal = policy_subgoal(self.policy)
         with self._guard.environment("env_subgoal"):
             self._note_ends()

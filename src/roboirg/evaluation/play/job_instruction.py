@@ -34,16 +34,17 @@ class PreparedJob:
     @cached_property
     def instruction(self) -> Instruction:
         """The instruction; raises like `instruct_job`."""
-        self._open_wordings()
+        self.open_wordings()
         return say_arm(self.scene_episode, self.job.options, self.job.arm).instruction
 
     @cached_property
     def explicit(self) -> Instruction:
         """The explicit instruction of the goal of `episode`; raises like `instruct_job`."""
-        self._open_wordings()
+        self.open_wordings()
         return language.instruct_with(self.episode, replace(self.job.options, setting=EXPLICIT))
 
-    def _open_wordings(self) -> None:
+    def open_wordings(self) -> None:
+        """Open the job's wording file, if it has one; raises like `instruct_job`."""
         if self.job.options.wordings is not None:
             open_wordings(self.job.wordings_file, self.job.options.wordings)
 

@@ -95,7 +95,7 @@ def too_long_text(audit: PromptAudit, verdict: PromptVerdict) -> str | None:
     if verdict != "cut":
         return None
     return (
-        f"the instruction needs {_between(audit.needed)} tokens, but the policy's model reads "
+        f"the instruction needs {audit.needed_text} tokens, but the policy's model reads "
         f"{audit.limit}; --long-prompts send plays the episode anyway"
     )
 
@@ -142,11 +142,6 @@ def warning_lines(shares: Iterable[PromptShares]) -> Iterator[str]:
             f"{one.policy} reads {one.limit.tokens} tokens of a prompt: the end of these "
             f"instructions does not reach it: {settings}."
         )
-
-
-def _between(needed: tuple[int, int]) -> str:
-    low, high = needed
-    return f"{low}" if low == high else f"{low} to {high}"
 
 
 def _percent(share: float) -> str:

@@ -43,9 +43,8 @@ from roboirg.evaluation.play.rollout_result import RolloutResult, make_record, u
 from roboirg.evaluation.play.video_writer import FrameSink, VideoWriter
 from roboirg.evaluation.policy_calls import policy_usage
 from roboirg.evaluation.records.action_log import write_actions
-from roboirg.evaluation.records.film import VIDEO_FOLDER, VideoMode, VideoOptions, points_name
+from roboirg.evaluation.records.film import VIDEO_FOLDER, VideoMode, points_name
 from roboirg.evaluation.records.record import Job, Record
-from roboirg.language.wordings.wording_store import open_wordings
 from roboirg.policies.by_name.loading import is_privileged, needs_host, planner_alone
 from roboirg.policies.by_name.systems import SCRIPTED, make_hands
 from roboirg.policies.contract.base import Policy, close_policy
@@ -69,7 +68,6 @@ class EpisodeRunner:
     Attributes:
         folder: output folder of the run; videos and sheets of points go to ``videos/`` in it.
         video: which episodes get a video.
-        options: format of the videos.
         policy_timeout_s: seconds that one call of the policy may take, if a supervisor watches.
         plan: fingerprint of the plan, for the records.
         hosting: how policies get processes of their own; None for policies in the world's process.
@@ -78,12 +76,12 @@ class EpisodeRunner:
             model reads.
         seed_secret: of the run, for the policies' seeds.
         replies: where those of models are kept; None for a run that keeps none.
-        recollection: of the scene that was played last; each process has its own.
+        recollection: of the scene that was played last; each process has its own. Used if the
+            policy is hosted and nothing is filmed.
     """
 
     folder: Path
     video: VideoMode = "off"
-    options: VideoOptions = field(default_factory=VideoOptions)
     policy_timeout_s: float | None = None
     plan: str | None = None
     hosting: HostSettings | None = None
@@ -133,18 +131,9 @@ class EpisodeRunner:
             attempt += 1
             writer = None
             if self.video != "off":
-                writer = VideoWriter(self.folder / VIDEO_FOLDER / f"{job.slug}.mp4", self.options)
+                writer = VideoWriter(self.folder / VIDEO_FOLDER / f"{job.slug}.mp4")
             try:
-                result = play_episode(
-                    job,
-                    writer,
-                    self.policy_timeout_s,
-                    self.hosts,
-                    alone=alone,
-                    refuse_long=self.refuse_long,
-                    seed_secret=self.seed_secret,
-                    recollection=self.recollection,
-                )
+                result = self.play_once(job, writer, alone=alone)
             except EpisodeLostError as error:
                 if attempt < MAX_LOSSES:
                     alone = alone or error.alone
@@ -156,6 +145,55 @@ class EpisodeRunner:
             result.attempt = attempt
             return writer, result
 
+    def play_once(
+        self, job: Job, writer: FrameSink | None = None, *, alone: bool = False
+    ) -> RolloutResult:
+        """Play one job once; errors of the policy or the environment end up in the result.
+
+        Args:
+            job: what to play.
+            writer: gets the frames of a video.
+            alone: whether a hosted policy must not be asked about it together with others.
+
+        Raises:
+            EpisodeLostError: the policy's process was lost; the episode can be played again.
+            RenderDeviceError: no Vulkan device can render.
+            MissingDependencyError: a package has to be installed first.
+            InvalidValueError: the job's wording file is missing or has changed.
+        """
+        prepared = PreparedJob(job)
+        prepared.open_wordings()
+        result = RolloutResult(prepared=prepared)
+        hosts = self.hosts if needs_host(job.policy_spec) else None
+        guard = CallGuard(result, self.policy_timeout_s, is_hosted=hosts is not None)
+        policy: Policy | None = None
+        try:
+            if hosts is None:
+                result.policy = describe_here(job.policy_spec)
+            with guard.policy("policy's constructor", "policy_load"):
+                if hosts is None:
+                    policy = load_policy(prepared, self.seed_secret)
+                else:
+                    seed = _policy_seed(prepared, self.seed_secret)
+                    policy = load_hosted_policy(hosts, job.policy_spec, seed, alone=alone)
+                    privileged = is_privileged(job.policy_spec)
+                    result.policy = PolicyDescription(policy.version, privileged)
+                needs = job_needs(policy, job)
+                result.prompt_limit = prompt_limit(needs)
+                if self.refuse_long and result.prompt_limit is not None:
+                    audit = audit_job(job, result.prompt_limit, prepared.instruction)
+                    if message := too_long_text(*audit):
+                        raise EpisodeError("prompt", message, "")
+            recalls = hosts is not None and writer is None and not is_privileged(job.policy_spec)
+            recollection = self.recollection if recalls else None
+            play_with(policy, job, needs, result, guard, writer, recollection)
+        except EpisodeError as error:
+            result.record_error(error.kind, error.cause, error.details)
+        finally:
+            if policy is not None:
+                _close_policy(policy, result, guard)
+        return result
+
     def _finish_video(self, writer: VideoWriter | None, result: RolloutResult) -> str | None:
         """Keep or discard the video; return its path relative to the folder, or None."""
         if writer is None:
@@ -165,69 +203,6 @@ class EpisodeRunner:
             return writer.path.relative_to(self.folder).as_posix()
         writer.discard()
         return None
-
-
-def play_episode(
-    job: Job,
-    writer: FrameSink | None = None,
-    policy_timeout_s: float | None = None,
-    hosts: socket | None = None,
-    *,
-    alone: bool = False,
-    refuse_long: bool = False,
-    seed_secret: str = "",
-    recollection: Recollection | None = None,
-) -> RolloutResult:
-    """Play one job; errors of the policy or the environment end up in the result.
-
-    Args:
-        job: what to play.
-        writer: gets the frames of a video.
-        policy_timeout_s: seconds that one call of the policy may take, if a supervisor watches.
-        hosts: the line on which to ask for processes of policies; None to run them in this one.
-        alone: whether a hosted policy must not be asked about this episode together with others.
-        refuse_long: whether not to play an episode whose prompt will be cut.
-        seed_secret: of the run, for the policy's seed.
-        recollection: of the scene; used if the policy is hosted and nothing is filmed.
-
-    Raises:
-        EpisodeLostError: the policy's process was lost; the episode can be played again.
-        RenderDeviceError: no Vulkan device can render.
-        MissingDependencyError: a package has to be installed first.
-        InvalidValueError: the job's wording file is missing or has changed.
-    """
-    if job.options.wordings is not None:
-        open_wordings(job.wordings_file, job.options.wordings)
-    prepared = PreparedJob(job)
-    result = RolloutResult(prepared=prepared)
-    if not needs_host(job.policy_spec):
-        hosts = None
-    guard = CallGuard(result, policy_timeout_s, is_hosted=hosts is not None)
-    policy: Policy | None = None
-    try:
-        if hosts is None:
-            result.policy = describe_here(job.policy_spec)
-        with guard.policy("policy's constructor", "policy_load"):
-            if hosts is None:
-                policy = load_policy(prepared, seed_secret)
-            else:
-                seed = _policy_seed(prepared, seed_secret)
-                policy = load_hosted_policy(hosts, job.policy_spec, seed, alone=alone)
-                privileged = is_privileged(job.policy_spec)
-                result.policy = PolicyDescription(policy.version, privileged)
-            needs = job_needs(policy, job)
-            result.prompt_limit = prompt_limit(needs)
-            if refuse_long:
-                _refuse_long_prompt(prepared, result)
-        if hosts is None or writer is not None or is_privileged(job.policy_spec):
-            recollection = None
-        play_with(policy, job, needs, result, guard, writer, recollection)
-    except EpisodeError as error:
-        result.record_error(error.kind, error.cause, error.details)
-    finally:
-        if policy is not None:
-            _close_policy(policy, result, guard)
-    return result
 
 
 def play_with(
@@ -270,15 +245,6 @@ def play_with(
             with contextlib.closing(env), guard.environment("env_step"):
                 if result.action_space is not None and stands:
                     result.end_state = env.end_state()
-
-
-def _refuse_long_prompt(prepared: PreparedJob, result: RolloutResult) -> None:
-    """Raise an `EpisodeError` if the instruction is longer than what the policy's model reads."""
-    if result.prompt_limit is None:
-        return
-    audit = audit_job(prepared.job, result.prompt_limit, prepared.instruction)
-    if message := too_long_text(*audit):
-        raise EpisodeError("prompt", message, "")
 
 
 def load_policy(prepared: PreparedJob, seed_secret: str = "") -> Policy:

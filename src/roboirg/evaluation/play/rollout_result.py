@@ -21,7 +21,6 @@ from pydantic import JsonValue
 from roboirg import language
 from roboirg.core.actions import CHOICE, find_action_space
 from roboirg.core.arms import TOLD
-from roboirg.core.conditions import Fact
 from roboirg.core.delivery import TURNS, PromptVerdict
 from roboirg.core.episode import ENVIRONMENT_VERSION
 from roboirg.core.errors import InvalidValueError, MissingDependencyError
@@ -30,7 +29,7 @@ from roboirg.core.inference_facts import InferenceFacts
 from roboirg.core.observations import DemonstrationSource
 from roboirg.core.plain_text import clip_text
 from roboirg.evaluation.hosting.policy_descriptions import PolicyDescription, describe_policy
-from roboirg.evaluation.play.goal_outcomes import find_goal_outcomes, name_other_goal
+from roboirg.evaluation.play.goal_outcomes import find_goal_outcomes, judged_events, name_other_goal
 from roboirg.evaluation.play.job_instruction import PreparedJob
 from roboirg.evaluation.play.point_sheet import Pointing
 from roboirg.evaluation.play.prompt_shares import audit_job, audit_prompt
@@ -48,16 +47,13 @@ from roboirg.evaluation.records.record import (
     SubgoalRecord,
     UtteranceRecord,
 )
-from roboirg.judging import Event, attribute_failure
+from roboirg.judging import attribute_failure
 from roboirg.judging.episode_replay import decide
 from roboirg.language.settings import EXPLICIT
 from roboirg.policies.by_name.loading import server_version
 from roboirg.policies.prompt_length.prompt_audit import PromptLimit
 from roboirg.util.processor import processor_family
 from roboirg.util.short_hash import DIGITS
-
-UNDECLARED: PromptVerdict = "unknown"
-"""Verdict on the prompts of a policy that declares no limit."""
 
 
 @dataclass
@@ -269,7 +265,7 @@ def _audit(
 ) -> tuple[PromptAudit | None, PromptVerdict]:
     """Return what of the instruction reached the policy's model, and the verdict."""
     if result.prompt_limit is None:
-        return None, UNDECLARED
+        return None, "unknown"
     steps = [one.step for one in utterances]
     try:
         if steps == [None] * len(steps):  # it ended before anything was said
@@ -319,10 +315,7 @@ def _analyze(
     if result.outcome == "error" or not result.events:
         return None, None
     episode, start, elapsed = prepared.episode, result.policy_start_step, result.elapsed_steps
-    events = [
-        Event(one.step + start, Fact(one.kind, one.subject, one.place), one.holds)
-        for one in result.events
-    ]
+    events = judged_events(result.events, start)
     decision = decide(episode, events, elapsed)
     goals = find_goal_outcomes(episode, events, elapsed, decision, result.original)
     if result.outcome != "failure":

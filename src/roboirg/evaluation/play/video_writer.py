@@ -15,10 +15,10 @@ from numpy.typing import NDArray
 
 from roboirg.core.errors import EndOfRunError
 from roboirg.core.extras import extra_needed
-from roboirg.core.observations import FRONT
+from roboirg.core.observations import CAMERAS, FRONT
 from roboirg.core.subgoal_text import Point
 from roboirg.evaluation.play.point_sheet import with_ring
-from roboirg.evaluation.records.film import LAST_FRAME_REPEATS, VideoOptions
+from roboirg.evaluation.records.film import FRAME_RATE, FRAME_STEPS, LAST_FRAME_REPEATS, poster_name
 from roboirg.util.media import draw_text, wrap_text
 
 if TYPE_CHECKING:
@@ -30,11 +30,13 @@ Frame = NDArray[np.uint8]
 DEMONSTRATION_COLOR = (255, 176, 32)
 """RGB of the border around the frames of the demonstration."""
 
+QUALITY = 28
+"""x264's constant rate factor; higher is smaller."""
+
 BORDER = 6
 GAP = 4
 """Pixels of the black line between two pictures; even, because H.264 needs an even width."""
 
-POSTER_SUFFIX = ".jpg"
 _PARTIAL_SUFFIX = ".part"
 
 _TEXT_SCALE, _TEXT_LINE, _TEXT_MARGIN = 0.4, 16, 6
@@ -53,13 +55,13 @@ class FrameSink(Protocol):
     """Takes the frames of an episode while it is played.
 
     Attributes:
-        options: how often there is a frame, and its format.
+        every: control steps between two frames.
         caption: what was said so far.
         longest_caption: everything that will have been said.
         point: row and column of the planner's subgoal in the front picture, if it has one.
     """
 
-    options: VideoOptions
+    every: int
     caption: str
     longest_caption: str
     point: Point | None
@@ -128,9 +130,9 @@ class VideoWriter:
 
     Args:
         path: of the finished MP4; a poster of the last frame gets the same name with ``.jpg``.
-        options: format of the video.
 
     Attributes:
+        every: control steps between two frames.
         caption: text below the pictures; set before the first frame.
         longest_caption: text for which there is room below the pictures, if the caption grows.
         point: row and column in the front picture, marked by a yellow ring.
@@ -138,7 +140,7 @@ class VideoWriter:
     """
 
     path: Path
-    options: VideoOptions = field(default_factory=VideoOptions)
+    every: int = field(default=FRAME_STEPS, init=False)
     caption: str = field(default="", init=False)
     longest_caption: str = field(default="", init=False)
     point: Point | None = field(default=None, init=False)
@@ -162,9 +164,9 @@ class VideoWriter:
         if self.error is not None:
             return
         try:
-            pictures = [source.picture(camera) for camera in self.options.cameras]
-            if self.point is not None and FRONT in self.options.cameras:
-                place = self.options.cameras.index(FRONT)
+            pictures = [source.picture(camera) for camera in CAMERAS]
+            if self.point is not None:
+                place = CAMERAS.index(FRONT)
                 pictures[place] = with_ring(pictures[place], self.point)
             frame = compose_frame(
                 pictures,
@@ -182,7 +184,7 @@ class VideoWriter:
         """Complete the video. Returns False if it has no frame or could not be written."""
         if self._last is None:
             return False
-        poster = self.path.with_suffix(POSTER_SUFFIX)
+        poster = Path(poster_name(str(self.path)))
         try:
             for _ in range(LAST_FRAME_REPEATS):
                 self._encode(self._last)
@@ -229,12 +231,12 @@ class VideoWriter:
         container = av.open(
             str(self.partial), "w", format="mp4", options={"movflags": "+faststart"}
         )
-        stream = container.add_stream("libx264", rate=Fraction(self.options.rate))
+        stream = container.add_stream("libx264", rate=Fraction(FRAME_RATE))
         stream.height, stream.width = frame.shape[:2]
         stream.pix_fmt = "yuv420p"
         # x264's macroblock tree reads memory that it has not written if the width is no multiple of
         # 128: equal pictures would give files that differ.
-        stream.options = {"crf": str(self.options.quality), "preset": "veryfast", "mbtree": "0"}
+        stream.options = {"crf": str(QUALITY), "preset": "veryfast", "mbtree": "0"}
         stream.codec_context.thread_count = 1
         self._container, self._stream = container, stream
         return container, stream

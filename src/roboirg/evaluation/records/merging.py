@@ -13,7 +13,7 @@ import msgspec
 from roboirg.core.errors import InvalidValueError
 from roboirg.evaluation.records.action_log import action_path
 from roboirg.evaluation.records.episode_log import log_path, logged_slugs
-from roboirg.evaluation.records.film import pointed_slugs, points_name
+from roboirg.evaluation.records.film import pointed_slugs, points_name, poster_name
 from roboirg.evaluation.records.record import Summary
 from roboirg.evaluation.records.record_codec import (
     StoreError,
@@ -158,15 +158,11 @@ def _lines(
 
 def _copy_video(name: str, source: Path, target: Path) -> bool:
     """Copy a video and its poster; return whether the video exists."""
-    video, copy = run_file(source, name), run_file(target, name)
-    if not video.is_file():
+    if not run_file(source, name).is_file():
         return False
-    if not copy.exists():
-        copy.parent.mkdir(parents=True, exist_ok=True)
-        _copy_file(video, copy)
-        poster = run_file(source, str(Path(name).with_suffix(".jpg")))
-        if poster.is_file():
-            _copy_file(poster, copy.with_suffix(".jpg"))
+    if not run_file(target, name).exists():
+        _copy_present(name, source, target)
+        _copy_present(poster_name(name), source, target)
     return True
 
 
@@ -174,18 +170,12 @@ def _copy_present(name: str, source: Path, target: Path) -> None:
     file, copy = run_file(source, name), run_file(target, name)
     if file.is_file() and not copy.exists():
         copy.parent.mkdir(parents=True, exist_ok=True)
-        _copy_file(file, copy)
+        try:
+            os.link(file.resolve(), copy)  # takes no space on the same disk
+        except OSError:
+            shutil.copyfile(file, copy)
 
 
 def _copy_log(source: Path, target: Path, name: str) -> None:
-    log, copy = run_file(source, name), run_file(target, name)
-    copy.parent.mkdir(parents=True, exist_ok=True)
-    copy.unlink(missing_ok=True)  # of an error that this record replaces
-    _copy_file(log, copy)
-
-
-def _copy_file(path: Path, copy: Path) -> None:
-    try:
-        os.link(path.resolve(), copy)  # takes no space on the same disk
-    except OSError:
-        shutil.copyfile(path, copy)
+    run_file(target, name).unlink(missing_ok=True)  # of an error that this record replaces
+    _copy_present(name, source, target)

@@ -50,11 +50,10 @@ def write_parquet(records: Iterable[Record], path: Path) -> int:
 
 
 def _row(record: Record) -> dict[str, Any]:
-    return {name: _fit(_value(record, name), kind) for name, kind in _COLUMNS.items()}
-
-
-def _value(record: Record, name: str) -> Any:  # noqa: ANN401 - whatever the field holds
-    return getattr(record.options if name in OPTION_NAMES else record, name)
+    return {
+        name: _fit(getattr(record.options if name in OPTION_NAMES else record, name), kind)
+        for name, kind in _COLUMNS.items()
+    }
 
 
 def _fit(value: Any, kind: inspect.Type) -> Any:  # noqa: ANN401 - a value of that type

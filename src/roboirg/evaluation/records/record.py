@@ -107,7 +107,6 @@ class Job(msgspec.Struct, frozen=True, kw_only=True, gc=False):
 
     @property
     def setting(self) -> str:
-        """Name of the setting."""
         return self.options.setting
 
     @property
@@ -286,9 +285,10 @@ class PromptAudit(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
     lost: tuple[Whole, ...] = ()
 
     @property
-    def sent(self) -> tuple[int, int]:
-        """Tokens of the longest message that the model reads, at least and at most."""
-        return min(self.needed[0], self.limit), min(self.needed[1], self.limit)
+    def needed_text(self) -> str:
+        """How many tokens are needed, between two bounds if they differ."""
+        low, high = self.needed
+        return f"{low}" if low == high else f"{low} to {high}"
 
 
 REAL_TRIAL = "real_trial"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import operator
 import re
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import astuple
 from pathlib import Path
 from typing import Any, TypeVar
@@ -154,10 +154,12 @@ def _from_schema_3(data: dict[str, Any]) -> dict[str, Any]:
     return found
 
 
-def with_nested_options(data: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the fields of a job whose instruction options are given among them, in one field."""
-    options = {name: value for name, value in data.items() if name in OPTION_NAMES}
-    others = {name: value for name, value in data.items() if name not in options}
+def with_nested_options(
+    data: Mapping[str, Any], names: Collection[str] = OPTION_NAMES
+) -> dict[str, Any]:
+    """Return fields, with the options of instructions of these names among them in ``options``."""
+    options = {name: value for name, value in data.items() if name in names}
+    others = {name: value for name, value in data.items() if name not in names}
     return {**others, "options": {**data.get("options", {}), **options}}
 
 

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from pathlib import Path
-from typing import Generic, NamedTuple, Self, TypeVar
+from typing import Generic, Self, TypeVar
 
 import msgspec
 
@@ -28,16 +28,6 @@ from roboirg.evaluation.records.record_codec import (
     read_summary,
 )
 
-__all__ = [
-    "RecordStore",
-    "StoreContents",
-    "StoreError",
-    "StoredRun",
-    "read_contents",
-    "read_records",
-    "read_results",
-]
-
 RECORDS_FILE = "records.jsonl"
 TORN_FILE = "records.torn"
 
@@ -45,20 +35,6 @@ _BUFFER = 1 << 20
 """Bytes to read at a time."""
 
 Stored = TypeVar("Stored", bound=Summary)
-
-
-class StoreContents(NamedTuple):
-    """Contents of a records file.
-
-    Attributes:
-        records: all records, in the order of the file.
-        torn: bytes of an unfinished last line, usually empty.
-        damaged: numbers of the lines that are not JSON, usually none.
-    """
-
-    records: tuple[Record, ...]
-    torn: bytes
-    damaged: tuple[int, ...] = ()
 
 
 class RecordStore:
@@ -134,17 +110,6 @@ class RecordStore:
         self.close()
 
 
-def read_contents(path: Path) -> StoreContents:
-    """Read a whole records file; takes no lock, so a run may be writing to it.
-
-    Raises:
-        StoreError: a line is not a record of this schema version.
-    """
-    lines = LineFile(path)
-    records = tuple(lines.parse(read_record))
-    return StoreContents(records, lines.torn, tuple(lines.damaged))
-
-
 def read_records(folder: Path) -> tuple[Record, ...]:
     """Read the records of a run's folder: the newest of each identity, in the order of the file.
 
@@ -175,7 +140,7 @@ def read_summaries(folder: Path) -> StoredRun[Summary]:
 
 
 def iterate_records(folder: Path) -> Iterator[Record]:
-    """Yield the records of a run, one after the other.
+    """Yield the records of a run, one after the other; takes no lock, so it may be going on.
 
     Nothing is kept, so records that were written again come twice.
 

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import functools
 from collections import defaultdict
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import NamedTuple
 
-from roboirg.core.episode import Stage
 from roboirg.evaluation.play.job_instruction import PreparedJob
 from roboirg.evaluation.records.record import Job
 from roboirg.evaluation.run.world_speed import has_video
@@ -35,7 +34,6 @@ from roboirg.policies.vlm.models import ModelOptions, ModelReply
 from roboirg.policies.vlm.models.paid_model import cost_of
 from roboirg.policies.vlm.models.reply_store import stored_counts
 from roboirg.policies.vlm.vlm_listener import VLMListener
-from roboirg.tasks import get_task
 
 SHOWN_STEPS = 430
 """Control steps of a video; mean over the tasks with a video."""
@@ -147,12 +145,7 @@ def _kind_of(asker: VLMPlanner | VLMListener, prepared: PreparedJob) -> tuple[ob
     """Return what an episode's size depends on, apart from its words."""
     if isinstance(asker, VLMListener):
         return (prepared.job.task,)
-    return has_video(prepared.job), len(_stages(prepared))
-
-
-def _stages(prepared: PreparedJob) -> Sequence[Stage]:
-    episode = prepared.episode
-    return get_task(episode.task).stages(episode.scene, episode.goal)
+    return has_video(prepared.job), len(prepared.episode.stages)
 
 
 def _episode_sizes(asker: VLMPlanner | VLMListener, prepared: PreparedJob) -> CallSizes:
@@ -160,6 +153,6 @@ def _episode_sizes(asker: VLMPlanner | VLMListener, prepared: PreparedJob) -> Ca
     shown = SHOWN_STEPS if has_video(prepared.job) else 0
     if isinstance(asker, VLMListener):
         return rehearse_listener(asker, prepared.job.task, words, shown)
-    stages = _stages(prepared)
+    stages = prepared.episode.stages
     subgoals = [one.subgoal.replace("{at}", "at <500, 500>") for one in stages]
     return rehearse(asker, words, shown, subgoals)

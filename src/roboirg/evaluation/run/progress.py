@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 import time
 from collections import Counter
-from typing import Protocol, Self
+from typing import Self
 
 from rich.console import Console, Group, RenderableType
 from rich.live import Live
@@ -20,8 +20,8 @@ from roboirg.evaluation.records.record import Record
 _MINUTE = 60
 
 
-class Reporter(Protocol):
-    """Interface for progress reports of a run."""
+class Reporter:
+    """Gets the progress of a run; this one shows nothing."""
 
     def start(self, total: int, done: int) -> None:
         """Start a run.
@@ -38,19 +38,6 @@ class Reporter(Protocol):
         """Show a sentence that the user should read now."""
 
 
-class SilentReporter:
-    """Reports nothing."""
-
-    def start(self, total: int, done: int) -> None:
-        """Do nothing."""
-
-    def advance(self, record: Record, *, is_new: bool = True) -> None:
-        """Do nothing."""
-
-    def warn(self, text: str) -> None:
-        """Do nothing."""
-
-
 class ProgressCounter:
     """Counts successes and valid episodes per setting and errors, and measures the pace."""
 
@@ -62,7 +49,6 @@ class ProgressCounter:
         self._start = time.monotonic()
 
     def add(self, record: Record) -> None:
-        """Count one record."""
         self.played += 1
         if record.outcome == "error":
             self.errors += 1
@@ -89,7 +75,7 @@ class ProgressCounter:
         return " · ".join(parts)
 
 
-class ConsoleReporter:
+class ConsoleReporter(Reporter):
     """Progress bar on a terminal, one line per episode elsewhere; a context manager."""
 
     def __init__(self, console: Console) -> None:

@@ -77,7 +77,6 @@ class RayCluster:
 
 
 def import_ray() -> ModuleType:
-    """Import and return the `ray` module."""
     # Ray would send usage statistics to its developers.
     os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")
     with extra_needed("--executor ray needs Ray", "ray"):

@@ -106,7 +106,7 @@ class CommandHook:
             self._process.stdin.close()
 
 
-class HookedReporter:
+class HookedReporter(Reporter):
     """Passes a run's progress on, and its records to a hook, whose failures are reported once.
 
     Args:
@@ -119,7 +119,6 @@ class HookedReporter:
         self._works = True
 
     def start(self, total: int, done: int) -> None:
-        """Pass it on."""
         self._reporter.start(total, done)
 
     def advance(self, record: Record, *, is_new: bool = True) -> None:
@@ -129,7 +128,6 @@ class HookedReporter:
             self._attempt(lambda: self._hook(record))
 
     def warn(self, text: str) -> None:
-        """Pass it on."""
         self._reporter.warn(text)
 
     def __enter__(self) -> Self:

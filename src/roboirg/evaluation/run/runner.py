@@ -25,22 +25,23 @@ from roboirg.evaluation.play.rollout import EpisodeRunner, PlayJob
 from roboirg.evaluation.play.video_writer import check_video_support, without_unfinished_videos
 from roboirg.evaluation.records.film import VIDEO_FOLDER
 from roboirg.evaluation.records.record import Job, Record, Summary
-from roboirg.evaluation.records.record_codec import identity_key
+from roboirg.evaluation.records.record_codec import StoreError, identity_key
 from roboirg.evaluation.records.store import (
     RECORDS_FILE,
     TORN_FILE,
     RecordStore,
-    StoreError,
     read_index,
 )
 from roboirg.evaluation.run.executor import Executor, Warn
-from roboirg.evaluation.run.progress import Reporter, SilentReporter
+from roboirg.evaluation.run.progress import Reporter
 from roboirg.language import LANGUAGE_VERSION
 from roboirg.policies.vlm.models.reply_store import ReplySettings
 from roboirg.tasks.splits.splits import get_episode
 
 UNREACHABLE_AFTER = 20
 """After this many consecutive connection errors, skip the rest of this policy."""
+
+_OUR_VERSIONS = {"language": LANGUAGE_VERSION, "environment": ENVIRONMENT_VERSION}
 
 
 class RunSummary(NamedTuple):
@@ -51,7 +52,6 @@ class RunSummary(NamedTuple):
         played: number of episodes played in this run, retries not counted.
         errors: records of the plan whose outcome is an error.
         missing: number of jobs of the plan without a record.
-        torn_bytes: length of an unfinished line that was moved to ``records.torn``.
         video_errors: why videos of new records could not be written.
         unreachable: policies skipped after too many connection errors.
     """
@@ -60,7 +60,6 @@ class RunSummary(NamedTuple):
     played: int
     errors: tuple[Summary, ...]
     missing: int
-    torn_bytes: int
     video_errors: tuple[str, ...]
     unreachable: tuple[str, ...]
 
@@ -94,7 +93,7 @@ def run_plan(
         RoboIRGError: an error that would end every episode (no Vulkan device, …).
         KeyboardInterrupt: Ctrl-C, or SIGTERM as `Terminated`; all finished episodes are stored.
     """
-    reporter = reporter or SilentReporter()
+    reporter = reporter or Reporter()
     jobs = plan.jobs()
     films = without_unfinished_videos(folder / VIDEO_FOLDER)
     with _sigterm_interrupts(), RecordStore(folder) as store, films:
@@ -106,7 +105,7 @@ def run_plan(
         todo = [
             job
             for job, key in zip(jobs, keys, strict=True)
-            if _should_play(store.stored.get(key), retry_errors=retry_errors)
+            if (one := store.stored.get(key)) is None or (retry_errors and one.outcome == "error")
         ]
         reporter.start(len(jobs), len(jobs) - len(todo))
         loop = _RunLoop(plan, store, reporter)
@@ -117,7 +116,6 @@ def run_plan(
             played=len(loop.tries),
             errors=tuple(one for one in found if one is not None and one.outcome == "error"),
             missing=found.count(None),
-            torn_bytes=len(store.torn),
             video_errors=tuple(loop.video_errors),
             unreachable=tuple(loop.unreachable),
         )
@@ -238,11 +236,8 @@ class _RunLoop:
 
 def _check_record_version(record: Record) -> None:
     """Refuse what a worker with another version of language or environment has played."""
-    for what, version, ours in (
-        ("language", record.language_version, LANGUAGE_VERSION),
-        ("environment", record.environment_version, ENVIRONMENT_VERSION),
-    ):
-        if version != ours:
+    for what, ours in _OUR_VERSIONS.items():
+        if (version := getattr(record, f"{what}_version")) != ours:
             raise StoreError(
                 f"A worker returned {record.slug} with {what} version {version}, but this roboirg "
                 f"has version {ours}; the record was not stored."
@@ -261,10 +256,6 @@ def _refuse_contradiction(record: Record) -> Record:
     return msgspec.structs.replace(record, **refused)
 
 
-def _should_play(stored: Summary | None, *, retry_errors: bool) -> bool:
-    return stored is None or (retry_errors and stored.outcome == "error")
-
-
 def _report_damage(store: RecordStore, reporter: Reporter) -> None:
     if store.torn:
         reporter.warn(
@@ -281,16 +272,12 @@ def _report_damage(store: RecordStore, reporter: Reporter) -> None:
 def _check_versions(records: Iterable[Summary], folder: Path) -> None:
     """Refuse records of another language or environment version: rates must not mix them."""
     records = tuple(records)
-    for language in {record.language_version for record in records} - {LANGUAGE_VERSION}:
-        raise StoreError(
-            f"{folder} holds episodes of language version {language}, but this roboirg has "
-            f"version {LANGUAGE_VERSION}; choose another --out."
-        )
-    for world in {record.environment_version for record in records} - {ENVIRONMENT_VERSION}:
-        raise StoreError(
-            f"{folder} holds episodes of environment version {world}, but this roboirg has "
-            f"version {ENVIRONMENT_VERSION}; choose another --out."
-        )
+    for what, ours in _OUR_VERSIONS.items():
+        for version in {getattr(record, f"{what}_version") for record in records} - {ours}:
+            raise StoreError(
+                f"{folder} holds episodes of {what} version {version}, but this roboirg has "
+                f"version {ours}; choose another --out."
+            )
     for task, split, episode, seed in {
         (record.task, record.split, record.episode, record.seed) for record in records
     }:

@@ -165,8 +165,13 @@ class WorkerSlot:
             self._worker = Worker.start(self._play, job, self._connect, limit_threads=True)
         else:
             self._worker.assign(job)
-        record = _wait_for_record(self._worker, self._episode_timeout_s)
-        if self._worker.is_dead:
+        worker, record = self._worker, None
+        while record is None:
+            if wait([worker.child.connection], POLL_S):
+                record = worker.receive()
+            else:
+                record = worker.kill_if_overdue(self._episode_timeout_s)
+        if worker.is_dead:
             self._worker = None
         return record
 
@@ -174,12 +179,6 @@ class WorkerSlot:
     def queued_s(self) -> float:
         """Seconds that the current job has waited for its turn."""
         return 0.0 if self._worker is None else self._worker.watchdog.queued_s
-
-    def close(self) -> None:
-        """Terminate the process."""
-        if self._worker is not None:
-            self._worker.child.end()
-            self._worker = None
 
 
 @contextlib.contextmanager
@@ -190,15 +189,6 @@ def connected(play: PlayJob, connect: Connect | None) -> Iterator[PlayJob]:
         return
     with connect() as line:
         yield cast("EpisodeRunner", play).with_hosts(line)
-
-
-def _wait_for_record(worker: Worker, episode_timeout_s: float) -> Record:
-    while True:
-        if wait([worker.child.connection], POLL_S):
-            return worker.receive()
-        record = worker.kill_if_overdue(episode_timeout_s)
-        if record is not None:
-            return record
 
 
 def _explain_exit(phase: Phase, ended: ChildExit) -> tuple[ErrorKind, str]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from multiprocessing.connection import Connection
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from roboirg.core.errors import PolicyConnectionError
@@ -71,12 +72,12 @@ def play(pipe: Pipe, job: Job, options: ListenerOptions) -> None:
         job: the episode; its policy's spec is `PipedListener`.
         options: of the listener.
     """
-    from roboirg.evaluation.play.rollout import play_episode
+    from roboirg.evaluation.play.rollout import EpisodeRunner
     from roboirg.evaluation.play.rollout_result import make_record, utc_now
 
     PipedListener.pipe, PipedListener.chosen = pipe, options
     started = utc_now()
-    record = make_record(job, play_episode(job), started_at=started)
+    record = make_record(job, EpisodeRunner(Path()).play_once(job), started_at=started)
     pipe.send(encode(record).decode())
 
 

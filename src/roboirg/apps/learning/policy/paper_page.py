@@ -182,7 +182,7 @@ def _percent(interval: Interval) -> tuple[float, float]:
 
 def _averages(cells: Cells) -> list[SummaryRow]:
     """Return the averages over tasks of implicit forms."""
-    found = summarize(cells, np.random.default_rng(SEED))
+    found = summarize(cells)
     return [one for one in found if one.scope == ALL and one.options.form == "implicit"]
 
 

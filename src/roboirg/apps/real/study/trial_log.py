@@ -21,7 +21,8 @@ from roboirg.core.errors import InvalidValueError
 from roboirg.evaluation.episode_errors import format_cause
 from roboirg.evaluation.play.rollout_result import RolloutResult, make_record, utc_now
 from roboirg.evaluation.records.record import REAL_TRIAL, Record, real_robot
-from roboirg.evaluation.records.store import RECORDS_FILE, RecordStore, StoreError, read_contents
+from roboirg.evaluation.records.record_codec import StoreError
+from roboirg.evaluation.records.store import RecordStore, iterate_records
 
 UNSCORED = format_cause("infrastructure", "played; waiting for the operator's verdict")
 WITHDRAWN = format_cause("infrastructure", "the operator undid the score")
@@ -59,7 +60,7 @@ class TrialLog:
         """
         trial_log = cls(plan, folder)
         names = {trial.identity: trial.name for trial in plan.trials}
-        for record in read_contents(folder / RECORDS_FILE).records:
+        for record in iterate_records(folder):
             name = names.get(record.identity)
             if name is not None:
                 trial_log._apply(name, record)

@@ -7,14 +7,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
 from roboirg.core.errors import InvalidValueError, UnknownNameError
-from roboirg.evaluation.analysis.figures.figure_style import STYLE, save
+from roboirg.evaluation.analysis.figures.figure_style import STYLE, check_figure_support, save
 from roboirg.evaluation.analysis.stats.run_data import RunData
-from roboirg.util.figure_files import check_figure_support
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-
-__all__ = ["FIGURES", "draw_figure", "write_figures"]
 
 FIGURES = ("gaps", "forms", "expressions", "context", "failures", "arms", "real", "strips")
 

@@ -32,22 +32,16 @@ ClassCounts = Mapping[str, Mapping[str, int]]
 """ClassCounts by group (setting or task), then by class."""
 
 
-def expressions(instruction: Instruction) -> frozenset[str]:
-    """Return the classes of referring expressions in an instruction."""
-    return frozenset(
-        mention.expression for mention in instruction.mentions if mention.expression is not None
-    )
-
-
 def expression_counts(instructions: Iterable[Instruction]) -> ClassCounts:
     """Count the scenes with each expression class, by setting.
 
     A scene counts once for a setting, even if it has several instructions there.
     """
     scenes = {
-        (instruction.setting, instruction.episode, expression)
+        (instruction.setting, instruction.episode, mention.expression)
         for instruction in instructions
-        for expression in expressions(instruction)
+        for mention in instruction.mentions
+        if mention.expression is not None
     }
     counts: dict[str, Counter[str]] = {}
     for setting, _, expression in sorted(scenes):

@@ -18,7 +18,7 @@ from roboirg.evaluation.analysis.figures.figure_style import (
     paper,
 )
 from roboirg.evaluation.analysis.stats.cells import PolicyRun
-from roboirg.evaluation.analysis.stats.failure_counts import UNATTRIBUTED, count_failures
+from roboirg.evaluation.analysis.stats.failure_counts import FAILURES, count_failures
 from roboirg.evaluation.analysis.stats.option_labels import options_label, options_sort_key
 from roboirg.evaluation.analysis.stats.run_data import RunData
 from roboirg.judging.failure_attribution import EXECUTION, GROUNDING
@@ -28,23 +28,9 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 ROW_INCHES, MARGIN_INCHES = 0.2, 0.55
-COLORS: Mapping[str, str] = {
-    **dict(
-        zip(
-            GROUNDING,
-            ("#7f2704", "#a63603", "#c0510a", "#ee8130", "#fbb477", "#fddfbf", "#fff1e3"),
-            strict=True,
-        )
-    ),
-    **dict(
-        zip(
-            EXECUTION,
-            ("#08306b", "#20578f", "#3f85bd", "#74b0d8", "#a9d0e8", "#d9ebf6"),
-            strict=True,
-        )
-    ),
-    UNATTRIBUTED: "#bbbbbb",
-}
+_ORANGE = ("#7f2704", "#a63603", "#c0510a", "#ee8130", "#fbb477", "#fddfbf", "#fff1e3")
+_BLUE = ("#08306b", "#20578f", "#3f85bd", "#74b0d8", "#a9d0e8", "#d9ebf6")
+COLORS = dict(zip(FAILURES, (*_ORANGE, *_BLUE, "#bbbbbb"), strict=True))
 """Shades of orange for grounding, of blue for execution."""
 MAX_COLUMNS = 2
 LEGEND_COLUMNS = {1: 2, 2: 4}

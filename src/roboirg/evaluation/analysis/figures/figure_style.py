@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import textwrap
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Any, Literal, cast
 
+from roboirg.core.errors import InvalidValueError
+from roboirg.core.extras import extra_needed
 from roboirg.evaluation.analysis.stats.intervals import Interval
-from roboirg.util.figure_files import save_figure
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -51,8 +52,24 @@ DARK_STYLE = {
 COLORS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#E69F00")
 """Okabe and Ito's colors, safe for color-blind readers; signs differ as well."""
 SIGNS = ("o", "s", "^", "D", "v", "P")
+_METADATA: Mapping[str, Mapping[str, None] | None] = {
+    "svg": {"Date": None},
+    "pdf": {"CreationDate": None},
+    "png": None,
+}
+_SAME_FILES: Mapping[str, object] = {
+    "font.family": "DejaVu Sans",
+    "pdf.fonttype": 42,  # letters, not outlines, which some venues refuse
+    "svg.hashsalt": "roboirg",  # the ids in an SVG file are random without it
+}
 PUBLISHED_NOTE = "published: the same tasks, the paper's instructions and simulator"
 GHOST, GHOST_SIGNS = "#8a8a8a", ("d", "X", "p", "<", ">", "h", "8", "*")
+
+
+def check_figure_support() -> None:
+    """Check early that figures can be drawn."""
+    with extra_needed("Figures need matplotlib", "report"):
+        import matplotlib as mpl  # noqa: F401
 
 
 def save(
@@ -63,17 +80,37 @@ def save(
 ) -> tuple[Path, ...]:
     """Draw a figure in the common style and write it in some formats, and for dark pages.
 
-    The files for dark pages end in ``-dark`` and have no PDF; see `save_figure`.
+    Equal figures give equal files. Those for dark pages end in ``-dark`` and have no PDF; `name`
+    has no extension, and the folder is created if it is missing. Without a figure no file is
+    written.
     """
     on_dark = [one for one in formats if one != "pdf"]
-    files = ((name, formats, STYLE), (f"{name}-dark", on_dark, DARK_STYLE))
-    return tuple(
-        path
-        for stem, endings, style in files
-        for path in save_figure(
-            draw, folder, stem, formats=endings, dots_per_inch=DOTS_PER_INCH, style=style
-        )
-    )
+    light = _save_in_style(draw, folder, name, formats, STYLE)
+    return light + _save_in_style(draw, folder, f"{name}-dark", on_dark, DARK_STYLE)
+
+
+def _save_in_style(
+    draw: Callable[[], Figure | None],
+    folder: Path,
+    name: str,
+    formats: Sequence[str],
+    style: Mapping[str, object],
+) -> tuple[Path, ...]:
+    check_figure_support()
+    import matplotlib as mpl
+
+    with mpl.rc_context(cast("Any", {**_SAME_FILES, **style})):
+        figure = draw()
+        if figure is None:
+            return ()
+        paths = tuple(folder / f"{name}.{one}" for one in formats)
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+            for path, one in zip(paths, formats, strict=True):
+                figure.savefig(path, dpi=DOTS_PER_INCH, metadata=_METADATA[one])
+        except OSError as error:
+            raise InvalidValueError(f"Cannot write to {folder}: {error.strerror}.") from error
+    return paths
 
 
 def paper() -> str:

@@ -17,10 +17,11 @@ from roboirg.evaluation.analysis.stats.option_labels import (
     options_label,
     options_sort_key,
 )
-from roboirg.evaluation.records.film import LAST_FRAME_REPEATS, VideoOptions
+from roboirg.evaluation.records.film import FRAME_STEPS, LAST_FRAME_REPEATS
 from roboirg.evaluation.records.record import Job, Record, Summary
 from roboirg.evaluation.records.run_files import run_file
 from roboirg.evaluation.records.store import iterate_records, read_results
+from roboirg.util.media import CONTROL_RATE
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -28,7 +29,6 @@ if TYPE_CHECKING:
 PICTURES = 5
 MOMENT_COLOR = "#D62728"
 ROW_INCHES = 1.9
-STEPS_PER_SECOND = 20
 PICTURE_PIXELS = 256
 _SUBGOAL_LETTERS, _TITLE_LETTERS = 26, 118
 
@@ -114,7 +114,7 @@ def _draw_strip(place: Any, strip: Strip) -> None:  # noqa: ANN401 - a SubFigure
         is_moment = step == moment
         for spine in axes.spines.values():
             spine.set(color=MOMENT_COLOR if is_moment else GHOST, linewidth=2.5 * is_moment + 0.5)
-        text = f"{step / STEPS_PER_SECOND:.1f} s"
+        text = f"{step / CONTROL_RATE:.1f} s"
         if subgoal := _subgoal(record, step):
             text += "\n" + textwrap.fill(f"“{subgoal}”", _SUBGOAL_LETTERS)
         label = axes.set_xlabel(text, fontsize=6)
@@ -138,7 +138,7 @@ def _pictures(path: Path, record: Record, steps: Sequence[int]) -> list[NDArray[
     if record.robot is not None:  # filmed by hand, from the first step to the last
         last, every = len(frames) - 1, max(record.steps, 1) / max(len(frames) - 1, 1)
     else:
-        last, every = len(frames) - 1 - LAST_FRAME_REPEATS, float(VideoOptions().every)
+        last, every = len(frames) - 1 - LAST_FRAME_REPEATS, float(FRAME_STEPS)
         frames = [frame[:PICTURE_PIXELS, :PICTURE_PIXELS] for frame in frames]
     places = (round(last - (record.steps - step) / every) for step in steps)
     return [frames[min(max(place, 0), len(frames) - 1)] for place in places]

@@ -20,7 +20,7 @@ from roboirg.evaluation.analysis.methods.played_facts import (
 )
 from roboirg.evaluation.analysis.stats.arm_figures import MEANING, arm_figures
 from roboirg.evaluation.analysis.stats.cells import PolicyRun
-from roboirg.evaluation.analysis.stats.chance import chance_level
+from roboirg.evaluation.analysis.stats.chance import CHANCE, floor_level
 from roboirg.evaluation.analysis.stats.intervals import ALPHA, DRAWS
 from roboirg.evaluation.analysis.stats.option_labels import options_label, options_sort_key
 from roboirg.evaluation.analysis.stats.rates import p_text, points
@@ -192,7 +192,7 @@ def control_items(data: RunData, jobs: Sequence[Job]) -> Items:
     settings = sorted({job.column for job in jobs}, key=options_sort_key)
     silent = [one for one in data.names if one.conditions.arm in SILENT_TEXTS]
     for options in settings:
-        level = chance_level(job for job in jobs if job.column == options)
+        level = floor_level(CHANCE, (job for job in jobs if job.column == options))
         floor = _rates(data, silent, [options]) or f"{NOT_REPORTED}, as no silent arm has a result"
         yield item(
             f"chance in {options_label(options)}",

@@ -73,7 +73,6 @@ class SaidTexts:
     choices: set[str] = field(default_factory=set)
 
     def add(self, record: Record) -> None:
-        """Take in the text of a record."""
         metadata = record.metadata
         is_ours = metadata.get("wordings") in (None, *POOLS) and record.arm not in SILENT_TEXTS
         text = " ".join(one.text for one in record.instruction)
@@ -114,7 +113,6 @@ class PlayedFacts:
     repeated: int = 0
 
     def add(self, record: Record) -> None:
-        """Take in one record."""
         for name, value in record.needs.items():
             self.needs[name].add(_words(value))
         self.scheme = record.policy_spec.partition("://")[0] if "://" in record.policy_spec else ""

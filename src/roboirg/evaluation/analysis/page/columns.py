@@ -20,13 +20,13 @@ from roboirg.evaluation.analysis.page.entries import EpisodeEntries, EpisodeEntr
 from roboirg.evaluation.analysis.page.episode_videos import EpisodeVideo, EpisodeVideos
 from roboirg.evaluation.analysis.page.reconstruction import resolved_form
 from roboirg.evaluation.analysis.stats.cells import FAIRNESS, EvalConditions, task_order
+from roboirg.evaluation.analysis.stats.failure_counts import UNATTRIBUTED
 from roboirg.evaluation.analysis.stats.option_labels import options_label, options_sort_key
 from roboirg.evaluation.records.record import ERROR_KINDS, FailureKind, Outcome, Record, Summary
 from roboirg.judging.failure_attribution import EXECUTION, GROUNDING
 from roboirg.tasks import all_tasks
 
 NO_FAILURE = -1
-UNATTRIBUTED = "not attributed"
 ERROR = "error"
 
 Row = dict[str, int | str]

@@ -137,15 +137,16 @@ def _prompt(record: Record) -> str | None:
     audit = record.prompt
     if audit is None or record.prompt_verdict == "heard":
         return None
-    low, high = audit.needed
-    needed = f"{low}" if low == high else f"{low} to {high}"
     counted_by = f"counted with {audit.tokenizer}" if audit.tokenizer else "bounds, no tokenizer"
     lost = sum(record.mentions[place].role == "anaphor" for place in audit.lost)
     tail = ""
     if audit.lost:
         tail = f"; {counted(len(audit.lost), 'mention')} lost, {lost} of them referring back"
     verdict = "cut" if record.prompt_verdict == "cut" else "may be cut"
-    return f"{verdict}: needs {needed} tokens, the model reads {audit.limit} ({counted_by}){tail}"
+    return (
+        f"{verdict}: needs {audit.needed_text} tokens, the model reads {audit.limit} "
+        f"({counted_by}){tail}"
+    )
 
 
 def _shown_events(record: Record) -> Iterator[EventRecord]:

@@ -5,17 +5,16 @@ from __future__ import annotations
 import base64
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from pathlib import Path, PurePosixPath
+from pathlib import Path
 from typing import NamedTuple
 from urllib.parse import quote
 
 from roboirg.evaluation.analysis.page.entries import EpisodeEntry
-from roboirg.evaluation.records.film import pointed_slugs, points_name
+from roboirg.evaluation.records.film import pointed_slugs, points_name, poster_name
 from roboirg.evaluation.records.run_files import run_file
 
 MAX_EMBEDDED_BYTES = 60_000_000
 """Larger videos, taken together, are linked to."""
-POSTER_SUFFIX = ".jpg"
 
 
 class EpisodeVideo(NamedTuple):
@@ -47,7 +46,7 @@ class EpisodeVideos:
         pointed = {folder: pointed_slugs(folder) for folder in folders}
         sheets = [run_file(at, points_name(slug)) for at in folders for slug in pointed[at]]
         files = [
-            (path, run_file(one.run.folder, _poster(one.record.video)))
+            (path, run_file(one.run.folder, poster_name(one.record.video)))
             for one in entries
             if one.run.folder is not None and one.record.video is not None
             if (path := run_file(one.run.folder, one.record.video)).is_file()
@@ -62,7 +61,7 @@ class EpisodeVideos:
         source = None if name is None else self._link(entry, name, "video/mp4")
         if name is None or source is None:
             return None
-        return EpisodeVideo(source, self._link(entry, _poster(name), "image/jpeg"))
+        return EpisodeVideo(source, self._link(entry, poster_name(name), "image/jpeg"))
 
     def points(self, entry: EpisodeEntry) -> str | None:
         """Return the sheet with what a planner saw and where it pointed, or None."""
@@ -77,8 +76,3 @@ class EpisodeVideos:
         if not self.embeds:
             return quote(f"{entry.run.link}{name}")
         return f"data:{kind};base64,{base64.b64encode(path.read_bytes()).decode('ascii')}"
-
-
-def _poster(video: str) -> str:
-    """Return the path of a video's last frame."""
-    return str(PurePosixPath(video).with_suffix(POSTER_SUFFIX))

@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
-import numpy as np
-
 from roboirg.core.episode import DIFFICULTIES
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.core.plain_text import counted
@@ -19,7 +17,7 @@ from roboirg.evaluation.analysis.stats.cells import (
     sort_cells,
     task_order,
 )
-from roboirg.evaluation.analysis.stats.intervals import SEED, Interval
+from roboirg.evaluation.analysis.stats.intervals import Interval
 from roboirg.evaluation.analysis.stats.option_labels import options_label, options_sort_key
 from roboirg.evaluation.analysis.stats.rates import p_text, points, whole_percent
 from roboirg.evaluation.analysis.stats.run_summary import (
@@ -111,7 +109,7 @@ def _matrix_cells(
             "at": [places[one.policy_run], lines[one.scope], columns.index(one.options)],
             **_cell(one, f"{names[one.policy_run]}, {rows[lines[one.scope]].name}"),
         }
-        for one in summarize(cells, np.random.default_rng(SEED))
+        for one in summarize(cells)
         if one.scope in lines
     ]
 

@@ -15,12 +15,11 @@ from typing import NamedTuple
 import msgspec
 
 from roboirg import language
-from roboirg.core.conditions import Fact
 from roboirg.core.episode import ENVIRONMENT_VERSION
 from roboirg.core.errors import RoboIRGError
+from roboirg.evaluation.play.goal_outcomes import judged_events
 from roboirg.evaluation.play.job_instruction import PreparedJob, instruct_job
 from roboirg.evaluation.records.record import Record
-from roboirg.judging import Event
 from roboirg.judging.episode_replay import completed_stages
 from roboirg.judging.judge import describe_object
 from roboirg.language.settings import EXPLICIT
@@ -59,10 +58,7 @@ def stages_of(record: Record) -> tuple[StageMark, ...]:
     if not record.events or not _has_this_environment(record):
         return ()
     turn = max(0, -min(event.step for event in record.events))
-    events = [
-        Event(one.step + turn, Fact(one.kind, one.subject, one.place), one.holds)
-        for one in record.events
-    ]
+    events = judged_events(record.events, turn)
     last = max(record.steps, *(event.step for event in record.events))
     try:
         episode = PreparedJob(record.identity).episode

@@ -23,16 +23,14 @@ from roboirg.evaluation.analysis.tables.arm_table import make_arm_table
 from roboirg.evaluation.analysis.tables.breakdown_table import make_breakdown_table
 from roboirg.evaluation.analysis.tables.table import Table
 from roboirg.evaluation.records.episode_log import logged_slugs
-from roboirg.evaluation.records.film import LAST_FRAME_REPEATS, VideoOptions
-from roboirg.evaluation.records.record import Job, Record
+from roboirg.evaluation.records.film import FRAME_RATE, FRAME_STEPS, LAST_FRAME_REPEATS
+from roboirg.evaluation.records.record import Job
 from roboirg.evaluation.records.store import read_summaries
 from roboirg.language.settings import EXPLICIT, all_settings
 from roboirg.util.atomic_write import write_atomically
 from roboirg.util.web.page_templates import check_page_support, template_environment
 
 REPORT_FILE = "report.html"
-FILMING = VideoOptions()
-"""As in `roboirg run`, so that the page finds the moment of an event in a video."""
 TEMPLATE = "report.html.j2"
 STYLES = ("base", "overview", "filters", "episodes", "pairs")
 SCRIPTS = (
@@ -87,29 +85,13 @@ def make_view(folder: Path, planned: Sequence[Job] = (), progress: Progress | No
     return render_runs([_run(folder, planned, videos=True)], embed=False, progress=progress)
 
 
-def render(
-    records: Sequence[Record],
-    folder: Path | None = None,
-    planned: Sequence[Job] = (),
-    *,
-    name: str = "",
-) -> str:
-    """Return the page of one run.
-
-    Args:
-        records: one for each identity.
-        folder: of the videos; None leaves them out. Videos of more than
-            `MAX_EMBEDDED_BYTES` are linked to by their paths in the folder.
-        planned: jobs that should have a record.
-        name: of the run.
-    """
-    return render_runs([Run(name, records, folder, planned)])
-
-
 def render_runs(
     runs: Sequence[Run], *, embed: bool = True, progress: Progress | None = None
 ) -> str:
-    """Return the page of one run, or of two to compare; videos that are too large are linked to."""
+    """Return the page of one run, or of two to compare.
+
+    Videos of more than `MAX_EMBEDDED_BYTES` are linked to.
+    """
     check_report_support()
     template = template_environment("roboirg.evaluation.analysis.page").get_template(TEMPLATE)
     entries = make_entries(runs)
@@ -148,7 +130,7 @@ def _data(entries: EpisodeEntries, columns: Columns) -> dict[str, Any]:
         "change": change,
         "reference": EXPLICIT,
         "framed": [name for name, one in all_settings().items() if "frame" in one.reads],
-        "film": {"every": FILMING.every, "rate": FILMING.rate, "repeats": LAST_FRAME_REPEATS},
+        "film": {"every": FRAME_STEPS, "rate": FRAME_RATE, "repeats": LAST_FRAME_REPEATS},
     }
 
 

@@ -7,8 +7,6 @@ from collections.abc import Iterable, Sequence
 from itertools import combinations
 from typing import Any, NamedTuple
 
-import numpy as np
-
 from roboirg.core.errors import InvalidValueError
 from roboirg.core.plain_text import counted, verb_for
 from roboirg.evaluation.analysis.page.entries import EpisodeEntries, Run
@@ -17,7 +15,6 @@ from roboirg.evaluation.analysis.stats.comparison import compare
 from roboirg.evaluation.analysis.stats.comparison_text import sentences
 from roboirg.evaluation.analysis.stats.headline import headline_notes
 from roboirg.evaluation.analysis.stats.heard_rates import count_heard, heard_notes
-from roboirg.evaluation.analysis.stats.intervals import SEED
 from roboirg.language.settings import EXPLICIT
 from roboirg.tasks.splits.private_splits import SALT_VARIABLE, MissingSaltError, check_salt
 
@@ -95,7 +92,7 @@ def _compared(entries: EpisodeEntries, first: PolicyRun, second: PolicyRun) -> l
         for policy_run in (first, second)
     )
     try:
-        comparison = compare(ours, theirs, np.random.default_rng(SEED))
+        comparison = compare(ours, theirs)
     except InvalidValueError as error:
         return [str(error)]
     return list(sentences(comparison, entries.names[first], entries.names[second]))

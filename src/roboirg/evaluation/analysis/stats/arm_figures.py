@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import msgspec
@@ -30,7 +30,7 @@ from roboirg.evaluation.analysis.stats.cells import (
 )
 from roboirg.evaluation.analysis.stats.intervals import SEED, Interval
 from roboirg.evaluation.analysis.stats.option_labels import options_sort_key
-from roboirg.evaluation.analysis.stats.paired_tests import Gap, Pairs, holm, measure_gap
+from roboirg.evaluation.analysis.stats.paired_tests import Gap, Pairs, measure_gap, with_holm
 from roboirg.evaluation.analysis.stats.run_data import RunData
 from roboirg.evaluation.records.record import Summary
 
@@ -106,7 +106,7 @@ def arm_figures(data: RunData) -> tuple[ArmFigure, ...]:
         trials = columns[run, options].values()
         made = (_figure(run, options, each, trials, rng) for each in CONTRASTS)
         found[run] += filter(None, made)
-    return tuple(one for figures in found.values() for one in _corrected(figures))
+    return tuple(one for figures in found.values() for one in with_holm(figures))
 
 
 def _figure(
@@ -141,11 +141,6 @@ def _cell(task: str, results: Sequence[Summary]) -> CellResults:
             seed = one.policy_seed * (MOST_PARAPHRASES + 1) + (paraphrase_number(one.arm) or 0)
             verdicts[Trial(one.episode, seed)] = _won(one)
     return CellResults(verdicts)
-
-
-def _corrected(found: Sequence[ArmFigure]) -> Sequence[ArmFigure]:
-    adjusted = holm([one.gap.p_value for one in found])
-    return [replace(one, p_holm=p_value) for one, p_value in zip(found, adjusted, strict=True)]
 
 
 def _won(one: Summary) -> bool:

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -14,9 +13,9 @@ from roboirg.evaluation.analysis.stats.cells import (
     cell_interval,
     clustered_interval,
 )
-from roboirg.evaluation.analysis.stats.intervals import Interval
+from roboirg.evaluation.analysis.stats.intervals import SEED, Interval
 from roboirg.evaluation.analysis.stats.option_labels import REFERENCE, options_sort_key
-from roboirg.evaluation.analysis.stats.paired_tests import Gap, holm, measure_gap
+from roboirg.evaluation.analysis.stats.paired_tests import Gap, measure_gap, with_holm
 from roboirg.evaluation.analysis.stats.run_summary import ALL, ScopeResults, group_by_scope
 
 
@@ -43,7 +42,7 @@ class BreakdownRow:
         return self.results.policy_run
 
 
-def break_down(cells: Cells, labels: Labels, rng: np.random.Generator) -> tuple[BreakdownRow, ...]:
+def break_down(cells: Cells, labels: Labels) -> tuple[BreakdownRow, ...]:
     """Return a row for each policy run, set of options and label, in the order of the cells.
 
     Gaps are paired by episode: those of a label are compared with explicit on the very same
@@ -62,7 +61,8 @@ def break_down(cells: Cells, labels: Labels, rng: np.random.Generator) -> tuple[
     runs = list(dict.fromkeys(key.policy_run for key in cells))
     # Stable: the labels of a setting stay in their order.
     found.sort(key=lambda pair: (runs.index(pair[1].policy_run), options_sort_key(pair[1].options)))
-    return _corrected([_row(label, one, rng) for label, one in found])
+    rng = np.random.default_rng(SEED)
+    return with_holm([_row(label, one, rng) for label, one in found], lambda row: row.policy_run)
 
 
 def _row(label: str, results: ScopeResults, rng: np.random.Generator) -> BreakdownRow:
@@ -74,17 +74,3 @@ def _row(label: str, results: ScopeResults, rng: np.random.Generator) -> Breakdo
         cell_interval(judged[0], rng) if len(judged) == 1 else clustered_interval(judged, rng),
         measure_gap(results.explicit_pairs(), rng),
     )
-
-
-def _corrected(rows: Sequence[BreakdownRow]) -> tuple[BreakdownRow, ...]:
-    corrected = list(rows)
-    for policy_run in dict.fromkeys(row.policy_run for row in rows):
-        own = [
-            (place, row.gap.p_value)
-            for place, row in enumerate(rows)
-            if row.policy_run == policy_run and row.gap is not None
-        ]
-        adjusted = holm([p_value for _, p_value in own])
-        for (place, _), p_value in zip(own, adjusted, strict=True):
-            corrected[place] = replace(rows[place], p_holm=p_value)
-    return tuple(corrected)

@@ -54,7 +54,6 @@ class InstructionKey(NamedTuple):
 
     @classmethod
     def of(cls, record: Record) -> InstructionKey:
-        """Return the key of a record's instruction."""
         return cls(**{name: getattr(record, name) for name in cls._fields})
 
     @classmethod
@@ -159,7 +158,6 @@ BREAKDOWNS: Mapping[str, Breakdown] = {
 
 
 def find_breakdowns(names: Iterable[str]) -> tuple[Breakdown, ...]:
-    """Return the breakdowns of some names."""
     wanted = tuple(names)
     for name in wanted:
         if name not in BREAKDOWNS:

@@ -23,10 +23,9 @@ from roboirg.evaluation.analysis.stats.intervals import (
     DRAWS,
     Interval,
     Rows,
-    percentile_interval,
+    resampled_interval,
     resampled_rates,
     wilson_interval,
-    without_spread,
 )
 from roboirg.evaluation.analysis.stats.option_labels import options_sort_key, words_label
 from roboirg.evaluation.records.record import DEFAULT_MAX_STEPS, DEFAULT_MESHES, Job, Summary
@@ -55,7 +54,6 @@ class EvalConditions(NamedTuple):
 
     @classmethod
     def of(cls, job: Job) -> EvalConditions:
-        """Return the conditions of a job."""
         return cls._make(_read_conditions(job))
 
     def text(self, name: str) -> str:
@@ -91,7 +89,6 @@ class Versions(NamedTuple):
 
     @classmethod
     def of(cls, result: Summary) -> Versions:
-        """Return the versions of a result."""
         policy, server = result.policy_version, result.server_version
         return cls(
             policy if server is None else f"{policy} (server {server})",
@@ -127,7 +124,6 @@ class PolicyRun(NamedTuple):
 
     @classmethod
     def of(cls, result: Summary, run: str = "") -> PolicyRun:
-        """Return the policy run of a result."""
         return cls(
             result.policy,
             EvalConditions.of(result),
@@ -222,11 +218,7 @@ def clustered_interval(
     sizes = [len(each) for each in rows]
     if not sizes or 0 in sizes:
         return None
-    values = resampled_rates(rows, rng, draws)[:, 0]
-    interval = percentile_interval(values, sizes)
-    if interval is not None and np.ptp(values) == 0:
-        return without_spread(float(values[0]), sum(sizes))
-    return interval
+    return resampled_interval(resampled_rates(rows, rng, draws)[:, 0], sizes)
 
 
 def cell_interval(cell: CellResults, rng: np.random.Generator) -> Interval | None:

@@ -37,16 +37,11 @@ FLOORS = (CHANCE, *SURFACE_RULES, *LEARNED)
 """The forgetful listener, the shortcut listeners by the names of their rules, and learners."""
 
 
-def chance_level(jobs: Iterable[Job]) -> Fraction | None:
-    """Return the mean chance over the distinct instructions of some jobs; None without jobs.
-
-    Policies and their seeds do not matter.
-    """
-    return floor_level(CHANCE, jobs)
-
-
 def floor_level(floor: str, jobs: Iterable[Job]) -> Fraction | None:
-    """Return the same as `chance_level` for any of `FLOORS`."""
+    """Return the mean level of one of `FLOORS` over the distinct instructions of some jobs.
+
+    Policies and their seeds do not matter. None without jobs, or if no level is known.
+    """
     instructions = dict.fromkeys((job.task, job.split, job.episode, job.column) for job in jobs)
     found = [_level(floor, *each) for each in instructions]
     levels = [level for level in found if level is not None]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Literal, NamedTuple
 
 import numpy as np
@@ -18,9 +18,9 @@ from roboirg.evaluation.analysis.stats.cells import (
     PolicyRun,
     only_told,
 )
-from roboirg.evaluation.analysis.stats.intervals import ALPHA
+from roboirg.evaluation.analysis.stats.intervals import ALPHA, SEED
 from roboirg.evaluation.analysis.stats.option_labels import REFERENCE, options_sort_key
-from roboirg.evaluation.analysis.stats.paired_tests import Gap, Pairs, holm, measure_gap
+from roboirg.evaluation.analysis.stats.paired_tests import Gap, Pairs, measure_gap, with_holm
 from roboirg.evaluation.analysis.stats.power import episodes_needed, smallest_gap
 
 Verdict = Literal["first", "second", "open"]
@@ -103,53 +103,49 @@ class Comparison:
     parts: Mapping[str, tuple[ComparisonResult, ...]]
 
 
-def compare(
-    first: Cells,
-    second: Cells,
-    rng: np.random.Generator,
-    labels: Mapping[str, Labels] | None = None,
-) -> Comparison:
+def compare(first: Cells, second: Cells, labels: Mapping[str, Labels] | None = None) -> Comparison:
     """Compare two policies on the episodes that both played, in the arm ``told`` if both have it.
 
     Args:
         first: the cells of one policy run.
         second: the cells of the other.
-        rng: of the bootstrap.
         labels: of the instructions, by the title of each wanted breakdown.
 
     Raises:
         InvalidValueError: one side has several policies or versions, the two have different
             language or environment versions, or they share no episode.
     """
+    rng = np.random.default_rng(SEED)
     first, second = only_told(first), only_told(second)
     ours, theirs = _only_policy_run(first), _only_policy_run(second)
     _check_fair(ours, theirs)
     here = {ComparisonKey(task, options): cell for (_, task, options), cell in first.items()}
     there = {ComparisonKey(task, options): cell for (_, task, options), cell in second.items()}
     shared = [key for key in here if key in there]
-    cells, averages = [], []
+    cells: list[ComparisonResult] = []
+    averages: list[ComparisonResult] = []
     for options in sorted({key.options for key in shared}, key=options_sort_key):
         keys = [key for key in shared if key.options == options]
-        cells += [_compared(key, [key], here, there, rng) for key in keys]
-        averages.append(_compared(ComparisonKey(None, options), keys, here, there, rng))
-    found = _corrected(averages)
-    if not found:
+        cells += filter(None, [_compared(key, [key], here, there, rng) for key in keys])
+        average = _compared(ComparisonKey(None, options), keys, here, there, rng)
+        averages += filter(None, [average])
+    if not averages:
         raise InvalidValueError(
             f"{ours.policy} and {theirs.policy} have no episode in common with the same "
             "instruction; play both on the same tasks, settings and episodes."
         )
     parts = {
-        title: _corrected(_compared_parts(first, second, own, rng))
+        title: with_holm(_compared_parts(first, second, own, rng))
         for title, own in (labels or {}).items()
     }
-    return Comparison(ours, theirs, found, _corrected(cells), parts)
+    return Comparison(ours, theirs, with_holm(averages), with_holm(cells), parts)
 
 
 def _compared_parts(
     first: Cells, second: Cells, labels: Labels, rng: np.random.Generator
-) -> list[ComparisonResult | None]:
+) -> list[ComparisonResult]:
     """Compare the averages over the instructions of each label; explicit ones have none."""
-    found = []
+    found: list[ComparisonResult] = []
     ours, theirs = (
         cells_by_label({key: one for key, one in cells.items() if key.options != REFERENCE}, labels)
         for cells in (first, second)
@@ -162,8 +158,9 @@ def _compared_parts(
         shared = [key for key in here if key in there]
         for options in sorted({key.options for key in shared}, key=options_sort_key):
             keys = [key for key in shared if key.options == options]
-            found.append(_compared(ComparisonKey(None, options, label), keys, here, there, rng))
-    return sorted(found, key=lambda one: () if one is None else options_sort_key(one.key.options))
+            part = _compared(ComparisonKey(None, options, label), keys, here, there, rng)
+            found += filter(None, [part])
+    return sorted(found, key=lambda one: options_sort_key(one.key.options))
 
 
 def _compared(
@@ -188,14 +185,6 @@ def _compared(
         p_holm=gap.p_value,
         unpaired=sum(ours.trials + theirs.trials for ours, theirs in both) - paired,
         unjudged=sum(one.errors + one.missing for pair in both for one in pair),
-    )
-
-
-def _corrected(results: Sequence[ComparisonResult | None]) -> tuple[ComparisonResult, ...]:
-    found = [result for result in results if result is not None]
-    adjusted = holm([result.gap.p_value for result in found])
-    return tuple(
-        replace(result, p_holm=p_value) for result, p_value in zip(found, adjusted, strict=True)
     )
 
 

@@ -10,7 +10,7 @@ from roboirg.evaluation.analysis.stats.comparison import Comparison, ComparisonR
 from roboirg.evaluation.analysis.stats.flips import Flips
 from roboirg.evaluation.analysis.stats.option_labels import options_label
 from roboirg.evaluation.analysis.stats.power import MAX_EPISODES, POWER
-from roboirg.evaluation.analysis.stats.rates import p_text, points
+from roboirg.evaluation.analysis.stats.rates import interval_note, p_text, points
 
 
 def sentences(
@@ -86,10 +86,7 @@ def _better(result: ComparisonResult, names: tuple[str, str]) -> str:
 
 def _figures(result: ComparisonResult) -> str:
     gap = result.gap
-    words = f"{points(gap.value, 1)} points"
-    if gap.interval is not None:
-        low, high = (points(end, 1) for end in gap.interval)
-        words += f" (95 % interval {low} to {high})"
+    words = f"{points(gap.value, 1)} points{interval_note(gap.interval)}"
     tasks = "" if len(result.tasks) == 1 else f" of {len(result.tasks)} tasks"
     p_value = p_text(result.p_holm)
     if _is_surprising(result):
@@ -141,8 +138,12 @@ def _caveats(comparison: Comparison) -> Iterator[str]:
         verb = verb_for(unpaired, "are")
         yield f"{counted(unpaired, 'trial')} without a counterpart {verb} left out."
     if unjudged:
-        verb = verb_for(unjudged, "are")
-        yield (
-            f"Incomplete: {counted(unjudged, 'trial')} without a verdict (an error, or still to be "
-            f"played) {verb} left out."
-        )
+        yield incomplete_note(unjudged)
+
+
+def incomplete_note(trials: int) -> str:
+    """Return a sentence on trials that are left out, as they have no verdict."""
+    return (
+        f"Incomplete: {counted(trials, 'trial')} without a verdict (an error, or still to be "
+        f"played) {verb_for(trials, 'are')} left out."
+    )

@@ -12,18 +12,16 @@ from roboirg.core.instruction_options import InstructionOptions
 from roboirg.core.plain_text import counted
 from roboirg.evaluation.analysis.stats.cells import CellKey, CellResults, Cells, PolicyRun
 from roboirg.evaluation.analysis.stats.intervals import (
-    DRAWS,
     SEED,
     Interval,
     Rows,
-    percentile_interval,
+    resampled_interval,
     resampled_rates,
-    without_spread,
 )
 from roboirg.evaluation.analysis.stats.measured_floors import measured_floors, settings_at_chance
 from roboirg.evaluation.analysis.stats.option_labels import REFERENCE
 from roboirg.evaluation.analysis.stats.paired_tests import Pairs
-from roboirg.evaluation.analysis.stats.rates import points
+from roboirg.evaluation.analysis.stats.rates import interval_note, points
 from roboirg.language.templates import LANGUAGE_VERSION
 
 
@@ -48,15 +46,10 @@ class Headline:
     @property
     def text(self) -> str:
         """The number, its interval, and what it is over."""
-        ends = (
-            ""
-            if self.interval is None
-            else (f" (95 % interval {' to '.join(points(end, 1) for end in self.interval)})")
-        )
         partial = "" if self.is_complete else ", incomplete"
         return (
-            f"{points(self.gap, 1)} points to explicit{ends}, the mean over the settings that "
-            f"words alone do not solve: {', '.join(self.settings)}; "
+            f"{points(self.gap, 1)} points to explicit{interval_note(self.interval)}, the mean "
+            f"over the settings that words alone do not solve: {', '.join(self.settings)}; "
             f"{counted(self.episodes, 'episode')}{partial}"
         )
 
@@ -92,7 +85,7 @@ def headline_notes(cells: Cells, names: Mapping[PolicyRun, str]) -> Iterator[str
 
 
 def measure_headline(
-    cells: Cells, policy_run: PolicyRun, settings: Sequence[str], draws: int = DRAWS
+    cells: Cells, policy_run: PolicyRun, settings: Sequence[str]
 ) -> Headline | None:
     """Return the headline number; None unless all settings were played next to explicit."""
     options = [InstructionOptions(name) for name in settings]
@@ -113,10 +106,8 @@ def measure_headline(
     sizes = [len(one) for one in rows]
     # Resampling equal rows only gives the rates themselves.
     value = _mean_gap([resampled_rates([one.sum(axis=0)[None]], rng, 1) for one in rows])
-    drawn = _mean_gap([resampled_rates([one], rng, draws) for one in rows])
-    interval = percentile_interval(drawn, sizes)
-    if interval is not None and np.ptp(drawn) == 0:
-        interval = without_spread(float(drawn[0]), sum(sizes), least=-1.0)
+    drawn = _mean_gap([resampled_rates([one], rng) for one in rows])
+    interval = resampled_interval(drawn, sizes, least=-1.0)
     played = [cell for task in own for cell in (explicit[task], *own[task])]
     is_complete = not any(cell.errors or cell.missing for cell in played)
     return Headline(tuple(settings), float(value[0]), interval, sum(sizes), is_complete)

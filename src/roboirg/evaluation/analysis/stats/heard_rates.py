@@ -37,7 +37,6 @@ class HeardCounts:
     heard_successes: int = 0
 
     def add(self, result: Summary) -> None:
-        """Count one result."""
         is_heard, won = result.prompt_verdict == "heard", result.outcome == "success"
         self.episodes += 1
         self.cut += result.prompt_verdict == "cut"

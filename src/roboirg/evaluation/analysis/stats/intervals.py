@@ -33,13 +33,13 @@ class Interval(NamedTuple):
     high: float
 
 
-def wilson_interval(successes: int, trials: int, z: float = Z_95) -> Interval:
+def wilson_interval(successes: int, trials: int) -> Interval:
     """Return Wilson's score interval of a proportion, which assumes independent trials."""
     if not 0 <= successes <= trials or trials == 0:
         raise ValueError(f"{successes} successes of {trials} trials are not a proportion")
-    rate, weight = successes / trials, z * z / trials
+    rate, weight = successes / trials, Z_95 * Z_95 / trials
     center = (rate + weight / 2) / (1 + weight)
-    half = z * math.sqrt(rate * (1 - rate) / trials + weight / (4 * trials)) / (1 + weight)
+    half = Z_95 * math.sqrt(rate * (1 - rate) / trials + weight / (4 * trials)) / (1 + weight)
     # The formula gives exactly 0 and 1 at the ends; floating point may not.
     low = 0.0 if successes == 0 else center - half
     high = 1.0 if successes == trials else center + half
@@ -93,6 +93,16 @@ def percentile_interval(values: NDArray[np.float64], sizes: Sequence[int]) -> In
         float(np.quantile(lows, low, method="inverted_cdf")),
         float(np.quantile(highs, high, method="inverted_cdf")),
     )
+
+
+def resampled_interval(
+    values: NDArray[np.float64], sizes: Sequence[int], least: float = 0.0
+) -> Interval | None:
+    """Return `percentile_interval`, or `without_spread` if all resamples have the same value."""
+    interval = percentile_interval(values, sizes)
+    if interval is not None and np.ptp(values) == 0:
+        return without_spread(float(values[0]), sum(sizes), least)
+    return interval
 
 
 def without_spread(value: float, episodes: int, least: float = 0.0) -> Interval:

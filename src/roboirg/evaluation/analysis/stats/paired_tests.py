@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import NamedTuple
+from collections import defaultdict
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, NamedTuple, Protocol, TypeVar, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +16,7 @@ from roboirg.evaluation.analysis.stats.intervals import (
     Interval,
     Rows,
     percentile_interval,
+    resampled_interval,
     resampled_rates,
     without_spread,
 )
@@ -134,7 +136,7 @@ def measure_gap(tasks: Sequence[Pairs], rng: np.random.Generator, draws: int = D
     drawn = resampled_rates(rows, rng, draws)
     return Gap(
         value=float(first - second),
-        interval=_gap_interval(drawn, sizes),
+        interval=resampled_interval(drawn[:, 0] - drawn[:, 1], sizes, least=-1.0),
         p_value=sign_flip_test(np.concatenate([pairs.differences for pairs in paired])),
         retention=float(first / second) if second else None,
         retention_interval=_retention_interval(drawn, sizes) if second else None,
@@ -172,14 +174,6 @@ def sign_flip_test(differences: NDArray[np.int64]) -> float:
     return min(1.0, float(chances[as_far].sum()))
 
 
-def _gap_interval(drawn: NDArray[np.float64], sizes: Sequence[int]) -> Interval | None:
-    values = drawn[:, 0] - drawn[:, 1]
-    interval = percentile_interval(values, sizes)
-    if interval is not None and np.ptp(values) == 0:
-        return without_spread(float(values[0]), sum(sizes), least=-1.0)
-    return interval
-
-
 def _retention_interval(drawn: NDArray[np.float64], sizes: Sequence[int]) -> Interval | None:
     with np.errstate(divide="ignore", invalid="ignore"):
         values = drawn[:, 0] / drawn[:, 1]
@@ -204,3 +198,29 @@ def holm(p_values: Sequence[float]) -> tuple[float, ...]:
     adjusted = np.empty_like(values)
     adjusted[order] = np.maximum.accumulate(values[order] * np.arange(len(values), 0, -1))
     return tuple(np.minimum(adjusted, 1.0).tolist())
+
+
+class GapRow(Protocol):
+    """A dataclass with a gap that is tested together with those of others, and its `p_holm`."""
+
+    @property
+    def gap(self) -> Gap | None:
+        """The gap; None if there is none."""
+
+
+Tested = TypeVar("Tested", bound=GapRow)
+
+
+def with_holm(
+    rows: Sequence[Tested], family: Callable[[Tested], object] = lambda _row: None
+) -> tuple[Tested, ...]:
+    """Return rows with the p-values of their gaps corrected over all rows of the same family."""
+    families: defaultdict[object, dict[int, float]] = defaultdict(dict)
+    for place, row in enumerate(rows):
+        if row.gap is not None:
+            families[family(row)][place] = row.gap.p_value
+    corrected = list(rows)
+    for own in families.values():
+        for place, p_value in zip(own, holm([*own.values()]), strict=True):
+            corrected[place] = replace(cast("Any", rows[place]), p_holm=p_value)
+    return tuple(corrected)

@@ -11,6 +11,8 @@ from collections.abc import Sequence
 from decimal import ROUND_HALF_UP, Decimal
 from fractions import Fraction
 
+from roboirg.evaluation.analysis.stats.intervals import Interval
+
 DIGITS = Decimal("0.01")
 
 _SMALLEST_P = 0.001
@@ -41,6 +43,14 @@ def points(gap: float, decimals: int = 0) -> str:
     """Return a gap in signed percentage points, with a proper minus: ``−12``, ``+3``, ``±0``."""
     text = f"{100 * gap:+.{decimals}f}".replace("-", "−")
     return f"±{text[1:]}" if not text.strip("+−0.") else text
+
+
+def interval_note(interval: Interval | None) -> str:
+    """Return the ends of a gap's interval in brackets, after a blank; empty without one."""
+    if interval is None:
+        return ""
+    low, high = (points(end, 1) for end in interval)
+    return f" (95 % interval {low} to {high})"
 
 
 def p_text(p_value: float) -> str:

@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-import numpy as np
-
 from roboirg.evaluation.analysis.stats.cells import (
     Cells,
     PolicyRun,
@@ -16,7 +14,6 @@ from roboirg.evaluation.analysis.stats.cells import (
     policy_order,
     sort_cells,
 )
-from roboirg.evaluation.analysis.stats.intervals import SEED
 from roboirg.evaluation.analysis.stats.run_summary import ScopeKey, SummaryRow, summarize
 from roboirg.evaluation.records.record import Job, Summary
 
@@ -61,7 +58,6 @@ class RunData:
         return RunData(results, cells, summaries, names)
 
     def owner(self, run: str, result: Summary) -> PolicyRun:
-        """Return the policy run of a result of a run."""
         return _owner(run, result, self.names)
 
     def is_complete(self, policy_run: PolicyRun) -> bool:
@@ -77,7 +73,7 @@ class RunData:
 
 def summaries_by_key(cells: Cells) -> Mapping[ScopeKey, SummaryRow]:
     """Summarize cells for look-up by key."""
-    return {one.key: one for one in summarize(cells, np.random.default_rng(SEED))}
+    return {one.key: one for one in summarize(cells)}
 
 
 def _owner(run: str, result: Summary, known: Mapping[PolicyRun, str]) -> PolicyRun:

@@ -6,7 +6,7 @@ intervals and tests, which need SciPy.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from typing import NamedTuple
@@ -22,15 +22,15 @@ from roboirg.evaluation.analysis.stats.cells import (
     cell_interval,
     clustered_interval,
 )
-from roboirg.evaluation.analysis.stats.intervals import Interval
+from roboirg.evaluation.analysis.stats.intervals import SEED, Interval
 from roboirg.evaluation.analysis.stats.option_labels import REFERENCE
 from roboirg.evaluation.analysis.stats.paired_tests import (
     Gap,
     Overlap,
     Pairs,
-    holm,
     measure_gap,
     pooled_overlap,
+    with_holm,
 )
 from roboirg.tasks import all_tasks
 
@@ -184,9 +184,14 @@ def group_by_scope(cells: Cells) -> tuple[ScopeResults, ...]:
     )
 
 
-def summarize(cells: Cells, rng: np.random.Generator) -> tuple[SummaryRow, ...]:
+def summarize(cells: Cells) -> tuple[SummaryRow, ...]:
     """Group cells by scope and add intervals, gaps and corrected p-values."""
-    return _corrected([_with_statistics(one, rng) for one in group_by_scope(cells)])
+    rng = np.random.default_rng(SEED)
+    rows = [_with_statistics(one, rng) for one in group_by_scope(cells)]
+    # What is read together: a policy run's tasks, suites, averages.
+    return with_holm(
+        rows, lambda one: (one.policy_run, one.scope.task is None, one.scope.suite is None)
+    )
 
 
 def _references(
@@ -220,19 +225,3 @@ def _with_statistics(results: ScopeResults, rng: np.random.Generator) -> Summary
         gap=measure_gap(results.explicit_pairs(), rng),
         form_gap=measure_gap(results.resolved_pairs(), rng),
     )
-
-
-def _corrected(rows: Sequence[SummaryRow]) -> tuple[SummaryRow, ...]:
-    """Correct p-values over what is read together: a policy run's tasks, suites, averages."""
-    families: dict[tuple[PolicyRun, bool, bool], list[int]] = {}
-    for index, one in enumerate(rows):
-        if one.gap is not None:
-            family = (one.policy_run, one.scope.task is None, one.scope.suite is None)
-            families.setdefault(family, []).append(index)
-    corrected = list(rows)
-    for members in families.values():
-        gaps = [rows[index].gap for index in members]
-        adjusted = holm([gap.p_value for gap in gaps if gap is not None])
-        for index, p_value in zip(members, adjusted, strict=True):
-            corrected[index] = replace(rows[index], p_holm=p_value)
-    return tuple(corrected)

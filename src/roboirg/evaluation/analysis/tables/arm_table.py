@@ -20,7 +20,7 @@ from roboirg.evaluation.analysis.stats.chance import silent_chance
 from roboirg.evaluation.analysis.stats.intervals import SEED, Interval
 from roboirg.evaluation.analysis.stats.option_labels import options_label
 from roboirg.evaluation.analysis.stats.paired_tests import Gap, Pairs, holm, measure_gap
-from roboirg.evaluation.analysis.stats.rates import p_text, points
+from roboirg.evaluation.analysis.stats.rates import interval_note, p_text, points
 from roboirg.evaluation.analysis.stats.run_data import RunData
 from roboirg.evaluation.analysis.tables.breakdown_table import corrected_p_text, interval_text
 from roboirg.evaluation.analysis.tables.table import NOT_APPLICABLE, Column, Entry, Row, Table
@@ -86,11 +86,10 @@ def language_use_sentences(
             gaps[options] = gap
     corrected = holm([gap.p_value for gap in gaps.values()])
     for (options, gap), p_value in zip(gaps.items(), corrected, strict=True):
-        ends = interval_text(gap)
-        interval = "" if ends == NOT_APPLICABLE else f" (95 % interval {ends})"
         yield (
             f"Language use, {options_label(options)}: {names[0]} less {names[1]} "
-            f"{points(gap.value, 1)} points{interval}, {p_text(p_value)}, {gap.episodes} scenes."
+            f"{points(gap.value, 1)} points{interval_note(gap.interval)}, {p_text(p_value)}, "
+            f"{gap.episodes} scenes."
         )
 
 

@@ -4,9 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 
-import numpy as np
-
-from roboirg.core.plain_text import counted, verb_for
 from roboirg.evaluation.analysis.stats.breakdown_rows import BreakdownRow, break_down
 from roboirg.evaluation.analysis.stats.breakdowns import UNKNOWN, Breakdown, Labels
 from roboirg.evaluation.analysis.stats.cells import (
@@ -16,7 +13,7 @@ from roboirg.evaluation.analysis.stats.cells import (
     policy_order,
     sort_cells,
 )
-from roboirg.evaluation.analysis.stats.intervals import SEED
+from roboirg.evaluation.analysis.stats.comparison_text import incomplete_note
 from roboirg.evaluation.analysis.stats.option_labels import REFERENCE, options_label
 from roboirg.evaluation.analysis.stats.paired_tests import Gap
 from roboirg.evaluation.analysis.stats.rates import p_text, percent, points
@@ -38,9 +35,8 @@ def make_breakdown_table(
     found: Labels,
     names: Mapping[PolicyRun, str] | None = None,
 ) -> Table:
-    """Make the table of one breakdown."""
     ordered = sort_cells(cells, list(names or policy_order(cells, ())))
-    rows = break_down(ordered, found, np.random.default_rng(SEED))
+    rows = break_down(ordered, found)
     names = names or labels(ordered)
     return Table(
         key=f"by_{breakdown.name}",
@@ -100,8 +96,4 @@ def _notes(breakdown: Breakdown, cells: Cells, rows: tuple[BreakdownRow, ...]) -
         yield f"{NOT_APPLICABLE} without explicit on the same episodes."
     left_out = sum(cell.errors + cell.missing for cell in cells.values())
     if left_out:
-        verb = verb_for(left_out, "are")
-        yield (
-            f"Incomplete: {counted(left_out, 'trial')} without a verdict (an error, or still to be "
-            f"played) {verb} left out."
-        )
+        yield incomplete_note(left_out)

@@ -117,9 +117,7 @@ def print_run_tables(tables: Sequence[RunTable], console: Console) -> None:
     console.print("; ".join(_legend(tables)), style="dim", highlight=False)
 
 
-def print_failures(
-    records: Iterable[Summary], console: Console, max_failures: int = MAX_FAILURES
-) -> None:
+def print_failures(records: Iterable[Summary], console: Console) -> None:
     """List the episodes of each policy without success and the cause; count the rest."""
     by_policy: dict[str, list[Summary]] = {}
     for record in records:
@@ -132,10 +130,10 @@ def print_failures(
         failures.sort(
             key=lambda one: (one.task, one.split, one.episode, options_sort_key(one.options))
         )
-        for record in failures[:max_failures]:
+        for record in failures[:MAX_FAILURES]:
             console.print(Text(f"  {failure_text(record)}"), highlight=False, soft_wrap=True)
-        if len(failures) > max_failures:
-            console.print(f"  and {len(failures) - max_failures} more", highlight=False)
+        if len(failures) > MAX_FAILURES:
+            console.print(f"  and {len(failures) - MAX_FAILURES} more", highlight=False)
 
 
 def failure_text(record: Summary) -> str:

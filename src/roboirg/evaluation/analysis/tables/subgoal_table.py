@@ -44,7 +44,6 @@ class _PlannerCell:
     costs: defaultdict[str, float] = field(default_factory=lambda: defaultdict(float))
 
     def add(self, record: Record) -> None:
-        """Add a record."""
         self.episodes += 1
         self.verdicts.update(one.verdict for one in record.subgoals)
         if (failure := planner_failure(record)) is not None:
@@ -53,7 +52,6 @@ class _PlannerCell:
             self.costs[name] += record.usage.get(name, 0)
 
     def entries(self, failures: Iterable[str], costs: Iterable[str]) -> Iterator[Entry]:
-        """Yield the entries of a row."""
         total = self.verdicts.total()
         yield Entry(word=str(total))
         for one in SUBGOAL_VERDICTS:

@@ -14,8 +14,6 @@ from roboirg.evaluation.analysis.tables.rendering.markdown import markdown
 from roboirg.evaluation.analysis.tables.rendering.terminal import plain
 from roboirg.evaluation.analysis.tables.table import Table
 
-__all__ = ["FORMATS", "Format", "get_format"]
-
 
 class Format(NamedTuple):
     """An output format.
@@ -39,7 +37,6 @@ FORMATS: Mapping[str, Format] = {
 
 
 def get_format(name: str) -> Format:
-    """Return the format of that name."""
     if name not in FORMATS:
         raise UnknownNameError("format", name, FORMATS)
     return FORMATS[name]
