@@ -6,7 +6,7 @@ python scripts/write_paper_results.py
 from __future__ import annotations
 
 import functools
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 
 from written_parts import with_part
@@ -26,8 +26,11 @@ from roboirg.language.settings import plain_settings
 ROOT = Path(__file__).parent.parent
 ANSWERS, TABLES = ROOT / "docs" / "paper-results.md", ROOT / "docs" / "paper-tables.md"
 PACKS = {
-    part: ROOT / "results" / f"paper-{part}-test.roboirg.zip" for part in (MAIN, CONTEXT, PLANNER)
+    part: path
+    for part in (MAIN, CONTEXT, PLANNER)
+    if (path := ROOT / "results" / f"paper-{part}-test.roboirg.zip").exists()
 }
+"""Of the parts that have been played."""
 
 
 @functools.cache
@@ -37,15 +40,20 @@ def played() -> Mapping[str, Cells]:
     for part, pack in PACKS.items():
         with opened_run(pack) as run:
             results[part] = list(read_results(run))
-    # Rows with planners stand next to their changed selves, and were played once.
+    if PLANNER in results:
+        results[PLANNER] += _planners_of_main(results[MAIN])
+    return {part: row_cells(part, found) for part, found in results.items()}
+
+
+def _planners_of_main(results: Iterable[Summary]) -> list[Summary]:
+    """Return the results with which those with other planners or hands are compared."""
     tasks = read_plan_file("paper-planners")["tasks"].split(",")
     rows = {row_name(memory) for memory in PLANNERS}
-    results[PLANNER] += [
+    return [
         one
-        for one in results[MAIN]
+        for one in results
         if one.policy in rows and one.task in tasks and one.options.form == "implicit"
     ]
-    return {part: row_cells(part, found) for part, found in results.items()}
 
 
 def rates_table(main: Cells) -> str:
@@ -59,17 +67,18 @@ def rates_table(main: Cells) -> str:
     }
     published = {(one.model, one.options.setting): one for one in published_rows("main")}
     for memory, system in SYSTEMS.items():
-        own = [_rate(found[row_name(memory), name]) for name in settings]
+        own = [found.get((row_name(memory), name)) for name in settings]
+        if any(own):
+            lines += [f"| {row_name(memory)} | {' | '.join(map(_rate, own))} |"]
         theirs = [f"{published[system, name].average:.0f}" for name in settings]
-        lines += [f"| {row_name(memory)} | {' | '.join(own)} |"]
         lines += [f"| {system} (published) | {' | '.join(theirs)} |"]
     return "\n".join(lines)
 
 
-def _rate(row: SummaryRow) -> str:
+def _rate(row: SummaryRow | None) -> str:
+    if row is None or row.rate is None or row.interval is None:
+        return "–"
     shown = f"{100 * row.rate:.0f}"
-    if row.interval is None:
-        return shown
     return f"{shown} ({100 * row.interval.low:.0f} to {100 * row.interval.high:.0f})"
 
 
