@@ -38,6 +38,7 @@ from roboirg.tasks.shared.fixtures import (
     draw_cube,
     draw_number,
 )
+from roboirg.tasks.shared.stages import PRESSED, press_stage
 from roboirg.tasks.task import Commands, Task, Wording
 
 COLORS_PRESENT: dict[Difficulty, int] = {"easy": 1, "medium": 2, "hard": 3}
@@ -159,32 +160,24 @@ def stages(scene: Scene, goal: Goal) -> tuple[Stage, ...]:
     """
     cubes = [cube.name for cube in scene.of_kind("cube")]
     picked, binned = tuple(Fact("picked", cube) for cube in cubes), _binned(cubes)
-    pressed = Fact("pressed", "button")
     plan: list[Stage] = []
     for drops, (color, ordinal, cube) in enumerate(_wanted(scene, goal), start=1):
         pick = Stage(
             expects=FactCount(picked),
-            forbids=(pressed,),
+            forbids=(PRESSED,),
             primitive=Primitive("pick_cube", cube),
             subgoal=f"pick up the {ordinal} {color} cube {{at}}",
             points_at=cube,
         )
         put_in = Stage(
             expects=FactCount(binned, least=drops),
-            forbids=(pressed,),
+            forbids=(PRESSED,),
             primitive=Primitive("drop_into", cube, "bin"),
             subgoal="put it into the bin {at}",
             points_at="bin",
         )
         plan += [pick, put_in]
-    press = Stage(
-        expects=pressed,
-        forbids=tuple(_wrong_counts(scene, goal)),
-        primitive=Primitive("press", "button"),
-        subgoal="press the button {at}",
-        points_at="button",
-    )
-    return (*plan, press)
+    return (*plan, press_stage(forbids=tuple(_wrong_counts(scene, goal))))
 
 
 def _wanted(scene: Scene, goal: Goal) -> Iterator[tuple[str, str, str]]:

@@ -14,6 +14,7 @@ from roboirg.core.footprints import Circle, Footprint, Region
 from roboirg.core.word_pools import Pools
 from roboirg.tasks.shared.fixtures import ORDINALS, draw_number, draw_target
 from roboirg.tasks.shared.real_table import Side, draw_sides, draw_tape, on_side
+from roboirg.tasks.shared.stages import pick_stage, place_stage
 from roboirg.tasks.task import Commands, Task, Wording
 
 TAPES: tuple[Color, ...] = ("yellow", "gray")
@@ -72,21 +73,9 @@ def stages(scene: Scene, goal: Goal) -> tuple[Stage, ...]:
     again = Rule(Fact("picked", tape), f"picked up the {color} tape again", failure="wrong_count")
     plan: list[Stage] = []
     for ordinal in ORDINALS[: goal.number("repeats")]:
-        pick = Stage(
-            expects=Fact("picked", tape),
-            forbids=wrong,
-            primitive=Primitive("pick_cube", tape),
-            subgoal=f"pick up the {color} tape {{at}} for the {ordinal} time",
-            points_at=tape,
-        )
-        put = Stage(
-            expects=Fact("placed", tape, "target"),
-            forbids=wrong,
-            primitive=Primitive("place_on", tape, "target"),
-            subgoal=f"place the {color} tape onto the target {{at}}",
-            points_at="target",
-        )
-        plan += [pick, put]
+        pick = f"pick up the {color} tape {{at}} for the {ordinal} time"
+        put = f"place the {color} tape onto the target {{at}}"
+        plan += [pick_stage(tape, pick, wrong), place_stage(tape, "target", put, wrong)]
     leave = Stage(
         expects=Elapsed(WAIT_STEPS, timer="left alone"),
         forbids=(again, *wrong),

@@ -21,6 +21,7 @@ from roboirg.tasks.shared.real_table import (
     draw_tape,
     on_side,
 )
+from roboirg.tasks.shared.stages import pick_stage
 from roboirg.tasks.task import Commands, Task, Wording
 
 BOXES: tuple[Color, ...] = ("green", "purple")
@@ -63,13 +64,7 @@ def stages(scene: Scene, goal: Goal) -> tuple[Stage, ...]:
         for box in scene.of_kind("box")
         if box.name != target
     )
-    pick = Stage(
-        expects=Fact("picked", "tape"),
-        forbids=wrong,
-        primitive=Primitive("pick_cube", "tape"),
-        subgoal="pick up the tape {at}",
-        points_at="tape",
-    )
+    pick = pick_stage("tape", "pick up the tape {at}", wrong)
     put_in = Stage(
         expects=Fact("binned", "tape", target),
         forbids=wrong,
