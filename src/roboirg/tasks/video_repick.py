@@ -13,15 +13,14 @@ import numpy as np
 
 from roboirg.core.conditions import All, Elapsed, Fact, Rule
 from roboirg.core.episode import COLORS, Difficulty, Goal, Primitive, Scene, SceneObject, Stage
-from roboirg.core.footprints import Obstacle, Region
+from roboirg.core.footprints import Region
 from roboirg.core.motions import Swap
 from roboirg.core.word_pools import Pools
 from roboirg.tasks.shared.fixtures import (
     ORDINALS,
     button_keep_out,
-    cube_obstacle,
     draw_button,
-    draw_cube,
+    draw_cubes,
     draw_number,
 )
 from roboirg.tasks.shared.layouts import layout_points
@@ -98,28 +97,22 @@ def make_scene(
 def _draw_layout(rng: np.random.Generator, button: SceneObject) -> list[SceneObject]:
     """Draw three cubes of one color, each near its point of a layout."""
     color = COLORS[int(rng.integers(len(COLORS)))]
-    obstacles: list[Obstacle] = [button_keep_out(button)]
-    cubes: list[SceneObject] = []
-    for number, point in enumerate(layout_points(rng, LAYOUT_CUBES)):
-        region = Region(*point, LAYOUT_HALF, LAYOUT_HALF)
-        cube = draw_cube(rng, f"cube_{color}_{number}", color, region, GAP, obstacles)
-        cubes.append(cube)
-        obstacles.append(cube_obstacle(cube))
-    return cubes
+    cubes = (
+        (f"cube_{color}_{number}", color, Region(*point, LAYOUT_HALF, LAYOUT_HALF))
+        for number, point in enumerate(layout_points(rng, LAYOUT_CUBES))
+    )
+    return draw_cubes(rng, cubes, GAP, [button_keep_out(button)])
 
 
 def _draw_clutter(rng: np.random.Generator, button: SceneObject) -> list[SceneObject]:
     """Draw five cubes of each color; in each round one of each, in any order."""
-    obstacles: list[Obstacle] = [button_keep_out(button)]
-    cubes: list[SceneObject] = []
-    for number in range(CLUTTER_ROUNDS):
-        for index in rng.permutation(len(COLORS)):
-            color = COLORS[index]
-            name = f"cube_{color}_{number}"
-            cube = draw_cube(rng, name, color, CLUTTER_REGION, GAP, obstacles)
-            cubes.append(cube)
-            obstacles.append(cube_obstacle(cube))
-    return cubes
+    # The colors of a round are drawn after the cubes of the one before.
+    cubes = (
+        (f"cube_{COLORS[index]}_{number}", COLORS[index], CLUTTER_REGION)
+        for number in range(CLUTTER_ROUNDS)
+        for index in rng.permutation(len(COLORS))
+    )
+    return draw_cubes(rng, cubes, GAP, [button_keep_out(button)])
 
 
 def demonstration(scene: Scene) -> tuple[Stage, ...]:
