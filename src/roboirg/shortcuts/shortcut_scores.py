@@ -6,11 +6,10 @@ from collections.abc import Callable, Mapping
 from fractions import Fraction
 from typing import NamedTuple, cast
 
-from roboirg.core.episode import Goal
+from roboirg.core.episode import Goal, values_in
 from roboirg.language.instruction import hidden_slots as hidden_in
 from roboirg.shortcuts.command_chance import blind_goals, right_share
 from roboirg.shortcuts.goal_learner import Told
-from roboirg.shortcuts.goal_vocabulary import values_in
 from roboirg.shortcuts.surface_rules import SURFACE_RULES
 from roboirg.shortcuts.text_guess import TextGuess, goal_share, guess_goal, slot_share
 

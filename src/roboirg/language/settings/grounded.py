@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from roboirg.core.episode import Goal
+from roboirg.core.episode import Goal, values_in
 from roboirg.language.grounded import (
     Clue,
     amount_clues,
@@ -102,10 +102,7 @@ def _is_open(request: InstructionRequest, slot: str) -> bool:
 
 def _others(goal: Goal, slot: str) -> list[str]:
     return sorted(
-        str(value)
-        for name, content in goal.slots
-        if name != slot
-        for value in (content if isinstance(content, tuple) else (content,))
+        str(value) for name, content in goal.slots if name != slot for value in values_in(content)
     )
 
 
