@@ -17,9 +17,9 @@ from roboirg.core.errors import InvalidValueError
 from roboirg.core.goal_slots import COLOR_SLOTS, SLOT_TYPE_NAMES, SlotTypeName
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.core.word_pools import PoolName, Pools, pool_of
-from roboirg.language.instruction import UtteranceStage
+from roboirg.language.instruction import Expression, UtteranceStage
 from roboirg.language.landmarks import Frame
-from roboirg.language.phrases import Phrase, antecedent, fill, plain, swap_particles
+from roboirg.language.phrases import Phrase, anaphor, antecedent, fill, plain, swap_particles
 from roboirg.language.template_sampler import TemplateSampler
 from roboirg.language.worded_command import StatedPhrase, TaskWordings, WordedCommand, goal_fields
 from roboirg.tasks import Task, get_task
@@ -94,6 +94,14 @@ class InstructionRequest:
     def resolved(self) -> bool:
         """Whether the command names the referents of its referring expressions."""
         return self.options.form == "resolved"
+
+    def refer(
+        self, words: str, expression: Expression, slot: str, value: str | int, *, resolved: str
+    ) -> Phrase:
+        """Return words that point back at a slot value; resolved, those that name it."""
+        if self.resolved:
+            return antecedent(resolved, slot, value)
+        return anaphor(words, expression, slot, value)
 
     @property
     def pool(self) -> PoolName:
