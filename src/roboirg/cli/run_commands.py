@@ -339,7 +339,7 @@ def _print_prompt_shares(
     from rich.table import Table
 
     from roboirg.evaluation.play.prompt_shares import prompt_shares, share_text
-    from roboirg.policies.by_name.policy_classes import BUILTIN
+    from roboirg.policies.builtin import BUILTIN
     from roboirg.util.console_width import widen
 
     shares = prompt_shares(jobs)

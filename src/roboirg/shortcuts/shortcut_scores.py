@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from fractions import Fraction
+from functools import partial
 from typing import NamedTuple, cast
 
 from roboirg.core.episode import Goal, values_in
@@ -77,8 +78,4 @@ def score_rule(rule: str, told: Told) -> ShortcutScore:
 
 def rule_scorers() -> Mapping[str, Scorer]:
     """Return chance and all surface rules, by name."""
-
-    def scorer(rule: str) -> Scorer:
-        return lambda told: score_rule(rule, told)
-
-    return {CHANCE: score_chance, **{rule: scorer(rule) for rule in SURFACE_RULES}}
+    return {CHANCE: score_chance} | {rule: partial(score_rule, rule) for rule in SURFACE_RULES}
