@@ -13,7 +13,7 @@ from roboirg.core.episode import Color, Difficulty, Goal, Primitive, Scene, Stag
 from roboirg.core.footprints import Circle, Footprint, Region
 from roboirg.core.word_pools import Pools
 from roboirg.tasks.shared.fixtures import ORDINALS, draw_number, draw_target
-from roboirg.tasks.shared.real_table import Side, draw_sides, draw_tape, on_side
+from roboirg.tasks.shared.real_table import draw_sides, draw_tape, on_side
 from roboirg.tasks.shared.stages import pick_stage, place_stage
 from roboirg.tasks.task import Commands, Task, Wording
 
@@ -34,8 +34,7 @@ def sample(rng: np.random.Generator, difficulty: Difficulty) -> tuple[Scene, Goa
     del difficulty
     target = draw_target(rng, "target", TARGET_RADIUS, TARGET_REGION, 0.0, ())
     obstacles: list[Footprint] = [Circle(target.position.x, target.position.y, TARGET_RADIUS)]
-    left, right = draw_sides(rng, TAPES)
-    sides: dict[Color, Side] = {left: "left", right: "right"}
+    sides = draw_sides(rng, TAPES)
     tapes = tuple(
         draw_tape(
             rng,

@@ -14,7 +14,6 @@ from roboirg.core.episode import Color, Difficulty, Goal, Primitive, Scene, Stag
 from roboirg.core.footprints import Footprint, Region
 from roboirg.core.word_pools import Pools
 from roboirg.tasks.shared.real_table import (
-    Side,
     box_footprint,
     draw_box,
     draw_sides,
@@ -35,8 +34,7 @@ TAPE_GAP = 0.03
 def sample(rng: np.random.Generator, difficulty: Difficulty) -> tuple[Scene, Goal]:
     """Draw a box on either side, the tape in front of them; sides and goal box are uniform."""
     del difficulty
-    left, right = draw_sides(rng, BOXES)
-    sides: dict[Color, Side] = {left: "left", right: "right"}
+    sides = draw_sides(rng, BOXES)
     boxes = tuple(
         draw_box(rng, f"box_{color}", color, on_side(LEFT_BOX_REGION, sides[color]))
         for color in BOXES
