@@ -24,8 +24,8 @@ from roboirg.evaluation.play.rollout_result import RolloutResult, make_record
 from roboirg.evaluation.records.record import Record
 from roboirg.evaluation.records.store import RecordStore
 from roboirg.main import app
+from roboirg.policies.builtin import BUILTIN
 from roboirg.policies.by_name.loading import load_policy_class
-from roboirg.policies.by_name.policy_classes import BUILTIN
 
 HORIZON = "Horizon and control rate"
 STEPS = "step limit of a rollout"

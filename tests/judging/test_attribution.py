@@ -14,7 +14,8 @@ from staged import Staged
 
 from roboirg.core.conditions import ExecutionFailure, Fact, GroundingFailure, Rule, facts_of
 from roboirg.core.episode import Episode
-from roboirg.judging import EXECUTION, GROUNDING, FailureAttribution, Status, attribute_failure
+from roboirg.judging import FailureAttribution, Status, attribute_failure
+from roboirg.judging.failure_attribution import EXECUTION, GROUNDING
 from roboirg.tasks import every_task
 from roboirg.tasks.splits.fingerprint import NOT_COUNTED, fingerprint, plain
 from roboirg.tasks.splits.splits import get_episode

@@ -8,9 +8,9 @@ from roboirg.core.actions import JOINT_ANGLE, WAYPOINT, check_chunk
 from roboirg.core.errors import InvalidValueError, UnknownNameError
 from roboirg.language.settings import plain_settings
 from roboirg.policies import Policy, PrivilegedPolicy, load_policy_class, make_policy
+from roboirg.policies.builtin import BUILTIN
 from roboirg.policies.builtin.listeners import ForgetfulPolicy, ListenerPolicy
 from roboirg.policies.by_name.loading import is_privileged, policy_version
-from roboirg.policies.by_name.policy_classes import BUILTIN
 from roboirg.policies.contract.policy_needs import PolicyNeeds
 from roboirg.tasks import every_task
 

@@ -7,9 +7,8 @@ import pytest
 
 import roboirg
 from roboirg.policies import make_policy, play
-from roboirg.policies.builtin import listeners
+from roboirg.policies.builtin import BUILTIN, listeners
 from roboirg.policies.by_name.loading import is_privileged, policy_version
-from roboirg.policies.by_name.policy_classes import BUILTIN
 from roboirg.shortcuts import SURFACE_RULES
 from roboirg.tasks.splits.splits import get_episode
 

@@ -15,6 +15,7 @@ from plan_files import plan_file
 from selection import slow_but
 from typer.testing import CliRunner
 
+from roboirg.core.episode import values_in
 from roboirg.core.errors import InvalidValueError, MissingDependencyError, UnknownNameError
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.language import instruct, instruct_with
@@ -23,7 +24,7 @@ from roboirg.language.variants import expressible_options
 from roboirg.main import app
 from roboirg.shortcuts import SURFACE_RULES, draw_goal, goal_share, guess_goal
 from roboirg.shortcuts.goal_learner import LEARNED_FLOORS
-from roboirg.shortcuts.goal_vocabulary import goal_vocabulary, values_in
+from roboirg.shortcuts.goal_vocabulary import goal_vocabulary
 from roboirg.shortcuts.shortcut_scores import (
     CHANCE,
     counted_slots,

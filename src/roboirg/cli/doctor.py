@@ -25,6 +25,7 @@ from roboirg.core.errors import MissingDependencyError, RenderDeviceError, RoboI
 from roboirg.core.extras import DISTRIBUTION, install_command
 from roboirg.simulation.model_files import look_for_model_files
 from roboirg.simulation.rendering.render_device import DEVICE_VARIABLE
+from roboirg.util.processor import core_count
 
 FRAME_TIMEOUT = 120.0
 """Time limit for the test frame, s."""
@@ -67,7 +68,7 @@ def run_checks() -> list[Check]:
         _check_opencv(),
         _check_model_files(),
         *_check_rendering(),
-        _check_processors(),
+        Check("processors", ok=True, found=f"{core_count()}"),
         _check_memory(),
     ]
 
@@ -222,12 +223,6 @@ def _run_frame_process() -> tuple[int, str, str]:
         return child.returncode, child.stdout, f"the driver crashed ({signal.strsignal(number)})"
     error_lines = child.stderr.strip().splitlines() or [f"exit code {child.returncode}"]
     return child.returncode, child.stdout, error_lines[-1]
-
-
-def _check_processors() -> Check:
-    # os.cpu_count() also counts processors that a container may not use.
-    count = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
-    return Check("processors", bool(count), f"{count}", "")
 
 
 def _check_memory() -> Check:

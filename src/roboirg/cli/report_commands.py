@@ -15,6 +15,7 @@ from roboirg.core.errors import InvalidValueError, UnknownNameError
 if TYPE_CHECKING:
     from roboirg.evaluation.analysis.stats.breakdowns import Breakdown, Labels
     from roboirg.evaluation.analysis.stats.cells import Cells
+    from roboirg.evaluation.analysis.tables.rendering import Format
     from roboirg.evaluation.analysis.tables.table import Table
     from roboirg.evaluation.records.record import Job, Summary
 
@@ -201,7 +202,7 @@ def tables(
     else:
         found = _breakdown_tables(runs or [], by)
     if out is not None:
-        _write(found, out, output.suffix, format)
+        _write(found, out, output)
     elif format == "terminal":
         _print(found)
     else:
@@ -348,13 +349,12 @@ def _print(found: list[Table]) -> None:
         console.print(renderable(table, console), highlight=False)
 
 
-def _write(found: list[Table], folder: Path, suffix: str, name: str) -> None:
-    from roboirg.evaluation.analysis.tables.rendering import get_format
+def _write(found: list[Table], folder: Path, output: Format) -> None:
     from roboirg.util.atomic_write import write_atomically
 
     for table in found:
-        path = folder / f"{table.key}{suffix}"
-        write_atomically(path, get_format(name).draw(table))
+        path = folder / f"{table.key}{output.suffix}"
+        write_atomically(path, output.draw(table))
         typer.echo(path)
 
 

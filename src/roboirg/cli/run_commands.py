@@ -162,8 +162,9 @@ def print_tables_of(folder: Path, planned: Sequence[Job]) -> None:
         print_failures,
         print_run_tables,
     )
+    from roboirg.evaluation.records.store import read_results
 
-    results, console = _results(folder), Console()
+    results, console = read_results(folder), Console()
     print_run_tables(make_run_tables(results, planned), console)
     print_failures(results, console)
 
@@ -202,12 +203,6 @@ def report_problems(summary: RunSummary, folder: Path) -> None:
         )
     if summary.errors or summary.missing:
         sys.exit(USAGE_ERROR)
-
-
-def _results(folder: Path) -> Any:  # noqa: ANN401 - imported where it is needed
-    from roboirg.evaluation.records.store import read_results
-
-    return read_results(folder)
 
 
 def _plan(name: str | None, typed: dict[str, Any], usual: Sequence[str]) -> Plan:
@@ -344,7 +339,7 @@ def _print_prompt_shares(
     from rich.table import Table
 
     from roboirg.evaluation.play.prompt_shares import prompt_shares, share_text
-    from roboirg.policies.by_name.policy_classes import BUILTIN
+    from roboirg.policies.builtin import BUILTIN
     from roboirg.util.console_width import widen
 
     shares = prompt_shares(jobs)

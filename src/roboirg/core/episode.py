@@ -46,6 +46,11 @@ ROBOT_BASE = (-0.615, 0.0, 0.0)
 SlotValue = str | int | tuple[str, ...] | tuple[int, ...]
 
 
+def values_in(content: SlotValue) -> tuple[str | int, ...]:
+    """Return the values of a slot, one or several."""
+    return content if isinstance(content, tuple) else (content,)
+
+
 @dataclass(frozen=True, slots=True)
 class SceneObject:
     """One object on the table, at its place at the start.

@@ -112,8 +112,10 @@ when they are first read, and then kept; images that are not read cost no time.
 """
 
 
-class FetchedDemonstration(Mapping[str, NDArray[Any]]):
-    """A demonstration in another process than the simulator; what is read is fetched and then kept.
+class FetchedFields(Mapping[str, Any]):
+    """Fields of observations; those that are not here are fetched when they are read, and kept.
+
+    To read several, call `draw` first, which fetches them together.
 
     Args:
         fields: names of all fields.
@@ -124,27 +126,22 @@ class FetchedDemonstration(Mapping[str, NDArray[Any]]):
     def __init__(
         self,
         fields: Sequence[str],
-        arrays: Mapping[str, NDArray[Any]],
-        fetch: Callable[[Sequence[str]], Mapping[str, NDArray[Any]]],
+        arrays: Mapping[str, Any],
+        fetch: Callable[[Sequence[str]], Mapping[str, Any]],
     ) -> None:
         self._fields, self._arrays, self._fetch = tuple(fields), dict(arrays), fetch
 
-    def __getitem__(self, field: str) -> NDArray[Any]:
-        """Return a field for all steps; raises KeyError if it does not exist."""
+    def __getitem__(self, field: str) -> Any:  # noqa: ANN401 - arrays and tuples of texts
+        """Return a field; raises KeyError if it does not exist."""
         if field not in self._arrays and field in self._fields:
             self._arrays.update(self._fetch([field]))
         return self._arrays[field]
 
     def draw(self) -> None:
-        """Fetch all fields that are not here, drawn together."""
+        """Fetch all fields that are not here."""
         missing = [field for field in self._fields if field not in self._arrays]
         if missing:
             self._arrays.update(self._fetch(missing))
-
-    @property
-    def length(self) -> int:
-        """Control steps in the video, T."""
-        return len(self["joint_positions"])
 
     def __contains__(self, field: object) -> bool:
         return field in self._fields
@@ -153,12 +150,20 @@ class FetchedDemonstration(Mapping[str, NDArray[Any]]):
         return iter(self._fields)
 
     def __len__(self) -> int:
-        """Return the number of fields; `length` is the number of control steps."""
         return len(self._fields)
 
-    def __reduce__(self) -> tuple[type[dict[str, Any]], tuple[dict[str, Any]]]:
+    def __reduce__(self) -> tuple[type[Mapping[str, Any]], tuple[Any, ...]]:
         self.draw()
         return dict, (dict(self),)
+
+
+class FetchedDemonstration(FetchedFields):
+    """A demonstration in another process than the simulator."""
+
+    @property
+    def length(self) -> int:
+        """Control steps in the video, T; ``len`` is the number of fields."""
+        return len(self["joint_positions"])
 
 
 def proprioception(joints: NDArray[Any], gripper: NDArray[Any]) -> NDArray[np.float32]:

@@ -2,13 +2,11 @@
 
 from roboirg.judging.episode_replay import Event, changes
 from roboirg.judging.failure_analysis import attribute_failure
-from roboirg.judging.failure_attribution import EXECUTION, GROUNDING, FailureAttribution
+from roboirg.judging.failure_attribution import FailureAttribution
 from roboirg.judging.judge import Judge, Status, plain_subgoal
 from roboirg.judging.subgoal_verdicts import SUBGOAL_VERDICTS, judge_subgoal
 
 __all__ = [
-    "EXECUTION",
-    "GROUNDING",
     "SUBGOAL_VERDICTS",
     "Event",
     "FailureAttribution",

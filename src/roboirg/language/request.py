@@ -12,22 +12,20 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Literal, NamedTuple, TypeVar, cast
 
-from roboirg.core.episode import Color, Episode, Goal, Scene, SceneObject, SlotValue
+from roboirg.core.episode import Color, Episode, Goal, Scene, SceneObject, values_in
 from roboirg.core.errors import InvalidValueError
 from roboirg.core.goal_slots import COLOR_SLOTS, SLOT_TYPE_NAMES, SlotTypeName
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.core.word_pools import PoolName, Pools, pool_of
-from roboirg.language.instruction import UtteranceStage
+from roboirg.language.instruction import Expression, UtteranceStage
 from roboirg.language.landmarks import Frame
-from roboirg.language.phrases import Phrase, antecedent, fill, plain, swap_particles
+from roboirg.language.phrases import Phrase, anaphor, antecedent, fill, plain, swap_particles
 from roboirg.language.template_sampler import TemplateSampler
 from roboirg.language.worded_command import StatedPhrase, TaskWordings, WordedCommand, goal_fields
 from roboirg.tasks import Task, get_task
 
 Distractor = Literal["neutral", "competing"]
 Option = TypeVar("Option")
-SlotContent = tuple[str, ...] | tuple[int, ...] | tuple[str | int, ...]
-"""The values of a slot, one or several."""
 DISTRACTORS: tuple[Distractor, ...] = ("neutral", "competing")
 MOST_DISTRACTORS = 100
 STAGE_SETS: tuple[tuple[int, ...], ...] = ((1, 5), (1, 2, 5), (1, 2, 3, 5), (1, 2, 3, 4, 5))
@@ -97,6 +95,14 @@ class InstructionRequest:
         """Whether the command names the referents of its referring expressions."""
         return self.options.form == "resolved"
 
+    def refer(
+        self, words: str, expression: Expression, slot: str, value: str | int, *, resolved: str
+    ) -> Phrase:
+        """Return words that point back at a slot value; resolved, those that name it."""
+        if self.resolved:
+            return antecedent(resolved, slot, value)
+        return anaphor(words, expression, slot, value)
+
     @property
     def pool(self) -> PoolName:
         """The pool from which the words are taken."""
@@ -131,7 +137,7 @@ class InstructionRequest:
         counts = {one.field: one for one in self.goal_values if one.slot == "counts"}
         return counts[f"counts.{index}"].number if counts else 1
 
-    def alternatives(self, slot: str) -> tuple[SlotContent, ...]:
+    def alternatives(self, slot: str) -> tuple[tuple[str | int, ...], ...]:
         """Return all that a slot can hold in this scene if the other slots keep their values."""
         return _alternatives(self.task.name, self.episode.scene, self.episode.goal, slot)
 
@@ -332,21 +338,23 @@ def _goal_values(goal: Goal) -> tuple[GoalValue, ...]:
 
 
 @functools.lru_cache(maxsize=64)
-def _alternatives(task: str, scene: Scene, goal: Goal, slot: str) -> tuple[SlotContent, ...]:
+def _alternatives(
+    task: str, scene: Scene, goal: Goal, slot: str
+) -> tuple[tuple[str | int, ...], ...]:
     same = dict(goal.slots) | {slot: 0}
     goals = [dict(one.slots) for one in get_task(task).goals(scene)]
     values = [one[slot] for one in goals if one | {slot: 0} == same]
-    return tuple(value if isinstance(value, tuple) else (value,) for value in values)
+    return tuple(map(values_in, values))
 
 
 @functools.lru_cache(maxsize=64)
 def _scene_colors(task: str, scene: Scene) -> tuple[str, ...]:
     goals = [dict(one.slots) for one in get_task(task).goals(scene)]
-    found = {color for goal in goals for slot in COLOR_SLOTS for color in _texts(goal.get(slot))}
+    found = {
+        color
+        for goal in goals
+        for slot in COLOR_SLOTS
+        if slot in goal
+        for color in values_in(goal[slot])
+    }
     return tuple(color for color in get_task(task).commands.colors if color in found)
-
-
-def _texts(content: SlotValue | None) -> tuple[str, ...]:
-    if content is None:
-        return ()
-    return tuple(map(str, content)) if isinstance(content, tuple) else (str(content),)

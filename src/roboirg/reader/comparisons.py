@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 from roboirg.core.episode import Scene, SceneObject
 from roboirg.reader.phrases import Phrases
+from roboirg.reader.places import TIE
 
 _COMPARATIVE = Phrases({
     "the cube of another color that is nearer to you": r"\b(?P<near>nearer|closer)(?: to you)?\b",
@@ -16,8 +17,6 @@ _COMPARATIVE = Phrases({
     "the one that is farther away from you":
         r"\b(?P<far>farther|further)(?: away)?(?: from you)?\b(?! (?:over|to|on)\b)",
 })  # fmt: skip
-_TIE = 0.01
-"""Meters; the same words may mean things that differ by less."""
 
 
 class PlaceComparison(NamedTuple):
@@ -70,4 +69,4 @@ def _foremost(comparison: PlaceComparison, items: list[SceneObject]) -> list[Sce
     if not items:
         return []
     places = [comparison.sign * item.position[comparison.axis] for item in items]
-    return [item for item, place in zip(items, places, strict=True) if max(places) - place <= _TIE]
+    return [item for item, place in zip(items, places, strict=True) if max(places) - place <= TIE]

@@ -14,11 +14,9 @@ from roboirg.core.episode import Goal, Scene
 from roboirg.reader.observed_numbers import observed_amount, observed_times
 from roboirg.reader.observed_placements import observed_placement
 from roboirg.reader.observed_things import observed_thing, with_remaining
-from roboirg.reader.phrases import Phrases
+from roboirg.reader.phrases import Phrases, Span
 from roboirg.reader.tokens import COLOR, Sentence
 
-Span = tuple[int, int, str | None]
-"""First character, one past the last, and what the words between stand for; None if unclear."""
 _LIKE = Phrases({"two cubes like the red cube": rf"\blike the ({COLOR}) cube\b"})
 Find = Callable[[str, Scene], Iterator[Span]]
 

@@ -7,11 +7,10 @@ from collections.abc import Iterator, Sequence
 from roboirg.core.episode import Scene, SceneObject
 from roboirg.core.motions import Swap
 from roboirg.reader.object_positions import scene_at_last
-from roboirg.reader.phrases import Phrases
+from roboirg.reader.phrases import Phrases, Span
+from roboirg.reader.places import TIE
 from roboirg.reader.tokens import COLOR, NUMBER, number_of
 
-Span = tuple[int, int, str | None]
-_TIE = 0.01
 _SIDE = "(?P<side>farther to your (?:left|right)|closer to you|farther from you)"
 _COUNT = "(?:(?:first |now )?(?:count|note|think|look|see) )?"
 _SWAPS = Phrases({
@@ -99,6 +98,6 @@ def _count(things: Sequence[SceneObject], reference: SceneObject, side: str) -> 
     axis = 0 if side.endswith("you") else 1
     sign = -1 if side == "closer to you" or side.endswith("right") else 1
     away = [sign * (item.position[axis] - reference.position[axis]) for item in things]
-    if any(abs(one) <= _TIE for one in away):
+    if any(abs(one) <= TIE for one in away):
         return None
     return sum(one > 0 for one in away)

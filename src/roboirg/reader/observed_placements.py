@@ -7,11 +7,10 @@ from collections.abc import Iterator, Sequence
 
 from roboirg.core.episode import Scene, SceneObject
 from roboirg.core.motions import Swap
-from roboirg.reader.phrases import Phrases
+from roboirg.reader.phrases import Phrases, Span
+from roboirg.reader.places import TIE
 from roboirg.reader.tokens import ORDINAL, ordinal_of
 
-Span = tuple[int, int, str | None]
-_TIE = 0.01
 _FROM_THE_END = Phrases({
     "the last placement but one":
         rf"the (?:(?P<rank>{ORDINAL}|next) to )?(?:last|final) placement(?P<but> but one)?\b",
@@ -63,7 +62,7 @@ def _placements(
         yield (*found.span(), [pressed - 1])
     for found in _AT.finditer(text):
         away = [_along(found["place"], item, scene) for item in shown]
-        yield (*found.span(), [at for at, one in enumerate(away) if one >= max(away) - _TIE])
+        yield (*found.span(), [at for at, one in enumerate(away) if one >= max(away) - TIE])
     swaps = [motion for motion in scene.motions if isinstance(motion, Swap)]
     moved = {name for motion in swaps for name in (motion.first, motion.second)}
     for found in _MOVED.finditer(text) if moved else ():

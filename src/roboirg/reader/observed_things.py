@@ -9,13 +9,9 @@ from collections.abc import Callable, Collection, Iterator, Sequence
 from roboirg.core.episode import Scene, SceneObject
 from roboirg.core.motions import Swap
 from roboirg.reader.object_positions import objects_at, scene_at_last
-from roboirg.reader.phrases import Phrases
-from roboirg.reader.places import Place, place_mentions, present
+from roboirg.reader.phrases import Phrases, Span
+from roboirg.reader.places import TIE, Place, place_mentions, present
 from roboirg.reader.temporal_relations import Time
-
-Span = tuple[int, int, str | None]
-_TIE = 0.01
-"""Meters; the same words may mean things that differ by less."""
 
 _NOUN = "(?P<noun>cube|container)"
 _FIRST = "(?P<when>initially |at first |started |)"
@@ -129,7 +125,7 @@ def _middle(things: Sequence[SceneObject], axis: int) -> list[SceneObject]:
     found: list[SceneObject] = []
     for item in things:
         away = [other.position[axis] - item.position[axis] for other in things if other != item]
-        sides = [sum(sign * one > _TIE for one in away) for sign in (1, -1)]
+        sides = [sum(sign * one > TIE for one in away) for sign in (1, -1)]
         if sides[0] == sides[1] > 0 and sum(sides) == len(away):
             found.append(item)
     return found
@@ -211,7 +207,7 @@ def _ranked(
     if rank > len(things):
         return []
     wanted = sorted(map(measure, things))[rank - 1]
-    return [item for item in things if abs(measure(item) - wanted) <= _TIE]
+    return [item for item in things if abs(measure(item) - wanted) <= TIE]
 
 
 def _named(things: Collection[SceneObject], scene: Scene, noun: str) -> str | None:

@@ -5,6 +5,9 @@ from __future__ import annotations
 import re
 from collections.abc import Collection, Iterator, Mapping
 
+Span = tuple[int, int, str | None]
+"""First character, one past the last, and what the words between stand for; None if unclear."""
+
 
 class Phrases:
     """Ways to say one thing, which are searched in the words of a sentence, joined by spaces.

@@ -45,7 +45,7 @@ _CAMERA = (0.3, 0.0, 0.4)
 _VIEW = (-0.3, 0.0, -0.6)
 """The front camera's eye and where it looks from there."""
 _CUBE_HEIGHT = 0.02
-_TIE = 0.01
+TIE = 0.01
 """Meters; the same words may mean things that differ by less."""
 _TANGENT_TIE = 2 / 128
 """Two pixels, as a tangent: the picture is 256 pixels wide and 90 degrees."""
@@ -339,7 +339,7 @@ def _orders(
         return
     for anchor in _anchors(place, scene, mirrored=mirrored):
         away = _distance_to(*anchor.position[:2], 1.0 if place.nearest else -1.0)
-        yield [item for item in candidates if item is not anchor], away, _TIE
+        yield [item for item in candidates if item is not anchor], away, TIE
 
 
 def present(scene: Scene, kind: str) -> list[SceneObject]:
@@ -365,13 +365,13 @@ def _ranked(
 def _measure(place: DirectionalPlace, *, mirrored: bool) -> tuple[Measure, float]:
     """Return the measure of a direction, the smallest first, and the margin of a tie."""
     if place.side is None:
-        return lambda item: -place.depth * item.position.x, _TIE
+        return lambda item: -place.depth * item.position.x, TIE
     left_of_robot = (place.side == "left") != mirrored
     if place.depth:
         x = _TABLE_FRONT if place.depth < 0 else _TABLE_BACK
-        return _distance_to(x, _TABLE_LEFT if left_of_robot else _TABLE_RIGHT, 1.0), _TIE
+        return _distance_to(x, _TABLE_LEFT if left_of_robot else _TABLE_RIGHT, 1.0), TIE
     if not mirrored:
-        return lambda item: -item.position.y if left_of_robot else item.position.y, _TIE
+        return lambda item: -item.position.y if left_of_robot else item.position.y, TIE
     return lambda item: _tangent(item) * (-1.0 if left_of_robot else 1.0), _TANGENT_TIE
 
 

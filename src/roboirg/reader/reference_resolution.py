@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from typing import TypeVar
 
-from roboirg.core.episode import ObjectKind, Scene, SceneObject
+from roboirg.core.episode import ObjectKind, Scene
 from roboirg.core.motions import Shuttle
 from roboirg.reader.command import Item
 from roboirg.reader.comparisons import compared_colors
@@ -218,10 +218,7 @@ class ReferenceResolver:
         return set(colors)
 
     def _colors(self) -> set[str]:
-        return {str(cube.color) for cube in self._cubes()}
-
-    def _cubes(self) -> Iterator[SceneObject]:
-        return (item for item in self._scene.objects if item.color is not None)
+        return {str(item.color) for item in self._scene.objects if item.color is not None}
 
     def _complain(self, what: str) -> None:
         self.complaints.append(f"nothing before the command introduces {what}")

@@ -3,6 +3,6 @@
 from __future__ import annotations
 
 from roboirg.shortcuts.surface_rules import SURFACE_RULES
-from roboirg.shortcuts.text_guess import TextGuess, draw_goal, goal_share, guess_goal
+from roboirg.shortcuts.text_guess import draw_goal, goal_share, guess_goal
 
-__all__ = ["SURFACE_RULES", "TextGuess", "draw_goal", "goal_share", "guess_goal"]
+__all__ = ["SURFACE_RULES", "draw_goal", "goal_share", "guess_goal"]

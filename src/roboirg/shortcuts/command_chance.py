@@ -6,7 +6,7 @@ from collections.abc import Collection, Mapping, Sequence
 from fractions import Fraction
 from typing import cast
 
-from roboirg.core.episode import Episode, Goal, SlotValue
+from roboirg.core.episode import Episode, Goal, SlotValue, values_in
 from roboirg.language.instruction import Instruction
 from roboirg.reader import interpret
 from roboirg.tasks import get_task
@@ -33,19 +33,16 @@ def blind_goals(instruction: Instruction, episode: Episode) -> tuple[Goal, ...]:
         goal
         for goal in get_task(episode.task).goals(episode.scene)
         if _shape(goal, candidates) in shapes
-        and all(_values(goal[slot]) <= set(values) for slot, values in candidates.items())
+        and all(set(values_in(goal[slot])) <= set(values) for slot, values in candidates.items())
     )
 
 
 def _shape(goal: Goal, candidates: Collection[str]) -> list[tuple[str, SlotValue]]:
     """Return a goal with the number of values in place of those of the candidates."""
     return [
-        (slot, len(_values(value)) if slot in candidates else value) for slot, value in goal.slots
+        (slot, len(set(values_in(value))) if slot in candidates else value)
+        for slot, value in goal.slots
     ]
-
-
-def _values(content: SlotValue) -> set[str | int]:
-    return set(content) if isinstance(content, tuple) else {content}
 
 
 def right_share(goals: Sequence[Goal], episode: Episode) -> Fraction:

@@ -16,11 +16,11 @@ from collections.abc import Collection, Mapping, Sequence
 from types import MappingProxyType
 from typing import Any, Literal, NamedTuple, cast, get_args
 
-from roboirg.core.episode import Episode, Goal
+from roboirg.core.episode import Episode, Goal, values_in
 from roboirg.core.errors import InvalidValueError
 from roboirg.core.extras import extra_needed
 from roboirg.language.instruction import Instruction, hidden_slots
-from roboirg.shortcuts.goal_vocabulary import SlotVocabulary, Value, goal_vocabulary, values_in
+from roboirg.shortcuts.goal_vocabulary import SlotVocabulary, Value, goal_vocabulary
 from roboirg.shortcuts.named_values import marked_text, named_values
 from roboirg.shortcuts.scene_facts import SceneFacts, scene_facts
 from roboirg.shortcuts.text_guess import TextGuess

@@ -7,7 +7,7 @@ import itertools
 from collections.abc import Iterator, Mapping
 from typing import NamedTuple
 
-from roboirg.core.episode import Goal, SlotValue, Split
+from roboirg.core.episode import Goal, SlotValue, Split, values_in
 from roboirg.tasks import get_task
 from roboirg.tasks.splits.splits import split_episodes
 
@@ -54,11 +54,6 @@ def _vocabulary(contents: set[SlotValue]) -> SlotVocabulary:
         longest=max(len(values_in(content)) for content in contents),
         several=any(isinstance(content, tuple) for content in contents),
     )
-
-
-def values_in(content: SlotValue) -> tuple[Value, ...]:
-    """Return the values of a slot, one or several."""
-    return content if isinstance(content, tuple) else (content,)
 
 
 def orders(goal: Goal) -> Iterator[Mapping[str, SlotValue]]:

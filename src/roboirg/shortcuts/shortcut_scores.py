@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from fractions import Fraction
+from functools import partial
 from typing import NamedTuple, cast
 
-from roboirg.core.episode import Goal
+from roboirg.core.episode import Goal, values_in
 from roboirg.language.instruction import hidden_slots as hidden_in
 from roboirg.shortcuts.command_chance import blind_goals, right_share
 from roboirg.shortcuts.goal_learner import Told
-from roboirg.shortcuts.goal_vocabulary import values_in
 from roboirg.shortcuts.surface_rules import SURFACE_RULES
 from roboirg.shortcuts.text_guess import TextGuess, goal_share, guess_goal, slot_share
 
@@ -78,8 +78,4 @@ def score_rule(rule: str, told: Told) -> ShortcutScore:
 
 def rule_scorers() -> Mapping[str, Scorer]:
     """Return chance and all surface rules, by name."""
-
-    def scorer(rule: str) -> Scorer:
-        return lambda told: score_rule(rule, told)
-
-    return {CHANCE: score_chance, **{rule: scorer(rule) for rule in SURFACE_RULES}}
+    return {CHANCE: score_chance} | {rule: partial(score_rule, rule) for rule in SURFACE_RULES}

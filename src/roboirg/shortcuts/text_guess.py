@@ -10,7 +10,7 @@ from fractions import Fraction
 
 import numpy as np
 
-from roboirg.core.episode import Episode, Goal, SlotValue
+from roboirg.core.episode import Episode, Goal, SlotValue, values_in
 from roboirg.core.errors import UnknownNameError
 from roboirg.shortcuts.command_chance import is_right
 from roboirg.shortcuts.goal_vocabulary import (
@@ -18,7 +18,6 @@ from roboirg.shortcuts.goal_vocabulary import (
     Value,
     goal_vocabulary,
     orders,
-    values_in,
 )
 from roboirg.shortcuts.named_values import (
     command_ranks,

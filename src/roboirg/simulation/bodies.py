@@ -183,19 +183,14 @@ def _build_container(scene: sapien.Scene, item: SceneObject, visible: bool) -> B
         ((0.0, 0.0, 0.0), (object_sizes.CUBE_HALF,) * 3),
     ]
     builder = ActorBuilder()
-    for center, half in boxes:
-        builder.add_box_collision(sapien.Pose(center), half_size=half)
-        if visible:
-            builder.add_box_visual(sapien.Pose(center), half_size=half, material=_material(WHITE))
+    _add_boxes(builder, boxes, WHITE if visible else None)
     return finish_body(builder, scene, item, "dynamic")
 
 
 def _build_target(scene: sapien.Scene, item: SceneObject, visible: bool) -> Body:
     """Build a ringed disc, purple unless the scene gives a color."""
     half = (item.thickness or object_sizes.TARGET_THICKNESS) / 2
-    return _ringed_disc(
-        scene, item, PURPLE if item.rgb is None else (*item.rgb, 1.0), half, visible
-    )
+    return _ringed_disc(scene, item, _rgba(item, PURPLE), half, visible)
 
 
 def _build_marker(scene: sapien.Scene, item: SceneObject, visible: bool) -> Body:

@@ -32,12 +32,12 @@ from roboirg.tasks.shared.fixtures import (
     bin_keep_out,
     button_footprint,
     button_keep_out,
-    cube_obstacle,
     draw_bin,
     draw_button,
-    draw_cube,
+    draw_cubes,
     draw_number,
 )
+from roboirg.tasks.shared.stages import PRESSED, press_stage
 from roboirg.tasks.task import Commands, Task, Wording
 
 COLORS_PRESENT: dict[Difficulty, int] = {"easy": 1, "medium": 2, "hard": 3}
@@ -70,7 +70,8 @@ def sample(rng: np.random.Generator, difficulty: Difficulty) -> tuple[Scene, Goa
     present = present[: COLORS_PRESENT[difficulty]]
     wanted = _draw_wanted(rng, difficulty, present)
     spawned = _draw_spawned(rng, difficulty, present, wanted)
-    cubes = _draw_cubes(rng, spawned, [button_keep_out(button), bin_keep_out(bin_)])
+    obstacles: list[Obstacle] = [button_keep_out(button), bin_keep_out(bin_)]
+    cubes = draw_cubes(rng, _numbered(spawned), CUBE_GAP, obstacles)
     named = tuple(color for color in GOAL_ORDER if wanted.get(color))
     goal = Goal.of(colors=named, counts=tuple(wanted[color] for color in named))
     order = tuple(named[index] for index in rng.permutation(len(named)))
@@ -102,19 +103,11 @@ def _draw_spawned(
     return [spawned[index] for index in rng.permutation(len(spawned))]
 
 
-def _draw_cubes(
-    rng: np.random.Generator, spawned: list[Color], obstacles: list[Obstacle]
-) -> list[SceneObject]:
-    """Draw cubes of the given colors, numbered within their color: ``cube_red_0`` and so on."""
-    taken = list(obstacles)
-    cubes: list[SceneObject] = []
+def _numbered(spawned: list[Color]) -> Iterator[tuple[str, Color, Region]]:
+    """Yield cubes of the given colors, numbered within their color: ``cube_red_0`` and so on."""
     numbers = {color: itertools.count() for color in COLORS}
     for color in spawned:
-        name = f"cube_{color}_{next(numbers[color])}"
-        cube = draw_cube(rng, name, color, CUBE_REGION, CUBE_GAP, taken)
-        cubes.append(cube)
-        taken.append(cube_obstacle(cube))
-    return cubes
+        yield f"cube_{color}_{next(numbers[color])}", color, CUBE_REGION
 
 
 def plan_motions(cubes: Sequence[SceneObject], *, late: bool) -> tuple[Motion, ...]:
@@ -159,32 +152,24 @@ def stages(scene: Scene, goal: Goal) -> tuple[Stage, ...]:
     """
     cubes = [cube.name for cube in scene.of_kind("cube")]
     picked, binned = tuple(Fact("picked", cube) for cube in cubes), _binned(cubes)
-    pressed = Fact("pressed", "button")
     plan: list[Stage] = []
     for drops, (color, ordinal, cube) in enumerate(_wanted(scene, goal), start=1):
         pick = Stage(
             expects=FactCount(picked),
-            forbids=(pressed,),
+            forbids=(PRESSED,),
             primitive=Primitive("pick_cube", cube),
             subgoal=f"pick up the {ordinal} {color} cube {{at}}",
             points_at=cube,
         )
         put_in = Stage(
             expects=FactCount(binned, least=drops),
-            forbids=(pressed,),
+            forbids=(PRESSED,),
             primitive=Primitive("drop_into", cube, "bin"),
             subgoal="put it into the bin {at}",
             points_at="bin",
         )
         plan += [pick, put_in]
-    press = Stage(
-        expects=pressed,
-        forbids=tuple(_wrong_counts(scene, goal)),
-        primitive=Primitive("press", "button"),
-        subgoal="press the button {at}",
-        points_at="button",
-    )
-    return (*plan, press)
+    return (*plan, press_stage(forbids=tuple(_wrong_counts(scene, goal))))
 
 
 def _wanted(scene: Scene, goal: Goal) -> Iterator[tuple[str, str, str]]:

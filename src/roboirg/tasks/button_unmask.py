@@ -9,12 +9,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from roboirg.core.conditions import Fact
 from roboirg.core.episode import Difficulty, Goal, Scene, Stage
 from roboirg.core.footprints import Region
 from roboirg.core.word_pools import Pools
 from roboirg.tasks.shared import unmask
 from roboirg.tasks.shared.fixtures import draw_button
+from roboirg.tasks.shared.stages import press_stage
 from roboirg.tasks.task import Task, Wording
 
 BUTTON_REGION = Region(-0.2, 0.0, 0.05, 0.05)
@@ -27,8 +27,7 @@ def sample(rng: np.random.Generator, difficulty: Difficulty) -> tuple[Scene, Goa
 
 def stages(scene: Scene, goal: Goal) -> tuple[Stage, ...]:
     """Return the stages: press the button, then lift the containers."""
-    press = unmask.press_stage(Fact("pressed", "button"), "button")
-    return (press, *unmask.pick_stages(scene, goal))
+    return (press_stage(), *unmask.pick_stages(scene, goal))
 
 
 COMMANDS = unmask.seen_commands(

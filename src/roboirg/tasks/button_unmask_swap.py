@@ -17,6 +17,7 @@ from roboirg.core.word_pools import Pools
 from roboirg.tasks.shared import unmask, unmask_swap
 from roboirg.tasks.shared.fixtures import button_keep_out, draw_button
 from roboirg.tasks.shared.layouts import PlanePoint
+from roboirg.tasks.shared.stages import press_stage
 from roboirg.tasks.task import Task, Wording
 
 RIGHT, LEFT = "button_right", "button_left"
@@ -56,8 +57,8 @@ def stages(scene: Scene, goal: Goal) -> tuple[Stage, ...]:
     right, left = Fact("pressed", RIGHT), Fact("pressed", LEFT)
     both = All((OccurrenceCount((left,)), OccurrenceCount((right,))))
     return (
-        unmask.press_stage(FactCount((left, right)), LEFT, "first button"),
-        unmask.press_stage(both, RIGHT, "second button"),
+        press_stage("press the first button {at}", expects=FactCount((left, right)), button=LEFT),
+        press_stage("press the second button {at}", expects=both, button=RIGHT),
         *unmask.pick_stages(scene, goal),
     )
 

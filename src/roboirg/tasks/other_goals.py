@@ -8,10 +8,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from roboirg.core.arms import OTHER_GOAL
-from roboirg.core.episode import Episode, Goal, Stage
+from roboirg.core.episode import PICKS, Episode, Goal, Stage
 from roboirg.tasks import get_task
-
-_PICKS = ("pick_cube", "pick_container")
 
 
 def other_goals(episode: Episode) -> tuple[Goal, ...]:
@@ -51,4 +49,4 @@ def _judged(stages: Sequence[Stage]) -> list[tuple[object, ...]]:
 
 
 def _picks(stages: Sequence[Stage]) -> int:
-    return sum(stage.primitive.kind in _PICKS for stage in stages)
+    return sum(stage.primitive.kind in PICKS for stage in stages)

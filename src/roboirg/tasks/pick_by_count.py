@@ -13,7 +13,8 @@ from roboirg.core.episode import Color, Difficulty, Goal, Primitive, Scene, Stag
 from roboirg.core.footprints import Circle, Footprint, Region
 from roboirg.core.word_pools import Pools
 from roboirg.tasks.shared.fixtures import ORDINALS, draw_number, draw_target
-from roboirg.tasks.shared.real_table import Side, draw_sides, draw_tape, on_side
+from roboirg.tasks.shared.real_table import draw_sides, draw_tape, on_side
+from roboirg.tasks.shared.stages import pick_stage, place_stage
 from roboirg.tasks.task import Commands, Task, Wording
 
 TAPES: tuple[Color, ...] = ("yellow", "gray")
@@ -33,8 +34,7 @@ def sample(rng: np.random.Generator, difficulty: Difficulty) -> tuple[Scene, Goa
     del difficulty
     target = draw_target(rng, "target", TARGET_RADIUS, TARGET_REGION, 0.0, ())
     obstacles: list[Footprint] = [Circle(target.position.x, target.position.y, TARGET_RADIUS)]
-    left, right = draw_sides(rng, TAPES)
-    sides: dict[Color, Side] = {left: "left", right: "right"}
+    sides = draw_sides(rng, TAPES)
     tapes = tuple(
         draw_tape(
             rng,
@@ -72,21 +72,9 @@ def stages(scene: Scene, goal: Goal) -> tuple[Stage, ...]:
     again = Rule(Fact("picked", tape), f"picked up the {color} tape again", failure="wrong_count")
     plan: list[Stage] = []
     for ordinal in ORDINALS[: goal.number("repeats")]:
-        pick = Stage(
-            expects=Fact("picked", tape),
-            forbids=wrong,
-            primitive=Primitive("pick_cube", tape),
-            subgoal=f"pick up the {color} tape {{at}} for the {ordinal} time",
-            points_at=tape,
-        )
-        put = Stage(
-            expects=Fact("placed", tape, "target"),
-            forbids=wrong,
-            primitive=Primitive("place_on", tape, "target"),
-            subgoal=f"place the {color} tape onto the target {{at}}",
-            points_at="target",
-        )
-        plan += [pick, put]
+        pick = f"pick up the {color} tape {{at}} for the {ordinal} time"
+        put = f"place the {color} tape onto the target {{at}}"
+        plan += [pick_stage(tape, pick, wrong), place_stage(tape, "target", put, wrong)]
     leave = Stage(
         expects=Elapsed(WAIT_STEPS, timer="left alone"),
         forbids=(again, *wrong),

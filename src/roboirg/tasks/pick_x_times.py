@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from roboirg.core.conditions import Fact
-from roboirg.core.episode import Difficulty, Goal, Primitive, Scene, Stage
+from roboirg.core.episode import Difficulty, Goal, Scene, Stage
 from roboirg.core.footprints import Obstacle, Region
 from roboirg.core.word_pools import Pools
 from roboirg.tasks.shared.fixtures import (
@@ -21,6 +21,7 @@ from roboirg.tasks.shared.fixtures import (
     draw_number,
     draw_target,
 )
+from roboirg.tasks.shared.stages import PRESSED, pick_stage, place_stage, press_stage
 from roboirg.tasks.task import Commands, Task, Wording
 
 CUBES: dict[Difficulty, int] = {"easy": 1, "medium": 3, "hard": 3}
@@ -61,33 +62,15 @@ def stages(scene: Scene, goal: Goal) -> tuple[Stage, ...]:
     color = goal.text("color")
     cube = f"cube_{color}"
     cubes = tuple(item.name for item in scene.of_kind("cube"))
-    pressed = Fact("pressed", "button")
-    wrong = (*(Fact("picked", other) for other in cubes if other != cube), pressed)
+    wrong_cubes = (Fact("picked", other) for other in cubes if other != cube)
+    wrong = (*wrong_cubes, PRESSED)
     plan: list[Stage] = []
     for ordinal in ORDINALS[: goal.number("repeats")]:
-        pick = Stage(
-            expects=Fact("picked", cube),
-            forbids=wrong,
-            primitive=Primitive("pick_cube", cube),
-            subgoal=f"pick up the {color} cube {{at}} for the {ordinal} time",
-            points_at=cube,
-        )
-        put = Stage(
-            expects=Fact("placed", cube, "target"),
-            forbids=wrong,
-            primitive=Primitive("place_on", cube, "target"),
-            subgoal=f"place the {color} cube onto the target {{at}}",
-            points_at="target",
-        )
-        plan += [pick, put]
-    press = Stage(
-        expects=pressed,
-        forbids=tuple(Fact("picked", any_cube) for any_cube in cubes),
-        primitive=Primitive("press", "button"),
-        subgoal="press the button {at} to stop",
-        points_at="button",
-    )
-    return (*plan, press)
+        pick = f"pick up the {color} cube {{at}} for the {ordinal} time"
+        put = f"place the {color} cube onto the target {{at}}"
+        plan += [pick_stage(cube, pick, wrong), place_stage(cube, "target", put, wrong)]
+    picks = tuple(Fact("picked", any_cube) for any_cube in cubes)
+    return (*plan, press_stage("press the button {at} to stop", picks))
 
 
 COMMANDS = Commands(

@@ -14,13 +14,13 @@ from roboirg.core.episode import Color, Difficulty, Goal, Primitive, Scene, Stag
 from roboirg.core.footprints import Footprint, Region
 from roboirg.core.word_pools import Pools
 from roboirg.tasks.shared.real_table import (
-    Side,
     box_footprint,
     draw_box,
     draw_sides,
     draw_tape,
     on_side,
 )
+from roboirg.tasks.shared.stages import pick_stage
 from roboirg.tasks.task import Commands, Task, Wording
 
 BOXES: tuple[Color, ...] = ("green", "purple")
@@ -34,8 +34,7 @@ TAPE_GAP = 0.03
 def sample(rng: np.random.Generator, difficulty: Difficulty) -> tuple[Scene, Goal]:
     """Draw a box on either side, the tape in front of them; sides and goal box are uniform."""
     del difficulty
-    left, right = draw_sides(rng, BOXES)
-    sides: dict[Color, Side] = {left: "left", right: "right"}
+    sides = draw_sides(rng, BOXES)
     boxes = tuple(
         draw_box(rng, f"box_{color}", color, on_side(LEFT_BOX_REGION, sides[color]))
         for color in BOXES
@@ -63,13 +62,7 @@ def stages(scene: Scene, goal: Goal) -> tuple[Stage, ...]:
         for box in scene.of_kind("box")
         if box.name != target
     )
-    pick = Stage(
-        expects=Fact("picked", "tape"),
-        forbids=wrong,
-        primitive=Primitive("pick_cube", "tape"),
-        subgoal="pick up the tape {at}",
-        points_at="tape",
-    )
+    pick = pick_stage("tape", "pick up the tape {at}", wrong)
     put_in = Stage(
         expects=Fact("binned", "tape", target),
         forbids=wrong,

@@ -25,6 +25,7 @@ from roboirg.tasks.shared.fixtures import (
     draw_target,
     marker_over,
 )
+from roboirg.tasks.shared.stages import PRESSED, pick_stage, press_stage
 from roboirg.tasks.task import Commands, Task, Wording
 
 CUBES: dict[Difficulty, int] = {"easy": 1, "medium": 3, "hard": 3}
@@ -94,21 +95,14 @@ def stages(scene: Scene, goal: Goal) -> tuple[Stage, ...]:
     """Return 2 N + 3 stages: pick, N times over the right and left target, put down, press."""
     color, repeats = goal.text("color"), goal.number("repeats")
     cube = f"cube_{color}"
-    pressed = Fact("pressed", "button")
     visits = tuple(Fact("over", cube, f"target_{side}") for side in SIDES)
     # Visits in a wrong order complete no stage but count, so they also violate this rule.
     too_often = Rule(
         OccurrenceCount(visits, least=2 * repeats + 1), "moved the cube over a target too often"
     )
     wrong_cubes = [Fact("picked", item.name) for item in scene.of_kind("cube") if item.name != cube]
-    wrong: tuple[Fact | Rule, ...] = (*wrong_cubes, pressed, too_often)
-    pick = Stage(
-        expects=Fact("picked", cube),
-        forbids=wrong,
-        primitive=Primitive("pick_cube", cube),
-        subgoal=f"pick up the {color} cube {{at}}",
-        points_at=cube,
-    )
+    wrong: tuple[Fact | Rule, ...] = (*wrong_cubes, PRESSED, too_often)
+    pick = pick_stage(cube, f"pick up the {color} cube {{at}}", wrong)
     swings = [
         _swing(cube, side, ordinal, wrong) for ordinal in ORDINALS[:repeats] for side in SIDES
     ]
@@ -118,14 +112,7 @@ def stages(scene: Scene, goal: Goal) -> tuple[Stage, ...]:
         primitive=Primitive("put_down", cube),
         subgoal=f"put the {color} cube on the table",
     )
-    press = Stage(
-        expects=pressed,
-        forbids=(*wrong_cubes, too_often),
-        primitive=Primitive("press", "button"),
-        subgoal="press the button {at}",
-        points_at="button",
-    )
-    return (pick, *swings, put_down, press)
+    return (pick, *swings, put_down, press_stage(forbids=(*wrong_cubes, too_often)))
 
 
 def _swing(cube: str, side: str, ordinal: str, wrong: tuple[Fact | Rule, ...]) -> Stage:

@@ -12,12 +12,12 @@ from roboirg.core.conditions import Fact
 from roboirg.core.episode import Difficulty, Goal, Scene, Stage
 from roboirg.core.word_pools import Pools
 from roboirg.tasks.shared import video_place
+from roboirg.tasks.shared.stages import PRESSED
 from roboirg.tasks.task import Commands, Task, Wording
 
 DISCS: dict[Difficulty, int] = {"easy": 3, "medium": 4, "hard": 4}
 SITE_RADIUS = 0.06
 RELATIONS = ("before", "after")
-PRESSED = Fact("pressed", "button")
 
 
 def sample(rng: np.random.Generator, difficulty: Difficulty) -> tuple[Scene, Goal]:

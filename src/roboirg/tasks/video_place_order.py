@@ -14,13 +14,13 @@ from roboirg.core.episode import Difficulty, Goal, Scene, Stage
 from roboirg.core.word_pools import Pools
 from roboirg.tasks.shared import video_place
 from roboirg.tasks.shared.fixtures import draw_number
+from roboirg.tasks.shared.stages import PRESSED
 from roboirg.tasks.task import Commands, Task, Wording
 
 DISCS = 4
 PLACEMENTS = (2, 4)
 """Fewest and most discs that the cube visits."""
 SITE_RADIUS = 0.1
-PRESSED = Fact("pressed", "button")
 
 
 def sample(rng: np.random.Generator, difficulty: Difficulty) -> tuple[Scene, Goal]:

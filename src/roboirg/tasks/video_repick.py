@@ -13,19 +13,25 @@ import numpy as np
 
 from roboirg.core.conditions import All, Elapsed, Fact, Rule
 from roboirg.core.episode import COLORS, Difficulty, Goal, Primitive, Scene, SceneObject, Stage
-from roboirg.core.footprints import Obstacle, Region
+from roboirg.core.footprints import Region
 from roboirg.core.motions import Swap
 from roboirg.core.word_pools import Pools
-from roboirg.tasks.shared import video_stages
 from roboirg.tasks.shared.fixtures import (
     ORDINALS,
     button_keep_out,
-    cube_obstacle,
     draw_button,
-    draw_cube,
+    draw_cubes,
     draw_number,
 )
 from roboirg.tasks.shared.layouts import layout_points
+from roboirg.tasks.shared.stages import (
+    PRESSED,
+    go_home,
+    hold_still,
+    pick_stage,
+    press_stage,
+    retreat,
+)
 from roboirg.tasks.shared.swapping import SWAP_START, SWAP_STEPS, plan_swaps
 from roboirg.tasks.task import Commands, Task, Wording
 
@@ -50,7 +56,6 @@ SHOWN_RELEASE, OWN_RELEASE = 0.03, 0.01
 
 EARLY_PRESS = (50, 500)
 """A premature press fails only within these control steps of its timer."""
-PRESSED = Fact("pressed", "button")
 
 
 def sample(rng: np.random.Generator, difficulty: Difficulty) -> tuple[Scene, Goal]:
@@ -92,28 +97,22 @@ def make_scene(
 def _draw_layout(rng: np.random.Generator, button: SceneObject) -> list[SceneObject]:
     """Draw three cubes of one color, each near its point of a layout."""
     color = COLORS[int(rng.integers(len(COLORS)))]
-    obstacles: list[Obstacle] = [button_keep_out(button)]
-    cubes: list[SceneObject] = []
-    for number, point in enumerate(layout_points(rng, LAYOUT_CUBES)):
-        region = Region(*point, LAYOUT_HALF, LAYOUT_HALF)
-        cube = draw_cube(rng, f"cube_{color}_{number}", color, region, GAP, obstacles)
-        cubes.append(cube)
-        obstacles.append(cube_obstacle(cube))
-    return cubes
+    cubes = (
+        (f"cube_{color}_{number}", color, Region(*point, LAYOUT_HALF, LAYOUT_HALF))
+        for number, point in enumerate(layout_points(rng, LAYOUT_CUBES))
+    )
+    return draw_cubes(rng, cubes, GAP, [button_keep_out(button)])
 
 
 def _draw_clutter(rng: np.random.Generator, button: SceneObject) -> list[SceneObject]:
     """Draw five cubes of each color; in each round one of each, in any order."""
-    obstacles: list[Obstacle] = [button_keep_out(button)]
-    cubes: list[SceneObject] = []
-    for number in range(CLUTTER_ROUNDS):
-        for index in rng.permutation(len(COLORS)):
-            color = COLORS[index]
-            name = f"cube_{color}_{number}"
-            cube = draw_cube(rng, name, color, CLUTTER_REGION, GAP, obstacles)
-            cubes.append(cube)
-            obstacles.append(cube_obstacle(cube))
-    return cubes
+    # The colors of a round are drawn after the cubes of the one before.
+    cubes = (
+        (f"cube_{COLORS[index]}_{number}", COLORS[index], CLUTTER_REGION)
+        for number in range(CLUTTER_ROUNDS)
+        for index in rng.permutation(len(COLORS))
+    )
+    return draw_cubes(rng, cubes, GAP, [button_keep_out(button)])
 
 
 def demonstration(scene: Scene) -> tuple[Stage, ...]:
@@ -126,9 +125,9 @@ def demonstration(scene: Scene) -> tuple[Stage, ...]:
         subgoal="drop the cube on the table",
     )
     swaps = [motion for motion in scene.motions if isinstance(motion, Swap)]
-    waiting = [video_stages.retreat()] if swaps else []
-    waiting += [video_stages.hold_still(SWAP_STEPS) for _ in swaps]
-    return (video_stages.show_pick(target), put_down, *waiting, video_stages.go_home())
+    waiting = [retreat()] if swaps else []
+    waiting += [hold_still(SWAP_STEPS) for _ in swaps]
+    return (pick_stage(target), put_down, *waiting, go_home())
 
 
 def goals(_scene: Scene) -> tuple[Goal, ...]:
@@ -144,12 +143,10 @@ def stages(scene: Scene, goal: Goal) -> tuple[Stage, ...]:
     wrong = tuple(Fact("picked", other) for other in cubes if other != target)
     plan: list[Stage] = []
     for ordinal in ORDINALS[: goal.number("repeats")]:
-        pick = Stage(
-            expects=Fact("picked", target),
-            forbids=(*wrong, _early_press("pick")),
-            primitive=Primitive("pick_cube", target),
-            subgoal=f"pick up the correct cube {{at}} for the {ordinal} time",
-            points_at=target,
+        pick = pick_stage(
+            target,
+            f"pick up the correct cube {{at}} for the {ordinal} time",
+            (*wrong, _early_press("pick")),
             timer="pick",
         )
         put_down = Stage(
@@ -160,14 +157,8 @@ def stages(scene: Scene, goal: Goal) -> tuple[Stage, ...]:
             timer="put down",
         )
         plan += [pick, put_down]
-    press = Stage(
-        expects=PRESSED,
-        forbids=tuple(Fact("picked", cube) for cube in cubes),
-        primitive=Primitive("press", "button"),
-        subgoal="press the button {at} to finish",
-        points_at="button",
-    )
-    return (*plan, press)
+    picks = tuple(Fact("picked", cube) for cube in cubes)
+    return (*plan, press_stage("press the button {at} to finish", picks))
 
 
 def _early_press(timer: str) -> Rule:

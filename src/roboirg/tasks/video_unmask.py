@@ -9,7 +9,8 @@ from __future__ import annotations
 
 from roboirg.core.episode import Scene, Stage
 from roboirg.core.word_pools import Pools
-from roboirg.tasks.shared import unmask, video_stages
+from roboirg.tasks.shared import unmask
+from roboirg.tasks.shared.stages import hold_still
 from roboirg.tasks.task import Task, Wording
 
 HOLD_STEPS = 64
@@ -17,7 +18,7 @@ HOLD_STEPS = 64
 
 def demonstration(_scene: Scene) -> tuple[Stage, ...]:
     """Return the video's stage: hold still for 64 steps."""
-    return (video_stages.hold_still(HOLD_STEPS),)
+    return (hold_still(HOLD_STEPS),)
 
 
 COMMANDS = unmask.hidden_commands(

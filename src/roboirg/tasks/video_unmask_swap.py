@@ -12,8 +12,9 @@ import numpy as np
 
 from roboirg.core.episode import Difficulty, Goal, Scene, Stage
 from roboirg.core.word_pools import Pools
-from roboirg.tasks.shared import unmask, unmask_swap, video_stages
+from roboirg.tasks.shared import unmask, unmask_swap
 from roboirg.tasks.shared.layouts import layout_points
+from roboirg.tasks.shared.stages import hold_still
 from roboirg.tasks.shared.swapping import last_step
 from roboirg.tasks.task import Task, Wording
 
@@ -26,7 +27,7 @@ def sample(rng: np.random.Generator, difficulty: Difficulty) -> tuple[Scene, Goa
 
 def demonstration(scene: Scene) -> tuple[Stage, ...]:
     """Return the video's stage: hold still until the last swap, for 114, 164 or 214 steps."""
-    return (video_stages.hold_still(last_step(scene.motions)),)
+    return (hold_still(last_step(scene.motions)),)
 
 
 COMMANDS = replace(

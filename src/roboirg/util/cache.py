@@ -21,6 +21,7 @@ from typing import Literal
 import platformdirs
 
 from roboirg.core.errors import InvalidValueError
+from roboirg.util.atomic_write import sync_to_disk
 
 FOLDER_VARIABLE = "ROBOIRG_CACHE"
 SIZE_VARIABLE = "ROBOIRG_CACHE_GIB"
@@ -96,7 +97,7 @@ class Cache:
                 part.replace(self._folder / key)
             finally:
                 part.unlink(missing_ok=True)
-            _flush_folder(self._folder)
+            sync_to_disk(self._folder)
         except OSError as error:
             _warn_once(error)
 
@@ -156,14 +157,6 @@ def _head(key: str, content: bytes | memoryview) -> bytes:
     digest = hashlib.sha256(key.encode())
     digest.update(content)
     return _MAGIC + digest.digest()
-
-
-def _flush_folder(folder: Path) -> None:
-    number = os.open(folder, os.O_RDONLY)
-    try:
-        os.fsync(number)
-    finally:
-        os.close(number)
 
 
 _warned: set[type[OSError]] = set()

@@ -5,7 +5,6 @@ from __future__ import annotations
 import importlib
 import importlib.metadata
 import pkgutil
-from collections.abc import Iterator
 from types import ModuleType
 from typing import Protocol, TypeVar
 
@@ -39,7 +38,8 @@ def discover(package: ModuleType, attribute: str, kind: type[Thing], group: str)
     """
     found = discover_in_modules(package, attribute, kind)
     taken = {one.name: "roboirg" for one in found}
-    for entry, thing in _from_entry_points(attribute, kind, group):
+    for entry in _sorted_entry_points(group):
+        thing = _load(entry, attribute, kind, group)
         _take_name(taken, thing, entry, group)
         found.append(thing)
     return found
@@ -72,13 +72,6 @@ def discover_in_modules(package: ModuleType, attribute: str, kind: type[Thing]) 
     names = (f"{package.__name__}.{info.name}" for info in pkgutil.iter_modules(package.__path__))
     things = (getattr(importlib.import_module(name), attribute, None) for name in names)
     return [thing for thing in things if isinstance(thing, kind)]
-
-
-def _from_entry_points(
-    attribute: str, kind: type[Thing], group: str
-) -> Iterator[tuple[importlib.metadata.EntryPoint, Thing]]:
-    for entry in _sorted_entry_points(group):
-        yield entry, _load(entry, attribute, kind, group)
 
 
 def _load(

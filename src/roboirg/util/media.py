@@ -149,7 +149,6 @@ def _check_pyav() -> None:
         import av  # noqa: F401 - an extra, and slow to import
 
 
-Frame = NDArray[np.uint8]
 Color = tuple[int, int, int]
 """RGB, 0 to 255."""
 
@@ -157,7 +156,7 @@ _FONT = 0  # cv2.FONT_HERSHEY_SIMPLEX; importing OpenCV is slow
 
 
 def draw_text(
-    image: Frame, text: str, x: int, y: int, scale: float, color: Color, thickness: int = 1
+    image: Pixels, text: str, x: int, y: int, scale: float, color: Color, thickness: int = 1
 ) -> None:
     """Draw a line of text into a picture; characters outside ASCII become ``?``.
 

@@ -50,7 +50,7 @@ def _fields() -> dict[str, str]:
 
 
 def core_count() -> int:
-    """Return the number of cores that this process may use."""
+    """Return the number of cores that this process may use; a container may use fewer."""
     if hasattr(os, "sched_getaffinity"):
         return len(os.sched_getaffinity(0))
     return os.cpu_count() or 1

@@ -19,11 +19,10 @@ from numpy.typing import ArrayLike, NDArray
 from roboirg.core.actions import check_chunk, find_action_space
 from roboirg.core.episode import Episode
 from roboirg.core.errors import InvalidActionError, InvalidValueError, UnknownNameError
-from roboirg.core.observations import FetchedDemonstration
+from roboirg.core.observations import FetchedDemonstration, FetchedFields
 from roboirg.envs.env_options import EnvOptions
 from roboirg.envs.env_settings import EnvSettings, choose_index
 from roboirg.envs.environment import RoboIRGEnv
-from roboirg.envs.vector.drawn_on_demand import LazyObservation
 from roboirg.envs.vector.vector_workers import (
     Recipe,
     Request,
@@ -267,16 +266,18 @@ class RoboIRGVectorEnv(gymnasium.vector.VectorEnv[Batch, Any, NDArray[Any]]):
                 batch[field] = self._arrays[field].copy()
         if not self._lazy:
             return batch
-        return LazyObservation(batch, self._pictures, partial(self._draw, moment=self._moment))
+        fields = (*sorted(self._pictures), *batch)
+        return FetchedFields(fields, batch, partial(self._draw, moment=self._moment))
 
-    def _draw(self, field: str, *, moment: int) -> NDArray[Any]:
-        """Draw a field of all observations of a moment, which must be now."""
+    def _draw(self, fields: Sequence[str], *, moment: int) -> dict[str, NDArray[Any]]:
+        """Draw fields of all observations of a moment, which must be now."""
         if moment != self._moment:
             raise InvalidValueError(
-                f"{field!r} of an earlier observation was not drawn; read it before the next step."
+                f"{fields[0]!r} of an earlier observation was not drawn; read it before the "
+                "next step."
             )
-        self._processes.ask(dict.fromkeys(range(self.num_envs), ("draw", ((field,),))))
-        return self._arrays[field].copy()
+        self._processes.ask(dict.fromkeys(range(self.num_envs), ("draw", (fields,))))
+        return {field: self._arrays[field].copy() for field in fields}
 
     def _read_video(
         self, fields: Sequence[str], *, index: int, start: int

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import traceback
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from multiprocessing.connection import Connection
 from multiprocessing.context import BaseContext
 from typing import Any, NamedTuple, cast
@@ -213,17 +213,12 @@ def _work(connection: Connection, recipe: Recipe, rows: Sequence[int]) -> None:
         failed: dict[int, str] = {}
         for index, (name, args) in batch.items():
             try:
-                done[index] = _method(environments[index], name)(*args)
+                done[index] = getattr(environments[index], name)(*args)
             except Exception as error:  # noqa: BLE001 - reported to the parent
                 failed[index] = _describe(error)
         return done, failed
 
     serve(connection, answer)
-
-
-def _method(environment: SubEnvironment, name: str) -> Callable[..., Any]:
-    method: Callable[..., Any] = getattr(environment, name)
-    return method
 
 
 def _describe(error: Exception) -> str:

@@ -122,11 +122,8 @@ def _context(request: InstructionRequest, excluded: str) -> Phrase:
 def _remaining(request: InstructionRequest, excluded: str) -> Phrase:
     """Return a remark on the two things that are left."""
     things = plural(request.task.commands.colored)
-    others = (
-        antecedent(f"the two {things} that are not {excluded}", REFERENCE, excluded)
-        if request.resolved
-        else anaphor(f"the other two {things}", "other", REFERENCE, excluded)
-    )
+    words, named = f"the other two {things}", f"the two {things} that are not {excluded}"
+    others = request.refer(words, "other", REFERENCE, excluded, resolved=named)
     return fill(request.pick("remaining", templates.REMAINING), {"others": others})
 
 

@@ -18,13 +18,13 @@ from roboirg.language.instruction import REFERENCE
 from roboirg.language.number_words import CARDINALS, cardinal
 from roboirg.language.open_reasoning import open_templates as templates
 from roboirg.language.patterns.pattern import Derived, Pattern
-from roboirg.language.phrases import Phrase, anaphor, antecedent, fill, listed, plain
+from roboirg.language.phrases import Phrase, antecedent, fill, listed, plain
 from roboirg.language.request import GoalValue, InstructionRequest
 from roboirg.language.rivals.rival_templates import NUMBER_PAIRS
+from roboirg.language.rivals.value_pair import NUMBER_SLOTS
 from roboirg.language.slot_types import Fields, amount
 from roboirg.language.slot_types.ordinal import wrapped
 
-NUMBER_SLOTS = ("repeats", "counts", "visit", "placement")
 COMBINED: Mapping[str, Callable[[int, int], int]] = {
     "total": lambda first, second: first + second,
     "difference": lambda first, second: abs(first - second),
@@ -176,11 +176,8 @@ def _steps(request: InstructionRequest, calculation: Calculation, numbers: Numbe
     """Return the sentence that calculates; resolved, it names both numbers."""
     both = " and ".join(map(str, numbers))
     words = request.pick("the numbers", templates.NUMBERS)
-    named = (
-        antecedent(" and ".join(map(cardinal, numbers)), REFERENCE, both)
-        if request.resolved
-        else anaphor(words, "them", REFERENCE, both)
-    )
+    resolved = " and ".join(map(cardinal, numbers))
+    named = request.refer(words, "them", REFERENCE, both, resolved=resolved)
     template = request.pick("calculation frame", templates.CALCULATIONS)
     for field, pools in (
         ("steps", calculation.second.words),

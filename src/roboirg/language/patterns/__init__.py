@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from roboirg.language.patterns import before_after, complement, deduction, exclusion, sequence
-from roboirg.language.patterns.pattern import Derived, Pattern
+from roboirg.language.patterns.pattern import Pattern
 
-__all__ = ["PATTERNS", "Derived", "Pattern"]
+__all__ = ["PATTERNS", "Pattern"]
 
 PATTERNS: Mapping[str, tuple[Pattern, ...]] = {
     "color exclusion": (exclusion.COLOR_LEFT,),

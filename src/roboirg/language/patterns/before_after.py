@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from roboirg.language.instruction import REFERENCE
 from roboirg.language.patterns.pattern import Derived, Pattern
-from roboirg.language.phrases import Phrase, anaphor, antecedent, fill, plain
+from roboirg.language.phrases import Phrase, antecedent, fill, plain
 from roboirg.language.request import GoalValue, InstructionRequest, NoCommandError
 from roboirg.language.slot_types import relation
 from roboirg.language.templates import derivations
@@ -30,11 +30,8 @@ def _other(request: InstructionRequest) -> Derived:
     }
     single = derivations.MOMENTS[rejected]
     slot, value = goal_value.slot, goal_value.value
-    other = (
-        antecedent(derivations.RESOLVED_MOMENT_COMPLEMENT.format(single=single), slot, value)
-        if request.resolved
-        else anaphor(derivations.MOMENT_COMPLEMENT, "other", slot, value)
-    )
+    named = derivations.RESOLVED_MOMENT_COMPLEMENT.format(single=single)
+    other = request.refer(derivations.MOMENT_COMPLEMENT, "other", slot, value, resolved=named)
     fields = relation.placed(request, goal_value, other)
     return Derived(fill(template, introduced), fields, {"patterns": ["contextual logic"]})
 
@@ -51,11 +48,7 @@ def _neighbor(request: InstructionRequest) -> Derived:
     if outside is not None and not outside.before and not outside.is_place:
         raise NoCommandError  # there is no word for the target that this could replace
     words = _single(request, rejected)
-    single = (
-        antecedent(words, REFERENCE, rejected)
-        if request.resolved
-        else anaphor(words, "that", REFERENCE, rejected)
-    )
+    single = request.refer(words, "that", REFERENCE, rejected, resolved=words)
     placement = (*plain("the target of "), *fill(derivations.NEIGHBOR, {"single": single}))
     notes: dict[str, object] = {
         "patterns": ["sequential relation"],

@@ -73,9 +73,7 @@ def _chosen(request: InstructionRequest) -> Deduction:
 
 
 def _pointer(request: InstructionRequest, number: int) -> Phrase:
-    if request.resolved:
-        return antecedent(cardinal(number), REFERENCE, number)
-    return anaphor("that", "that", REFERENCE, number)
+    return request.refer("that", "that", REFERENCE, number, resolved=cardinal(number))
 
 
 def _notes(deduction: Deduction) -> dict[str, object]:
@@ -105,7 +103,7 @@ def _amounts(request: InstructionRequest) -> Derived:
     items = [
         fill(
             deduction.relation.cubes,
-            {"color": _shade(shade), "number": _pointer(request, number)},
+            {"color": amount.color_of(shade), "number": _pointer(request, number)},
         )
         for (shade, _), number in zip(matched, deduction.references, strict=True)
     ]
@@ -126,10 +124,6 @@ def _of_each(
     named = "".join(piece.text for piece in quantities)
     words = f"of each {relation.than} {named}"
     return fill(relation.each, {"number": antecedent(words, "colors", colors)})
-
-
-def _shade(goal_value: GoalValue) -> Phrase:
-    return antecedent(goal_value.color, goal_value.slot, goal_value.value)
 
 
 TIMES = Pattern(lambda request: _possible(request, "number"), _times)

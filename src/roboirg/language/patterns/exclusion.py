@@ -10,7 +10,7 @@ import itertools
 
 from roboirg.language.instruction import REFERENCE
 from roboirg.language.patterns.pattern import Derived, Pattern
-from roboirg.language.phrases import Phrase, anaphor, antecedent, fill, plain, sentences
+from roboirg.language.phrases import Phrase, antecedent, fill, plain, sentences
 from roboirg.language.request import GoalValue, InstructionRequest
 from roboirg.language.slot_types import described
 from roboirg.language.templates import derivations
@@ -53,10 +53,12 @@ def _excluding(request: InstructionRequest, target: GoalValue, colors: tuple[str
     """Return ``the cube that is neither of those``, ``two cubes of a color other than that``."""
     options = derivations.EXCLUSIONS if len(colors) > 1 else derivations.SINGLE_EXCLUSIONS
     frame, words, resolved = request.pick("exclusion", options)
-    excluded = (
-        antecedent(resolved.format(colors=" nor ".join(colors)), REFERENCE, " and ".join(colors))
-        if request.resolved
-        else anaphor(words, "pair" if len(colors) > 1 else "that", REFERENCE, " and ".join(colors))
+    excluded = request.refer(
+        words,
+        "pair" if len(colors) > 1 else "that",
+        REFERENCE,
+        " and ".join(colors),
+        resolved=resolved.format(colors=" nor ".join(colors)),
     )
     article = "" if request.values_of("amount") else "the "
     return _thing(request, target, f"{article}{frame}", {"excluded": excluded})
@@ -79,10 +81,9 @@ def _singled(request: InstructionRequest, goal_value: GoalValue, pair: tuple[str
 
 def _other(request: InstructionRequest, goal_value: GoalValue, pair: tuple[str, ...]) -> Phrase:
     """Return the command's words for the other color of the pair."""
-    if request.resolved:
-        words = f"{' or '.join(pair)}, not {_rejected(goal_value, pair)}"
-        return antecedent(words, goal_value.slot, goal_value.value)
-    return anaphor("the other color", "other", goal_value.slot, goal_value.value)
+    named = f"{' or '.join(pair)}, not {_rejected(goal_value, pair)}"
+    slot, value = goal_value.slot, goal_value.value
+    return request.refer("the other color", "other", slot, value, resolved=named)
 
 
 def _rejected(goal_value: GoalValue, pair: tuple[str, ...]) -> str:

@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 from roboirg.language.instruction import REFERENCE
 from roboirg.language.number_words import ordinal as ordinal_word
 from roboirg.language.patterns.pattern import Derived, Pattern
-from roboirg.language.phrases import Phrase, anaphor, antecedent, fill, plain
+from roboirg.language.phrases import Phrase, fill, plain
 from roboirg.language.request import GoalValue, InstructionRequest
 from roboirg.language.slot_types import Fields, ordinal
 from roboirg.language.templates import derivations
@@ -94,9 +94,8 @@ def _rule(steps_of: Steps) -> Pattern:
 
 
 def _reference(request: InstructionRequest, position: int) -> Phrase:
-    if request.resolved:
-        return antecedent(f"the {ordinal_word(position)}", REFERENCE, position)
-    return anaphor("that", "that", REFERENCE, position)
+    named = f"the {ordinal_word(position)}"
+    return request.refer("that", "that", REFERENCE, position, resolved=named)
 
 
 def _derived(

@@ -9,14 +9,13 @@ from roboirg.language.rivals.pair_words import (
     pair_notes,
     pair_reinforcement,
 )
-from roboirg.language.rivals.value_pair import ValuePair, pair_refusal
+from roboirg.language.rivals.value_pair import pair_refusal
 
 RIVAL_SETTINGS = ("direct-rival", "contextual-rival", "spatial-rival")
 """The settings that introduce a rival."""
 
 __all__ = [
     "RIVAL_SETTINGS",
-    "ValuePair",
     "draw_pair",
     "pair_command",
     "pair_introduction",

@@ -180,11 +180,8 @@ def _counted(request: InstructionRequest, draw: PairDraw) -> Fields:
     """Return ``the right number of red cubes``; resolved, ``two red cubes``."""
     meant, (color,) = draw.pair.meant, request.color_values
     words = request.pick("rival number", templates.NUMBERS_OF)
-    number = (
-        antecedent(cardinal(meant.number), meant.slot, meant.value)
-        if request.resolved
-        else anaphor(words, "choice", meant.slot, meant.value)
-    )
+    named = cardinal(meant.number)
+    number = request.refer(words, "choice", meant.slot, meant.value, resolved=named)
     # The plural fits any number that is not named.
     count = meant.number if request.resolved else 2
     return amount.amounts([amount.amount(number, amount.cubes(color, count))])

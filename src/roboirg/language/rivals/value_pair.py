@@ -6,7 +6,7 @@ import functools
 from collections.abc import Callable, Iterator, Mapping
 from typing import NamedTuple
 
-from roboirg.core.episode import Difficulty, Goal, Split
+from roboirg.core.episode import Difficulty, Split, values_in
 from roboirg.core.goal_slots import COLOR_SLOTS
 from roboirg.language.instruction import REFERENCE
 from roboirg.language.landmarks import Landmark
@@ -109,11 +109,6 @@ def possible_pairs(request: InstructionRequest) -> Iterator[ValuePair]:
                 yield ValuePair(meant, rival)
 
 
-def _contents(goal: Goal, slot: str) -> tuple[str | int, ...]:
-    content = goal[slot]
-    return content if isinstance(content, tuple) else (content,)
-
-
 @functools.cache
 def _usual_numbers(task: str, difficulty: Difficulty, slot: str) -> frozenset[str | int]:
     """Return the numbers in goals of a difficulty.
@@ -124,5 +119,5 @@ def _usual_numbers(task: str, difficulty: Difficulty, slot: str) -> frozenset[st
         value
         for episode in split_episodes([get_task(task).name], [SPLIT])
         if episode.difficulty == difficulty
-        for value in _contents(episode.goal, slot)
+        for value in values_in(episode.goal[slot])
     )

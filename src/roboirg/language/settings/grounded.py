@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from roboirg.core.episode import Goal
+from roboirg.core.episode import Goal, values_in
 from roboirg.language.grounded import (
     Clue,
     amount_clues,
@@ -102,10 +102,7 @@ def _is_open(request: InstructionRequest, slot: str) -> bool:
 
 def _others(goal: Goal, slot: str) -> list[str]:
     return sorted(
-        str(value)
-        for name, content in goal.slots
-        if name != slot
-        for value in (content if isinstance(content, tuple) else (content,))
+        str(value) for name, content in goal.slots if name != slot for value in values_in(content)
     )
 
 
@@ -147,9 +144,7 @@ def _pointed(request: InstructionRequest, colors: Clues) -> list[Phrase]:
         pointers = (request.sampler.pick("color anaphor", single),)
     things: list[Phrase] = []
     for (value, clue), pointer in zip(colors.items(), pointers, strict=True):
-        place = anaphor(*pointer, value.slot, value.value)
-        if request.resolved:
-            place = antecedent(clue.words, value.slot, value.value)
+        place = request.refer(*pointer, value.slot, value.value, resolved=clue.words)
         template = commands.by_rank or commands.by_color.replace("{cube}", "{place}")
         if clue.of_handled or (commands.pointed == commands.thing and commands.by_rank is None):
             template = "{place}"
@@ -162,9 +157,8 @@ def _repeats(request: InstructionRequest, value: GoalValue, clue: Clue) -> tuple
     template = request.pick("number introduction", COUNTED)
     words = request.pick("same number", number.SAME_NUMBER)
     said = fill(template, {"times": antecedent(clue.short, value.slot, value.value)})
-    named = antecedent(clue.words, value.slot, value.value)
-    pointing = anaphor(words, "that", value.slot, value.value)
-    return said, {value.field: named if request.resolved else pointing}
+    times = request.refer(words, "that", value.slot, value.value, resolved=clue.words)
+    return said, {value.field: times}
 
 
 def _counts(request: InstructionRequest, value: GoalValue, clue: Clue) -> tuple[Phrase, Fields]:

@@ -112,10 +112,7 @@ def _pointed(
     words, expression = pointer
     if expression != "there":
         return at_place(request, color, landmark, anaphor(words, expression, *_of(color)))
-    if request.resolved:
-        place = antecedent(landmark.phrase, *_of(color))
-    else:
-        place = anaphor(words, expression, *_of(color))
+    place = request.refer(words, expression, *_of(color), resolved=landmark.phrase)
     template = None
     stands_last = _STANDS_LAST.fullmatch(request.task.commands.by_place)
     if request.wordings is None and stands_last:
@@ -125,11 +122,8 @@ def _pointed(
             "noun there",
             (f"the {noun}", "that one", f"that {noun} over", "the one over"),
         )
-        place = (
-            antecedent(f"the {noun} {landmark.phrase}", *_of(color))
-            if request.resolved
-            else anaphor(f"{words} there", expression, *_of(color))
-        )
+        named = f"the {noun} {landmark.phrase}"
+        place = request.refer(f"{words} there", expression, *_of(color), resolved=named)
         template = stands_last["before"] + "{place}"
     return request.by_place(color, place, plural=request.count_of(color) > 1, template=template)
 

@@ -15,7 +15,7 @@ from roboirg.language.slot_types import amount, color, number, ordinal, relation
 from roboirg.language.slot_types.slot_type import Fields, SlotType
 from roboirg.language.worded_command import goal_fields
 
-__all__ = ["SLOT_TYPES", "Fields", "SlotType", "described", "slot_types_in", "stated"]
+__all__ = ["Fields", "described", "slot_types_in", "stated"]
 
 SLOT_TYPES: Mapping[SlotTypeName, SlotType] = {
     slot_type.name: slot_type

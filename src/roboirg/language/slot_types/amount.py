@@ -51,7 +51,7 @@ def _stated(request: InstructionRequest, goal_values: tuple[GoalValue, ...]) -> 
     matched = pairs(goal_values)
     things = [cubes(shade, count.number) for shade, count in matched]
     if len(matched) > 2:  # noqa: PLR2004 - the noun of many stands at the end
-        things[:-1] = [_color(shade) for shade, _ in matched[:-1]]
+        things[:-1] = [color_of(shade) for shade, _ in matched[:-1]]
     return _described(request, goal_values, things)
 
 
@@ -115,12 +115,13 @@ def _introduce(request: InstructionRequest, goal_values: tuple[GoalValue, ...]) 
     template = request.pick("amount introduction", introductions.AMOUNT_INTRODUCTIONS)
     # "One of the red cubes": "them" then also fits a count of one.
     *others, last = pairs(goal_values)
-    things = [(*_count(count), *plain(" of the "), *_color(shade)) for shade, count in others]
+    things = [(*_count(count), *plain(" of the "), *color_of(shade)) for shade, count in others]
     things.append((*_count(last[1]), *plain(" of the "), *cubes(last[0], 2)))
     return fill(template, {"things": listed(things)})
 
 
-def _color(shade: GoalValue) -> Phrase:
+def color_of(shade: GoalValue) -> Phrase:
+    """Return ``red``."""
     return antecedent(shade.color, shade.slot, shade.value)
 
 
@@ -138,7 +139,7 @@ def introduce_references(
 def references(goal_values: tuple[GoalValue, ...], slot: str, quantities: Sequence[int]) -> Phrase:
     """Return ``six red and four blue cubes``, whose numbers only lead to the goal."""
     shades = [shade for shade, _ in pairs(goal_values)]
-    nouns = [*map(_color, shades[:-1]), cubes(shades[-1], quantities[-1])]
+    nouns = [*map(color_of, shades[:-1]), cubes(shades[-1], quantities[-1])]
     return listed(
         [
             amount(antecedent(cardinal(quantity), slot, quantity), noun)

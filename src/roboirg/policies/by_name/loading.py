@@ -10,9 +10,9 @@ from urllib.parse import urlencode
 
 from roboirg.core.errors import InvalidValueError
 from roboirg.core.field_types import as_name
+from roboirg.policies.builtin import BUILTIN
 from roboirg.policies.by_name import policy_specs
 from roboirg.policies.by_name.policy_classes import (
-    BUILTIN,
     CHECKPOINTS,
     find_class,
     make_from_class,
@@ -65,7 +65,7 @@ def make_policy(spec: str, seed: int) -> Policy:
     """Make a policy from its spec.
 
     Args:
-        spec: a name in `policy_classes.BUILTIN`, such as ``oracle``; ``package.module:Class``,
+        spec: a name in `BUILTIN`, such as ``oracle``; ``package.module:Class``,
             called with ``seed=`` if it takes it, else without arguments; or a URL.
         seed: of the policy's own random choices.
 

@@ -14,8 +14,9 @@ from types import ModuleType
 from typing import Any
 
 from roboirg.core.errors import InvalidValueError, MissingDependencyError, UnknownNameError
+from roboirg.policies.builtin import BUILTIN
 from roboirg.policies.contract.base import Policy
-from roboirg.policies.contract.batch_policy import make_batched, takes_batches
+from roboirg.policies.contract.batch_policy import make_batched, parameters_of, takes_batches
 from roboirg.policies.contract.policy_needs import PolicyNeeds
 from roboirg.policies.contract.policy_urls import is_url
 from roboirg.policies.planners.planner import Planner
@@ -30,19 +31,6 @@ ARGUMENTS: Mapping[str, tuple[str, ...]] = {
     "plan": ("observation", "step"),
 }
 """What the methods of a policy or a planner are called with."""
-
-BUILTIN: Mapping[str, str] = {
-    "oracle": "roboirg.policies.builtin.oracle_policy:OraclePolicy",
-    "listener": "roboirg.policies.builtin.listeners:ListenerPolicy",
-    "forgetful": "roboirg.policies.builtin.listeners:ForgetfulPolicy",
-    "first-mention": "roboirg.policies.builtin.listeners:FirstMentionPolicy",
-    "last-mention": "roboirg.policies.builtin.listeners:LastMentionPolicy",
-    "elimination": "roboirg.policies.builtin.listeners:EliminationPolicy",
-    "surface": "roboirg.policies.builtin.listeners:SurfacePolicy",
-    "habit": "roboirg.policies.builtin.oracle_policy:HabitPolicy",
-    "previous-goal": "roboirg.policies.builtin.oracle_policy:PreviousGoalPolicy",
-    "random": "roboirg.policies.builtin.random_policy:RandomPolicy",
-}
 
 CHECKPOINTS: Mapping[str, str] = {"lerobot": "roboirg.policies.lerobot_policy:LeRobotPolicy"}
 """Policies of this process that a URL names, by its scheme; called with ``(url, seed=)``."""
@@ -136,7 +124,7 @@ def make_from_class(spec: str, policy_class: type[Any], seed: int) -> Policy:
 def _construct(spec: str, policy_class: type[Any], seed: int) -> Any:  # noqa: ANN401
     if is_url(spec):
         return policy_class(spec, seed=seed)
-    return policy_class(seed=seed) if "seed" in _parameters(policy_class) else policy_class()
+    return policy_class(seed=seed) if "seed" in parameters_of(policy_class) else policy_class()
 
 
 def _check_class(spec: str, policy_class: type[Any], methods: tuple[str, ...]) -> None:
@@ -159,7 +147,7 @@ def _check_class(spec: str, policy_class: type[Any], methods: tuple[str, ...]) -
         raise InvalidValueError(
             f"Policy {spec!r}: class {name} is abstract; it lacks {', '.join(missing)}."
         )
-    for parameter in _parameters(policy_class).values():
+    for parameter in parameters_of(policy_class).values():
         optional = parameter.default is not parameter.empty or parameter.kind in (
             parameter.VAR_POSITIONAL,
             parameter.VAR_KEYWORD,
@@ -234,13 +222,6 @@ def _examples() -> list[str]:
     urls = (f"{scheme}://…" for scheme in url_schemes())
     kinds = (f"{kind}:…" for kind in entry_names(KINDS_GROUP))
     return [*urls, "system:NAME", "planner:KIND", "vlm-listener:PROVIDER", *kinds]
-
-
-def _parameters(policy_class: type[Any]) -> Mapping[str, inspect.Parameter]:
-    try:
-        return inspect.signature(policy_class).parameters
-    except (TypeError, ValueError):  # a class written in C may have no signature
-        return {}
 
 
 def _module(spec: str, name: str) -> ModuleType:

@@ -95,7 +95,8 @@ def load_system(
 def all_systems() -> tuple[str, ...]:
     """Return the names of the systems in this package."""
     files = resources.files(PACKAGE).joinpath(FOLDER).iterdir()
-    return tuple(sorted(_stem(one.name) for one in files if one.name.endswith(SUFFIX)))
+    names = (one.name for one in files)
+    return tuple(sorted(name.removesuffix(SUFFIX) for name in names if name.endswith(SUFFIX)))
 
 
 def find_system(name_or_file: str, overrides: Mapping[str, str]) -> System:
@@ -176,7 +177,3 @@ def _nested(entries: Mapping[str, Any], path: list[str], value: str) -> dict[str
         return {**entries, first: value}
     table = entries.get(first, {})
     return {**entries, first: _nested(table if isinstance(table, dict) else {}, rest, value)}
-
-
-def _stem(name: str) -> str:
-    return name.removesuffix(SUFFIX)

@@ -8,7 +8,7 @@ object per episode, and ``act_batch(states, observations)``, which returns a chu
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -45,7 +45,7 @@ class BatchedEpisode:
     def reset(self, instruction: str, demonstration: Demonstration) -> None:
         """Begin the episode."""
         begin = self._policy.begin
-        seed = {"seed": self._seed} if "seed" in _parameters(begin) else {}
+        seed = {"seed": self._seed} if "seed" in parameters_of(begin) else {}
         self._state = begin(instruction, demonstration, **seed)
 
     def act(self, observation: Observation) -> NDArray[np.floating[Any]]:
@@ -92,8 +92,9 @@ def make_batched(key: object, make: Callable[[], Any], seed: int) -> BatchedEpis
     return BatchedEpisode(_made[key], seed)
 
 
-def _parameters(function: Callable[..., Any]) -> Sequence[str]:
+def parameters_of(function: Callable[..., Any]) -> Mapping[str, inspect.Parameter]:
+    """Return the parameters of a function or class, by name; none if it has no signature."""
     try:
-        return list(inspect.signature(function).parameters)
-    except (TypeError, ValueError):  # written in C, it may have no signature
-        return ()
+        return inspect.signature(function).parameters
+    except (TypeError, ValueError):  # written in C
+        return {}

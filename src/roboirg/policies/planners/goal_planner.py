@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import pkgutil
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 from roboirg.core.episode import HANDLES_HELD, Stage
 from roboirg.core.observations import Demonstration, Observation
+from roboirg.policies.builtin import BUILTIN
 from roboirg.policies.builtin.scripted import ScriptedPolicy, StageProgress
 from roboirg.policies.contract.base import SubgoalEnd
 from roboirg.policies.planners.oracle_planner import OracleOptions, OraclePlanner, stage_subgoal
@@ -14,17 +15,6 @@ from roboirg.tasks import get_task
 
 MAX_RETRIES = 3
 """Repetitions per episode of subgoals that came to nothing."""
-_BUILTIN = "roboirg.policies.builtin"
-DECIDERS: Mapping[str, str] = {
-    "listener": f"{_BUILTIN}.listeners:ListenerPolicy",
-    "forgetful": f"{_BUILTIN}.listeners:ForgetfulPolicy",
-    "first-mention": f"{_BUILTIN}.listeners:FirstMentionPolicy",
-    "last-mention": f"{_BUILTIN}.listeners:LastMentionPolicy",
-    "elimination": f"{_BUILTIN}.listeners:EliminationPolicy",
-    "surface": f"{_BUILTIN}.listeners:SurfacePolicy",
-    "fixed": f"{_BUILTIN}.listeners:ListenerPolicy",
-}
-"""Classes of policies whose ``decide`` gives each planner the goal."""
 
 
 class GoalPlanner(OraclePlanner):
@@ -41,7 +31,8 @@ class GoalPlanner(OraclePlanner):
     ) -> None:
         super().__init__(options, kind)
         self.grounded = False  # it reads the pixels itself
-        decider: type[ScriptedPolicy] = pkgutil.resolve_name(DECIDERS[kind])
+        name = "listener" if kind == "fixed" else kind
+        decider: type[ScriptedPolicy] = pkgutil.resolve_name(BUILTIN[name])
         self._decider = decider(seed)
         self._heard: list[str] = []
         self._stages: Sequence[Stage] | None = None

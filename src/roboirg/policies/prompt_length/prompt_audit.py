@@ -76,14 +76,12 @@ class MessageAudit(NamedTuple):
     Attributes:
         least: tokens that it needs at least.
         most: tokens that it needs at most; equal to `least` if they were counted and none added.
-        sure: characters from its beginning that certainly arrive.
-        reached: characters from its beginning that can arrive; equal to `sure` if counted.
+        reached: characters from its beginning that can arrive.
         verdict: ``heard`` if all of it arrives, ``cut`` if something is lost, else ``unknown``.
     """
 
     least: int
     most: int
-    sure: int
     reached: int
     verdict: PromptVerdict
 
@@ -157,16 +155,14 @@ def audit_message(text: str, limit: PromptLimit) -> MessageAudit:
         bounds = (limit.tokenize(cleaned),) * 2
     least, most = bounds[0].total, bounds[1].total + limit.added
     indent = len(text) - len(text.lstrip())
-    reached, sure = (
-        len(text) if found == len(cleaned) else indent + found
-        for found in (one.reach(limit.tokens, len(cleaned)) for one in bounds)
-    )
+    found = bounds[0].reach(limit.tokens, len(cleaned))
+    reached = len(text) if found == len(cleaned) else indent + found
     verdict: PromptVerdict = "unknown"
     if most <= limit.tokens:
         verdict = "heard"
     elif least > limit.tokens:
         verdict = "cut"
-    return MessageAudit(least, most, sure, reached, verdict)
+    return MessageAudit(least, most, reached, verdict)
 
 
 def audit_instruction(messages: Sequence[Sequence[str]], limit: PromptLimit) -> InstructionAudit:

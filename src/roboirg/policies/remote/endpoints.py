@@ -12,9 +12,9 @@ from pydantic import AfterValidator, Field
 from roboirg.core.actions import find_action_space
 from roboirg.core.errors import InvalidValueError
 from roboirg.policies.contract.policy_urls import PolicyUrl, UrlOptions
+from roboirg.util.web.request_origin import LOOPBACK_NAMES
 
 MIB = 2**20
-_LOOPBACK = {"localhost", "127.0.0.1", "::1"}
 
 ActionSpaceName = Annotated[str, AfterValidator(lambda name: find_action_space(name).name)]
 """An option that names an action space."""
@@ -32,7 +32,7 @@ class Endpoint(NamedTuple):
     @property
     def identity(self) -> str:
         """A file name, the same for every spelling of this computer's address."""
-        here = self.host in _LOOPBACK
+        here = self.host in LOOPBACK_NAMES
         host = f"{socket.gethostname()}-itself" if here else self.host.replace(":", "_")
         return f"{host}-{self.port}"
 

@@ -15,7 +15,7 @@ from typing import Any
 from roboirg.core.episode import Goal, SlotValue, Split
 from roboirg.core.goal_slots import COLOR_SLOTS, SLOT_TYPE_NAMES
 from roboirg.tasks import get_task
-from roboirg.tasks.splits.splits import SIZES, get_episode
+from roboirg.tasks.splits.splits import split_episodes
 from roboirg.util.json_reply import UnparsableReplyError, json_object
 
 Answer = Mapping[str, Any]
@@ -116,8 +116,8 @@ def goal_schema(task: str) -> GoalSchema:
     """Return the goal schema of a task."""
     known_task = get_task(task)
     goals: dict[str, Goal] = {}
-    for index in range(SIZES[SOURCE]):
-        for goal in known_task.goals(get_episode(task, SOURCE, index).scene):
+    for episode in split_episodes([known_task.name], [SOURCE]):
+        for goal in known_task.goals(episode.scene):
             goals.setdefault(_canonical(_answer(goal)), goal)
     return _complete(goals, known_task.commands.colored)
 

@@ -90,10 +90,17 @@ class MotionPrimitives:
         yield self._move(_above(place, CUBE_HOVER), rotation)
 
     def _place_on(self, primitive: Primitive) -> Iterator[JointTrajectory]:
-        place, rotation = self._place(primitive), self._rotation()
         is_site = self._world.bodies[str(primitive.place)].item.kind == "site"
+        return self._release(primitive, SITE_RELEASE if is_site else TARGET_RELEASE)
+
+    def _put_into(self, primitive: Primitive) -> Iterator[JointTrajectory]:
+        return self._release(primitive, BOX_RELEASE)
+
+    def _release(self, primitive: Primitive, height: float) -> Iterator[JointTrajectory]:
+        """Yield the trajectories that let go of a thing at a height above a place."""
+        place, rotation = self._place(primitive), self._rotation()
         yield self._move(_above(place, CUBE_HOVER), rotation)
-        yield self._move(_above(place, SITE_RELEASE if is_site else TARGET_RELEASE), rotation)
+        yield self._move(_above(place, height), rotation)
         yield self._grip(OPEN)
         yield self._move(_above(place, CUBE_HOVER), rotation)
 
@@ -103,13 +110,6 @@ class MotionPrimitives:
         yield self._grip(OPEN)
         back = place._replace(x=place.x - BIN_RETREAT)
         yield self._move(_above(back, BIN_RELEASE), rotation)
-
-    def _put_into(self, primitive: Primitive) -> Iterator[JointTrajectory]:
-        place, rotation = self._place(primitive), self._rotation()
-        yield self._move(_above(place, CUBE_HOVER), rotation)
-        yield self._move(_above(place, BOX_RELEASE), rotation)
-        yield self._grip(OPEN)
-        yield self._move(_above(place, CUBE_HOVER), rotation)
 
     def _move_over(self, primitive: Primitive) -> Iterator[JointTrajectory]:
         yield self._move(_above(self._place(primitive), OVER_TARGET), self._rotation())

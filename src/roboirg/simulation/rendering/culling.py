@@ -139,22 +139,24 @@ _boxes_of_files: dict[tuple[object, ...], NDArray[np.float64]] = {}
 def _box(points: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return homogeneous corners (8, 4) of the box around points (n, 3), with the margin."""
     low, high = points.min(axis=0) - MARGIN, points.max(axis=0) + MARGIN
+    return np.column_stack([_corners(low, high), np.ones(8)])
+
+
+def _corners(low: NDArray[np.float64], high: NDArray[np.float64]) -> NDArray[np.float64]:
     grid = np.stack(np.meshgrid(*zip(low, high, strict=True), indexing="ij"), axis=-1)
-    return np.column_stack([grid.reshape(-1, 3), np.ones(8)])
+    return grid.reshape(-1, 3)
 
 
 def _points(body: sapien.render.RenderBodyComponent) -> NDArray[np.float64]:
     """Return corners (n, 3) of the boxes of a body's shapes in its entity's frame."""
-    corners: list[NDArray[np.float64]] = [_shape_corners(shape) for shape in body.render_shapes]
-    return np.concatenate(corners)
+    return np.concatenate([_shape_corners(shape) for shape in body.render_shapes])
 
 
 def _shape_corners(shape: sapien.render.RenderShape) -> NDArray[np.float64]:
     """Return corners of a shape's box in its entity's frame, (8, 3)."""
-    low, high = _shape_bounds(shape)
-    grid = np.stack(np.meshgrid(*zip(low, high, strict=True), indexing="ij"), axis=-1)
+    corners = _corners(*_shape_bounds(shape))
     matrix = shape.local_pose.to_transformation_matrix()
-    return np.asarray(grid.reshape(-1, 3) @ matrix[:3, :3].T + matrix[:3, 3])
+    return np.asarray(corners @ matrix[:3, :3].T + matrix[:3, 3])
 
 
 def _shape_bounds(

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
+from functools import partial
 from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 from roboirg.core.episode import Episode
+from roboirg.core.observations import FetchedFields
 from roboirg.simulation.observation_builder import (
     ObservationSpec,
     picture_fields,
@@ -18,13 +20,13 @@ from roboirg.simulation.recording import Recording
 from roboirg.simulation.video.frame_sequence import FrameSequence, read_frames
 
 
-class DemonstrationVideo(Mapping[str, NDArray[Any]]):
+class DemonstrationVideo(FetchedFields):
     """A demonstration as a mapping from an observation's fields to arrays, with a leading axis T.
 
-    Pictures are drawn when they are first read, at any later time, and then stored. To read
-    several picture fields, call `draw` first, which is faster. Pickling draws all pictures and
-    leaves the actions out. The pickled video is no dictionary either: Gymnasium's vector
-    environments put the arrays of dictionaries into one, and videos differ in length.
+    Pictures are drawn when they are first read, at any later time; `draw` draws all that are left
+    in one replay for all cameras. Pickling draws all pictures and leaves the actions out. The
+    pickled video is no dictionary either: Gymnasium's vector environments put the arrays of
+    dictionaries into one, and videos differ in length.
 
     Attributes:
         length: control steps in the video, T.
@@ -39,39 +41,14 @@ class DemonstrationVideo(Mapping[str, NDArray[Any]]):
         length: int,
         actions: NDArray[np.float64],
     ) -> None:
-        self.length, self.actions = length, actions
-        self._arrays = dict(proprioception)
-        self._sequences = dict(sequences)
-
-    def __getitem__(self, field: str) -> NDArray[Any]:
-        """Return a field for all steps; raises KeyError if it does not exist."""
-        if field not in self._arrays:
-            self._read((field,))
-        return self._arrays[field]
+        fields = dict.fromkeys([*sequences, *proprioception])
+        super().__init__(tuple(fields), proprioception, partial(_read, sequences))
+        self.length, self.actions, self._sequences = length, actions, sequences
 
     def undrawn(self) -> Self:
         """Return a copy without the pictures that can be drawn again."""
         read = {field: one for field, one in self._arrays.items() if field not in self._sequences}
         return type(self)(read, self._sequences, self.length, self.actions)
-
-    def draw(self) -> None:
-        """Draw all pictures that have not been drawn, in one replay for all cameras."""
-        self._read([field for field in self._sequences if field not in self._arrays])
-
-    def _read(self, fields: Sequence[str]) -> None:
-        arrays = read_frames([self._sequences[field] for field in fields])
-        self._arrays.update(zip(fields, arrays, strict=True))
-
-    def __iter__(self) -> Iterator[str]:
-        yield from self._sequences
-        yield from (field for field in self._arrays if field not in self._sequences)
-
-    def __len__(self) -> int:
-        """Return the number of fields; `length` is the number of control steps."""
-        return sum(1 for _ in self)
-
-    def __contains__(self, field: object) -> bool:
-        return field in self._sequences or field in self._arrays
 
     def __reduce__(self) -> tuple[type[Self], tuple[Any, ...]]:
         self.draw()
@@ -83,6 +60,11 @@ class DemonstrationVideo(Mapping[str, NDArray[Any]]):
         ]
         fields += (field for field in self._arrays if field not in self._sequences)
         return f"<Video of {self.length} steps: {', '.join(fields)}>"
+
+
+def _read(sequences: Mapping[str, FrameSequence], fields: Sequence[str]) -> dict[str, NDArray[Any]]:
+    frames = read_frames([sequences[field] for field in fields])
+    return dict(zip(fields, frames, strict=True))
 
 
 def make_video(

@@ -6,7 +6,7 @@ What finds no free place raises `SceneRejectedError`: the seed gives no scene.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 
 import numpy as np
 
@@ -88,6 +88,22 @@ def draw_cube(
     return placed(name, draw, lambda cube: cube_footprint(cube).grown(gap), obstacles)
 
 
+def draw_cubes(
+    rng: np.random.Generator,
+    cubes: Iterable[tuple[str, Color, Region]],
+    gap: float,
+    obstacles: Sequence[Obstacle],
+) -> list[SceneObject]:
+    """Draw a cube for each name, color and region, one after the other."""
+    taken = list(obstacles)
+    drawn: list[SceneObject] = []
+    for name, color, region in cubes:
+        cube = draw_cube(rng, name, color, region, gap, taken)
+        drawn.append(cube)
+        taken.append(cube_obstacle(cube))
+    return drawn
+
+
 def draw_colored_cubes(
     rng: np.random.Generator,
     count: int,
@@ -96,14 +112,9 @@ def draw_colored_cubes(
     obstacles: Sequence[Obstacle],
 ) -> tuple[SceneObject, ...]:
     """Draw `count` cubes of different colors, ``cube_red`` and so on, in random order."""
-    taken = list(obstacles)
-    cubes: list[SceneObject] = []
-    for index in rng.permutation(len(COLORS))[:count]:
-        color = COLORS[index]
-        cube = draw_cube(rng, f"cube_{color}", color, region, gap, taken)
-        cubes.append(cube)
-        taken.append(cube_obstacle(cube))
-    return tuple(cubes)
+    colors = [COLORS[index] for index in rng.permutation(len(COLORS))[:count]]
+    cubes = ((f"cube_{color}", color, region) for color in colors)
+    return tuple(draw_cubes(rng, cubes, gap, obstacles))
 
 
 def draw_target(

@@ -32,10 +32,10 @@ def on_side(region: Region, side: Side) -> Region:
     return region._replace(y=SIGNS[side] * region.y)
 
 
-def draw_sides(rng: np.random.Generator, colors: Sequence[Color]) -> tuple[Color, Color]:
-    """Draw the colors on the left and the right, both orders equally likely."""
-    first, second = (colors[index] for index in rng.permutation(len(colors)))
-    return first, second
+def draw_sides(rng: np.random.Generator, colors: Sequence[Color]) -> dict[Color, Side]:
+    """Draw the sides of two colors, both orders equally likely."""
+    left, right = (colors[index] for index in rng.permutation(len(colors)))
+    return {left: "left", right: "right"}
 
 
 def left_to_right(scene: Scene, kind: ObjectKind) -> tuple[Color, ...]:

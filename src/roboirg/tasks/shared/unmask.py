@@ -10,7 +10,7 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 
 from roboirg.core import object_sizes
-from roboirg.core.conditions import Condition, Fact
+from roboirg.core.conditions import Fact
 from roboirg.core.episode import (
     COLORS,
     Color,
@@ -146,17 +146,6 @@ def _put_down(held: str, containers: Sequence[str]) -> Stage:
 def appearing(containers: Sequence[SceneObject]) -> tuple[Away, ...]:
     """Return the motions by which every container appears at its place after 32 steps."""
     return tuple(Away(container.name, 0, APPEAR_STEP) for container in containers)
-
-
-def press_stage(expects: Condition, button: str, which: str = "button") -> Stage:
-    """Return the stage of a press, which forbids nothing; the subgoal names the button `which`."""
-    return Stage(
-        expects=expects,
-        forbids=(),
-        primitive=Primitive("press", button),
-        subgoal=f"press the {which} {{at}}",
-        points_at=button,
-    )
 
 
 def hidden_commands(wordings: Pools[Wording]) -> Commands:

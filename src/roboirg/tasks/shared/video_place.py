@@ -16,13 +16,20 @@ from roboirg.core.conditions import Fact
 from roboirg.core.episode import Difficulty, Primitive, Scene, SceneObject, Stage
 from roboirg.core.footprints import Circle, Obstacle, Region
 from roboirg.core.motions import Point, Swap
-from roboirg.tasks.shared import video_stages
 from roboirg.tasks.shared.fixtures import (
     button_keep_out,
     cube_obstacle,
     draw_button,
     draw_colored_cubes,
     draw_target,
+)
+from roboirg.tasks.shared.stages import (
+    go_home,
+    hold_still,
+    pick_stage,
+    place_stage,
+    press_stage,
+    retreat,
 )
 from roboirg.tasks.shared.swapping import SWAP_START, SWAP_STEPS
 
@@ -89,7 +96,7 @@ def _demonstration_of(past: Sequence[Fact]) -> tuple[Stage, ...]:
     cube = next(fact.subject for fact in past if fact.kind == "placed")
     plan: list[Stage] = []
     for fact in past:
-        plan += [_show_press(fact)] if fact.kind == "pressed" else _show_placing(fact)
+        plan += [press_stage()] if fact.kind == "pressed" else _show_placing(fact)
     put_back = Stage(
         expects=Fact("placed", cube, "site"),
         forbids=(),
@@ -98,34 +105,17 @@ def _demonstration_of(past: Sequence[Fact]) -> tuple[Stage, ...]:
     )
     return (
         *plan,
-        video_stages.show_pick(cube),
+        pick_stage(cube),
         put_back,
-        video_stages.retreat(),
-        video_stages.hold_still(HOLD_STEPS),
-        video_stages.go_home(),
+        retreat(),
+        hold_still(HOLD_STEPS),
+        go_home(),
     )
 
 
 def _show_placing(placed: Fact) -> list[Stage]:
-    disc = str(placed.place)
-    put = Stage(
-        expects=placed,
-        forbids=(),
-        primitive=Primitive("place_on", placed.subject, disc),
-        subgoal="drop the cube onto target {at}",
-        points_at=disc,
-    )
-    return [video_stages.show_pick(placed.subject), put]
-
-
-def _show_press(pressed: Fact) -> Stage:
-    return Stage(
-        expects=pressed,
-        forbids=(),
-        primitive=Primitive("press", pressed.subject),
-        subgoal="press the button {at}",
-        points_at=pressed.subject,
-    )
+    put = place_stage(placed.subject, str(placed.place), "drop the cube onto target {at}")
+    return [pick_stage(placed.subject), put]
 
 
 def place_stages(scene: Scene, color: str, answer: str) -> tuple[Stage, ...]:
@@ -133,21 +123,10 @@ def place_stages(scene: Scene, color: str, answer: str) -> tuple[Stage, ...]:
     cube = f"cube_{color}"
     cubes = (item.name for item in scene.of_kind("cube"))
     discs = (item.name for item in scene.of_kind("target"))
-    pick = Stage(
-        expects=Fact("picked", cube),
-        forbids=tuple(Fact("picked", other) for other in cubes if other != cube),
-        primitive=Primitive("pick_cube", cube),
-        subgoal="pick up the cube {at}",
-        points_at=cube,
-    )
-    put = Stage(
-        expects=Fact("placed", cube, answer),
-        forbids=tuple(Fact("placed", cube, other) for other in discs if other != answer),
-        primitive=Primitive("place_on", cube, answer),
-        subgoal="place the cube onto the correct target {at}",
-        points_at=answer,
-    )
-    return pick, put
+    wrong_cubes = tuple(Fact("picked", other) for other in cubes if other != cube)
+    wrong_discs = tuple(Fact("placed", cube, other) for other in discs if other != answer)
+    put = "place the cube onto the correct target {at}"
+    return pick_stage(cube, forbids=wrong_cubes), place_stage(cube, answer, put, wrong_discs)
 
 
 def colors_of(scene: Scene) -> tuple[str, ...]:

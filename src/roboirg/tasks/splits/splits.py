@@ -24,7 +24,7 @@ from typing import NamedTuple, SupportsIndex
 import numpy as np
 
 from roboirg.core.conditions import Fact, facts_of
-from roboirg.core.episode import SPLITS, Difficulty, Episode, Goal, Scene, Split, Stage
+from roboirg.core.episode import ROBOT, SPLITS, Difficulty, Episode, Goal, Scene, Split, Stage
 from roboirg.core.errors import InvalidValueError, SceneRejectedError, UnknownNameError
 from roboirg.core.fact_traits import FACT_TRAITS, FactTraits
 from roboirg.tasks import Task, get_task
@@ -46,8 +46,6 @@ SEED_STRIDE = 100
 MAX_REJECTED = SEED_STRIDE - 1
 """Limit of seeds passed over for an episode; the seed after that belongs to the next episode."""
 SPLITS_FILE = "splits.json"
-ROBOT = "robot"
-"""The subject of facts about the robot itself."""
 
 
 class TaskSplits(NamedTuple):

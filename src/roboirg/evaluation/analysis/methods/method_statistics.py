@@ -35,7 +35,7 @@ from roboirg.evaluation.analysis.stats.sensitivity import (
 )
 from roboirg.evaluation.records.record import Job, Summary
 from roboirg.language import settings_of
-from roboirg.policies.by_name.policy_classes import BUILTIN
+from roboirg.policies.builtin import BUILTIN
 from roboirg.tasks import LEFT_OUT, all_tasks, every_task
 from roboirg.tasks.splits.published_episodes import is_published
 from roboirg.tasks.splits.splits import SIZES, shipped_splits

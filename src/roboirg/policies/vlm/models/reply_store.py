@@ -8,6 +8,7 @@ network file system whose locks do not work, processes may wait for each other o
 from __future__ import annotations
 
 import contextlib
+import functools
 import sqlite3
 import time
 from collections.abc import Iterator
@@ -60,7 +61,7 @@ class Found(NamedTuple):
 
 @dataclass
 class ReplyStore:
-    """The store during one episode.
+    """The store during one episode; the file is opened when it is first used.
 
     Args:
         settings: of the run.
@@ -74,18 +75,21 @@ class ReplyStore:
     episode: str
     calls: int = field(default=0, init=False)
 
-    def __post_init__(self) -> None:
+    @functools.cached_property
+    def _database(self) -> sqlite3.Connection:
         self.settings.folder.mkdir(parents=True, exist_ok=True)
-        self._database = sqlite3.connect(
+        database = sqlite3.connect(
             self.settings.folder / REPLIES_FILE, timeout=_LOCK_S, isolation_level=None
         )
         # What is committed is on disk, and survives a kill at any moment.
-        self._database.execute("PRAGMA synchronous = FULL")
-        self._database.executescript(_TABLES)
+        database.execute("PRAGMA synchronous = FULL")
+        database.executescript(_TABLES)
+        return database
 
     def close(self) -> None:
-        """Close the file."""
-        self._database.close()
+        """Close the file if it has been opened."""
+        if "_database" in vars(self):
+            self._database.close()
 
     def find(self, sent: str) -> Found:
         """Return what is stored of the next call, whose content has the digest `sent`."""
@@ -179,24 +183,7 @@ def stored_counts(folder: Path) -> dict[str, tuple[int, int, int]]:
         return {episode: (calls, sent, received) for episode, calls, sent, received in rows}
 
 
-class _Use:
-    """The use of the store by one episode, which opens the file when it asks a model."""
-
-    def __init__(self, settings: ReplySettings, episode: str) -> None:
-        self._settings, self._episode = settings, episode
-        self._store: ReplyStore | None = None
-
-    @property
-    def store(self) -> ReplyStore:
-        self._store = self._store or ReplyStore(self._settings, self._episode)
-        return self._store
-
-    def close(self) -> None:
-        if self._store is not None:
-            self._store.close()
-
-
-_uses: list[_Use] = []
+_stores: list[ReplyStore] = []
 """The newest is that of the episode that is played."""
 
 
@@ -209,13 +196,13 @@ def use_replies(settings: ReplySettings | None, episode: str) -> Iterator[None]:
     if settings is None:
         yield
         return
-    _uses.append(_Use(settings, episode))
+    _stores.append(ReplyStore(settings, episode))
     try:
         yield
     finally:
-        _uses.pop().close()
+        _stores.pop().close()
 
 
 def current_store() -> ReplyStore | None:
     """Return the store of the episode that is played; None if the run keeps none."""
-    return _uses[-1].store if _uses else None
+    return _stores[-1] if _stores else None

@@ -1,0 +1,88 @@
+"""Stages of several tasks and of their videos."""
+
+from __future__ import annotations
+
+from roboirg.core.conditions import Condition, Fact, Rule
+from roboirg.core.episode import Primitive, Stage
+
+PRESSED = Fact("pressed", "button")
+RETREAT_STEPS = 20
+"""Control steps for which the hand waits away from the objects (RoboMME)."""
+
+
+def pick_stage(
+    name: str,
+    subgoal: str = "pick up the cube {at}",
+    forbids: tuple[Fact | Rule, ...] = (),
+    timer: str | None = None,
+) -> Stage:
+    """Return the stage in which a cube or tape is picked up."""
+    return Stage(
+        expects=Fact("picked", name),
+        forbids=forbids,
+        primitive=Primitive("pick_cube", name),
+        subgoal=subgoal,
+        points_at=name,
+        timer=timer,
+    )
+
+
+def place_stage(
+    name: str, place: str, subgoal: str, forbids: tuple[Fact | Rule, ...] = ()
+) -> Stage:
+    """Return the stage in which a cube or tape is placed on a target."""
+    return Stage(
+        expects=Fact("placed", name, place),
+        forbids=forbids,
+        primitive=Primitive("place_on", name, place),
+        subgoal=subgoal,
+        points_at=place,
+    )
+
+
+def press_stage(
+    subgoal: str = "press the button {at}",
+    forbids: tuple[Fact | Rule, ...] = (),
+    *,
+    expects: Condition = PRESSED,
+    button: str = "button",
+) -> Stage:
+    """Return the stage in which a button is pressed."""
+    return Stage(
+        expects=expects,
+        forbids=forbids,
+        primitive=Primitive("press", button),
+        subgoal=subgoal,
+        points_at=button,
+    )
+
+
+def retreat() -> Stage:
+    """Return the stage in which the hand moves away from the objects and waits there."""
+    return _static(Primitive("retreat", "robot", steps=RETREAT_STEPS))
+
+
+def hold_still(steps: int) -> Stage:
+    """Return the stage in which the robot holds still for a number of control steps."""
+    return _static(Primitive("hold", "robot", steps=steps))
+
+
+def _static(primitive: Primitive) -> Stage:
+    return Stage(
+        expects=Fact("still", "robot"),
+        forbids=(),
+        primitive=primitive,
+        subgoal="static",
+        lasting=primitive.steps,
+    )
+
+
+def go_home() -> Stage:
+    """Return the stage after the video in which the robot goes to the policy's start pose."""
+    return Stage(
+        expects=Fact("home", "robot"),
+        forbids=(),
+        primitive=Primitive("go_home", "robot"),
+        subgoal="go home",
+        in_video=False,
+    )
