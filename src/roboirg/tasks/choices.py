@@ -24,6 +24,7 @@ _WORDS = {
     "press": "press the {subject}",
     "press_below": "press the button at once",
     "hover": "move above the button",
+    "retreat": "move back and wait",
     "hold_until": "hold still until the next checkpoint",
 }
 _PRESSES = ("press", "press_below")
@@ -57,7 +58,7 @@ def _motions(scene: Scene, episode: Episode) -> Iterator[Primitive]:
             motion = stage.primitive
             if motion.kind in _PRESSES:
                 yield motion._replace(steps=0)
-            elif motion.kind == "hover":
+            elif motion.kind in ("hover", "retreat"):
                 yield motion
             else:
                 kind = "" if motion.subject == "robot" else scene[motion.subject].kind
