@@ -78,7 +78,7 @@ def rates_table(main: Cells) -> str:
 def _rate(row: SummaryRow | None) -> str:
     if row is None or row.rate is None or row.interval is None:
         return "–"
-    shown = f"{100 * row.rate:.0f}"
+    shown = f"{100 * float(row.rate):.0f}"
     return f"{shown} ({100 * row.interval.low:.0f} to {100 * row.interval.high:.0f})"
 
 

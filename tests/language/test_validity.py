@@ -88,7 +88,7 @@ def exceptions(task):
     for split, episodes in ALL:
         total.add(results(task, split, episodes))
     return {
-        (group.difficulty, group.pattern or group.setting): count / total.commands[group]
+        (group.difficulty, group.detail or group.setting): count / total.commands[group]
         for group, count in total.exceptions.items()
         if count
     }
