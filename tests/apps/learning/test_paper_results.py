@@ -59,3 +59,13 @@ def test_a_pack_holds_when_some_of_it_is_played_again(part):
     with opened_run(written.PACKS[part]) as run:
         found = verify_run(run, sample=0.002)
     assert found.holds, (found.checks, found.missing, found.doubled)
+
+
+def test_the_readme_has_the_rates_of_the_rows_that_were_played():
+    readme = (written.ROOT / "README.md").read_text(encoding="utf-8").splitlines()
+    rows = written.rates_table(written.played()[MAIN]).splitlines()
+    own = {row.split(" | ")[0].strip("| "): row for row in rows if row.startswith("| small-")}
+    assert own
+    for name, row in own.items():
+        (line,) = [one for one in readme if f"`{name}`" in one and one.startswith("|")]
+        assert row.split(" | ", 1)[1].replace(" to ", "–") == line.split(" | ", 1)[1]
