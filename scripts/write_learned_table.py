@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
-from written_parts import with_part
+from written_parts import rate_text, with_part
 
 from roboirg.apps.leaderboard.packing import opened_run
 from roboirg.apps.learning.listener.study_report import TrainedRate, trained_rate
@@ -152,8 +152,7 @@ def _tasks_of(by_task: Mapping[str, Mapping[int, CellResults]]) -> Iterator[NDAr
 
 
 def _rate(one: TrainedRate) -> str:
-    low, high = (100 * end for end in one.interval)
-    return f"{100 * one.rate:.0f} ({low:.0f} to {high:.0f})"
+    return rate_text(one.rate, one.interval)
 
 
 def _with_seeds(one: TrainedRate) -> str:

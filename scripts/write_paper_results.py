@@ -9,7 +9,7 @@ import functools
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 
-from written_parts import with_part
+from written_parts import rate_text, with_part
 
 from roboirg.apps.leaderboard.packing import opened_run
 from roboirg.apps.learning.policy.paper_experiment import CONTEXT, MAIN, PLANNER, SYSTEMS, row_name
@@ -78,8 +78,7 @@ def rates_table(main: Cells) -> str:
 def _rate(row: SummaryRow | None) -> str:
     if row is None or row.rate is None or row.interval is None:
         return "–"
-    shown = f"{100 * float(row.rate):.0f}"
-    return f"{shown} ({100 * row.interval.low:.0f} to {100 * row.interval.high:.0f})"
+    return rate_text(float(row.rate), row.interval)
 
 
 def answers_page() -> str:

@@ -17,6 +17,7 @@ from pyarrow import parquet
 
 from roboirg.apps.demonstrations import export_run
 from roboirg.apps.demonstrations.dataset_reading import read_dataset
+from roboirg.apps.demonstrations.export_plan import ExportPlan
 from roboirg.apps.demonstrations.size_estimate import estimate_size
 from roboirg.core.errors import InvalidValueError, UnknownNameError
 from roboirg.tasks.splits.splits import get_episode
@@ -250,3 +251,22 @@ def test_states_alone_need_no_pictures(export):
     info = json.loads((root / "meta/info.json").read_text())
     assert not [name for name in info["features"] if "image" in name]
     assert sum(path.stat().st_size for path in root.rglob("*") if path.is_file()) < 300_000
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        {"format": "csv"},
+        {"pictures": "gif"},
+        {"video": "sometimes"},
+        {"names": "mine"},
+        {"outcomes": "some"},
+        {"forms": ("spoken",)},
+        {"extra_actions": ("torques",)},
+    ],
+)
+def test_each_name_of_a_plan_is_checked(wrong):
+    plan = ExportPlan(("PickXtimes",), "train", (0,), ("explicit",), **wrong)
+    (word,) = (one if isinstance(one, str) else one[0] for one in wrong.values())
+    with pytest.raises(UnknownNameError, match=word):
+        plan.validated()

@@ -18,7 +18,7 @@ from roboirg.core.errors import InvalidValueError
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.core.observations import CAMERAS, check_cameras
 from roboirg.core.word_pools import pool_of
-from roboirg.language import LANGUAGE_VERSION
+from roboirg.language import FORMS, LANGUAGE_VERSION
 from roboirg.language.generator import instruct_with
 from roboirg.language.instruction_row import row
 from roboirg.language.settings import all_settings
@@ -93,8 +93,16 @@ class ExportPlan:
             UnknownNameError: a name does not exist.
             InvalidValueError: a value or a combination is not possible.
         """
-        known_name("format", self.format, get_args(FormatName))
-        known_name("way to store pictures", self.pictures, get_args(PictureCoding))
+        for kind, value, known in (
+            ("format", self.format, get_args(FormatName)),
+            ("way to store pictures", self.pictures, get_args(PictureCoding)),
+            ("way to treat the video", self.video, get_args(VideoTreatment)),
+            ("set of names", self.names, get_args(KeyNames)),
+            ("choice of outcomes", self.outcomes, get_args(Outcomes)),
+            *(("form", form, FORMS) for form in self.forms),
+            *(("description of actions", one, get_args(ExtraAction)) for one in self.extra_actions),
+        ):
+            known_name(kind, value, known)
         if self.variations < 1:
             raise InvalidValueError(f"variations is {self.variations}; it must be at least 1.")
         if self.variations > 1 and self.policy != ORACLE:
