@@ -10,10 +10,10 @@ import sapien
 import sapien.physx
 import sapien.render
 
+from roboirg.util.media import CONTROL_RATE
+
 PHYSICS_RATE = 100
 """Physics steps per second."""
-CONTROL_RATE = 20
-"""Control steps per second."""
 PHYSICS_STEPS = PHYSICS_RATE // CONTROL_RATE
 """Physics steps in a control step."""
 CONTROL_PERIOD = 1.0 / CONTROL_RATE

@@ -1,8 +1,9 @@
-"""Files that appear whole or not at all, whatever is killed meanwhile."""
+"""Files that appear whole or not at all, whatever is killed, and locks that end with a process."""
 
 from __future__ import annotations
 
 import contextlib
+import fcntl
 import os
 import secrets
 from collections.abc import Iterator
@@ -37,6 +38,30 @@ def write_atomically(path: Path, content: str | bytes) -> None:
     """Replace a file by a text (as UTF-8) or by bytes, as `replacing` does."""
     with replacing(path) as part:
         part.write_bytes(content.encode() if isinstance(content, str) else content)
+
+
+@contextlib.contextmanager
+def locked(path: Path, taken: str) -> Iterator[None]:
+    """Hold the lock of a file, which is made if it is missing and stays, for one process alone.
+
+    The kernel releases it when the process ends, however it ends.
+
+    Args:
+        path: the file.
+        taken: the error if another process holds the lock.
+
+    Raises:
+        InvalidValueError: another process holds it.
+    """
+    descriptor = os.open(path, os.O_RDWR | os.O_CREAT, 0o644)
+    try:
+        try:
+            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            raise InvalidValueError(taken) from None
+        yield
+    finally:
+        os.close(descriptor)
 
 
 def sync_to_disk(path: Path) -> None:

@@ -7,10 +7,8 @@ and what makes the dataset readable is written last.
 from __future__ import annotations
 
 import contextlib
-import fcntl
 import functools
 import json
-import os
 import shutil
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -39,7 +37,7 @@ from roboirg.apps.demonstrations.trajectory_recorder import record_trajectory
 from roboirg.core.episode import ENVIRONMENT_VERSION
 from roboirg.core.errors import InvalidValueError
 from roboirg.core.version import __version__
-from roboirg.util.atomic_write import write_atomically
+from roboirg.util.atomic_write import locked, write_atomically
 from roboirg.util.parallel_map import parallel_map
 from roboirg.util.parquet_support import check_parquet_support
 
@@ -159,12 +157,7 @@ def _opened(plan: ExportPlan, out: Path) -> Iterator[Path]:
             f"{str(out)!r} is not empty and no export that was stopped; choose another folder."
         )
     work.mkdir(parents=True, exist_ok=True)
-    lock = os.open(work / ".lock", os.O_RDWR | os.O_CREAT, 0o644)
-    try:
-        try:
-            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except OSError as error:
-            raise InvalidValueError(f"Another export writes to {str(out)!r}.") from error
+    with locked(work / ".lock", f"Another export writes to {str(out)!r}."):
         started = work / "plan.json"
         before = _read_fingerprint(started)
         if before not in (None, plan.fingerprint()):
@@ -177,8 +170,6 @@ def _opened(plan: ExportPlan, out: Path) -> Iterator[Path]:
             path.unlink(missing_ok=True)
         yield work
         shutil.rmtree(work)
-    finally:
-        os.close(lock)
 
 
 def _read_fingerprint(path: Path) -> str | None:

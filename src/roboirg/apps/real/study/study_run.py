@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import fcntl
-import os
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import AbstractContextManager
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal, get_args
@@ -35,6 +33,7 @@ from roboirg.policies.by_name.policy_specs import SYSTEM
 from roboirg.policies.by_name.systems import find_system
 from roboirg.policies.contract.policy_urls import is_url, parse_query, split_url
 from roboirg.policies.contract.random_state import episode_policy_seed
+from roboirg.util.atomic_write import locked
 
 ROBOT_LOCK = ".robot.lock"
 
@@ -231,24 +230,10 @@ def _check_versions(trial_log: TrialLog, policies: Mapping[str, str | None]) -> 
                 )
 
 
-@contextmanager
-def lock_robot(folder: Path) -> Iterator[None]:
-    """Lock the robot of a study, which only one process at a time may command.
-
-    Raises:
-        InvalidValueError: another process holds the lock.
-    """
-    descriptor = os.open(folder / ROBOT_LOCK, os.O_RDWR | os.O_CREAT, 0o644)
-    try:
-        try:
-            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError:
-            raise InvalidValueError(
-                f"Another process plays the study in {folder}; wait for it or stop it."
-            ) from None
-        yield
-    finally:
-        os.close(descriptor)
+def lock_robot(folder: Path) -> AbstractContextManager[None]:
+    """Lock the robot of a study, which only one process at a time may command."""
+    taken = f"Another process plays the study in {folder}; wait for it or stop it."
+    return locked(folder / ROBOT_LOCK, taken)
 
 
 def _without_verdict(record: Record) -> Record:
