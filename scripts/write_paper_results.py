@@ -24,7 +24,7 @@ from roboirg.evaluation.records.store import read_results
 from roboirg.language.settings import plain_settings
 
 ROOT = Path(__file__).parent.parent
-ANSWERS, TABLES = ROOT / "docs" / "paper-results.md", ROOT / "docs" / "paper-tables.md"
+RATES, TABLES = ROOT / "docs" / "paper-results.md", ROOT / "docs" / "paper-tables.md"
 PACKS = {
     part: path
     for part in (MAIN, CONTEXT, PLANNER)
@@ -81,19 +81,19 @@ def _rate(row: SummaryRow | None) -> str:
     return rate_text(float(row.rate), row.interval)
 
 
-def answers_page() -> str:
-    """Return the page of answers with the rates and answers of the packs."""
-    page = with_part(
-        ANSWERS.read_text(encoding="utf-8"), "paper rates", rates_table(played()[MAIN])
-    )
-    return with_part(page, "paper answers", answers_text(played()))
+def rates_page() -> str:
+    """Return the page of results with the rates of the packs."""
+    page = RATES.read_text(encoding="utf-8")
+    return with_part(page, "paper rates", rates_table(played()[MAIN]))
 
 
 def tables_page() -> str:
-    """Return the page of tables with those of the packs."""
-    return with_part(TABLES.read_text(encoding="utf-8"), "paper tables", tables_text(played()))
+    """Return the page of answers and tables with those of the packs."""
+    page = TABLES.read_text(encoding="utf-8")
+    page = with_part(page, "paper answers", answers_text(played()))
+    return with_part(page, "paper tables", tables_text(played()))
 
 
 if __name__ == "__main__":
-    ANSWERS.write_text(answers_page(), encoding="utf-8")
+    RATES.write_text(rates_page(), encoding="utf-8")
     TABLES.write_text(tables_page(), encoding="utf-8")

@@ -70,12 +70,14 @@ def test_the_same_questions_have_the_same_answers_for_equal_rates(published_like
         if one.policy in ROW_OF
     ]
     text = results_text({"main": gather([("main", results)])})
-    carried, apart, kept = text.split("\n## ")[1:]
+    carried, apart, where, kept = text.split("\n## ")[1:]
     for system, row in ROW_OF.items():
         assert values(carried, row) == pytest.approx(values(carried, system), abs=0.11)
         assert values(kept, row) == pytest.approx(values(kept, system), abs=1.01)
         if row != row_name("none"):
             assert values(apart, row) == pytest.approx(values(apart, system), abs=0.11)
+            assert values(where, row) == pytest.approx(values(where, system), abs=0.11)
+    assert values(where, "FrameS-Modul") == pytest.approx([39.8, 5.3, 24.4, 17.3], abs=0.1)
     assert values(carried, "FrameS-Modul")[0] == pytest.approx(-16.1, abs=0.1)
 
 

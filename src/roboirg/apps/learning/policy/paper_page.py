@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from decimal import Decimal
 from pathlib import Path
@@ -34,6 +34,8 @@ from roboirg.evaluation.analysis.tables.rendering.markdown import markdown
 from roboirg.evaluation.records.record import Summary
 from roboirg.evaluation.records.store import read_results
 from roboirg.language.settings import EXPLICIT, plain_settings
+from roboirg.tasks import all_tasks
+from roboirg.tasks.splits.splits import get_episode
 from roboirg.util.atomic_write import write_atomically
 
 PAGE = "paper.md"
@@ -121,6 +123,14 @@ def _questions(main: Cells) -> Iterator[str]:
     yield "Success less that of the row without memory, in points."
     every = [EXPLICIT, *settings]
     yield _table(every, lambda one: _own_against(main, one), lambda one: _published(one, None))
+    groups = _task_groups()
+    yield "## Where does memory help?"
+    yield "Explicit success less that of the row without memory, in points, by group of tasks."
+    yield _table(
+        list(groups),
+        lambda one: _own_against(main, EXPLICIT, groups[one]),
+        lambda one: _published(EXPLICIT, None, groups[one]),
+    )
     yield "## Do planners keep more?"
     yield "Success in each setting by explicit success, in percent."
     yield _retention(averages, settings)
@@ -128,6 +138,15 @@ def _questions(main: Cells) -> Iterator[str]:
         yield "## Do resolved forms recover it?"
         yield "Success with references replaced by names less success with references, in points."
         yield _table(settings, lambda one: _own_form_gaps(averages, one), lambda _: {})
+
+
+def _task_groups() -> dict[str, list[str]]:
+    """Return the tasks of each suite, and those with a video."""
+    found: dict[str, list[str]] = {}
+    for name, task in all_tasks().items():
+        found.setdefault(task.suite, []).append(name)
+    with_video = [name for name in all_tasks() if get_episode(name, "test", 0).demonstration]
+    return found | {"with a video": with_video}
 
 
 def _stage_question(context: Cells) -> Iterator[str]:
@@ -209,12 +228,16 @@ def _as_difference(gap: Gap) -> Difference:
     return Difference(gap.value, gap.interval, gap.p_value)
 
 
-def _own_against(cells: Cells, setting: str) -> dict[str, Difference]:
-    """Return each row less the first one on the same episodes, averaged over tasks."""
+def _own_against(
+    cells: Cells, setting: str, tasks: Collection[str] | None = None
+) -> dict[str, Difference]:
+    """Return each row less the first one on the same episodes, averaged over tasks; None: all."""
     own = {
         key: cell
         for key, cell in cells.items()
-        if key.options.setting == setting and key.options.form == "implicit"
+        if key.options.setting == setting
+        and key.options.form == "implicit"
+        and (tasks is None or key.task in tasks)
     }
     name = row_name(FIRST)
     first = {key.task: cell for key, cell in own.items() if key.policy_run.policy == name}
@@ -251,7 +274,9 @@ def _paired(
     return {policy: _as_difference(gap) for policy, gap in gaps.items() if gap is not None}
 
 
-def _published(setting: str, reference: str | None) -> dict[str, Difference]:
+def _published(
+    setting: str, reference: str | None, tasks: Collection[str] | None = None
+) -> dict[str, Difference]:
     """Return published rates less those of the setting `reference`, or less the first system's.
 
     The trials of two published cells are taken as independent, as only their rates are known.
@@ -261,7 +286,7 @@ def _published(setting: str, reference: str | None) -> dict[str, Difference]:
     for system in SYSTEMS.values():
         other = (system, reference) if reference else (SYSTEMS[FIRST], setting)
         if other != (system, setting):
-            found[system] = _independent(rows[system, setting], rows[other])
+            found[system] = _independent(rows[system, setting], rows[other], tasks)
     return found
 
 
@@ -276,8 +301,14 @@ def _published_longer(
     }
 
 
-def _independent(first: PublishedRow, second: PublishedRow) -> Difference:
-    tasks = [task for task, rate in first.rates.items() if rate is not None]
+def _independent(
+    first: PublishedRow, second: PublishedRow, among: Collection[str] | None = None
+) -> Difference:
+    tasks = [
+        task
+        for task, rate in first.rates.items()
+        if rate is not None and (among is None or task in among)
+    ]
     ours, theirs = ([_share(one.rates[task]) for task in tasks] for one in (first, second))
     trials = math.prod(TRIALS["main"])
     variance = sum(one * (1 - one) for one in (*ours, *theirs)) / trials / len(tasks) ** 2
