@@ -100,24 +100,26 @@ def test_a_forged_run_does_not(name: str, honest: Path, tmp_path: Path) -> None:
 
 
 def test_only_other_processors_may_end_a_little_elsewhere(honest: Path, tmp_path: Path) -> None:
-    def shift(processor: str | None) -> Forgery:
+    def shift(processor: str | None, by: float) -> Forgery:
         def forgery(lines: Lines, folder: Path, rng: random.Random) -> Lines:
             one = rng.choice(lines)
             log = read_actions(folder, one["action_log"])
-            moved = replace(log, end_state=log.end_state + 0.001)
+            moved = replace(log, end_state=log.end_state + by)
             one.update(action_log=write_actions(moved, folder), end_state="0" * 64)
             one.update({} if processor is None else {"processor": processor})
             return lines
 
         return forgery
 
-    for processor, holds in ((None, False), ("x86_64 OtherMaker 1", True)):
-        folder = tmp_path / str(processor)
+    other = "x86_64 OtherMaker 1"
+    for processor, by, holds in ((None, 0.001, False), (other, 0.001, True), (other, 0.1, False)):
+        folder = tmp_path / f"{processor}-{by}"
         shutil.copytree(honest, folder)
-        assert forge(folder, shift(processor), random.Random(0))
+        assert forge(folder, shift(processor, by), random.Random(0))
         found = verify_run(folder)
         assert found.holds is holds
         assert found.verdicts[ReplayVerdict.TOLERANT] == holds
+        assert any("another kind of processor" in note for note in found.notes) is (by == 0.1)
 
 
 def test_errors_of_policies_are_played_as_far_as_they_came(tmp_path: Path) -> None:

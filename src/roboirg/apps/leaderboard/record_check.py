@@ -68,12 +68,14 @@ class RecordCheck(NamedTuple):
         findings: what does not hold, one sentence each.
         replayed: how its end compares.
         deviation: largest difference of the end state, in m, rad and s.
+        elsewhere: whether the record is from a processor of another family, or does not report it.
     """
 
     slug: str
     findings: tuple[str, ...]
     replayed: ReplayVerdict = ReplayVerdict.NOT_REPLAYED
     deviation: float = 0.0
+    elsewhere: bool = False
 
 
 class LineToCheck(NamedTuple):
@@ -125,7 +127,8 @@ def _check(record: Record, folder: Path, *, play: bool) -> RecordCheck:
         findings.append(f"end_state: when played again, it differs by {deviation:.2g} (m, rad, s).")
     if not _same_answers(played, log):
         findings.append("actions: some of them come after the end of the episode.")
-    return RecordCheck(record.slug, tuple(findings), verdict, deviation)
+    elsewhere = record.processor != again.processor
+    return RecordCheck(record.slug, tuple(findings), verdict, deviation, elsewhere)
 
 
 def _same_answers(played: ActionLog, log: ActionLog) -> bool:
