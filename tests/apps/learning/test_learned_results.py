@@ -8,8 +8,13 @@ import write_learned_table as tables
 
 from roboirg.apps.leaderboard.packing import opened_run
 from roboirg.apps.leaderboard.run_verification import verify_run
+from roboirg.evaluation.records.store import read_results
 from roboirg.language.settings import EXPLICIT, plain_settings, settings_of
 from roboirg.tasks import all_tasks, get_task
+
+ACT = tables.ROOT / "results" / "act-val.roboirg.zip"
+ROWS = "act", "act20"
+"""All 100 actions of a chunk, and 20 of them."""
 
 
 def test_the_documentation_has_the_tables_of_the_pack():
@@ -47,6 +52,16 @@ def test_the_pack_has_whole_rows_without_errors():
             assert {one.trials for one in trained.values()} == {50}
 
 
+def test_the_page_has_what_act_solves():
+    with opened_run(ACT) as run:
+        results = read_results(run)
+    won = {row: [one.outcome == "success" for one in results if one.policy == row] for row in ROWS}
+    page = tables.PAGE.read_text(encoding="utf-8")
+    assert f"It solves **{sum(won['act'])} of {len(won['act'])}**" in page
+    assert "also none if 20" in " ".join(page.split())
+    assert (sum(won["act20"]), len(won["act20"])) == (0, 50)
+
+
 def test_trainings_count_alike_however_many_there_are():
     one, other = np.array([[1, 1, 0], [1, 0, 0], [1, 1, 0]]), np.array([[1, 0, 1], [1, 0, 0]])
     assert tables.differences(one, other).tolist() == [0, 4, -3]
@@ -55,8 +70,9 @@ def test_trainings_count_alike_however_many_there_are():
 
 @pytest.mark.sim
 @pytest.mark.slow
-def test_the_pack_holds_when_some_of_it_is_played_again():
-    with opened_run(tables.PACK) as run:
+@pytest.mark.parametrize("pack", [tables.PACK, ACT], ids=["small", "act"])
+def test_packs_hold_when_some_of_their_episodes_are_played_again(pack):
+    with opened_run(pack) as run:
         found = verify_run(run, sample=0.005)
     # On a processor of another maker than the record's, one episode in ten ends differently.
     here = [one for one in found.checks if not one.elsewhere]
