@@ -68,7 +68,8 @@ class RecordCheck(NamedTuple):
         findings: what does not hold, one sentence each.
         replayed: how its end compares.
         deviation: largest difference of the end state, in m, rad and s.
-        elsewhere: whether the record is from a processor of another family, or does not report it.
+        elsewhere: whether only what follows from the motion does not hold, and the record is from a
+            processor of another family, or does not report it.
     """
 
     slug: str
@@ -118,17 +119,18 @@ def _check(record: Record, folder: Path, *, play: bool) -> RecordCheck:
         findings.append("Its actions were not kept, so the verdict cannot be checked.")
     if log is None or not play:
         return RecordCheck(record.slug, (*findings, *_words(record, again)))
+    elsewhere = record.processor != again.processor
+    may_move_differently = elsewhere and not findings
     findings += _differences(record, again, PLAYED_FIELDS)
     if played is None:
         findings.append("actions: when played again, the episode takes none.")
         return RecordCheck(record.slug, tuple(findings), ReplayVerdict.DIFFERENT, float("inf"))
-    verdict, deviation = _compare_ends(record, again, log, played)
+    verdict, deviation = _compare_ends(record, again, log, played, elsewhere=elsewhere)
     if verdict is ReplayVerdict.DIFFERENT:
         findings.append(f"end_state: when played again, it differs by {deviation:.2g} (m, rad, s).")
     if not _same_answers(played, log):
         findings.append("actions: some of them come after the end of the episode.")
-    elsewhere = record.processor != again.processor
-    return RecordCheck(record.slug, tuple(findings), verdict, deviation, elsewhere)
+    return RecordCheck(record.slug, tuple(findings), verdict, deviation, may_move_differently)
 
 
 def _same_answers(played: ActionLog, log: ActionLog) -> bool:
@@ -174,7 +176,7 @@ def _short(value: object) -> str:
 
 
 def _compare_ends(
-    record: Record, again: Record, log: ActionLog, played: ActionLog
+    record: Record, again: Record, log: ActionLog, played: ActionLog, *, elsewhere: bool
 ) -> tuple[ReplayVerdict, float]:
     """Return how the ends compare, and their largest difference.
 
@@ -187,6 +189,5 @@ def _compare_ends(
     if deviation == 0.0:
         same = record.end_state == again.end_state
         return ReplayVerdict.EXACT if same else ReplayVerdict.DIFFERENT, 0.0
-    elsewhere = record.processor != again.processor
     within = deviation <= TOLERANCE and record.end_state != again.end_state
     return ReplayVerdict.TOLERANT if elsewhere and within else ReplayVerdict.DIFFERENT, deviation
