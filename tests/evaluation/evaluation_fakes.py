@@ -65,7 +65,8 @@ class FakePlayer:
     """Plays nothing and writes a video of it.
 
     Attributes:
-        gate: a file without which the episodes from `closed` on do not end.
+        gate: a file without which the episodes from `closed` on do not end; who waits for it
+            leaves a file of its own next to it.
     """
 
     folder: Path
@@ -78,8 +79,10 @@ class FakePlayer:
         return replace(self, folder=folder)
 
     def __call__(self, job: Job) -> Record:
-        while self.gate is not None and job.episode >= self.closed and not self.gate.exists():
-            time.sleep(0.05)
+        if self.gate is not None and job.episode >= self.closed:
+            (self.gate.parent / f"waiting-{os.getpid()}").touch()
+            while not self.gate.exists():
+                time.sleep(0.05)
         record = FakePlay(seconds=self.seconds, fatal=self.fatal)(job)
         video = self.folder / "videos" / f"{job.slug}.mp4"
         video.parent.mkdir(exist_ok=True)
@@ -131,8 +134,8 @@ def starts(folder: Path, job: Job | None = None) -> list[str]:
     return [line for line in lines if job is None or line == job.slug]
 
 
-def worker_pids(folder: Path) -> list[int]:
-    return [int(path.name.removeprefix("worker-")) for path in folder.glob("worker-*")]
+def worker_pids(folder: Path, kind: str = "worker") -> list[int]:
+    return [int(path.name.removeprefix(f"{kind}-")) for path in folder.glob(f"{kind}-*")]
 
 
 def is_alive(pid: int) -> bool:

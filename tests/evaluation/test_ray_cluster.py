@@ -67,10 +67,12 @@ def test_records_are_those_of_one_process_even_if_a_node_is_killed_half_way(
     killed = threading.Event()
 
     def kill() -> None:
-        while lines(tmp_path) < 8:
+        # Until each of the three machines has one of the endless episodes in hand.
+        while lines(tmp_path) < 8 or len(players := worker_pids(tmp_path, "waiting")) < 3:
             time.sleep(0.05)
-        time.sleep(3)  # until each machine has one of the endless episodes in hand
         cluster.remove_node(doomed, allow_graceful=False)
+        while all(map(is_alive, players)):  # they outlive their node for a moment
+            time.sleep(0.05)
         (tmp_path / "gate").touch()
         killed.set()
 

@@ -62,6 +62,7 @@ class HostPool:
         self._settings = settings
         self._hosts: dict[tuple[str, str | None], PolicyHost] = {}
         self._lines: list[socket.socket] = []
+        self._far_ends: list[socket.socket] = []
         self._lock, self._is_closed = threading.Lock(), False
         # The kernel ends a process with the thread that started it.
         self._starter = ThreadPoolExecutor(1, "policy starter")
@@ -69,6 +70,7 @@ class HostPool:
     def connect(self) -> socket.socket:
         """Return a new line, on which `HostedPolicy` begins episodes; no other process has it."""
         ours, theirs = socket.socketpair()
+        self._far_ends.append(theirs)
         self.serve(ours)
         return theirs
 
@@ -92,7 +94,7 @@ class HostPool:
         return [child for child in children if child is not None]
 
     def close(self) -> None:
-        """End all hosts."""
+        """End all hosts, and close the lines that `connect` returned."""
         with self._lock:
             self._is_closed = True
             hosts = list(self._hosts.values())
@@ -102,6 +104,8 @@ class HostPool:
                 line.shutdown(socket.SHUT_RDWR)
         for host in hosts:
             host.stop()
+        for line in self._far_ends:
+            line.close()
         self._starter.shutdown(wait=False)
 
     def __enter__(self) -> Self:

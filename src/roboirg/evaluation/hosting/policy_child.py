@@ -188,6 +188,8 @@ class PolicyChild:
                 self._kept += data[:room]
                 self._dropped += len(data[room:])
                 self._is_reading = False
+                if not data:
+                    self._output.close()
                 self._changed.notify_all()
             if not data:
                 return

@@ -130,7 +130,8 @@ class PolicyHost:
     def stop(self) -> None:
         """End the process; what is under way is lost."""
         self._is_stopped = True
-        self._kill()
+        if (child := self.child) is not None:
+            child.end()
         self._limit.__exit__()
 
     def _kill(self) -> None:
