@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import functools
+import textwrap
 import traceback
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
@@ -15,6 +16,9 @@ from roboirg.util.child_process import ChildExit, ChildProcess, serve
 
 Item = TypeVar("Item")
 Outcome = TypeVar("Outcome")
+
+MOST_SHOWN = 120
+"""Characters of the item at which a process died; a scene has thousands."""
 
 
 def parallel_map(
@@ -50,7 +54,8 @@ def parallel_map(
                 child, item = busy.pop(connection)
                 reply = child.receive()
                 if isinstance(reply, ChildExit):
-                    raise RoboIRGError(f"A worker process died at {item!r}: {reply}.")
+                    shown = textwrap.shorten(repr(item), MOST_SHOWN, placeholder=" …")
+                    raise RoboIRGError(f"A worker process died at {shown}: {reply}.")
                 outcome, error = reply
                 if error is not None:
                     raise error

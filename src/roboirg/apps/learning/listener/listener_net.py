@@ -37,7 +37,7 @@ class ListenerNet(nn.Module):
         self._tasks = {task: place for place, task in enumerate(vocabulary.tasks)}
         self.tasks = nn.Embedding(len(vocabulary.tasks), WIDTH)
         layer = nn.TransformerEncoderLayer(
-            WIDTH, HEADS, 2 * WIDTH, dropout=0.1, batch_first=True, norm_first=True
+            WIDTH, HEADS, 2 * WIDTH, dropout=0.0, batch_first=True, norm_first=True
         )
         self.encoder = nn.TransformerEncoder(layer, LAYERS, enable_nested_tensor=False)
         self.answer = nn.Linear(WIDTH, len(vocabulary.parts))

@@ -66,7 +66,7 @@ class TrainingPlan(NamedTuple):
     scenes: NonNegativeInt = 300
     goals: PositiveInt = 4
     detector_epochs: PositiveInt = 6
-    reader_epochs: PositiveInt = 12
+    reader_epochs: PositiveInt = 6
     without: Without = "none"
     seed: NonNegativeInt = 0
     seeds: PositiveInt = 3

@@ -41,7 +41,7 @@ _SECTIONS = (
 )
 """The title of each section, and its words: of which pool, and whether with a rival."""
 _NOTE = (
-    "Right answers in percent, and the 95 % interval over trainings and scenes: means over tasks "
+    "Right answers in percent, with the 95 % interval over trainings and scenes: means over tasks "
     "and {}, implicit form, test split."
 )
 
@@ -84,17 +84,26 @@ def trained_rate(tasks: Sequence[Verdicts]) -> TrainedRate:
 def write_study(answers: Iterable[StudyAnswer], about: Mapping[str, Any], folder: Path) -> Path:
     """Write the page of a study, its figure and its table by task; return the page."""
     answers = list(answers)
-    found = {cell: trained_rate(tasks) for cell, tasks in _verdicts(answers).items()}
+    found = study_rates(answers)
     trained = ", ".join(f"{name} {value}" for name, value in about.items())
-    parts = ["# What a listener learns", f"Trained with: {trained}."]
-    parts += [markdown(table) for table in _tables(found)]
+    parts = ["# What a listener learns", f"Trained with: {trained}.", tables_text(found)]
     parts.append(f"![Right answers by setting, held-out words]({FIGURE}.png)")
     parts.append(f"By task: {BY_TASK}. Every answer: NAME-SEED.jsonl.")
     page = folder / "study.md"
-    write_atomically(page, "\n\n".join(part.rstrip("\n") for part in parts) + "\n")
+    write_atomically(page, "\n\n".join(parts) + "\n")
     write_atomically(folder / BY_TASK, _by_task(answers))
     save(lambda: _draw(found), folder, FIGURE)
     return page
+
+
+def study_rates(answers: Iterable[StudyAnswer]) -> dict[ListenerCell, TrainedRate]:
+    """Return how often each listener is right."""
+    return {cell: trained_rate(tasks) for cell, tasks in _verdicts(answers).items()}
+
+
+def tables_text(found: Mapping[ListenerCell, TrainedRate]) -> str:
+    """Return a table for each kind of words as Markdown."""
+    return "\n\n".join(markdown(table).rstrip("\n") for table in _tables(found))
 
 
 def _verdicts(answers: Iterable[StudyAnswer]) -> dict[ListenerCell, list[Verdicts]]:
@@ -149,14 +158,12 @@ def _rows(
     for variant in VARIANTS:
         own = [found.get((variant.name, pool, setting)) for setting in settings]
         cells = [
-            (_percent([one.rate]), _percent(one.interval, "–"), _percent(one.by_seed))
+            (f"{_percent([one.rate])} ({_percent(one.interval, '–')})", _percent(one.by_seed))
             if one
-            else (NOT_APPLICABLE,) * 3
+            else (NOT_APPLICABLE,) * 2
             for one in own
         ]
-        for name, words in zip(
-            ("right", "interval", "by seed"), zip(*cells, strict=True), strict=True
-        ):
+        for name, words in zip(("right", "by seed"), zip(*cells, strict=True), strict=True):
             yield Row(variant.title, name, "ours", tuple(Entry(word=word) for word in words))
 
 
