@@ -3,12 +3,14 @@
 import csv
 import json
 import re
+from collections import Counter
 from fractions import Fraction
 from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
+import write_listener_study as study
 from plan_files import plan_file
 from typer.testing import CliRunner
 
@@ -27,6 +29,20 @@ from roboirg.tasks.splits.splits import get_episode
 from roboirg.util.media import Clip, Picture, encode_mp4, encode_png
 
 PAGE = Path(__file__).parents[3] / "docs" / "learned-listener.md"
+
+
+def test_the_page_has_the_tables_of_the_study_s_answers():
+    assert study.PAGE.read_text(encoding="utf-8") == study.page_text(), "write_listener_study.py"
+
+
+def test_each_listener_of_the_study_answered_every_instruction_with_every_seed():
+    asked = Counter((one.listener, one.seed) for one in study.answers())
+    assert asked.keys() == {(one.name, seed) for one in VARIANTS for seed in range(3)}
+    assert len(set(asked.values())) == 1
+    with study.TASKS.open() as file:
+        rows = list(csv.DictReader(file))
+    assert sum(int(one["answers"]) for one in rows) == len(study.answers())
+    assert sum(int(one["right"]) for one in rows) == sum(one.is_right for one in study.answers())
 
 
 def test_without_pytorch_one_sentence_says_what_to_do(monkeypatch, tmp_path):
