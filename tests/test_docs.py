@@ -122,8 +122,8 @@ def test_what_came_since_the_paper_is_the_file_s():
 
 def test_readme_s_results_are_those_of_their_pages():
     page = (ROOT / "docs" / "learned-listener-results.md").read_text()
+    held_out = page.split("### Held-out words\n")[1]
     for name, listener in (("all settings", "all settings"), ("explicit words", "explicit only")):
-        held_out = page.split("### Held-out words\n")[1]
         rates = row_of(f"| {listener} | right |", held_out).partition(" right |")[2]
         assert row_of(f"{name} (goals").endswith(rates)
     statistics = (ROOT / "docs" / "statistics.md").read_text()

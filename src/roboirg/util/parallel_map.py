@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import functools
-import textwrap
 import traceback
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
@@ -54,7 +53,7 @@ def parallel_map(
                 child, item = busy.pop(connection)
                 reply = child.receive()
                 if isinstance(reply, ChildExit):
-                    shown = textwrap.shorten(repr(item), MOST_SHOWN, placeholder=" …")
+                    shown = repr(item)[:MOST_SHOWN]
                     raise RoboIRGError(f"A worker process died at {shown}: {reply}.")
                 outcome, error = reply
                 if error is not None:

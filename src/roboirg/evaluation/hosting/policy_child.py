@@ -179,7 +179,8 @@ class PolicyChild:
 
     def _read_output(self) -> None:
         """Read what it prints, so that it never waits, and keep a part of it."""
-        while select.select([self._output], [], []):
+        while not self._output.closed:
+            select.select([self._output], [], [])
             with self._changed:
                 self._is_reading = True
             data = os.read(self._output.fileno(), 65_536)
@@ -191,8 +192,6 @@ class PolicyChild:
                 if not data:
                     self._output.close()
                 self._changed.notify_all()
-            if not data:
-                return
 
 
 def _explain(ended: ChildExit) -> EpisodeLostError:
