@@ -6,6 +6,8 @@ import re
 
 MOST_SUBGOAL_LETTERS = 300
 """Characters; the policies that follow subgoals truncate after 128 tokens."""
+BETWEEN_VERSIONS = " + "
+"""Between the versions of a planner and its policy, as one version of both."""
 SCRIPTED_HANDS = "scripted hands"
 """Version of the scripted expert where it follows subgoals; rows and pages are marked by it."""
 UNKNOWN_WORDS = "these words are no subgoal that the hands know"

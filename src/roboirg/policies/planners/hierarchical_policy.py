@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from roboirg.core.errors import InvalidValueError
 from roboirg.core.observations import Demonstration, Observation
+from roboirg.core.subgoal_text import BETWEEN_VERSIONS
 from roboirg.policies.contract.base import (
     Policy,
     ReportingFollower,
@@ -191,7 +192,7 @@ class PrivilegedHierarchicalPolicy(HierarchicalPolicy):
 
 def joint_version(*parts: object) -> str:
     """Return the versions of a planner and its policy as one."""
-    return " + ".join(str(getattr(one, "version", "unknown")) for one in parts)
+    return BETWEEN_VERSIONS.join(str(getattr(one, "version", "unknown")) for one in parts)
 
 
 def with_planner(planner: Planner, policy: Policy, name: str | None = None) -> HierarchicalPolicy:

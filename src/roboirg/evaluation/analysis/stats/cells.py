@@ -18,7 +18,7 @@ import numpy as np
 from roboirg.core.arms import TOLD
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.core.observations import DemonstrationFrames
-from roboirg.core.subgoal_text import SCRIPTED_HANDS
+from roboirg.core.subgoal_text import BETWEEN_VERSIONS, SCRIPTED_HANDS
 from roboirg.evaluation.analysis.stats.intervals import (
     DRAWS,
     Interval,
@@ -137,6 +137,11 @@ class PolicyRun(NamedTuple):
     def marked_policy(self) -> str:
         """The policy's name, marked if it is privileged."""
         return self.policy + self.mark
+
+    @property
+    def has_planner(self) -> bool:
+        """Whether it has played as a planner with a policy."""
+        return self.versions is not None and BETWEEN_VERSIONS in self.versions.policy
 
     @property
     def mark(self) -> str:

@@ -112,10 +112,7 @@ def is_informative(which: Which, cells: Cells) -> bool:
     rows = list(_positions(which, only_told(cells)))
     if which == "planner":
         runs = {policy_run for policy_run, _ in rows}
-        return len(runs) > 1 and any(
-            one.versions and " + " in one.versions.policy  # a planner's and its policy's
-            for one in runs
-        )
+        return len(runs) > 1 and any(one.has_planner for one in runs)
     if which == "context":
         return len({position.options for _, position in rows}) > 1
     # Explicit alone is a reference, but nothing to read.
