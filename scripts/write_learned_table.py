@@ -146,9 +146,9 @@ def _both_rates(one: ArmFigure) -> str:
 
 
 def _tasks_of(by_task: Mapping[str, Mapping[int, CellResults]]) -> Iterator[NDArray[np.float64]]:
-    """Yield the verdicts of the first training seed for each task."""
+    """Yield the verdicts of each training seed, by task."""
     for trained in by_task.values():
-        yield verdicts({0: trained[0]}).astype(float)
+        yield verdicts(trained).astype(float)
 
 
 def _rate(one: TrainedRate) -> str:

@@ -42,7 +42,7 @@ def write_atomically(path: Path, content: str | bytes) -> None:
 
 @contextlib.contextmanager
 def locked(path: Path, taken: str) -> Iterator[None]:
-    """Hold the lock of a file, which is made if it is missing and stays, for one process alone.
+    """Hold the lock of a file for one process alone; file and folder are made if missing, and stay.
 
     The kernel releases it when the process ends, however it ends.
 
@@ -51,9 +51,13 @@ def locked(path: Path, taken: str) -> Iterator[None]:
         taken: the error if another process holds the lock.
 
     Raises:
-        InvalidValueError: another process holds it.
+        InvalidValueError: another process holds it, or it cannot be made.
     """
-    descriptor = os.open(path, os.O_RDWR | os.O_CREAT, 0o644)
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        descriptor = os.open(path, os.O_RDWR | os.O_CREAT, 0o644)
+    except OSError as error:
+        raise InvalidValueError(f"Cannot write {path}: {error.strerror}.") from error
     try:
         try:
             fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)

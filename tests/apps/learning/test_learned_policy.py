@@ -4,6 +4,8 @@ import json
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 from plan_files import plan_file
 from typer.testing import CliRunner
 
@@ -24,6 +26,7 @@ from roboirg.policies import play
 from roboirg.policies.builtin.waypoint_expert import Disturbance, WaypointExpert
 from roboirg.policies.by_name.loading import is_privileged, make_policy, needs_host
 from roboirg.tasks.splits.splits import get_episode
+from roboirg.util.atomic_write import locked
 
 
 def test_without_pytorch_one_sentence_says_what_to_do(monkeypatch, tmp_path):
@@ -184,13 +187,49 @@ def test_a_recording_is_read_as_it_was_written(recorded, tmp_path):
         load_recording(path)
 
 
+@given(st.lists(st.sampled_from(["PickXtimes", "BinFill", "StopCube"]), max_size=90))
+def test_each_task_is_learned_and_shows_how_training_goes(tasks):
+    pytest.importorskip("torch")
+    from roboirg.apps.learning.policy.body_training import HELD_BACK, held_back
+
+    found = list(zip(tasks, held_back(tasks), strict=True))
+    for task in set(tasks):
+        own = [is_held for one, is_held in found if one == task]
+        assert not own[0]
+        assert sum(own) == (len(own) + HELD_BACK - 2) // HELD_BACK
+
+
+def learn(*options):
+    """Return the error of the command with wrong options."""
+    pytest.importorskip("torch")
+    done = CliRunner().invoke(app, ["learn", "policy", *map(str, options)])
+    assert isinstance(done.exception, InvalidValueError), done.output
+    return str(done.exception)
+
+
+def test_what_cannot_be_learned_is_said_before_anything_is_recorded(tmp_path):
+    out = tmp_path / "policy"
+    unheard = learn("--tasks", "StopCube", "--settings", "spatial", "--out", out)
+    assert "None of these tasks has the setting spatial." in unheard
+    plan = plan_file(training={"encoders": {"bert": {}}})
+    assert "no encoder 'bert'" in learn("--plan", plan, "--out", out)
+    assert "--paper trains all memories" in learn("--paper", "--memory", "none", "--out", out)
+    (tmp_path / "file").touch()
+    assert "Cannot write" in learn("--out", tmp_path / "file" / "policy")
+    with locked(out / ".lock", "held"):
+        assert "Another command learns in" in learn("--out", out)
+    assert not (out / "recordings").exists()
+
+
+FEW = {"scenes": 3, "drawn": 2, "detector_epochs": 1, "body_epochs": 2, "reader_epochs": 1}
+
+
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
     """A policy that has hardly learned, made by the command."""
     pytest.importorskip("torch")
     folder = tmp_path_factory.mktemp("policy")
-    few = {"scenes": 3, "drawn": 2, "detector_epochs": 1, "body_epochs": 2, "reader_epochs": 1}
-    plan = plan_file(training=few)
+    plan = plan_file(training=FEW)
     call = ["learn", "policy", "--tasks", "ButtonUnmask", "--out", str(folder), "--plan", plan]
     done = CliRunner().invoke(app, [*call, "--workers", "0"])
     assert done.exit_code == 0, done.output
@@ -228,3 +267,17 @@ def test_recordings_and_the_detector_are_used_again(folder):
     assert done.exit_code == 0, done.output
     assert (place / "none-none-0.pt").exists()
     assert {path: path.stat().st_mtime_ns for path in kept} == before
+
+
+@pytest.mark.sim
+@pytest.mark.slow
+def test_a_folder_of_another_plan_loses_nothing(folder):
+    place, (*call, plan) = folder
+    before = {path: path.stat().st_mtime_ns for path in place.rglob("*.*")}
+    options = call[2:]
+    other = "--memory", "none"
+    assert "recordings with tasks" in learn("--tasks", "PickXtimes", *options[2:], plan, *other)
+    assert "recordings with drawn 2, not 300" in learn(*options[:-1], *other)
+    longer = plan_file(training=FEW | {"body_epochs": 3})
+    assert "was trained by another plan" in learn(*options, longer)
+    assert {path: path.stat().st_mtime_ns for path in place.rglob("*.*")} == before

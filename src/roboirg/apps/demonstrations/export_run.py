@@ -156,7 +156,6 @@ def _opened(plan: ExportPlan, out: Path) -> Iterator[Path]:
         raise InvalidValueError(
             f"{str(out)!r} is not empty and no export that was stopped; choose another folder."
         )
-    work.mkdir(parents=True, exist_ok=True)
     with locked(work / ".lock", f"Another export writes to {str(out)!r}."):
         started = work / "plan.json"
         before = _read_fingerprint(started)

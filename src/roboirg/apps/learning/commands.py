@@ -127,6 +127,7 @@ class PolicyWords(PlanWords):
 
 
 NO_POLICY_WORDS = PolicyWords()
+USUAL_MEMORY = "recurrent"
 PLAYED = ("episodes", "split")
 """Keys of a plan that change what the paper's experiment plays."""
 
@@ -146,7 +147,7 @@ def learn_policy(
         typer.Option(
             help="What it remembers: none, recurrent, ttt, framesamp, subgoal or keyframes."
         ),
-    ] = "recurrent",
+    ] = USUAL_MEMORY,
     words: PolicyWords = NO_POLICY_WORDS,
     paper: Annotated[
         bool,
@@ -170,6 +171,7 @@ def learn_policy(
     from roboirg.apps.learning.policy.policy_plan import MEMORY_NAMES, PolicyPlan
     from roboirg.cli.names import known_name, known_settings, known_tasks
     from roboirg.core.word_pools import POOLS
+    from roboirg.util.atomic_write import locked
     from roboirg.util.processor import worker_count
 
     plan = PolicyPlan(
@@ -179,19 +181,32 @@ def learn_policy(
         memory=known_name("memory", memory, MEMORY_NAMES),
         **words.choices(PolicyPlan),
     )
+    if paper and memory != USUAL_MEMORY:
+        raise InvalidValueError("--paper trains all memories; name some under memories in a plan.")
     check_learn_support()
-    out.mkdir(parents=True, exist_ok=True)
-    if paper:
-        _play_paper(plan, words, out, worker_count(workers))
-        return
-    from roboirg.apps.learning.policy.policy_model import save_policy
-    from roboirg.apps.learning.policy.policy_training import train_policy
-
-    path = out / f"{plan.name}.pt"
-    check_output_file(path)
-    save_policy(train_policy(plan, out, worker_count(workers), _print_tenths()), path)
+    with locked(out / ".lock", f"Another command learns in {str(out)!r}."):
+        if paper:
+            _play_paper(plan, words, out, worker_count(workers))
+            return
+        path = _train_policy(plan, out, worker_count(workers))
     typer.echo(f"{path}, {path.stat().st_size / 2**20:.1f} MiB")
-    typer.echo(f"Play it with: roboirg run --policy trained:{path} --tasks {tasks} --out runs")
+    heard = "explicit" if settings == "none" else settings
+    typer.echo(
+        f"Play it with: roboirg run --policy trained:{path} --tasks {tasks} --split val "
+        f"--settings {heard} --out runs"
+    )
+
+
+def _train_policy(plan: PolicyPlan, folder: Path, workers: int) -> Path:
+    """Train a policy; return its file."""
+    from roboirg.apps.learning.policy.policy_model import load_policy, save_policy
+    from roboirg.apps.learning.policy.policy_training import check_same_plan, train_policy
+
+    path = folder / f"{plan.name}.pt"
+    if path.exists():
+        check_same_plan(plan, load_policy(path), path)
+    save_policy(train_policy(plan, folder, workers, _print_tenths()), path)
+    return path
 
 
 def _play_paper(plan: PolicyPlan, words: PolicyWords, out: Path, workers: int) -> None:

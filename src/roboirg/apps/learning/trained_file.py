@@ -62,13 +62,16 @@ def load_trained(
     Raises:
         InvalidValueError: the file is none of that kind.
     """
+    reason = "PyTorch cannot read it"
     try:
         content = torch.load(path, weights_only=True, map_location="cpu")
-        if content.get("format") != file_format:
-            raise InvalidValueError(f"its format is {content.get('format')!r}, not {file_format!r}")
-        return read(content)
+        found = content.get("format")
+        reason = f"its format is {found!r}, not {file_format!r}"
+        if found == file_format:
+            reason = "its parts do not fit together"
+            return read(content)
+        raise ValueError(reason)
     except Exception as error:
-        reason = str(error).splitlines()[0] if str(error) else type(error).__name__
         raise InvalidValueError(
             f"{str(path)!r} is no trained {kind} ({reason}); make one with: roboirg learn {kind}."
         ) from error

@@ -91,10 +91,11 @@ def run_study(
     there and were made of the same plan are used again.
     """
     from roboirg.apps.learning.listener.learned_model import load_model, save_model
-    from roboirg.apps.learning.listener.listener_training import check_plan, see_episodes, teach
+    from roboirg.apps.learning.listener.listener_training import see_episodes, teach
+    from roboirg.apps.learning.listener.reader_training import check_reader
     from roboirg.apps.learning.trainer import part_of
 
-    check_plan(plan)
+    check_reader(plan.tasks, plan.settings, plan.encoders)
     work = folder / WORK
     shown: list[tuple[Episode, list[Pixels]]] = []
     for seed in range(plan.seed, plan.seed + plan.seeds):

@@ -14,7 +14,7 @@ from pydantic import NonNegativeInt, PositiveInt
 
 from roboirg.apps.learning.labeled_views import LabeledView, draw_missing, look, read_views
 from roboirg.apps.learning.listener.detector_net import SIZE, DetectorNet, detector_loss
-from roboirg.apps.learning.listener.encoders import ENCODERS, make_encoders
+from roboirg.apps.learning.listener.encoders import ENCODERS
 from roboirg.apps.learning.listener.learned_model import LearnedModel, Without, hide
 from roboirg.apps.learning.listener.object_relations import (
     SeenObjects,
@@ -22,15 +22,17 @@ from roboirg.apps.learning.listener.object_relations import (
     fit_plane,
     relate,
 )
-from roboirg.apps.learning.listener.reader_training import lesson_of, said, train_reader
+from roboirg.apps.learning.listener.reader_training import (
+    check_reader,
+    lesson_of,
+    said,
+    train_reader,
+)
 from roboirg.apps.learning.listener.vocabulary import USUAL_ENCODERS, ListenerInput, make_vocabulary
 from roboirg.apps.learning.trainer import KeptTraining, Progress, Trainer, batch_count, batches
 from roboirg.core.episode import ENVIRONMENT_VERSION, Episode, Split
-from roboirg.core.errors import InvalidValueError
 from roboirg.core.word_pools import PoolName
 from roboirg.language import LANGUAGE_VERSION
-from roboirg.language.settings import settings_of
-from roboirg.tasks import get_task
 from roboirg.tasks.splits.splits import SIZES, get_episode
 
 TRAINING_SPLIT: Split = "train"
@@ -106,16 +108,9 @@ def train_listener(
     Pictures, the detector and the reader on the way stay in the folder, and are used again as far
     as they fit. The name is the listener's among those of the folder.
     """
-    check_plan(plan)
+    check_reader(plan.tasks, plan.settings, plan.encoders)
     scenes = see_episodes(plan, folder, workers, progress)
     return teach(scenes, plan, folder / f"reader-{name}-{plan.seed}.pt", progress)
-
-
-def check_plan(plan: TrainingPlan) -> None:
-    """Raise early what would else be raised after pictures are drawn."""
-    if not any(set(plan.settings) & set(settings_of(get_task(task))) for task in plan.tasks):
-        raise InvalidValueError(f"None of these tasks has the setting {', '.join(plan.settings)}.")
-    make_encoders(make_vocabulary(["a"], ["cube"], plan.tasks), plan.encoders)
 
 
 def see_episodes(

@@ -10,8 +10,9 @@ from typing import Any, NamedTuple
 import torch
 from torch.nn import functional
 
+from roboirg.apps.learning.listener.encoders import make_encoders
 from roboirg.apps.learning.listener.listener_net import ListenerNet
-from roboirg.apps.learning.listener.vocabulary import ListenerInput, Vocabulary
+from roboirg.apps.learning.listener.vocabulary import ListenerInput, Vocabulary, make_vocabulary
 from roboirg.apps.learning.trainer import (
     KeptTraining,
     Progress,
@@ -20,14 +21,15 @@ from roboirg.apps.learning.trainer import (
     even_batches,
 )  # fmt: skip
 from roboirg.core.episode import Episode
+from roboirg.core.errors import InvalidValueError
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.core.word_pools import PoolName
 from roboirg.language import FORMS
 from roboirg.language.instruction import Instruction
-from roboirg.language.settings import EXPLICIT, all_settings
+from roboirg.language.settings import EXPLICIT, all_settings, settings_of
 from roboirg.language.variants import instructions
 from roboirg.policies.vlm.goal_schema import goal_schema
-from roboirg.tasks import goals_of, with_goal
+from roboirg.tasks import get_task, goals_of, with_goal
 
 READER_RATE = 1e-3
 FORGOTTEN_WORDS = 0.05
@@ -65,6 +67,15 @@ def with_more_goals(episodes: Iterable[Episode], goals: int, seed: int) -> Itera
         others = [goal for goal in every if goal != episode.goal]
         for goal in rng.sample(others, min(goals - 1, len(others))):
             yield with_goal(episode, goal)
+
+
+def check_reader(
+    tasks: Sequence[str], settings: Sequence[str], encoders: Mapping[str, Mapping[str, Any]]
+) -> None:
+    """Raise early what would else be raised after pictures are drawn."""
+    if settings and not any(set(settings) & set(settings_of(get_task(task))) for task in tasks):
+        raise InvalidValueError(f"None of these tasks has the setting {', '.join(settings)}.")
+    make_encoders(make_vocabulary(["a"], ["cube"], tasks), encoders)
 
 
 class Lesson(NamedTuple):

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import math
 import random
+from collections import Counter
 from collections.abc import Iterator, Sequence
 from functools import partial
+from itertools import compress
 from pathlib import Path
 from typing import Any
 
@@ -37,7 +39,7 @@ COUNT_WEIGHT = 0.5
 NEW_NOISE_EVERY = 2
 """Passes after which the noise of the detector is drawn anew."""
 HELD_BACK = 10
-"""Every tenth episode is not learned from, but shows how learning goes."""
+"""Of every ten episodes of a task, the second shows how training goes and is not learned from."""
 
 
 def train_body(
@@ -69,8 +71,8 @@ def train_body(
             found.append(with_planned(plan.memory, one, episode, len(moves), sight, rng))
         return found
 
-    held_back = -(-len(recorded) // HELD_BACK)
-    count = math.ceil((len(recorded) - held_back) / BATCH)
+    learned = [not one for one in held_back([one.episode.task for one in recorded])]
+    count = math.ceil(sum(learned) / BATCH)
     trainer = Trainer[EpisodeNumbers](
         body,
         lambda batch: body_loss(body, to_batch(batch)),
@@ -83,19 +85,33 @@ def train_body(
     def mixed(number: int) -> Iterator[list[EpisodeNumbers]]:
         if not shown or number % NEW_NOISE_EVERY == 0:
             shown[:] = see(number // NEW_NOISE_EVERY)
-        learned = [one for place, one in enumerate(shown) if place % HELD_BACK]
-        return even_batches(learned, random.Random(f"{plan.seed}/{number}"), _length, BATCH)
+        rng = random.Random(f"{plan.seed}/{number}")
+        return even_batches(list(compress(shown, learned)), rng, _length, BATCH)
+
+    def score_unseen() -> dict[str, float]:
+        unseen = [one for one, is_learned in zip(shown, learned, strict=True) if not is_learned]
+        return dict(zip(SHOWN, score(body, unseen), strict=True))
 
     found = trainer.learn(
         plan.body_epochs,
         mixed,
         partial(progress, "body"),
         KeptTraining(path, _made_of(plan, recorded, moves, sight, vocabulary)),
-        lambda: dict(zip(SHOWN, score(body, shown[::HELD_BACK]), strict=True)),
+        score_unseen,
     )
     scores = [BodyScore(epoch, **one) for epoch, one in enumerate(found, 1)]
     save_curve(scores, path)
     return body
+
+
+def held_back(tasks: Sequence[str]) -> list[bool]:
+    """Return which episodes are not learned from, given the task of each."""
+    before: Counter[str] = Counter()
+    found = []
+    for task in tasks:
+        found.append(before[task] % HELD_BACK == 1)
+        before[task] += 1
+    return found
 
 
 def _made_of(

@@ -101,7 +101,7 @@ def train_rows(
         progress: called with the row and a kind of work, what is done of it, and all of it.
     """
     from roboirg.apps.learning.policy.policy_model import load_policy, save_policy
-    from roboirg.apps.learning.policy.policy_training import about_policy, train_policy
+    from roboirg.apps.learning.policy.policy_training import check_same_plan, train_policy
     from roboirg.apps.learning.trainer import part_of
 
     found = {}
@@ -111,11 +111,7 @@ def train_rows(
             path = folder / f"{own.name}.pt"
             if not path.exists():
                 save_policy(train_policy(own, folder, workers, part_of(progress, name)), path)
-            trained = load_policy(path).about
-            if any(trained[key] != value for key, value in about_policy(own).items()):
-                raise InvalidValueError(
-                    f"{str(path)!r} was trained by another plan; give another folder, or delete it."
-                )
+            check_same_plan(own, load_policy(path), path)
             found[name] = path
     return found
 

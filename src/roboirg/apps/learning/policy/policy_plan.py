@@ -11,6 +11,7 @@ from roboirg.apps.learning.listener.vocabulary import USUAL_ENCODERS
 from roboirg.apps.learning.policy.recording import ExpertRecording
 from roboirg.core.episode import Episode
 from roboirg.core.word_pools import PoolName
+from roboirg.language.settings import plain_settings
 
 MEMORY_NAMES = ("none", "recurrent", "ttt", "framesamp", "subgoal", "keyframes")
 """The kinds of memory; the last two are a planner's."""
@@ -21,8 +22,6 @@ HANDS = "hands"
 """The body that follows the subgoals of a planner, and remembers nothing."""
 WORDLESS = "none"
 """Words of a policy that is trained without any."""
-MANY = 3
-"""Settings from which on their names are not listed."""
 
 
 class PolicyPlan(NamedTuple):
@@ -59,8 +58,9 @@ class PolicyPlan(NamedTuple):
     @property
     def heard(self) -> str:
         """Which settings it hears, for names of files."""
-        few = "-".join(self.settings) or WORDLESS
-        return "all" if len(self.settings) > MANY else few
+        if self.settings == plain_settings():
+            return "all"
+        return "-".join(self.settings) or WORDLESS
 
     @property
     def name(self) -> str:

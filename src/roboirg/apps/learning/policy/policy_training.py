@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import json
 import math
 import random
 from collections.abc import Iterator, Sequence
@@ -15,9 +16,16 @@ import torch
 from numpy.typing import NDArray
 from torch.nn import functional
 
+from roboirg.apps.learning.listener.encoders import ENCODERS
 from roboirg.apps.learning.listener.listener_net import ListenerNet
 from roboirg.apps.learning.listener.object_relations import corners_of
-from roboirg.apps.learning.listener.reader_training import Lesson, lesson_of, said, train_reader
+from roboirg.apps.learning.listener.reader_training import (
+    Lesson,
+    check_reader,
+    lesson_of,
+    said,
+    train_reader,
+)
 from roboirg.apps.learning.listener.vocabulary import ListenerInput, Vocabulary, make_vocabulary
 from roboirg.apps.learning.policy.body_training import train_body
 from roboirg.apps.learning.policy.moves import common_moves, decisions_of
@@ -57,10 +65,12 @@ from roboirg.apps.learning.policy.thing_detector import (
 )
 from roboirg.apps.learning.policy.tracks import LookTokens
 from roboirg.apps.learning.trainer import KeptTraining, Progress, Trainer, batch_count, batches
+from roboirg.core.episode import ENVIRONMENT_VERSION
 from roboirg.core.errors import InvalidValueError, MotionPlanningError
 from roboirg.language import LANGUAGE_VERSION
 from roboirg.policies.builtin.waypoint_expert import Disturbance
 from roboirg.tasks.splits.splits import get_episode
+from roboirg.util.atomic_write import write_atomically
 from roboirg.util.media import decode_png
 from roboirg.util.parallel_map import parallel_map
 from roboirg.util.short_hash import short_hash
@@ -89,8 +99,13 @@ def train_policy(plan: PolicyPlan, folder: Path, workers: int, progress: Progres
         progress: called with a kind of work, what is done of it, and all of it.
 
     Raises:
-        InvalidValueError: no episode of a task could be recorded.
+        InvalidValueError: no episode of a task could be recorded, the plan cannot be followed, or
+            the folder holds what another plan recorded.
     """
+    check_reader(plan.tasks, plan.settings, plan.encoders)
+    if pixels := [name for name in plan.encoders if ENCODERS[name].reads_pixels]:
+        raise InvalidValueError(f"Encoder {pixels[0]!r} reads pixels; a policy's reader has none.")
+    _check_folder(plan, folder)
     recorded = record_all(plan, folder, workers, progress)
     sight = sight_of(one.recording for one in recorded)
     detector = _detector(plan, recorded, sight, folder, progress)
@@ -126,6 +141,33 @@ def about_policy(plan: PolicyPlan) -> dict[str, Any]:
         "words": plan.words if plan.settings else WORDLESS,
         "language_version": LANGUAGE_VERSION,
     }
+
+
+def check_same_plan(plan: PolicyPlan, trained: PolicyModel, path: Path) -> None:
+    """Raise an error if a policy's file is another plan's."""
+    if any(trained.about.get(name) != value for name, value in about_policy(plan).items()):
+        raise InvalidValueError(
+            f"{str(path)!r} was trained by another plan; give another folder, or delete it."
+        )
+
+
+def _check_folder(plan: PolicyPlan, folder: Path) -> None:
+    """Refuse a folder whose recordings and detector do not fit; write what they are made for."""
+    path = folder / "recorded.json"
+    wanted = {
+        "tasks": list(plan.tasks),
+        "drawn": plan.drawn,
+        "environment_version": ENVIRONMENT_VERSION,
+    }
+    if not path.exists():
+        write_atomically(path, json.dumps(wanted))
+    found = json.loads(path.read_text(encoding="utf-8"))
+    for name, value in wanted.items():
+        if found.get(name) != value:
+            raise InvalidValueError(
+                f"{str(folder)!r} holds recordings with {name} {found.get(name)}, not {value}; "
+                "give another folder."
+            )
 
 
 def record_all(plan: PolicyPlan, folder: Path, workers: int, progress: Progress) -> list[Recorded]:
@@ -234,7 +276,9 @@ def _lessons(
     told = [
         (episode, instruction.text)
         for episode, instruction in said(episodes, plan.settings, plan.words, plan.goals, plan.seed)
-    ] or [(episode, "") for episode in episodes]
+    ]
+    if not plan.settings:
+        told = [(episode, "") for episode in episodes]
     vocabulary = make_vocabulary((text for _, text in told), sight.classes, plan.tasks)
     lessons = [
         lesson_of(ListenerInput(episode.task, text, seen[episode.key]), episode)
