@@ -187,6 +187,27 @@ def test_a_recording_is_read_as_it_was_written(recorded, tmp_path):
         load_recording(path)
 
 
+def test_a_file_that_cannot_be_loaded_is_said_with_the_reason(tmp_path):
+    torch = pytest.importorskip("torch")
+    from roboirg.apps.learning.trained_file import load_trained
+
+    def reason(read=dict):
+        with pytest.raises(InvalidValueError, match="is no trained policy") as found:
+            load_trained(path, "policy", "this", read)
+        return str(found.value)
+
+    path = tmp_path / "policy.pt"
+    assert "No such file" in reason()
+    path.write_bytes(b"nothing")
+    assert "it is damaged" in reason()
+    for content in ([1], {"format": "that"}):
+        torch.save(content, path)
+        assert "its format is not 'this'" in reason()
+    torch.save({"format": "this"}, path)
+    assert "it is damaged" in reason(lambda content: content["body"])
+    assert load_trained(path, "policy", "this", dict) == {"format": "this"}
+
+
 @given(st.lists(st.sampled_from(["PickXtimes", "BinFill", "StopCube"]), max_size=90))
 def test_each_task_is_learned_and_shows_how_training_goes(tasks):
     pytest.importorskip("torch")
@@ -207,15 +228,28 @@ def learn(*options):
     return str(done.exception)
 
 
-def test_what_cannot_be_learned_is_said_before_anything_is_recorded(tmp_path):
+def test_what_cannot_be_learned_is_said_before_anything_is_recorded(tmp_path, monkeypatch):
+    pytest.importorskip("torch")
+    from roboirg.apps.learning.listener.encoders import ENCODERS, TokenEncoder
+
+    class PixelEncoder(TokenEncoder):
+        reads_pixels = True
+
+        def __init__(self, vocabulary):
+            super().__init__()
+
+    monkeypatch.setitem(ENCODERS, "pixels", PixelEncoder)
     out = tmp_path / "policy"
     unheard = learn("--tasks", "StopCube", "--settings", "spatial", "--out", out)
     assert "None of these tasks has the setting spatial." in unheard
     plan = plan_file(training={"encoders": {"bert": {}}})
     assert "no encoder 'bert'" in learn("--plan", plan, "--out", out)
-    assert "--paper trains all memories" in learn("--paper", "--memory", "none", "--out", out)
+    assert "training.memories" in learn("--paper", "--memory", "none", "--out", out)
     (tmp_path / "file").touch()
+    assert "is a file; --out needs a folder" in learn("--out", tmp_path / "file")
     assert "Cannot write" in learn("--out", tmp_path / "file" / "policy")
+    pixels = plan_file(training={"encoders": {"pixels": {}}})
+    assert "a policy's reader has none" in learn("--plan", pixels, "--out", out)
     with locked(out / ".lock", "held"):
         assert "Another command learns in" in learn("--out", out)
     assert not (out / "recordings").exists()

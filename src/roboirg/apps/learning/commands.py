@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from shlex import quote
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -182,7 +183,9 @@ def learn_policy(
         **words.choices(PolicyPlan),
     )
     if paper and memory != USUAL_MEMORY:
-        raise InvalidValueError("--paper trains all memories; name some under memories in a plan.")
+        raise InvalidValueError("--paper has its memories from the plan: training.memories.")
+    if out.exists() and not out.is_dir():
+        raise InvalidValueError(f"{str(out)!r} is a file; --out needs a folder.")
     check_learn_support()
     with locked(out / ".lock", f"Another command learns in {str(out)!r}."):
         if paper:
@@ -191,9 +194,9 @@ def learn_policy(
         path = _train_policy(plan, out, worker_count(workers))
     typer.echo(f"{path}, {path.stat().st_size / 2**20:.1f} MiB")
     heard = "explicit" if settings == "none" else settings
+    options = f"--tasks {quote(tasks)} --split val --settings {quote(heard)} --wordings test"
     typer.echo(
-        f"Play it with: roboirg run --policy trained:{path} --tasks {tasks} --split val "
-        f"--settings {heard} --out runs"
+        f"Play it with: roboirg run --policy {quote(f'trained:{path}')} {options} --out runs"
     )
 
 

@@ -62,16 +62,22 @@ def load_trained(
     Raises:
         InvalidValueError: the file is none of that kind.
     """
-    reason = "PyTorch cannot read it"
     try:
         content = torch.load(path, weights_only=True, map_location="cpu")
-        found = content.get("format")
-        reason = f"its format is {found!r}, not {file_format!r}"
-        if found == file_format:
-            reason = "its parts do not fit together"
-            return read(content)
-        raise ValueError(reason)
+        if not isinstance(content, dict) or content.get("format") != file_format:
+            raise InvalidValueError(f"its format is not {file_format!r}")
+        return read(content)
     except Exception as error:
         raise InvalidValueError(
-            f"{str(path)!r} is no trained {kind} ({reason}); make one with: roboirg learn {kind}."
+            f"{str(path)!r} is no trained {kind} ({_reason(error)}); "
+            f"make one with: roboirg learn {kind}."
         ) from error
+
+
+def _reason(error: Exception) -> str:
+    """Return in a few words why a file could not be loaded."""
+    if isinstance(error, OSError):
+        return error.strerror or str(error)
+    if isinstance(error, InvalidValueError):
+        return str(error).splitlines()[0].removesuffix(".")
+    return "it is damaged, or was not written by this version"

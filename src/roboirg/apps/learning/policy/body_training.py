@@ -127,7 +127,7 @@ def _made_of(
         [list(move) for move in moves],
         list(sight.classes),
         [list(vocabulary.tasks), list(vocabulary.parts)],
-        plan.body_epochs,
+        [plan.body_epochs, HELD_BACK],
     ]
 
 

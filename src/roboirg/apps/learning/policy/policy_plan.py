@@ -58,7 +58,7 @@ class PolicyPlan(NamedTuple):
     @property
     def heard(self) -> str:
         """Which settings it hears, for names of files."""
-        if self.settings == plain_settings():
+        if set(self.settings) == set(plain_settings()):
             return "all"
         return "-".join(self.settings) or WORDLESS
 

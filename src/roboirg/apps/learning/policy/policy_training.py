@@ -76,6 +76,8 @@ from roboirg.util.parallel_map import parallel_map
 from roboirg.util.short_hash import short_hash
 
 RECORDED_SPLIT = "random"
+RECORDINGS = "recordings"
+"""The folder of recordings in that of a policy."""
 PICTURE_EVERY = 16
 """Looks from one picture to the next in scenes that are drawn; many scenes help more than many
 pictures of each."""
@@ -153,7 +155,11 @@ def check_same_plan(plan: PolicyPlan, trained: PolicyModel, path: Path) -> None:
 
 def _check_folder(plan: PolicyPlan, folder: Path) -> None:
     """Refuse a folder whose recordings and detector do not fit; write what they are made for."""
-    path = folder / "recorded.json"
+    path, recordings = folder / "recorded.json", folder / RECORDINGS
+    if recordings.exists() and not path.exists():
+        raise InvalidValueError(
+            f"{str(folder)!r} holds recordings of an earlier version; give another folder."
+        )
     wanted = {
         "tasks": list(plan.tasks),
         "drawn": plan.drawn,
@@ -176,7 +182,7 @@ def record_all(plan: PolicyPlan, folder: Path, workers: int, progress: Progress)
     Raises:
         InvalidValueError: it succeeded in none of a task.
     """
-    place = folder / "recordings"
+    place = folder / RECORDINGS
     place.mkdir(parents=True, exist_ok=True)
     jobs = [(task, number) for number in range(plan.scenes) for task in plan.tasks]
     missing = [job for job in jobs if not _path(place, *job).exists()]
@@ -220,11 +226,11 @@ def _detector(
     plan: PolicyPlan, recorded: Sequence[Recorded], sight: Sight, folder: Path, progress: Progress
 ) -> ThingDetector:
     """Return the folder's detector if it is of the same plan, or train it."""
-    made_of = [list(sight.classes), list(plan.tasks), plan.drawn, plan.detector_epochs]
     torch.manual_seed(plan.seed)
     detector = ThingDetector(len(sight.classes))
     views: list[LabeledPicture] = []
     count = sum(len(one.recording.pictures) for one in recorded)
+    made_of = [list(sight.classes), list(plan.tasks), count, plan.detector_epochs]
 
     def moved(number: int) -> Iterator[list[LabeledPicture]]:
         if not views:
