@@ -1,4 +1,4 @@
-"""Write the tables of docs/learned-policy-results.md from the pack that holds their episodes.
+"""Write the tables of docs/learned-policy-results.md, and all rates as CSV, from their episodes.
 
 python scripts/write_learned_table.py
 """
@@ -6,6 +6,7 @@ python scripts/write_learned_table.py
 from __future__ import annotations
 
 import functools
+from collections import Counter
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 
@@ -16,6 +17,7 @@ from written_parts import rate_text, with_part
 from roboirg.apps.leaderboard.packing import opened_run
 from roboirg.apps.learning.listener.study_report import TrainedRate, trained_rate
 from roboirg.apps.learning.policy.paper_experiment import row_of
+from roboirg.core.arms import TOLD
 from roboirg.evaluation.analysis.stats.arm_figures import (
     LANGUAGE_USE,
     ORDERS_WORTH,
@@ -28,16 +30,20 @@ from roboirg.evaluation.analysis.stats.chance import silent_chance
 from roboirg.evaluation.analysis.stats.intervals import ALPHA
 from roboirg.evaluation.analysis.stats.paired_tests import holm, sign_flip_test
 from roboirg.evaluation.analysis.stats.run_data import RunData
+from roboirg.evaluation.records.record import Summary
 from roboirg.evaluation.records.store import read_results
 from roboirg.language.settings import EXPLICIT, plain_settings
 from roboirg.tasks import all_tasks
+from roboirg.tasks.splits.splits import SIZES
 
 ROOT = Path(__file__).parent.parent
 PAGE = ROOT / "docs" / "learned-policy-results.md"
-PACK = ROOT / "results" / "learned-policy-val.roboirg.zip"
+RESULTS = ROOT / "results"
+PACK = RESULTS / "learned-policy-val.roboirg.zip"
+BY_TASK = RESULTS / "learned-policy-by-task.csv"
 SMALLEST_P = 0.001
 """Smaller ones are not printed."""
-MEMORY, WITHOUT = "small-recurrent", "small-none"
+MEMORY, FRAMES, WITHOUT = "small-recurrent", "small-framesamp", "small-none"
 WORDS = {MEMORY: "explicit", "small-recurrent-all-words": "all five settings"}
 """What each row's reader was trained on; the body is the same."""
 WORDLESS = "small-recurrent-no-words"
@@ -94,12 +100,56 @@ def memory_table(data: RunData) -> str:
     ]
     for task, pair, p_value in zip(tasks, pairs, p_values, strict=True):
         shown = [_with_seeds(trained_rate([one.astype(float)])) for one in pair]
-        episodes = sorted({trial.episode for trial in with_memory[task][0].verdicts})
-        guess = 100 * np.mean([silent_chance(task, "val", episode) for episode in episodes])
         p_shown = "< 0.001" if p_value < SMALLEST_P else f"{p_value:.3f}"
-        lines.append(f"| {task} | {' | '.join(shown)} | {p_shown} | {guess:.0f} |")
+        lines.append(
+            f"| {task} | {' | '.join(shown)} | {p_shown} | {100 * blind_guess(task):.0f} |"
+        )
     means = [_with_seeds(trained_rate([one[at].astype(float) for one in pairs])) for at in (0, 1)]
     return "\n".join([*lines, f"| mean | {' | '.join(means)} | | |"])
+
+
+def memories_table(data: RunData) -> str:
+    """Return the success of each memory in explicit words, mean over tasks."""
+    cells = told(data)
+    lines = ["| memory | all eleven tasks | each seed |", "| --- | ---: | --- |"]
+    for row in (MEMORY, FRAMES, WITHOUT):
+        found = _with_seeds(trained_rate(list(_tasks_of(cells[row, EXPLICIT]))))
+        lines.append(f"| `{row.removeprefix('small-')}` | {found} |")
+    return "\n".join(lines)
+
+
+def failures_table(data: RunData) -> str:
+    """Return how the policy with memory fails in explicit words, over its training seeds."""
+    found: dict[str, Counter[str]] = {}
+    for one in failures(data):
+        if one.attribution is not None:
+            found.setdefault(one.task, Counter())[one.attribution.failure] += 1
+    lines = ["| task | failures | of which |", "| --- | ---: | --- |"]
+    for task in (one for one in all_tasks() if one in found):
+        kinds = ", ".join(f"`{name}` {count}" for name, count in found[task].most_common())
+        lines.append(f"| {task} | {found[task].total()} | {kinds} |")
+    return "\n".join(lines)
+
+
+def failures(data: RunData) -> list[Summary]:
+    """Return the failures of the policy with memory in explicit words, of all training seeds."""
+    return [
+        one
+        for _, one in data.results
+        if row_of(one.policy)[0] == MEMORY
+        and (one.arm, one.setting, one.outcome) == (TOLD, EXPLICIT, "failure")
+    ]
+
+
+def by_task(data: RunData) -> str:
+    """Return all rates as CSV: a line for each row, setting, task and training seed."""
+    lines = ["row,setting,task,seed,solved,episodes"]
+    for (row, setting), tasks in sorted(told(data).items()):
+        for task, trained in sorted(tasks.items()):
+            for seed, cell in sorted(trained.items()):
+                solved = sum(cell.verdicts.values())
+                lines.append(f"{row},{setting},{task},{seed},{solved},{cell.trials}")
+    return "\n".join(lines) + "\n"
 
 
 def words_table(data: RunData) -> str:
@@ -118,7 +168,11 @@ def words_table(data: RunData) -> str:
         trained_rate(list(_tasks_of({task: every[task] for task in cells[MEMORY, one]})))
         for one in settings
     ]
-    return "\n".join([*lines, f"| no words | {' | '.join(map(_rate, unheard))} |"])
+    lines.append(f"| no words | {' | '.join(map(_rate, unheard))} |")
+    guesses = [
+        100 * np.mean([blind_guess(task) for task in cells[MEMORY, one]]) for one in settings
+    ]
+    return "\n".join([*lines, f"| a blind guess | {' | '.join(f'{one:.0f}' for one in guesses)} |"])
 
 
 def arms_table(data: RunData) -> str:
@@ -137,6 +191,11 @@ def arms_table(data: RunData) -> str:
             rates = [_both_rates(found[row, figure, one]) for one in settings]
             lines.append(f"| {words} | {figure} | {' | '.join(rates)} |")
     return "\n".join(lines)
+
+
+def blind_guess(task: str) -> float:
+    """Return how often a random goal of the scene would be right."""
+    return float(np.mean([silent_chance(task, "val", episode) for episode in range(SIZES["val"])]))
 
 
 def _both_rates(one: ArmFigure) -> str:
@@ -159,7 +218,13 @@ def _with_seeds(one: TrainedRate) -> str:
     return f"{_rate(one)} | {', '.join(f'{100 * rate:.0f}' for rate in one.by_seed)}"
 
 
-TABLES = {"memory": memory_table, "words": words_table, "arms": arms_table}
+TABLES = {
+    "memory": memory_table,
+    "memories": memories_table,
+    "words": words_table,
+    "arms": arms_table,
+    "failures": failures_table,
+}
 
 
 def page_text() -> str:
@@ -172,3 +237,4 @@ def page_text() -> str:
 
 if __name__ == "__main__":
     PAGE.write_text(page_text(), encoding="utf-8")
+    BY_TASK.write_text(by_task(played()), encoding="utf-8")

@@ -1,6 +1,7 @@
 """The tables of the learned policy are those of its episodes, and they can be played again."""
 
 import re
+from collections import Counter
 
 import numpy as np
 import pytest
@@ -8,11 +9,14 @@ import write_learned_table as tables
 from played_again import assert_holds_here
 
 from roboirg.apps.leaderboard.packing import opened_run
+from roboirg.apps.learning.listener.study_report import trained_rate
 from roboirg.evaluation.records.store import read_results
 from roboirg.language.settings import EXPLICIT, plain_settings, settings_of
 from roboirg.tasks import all_tasks, get_task
+from roboirg.tasks.splits.splits import get_episode
 
 ACT = tables.ROOT / "results" / "act-val.roboirg.zip"
+PICKXTIMES = tables.RESULTS / "pickxtimes-val.roboirg.zip"
 ROWS = "act", "act20"
 """All 100 actions of a chunk, and 20 of them."""
 
@@ -42,7 +46,7 @@ def test_the_readme_has_the_rates_of_the_pack():
 def test_the_pack_has_whole_rows_without_errors():
     cells = tables.told(tables.played())
     wanted = {(row, setting) for row in tables.WORDS for setting in plain_settings()}
-    wanted |= {(row, EXPLICIT) for row in (tables.WITHOUT, tables.WORDLESS)}
+    wanted |= {(row, EXPLICIT) for row in (tables.FRAMES, tables.WITHOUT, tables.WORDLESS)}
     assert cells.keys() == wanted
     for (row, setting), by_task in cells.items():
         tasks = [task for task in all_tasks() if setting in settings_of(get_task(task))]
@@ -50,6 +54,59 @@ def test_the_pack_has_whole_rows_without_errors():
         for trained in by_task.values():
             assert not any(one.errors or one.missing for one in trained.values())
             assert {one.trials for one in trained.values()} == {50}
+
+
+def test_all_rates_are_stored_by_task():
+    assert tables.BY_TASK.read_text(encoding="utf-8") == tables.by_task(tables.played())
+
+
+def test_the_page_has_what_memory_and_a_blind_guess_solve():
+    cells = tables.told(tables.played())
+    apart = 0
+    for task in all_tasks():
+        rates = [
+            trained_rate([tables.verdicts(cells[row, EXPLICIT][task]).astype(float)])
+            for row in (tables.MEMORY, tables.WITHOUT)
+        ]
+        low = rates[0].interval.low
+        apart += low > rates[1].interval.high and low > tables.blind_guess(task)
+    page = " ".join(tables.PAGE.read_text(encoding="utf-8").split())
+    assert apart == 10
+    assert "In ten of eleven tasks, the interval of the policy with memory lies above" in page
+    first = cells[tables.WITHOUT, EXPLICIT]["SwingXtimes"][0].verdicts
+    three = {
+        trial: get_episode("SwingXtimes", "val", trial.episode).goal.number("repeats") == 3
+        for trial in first
+    }
+    solved = [sum(first[one] for one in first if three[one] is long) for long in (False, True)]
+    assert (solved, sum(three.values())) == ([25, 0], 20)
+    assert "solves 25 of the 30 episodes with one or two rounds and none of the 20" in page
+
+
+def test_the_page_has_why_stop_cube_fails():
+    sentences = [
+        one.attribution.sentence
+        for one in tables.failures(tables.played())
+        if one.task == "StopCube"
+    ]
+    late = sum(one.startswith("Let the cube's") for one in sentences)
+    words = f"visit pass without pressing in {late} of its {len(sentences)} failures"
+    page = " ".join(tables.PAGE.read_text(encoding="utf-8").split())
+    assert words in page
+
+
+def test_the_page_has_what_policies_of_one_task_solve():
+    with opened_run(PICKXTIMES) as run:
+        results = read_results(run)
+    won = Counter(one.policy for one in results if one.outcome == "success")
+    first, second, third = (won[name] for name in sorted(won))
+    solved = [
+        [one.outcome == "success" for one in results if one.policy == name] for name in sorted(won)
+    ]
+    rate = trained_rate([np.array(solved, float)])
+    page = " ".join(tables.PAGE.read_text(encoding="utf-8").split())
+    mean, low, high = (round(100 * one) for one in (rate.rate, *rate.interval))
+    assert f"{first}, {second} and {third}, **{mean} % on average** ({low} to {high} %" in page
 
 
 def test_the_page_has_what_act_solves():
@@ -70,6 +127,6 @@ def test_trainings_count_alike_however_many_there_are():
 
 @pytest.mark.sim
 @pytest.mark.slow
-@pytest.mark.parametrize("pack", [tables.PACK, ACT], ids=["small", "act"])
+@pytest.mark.parametrize("pack", [tables.PACK, ACT, PICKXTIMES], ids=lambda pack: pack.name)
 def test_packs_hold_when_some_of_their_episodes_are_played_again(pack):
     assert_holds_here(pack, sample=0.005)
