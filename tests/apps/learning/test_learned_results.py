@@ -1,7 +1,6 @@
 """The tables of the learned policy are those of its episodes, and they can be played again."""
 
 import re
-from collections import Counter
 
 import numpy as np
 import pytest
@@ -15,10 +14,15 @@ from roboirg.language.settings import EXPLICIT, plain_settings, settings_of
 from roboirg.tasks import all_tasks, get_task
 from roboirg.tasks.splits.splits import get_episode
 
-ACT = tables.ROOT / "results" / "act-val.roboirg.zip"
+ACT = tables.RESULTS / "act-val.roboirg.zip"
 PICKXTIMES = tables.RESULTS / "pickxtimes-val.roboirg.zip"
 ROWS = "act", "act20"
 """All 100 actions of a chunk, and 20 of them."""
+
+
+def words_of(page):
+    """Return a page as one line, so that no sentence is broken."""
+    return " ".join(page.read_text(encoding="utf-8").split())
 
 
 def test_the_documentation_has_the_tables_of_the_pack():
@@ -29,8 +33,7 @@ def test_the_documentation_has_the_tables_of_the_pack():
 def test_the_readme_has_the_rates_of_the_pack():
     last = tables.memory_table(tables.played()).splitlines()[-1]
     with_memory, without = re.findall(r"(\d+) \(", last)
-    readme = (tables.ROOT / "README.md").read_text(encoding="utf-8")
-    words = " ".join(readme.split())
+    words = words_of(tables.ROOT / "README.md")
     assert f"solves {with_memory} % of the validation episodes" in words
     assert f"and {without} % without memory" in words
     of_explicit, of_all = tables.words_table(tables.played()).splitlines()[2:4]
@@ -70,7 +73,7 @@ def test_the_page_has_what_memory_and_a_blind_guess_solve():
         ]
         low = rates[0].interval.low
         apart += low > rates[1].interval.high and low > tables.blind_guess(task)
-    page = " ".join(tables.PAGE.read_text(encoding="utf-8").split())
+    page = words_of(tables.PAGE)
     assert apart == 10
     assert "In ten of eleven tasks, the interval of the policy with memory lies above" in page
     first = cells[tables.WITHOUT, EXPLICIT]["SwingXtimes"][0].verdicts
@@ -91,20 +94,18 @@ def test_the_page_has_why_stop_cube_fails():
     ]
     late = sum(one.startswith("Let the cube's") for one in sentences)
     words = f"visit pass without pressing in {late} of its {len(sentences)} failures"
-    page = " ".join(tables.PAGE.read_text(encoding="utf-8").split())
+    page = words_of(tables.PAGE)
     assert words in page
 
 
 def test_the_page_has_what_policies_of_one_task_solve():
     with opened_run(PICKXTIMES) as run:
         results = read_results(run)
-    won = Counter(one.policy for one in results if one.outcome == "success")
-    first, second, third = (won[name] for name in sorted(won))
-    solved = [
-        [one.outcome == "success" for one in results if one.policy == name] for name in sorted(won)
-    ]
+    names = sorted({one.policy for one in results})
+    solved = [[one.outcome == "success" for one in results if one.policy == name] for name in names]
+    first, second, third = map(sum, solved)
     rate = trained_rate([np.array(solved, float)])
-    page = " ".join(tables.PAGE.read_text(encoding="utf-8").split())
+    page = words_of(tables.PAGE)
     mean, low, high = (round(100 * one) for one in (rate.rate, *rate.interval))
     assert f"{first}, {second} and {third}, **{mean} % on average** ({low} to {high} %" in page
 
@@ -113,9 +114,9 @@ def test_the_page_has_what_act_solves():
     with opened_run(ACT) as run:
         results = read_results(run)
     won = {row: [one.outcome == "success" for one in results if one.policy == row] for row in ROWS}
-    page = tables.PAGE.read_text(encoding="utf-8")
+    page = words_of(tables.PAGE)
     assert f"It solves **{sum(won['act'])} of {len(won['act'])}**" in page
-    assert "also none if 20" in " ".join(page.split())
+    assert "also none if 20" in page
     assert (sum(won["act20"]), len(won["act20"])) == (0, 50)
 
 

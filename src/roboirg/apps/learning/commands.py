@@ -193,11 +193,14 @@ def learn_policy(
             return
         path = _train_policy(plan, out, worker_count(workers))
     typer.echo(f"{path}, {path.stat().st_size / 2**20:.1f} MiB")
+    typer.echo(f"Play it with: {_command_to_play(path, tasks, settings)}")
+
+
+def _command_to_play(path: Path, tasks: str, settings: str) -> str:
+    """Return the command that plays a policy in words that it has not heard."""
     heard = "explicit" if settings == "none" else settings
     options = f"--tasks {quote(tasks)} --split val --settings {quote(heard)} --wordings test"
-    typer.echo(
-        f"Play it with: roboirg run --policy {quote(f'trained:{path}')} {options} --out runs"
-    )
+    return f"roboirg run --policy {quote(f'trained:{path}')} {options} --out runs"
 
 
 def _train_policy(plan: PolicyPlan, folder: Path, workers: int) -> Path:

@@ -64,8 +64,9 @@ def load_trained(
     """
     try:
         content = torch.load(path, weights_only=True, map_location="cpu")
-        if not isinstance(content, dict) or content.get("format") != file_format:
-            raise InvalidValueError(f"its format is not {file_format!r}")
+        found = content.get("format") if isinstance(content, dict) else None
+        if found != file_format:
+            raise InvalidValueError(f"its format is not {file_format!r}, but {found!r}")
         return read(content)
     except Exception as error:
         raise InvalidValueError(
