@@ -48,7 +48,6 @@ NEEDS = {
     "export demonstrations": "sim", "export recordings": "sim", "export grounding": "sim",
     "leaderboard repeat": "sim", "leaderboard board": "report",
     "language shortcuts": "report",
-    "listen plan": "sim",
 }  # fmt: skip
 """The extra of each command that cannot do its work without one; all others work."""
 

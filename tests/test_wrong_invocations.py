@@ -13,7 +13,7 @@ from all_commands import all_commands, make_run, words_of
 from roboirg import main as cli
 
 NAMES = {
-    "--tasks": "PickXtime", "--settings": "spatail", "--setting": "spatail", "--forms": "implict",
+    "--tasks": "PickXtime", "--settings": "spatail", "--forms": "implict",
     "--split": "tset", "--episodes": "four", "--policy-seeds": "one",
     "--stages": "9-1", "--distractor": "nutral", "--frame": "robt",
     "--wordings": "nowhere.toml", "--floors": "chanse",
@@ -57,9 +57,6 @@ RIGHT = {
     "replay": ["nowhere"],
     "score grounding": ["nowhere", "--data", "nowhere"],
     "records import": ["lerobot", "nowhere", "--out", "out", "--policy", "p"],
-    "listen serve": ["nowhere"],
-    "listen results": ["nowhere"],
-    "drive": ["PickXtimes", "0", "--port", "99999"],
     "learn listener": ["--out", "out"],
     "learn policy": ["--out", "out"],
     "learn answers": ["nowhere", "--data", "nowhere", "--out", "out"],

@@ -18,7 +18,6 @@ APPLICATIONS = sorted(path.parent.name for path in (layout.PACKAGE / "apps").glo
 KINDS_OF = {
     "demonstrations": {"recorded"},
     "learning": {"learned", "trained"},
-    "people": {"people"},
 }
 
 WALK = """
@@ -74,7 +73,7 @@ def everything(tmp_path_factory: pytest.TempPathFactory) -> tuple[dict[str, list
 def test_every_kind_of_policy_and_every_application_is_there(everything):
     commands, kinds = everything
     assert kinds == set(entry_names("roboirg.policy_kinds")) == {
-        "learned", "people", "recorded", "trained",
+        "learned", "recorded", "trained",
     }  # fmt: skip
     assert len(APPLICATIONS) >= 10
     assert {
@@ -82,12 +81,12 @@ def test_every_kind_of_policy_and_every_application_is_there(everything):
         "tables",
         "records export",
         "leaderboard verify",
-        "listen plan",
+        "show",
     } <= commands.keys()
 
 
 @pytest.mark.sim
-@pytest.mark.parametrize("application", slow_but(["leaderboard", "people"], APPLICATIONS))
+@pytest.mark.parametrize("application", slow_but(["leaderboard", "learning"], APPLICATIONS))
 def test_without_an_application_the_rest_works(application, everything, tmp_path):
     variables = without(application, tmp_path / "src")
     commands, kinds = commands_and_kinds(variables)

@@ -45,11 +45,6 @@ WORDS = {
     "learn listener": "--help",
     "learn answers": "--help",
     "learn policy": "--help",
-    "listen plan": "{folder}/listeners --people 1 --tasks StopCube --episodes 1"
-    " --plan {no_practice} --settings explicit",
-    "listen serve": "--help",
-    "listen results": "--help",
-    "drive": "--help",
     "leaderboard repeat": "{run} --out {folder}/again",
     "leaderboard pack": "{run} --out {folder}/packed.zip",
     "leaderboard verify": "--help",
@@ -104,7 +99,6 @@ def words_of(folder, run):
         "folder": folder,
         "run": run,
         "one_episode": plan_file(episodes=1),
-        "no_practice": plan_file(listening={"practice": 0, "checks": 0}),
     }
     return {
         name: [word.format_map(paths) for word in words.split()] for name, words in WORDS.items()

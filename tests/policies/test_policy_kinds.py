@@ -47,7 +47,7 @@ def test_the_recipe_makes_policies_in_a_process_of_their_own():
     assert isinstance(make_policy("lab:walk?fast=yes", 3), RandomPolicy)
     assert is_foreign("lab:walk")
     assert needs_host("lab:walk")
-    assert not is_foreign("people:folder")
+    assert not is_foreign("recorded:folder")
     with pytest.raises(UnknownNameError, match="lab:…"):
         make_policy("nothing", 0)
 

@@ -39,7 +39,6 @@ PlanName = Annotated[
         rich_help_panel=options.EPISODES,
     ),
 ]
-Out = Annotated[str, typer.Option(help="Output folder; give the same folder again to resume.")]
 Folder = Annotated[str, typer.Argument(help="Output folder of a run.")]
 RetryErrors = Annotated[
     bool,

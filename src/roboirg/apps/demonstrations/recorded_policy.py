@@ -25,9 +25,9 @@ if TYPE_CHECKING:
 class RecordedPolicy:
     """Plays the stored actions of an episode, whatever space they are in.
 
-    So what a person drove, or a policy did in way points or tool poses, can be exported as a
-    demonstration. Of several records of an episode it takes the newest success, best in the
-    setting and form that are played. Privileged: it knows the arm's own joints.
+    So what a policy did in way points or tool poses can be exported as a demonstration. Of several
+    records of an episode it takes the newest success, best in the setting and form that are played.
+    Privileged: it knows the arm's own joints.
 
     Args:
         folder: of the run.

@@ -42,7 +42,6 @@ class EpisodeMedia(NamedTuple):
         steps: control steps of the video.
         points: one for each thing that is meant.
         meters: distance of the first of them from the camera.
-        objects: where every object is seen that could be meant, by its name.
     """
 
     picture: str
@@ -51,7 +50,6 @@ class EpisodeMedia(NamedTuple):
     steps: int
     points: tuple[PointTarget, ...]
     meters: float
-    objects: dict[str, PointTarget] = {}  # noqa: RUF012 - the type of a tuple's field
 
 
 def wanted_options(

@@ -48,7 +48,6 @@ def store_media(folder: Path, episode: Episode, every: int, most: int) -> Episod
         steps=seen.steps,
         points=seen.points,
         meters=seen.meters,
-        objects=dict(seen.objects),
     )
 
 

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import functools
 import itertools
-from dataclasses import replace
 from typing import NamedTuple
 
-from roboirg.core.episode import Episode, Goal, ObjectKind, Scene, SceneObject, Split
-from roboirg.tasks import Task, get_task, goals_of
+from roboirg.core.episode import Episode, Goal, ObjectKind, Scene, Split
+from roboirg.tasks import Task, get_task
 from roboirg.tasks.splits.splits import split_episodes
 
 SOURCE: Split = "train"
@@ -71,16 +70,6 @@ def find_referents(episode: Episode) -> tuple[Referent, ...]:
         Referent(scene[name].kind, (name,))
         for name in (_told_apart(task, scene, one) for one in names)
     )
-
-
-def find_candidates(episode: Episode) -> tuple[SceneObject, ...]:
-    """Return all objects of the kinds that goals of the scene mean, in scene order."""
-    goals = goals_of(episode)
-    meant = itertools.chain.from_iterable(
-        find_referents(replace(episode, goal=goal)) for goal in goals
-    )
-    kinds = {one.kind for one in meant}
-    return tuple(one for one in episode.scene.objects if one.kind in kinds)
 
 
 def noun(task_name: str, kind: ObjectKind) -> str:

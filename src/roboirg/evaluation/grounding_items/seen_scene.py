@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
@@ -12,7 +11,7 @@ from roboirg.core.errors import RoboIRGError
 from roboirg.core.observations import FRONT
 from roboirg.envs.environment import RoboIRGEnv
 from roboirg.evaluation.grounding_items.grounding_item import Mask, PointTarget, encode_mask
-from roboirg.evaluation.grounding_items.referents import find_candidates, find_referents
+from roboirg.evaluation.grounding_items.referents import find_referents
 from roboirg.util.media import Pixels
 
 FIRST = "first"
@@ -28,7 +27,6 @@ class SeenScene(NamedTuple):
         steps: control steps of the video.
         points: where the things that are meant are seen.
         meters: distance of the first of them from the camera.
-        objects: where every object is seen that could be meant, by its name.
     """
 
     picture: Pixels
@@ -36,7 +34,6 @@ class SeenScene(NamedTuple):
     steps: int
     points: tuple[PointTarget, ...]
     meters: float
-    objects: Mapping[str, PointTarget]
 
 
 def look_at_episode(episode: Episode, every: int) -> SeenScene:
@@ -67,7 +64,6 @@ def look_at_episode(episode: Episode, every: int) -> SeenScene:
                 "picture."
             )
         found.append(_target(referent.kind, mask))
-    masks = {one: segments == numbers[one.name] for one in find_candidates(episode)}
     first = found[0]
     return SeenScene(
         picture=observation["front_rgb"],
@@ -75,7 +71,6 @@ def look_at_episode(episode: Episode, every: int) -> SeenScene:
         steps=video.length,
         points=tuple(found),
         meters=round(float(observation["front_depth"][first.y, first.x, 0]) / 1000, 3),
-        objects={one.name: _target(one.kind, mask) for one, mask in masks.items() if mask.any()},
     )
 
 

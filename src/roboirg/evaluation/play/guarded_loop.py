@@ -17,7 +17,7 @@ from roboirg.core.subgoal_text import split_point
 from roboirg.evaluation.play.call_guard import CallGuard
 from roboirg.evaluation.play.point_sheet import MOST_PICTURES, Pointing
 from roboirg.evaluation.play.rollout_result import RolloutResult
-from roboirg.evaluation.play.video_writer import FrameSink
+from roboirg.evaluation.play.video_writer import VideoWriter
 from roboirg.evaluation.policy_calls import check_rows, policy_metadata, policy_subgoal
 from roboirg.evaluation.records.record import Job, SubgoalRecord
 from roboirg.judging import judge_subgoal, plain_subgoal
@@ -54,7 +54,7 @@ class GuardedLoop(EpisodeLoop):
         space: ActionSpace,
         result: RolloutResult,
         guard: CallGuard,
-        writer: FrameSink | None = None,
+        writer: VideoWriter | None = None,
     ) -> None:
         super().__init__(env, policy)
         self._job, self._space, self._writer = job, space, writer

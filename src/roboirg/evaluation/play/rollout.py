@@ -40,7 +40,7 @@ from roboirg.evaluation.play.point_sheet import write_point_sheet
 from roboirg.evaluation.play.policy_environment import job_needs, make_env
 from roboirg.evaluation.play.prompt_shares import audit_job, too_long_text
 from roboirg.evaluation.play.rollout_result import RolloutResult, make_record, utc_now
-from roboirg.evaluation.play.video_writer import FrameSink, VideoWriter
+from roboirg.evaluation.play.video_writer import VideoWriter
 from roboirg.evaluation.policy_calls import policy_usage
 from roboirg.evaluation.records.action_log import write_actions
 from roboirg.evaluation.records.film import VIDEO_FOLDER, VideoMode, points_name
@@ -146,7 +146,7 @@ class EpisodeRunner:
             return writer, result
 
     def play_once(
-        self, job: Job, writer: FrameSink | None = None, *, alone: bool = False
+        self, job: Job, writer: VideoWriter | None = None, *, alone: bool = False
     ) -> RolloutResult:
         """Play one job once; errors of the policy or the environment end up in the result.
 
@@ -211,7 +211,7 @@ def play_with(
     needs: PolicyNeeds,
     result: RolloutResult,
     guard: CallGuard,
-    writer: FrameSink | None = None,
+    writer: VideoWriter | None = None,
     recollection: Recollection | None = None,
 ) -> None:
     """Play one job with a loaded policy, which is not closed.
@@ -250,10 +250,7 @@ def play_with(
 def load_policy(prepared: PreparedJob, seed_secret: str = "") -> Policy:
     """Return a new policy object, so that no state of an earlier episode remains."""
     job = prepared.job
-    policy = policies.make_policy(job.policy_spec, seed=_policy_seed(prepared, seed_secret))
-    if callable(take := getattr(policy, "take_job", None)):
-        take(job)  # of ours that look up what a person answered
-    return policy
+    return policies.make_policy(job.policy_spec, seed=_policy_seed(prepared, seed_secret))
 
 
 def load_hosted_policy(

@@ -51,25 +51,6 @@ class PictureSource(Protocol):
         """Return the camera's current picture, uint8 (256, 256, 3)."""
 
 
-class FrameSink(Protocol):
-    """Takes the frames of an episode while it is played.
-
-    Attributes:
-        every: control steps between two frames.
-        caption: what was said so far.
-        longest_caption: everything that will have been said.
-        point: row and column of the planner's subgoal in the front picture, if it has one.
-    """
-
-    every: int
-    caption: str
-    longest_caption: str
-    point: Point | None
-
-    def add_frame(self, source: PictureSource, is_demonstration: bool = False) -> None:
-        """Take the current pictures."""
-
-
 def check_video_support() -> None:
     """Check that videos can be written.
 

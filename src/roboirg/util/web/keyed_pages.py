@@ -8,36 +8,28 @@ for this site's own requests, and the headers ``Host`` and ``Origin`` must be th
 from __future__ import annotations
 
 import hmac
-import json
 import secrets
-from collections.abc import Awaitable, Callable, Mapping, Sequence
-from pathlib import Path
-from typing import Any
+from collections.abc import Callable, Sequence
 from urllib.parse import urlencode
 
 from starlette.applications import Starlette
-from starlette.concurrency import run_in_threadpool
-from starlette.exceptions import HTTPException
 from starlette.requests import Request
 from starlette.responses import (
     HTMLResponse,
-    JSONResponse,
     PlainTextResponse,
     RedirectResponse,
     Response,
 )
 from starlette.routing import BaseRoute
 
-from roboirg.core.errors import InvalidValueError, RoboIRGError
+from roboirg.core.errors import RoboIRGError
 from roboirg.util.web.app_server import (
     AppServer,
     RequestGuard,
     error_handler,
-    read_body,
 )
-from roboirg.util.web.request_origin import LOOPBACK, is_own_request, names_of_this_machine
+from roboirg.util.web.request_origin import is_own_request, names_of_this_machine
 
-KEY_FILE = "key"
 MAX_BODY_BYTES = 65_536
 PRIVATE_HEADERS = {
     "Cache-Control": "no-store",
@@ -59,49 +51,21 @@ def page_policy(nonce: str) -> dict[str, str]:
     }
 
 
-def stored_key(folder: Path) -> str:
-    """Return the key of a folder's pages, made when it is first asked for.
-
-    It is kept, so that pages that are open go on after the server was started again.
-
-    Raises:
-        InvalidValueError: the file cannot be read or written.
-    """
-    path = folder / KEY_FILE
-    try:
-        if not path.exists():
-            path.touch(mode=0o600)
-            path.write_text(secrets.token_urlsafe(18) + "\n")
-        return path.read_text().strip()
-    except (OSError, UnicodeDecodeError) as error:
-        raise InvalidValueError(f"Cannot keep the page's key in {path}: {error}.") from error
-
-
 class KeyedPageServer(AppServer):
-    """Serves pages to browsers that were given the key.
+    """Serves pages on loopback to browsers that were given the key.
 
     Args:
         routes: of the pages.
         key: secret in the address.
-        host: address to listen at.
         port: 0 for any free port.
-        statuses: of the responses to errors; other errors of the package have status 400.
     """
 
-    def __init__(
-        self,
-        routes: Sequence[BaseRoute],
-        key: str,
-        host: str = LOOPBACK,
-        port: int = 0,
-        statuses: Mapping[type[Exception], int] | None = None,
-    ) -> None:
+    def __init__(self, routes: Sequence[BaseRoute], key: str, port: int = 0) -> None:
         self.key = key
-        self._names = frozenset({*names_of_this_machine(), host.lower()})
-        known: dict[type[Exception], int] = {RoboIRGError: 400, **(statuses or {})}
-        handlers = {kind: error_handler(status) for kind, status in known.items()}
+        self._names = names_of_this_machine()
+        handlers = {RoboIRGError: error_handler(400)}
         app = Starlette(routes=routes, exception_handlers=handlers)
-        super().__init__(RequestGuard(app, self._refuse, PRIVATE_HEADERS), host, port)
+        super().__init__(RequestGuard(app, self._refuse, PRIVATE_HEADERS), port=port)
 
     @property
     def url(self) -> str:
@@ -136,21 +100,3 @@ def page_response(render: Callable[[str], str]) -> HTMLResponse:
     """Return a page; `render` gets the nonce of its style and script."""
     nonce = secrets.token_urlsafe(16)
     return HTMLResponse(render(nonce), headers=page_policy(nonce))
-
-
-def json_endpoint(
-    answer: Callable[[Request, dict[str, Any]], object],
-) -> Callable[[Request], Awaitable[Response]]:
-    """Return the endpoint of requests with a JSON object; `answer` returns the JSON reply."""
-
-    async def endpoint(request: Request) -> Response:
-        content = await read_body(request, MAX_BODY_BYTES)
-        try:
-            body = json.loads(content)
-        except (ValueError, RecursionError):
-            body = None
-        if not isinstance(body, dict):
-            raise HTTPException(400, "The request is not a JSON object.")
-        return JSONResponse(await run_in_threadpool(answer, request, body))
-
-    return endpoint

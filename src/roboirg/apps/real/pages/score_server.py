@@ -49,7 +49,7 @@ class ScoreServer(KeyedPageServer):
             Route("/score", self._take_form, methods=["POST"]),
             Route("/undo", self._take_form, methods=["POST"]),
         ]
-        super().__init__(routes, secrets.token_urlsafe(18), port=port)
+        super().__init__(routes, secrets.token_urlsafe(18), port)
 
     def read_trial_log(self) -> TrialLog:
         """Read the records on the disk."""

@@ -1,1 +1,0 @@
-"""People as listeners and as policies: pages of a study, what people answered, the arm driven."""
