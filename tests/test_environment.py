@@ -23,7 +23,6 @@ from roboirg.envs.env_options import EnvOptions
 from roboirg.envs.env_settings import EnvSettings
 from roboirg.envs.environment import RoboIRGEnv
 from roboirg.envs.registration import environment_id
-from roboirg.envs.vector.vector_environment import RoboIRGVectorEnv
 from roboirg.evaluation.play.job_instruction import PreparedJob
 from roboirg.evaluation.play.policy_environment import make_env
 from roboirg.evaluation.records.record import Job
@@ -168,7 +167,7 @@ def test_make_is_typed_with_the_options_of_the_environment():
     assert typed.keys() == {*own, *OPTION_NAMES}
     documented = inspect.getdoc(roboirg.make).partition("Keyword Args:")[2].partition("Raises:")[0]
     assert re.findall(r"^    (\w+): ", documented, re.MULTILINE) == list(own)
-    for made in (roboirg.make, roboirg.make_vec, RoboIRGEnv, RoboIRGVectorEnv):
+    for made in (roboirg.make, RoboIRGEnv):
         annotation = inspect.signature(made).parameters["options"].annotation
         assert annotation == "Unpack[EnvOptions]"
     with pytest.raises(TypeError, match="camera"):

@@ -89,7 +89,7 @@ def test_nothing_is_loaded_from_elsewhere(pages):
 
 def test_the_search_knows_pages_notebooks_and_the_reference(site):
     index = (site / "search" / "search_index.json").read_text()
-    for words in ("PickXtimes", "Reading results", "make_vec"):
+    for words in ("PickXtimes", "Reading results", "ActionChunks"):
         assert words in index
 
 

@@ -8,17 +8,16 @@ from typing import TYPE_CHECKING
 from roboirg.core.version import __version__
 
 if TYPE_CHECKING:
-    from roboirg.envs.factory import make, make_vec
+    from roboirg.envs.factory import make
     from roboirg.evaluation.api.evaluate import evaluate
     from roboirg.policies.by_name.local_policies import Privileged
 
-__all__ = ["Privileged", "__version__", "evaluate", "make", "make_vec"]
+__all__ = ["Privileged", "__version__", "evaluate", "make"]
 
 _HOMES = {
     "Privileged": "roboirg.policies.by_name.local_policies",
     "evaluate": "roboirg.evaluation.api.evaluate",
     "make": "roboirg.envs.factory",
-    "make_vec": "roboirg.envs.factory",
 }
 
 

@@ -85,9 +85,7 @@ class PaperRunner(EpisodeRunner):
         if self.notes is not None:
             (self.notes / f"worker-{os.getpid()}").touch()
         kept = rollout.make_env
-        rollout.make_env = lambda prepared, _needs, _recollection: PaperWorld(
-            prepared.job, self.seconds
-        )
+        rollout.make_env = lambda prepared, _needs: PaperWorld(prepared.job, self.seconds)
         try:
             return EpisodeRunner.__call__(self, job)
         finally:

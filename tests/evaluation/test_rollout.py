@@ -125,7 +125,7 @@ class PaperInsider(PaperPolicy):
 @pytest.fixture
 def stage(monkeypatch: pytest.MonkeyPatch) -> Callable[..., Any]:
     def play(world: PaperWorld, policy: Any, job: Job = JOB) -> RolloutResult:
-        monkeypatch.setattr(rollout, "make_env", lambda _job, _needs, _recollection: world)
+        monkeypatch.setattr(rollout, "make_env", lambda _job, _needs: world)
         monkeypatch.setattr(rollout, "load_policy", lambda _job, _secret: policy)
         return EpisodeRunner(Path()).play_once(job)
 
@@ -264,9 +264,7 @@ def test_one_line_is_the_same_in_every_process() -> None:
 def test_videos_are_kept_as_asked(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path, mode: Any, status: str, kept: bool
 ) -> None:
-    monkeypatch.setattr(
-        rollout, "make_env", lambda _job, _needs, _recollection: PaperWorld(5, status)
-    )
+    monkeypatch.setattr(rollout, "make_env", lambda _job, _needs: PaperWorld(5, status))
     monkeypatch.setattr(rollout, "load_policy", lambda _job, _secret: PaperPolicy())
     record = EpisodeRunner(tmp_path, mode)(JOB)
     assert (record.video is not None) == kept
@@ -301,7 +299,7 @@ def test_a_video_that_cannot_be_written_does_not_change_the_verdict(
         real(writer, frame)
 
     monkeypatch.setattr(VideoWriter, "_encode", add)
-    monkeypatch.setattr(rollout, "make_env", lambda _job, _needs, _recollection: PaperWorld(5))
+    monkeypatch.setattr(rollout, "make_env", lambda _job, _needs: PaperWorld(5))
     monkeypatch.setattr(rollout, "load_policy", lambda _job, _secret: PaperPolicy())
     record = EpisodeRunner(tmp_path, "all")(JOB)
     assert (record.outcome, record.steps, record.video) == ("success", 5, None)
@@ -313,7 +311,7 @@ def test_a_video_folder_that_is_a_file_does_not_change_the_verdict(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     (tmp_path / "videos").touch()
-    monkeypatch.setattr(rollout, "make_env", lambda _job, _needs, _recollection: PaperWorld(5))
+    monkeypatch.setattr(rollout, "make_env", lambda _job, _needs: PaperWorld(5))
     monkeypatch.setattr(rollout, "load_policy", lambda _job, _secret: PaperPolicy())
     record = EpisodeRunner(tmp_path, "all")(JOB)
     assert (record.outcome, record.video) == ("success", None)
@@ -437,7 +435,7 @@ def test_a_record_holds_what_was_heard_when(
     policy_class: type[PaperPolicy], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     world, policy = TellingWorld((0, 3, 6, 6), length=10), policy_class()
-    monkeypatch.setattr(rollout, "make_env", lambda _job, _needs, _recollection: world)
+    monkeypatch.setattr(rollout, "make_env", lambda _job, _needs: world)
     monkeypatch.setattr(rollout, "load_policy", lambda _job, _secret: policy)
     turns = world.instruction.turns
     record = EpisodeRunner(tmp_path)(TURNS)
@@ -464,7 +462,7 @@ def test_the_caption_grows_as_utterances_are_heard(
             assert self.longest_caption == world.instruction.text
 
     world = TellingWorld((0, 3, 6, 6, 9), length=11)
-    monkeypatch.setattr(rollout, "make_env", lambda _job, _needs, _recollection: world)
+    monkeypatch.setattr(rollout, "make_env", lambda _job, _needs: world)
     monkeypatch.setattr(rollout, "load_policy", lambda _job, _secret: PaperPolicy())
     EpisodeRunner(tmp_path).play_once(TURNS, Captions(tmp_path / "x.mp4"))
     counts = [1, 1, *[1] * 3, *[2] * 3, *[4] * 3, *[5] * 2]  # video, first frame, chunks of 3
@@ -478,9 +476,7 @@ def test_what_a_policy_raises_while_it_hears_is_its_error(
         def hear(self, text: str, step: int) -> None:
             raise ValueError(f"no ears for {text} at {step}")
 
-    monkeypatch.setattr(
-        rollout, "make_env", lambda _job, _needs, _recollection: TellingWorld((0, 3), 9)
-    )
+    monkeypatch.setattr(rollout, "make_env", lambda _job, _needs: TellingWorld((0, 3), 9))
     monkeypatch.setattr(rollout, "load_policy", lambda _job, _secret: Deaf())
     result = EpisodeRunner(Path()).play_once(TURNS)
     assert (result.outcome, result.error) == ("error", "policy")

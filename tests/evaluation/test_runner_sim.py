@@ -60,38 +60,6 @@ def command(*words: object, cwd: Path, **environment: str) -> subprocess.Complet
     )
 
 
-SWAYING = """
-import numpy as np
-
-class Swaying:
-    cameras = ("front",)
-    observe_every = 4
-    def reset(self, instruction, demonstration):
-        self.swing = 0.02 if "red" in instruction else -0.02
-    def act(self, observation):
-        assert len(observation["history"]) in (0, 1)
-        self.swing = -self.swing
-        return np.tile(np.append(observation["joint_positions"] + self.swing, 1.0), (4, 1))
-"""
-
-
-def test_records_are_the_same_whether_equal_actions_are_simulated_again(tmp_path: Path) -> None:
-    (tmp_path / "mine.py").write_text(SWAYING)
-    words = ("run", "--policy", "mine:Swaying", "--tasks", "PickXtimes,VideoUnmask")
-    limits = ("--episodes", "2", "--policy-seeds", "2", "--max-steps", "20")
-    played = []
-    for out, mode in (("recalled", "off"), ("simulated", "all")):
-        done = command(
-            *words, *limits, "--video", mode, "--workers", "2", "--out", out, cwd=tmp_path
-        )
-        assert done.returncode == 0, done.stderr
-        records = read_records(tmp_path / out)
-        played.append({one.slug: comparable(one) | {"video": None} for one in records})
-    assert played[0] == played[1]
-    texts = {" ".join(said.text for said in one.instruction) for one in records}
-    assert {"red" in text for text in texts} == {True, False}
-
-
 def test_an_invalid_action_is_recorded_and_told(tmp_path: Path) -> None:
     (tmp_path / "mine.py").write_text(BROKEN)
     words = ("--policy", "mine:Broken", "--episodes", "1", "--settings", "explicit")

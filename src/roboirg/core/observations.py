@@ -112,26 +112,31 @@ when they are first read, and then kept; images that are not read cost no time.
 """
 
 
-class FetchedFields(Mapping[str, Any]):
-    """Fields of observations; those that are not here are fetched when they are read, and kept.
+class FetchedDemonstration(Mapping[str, NDArray[Any]]):
+    """A demonstration; fields that are not here are fetched when they are read, and kept.
 
     To read several, call `draw` first, which fetches them together.
 
     Args:
         fields: names of all fields.
         arrays: those that are already here.
-        fetch: returns other fields; raises if it is too late.
+        fetch: returns other fields.
     """
 
     def __init__(
         self,
         fields: Sequence[str],
-        arrays: Mapping[str, Any],
-        fetch: Callable[[Sequence[str]], Mapping[str, Any]],
+        arrays: Demonstration,
+        fetch: Callable[[Sequence[str]], Demonstration],
     ) -> None:
         self._fields, self._arrays, self._fetch = tuple(fields), dict(arrays), fetch
 
-    def __getitem__(self, field: str) -> Any:  # noqa: ANN401 - arrays and tuples of texts
+    @property
+    def length(self) -> int:
+        """Control steps in the video, T; ``len`` is the number of fields."""
+        return len(self["joint_positions"])
+
+    def __getitem__(self, field: str) -> NDArray[Any]:
         """Return a field; raises KeyError if it does not exist."""
         if field not in self._arrays and field in self._fields:
             self._arrays.update(self._fetch([field]))
@@ -155,15 +160,6 @@ class FetchedFields(Mapping[str, Any]):
     def __reduce__(self) -> tuple[type[Mapping[str, Any]], tuple[Any, ...]]:
         self.draw()
         return dict, (dict(self),)
-
-
-class FetchedDemonstration(FetchedFields):
-    """A demonstration in another process than the simulator."""
-
-    @property
-    def length(self) -> int:
-        """Control steps in the video, T; ``len`` is the number of fields."""
-        return len(self["joint_positions"])
 
 
 def proprioception(joints: NDArray[Any], gripper: NDArray[Any]) -> NDArray[np.float32]:

@@ -22,7 +22,6 @@ from roboirg.envs.env_options import EnvOptions
 from roboirg.envs.env_settings import RENDER_MODES, EnvSettings, choose_index
 from roboirg.envs.episode_state import EpisodeState
 from roboirg.envs.observation_spaces import make_observation_space
-from roboirg.envs.recollection import EndState
 from roboirg.judging import Event, Status, plain_subgoal
 from roboirg.language import Instruction
 from roboirg.language.arms import say_arm
@@ -85,7 +84,7 @@ class RoboIRGEnv(gymnasium.Env[dict[str, Any], NDArray[np.floating[Any]]]):
         original: the scene's own episode in the arm ``other-goal``, whose `episode` has another
             goal; else None.
         choices: the task's choices of motions; empty in the other action spaces.
-        draws: whether observations hold pictures; `read_pictures` reads them at any time.
+        draws: whether observations hold pictures; `picture` draws one at any time.
 
     Raises:
         UnknownNameError: a task, setting, split, form, action space or camera does not exist.
@@ -279,10 +278,6 @@ class RoboIRGEnv(gymnasium.Env[dict[str, Any], NDArray[np.floating[Any]]]):
         """
         return self.session.world.picture(camera)
 
-    def read_pictures(self, fields: Sequence[str]) -> dict[str, NDArray[Any]]:
-        """Return fields of the current observation that are drawn, for example ``front_rgb``."""
-        return self._current.observation_builder.read_pictures(fields)
-
     def objects_at(self, point: Point) -> frozenset[str] | None:
         """Return the names of the objects at a point of the front picture; None without pictures.
 
@@ -301,7 +296,7 @@ class RoboIRGEnv(gymnasium.Env[dict[str, Any], NDArray[np.floating[Any]]]):
         """
         self._frame_hook, self._hook_period = hook, every
 
-    def end_state(self) -> EndState:
+    def end_state(self) -> tuple[NDArray[np.float64], str]:
         """Return the state in numbers, as `EpisodeSession.state_numbers`, and as a hash."""
         return self.session.state_numbers(), self.session.state_hash()
 
@@ -350,10 +345,6 @@ class RoboIRGEnv(gymnasium.Env[dict[str, Any], NDArray[np.floating[Any]]]):
 
         return state.session.play_demonstration(record_step, recording)
 
-    def _spoken(self) -> SpokenInstruction:
-        """Return the instruction of which nothing but the beginning has been heard."""
-        return SpokenInstruction(self.instruction.turns, self.delivery)
-
     def _start_episode(self) -> EpisodeState:
         session = EpisodeSession(
             self.episode,
@@ -364,7 +355,7 @@ class RoboIRGEnv(gymnasium.Env[dict[str, Any], NDArray[np.floating[Any]]]):
         world = session.world
         return EpisodeState(
             session,
-            self._spoken(),
+            SpokenInstruction(self.instruction.turns, self.delivery),
             ObservationBuilder(world, self._spec),
             make_controller(self._space, world, self.choices),
             PixelGrounding(world.bodies, world.cameras) if self.grounded else None,

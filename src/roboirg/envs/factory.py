@@ -1,4 +1,4 @@
-"""`make` and `make_vec`, which create environments, and their options."""
+"""`make`, which creates an environment."""
 
 from __future__ import annotations
 
@@ -10,11 +10,8 @@ from roboirg.envs.env_options import EnvOptions
 
 if TYPE_CHECKING:
     # Not at run time: these load NumPy and SAPIEN, which `import roboirg` must not.
-    from gymnasium.vector import AutoresetMode
-
     from roboirg.core.episode import Episode
     from roboirg.envs.environment import RoboIRGEnv
-    from roboirg.envs.vector.vector_environment import RoboIRGVectorEnv
 
 
 def make(task: str | Episode, **options: Unpack[EnvOptions]) -> RoboIRGEnv:
@@ -54,38 +51,6 @@ def make(task: str | Episode, **options: Unpack[EnvOptions]) -> RoboIRGEnv:
     with extra_needed("Playing episodes needs the simulator", "sim"):
         from roboirg.envs.environment import RoboIRGEnv
     return RoboIRGEnv(task, **options)
-
-
-def make_vec(
-    task: str | Episode,
-    num_envs: int = 1,
-    *,
-    autoreset_mode: str | AutoresetMode = "NextStep",
-    workers: int | None = None,
-    lazy: bool = False,
-    **options: Unpack[EnvOptions],
-) -> RoboIRGVectorEnv:
-    """Create a Gymnasium vector environment whose sub-environments run in worker processes.
-
-    Args:
-        task: as in `make`.
-        num_envs: number of sub-environments.
-        autoreset_mode: ``NextStep``, ``SameStep`` or ``Disabled``, as Gymnasium defines them.
-        workers: number of worker processes; None for one per core, at most `num_envs`.
-        lazy: whether pictures are drawn only when they are read from an observation; they must
-            then be read before the next step.
-        **options: as in `make`, but `episode` is None by default: seeds choose episodes.
-
-    Raises:
-        MissingDependencyError: the simulator is not installed.
-        UnknownNameError: a task, an option's value or the autoreset mode does not exist.
-        InvalidValueError: a number is out of range, or the combination is not defined.
-    """
-    with extra_needed("Playing episodes needs the simulator", "sim"):
-        from roboirg.envs.vector.vector_environment import RoboIRGVectorEnv
-    return RoboIRGVectorEnv(
-        task, num_envs, autoreset_mode=autoreset_mode, workers=workers, lazy=lazy, **options
-    )
 
 
 def check_simulator() -> None:

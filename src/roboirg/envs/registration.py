@@ -25,7 +25,6 @@ def register_environments() -> None:
         register(
             id=environment_id(task),
             entry_point="roboirg.envs.environment:RoboIRGEnv",
-            vector_entry_point="roboirg.envs.vector.vector_environment:RoboIRGVectorEnv",
             kwargs={"task": task},
         )
 

@@ -122,6 +122,6 @@ def check_drawing_process() -> None:
         raise RoboIRGError(
             "This process was forked from one that had drawn pictures, and the renderer's "
             "threads do not survive a fork; start it another way, such as AsyncVectorEnv(..., "
-            "context='spawn') or roboirg.make_vec."
+            "context='spawn')."
         )
     _drawing_processes.add(os.getpid())

@@ -59,20 +59,18 @@ class ChildProcess:
         self._process, self.connection = process, connection
 
     @classmethod
-    def spawn(cls, work: Callable[..., None], *args: Any, daemon: bool = False) -> Self:  # noqa: ANN401
+    def spawn(cls, work: Callable[..., None], *args: Any) -> Self:  # noqa: ANN401
         """Start ``work(connection, *args)`` in a new interpreter; all of it must be picklable.
 
         Args:
             work: runs in the child.
             *args: its arguments.
-            daemon: whether a parent that exits without closing it ends it, instead of waiting for
-                it; it may then have no processes of its own by `multiprocessing`.
         """
         # Spawned, not forked: a forked Vulkan driver or thread pool is undefined behavior.
         context = multiprocessing.get_context("spawn")
         ours, theirs = context.Pipe()
         process = context.Process(
-            target=_begin_work, args=(os.getpid(), work, theirs, args), daemon=daemon
+            target=_begin_work, args=(os.getpid(), work, theirs, args), daemon=False
         )
         with _safe_path():
             resource_tracker.ensure_running()  # which would unblock what is blocked below

@@ -20,16 +20,12 @@ from roboirg.evaluation.records.store import read_records
 pytestmark = pytest.mark.sim
 
 MODES = {
-    "ours": "lazy=True, workers={workers}",
-    "sync": "vectorization_mode='sync', episode=None",
-    "async": "vectorization_mode='async', episode=None, vector_kwargs={{'context': 'spawn'}}",
+    "async": '"async", vector_kwargs=spawned',
+    "sync": '"sync"',
 }
-BATCHES = [(2, "ours", 2)]
+BATCHES = [(2, "async")]
 if MANY:
-    BATCHES = [
-        (1, "ours", 1), (2, "ours", 1), (2, "ours", 2), (8, "ours", 1), (8, "ours", 8),
-        (1, "sync", 0), (2, "sync", 0), (2, "async", 0), (8, "sync", 0), (8, "async", 0),
-    ]  # fmt: skip
+    BATCHES = [(count, mode) for count in (1, 2, 8) for mode in MODES]
 
 MY_POLICY = """
 import os
@@ -50,14 +46,13 @@ class MyPolicy:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("count", "mode", "workers"), BATCHES)
-def test_the_page_s_program_has_the_outcomes_of_our_runner(
-    table, ours, tmp_path, count, mode, workers
-):
+@pytest.mark.parametrize(("count", "mode"), BATCHES)
+def test_the_page_s_program_has_the_outcomes_of_our_runner(table, ours, tmp_path, count, mode):
     values = {
         **in_batches_of(count),
-        "lazy=True": f"cameras=('front',), meshes={MESHES!r}, max_steps={MAX_STEPS}, "
-        f"demonstration_frames='none', {MODES[mode].format(workers=workers)}",
+        "setting=SETTING": f"setting=SETTING, cameras=('front',), meshes={MESHES!r}, "
+        f"max_steps={MAX_STEPS}, demonstration_frames='none'",
+        MODES["async"]: MODES[mode],
     }
     (program,) = blocks("Gymnasium", "python")
     (tmp_path / "play.py").write_text(replaced(program, values))

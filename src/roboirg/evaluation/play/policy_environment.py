@@ -5,10 +5,8 @@ from __future__ import annotations
 from dataclasses import asdict, replace
 from typing import TYPE_CHECKING
 
-from roboirg.core.delivery import TURNS
 from roboirg.core.errors import InvalidValueError
-from roboirg.envs.factory import check_simulator, make
-from roboirg.envs.recollection import Recollection
+from roboirg.envs.factory import make
 from roboirg.evaluation.play.job_instruction import PreparedJob
 from roboirg.evaluation.records.record import Job
 from roboirg.policies.contract.base import Policy
@@ -38,15 +36,12 @@ def job_needs(policy: Policy, job: Job) -> PolicyNeeds:
     return needs
 
 
-def make_env(
-    prepared: PreparedJob, needs: PolicyNeeds, recollection: Recollection | None = None
-) -> RoboIRGEnv:
+def make_env(prepared: PreparedJob, needs: PolicyNeeds) -> RoboIRGEnv:
     """Return the environment of a job with what the policy needs.
 
     Args:
         prepared: the job with its episode.
         needs: of the policy.
-        recollection: of what the scene was seen to do before; None simulates everything.
     """
     job = prepared.job
     options = {
@@ -56,9 +51,4 @@ def make_env(
         "meshes": job.meshes,
         "max_steps": job.max_steps,
     }
-    if recollection is None or job.options.delivery == TURNS:
-        return make(prepared.scene_episode, **options)
-    check_simulator()
-    from roboirg.envs.recalling_environment import RecallingEnv
-
-    return RecallingEnv(prepared.scene_episode, recollection, **options)
+    return make(prepared.scene_episode, **options)

@@ -17,13 +17,12 @@ from __future__ import annotations
 import contextlib
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from socket import socket
 
 from roboirg import policies
 from roboirg.core.arms import AGAIN
-from roboirg.envs.recollection import Recollection
 from roboirg.evaluation.episode_errors import (
     EpisodeError,
     EpisodeLostError,
@@ -76,8 +75,6 @@ class EpisodeRunner:
             model reads.
         seed_secret: of the run, for the policies' seeds.
         replies: where those of models are kept; None for a run that keeps none.
-        recollection: of the scene that was played last; each process has its own. Used if the
-            policy is hosted and nothing is filmed.
     """
 
     folder: Path
@@ -89,7 +86,6 @@ class EpisodeRunner:
     refuse_long: bool = False
     seed_secret: str = ""
     replies: ReplySettings | None = None
-    recollection: Recollection = field(default_factory=Recollection, compare=False)
 
     def in_folder(self, folder: Path) -> EpisodeRunner:
         """Return a copy that writes its videos and the replies of models to another folder."""
@@ -184,9 +180,7 @@ class EpisodeRunner:
                     audit = audit_job(job, result.prompt_limit, prepared.instruction)
                     if message := too_long_text(*audit):
                         raise EpisodeError("prompt", message, "")
-            recalls = hosts is not None and writer is None and not is_privileged(job.policy_spec)
-            recollection = self.recollection if recalls else None
-            play_with(policy, job, needs, result, guard, writer, recollection)
+            play_with(policy, job, needs, result, guard, writer)
         except EpisodeError as error:
             result.record_error(error.kind, error.cause, error.details)
         finally:
@@ -212,7 +206,6 @@ def play_with(
     result: RolloutResult,
     guard: CallGuard,
     writer: VideoWriter | None = None,
-    recollection: Recollection | None = None,
 ) -> None:
     """Play one job with a loaded policy, which is not closed.
 
@@ -223,8 +216,6 @@ def play_with(
         result: is filled in.
         guard: attributes errors and measures calls.
         writer: gets the frames of a video.
-        recollection: of what the scene was seen to do before; None simulates everything. The policy
-            must not write into its observations, and there is no writer.
 
     Raises:
         EpisodeError: the environment raised, or the policy, or an action cannot be executed.
@@ -233,7 +224,7 @@ def play_with(
     try:
         with guard.environment("env_reset"):
             result.prepared = result.prepared or PreparedJob(job)
-            env = make_env(result.prepared, needs, recollection)
+            env = make_env(result.prepared, needs)
             result.needs = needs.declared
         GuardedLoop(env, policy, job, needs.action_space, result, guard, writer).play()
         stands = True

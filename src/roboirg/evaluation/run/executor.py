@@ -133,8 +133,8 @@ class LocalProcesses:
 def take_job(jobs: deque[Job], others: Iterable[Worker]) -> Job:
     """Remove the next job for a worker from the queue and return it.
 
-    It is the first one of a scene that no other worker plays with the same policy, so that a worker
-    stays with its scene, and recalls what it does there. If there is none, it is the first of all.
+    It is the first one of a scene that no other worker plays with the same policy, so that the
+    demonstration of a scene is planned and drawn once. If there is none, it is the first of all.
 
     Args:
         jobs: the queue, not empty; the jobs of a scene are next to each other.

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from roboirg.core.episode import Episode
-from roboirg.core.observations import FetchedFields
+from roboirg.core.observations import FetchedDemonstration
 from roboirg.simulation.observation_builder import (
     ObservationSpec,
     picture_fields,
@@ -20,7 +20,7 @@ from roboirg.simulation.recording import Recording
 from roboirg.simulation.video.frame_sequence import FrameSequence, read_frames
 
 
-class DemonstrationVideo(FetchedFields):
+class DemonstrationVideo(FetchedDemonstration):
     """A demonstration as a mapping from an observation's fields to arrays, with a leading axis T.
 
     Pictures are drawn when they are first read, at any later time; `draw` draws all that are left
@@ -29,7 +29,6 @@ class DemonstrationVideo(FetchedFields):
     dictionaries into one, and videos differ in length.
 
     Attributes:
-        length: control steps in the video, T.
         actions: (T, 8) joint targets (rad) and the gripper, that led to each step; no policy sees
             them.
     """
@@ -38,21 +37,15 @@ class DemonstrationVideo(FetchedFields):
         self,
         proprioception: Mapping[str, NDArray[Any]],
         sequences: Mapping[str, FrameSequence],
-        length: int,
         actions: NDArray[np.float64],
     ) -> None:
         fields = dict.fromkeys([*sequences, *proprioception])
         super().__init__(tuple(fields), proprioception, partial(_read, sequences))
-        self.length, self.actions, self._sequences = length, actions, sequences
-
-    def undrawn(self) -> Self:
-        """Return a copy without the pictures that can be drawn again."""
-        read = {field: one for field, one in self._arrays.items() if field not in self._sequences}
-        return type(self)(read, self._sequences, self.length, self.actions)
+        self.actions, self._sequences = actions, sequences
 
     def __reduce__(self) -> tuple[type[Self], tuple[Any, ...]]:
         self.draw()
-        return type(self), (dict(self), {}, self.length, self.actions[:0])
+        return type(self), (dict(self), {}, self.actions[:0])
 
     def __repr__(self) -> str:
         fields = [
@@ -83,4 +76,4 @@ def make_video(
     }
     arrays = stack_proprioception(proprioception, spec)
     actions = recording.video_actions(episode)
-    return DemonstrationVideo(arrays, sequences, len(proprioception), actions)
+    return DemonstrationVideo(arrays, sequences, actions)

@@ -1,7 +1,7 @@
 """Batches of sub-environments for LeRobot, without importing it.
 
-They are Gymnasium's own vector classes, and not `roboirg.make_vec`, because LeRobot asks for them:
-it reads `envs`, and calls what sub-environments have under its own names.
+They are Gymnasium's vector environments: LeRobot reads their `envs`, and calls what
+sub-environments have under its own names.
 """
 
 from __future__ import annotations

@@ -1,1 +1,0 @@
-"""The vector environment: sub-environments in worker processes."""

@@ -1,0 +1,102 @@
+"""Chunks of actions as one step, also in Gymnasium's vector environment."""
+
+import re
+import subprocess
+import sys
+from functools import partial
+from pathlib import Path
+
+import gymnasium
+import numpy as np
+import pytest
+
+import roboirg
+from roboirg.core.errors import InvalidActionError, InvalidValueError
+from roboirg.envs.action_chunks import ActionChunks
+from roboirg.envs.registration import environment_id
+from roboirg.simulation.physics_settings import HOME_ACTION
+
+pytestmark = pytest.mark.sim
+
+OPTIONS = {"setting": "spatial", "cameras": ("front",), "max_steps": 10, "meshes": "light"}
+HISTORY = {"observe_every": 3, "delivery": "turns"}
+CHUNKS = np.random.default_rng(0).normal(0, 0.05, (3, 2, 4, 8)) + HOME_ACTION
+"""Three chunks of four actions for two environments, whose episodes last two and a half."""
+
+
+def assert_same(ours, theirs):
+    """Assert that two observations are equal bit for bit."""
+    assert set(ours) == set(theirs)
+    for key, value in theirs.items():
+        if key == "history":
+            for one, other in zip(ours[key], value, strict=True):
+                assert_same(one, other)
+        else:
+            assert np.array_equal(ours[key], value), key
+
+
+@pytest.mark.parametrize(
+    ("task", "shared", "options"),
+    [("PickXtimes", True, {}), ("VideoUnmask", False, HISTORY)],
+    ids=["shared-memory", "video-and-history"],
+)
+def test_sub_environments_that_take_chunks_equal_single_ones(task, shared, options):
+    vector = gymnasium.make_vec(
+        f"roboirg.envs.registration:{environment_id(task)}",
+        2,
+        "async",
+        vector_kwargs={"context": "spawn", "shared_memory": shared},
+        wrappers=[partial(ActionChunks, length=4)],
+        episode=None,
+        **OPTIONS,
+        **options,
+    )
+    singles = [roboirg.make(task, **OPTIONS, **options) for _ in range(2)]
+
+    def check(batch, infos, expected):
+        for index, (observation, *_, info) in enumerate(expected):
+            assert_same({key: value[index] for key, value in batch.items()}, observation)
+            for key in info.keys() - {"demonstration"}:
+                assert np.all(infos[key][index] == info[key]), key
+            video = info.get("demonstration", {})
+            for key in video:
+                assert np.array_equal(infos["demonstration"][index][key], video[key]), key
+
+    batch, infos = vector.reset(seed=57)
+    check(batch, infos, [one.reset(options={"episode": 7 + i}) for i, one in enumerate(singles)])
+    assert infos["demonstration"][1].length == (66 if task == "VideoUnmask" else 0)
+    for chunks in CHUNKS:
+        batch, rewards, terminated, truncated, infos = vector.step(chunks)
+        expected = [one.step_chunk(rows) for one, rows in zip(singles, chunks, strict=True)]
+        check(batch, infos, expected)
+        assert [*zip(rewards, terminated, truncated, strict=True)] == [one[1:4] for one in expected]
+    assert infos["steps"].tolist() == [10, 10]
+    assert truncated.all()
+    batch, *_, infos = vector.step(chunks)  # starts the next episodes
+    check(batch, infos, [one.reset(options={"episode": 8 + i}) for i, one in enumerate(singles)])
+    vector.close()
+
+
+def test_a_chunk_of_another_shape_is_refused_before_anything_moves():
+    with pytest.raises(InvalidValueError, match="length is 0; it must be an integer >= 1"):
+        ActionChunks(roboirg.make("PickXtimes", cameras=()), 0)
+    env = ActionChunks(roboirg.make("PickXtimes", cameras=(), actions="ee_pose"), 3)
+    assert env.action_space.shape == (3, 7)
+    env.reset()
+    for wrong in (np.zeros((2, 7)), np.zeros(7), np.full((3, 7), np.nan)):
+        with pytest.raises(InvalidActionError):
+            env.step(wrong)
+    assert env.unwrapped.executed_actions == 0
+
+
+def test_the_example_in_the_documents_runs(tmp_path):
+    page = (Path(__file__).parents[2] / "docs" / "environment.md").read_text()
+    (example,) = [
+        block
+        for block in re.findall(r"```python\n(.*?)```", page, re.DOTALL)
+        if "make_vec" in block
+    ]
+    script = tmp_path / "example.py"
+    script.write_text(example)
+    done = subprocess.run([sys.executable, script], capture_output=True, text=True, check=False)
+    assert done.stdout.strip() == "[False False False False] [16 16 16 16]", done.stderr
