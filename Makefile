@@ -3,7 +3,7 @@
 PYTHON := .venv/bin/python
 
 .DEFAULT_GOAL := help
-.PHONY: help setup dev style types test fast-tests test-slow test-all every-test integrations lint docs demo card clean
+.PHONY: help setup dev style types test fast-tests test-slow test-all every-test net integrations lint docs demo card clean
 
 help: ## list the targets
 	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):.*## /  make \1\t/' | expand -t 21
@@ -42,6 +42,9 @@ test-all: lint every-test ## lint, then every test; both at once with --jobs 2
 
 every-test: dev
 	$(PYTEST)
+
+net: dev ## compare words, prints, golden runs and packs with what is stored of them; takes minutes
+	$(PYTHON) tests/net/net.py compare
 
 integrations: ## the plug-ins in the real LeRobot, vla-eval and Inspect, in environments of their own
 	@scripts/test-integrations
