@@ -12,7 +12,6 @@ import yaml
 from net_printed import printed
 
 from roboirg.evaluation.records.store import iterate_records
-from roboirg.util.processor import processor_family
 
 PLANS: Mapping[str, dict[str, Any]] = {
     "oracle": {"policies": ["oracle"], "settings": "explicit", "episodes": [0, 1]},
@@ -69,7 +68,7 @@ def episodes(folder: Path) -> dict[str, str]:
     (folder / "net_policies.py").write_bytes(
         Path(__file__).with_name("net_policies.py").read_bytes()
     )
-    found = {"processor": f"{processor_family()}\n"}
+    found = {}
     for name, fields in PLANS.items():
         plan = {"tasks": EVERY_TASK, "split": "val", **fields}
         (folder / f"{name}.yaml").write_text(yaml.safe_dump(plan), encoding="utf-8")
@@ -81,25 +80,10 @@ def episodes(folder: Path) -> dict[str, str]:
     return found
 
 
-def comparable(
-    before: dict[str, str], now: dict[str, str]
-) -> tuple[dict[str, str], dict[str, str]]:
-    """Return both, without motion if processors of two families simulated it."""
-    if before["processor"] == now["processor"]:
-        return before, now
-    print(f"processors: {before['processor']}and {now['processor']}so motion is not compared")
-    return _still(before), _still(now)
-
-
-def _still(found: dict[str, str]) -> dict[str, str]:
-    return {
-        name: "\n".join(
-            json.dumps({key: value for key, value in json.loads(line).items() if key != "motion"})
-            for line in text.splitlines()
-        )
-        for name, text in found.items()
-        if name != "processor"
-    }
+def without_motion(text: str) -> str:
+    """Return the episodes of a run without what the last bits of a processor may change."""
+    lines = [{**json.loads(line), "motion": None} for line in text.splitlines()]
+    return "\n".join(json.dumps(one, sort_keys=True) for one in lines)
 
 
 def _kept(record: Any) -> dict[str, Any]:
