@@ -82,8 +82,6 @@ def weights():
 class Honest:
     """Does what it learned; everything that it is given has a small effect."""
 
-    remembered_words = 1000
-
     def __init__(self, seed=0):
         self.seed = seed
 
@@ -94,9 +92,8 @@ class Honest:
 
     def trace(self, observation):
         """Return a small number that depends on the words, the video and the call."""
-        words = " ".join(self.instruction.split()[: self.remembered_words])
         self.calls += 1
-        return 1e-5 * ((zlib.crc32(words.encode()) + self.memory) % 997 + self.calls)
+        return 1e-5 * ((zlib.crc32(self.instruction.encode()) + self.memory) % 997 + self.calls)
 
     def see(self, observation):
         return pixels(observation["front_rgb"], observation["wrist_rgb"])
@@ -113,13 +110,6 @@ class Honest:
         return np.column_stack([path, np.full(ROWS, self.gripper(observation))])
 
 
-class FromPictures(Honest):
-    """Honest; does not see the state."""
-
-    def joints(self, observation):
-        return REST
-
-
 class OneByOne(Honest):
     """Honest; computes a chunk and gives it action by action, as LeRobot's policies."""
 
@@ -131,16 +121,6 @@ class OneByOne(Honest):
         if not self.queue:
             self.queue.extend(super().act(observation)[:3])
         return self.queue.popleft()
-
-
-class Baseline(Honest):
-    """Honest; asks for one camera and no video."""
-
-    cameras = ("front",)
-    demonstration_frames = "none"
-
-    def see(self, observation):
-        return pixels(observation["front_rgb"], np.full((256, 256, 3), 128))
 
 
 class Noisy(Honest):
@@ -163,22 +143,4 @@ class Untrained(Honest):
         return np.column_stack([path, np.full(ROWS, np.tanh(motion[0]))])
 
 
-class Uniform:
-    """Draws targets anywhere within the limits."""
-
-    cameras = ()
-
-    def __init__(self, seed=0):
-        self.seed = seed
-
-    def reset(self, instruction, demonstration):
-        self.rng = np.random.default_rng([self.seed, zlib.crc32(instruction.encode())])
-
-    def act(self, observation):
-        joints = self.rng.uniform(JOINT_LOW, JOINT_HIGH, (4, 7)) * 0.9
-        joints[:, [3, 5]] = [-1.5, 1.8]
-        start = 0.9 * np.asarray(observation["joint_positions"])
-        return np.column_stack([0.1 * joints + start, self.rng.uniform(-1, 1, 4)])
-
-
-HONEST = (Honest, FromPictures, OneByOne, Baseline, Noisy, Untrained, Uniform)
+HONEST = (Honest, OneByOne, Noisy, Untrained)

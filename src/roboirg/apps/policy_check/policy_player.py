@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import copy
-import time
-from collections.abc import Collection, Sequence
 from functools import cached_property
 from typing import NamedTuple
 
@@ -12,13 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from roboirg.apps.policy_check.check_result import FAIL, CheckAbortedError, describe_error
+from roboirg.apps.policy_check.expert_episode import ExpertEpisode
 from roboirg.apps.policy_check.synthetic_episodes import SyntheticEpisode, SyntheticEpisodes
 from roboirg.core.actions import ActionSpace, check_chunk
-from roboirg.core.observations import Demonstration, Observation
 from roboirg.policies.by_name.loading import make_policy
 from roboirg.policies.contract.base import Policy, close_policy
 from roboirg.policies.contract.policy_needs import PolicyNeeds
-from roboirg.policies.contract.policy_urls import is_url
 
 CALLS = 3
 """Calls of `act` in a synthetic episode."""
@@ -28,16 +25,14 @@ FIRST, SECOND = "Put the red cube on the target.", "Press the second button from
 
 
 class SyntheticRollout(NamedTuple):
-    """The policy's actions in a synthetic episode, and the time of each call.
+    """The policy's actions in a synthetic episode.
 
     Attributes:
         chunks: (n, size) each.
-        seconds: of each call.
         dtype: of the last answer.
     """
 
     chunks: Chunks
-    seconds: list[float]
     dtype: str
 
 
@@ -51,14 +46,12 @@ class PolicyPlayer:
     Attributes:
         needs: of the policy; set by a check.
         repeatable: whether two equal episodes had equal actions; set by a check.
-        constant: whether every action was the same one; set by a check.
-        explained: whether it is known why targets are not where they should be; set by checks.
     """
 
     def __init__(self, source: str | Policy, seed: int) -> None:
         self.source, self.seed = source, seed
         self.needs = PolicyNeeds()
-        self.repeatable = self.constant = self.explained = False
+        self.repeatable = False
         self._policy: Policy | None = None
 
     @property
@@ -71,20 +64,13 @@ class PolicyPlayer:
         """The policy's action space."""
         return self.needs.action_space
 
-    @property
-    def is_local(self) -> bool:
-        """Whether the policy runs in this process, so that any input reaches it."""
-        return not isinstance(self.source, str) or not (
-            is_url(self.source) or self.source.startswith("system:")
-        )
-
     @cached_property
     def without_video(self) -> SyntheticEpisode:
-        return self.make_episodes().episode(FIRST, 0)
+        return SyntheticEpisodes(self.needs, self.seed).episode(FIRST, 0)
 
     @cached_property
     def with_video(self) -> SyntheticEpisode:
-        return self.make_episodes().episode(SECOND, VIDEO_STEPS)
+        return SyntheticEpisodes(self.needs, self.seed).episode(SECOND, VIDEO_STEPS)
 
     @cached_property
     def first_rollout(self) -> SyntheticRollout:
@@ -96,19 +82,13 @@ class PolicyPlayer:
         """The rollout of the episode with a video, played first by a fresh policy."""
         return self.play("acts with a video", self.with_video)
 
-    def make_episodes(self, changed: Collection[str] = ()) -> SyntheticEpisodes:
-        """Return synthetic episodes as the policy needs them; see there for `changed`."""
-        return SyntheticEpisodes(self.needs, self.seed, changed=changed)
-
     def play(
         self,
         check: str,
         episode: SyntheticEpisode,
         *,
         fresh: bool = True,
-        changed: Sequence[str] = (),
         calls: int = CALLS,
-        in_place: bool = False,
     ) -> SyntheticRollout:
         """Play some calls of a copy of an episode, which the policy may change.
 
@@ -116,22 +96,22 @@ class PolicyPlayer:
             check: that is under way.
             episode: its inputs.
             fresh: whether to make the policy anew, if it is a spec.
-            changed: fields of later observations that are drawn differently.
             calls: of `act`.
-            in_place: whether to play the episode itself.
 
         Raises:
             CheckAbortedError: the policy raised, or gave no actions.
         """
-        episode = episode if in_place else copy.deepcopy(episode)
-        policy = self.reset(check, episode, fresh=fresh)
-        episodes, observation = self.make_episodes(changed=changed), episode.first
-        rollout = SyntheticRollout([], [], "")
+        episode = copy.deepcopy(episode)
+        try:
+            policy = self.make_fresh() if fresh or self._policy is None else self._policy
+            policy.reset(episode.instruction, episode.demonstration)
+        except Exception as error:
+            raise CheckAbortedError(check, FAIL, f"reset(): {describe_error(error)}") from error
+        episodes, observation = SyntheticEpisodes(self.needs, self.seed), episode.first
+        rollout = SyntheticRollout([], "")
         for _ in range(calls):
-            start = time.perf_counter()
             try:
                 actions = policy.act(observation)
-                seconds = time.perf_counter() - start
                 chunk = check_chunk(actions, self.space)
             except Exception as error:
                 keys = f" Observations have {', '.join(sorted(observation))}."
@@ -141,33 +121,18 @@ class PolicyPlayer:
                 ) from error
             # A copy: a policy may reuse its array.
             rollout.chunks.append(chunk.copy())
-            rollout.seconds.append(seconds)
             rollout = rollout._replace(dtype=str(np.asarray(actions).dtype))
             observation = episodes.after(episode, len(chunk))
         return rollout
 
-    def ask(
-        self, instruction: str, demonstration: Demonstration, observations: Sequence[Observation]
-    ) -> Chunks:
-        """Return a fresh policy's answers to given observations; its errors are not caught."""
+    def ask(self, episode: ExpertEpisode) -> Chunks:
+        """Return a fresh policy's answers in the expert's episode; its errors are not caught."""
         policy = self.make_fresh()
-        policy.reset(instruction, demonstration)
+        policy.reset(episode.instruction, episode.demonstration)
         return [
-            check_chunk(policy.act(copy.deepcopy(one)), self.space).copy() for one in observations
+            check_chunk(policy.act(copy.deepcopy(one.observation)), self.space).copy()
+            for one in episode.moments
         ]
-
-    def reset(self, check: str, episode: SyntheticEpisode, *, fresh: bool = True) -> Policy:
-        """Begin an episode.
-
-        Raises:
-            CheckAbortedError: the policy raised.
-        """
-        try:
-            policy = self.make_fresh() if fresh or self._policy is None else self._policy
-            policy.reset(episode.instruction, episode.demonstration)
-        except Exception as error:
-            raise CheckAbortedError(check, FAIL, f"reset(): {describe_error(error)}") from error
-        return policy
 
     def make_fresh(self) -> Policy:
         """Return a fresh policy, or the object; the one before is closed."""
@@ -189,15 +154,9 @@ def are_equal(one: SyntheticRollout, other: SyntheticRollout) -> bool:
     )
 
 
-def largest_difference(one: Chunks, other: Chunks) -> float:
-    """Return the largest difference of actions; infinite if their number differs."""
-    pairs = list(zip(one, other, strict=True))
-    if any(first.shape != second.shape for first, second in pairs):
-        return np.inf
-    return max(float(np.abs(first - second).max()) for first, second in pairs)
-
-
 def describe_difference(one: SyntheticRollout, other: SyntheticRollout) -> str:
     """Return the largest difference of two rollouts, in words."""
-    difference = largest_difference(one.chunks, other.chunks)
-    return "the number of actions" if difference == np.inf else f"{difference:.3g}"
+    pairs = list(zip(one.chunks, other.chunks, strict=True))
+    if any(first.shape != second.shape for first, second in pairs):
+        return "the number of actions"
+    return f"{max(float(np.abs(first - second).max()) for first, second in pairs):.3g}"

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
 from typing import Any, NamedTuple, cast
 
 import numpy as np
-from numpy.typing import NDArray
 
 from roboirg.core.actions import ARM_JOINTS, JOINT_HIGH, JOINT_LOW, REACH_HIGH, REACH_LOW
 from roboirg.core.observations import Observation
@@ -41,20 +39,12 @@ class SyntheticEpisodes:
     Args:
         needs: of the policy.
         seed: of all random values.
-        changed: fields that get other values than without this argument; all others keep theirs.
     """
 
-    def __init__(
-        self,
-        needs: PolicyNeeds,
-        seed: int = 0,
-        *,
-        changed: Collection[str] = (),
-    ) -> None:
+    def __init__(self, needs: PolicyNeeds, seed: int = 0) -> None:
         self._needs = needs
         self._frames, self._every = needs.demonstration_frames, needs.observe_every
         self._rng = np.random.default_rng(seed)
-        self._changed, self._other_rng = changed, np.random.default_rng([seed, 1])
 
     def episode(self, instruction: str, size: int) -> SyntheticEpisode:
         """Return an episode with a video of `size` control steps; 0 for none."""
@@ -81,32 +71,8 @@ class SyntheticEpisodes:
                 last["history"] = (*last["history"][:-1], now)
         return cast("Observation", last)
 
-    def broken(self, episode: SyntheticEpisode) -> Observation:
-        """Return an observation of broken sensors: NaN everywhere, pictures of noise."""
-        broken = self._observation(episode.instruction)
-        for field, value in broken.items():
-            if isinstance(value, np.ndarray) and value.dtype.kind == "f":
-                broken[field] = np.full_like(value, np.nan)
-        if self._every is not None:
-            broken["history"] = ()
-        return cast("Observation", broken)
-
     def _observation(self, instruction: str) -> dict[str, Any]:
-        observation = self._draw(instruction, self._rng)
-        if self._changed:
-            other = self._draw(instruction, self._other_rng)
-            for field in self._changed:
-                # Noise looks like noise: a policy that rounds its answers may give the same ones.
-                is_picture = field.endswith("_rgb")
-                observation[field] = self._plain_picture() if is_picture else other[field]
-        return observation
-
-    def _plain_picture(self) -> NDArray[np.uint8]:
-        return np.broadcast_to(
-            self._other_rng.integers(0, 256, PICTURE[-1], dtype=np.uint8), PICTURE
-        ).copy()
-
-    def _draw(self, instruction: str, rng: np.random.Generator) -> dict[str, Any]:
+        rng = self._rng
         pictures: dict[str, Any] = {
             f"{camera}_rgb": rng.integers(0, 256, PICTURE, dtype=np.uint8)
             for camera in self._needs.cameras
