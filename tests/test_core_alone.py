@@ -46,7 +46,6 @@ NEEDS = {
     "figures": "report", "compare": "report", "serve": "remote",
     "records export": "export", "real run": "sim", "real score": "pages",
     "export demonstrations": "sim", "export recordings": "sim", "export grounding": "sim",
-    "leaderboard repeat": "sim", "leaderboard board": "report",
     "language shortcuts": "report",
 }  # fmt: skip
 """The extra of each command that cannot do its work without one; all others work."""

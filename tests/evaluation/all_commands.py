@@ -45,10 +45,8 @@ WORDS = {
     "learn listener": "--help",
     "learn answers": "--help",
     "learn policy": "--help",
-    "leaderboard repeat": "{run} --out {folder}/again",
     "leaderboard pack": "{run} --out {folder}/packed.zip",
     "leaderboard verify": "--help",
-    "leaderboard board": "{folder} --out {folder}-site",
     "real plan": "--policy random --tasks PutInBox --trials 1 --demonstrations 1"
     " --out {folder}/study",
     "export recordings": "{folder}/study {folder}",

@@ -227,7 +227,6 @@ def compare(
     from roboirg.evaluation.analysis.stats.cells import gather
     from roboirg.evaluation.analysis.stats.comparison import compare as compare_cells
     from roboirg.evaluation.analysis.stats.comparison_text import sentences
-    from roboirg.evaluation.analysis.stats.flips import read_flips
     from roboirg.evaluation.analysis.stats.headline import headline_notes
     from roboirg.evaluation.analysis.stats.run_data import RunData
     from roboirg.evaluation.analysis.stats.sensitivity import policy_contrasts, try_choices
@@ -245,12 +244,11 @@ def compare(
         names = [f"{names[0]} ({first})", f"{names[1]} ({second})"]
     console = Console()
     widen(console)
-    flips = read_flips(Path(_split(first)[0])), read_flips(Path(_split(second)[0]))
     headlines = (
         *headline_notes(ours, {found.first: names[0]}),
         *headline_notes(theirs, {found.second: names[1]}),
     )
-    for sentence in (*sentences(found, names[0], names[1], flips), *headlines):
+    for sentence in (*sentences(found, names[0], names[1]), *headlines):
         console.print(Text(sentence), highlight=False)
     data = [RunData.of(*each) for each in sides]
     for sentence in language_use_sentences(data[0], data[1], (names[0], names[1])):

@@ -1,7 +1,7 @@
 """Malformed runs, packs, plans and wording files: one sentence or an answer, and nothing outside.
 
 Each attack changes an honest run, then reads it. Without a simulator; what replays say about forged
-actions is in test_verification.py and test_forged_runs.py.
+actions is in test_verification.py.
 """
 
 from __future__ import annotations
@@ -24,12 +24,10 @@ import numpy as np
 import pytest
 from evaluation_fakes import fake_result, small_plan
 
-from roboirg.apps.leaderboard.board_page import read_packs, render_board
-from roboirg.apps.leaderboard.packing import MANIFEST, PACK_SUFFIX, opened_run, pack_run
+from roboirg.apps.leaderboard.packing import MANIFEST, opened_run, pack_run
 from roboirg.apps.leaderboard.run_verification import verify_run
 from roboirg.core.errors import RoboIRGError
 from roboirg.evaluation.analysis.page.report import write_report
-from roboirg.evaluation.analysis.stats.flips import read_flips
 from roboirg.evaluation.plan.plan_file import read_plan_file
 from roboirg.evaluation.plan.stored_plans import read_plans, write_plan
 from roboirg.evaluation.play.rollout_result import make_record
@@ -100,7 +98,7 @@ def _patience() -> Iterator[None]:
 
 
 def pack(run: Path) -> Path:
-    out = run.parent / f"mine{PACK_SUFFIX}"
+    out = run.parent / "mine.roboirg.zip"
     pack_run(run, out, videos=True, logs=True)
     return out
 
@@ -219,9 +217,7 @@ REFUSED_RECORDS: Mapping[str, tuple[Change, str]] = {
 }
 
 
-@pytest.mark.parametrize(
-    "reader", [read_records, pack, merge, export], ids=lambda one: one.__name__
-)
+@pytest.mark.parametrize("reader", [read_records, pack], ids=lambda one: one.__name__)
 @pytest.mark.parametrize("name", REFUSED_RECORDS)
 def test_records_are_refused(name: str, reader: Reader, run: Path) -> None:
     change, says = REFUSED_RECORDS[name]
@@ -354,8 +350,7 @@ UNREAD_PLANS: Mapping[str, Change] = {
 def test_plans_that_cannot_be_are_missing(name: str, run: Path) -> None:
     UNREAD_PLANS[name](run)
     assert read_plans(run) == ()
-    missing = verify_run(run, sample=0).missing
-    assert any(one.startswith("the plan ") for one in missing)
+    assert verify_run(run, sample=0).notes == ("From no plan that is kept: 2 records.",)
 
 
 def test_a_plan_of_3_gb_is_neither_merged_nor_played(run: Path) -> None:
@@ -515,63 +510,6 @@ def test_packs_are_refused(name: str, run: Path) -> None:
 
     assert says in refusal(read, path)
     assert sorted(run.parent.rglob("*")) == before
-
-
-@pytest.mark.parametrize(
-    ("make", "says"),
-    [
-        (os.mkfifo, "not a regular file"),
-        (Path.mkdir, "no records"),
-        (link("/dev/zero"), "not a link"),
-        (link("nowhere"), "not a link"),
-    ],
-    ids=["pipe", "folder", "device", "dangling link"],
-)
-def test_a_board_names_what_is_no_pack(
-    make: Callable[[Path], object], says: str, tmp_path: Path
-) -> None:
-    make(tmp_path / f"odd{PACK_SUFFIX}")
-    (found,) = read_packs(tmp_path, tmp_path.parent / "site")
-    assert says in found.why_unranked
-    assert "odd is not ranked: " in re.sub("<[^>]+>", "", render_board([found]))
-
-
-@pytest.mark.parametrize("name", [b"\xff", b"\x1b[31mx", b'"><script>alert(1)<'])
-def test_names_of_packs_do_not_get_into_the_page_as_they_are(name: bytes, run: Path) -> None:
-    pytest.importorskip("jinja2")
-    folder = run.parent / "packs"
-    folder.mkdir()
-    shutil.move(pack(run), os.fsencode(folder) + b"/" + name + PACK_SUFFIX.encode())
-    page = render_board(read_packs(folder, folder / "site"))
-    assert "\x1b" not in page
-    assert "<script>alert(1)" not in page
-    assert page.encode()
-
-
-@pytest.mark.parametrize(
-    "make",
-    [os.mkfifo, Path.mkdir, link("/dev/zero"), lambda path: path.write_text("[" * 200_000)],
-    ids=["pipe", "folder", "device", "deep nesting"],
-)
-def test_remembered_checks_that_cannot_be_read_are_forgotten(
-    make: Callable[[Path], object], run: Path
-) -> None:
-    path = pack(run)
-    site = path.parent / "site"
-    site.mkdir()
-    make(site / "checks.json")
-    (read,) = read_packs(path.parent, site)
-    assert read.check is None
-
-
-@pytest.mark.parametrize(
-    "make",
-    [os.mkfifo, lambda path: path.write_text("[" * 200_000), link("/dev/zero")],
-    ids=["pipe", "deep nesting", "device"],
-)
-def test_flips_that_cannot_be_read_are_refused(make: Callable[[Path], object], run: Path) -> None:
-    replaced("flips.json", make)(run)
-    assert "flips.json" in refusal(read_flips, run)
 
 
 WORDINGS = """name = "workshop"

@@ -1,8 +1,7 @@
-"""Honest runs hold; forged ones do not."""
+"""Honest runs hold; altered ones do not."""
 
 from __future__ import annotations
 
-import json
 import random
 import shutil
 from dataclasses import replace
@@ -76,27 +75,38 @@ def test_an_honest_run_holds(honest: Path) -> None:
     assert outcomes == {"success", "failure"}
 
 
-# Of each kind, one: a changed line, changed actions, a changed plan.
 QUICK = (
     "failure to success",
-    "steps",
+    "actions changed",
     "actions of another episode",
-    "actions cut",
-    "no actions",
-    "words",
-    "seed of the scene",
-    "record left out",
-    "record left out, and the plan",
-    "another episode of the split",
+    "actions lost",
+    "another file of actions",
+    "explicit command",
 )
 
 
 @pytest.mark.parametrize("name", slow_but(QUICK, FORGERIES))
-def test_a_forged_run_does_not(name: str, honest: Path, tmp_path: Path) -> None:
+def test_what_was_altered_does_not_hold(name: str, honest: Path, tmp_path: Path) -> None:
     forged = tmp_path / "forged"
     shutil.copytree(honest, forged)
-    assert forge(forged, FORGERIES[name], random.Random(name))
-    assert not verify_run(forged).holds
+    forgery, words = FORGERIES[name]
+    forge(forged, forgery, random.Random(name))
+    (found, *_) = verify_run(forged).checks
+    assert words in "\n".join(found.findings)
+
+
+def test_an_episode_of_the_plan_that_was_left_out_is_named(honest: Path, tmp_path: Path) -> None:
+    shorter = tmp_path / "shorter"
+    shutil.copytree(honest, shorter)
+    lines = (shorter / "records.jsonl").read_bytes().splitlines(keepends=True)
+    (shorter / "records.jsonl").write_bytes(b"".join(lines[1:]))
+    found = verify_run(shorter, sample=0.0)
+    assert found.missing == (read_records(honest)[0].slug,)
+    assert not found.holds
+    (shorter / "plan.json").unlink()
+    found = verify_run(shorter, sample=0.0)
+    assert found.holds
+    assert found.notes == ("From no plan that is kept: 3 records.",)
 
 
 def test_only_other_processors_may_end_a_little_elsewhere(honest: Path, tmp_path: Path) -> None:
@@ -115,7 +125,7 @@ def test_only_other_processors_may_end_a_little_elsewhere(honest: Path, tmp_path
     for processor, by, holds in ((None, 0.001, False), (other, 0.001, True), (other, 0.1, False)):
         folder = tmp_path / f"{processor}-{by}"
         shutil.copytree(honest, folder)
-        assert forge(folder, shift(processor, by), random.Random(0))
+        forge(folder, shift(processor, by), random.Random(0))
         found = verify_run(folder)
         assert found.holds is holds
         assert found.verdicts[ReplayVerdict.TOLERANT] == holds
@@ -175,32 +185,12 @@ def test_the_command_tells_what_does_not_hold(honest: Path, tmp_path: Path, cli:
     assert "All that was checked holds." in good.output
     forged = tmp_path / "forged"
     shutil.copytree(honest, forged)
-    assert forge(forged, FORGERIES["failure to success"], random.Random(0))
+    forge(forged, FORGERIES["failure to success"][0], random.Random(0))
     bad = cli.invoke(app, ["leaderboard", "verify", str(forged)])
     assert bad.exit_code == 2
-    lines = (forged / "records.jsonl").read_text().splitlines()
-    assert json.loads(lines[0])["schema_version"] == 4
     assert "outcome: the record says 'success'; it should be 'failure'" in bad.output
     assert "1 thing does not hold." in bad.output
-    assert "the record says success, but not that the goal was reached" in bad.output
     for share in ("many", "5", "0%", "101%", "nan"):
         wrong = cli.invoke(app, ["leaderboard", "verify", str(honest), "--sample", share])
         assert wrong.exit_code != 0
         assert f"{share!r}; give one such as 5%" in str(wrong.exception)
-
-
-def test_a_repeated_run_shows_no_flip(honest: Path, tmp_path: Path, cli: CliRunner) -> None:
-    out = str(tmp_path / "again")
-    done = cli.invoke(app, ["leaderboard", "repeat", str(honest), "--out", out])
-    assert done.exit_code == 0, done.output
-    assert "0 of 4 verdicts changed." in done.output
-    refused = cli.invoke(app, ["leaderboard", "repeat", str(honest), "--out", str(honest)])
-    assert refused.exit_code != 0
-
-
-def test_several_commands_in_one_folder_are_no_holes(tmp_path: Path) -> None:
-    given = {"tasks": "StopCube", "max_steps": 20}
-    play(tmp_path, ["random"], **given, episodes="2", settings="explicit,direct")
-    play(tmp_path, ["random"], **given, episodes="3", settings="contextual", stages="1,5")
-    play(tmp_path, ["random"], **given, episodes="1", settings="reasoning", policy_seeds="0,1")
-    assert verify_run(tmp_path, sample=0.0).missing == ()

@@ -1,1 +1,1 @@
-"""Results that others can check: verification, packed runs, repeated runs, and the leaderboard."""
+"""Results that others can check: verification, and packed runs."""

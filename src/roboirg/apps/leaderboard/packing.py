@@ -36,7 +36,6 @@ from roboirg.evaluation.records.store import RECORDS_FILE, StoredRun
 from roboirg.util.atomic_write import replacing
 from roboirg.util.regular_file import open_regular
 
-PACK_SUFFIX = ".roboirg.zip"
 MANIFEST = "manifest.json"
 _PACKED_FOLDERS = {"actions": ACTION_FOLDER, "logs": LOG_FOLDER, "videos": "videos"}
 _MAX_BYTES = 20 << 30

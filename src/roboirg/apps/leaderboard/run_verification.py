@@ -1,11 +1,11 @@
-"""Verify a run: its records one by one, and that none is missing or doubled."""
+"""Verify a run: its records one by one, and that none of its plan is missing."""
 
 from __future__ import annotations
 
 import functools
 import random
-from collections import Counter, defaultdict
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections import Counter
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -15,22 +15,16 @@ from roboirg.apps.leaderboard.record_check import (
     ReplayVerdict,
     check_line,
 )
-from roboirg.core.errors import InvalidValueError, RoboIRGError
-from roboirg.core.instruction_options import InstructionOptions
+from roboirg.core.errors import InvalidValueError
 from roboirg.core.plain_text import counted
-from roboirg.evaluation.analysis.stats.option_labels import options_label
-from roboirg.evaluation.plan.stored_plans import kept_fingerprints, read_plans
+from roboirg.evaluation.plan.stored_plans import read_plans
 from roboirg.evaluation.records.record import Summary
 from roboirg.evaluation.records.record_codec import identity_key
 from roboirg.evaluation.records.store import StoredRun, read_summaries
-from roboirg.language.arms import say_arm
 from roboirg.tasks.splits.private_splits import check_salt
-from roboirg.tasks.splits.splits import get_episode
 from roboirg.util.parallel_map import parallel_map
 
 Progress = Callable[[int, int], object]
-_CellName = tuple[str, str, str, InstructionOptions, str]
-"""Policy, task, split, options and arm."""
 
 
 @dataclass(frozen=True)
@@ -40,8 +34,7 @@ class Verification:
     Attributes:
         records: number of records.
         checks: of the records with findings.
-        missing: slugs or descriptions of episodes that have no record.
-        doubled: slugs of episodes with more than one verdict.
+        missing: slugs of the plan's episodes that have no record.
         verdicts: how many ends compare how.
         deviation: largest difference of an end state that was tolerated, in m, rad and s.
         errors: number of records that are errors: never counted as failures, so too many of them
@@ -52,7 +45,6 @@ class Verification:
     records: int
     checks: tuple[RecordCheck, ...]
     missing: tuple[str, ...]
-    doubled: tuple[str, ...]
     verdicts: Counter[ReplayVerdict] = field(default_factory=Counter)
     deviation: float = 0.0
     errors: int = 0
@@ -61,7 +53,7 @@ class Verification:
     @property
     def holds(self) -> bool:
         """Whether nothing was found."""
-        return not (self.checks or self.missing or self.doubled)
+        return not (self.checks or self.missing)
 
 
 def verify_run(
@@ -115,7 +107,6 @@ def verify_run(
         records=len(run.newest),
         checks=tuple(sorted(checks)),
         missing=missing,
-        doubled=tuple(sorted({one.slug for one in run.replaced if one.outcome != "error"})),
         verdicts=verdicts,
         deviation=deviation,
         errors=sum(one.outcome == "error" for one in run.newest),
@@ -140,57 +131,11 @@ def _completeness(
 ) -> tuple[tuple[str, ...], tuple[str, ...]]:
     """Return which episodes are missing, and notes about the plan."""
     plans = read_plans(folder)
-    made_by = {one.plan for one in entries if one.plan is not None}
-    unknown = made_by - kept_fingerprints(folder)
-    missing = {f"the plan {one}, by which episodes were played" for one in unknown}
     jobs = {identity_key(job): job.slug for plan in plans for job in plan.jobs()}
-    missing |= set(_holes(one for one in entries if identity_key(one) not in jobs))
     there = {identity_key(one) for one in entries}
-    missing |= {slug for key, slug in jobs.items() if key not in there}
+    missing = {slug for key, slug in jobs.items() if key not in there}
     notes = []
     if outside := len(there - jobs.keys()):
         whose = "an earlier plan" if plans else "no plan that is kept"
         notes.append(f"From {whose}: {counted(outside, 'record')}.")
     return tuple(sorted(missing)), tuple(notes)
-
-
-def _holes(entries: Iterable[Summary]) -> Iterator[str]:
-    """Yield episodes that a policy played in one setting or seed of a task, but not in another.
-
-    Only within one plan: a folder may hold commands with other settings, episodes and seeds.
-    """
-    plans: dict[str | None, list[Summary]] = defaultdict(list)
-    for one in entries:
-        plans[one.plan].append(one)
-    for played in plans.values():
-        yield from _holes_of_plan(played)
-
-
-def _holes_of_plan(entries: Iterable[Summary]) -> Iterator[str]:
-    episodes: dict[tuple[str, ...], set[int]] = defaultdict(set)
-    seeds: dict[str, set[int]] = defaultdict(set)
-    cells: dict[_CellName, set[tuple[int, int]]] = defaultdict(set)
-    for one in entries:
-        episodes[one.policy, one.task, one.split].add(one.episode)
-        seeds[one.policy].add(one.policy_seed)
-        played = cells[one.policy, one.task, one.split, one.column, one.arm]
-        played.add((one.episode, one.policy_seed))
-    for (policy, task, split, options, arm), played in cells.items():
-        for episode in sorted(episodes[policy, task, split]):
-            lacking = {seed for seed in seeds[policy] if (episode, seed) not in played}
-            if not lacking or not _is_expressible(task, split, episode, options, arm):
-                continue
-            for seed in sorted(lacking):
-                words = f"{options_label(options)}, {arm}"
-                yield f"{policy} {task} {split}/{episode} ({words}), policy seed {seed}"
-
-
-def _is_expressible(
-    task: str, split: str, episode: int, options: InstructionOptions, arm: str
-) -> bool:
-    """Return whether an episode exists and has words; what has none is named by its record."""
-    try:
-        say_arm(get_episode(task, split, episode), options, arm)
-    except RoboIRGError:
-        return False
-    return True

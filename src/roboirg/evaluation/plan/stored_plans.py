@@ -19,7 +19,6 @@ from roboirg.evaluation.records.run_files import (
     store_plan,
 )
 from roboirg.util.regular_file import read_regular
-from roboirg.util.short_hash import short_hash
 
 
 def with_secret(plan: Plan, folder: Path) -> Plan:
@@ -57,15 +56,6 @@ def read_earlier_plans(folder: Path) -> tuple[Plan, ...]:
     """Return the plans of earlier commands, or of merged runs, that can be read."""
     found = map(_parse, _stored(earlier_plans(folder)))
     return tuple(plan for plan in found if plan is not None)
-
-
-def kept_fingerprints(folder: Path) -> frozenset[str]:
-    """Return the fingerprints, as in records, of the newest and the earlier plans of a folder."""
-    stored = _stored([folder / PLAN_FILE, *earlier_plans(folder)])
-    # Of what was written: a plan of an older schema has other fields now.
-    return frozenset(
-        short_hash(json.dumps(data, ensure_ascii=False, separators=(",", ":"))) for data in stored
-    )
 
 
 def from_schema_3(data: dict[str, Any]) -> dict[str, Any]:

@@ -170,7 +170,6 @@ class StoredRun(Generic[Stored]):
 
     Attributes:
         newest: what is kept of each record, in the order of the file.
-        replaced: of earlier records of the same episodes.
 
     Raises:
         StoreError: there are no records, or a line is not a record of this schema version.
@@ -180,12 +179,8 @@ class StoredRun(Generic[Stored]):
         self._path = folder / RECORDS_FILE
         lines = LineFile(self._path)
         kept: dict[RecordKey, tuple[Stored, LinePlace]] = {}
-        self.replaced: list[Stored] = []
         for one in lines.parse(parse_line):
-            key = identity_key(one)
-            if key in kept:
-                self.replaced.append(kept[key][0])
-            kept[key] = (one, lines.place)
+            kept[identity_key(one)] = (one, lines.place)
         if not kept:
             raise StoreError(
                 f"There are no records in {folder}; give the --out folder of a `roboirg run`."

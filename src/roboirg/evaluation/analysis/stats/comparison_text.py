@@ -7,25 +7,21 @@ from collections.abc import Iterator
 
 from roboirg.core.plain_text import counted, verb_for
 from roboirg.evaluation.analysis.stats.comparison import Comparison, ComparisonResult
-from roboirg.evaluation.analysis.stats.flips import Flips
 from roboirg.evaluation.analysis.stats.option_labels import options_label
 from roboirg.evaluation.analysis.stats.power import MAX_EPISODES, POWER
 from roboirg.evaluation.analysis.stats.rates import interval_note, p_text, points
 
 
-def sentences(
-    comparison: Comparison, first: str, second: str, flips: tuple[Flips, Flips] | None = None
-) -> Iterator[str]:
+def sentences(comparison: Comparison, first: str, second: str) -> Iterator[str]:
     """Yield the results, a sentence each; empty ones separate paragraphs.
 
-    `first` and `second` are labels. `flips` says how often the verdicts of each policy change by
-    themselves, as far as that is known; None says nothing about it.
+    `first` and `second` are labels.
     """
     names = (first, second)
     yield f"{first} against {second}, on the same episodes."
     yield ""
     for result in comparison.averages:
-        yield _sentence(result, names) + _own_flips(comparison, result, names, flips)
+        yield _sentence(result, names)
     decided = [result for result in comparison.cells if result.verdict != "open"]
     if any(len(result.tasks) > 1 for result in comparison.averages):
         yield ""
@@ -44,34 +40,12 @@ def sentences(
             yield f"  {_sentence(result, names)}"
     yield ""
     yield from _caveats(comparison)
-    if flips is not None and not all(flips):
-        yield (
-            "How much a policy differs from itself is not known of "
-            f"{' and '.join(name for name, own in zip(names, flips, strict=True) if not own)}: "
-            "`roboirg leaderboard repeat RUN --out AGAIN` measures it."
-        )
 
 
 def _sentence(result: ComparisonResult, names: tuple[str, str]) -> str:
     if result.verdict == "open":
         return f"{_subject(result)}: no clear difference, {_figures(result)}.{_outlook(result)}"
     return f"{_subject(result)}: {_better(result, names)}, {_figures(result)}."
-
-
-def _own_flips(
-    comparison: Comparison,
-    result: ComparisonResult,
-    names: tuple[str, str],
-    flips: tuple[Flips, Flips] | None,
-) -> str:
-    """Return which share of the policies' verdicts changed when the same was played again."""
-    runs = (comparison.first, comparison.second)
-    found = [
-        f"{name} {own[run.policy, result.key.options]}"
-        for name, run, own in zip(names, runs, flips or ({}, {}), strict=True)
-        if (run.policy, result.key.options) in own
-    ]
-    return f" Verdicts that change between repeated runs: {', '.join(found)}." if found else ""
 
 
 def _subject(result: ComparisonResult) -> str:
