@@ -30,31 +30,16 @@ def write(folder: Path, *lines: bytes) -> Path:
     return folder
 
 
-@pytest.mark.parametrize("version", [1, 2])
+@pytest.mark.parametrize("version", [2, 3])
 def test_records_of_older_schemas_are_refused(tmp_path: Path, version: int) -> None:
     record = FakePlay()(small_plan().jobs()[0])
     line = {**msgspec.to_builtins(record), "schema_version": version, "film_lost": None}
     del line["video_error"]
     write(tmp_path, json.dumps(line).encode() + b"\n")
-    sentence = f"line 1 has schema version {version}, but this roboirg reads only versions 3 and 4;"
+    sentence = f"line 1 has schema version {version}, but this roboirg reads only version 4;"
     for read in (read_records, read_results, read_index, RecordStore):
         with pytest.raises(StoreError, match=sentence):
             read(tmp_path)
-
-
-def test_a_record_from_before_turns_was_told_at_once(tmp_path: Path) -> None:
-    record = FakePlay()(small_plan().jobs()[1])
-    line = {**msgspec.to_builtins(record), "schema_version": 3}
-    line |= line.pop("options")  # they were fields of the record
-    for name in ("delivery", "robot"):
-        del line[name]
-    for utterance in line["instruction"]:
-        del utterance["step"]
-    write(tmp_path, json.dumps(line).encode() + b"\n")
-    assert read_records(tmp_path) == (record,)
-    assert list(read_index(tmp_path)) == [identity_key(record)]
-    turns = record.with_options(delivery="turns")
-    assert identity_key(turns) != identity_key(record)
 
 
 def test_a_damaged_line_loses_only_its_episode(tmp_path: Path) -> None:

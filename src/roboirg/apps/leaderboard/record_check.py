@@ -10,7 +10,6 @@ from typing import NamedTuple
 import numpy as np
 
 from roboirg.apps.leaderboard.action_replay import replay, unplayed
-from roboirg.core.arms import TOLD
 from roboirg.core.episode import ENVIRONMENT_VERSION
 from roboirg.core.errors import RoboIRGError
 from roboirg.evaluation.records.action_log import ActionLog, read_actions
@@ -153,8 +152,7 @@ def _words(record: Record, unplayed: Record) -> Iterator[str]:
 def _differences(record: Record, again: Record, fields: tuple[str, ...]) -> Iterator[str]:
     for name in fields:
         recorded, expected = getattr(record, name), getattr(again, name)
-        is_older = name == "goals" and recorded is None and record.arm == TOLD
-        if recorded != expected and not is_older:  # records from before the goals were kept
+        if recorded != expected:
             yield _difference(name, recorded, expected)
 
 

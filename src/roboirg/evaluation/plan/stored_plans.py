@@ -10,8 +10,7 @@ from typing import Any
 
 from roboirg.core.errors import InvalidValueError
 from roboirg.core.plain_text import is_encodable
-from roboirg.evaluation.plan.plan import Plan, nest_options
-from roboirg.evaluation.records.record_codec import harder_setting
+from roboirg.evaluation.plan.plan import Plan
 from roboirg.evaluation.records.run_files import (
     MOST_PLAN_BYTES,
     PLAN_FILE,
@@ -58,19 +57,6 @@ def read_earlier_plans(folder: Path) -> tuple[Plan, ...]:
     return tuple(plan for plan in found if plan is not None)
 
 
-def from_schema_3(data: dict[str, Any]) -> dict[str, Any]:
-    """Return the fields of a plan; in schema 3 options were flat, harder settings among them."""
-    identity = data.get("wordings_identity")
-    data = nest_options({name: one for name, one in data.items() if name != "wordings_identity"})
-    if identity is not None:
-        data["options"]["wordings"] = identity
-    rival, reasoning = data.pop("rival", "none"), data.pop("reasoning", "plain")
-    if isinstance(data.get("settings"), list):
-        harder = [harder_setting(one, rival=rival, reasoning=reasoning) for one in data["settings"]]
-        data["settings"] = harder
-    return data
-
-
 def _stored(paths: list[Path]) -> Iterator[dict[str, Any]]:
     """Yield the contents of the files that hold a JSON object."""
     for path in paths:
@@ -86,6 +72,6 @@ def _stored(paths: list[Path]) -> Iterator[dict[str, Any]]:
 def _parse(data: dict[str, Any]) -> Plan | None:
     try:
         # As JSON, in which a list is a tuple and nothing else is converted.
-        return Plan.model_validate_json(json.dumps(from_schema_3(data)))
+        return Plan.model_validate_json(json.dumps(data))
     except (ValueError, InvalidValueError):
         return None

@@ -317,8 +317,7 @@ class Summary(Job, frozen=True, kw_only=True, gc=False):
         error: kind of error; None if the outcome is not an error.
         cause: why it failed or ended in an error, in words.
         attribution: of a failure; None if the reason is unclear.
-        goals: which goals of the scene were reached; None for an error, and in records from before
-            this was kept.
+        goals: which goals of the scene were reached; None for an error.
         steps: control steps that the policy played.
         demonstration_steps: frames of the video before the policy's turn, one per control step;
             0 without a video.
@@ -341,7 +340,7 @@ class Summary(Job, frozen=True, kw_only=True, gc=False):
         video: path of the video relative to the records file, or None.
         render_device: the driver's name of the render device; None if nothing was rendered.
         processor: architecture, maker and family of the processor that simulated it, which decide
-            the last bits of the record's `end_state`; None in records from before this was kept.
+            the last bits of the record's `end_state`; None if it is not known.
         started_at: ISO 8601, UTC.
         duration_s: wall-clock seconds.
     """

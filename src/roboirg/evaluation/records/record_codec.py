@@ -14,13 +14,7 @@ import msgspec
 from roboirg.core.errors import RoboIRGError
 from roboirg.core.field_types import MOST_NAME_LETTERS, NAME
 from roboirg.core.instruction_options import OPTION_NAMES
-from roboirg.evaluation.records.record import (
-    IDENTITY,
-    SCHEMA_VERSION,
-    Record,
-    Summary,
-    real_robot,
-)
+from roboirg.evaluation.records.record import IDENTITY, SCHEMA_VERSION, Record, Summary
 from roboirg.evaluation.records.run_files import RELATIVE_PATH
 
 Stored = TypeVar("Stored", bound=Summary)
@@ -90,7 +84,7 @@ def _read(decoder: msgspec.json.Decoder[Stored], line: bytes, path: Path, number
     try:
         stored = decoder.decode(line)
     except msgspec.ValidationError as error:
-        stored = _read_other_version(decoder, line, path, number, error)
+        raise _explain(line, path, number, error) from error
     except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
         raise DamagedLineError(
             f"{path} line {number} is damaged: it is not JSON ({error})."
@@ -105,30 +99,18 @@ def _read(decoder: msgspec.json.Decoder[Stored], line: bytes, path: Path, number
     return stored
 
 
-def _read_other_version(
-    decoder: msgspec.json.Decoder[Stored],
-    line: bytes,
-    path: Path,
-    number: int,
-    error: msgspec.ValidationError,
-) -> Stored:
-    """Read a line that is not of this schema version; raises `error` in words if it is."""
+def _explain(line: bytes, path: Path, number: int, error: msgspec.ValidationError) -> StoreError:
+    """Return what is wrong with a line of JSON: its schema version, or else a field."""
     try:
         version = _version_decoder.decode(line).schema_version
     except msgspec.ValidationError:
         version = None
     if version == SCHEMA_VERSION:
-        raise StoreError(f"{path} line {number} is not a record: {_words(error)}.") from error
-    if version != SCHEMA_VERSION - 1:
-        raise StoreError(
-            f"{path} line {number} has schema version {version!r}, but this roboirg reads only "
-            f"versions {SCHEMA_VERSION - 1} and {SCHEMA_VERSION}; use the roboirg that wrote it, "
-            "or another folder."
-        )
-    try:
-        return msgspec.convert(_from_schema_3(msgspec.json.decode(line)), decoder.type)
-    except (msgspec.ValidationError, TypeError, AttributeError) as problem:
-        raise StoreError(f"{path} line {number} is not a record: {_words(problem)}.") from problem
+        return StoreError(f"{path} line {number} is not a record: {_words(error)}.")
+    return StoreError(
+        f"{path} line {number} has schema version {version!r}, but this roboirg reads only version "
+        f"{SCHEMA_VERSION}; use the roboirg that wrote it, or another folder."
+    )
 
 
 def _words(error: Exception) -> str:
@@ -139,21 +121,6 @@ def _words(error: Exception) -> str:
     return words
 
 
-def _from_schema_3(data: dict[str, Any]) -> dict[str, Any]:
-    """Return a record of schema 3 with the fields of this one; what it lacks is still lacking."""
-    found = {**data, "schema_version": SCHEMA_VERSION}
-    rival, reasoning = found.pop("rival", "none"), found.pop("reasoning", "plain")
-    if "setting" in found:
-        found["setting"] = harder_setting(found["setting"], rival=rival, reasoning=reasoning)
-    found = with_nested_options(found)
-    if "metadata" in found:
-        notes = found["metadata"].items()
-        found["metadata"] = {name: note for name, note in notes if name != "reasoning"}
-    if "policy_metadata" in found:
-        found["robot"] = real_robot(found["policy_metadata"].get("real_trial"))
-    return found
-
-
 def with_nested_options(
     data: Mapping[str, Any], names: Collection[str] = OPTION_NAMES
 ) -> dict[str, Any]:
@@ -161,11 +128,3 @@ def with_nested_options(
     options = {name: value for name, value in data.items() if name in names}
     others = {name: value for name, value in data.items() if name not in names}
     return {**others, "options": {**data.get("options", {}), **options}}
-
-
-def harder_setting(setting: str, *, rival: str, reasoning: str) -> str:
-    """Return the setting that schema 3 wrote as another one with an option."""
-    if setting == "reasoning":
-        return setting if reasoning == "plain" else f"{setting}-{reasoning}"
-    has_rival = rival == "drawn" and setting in ("direct", "contextual", "spatial")
-    return f"{setting}-rival" if has_rival else setting
