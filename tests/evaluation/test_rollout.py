@@ -126,7 +126,7 @@ class PaperInsider(PaperPolicy):
 def stage(monkeypatch: pytest.MonkeyPatch) -> Callable[..., Any]:
     def play(world: PaperWorld, policy: Any, job: Job = JOB) -> RolloutResult:
         monkeypatch.setattr(rollout, "make_env", lambda _job, _needs: world)
-        monkeypatch.setattr(rollout, "load_policy", lambda _job, _secret: policy)
+        monkeypatch.setattr(rollout, "load_policy", lambda _job: policy)
         return EpisodeRunner(Path()).play_once(job)
 
     return play
@@ -265,7 +265,7 @@ def test_videos_are_kept_as_asked(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path, mode: Any, status: str, kept: bool
 ) -> None:
     monkeypatch.setattr(rollout, "make_env", lambda _job, _needs: PaperWorld(5, status))
-    monkeypatch.setattr(rollout, "load_policy", lambda _job, _secret: PaperPolicy())
+    monkeypatch.setattr(rollout, "load_policy", lambda _job: PaperPolicy())
     record = EpisodeRunner(tmp_path, mode)(JOB)
     assert (record.video is not None) == kept
     files = sorted(path.suffix for path in tmp_path.rglob("*") if path.is_file())
@@ -300,7 +300,7 @@ def test_a_video_that_cannot_be_written_does_not_change_the_verdict(
 
     monkeypatch.setattr(VideoWriter, "_encode", add)
     monkeypatch.setattr(rollout, "make_env", lambda _job, _needs: PaperWorld(5))
-    monkeypatch.setattr(rollout, "load_policy", lambda _job, _secret: PaperPolicy())
+    monkeypatch.setattr(rollout, "load_policy", lambda _job: PaperPolicy())
     record = EpisodeRunner(tmp_path, "all")(JOB)
     assert (record.outcome, record.steps, record.video) == ("success", 5, None)
     assert "No space left on device" in str(record.video_error)
@@ -312,7 +312,7 @@ def test_a_video_folder_that_is_a_file_does_not_change_the_verdict(
 ) -> None:
     (tmp_path / "videos").touch()
     monkeypatch.setattr(rollout, "make_env", lambda _job, _needs: PaperWorld(5))
-    monkeypatch.setattr(rollout, "load_policy", lambda _job, _secret: PaperPolicy())
+    monkeypatch.setattr(rollout, "load_policy", lambda _job: PaperPolicy())
     record = EpisodeRunner(tmp_path, "all")(JOB)
     assert (record.outcome, record.video) == ("success", None)
     assert "FileExistsError" in str(record.video_error)
@@ -436,7 +436,7 @@ def test_a_record_holds_what_was_heard_when(
 ) -> None:
     world, policy = TellingWorld((0, 3, 6, 6), length=10), policy_class()
     monkeypatch.setattr(rollout, "make_env", lambda _job, _needs: world)
-    monkeypatch.setattr(rollout, "load_policy", lambda _job, _secret: policy)
+    monkeypatch.setattr(rollout, "load_policy", lambda _job: policy)
     turns = world.instruction.turns
     record = EpisodeRunner(tmp_path)(TURNS)
     assert record.outcome == "success"
@@ -463,7 +463,7 @@ def test_the_caption_grows_as_utterances_are_heard(
 
     world = TellingWorld((0, 3, 6, 6, 9), length=11)
     monkeypatch.setattr(rollout, "make_env", lambda _job, _needs: world)
-    monkeypatch.setattr(rollout, "load_policy", lambda _job, _secret: PaperPolicy())
+    monkeypatch.setattr(rollout, "load_policy", lambda _job: PaperPolicy())
     EpisodeRunner(tmp_path).play_once(TURNS, Captions(tmp_path / "x.mp4"))
     counts = [1, 1, *[1] * 3, *[2] * 3, *[4] * 3, *[5] * 2]  # video, first frame, chunks of 3
     assert captions == [" ".join(world.instruction.turns[:count]) for count in counts]
@@ -477,7 +477,7 @@ def test_what_a_policy_raises_while_it_hears_is_its_error(
             raise ValueError(f"no ears for {text} at {step}")
 
     monkeypatch.setattr(rollout, "make_env", lambda _job, _needs: TellingWorld((0, 3), 9))
-    monkeypatch.setattr(rollout, "load_policy", lambda _job, _secret: Deaf())
+    monkeypatch.setattr(rollout, "load_policy", lambda _job: Deaf())
     result = EpisodeRunner(Path()).play_once(TURNS)
     assert (result.outcome, result.error) == ("error", "policy")
     assert "no ears for" in str(result.cause)

@@ -127,6 +127,24 @@ def all_comparable(folder: Path) -> list[dict[str, object]]:
     return [comparable(record) for record in records]
 
 
+@pytest.mark.usefixtures("without_cache")
+def test_equal_commands_give_equal_records(tmp_path: Path) -> None:
+    played = []
+    for workers in (1, 2):
+        folder = tmp_path / f"by {workers}"
+        said = command(
+            "run", "--policy", "random,forgetful", "--tasks", "PickXtimes,VideoUnmask",
+            "--settings", "direct", "--episodes", "1", "--max-steps", "80",
+            "--workers", workers, "--out", folder,
+            cwd=tmp_path,
+        )  # fmt: skip
+        assert said.returncode == 0, said.stderr
+        played.append((read_plan(folder), all_comparable(folder)))
+    assert len(played[0][1]) == 4
+    assert all(record["end_state"] for record in played[0][1])
+    assert played[0] == played[1]
+
+
 def kill_in_the_middle(folder: Path, *words: str) -> None:
     """Begin the small run and SIGKILL it when two of its eight records are there."""
     child = subprocess.Popen([sys.executable, "-m", "roboirg", *words], stdout=subprocess.DEVNULL)
@@ -143,10 +161,8 @@ def kill_in_the_middle(folder: Path, *words: str) -> None:
 @pytest.mark.slow
 def test_workers_and_kills_leave_no_trace_in_the_records(tmp_path: Path) -> None:
     folders = [tmp_path / name for name in ("one", "two", "killed")]
-    plan = tmp_path / "plan.yaml"
-    plan.write_text("seed_secret: a secret of the runs")
     words = [
-        (*SMALL_RUN, "--plan", str(plan), "--workers", str(min(number, 2)), "--out", str(folder))
+        (*SMALL_RUN, "--workers", str(min(number, 2)), "--out", str(folder))
         for number, folder in enumerate(folders, start=1)
     ]
     kill_in_the_middle(folders[2], *words[2])

@@ -128,7 +128,6 @@ def play(
 ) -> RunSummary:
     """Play a plan with a progress bar; exits the process when it is interrupted."""
     from roboirg.evaluation.episode_errors import Terminated
-    from roboirg.evaluation.plan.stored_plans import with_secret
     from roboirg.evaluation.run.progress import ConsoleReporter
     from roboirg.evaluation.run.record_hook import CommandHook, HookedReporter
     from roboirg.evaluation.run.runner import episode_runner, run_plan
@@ -136,7 +135,6 @@ def play(
     from roboirg.util.freed_memory import keep_freed_memory
 
     keep_freed_memory()
-    plan = with_secret(plan, out)
     play_job = episode_runner(plan, out)
     try:
         with ConsoleReporter(progress_console()) as shown, contextlib.ExitStack() as stack:

@@ -339,7 +339,7 @@ UNREAD_PLANS: Mapping[str, Change] = {
     "no seeds": planned(policy_seeds=[]),
     "policy that controls the terminal": planned(policies=["\x1b[31m"]),
     "task that controls the terminal": planned(tasks=["\u202eksat"]),
-    "secret of half a character": planned(seed_secret="\ud800"),  # noqa: S106
+    "split of half a character": planned(split="\ud800"),
     "deep nesting": replaced(PLAN_FILE, lambda path: path.write_text("[" * 200_000)),
     "pipe": replaced(PLAN_FILE, os.mkfifo),
     "3 GB": replaced(PLAN_FILE, sparse(3 << 30)),

@@ -12,7 +12,6 @@ from roboirg.core.errors import InvalidValueError
 from roboirg.evaluation.hosting.policy_descriptions import know_policy
 from roboirg.evaluation.plan.plan import Plan
 from roboirg.evaluation.plan.plan_maker import make_plan
-from roboirg.evaluation.plan.stored_plans import with_secret
 from roboirg.evaluation.run.executor import choose_executor
 from roboirg.evaluation.run.progress import ConsoleReporter, Reporter
 from roboirg.evaluation.run.record_hook import CommandHook, HookedReporter, RecordFunction
@@ -67,7 +66,6 @@ def play_plan(
                 "into a module that can be imported, or leave workers out."
             )
         workers = 0
-    plan = with_secret(plan, folder)
     executor = choose_executor(workers, plan.episode_timeout_s)
     shown = ConsoleReporter(progress_console(stderr=True)) if progress else None
     hook = CommandHook(on_record) if isinstance(on_record, str) else on_record

@@ -108,9 +108,6 @@ class Plan(BaseModel):
     """told, and control arms of the same scenes: other-goal, silent, silent-empty, scrambled,
     paraphrase:N (N other texts), again (another policy seed). Scenes without such an arm
     are left out."""
-    seed_secret: str | None = None
-    """Text from which, with the policy seed and the scene, the seeds of policies are derived; if
-    missing, the run uses its folder's or draws one."""
     stages: tuple[tuple[int, ...], ...] = (ALL_STAGES,)
     """Sets of stages of the contextual setting; every set is played."""
     options: InstructionOptions = InstructionOptions()
@@ -184,9 +181,7 @@ class Plan(BaseModel):
 
     @model_validator(mode="after")
     def _check_text(self) -> Plan:
-        if not is_encodable(self.seed_secret or ""):
-            raise InvalidValueError(f"seed_secret is {self.seed_secret!r}: it has lone surrogates.")
-        texts = self.model_dump(exclude={"seed_secret"})
+        texts = self.model_dump()
         texts |= texts.pop("options")
         for name, value in texts.items():
             for text in value if isinstance(value, tuple) else (value,):

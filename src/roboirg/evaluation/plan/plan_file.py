@@ -17,6 +17,7 @@ from roboirg.core.errors import InvalidValueError, UnknownNameError
 from roboirg.core.instruction_options import OPTION_HELP
 from roboirg.evaluation.plan.plan import SINGLE_OPTIONS, Plan
 from roboirg.evaluation.plan.plan_maker import make_plan
+from roboirg.evaluation.plan.stored_plans import present_fields
 from roboirg.util.regular_file import read_regular
 
 _PACKAGE = "roboirg.evaluation.plan"
@@ -91,7 +92,7 @@ def _load(name: str) -> object:
     file = _find(name)
     try:
         # A safe loader, with two more checks.
-        return yaml.load(_text(file), _PlanLoader)  # noqa: S506
+        data = yaml.load(_text(file), _PlanLoader)  # noqa: S506
     except (OSError, UnicodeDecodeError, InvalidValueError) as error:
         words = str(error).rstrip(".")
         raise InvalidValueError(f"The plan {name!r} cannot be read: {words}.") from error
@@ -100,6 +101,8 @@ def _load(name: str) -> object:
     except (yaml.YAMLError, ValueError) as error:  # such as a number of too many digits
         words = " ".join(str(error).split())
         raise InvalidValueError(f"The plan {name!r} is not valid YAML: {words}.") from error
+    is_stored = name.endswith(".json") and isinstance(data, dict)
+    return present_fields(data) if is_stored else data
 
 
 def _text(file: Path | Traversable) -> str:

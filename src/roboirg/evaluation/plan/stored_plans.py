@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import secrets
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -19,17 +18,8 @@ from roboirg.evaluation.records.run_files import (
 )
 from roboirg.util.regular_file import read_regular
 
-
-def with_secret(plan: Plan, folder: Path) -> Plan:
-    """Return a plan whose `seed_secret` is known: its own, the folder's, or a new one.
-
-    A run that began without one goes on without.
-    """
-    if plan.seed_secret is not None:
-        return plan
-    before = read_plan(folder)
-    secret = secrets.token_hex(16) if before is None else before.seed_secret or ""
-    return plan.model_copy(update={"seed_secret": secret})
+_FORMER_FIELDS = ("seed_secret",)
+"""Fields of plans in published packs that have no meaning any more."""
 
 
 def write_plan(plan: Plan, folder: Path) -> None:
@@ -57,6 +47,11 @@ def read_earlier_plans(folder: Path) -> tuple[Plan, ...]:
     return tuple(plan for plan in found if plan is not None)
 
 
+def present_fields(data: dict[str, Any]) -> dict[str, Any]:
+    """Return the fields of a stored plan without those that plans no longer have."""
+    return {name: value for name, value in data.items() if name not in _FORMER_FIELDS}
+
+
 def _stored(paths: list[Path]) -> Iterator[dict[str, Any]]:
     """Yield the contents of the files that hold a JSON object."""
     for path in paths:
@@ -72,6 +67,6 @@ def _stored(paths: list[Path]) -> Iterator[dict[str, Any]]:
 def _parse(data: dict[str, Any]) -> Plan | None:
     try:
         # As JSON, in which a list is a tuple and nothing else is converted.
-        return Plan.model_validate_json(json.dumps(data))
+        return Plan.model_validate_json(json.dumps(present_fields(data)))
     except (ValueError, InvalidValueError):
         return None

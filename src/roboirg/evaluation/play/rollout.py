@@ -22,7 +22,6 @@ from pathlib import Path
 from socket import socket
 
 from roboirg import policies
-from roboirg.core.arms import AGAIN
 from roboirg.evaluation.episode_errors import (
     EpisodeError,
     EpisodeLostError,
@@ -73,7 +72,6 @@ class EpisodeRunner:
         hosts: the line on which to ask for them; an executor sets it.
         refuse_long: whether an episode is not played if its prompt is longer than what the policy's
             model reads.
-        seed_secret: of the run, for the policies' seeds.
         replies: where those of models are kept; None for a run that keeps none.
     """
 
@@ -84,7 +82,6 @@ class EpisodeRunner:
     hosting: HostSettings | None = None
     hosts: socket | None = None
     refuse_long: bool = False
-    seed_secret: str = ""
     replies: ReplySettings | None = None
 
     def in_folder(self, folder: Path) -> EpisodeRunner:
@@ -168,9 +165,9 @@ class EpisodeRunner:
                 result.policy = describe_here(job.policy_spec)
             with guard.policy("policy's constructor", "policy_load"):
                 if hosts is None:
-                    policy = load_policy(prepared, self.seed_secret)
+                    policy = load_policy(prepared)
                 else:
-                    seed = _policy_seed(prepared, self.seed_secret)
+                    seed = _policy_seed(prepared)
                     policy = load_hosted_policy(hosts, job.policy_spec, seed, alone=alone)
                     privileged = is_privileged(job.policy_spec)
                     result.policy = PolicyDescription(policy.version, privileged)
@@ -238,10 +235,9 @@ def play_with(
                     result.end_state = env.end_state()
 
 
-def load_policy(prepared: PreparedJob, seed_secret: str = "") -> Policy:
+def load_policy(prepared: PreparedJob) -> Policy:
     """Return a new policy object, so that no state of an earlier episode remains."""
-    job = prepared.job
-    return policies.make_policy(job.policy_spec, seed=_policy_seed(prepared, seed_secret))
+    return policies.make_policy(prepared.job.policy_spec, seed=_policy_seed(prepared))
 
 
 def load_hosted_policy(
@@ -254,11 +250,9 @@ def load_hosted_policy(
     return with_planner(hosted, make_hands(SCRIPTED, seed), spec.partition("?")[0])
 
 
-def _policy_seed(prepared: PreparedJob, secret: str) -> int:
+def _policy_seed(prepared: PreparedJob) -> int:
     job = prepared.job
-    if job.arm == AGAIN:
-        secret = f"{secret}|{AGAIN}"
-    return episode_policy_seed(job.policy_seed, prepared.scene_episode.seed, secret)
+    return episode_policy_seed(job.policy_seed, prepared.scene_episode.seed, job.arm)
 
 
 def _close_policy(policy: Policy, result: RolloutResult, guard: CallGuard) -> None:

@@ -132,7 +132,6 @@ def episode_runner(plan: Plan, folder: Path) -> EpisodeRunner:
         plan=plan.fingerprint,
         hosting=plan.hosting,
         refuse_long=plan.long_prompts == "refuse",
-        seed_secret=plan.seed_secret or "",
         replies=ReplySettings(folder, plan.max_cost, plan.model_replies == "anew"),
     )
 

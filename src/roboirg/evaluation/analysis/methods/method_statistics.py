@@ -238,7 +238,7 @@ def error_items(
     yield item(
         "policy seeds",
         f"{counted(len(seeds), 'seed')}, numbered {distinct(seeds)}",
-        "the seed that a policy gets is made from this number, the scene and a secret in the plan",
+        "the seed that a policy gets is made from this number and the scene",
     )
     again = sum(one.repeated for one in played.values())
     yield "rollouts begun again after a fault", f"{again} of {len(results)}"

@@ -1,0 +1,54 @@
+"""Policies' seeds: from policy seed and scene alone; and no command of a scene is heard early."""
+
+import json
+
+import pytest
+
+from roboirg.evaluation.plan.plan_maker import make_plan
+from roboirg.evaluation.plan.stored_plans import read_plan, write_plan
+from roboirg.evaluation.play.job_instruction import PreparedJob
+from roboirg.evaluation.play.rollout import load_policy
+from roboirg.evaluation.records.run_files import PLAN_FILE
+from roboirg.policies.contract.random_state import episode_policy_seed
+from roboirg.tasks.splits.splits import SIZES, get_episode
+
+
+def a_plan(**options):
+    chosen = {"tasks": "PickXtimes", "settings": "direct,explicit", "episodes": "3"} | options
+    return make_plan(["random"], **chosen)
+
+
+def test_every_scene_policy_seed_and_only_the_arm_again_have_a_seed_of_their_own():
+    scenes = [get_episode("PickXtimes", "test", index).seed for index in range(SIZES["test"])]
+    cases = [(seed, scene, arm) for seed in (0, 1) for scene in scenes for arm in ("told", "again")]
+    assert len({episode_policy_seed(*case) for case in cases}) == len(cases)
+    for arm in ("other-goal", "silent", "paraphrase-1"):
+        assert episode_policy_seed(0, scenes[0], arm) == episode_policy_seed(0, scenes[0])
+
+
+def test_a_stored_plan_may_still_have_the_secret_of_its_run(tmp_path):
+    write_plan(a_plan(), tmp_path)
+    path = tmp_path / PLAN_FILE
+    fields = {"seed_secret": "of the run", **json.loads(path.read_text())}
+    path.write_text(json.dumps(fields))
+    assert read_plan(tmp_path) == a_plan()
+
+
+def test_settings_and_forms_of_a_scene_share_the_seed_and_scenes_do_not():
+    jobs = a_plan(forms="implicit,resolved").jobs()
+    seeds = {(job.episode, load_policy(PreparedJob(job)).seed) for job in jobs}
+    assert len(jobs) == 9
+    assert len(seeds) == 3
+
+
+@pytest.mark.parametrize("settings", ["all", "explicit,spatial,direct"])
+def test_what_names_the_goal_comes_after_what_does_not(settings):
+    plan = a_plan(tasks="BinFill", settings=settings, forms="resolved,implicit", policy_seeds="0,1")
+    for episode in range(3):
+        said = [
+            one.setting == "explicit" or one.form == "resolved"
+            for one in plan.jobs()
+            if one.episode == episode
+        ]
+        assert said == sorted(said)
+        assert {True, False} == set(said)
