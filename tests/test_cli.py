@@ -449,8 +449,7 @@ def test_a_dry_run_says_what_models_will_be_asked(roboirg, tmp_path: Path) -> No
     words = (*RUN, "--policy", f"p=planner:stateless?{model}", "--settings", "explicit")
     said = roboirg(*words, "--dry-run", "--out", tmp_path / "out")
     assert said.code == 0, said.err
-    assert "expected calls of models" in said.out
-    assert "not known" in said.out
+    assert "least calls of models" in said.out
     assert not (tmp_path / "out").exists()
 
 

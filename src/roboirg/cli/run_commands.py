@@ -74,7 +74,7 @@ def run(
     on_record: OnRecord = None,
     dry_run: Annotated[
         bool,
-        typer.Option("--dry-run", help="Only check, count the episodes, estimate time and costs."),
+        typer.Option("--dry-run", help="Only check, and count episodes and calls of models."),
     ] = False,
     show_plan: Annotated[
         bool,
@@ -104,7 +104,7 @@ def run(
     chosen = _executor(made, executor, workers)
     _check_run(made, folder)
     if dry_run:
-        _print_estimate(made, folder, workers)
+        _print_counts(made, folder)
         return
     _warn_of_cut_prompts(made)
     summary = play(made, folder, chosen, retry=retry_errors, on_record=on_record)
@@ -251,17 +251,15 @@ def _executor(plan: Plan, name: str, workers: int | None) -> Executor:
     return choose_executor(workers, plan.episode_timeout_s)
 
 
-def _print_estimate(plan: Plan, folder: Path, workers: int | None) -> None:
+def _print_counts(plan: Plan, folder: Path) -> None:
     from rich.console import Console
     from rich.table import Table
 
     from roboirg.evaluation.records.record_codec import identity_key
     from roboirg.evaluation.records.store import read_index
-    from roboirg.evaluation.run.estimate import cell_sizes, estimate, estimate_text
-    from roboirg.evaluation.run.world_speed import ASSUMED, measure_world
+    from roboirg.evaluation.run.plan_counts import cell_sizes
     from roboirg.language.settings import EXPLICIT
     from roboirg.util.console_width import widen
-    from roboirg.util.processor import core_count, worker_count
 
     jobs, console = plan.jobs(), Console()
     table = Table(title=f"plan {plan.fingerprint}", title_justify="left")
@@ -283,50 +281,31 @@ def _print_estimate(plan: Plan, folder: Path, workers: int | None) -> None:
     _print_prompt_shares(jobs, settings, console)
     played = read_index(folder)
     todo = [job for job in jobs if identity_key(job) not in played]
-    count = max(worker_count(workers), 1)  # 0 is this process
-    known = {(one.policy, one.task) for one in played.values()}
-    new = [job for job in todo if (job.policy, job.task) not in known]
-    speed = measure_world(new) if new else ASSUMED
-    found = estimate(todo, played.values(), min(count, core_count()), speed)
-    for line in estimate_text(found, len(jobs), count, speed):
-        console.print(line, highlight=False)
-    _print_model_costs(todo, jobs, folder, console)
+    stored = len(jobs) - len(todo)
+    console.print(f"{counted(len(jobs), 'episode')}, {stored:,} already stored.", highlight=False)
+    _print_model_calls(todo, console)
 
 
-def _print_model_costs(
-    todo: Sequence[Job], jobs: Sequence[Job], folder: Path, console: Console
-) -> None:
-    """Print what models are expected to be asked, and what that costs."""
+def _print_model_calls(todo: Sequence[Job], console: Console) -> None:
+    """Print how often models will be asked at least, if policies ask any."""
     from rich.table import Table
 
-    from roboirg.evaluation.run.cost_estimate import model_costs, unknown_costs
+    from roboirg.evaluation.run.plan_counts import least_calls
     from roboirg.util.console_width import widen
 
-    table = Table(title="expected calls of models", title_justify="left")
+    table = Table(title="least calls of models", title_justify="left")
     table.add_column("policy")
     table.add_column("setting")
-    for name in ("calls", "tokens in", "tokens out", "US$"):
-        table.add_column(name, justify="right")
-    measured = 0
-    for one in model_costs(todo, jobs, folder):
-        cost = "not known" if one.cost_usd is None else f"{one.cost_usd:.2f}"
-        table.add_row(one.policy, one.setting, *(f"{size:,.0f}" for size in one.sizes), cost)
-        measured += one.measured
+    table.add_column("calls", justify="right")
+    for (policy, setting), calls in least_calls(todo).items():
+        table.add_row(policy, setting, f"{calls:,}")
     table.caption = (
-        "for a model that names the right subgoals, with one call each or as many as its planner "
-        "makes; tokens "
-        + (
-            "estimated from the stored answers"
-            if measured
-            else "estimated from letters and pictures, without thoughts; US$ from input_price "
-            "and output_price"
-        )
+        "one for each episode of a listener and for each subgoal of a planner; a planner that is "
+        "asked before every chunk, second questions and retried episodes need more"
     )
     if table.row_count:
         widen(console, table)
         console.print(table)
-    for sentence in unknown_costs(todo):
-        console.print(sentence, highlight=False)
 
 
 def _print_prompt_shares(

@@ -22,6 +22,7 @@ from roboirg.policies.by_name.systems import ELSEWHERE, HANDS, SCRIPTED, find_sy
 from roboirg.policies.contract.base import Policy
 from roboirg.policies.contract.policy_needs import PolicyNeeds
 from roboirg.policies.contract.policy_urls import is_url, parse_query
+from roboirg.policies.planners import OF_MODELS
 from roboirg.util.short_hash import short_hash
 
 _MAX_VERSION_LENGTH = 200
@@ -118,25 +119,19 @@ def planner_alone(spec: str) -> str | None:
     return f"{kind}:{name}?{urlencode({**options, HANDS: ELSEWHERE})}"
 
 
-def hands_of(spec: str) -> str | None:
-    """Return the spec of the policy that follows one of our planners; None without such a planner.
+def model_asker(spec: str) -> str | None:
+    """Return the kind of what asks a model for one of our policies: `LISTENER` or `PLANNER`.
 
-    The scripted hands are `SCRIPTED`.
+    None if nothing does, or if it is code of others.
     """
     kind, _, rest = undeclared(spec).partition(":")
     name, _, query = rest.partition("?")
     if kind == policy_specs.SYSTEM:
-        system = find_system(name, parse_query(spec, query))
-        return None if system.planner is None else system.policy
-    if kind == policy_specs.PLANNER and ":" not in name:
-        return parse_query(spec, query).get(HANDS, SCRIPTED)
-    return None
-
-
-def with_scripted_hands(spec: str) -> str:
-    """Return the spec of one of our planners with the scripted hands instead of any others."""
-    head, _, query = undeclared(spec).partition("?")
-    return f"{head}?{urlencode({**parse_query(spec, query), HANDS: SCRIPTED})}"
+        planner = find_system(name, parse_query(spec, query)).planner
+        kind, name = policy_specs.PLANNER, "" if planner is None else str(planner.get("kind"))
+    if kind == policy_specs.PLANNER:
+        return kind if name in OF_MODELS else None
+    return kind if kind == policy_specs.LISTENER else None
 
 
 def needs_host(spec: str) -> bool:

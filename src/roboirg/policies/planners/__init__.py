@@ -14,12 +14,14 @@ from roboirg.policies.planners.planner import Planner
 
 _HERE = "roboirg.policies.planners"
 _OF_GOALS = ("listener", "forgetful", "first-mention", "last-mention", "elimination", "surface")
+OF_MODELS = ("qwen", "gemini", "memer", "stateless")
+"""Planners that query a model."""
 
 PLANNERS: Mapping[str, str] = {
     "oracle": f"{_HERE}.oracle_planner:OraclePlanner",
     **dict.fromkeys(_OF_GOALS, f"{_HERE}.goal_planner:GoalPlanner"),
     "fixed": f"{_HERE}.goal_planner:FixedPlanner",
-    **dict.fromkeys(("qwen", "gemini", "memer", "stateless"), f"{_HERE}.vlm_planner:VLMPlanner"),
+    **dict.fromkeys(OF_MODELS, f"{_HERE}.vlm_planner:VLMPlanner"),
 }
 """Import paths of the classes. ``options_type`` is the type of a class's options, and ``settings``,
 if it has that, the defaults that belong to a kind."""

@@ -170,19 +170,6 @@ class ReplyStore:
         self._database.execute("COMMIT")
 
 
-def stored_counts(folder: Path) -> dict[str, tuple[int, int, int]]:
-    """Return the calls of each episode of a run that were answered, and their tokens in and out."""
-    file = folder / REPLIES_FILE
-    if not file.is_file():
-        return {}
-    with contextlib.closing(sqlite3.connect(f"{file.absolute().as_uri()}?mode=ro", uri=True)) as it:
-        rows = it.execute(
-            "SELECT episode, count(*), sum(input_tokens), sum(output_tokens) "
-            "FROM replies GROUP BY episode"
-        )
-        return {episode: (calls, sent, received) for episode, calls, sent, received in rows}
-
-
 _stores: list[ReplyStore] = []
 """The newest is that of the episode that is played."""
 
