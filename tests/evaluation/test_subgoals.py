@@ -122,9 +122,7 @@ class Planning:
 def test_a_played_episode_notes_what_is_new_with_the_stage_that_is_due(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr(
-        "roboirg.evaluation.play.rollout.load_policy", lambda prepared: Planning()
-    )
+    monkeypatch.setattr("roboirg.evaluation.play.rollout.load_policy", lambda prepared: Planning())
     env = roboirg.make(JOB.task, episode=0, cameras=(), grounded=True)
     _, info = env.reset()
     _, point = split_point(info["grounded_subgoal"])

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import os
 import sys
 from collections.abc import Sequence
@@ -22,7 +21,6 @@ if TYPE_CHECKING:
     from roboirg.evaluation.plan.plan import Plan
     from roboirg.evaluation.records.record import Job
     from roboirg.evaluation.run.executor import Executor
-    from roboirg.evaluation.run.progress import Reporter
     from roboirg.evaluation.run.runner import RunSummary
 
 # Heavy modules are imported inside the commands, so that --help is fast.
@@ -48,14 +46,6 @@ RetryErrors = Annotated[
 ]
 
 
-OnRecord = Annotated[
-    str | None,
-    typer.Option(
-        help="Command that reads each stored record as a line of JSON from its standard input."
-    ),
-]
-
-
 @spread
 def run(
     out: Annotated[
@@ -71,7 +61,6 @@ def run(
         str, typer.Option(help="Where to play: local, or ray (cluster address in RAY_ADDRESS).")
     ] = "local",
     retry_errors: RetryErrors = True,
-    on_record: OnRecord = None,
     dry_run: Annotated[
         bool,
         typer.Option("--dry-run", help="Only check, and count episodes and calls of models."),
@@ -88,7 +77,6 @@ def run(
     Example: roboirg run --policy oracle --tasks PickXtimes --out runs/first
     """
     from roboirg.evaluation.plan.plan_file import plan_text
-    from roboirg.evaluation.run.record_hook import split_command
 
     add_working_directory(last=True)
     made = _plan(plan, choices.typed(), usual=("oracle",) if show_plan else ())
@@ -99,15 +87,13 @@ def run(
         raise InvalidValueError("No folder given; name one with --out, such as runs/first.")
     # Absolute: a policy in this process may change the working directory.
     folder = folder_of(out).absolute()
-    if on_record is not None:
-        split_command(on_record)
     chosen = _executor(made, executor, workers)
     _check_run(made, folder)
     if dry_run:
         _print_counts(made, folder)
         return
     _warn_of_cut_prompts(made)
-    summary = play(made, folder, chosen, retry=retry_errors, on_record=on_record)
+    summary = play(made, folder, chosen, retry=retry_errors)
     print_tables_of(folder, planned_jobs(folder))
     report_problems(summary, folder)
 
@@ -123,13 +109,10 @@ def folder_of(text: str) -> Path:
     return Path(text)
 
 
-def play(
-    plan: Plan, out: Path, executor: Executor, *, retry: bool, on_record: str | None = None
-) -> RunSummary:
+def play(plan: Plan, out: Path, executor: Executor, *, retry: bool) -> RunSummary:
     """Play a plan with a progress bar; exits the process when it is interrupted."""
     from roboirg.evaluation.episode_errors import Terminated
     from roboirg.evaluation.run.progress import ConsoleReporter
-    from roboirg.evaluation.run.record_hook import CommandHook, HookedReporter
     from roboirg.evaluation.run.runner import episode_runner, run_plan
     from roboirg.util.console_width import progress_console
     from roboirg.util.freed_memory import keep_freed_memory
@@ -137,10 +120,7 @@ def play(
     keep_freed_memory()
     play_job = episode_runner(plan, out)
     try:
-        with ConsoleReporter(progress_console()) as shown, contextlib.ExitStack() as stack:
-            reporter: Reporter = shown
-            if on_record is not None:
-                reporter = stack.enter_context(HookedReporter(shown, CommandHook(on_record)))
+        with ConsoleReporter(progress_console()) as reporter:
             return run_plan(plan, out, play_job, executor, retry_errors=retry, reporter=reporter)
     except KeyboardInterrupt as interrupt:
         typer.echo(

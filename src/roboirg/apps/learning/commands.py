@@ -234,7 +234,7 @@ def _play_paper(plan: PolicyPlan, words: PolicyWords, out: Path, workers: int) -
     changes |= {name: words.fields[name] for name in PLAYED if name in words.fields}
     for part in experiment.parts:
         made = make_plan(**part_options(part, experiment, files, changes))
-        play_plan(made, run_of(out, part), workers=workers, progress=True, on_record=None)
+        play_plan(made, run_of(out, part), workers=workers, progress=True)
     typer.echo(str(write_paper_page(out)))
 
 

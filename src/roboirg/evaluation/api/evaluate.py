@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from roboirg.evaluation.api.python_run import AnyPolicy
     from roboirg.evaluation.api.results import Results
-    from roboirg.evaluation.run.record_hook import RecordFunction
 
 # Imported inside, so that `import roboirg` stays fast.
 
@@ -27,7 +26,6 @@ def evaluate(
     workers: int | None = None,
     video: str = "off",
     progress: bool = True,
-    on_record: str | RecordFunction | None = None,
     **options: object,
 ) -> Results:
     """Play policies and return their results; the records are those of ``roboirg run``.
@@ -50,8 +48,6 @@ def evaluate(
         workers: processes, by default one for each core; 0 for this process.
         video: off, failures or all.
         progress: whether to show it on stderr.
-        on_record: called with each stored record (`roboirg.evaluation.records.record.Record`), or
-            a command that reads them as lines of JSON. If it fails, the run goes on without it.
         **options: other fields of `roboirg.evaluation.plan.plan.Plan`, as ``max_steps=600``.
 
     Returns:
@@ -77,4 +73,4 @@ def evaluate(
         video=video,
         **options,
     )
-    return Results(play_plan(plan, out, workers=workers, progress=progress, on_record=on_record))
+    return Results(play_plan(plan, out, workers=workers, progress=progress))

@@ -13,8 +13,7 @@ from roboirg.evaluation.hosting.policy_descriptions import know_policy
 from roboirg.evaluation.plan.plan import Plan
 from roboirg.evaluation.plan.plan_maker import make_plan
 from roboirg.evaluation.run.executor import choose_executor
-from roboirg.evaluation.run.progress import ConsoleReporter, Reporter
-from roboirg.evaluation.run.record_hook import CommandHook, HookedReporter, RecordFunction
+from roboirg.evaluation.run.progress import ConsoleReporter
 from roboirg.evaluation.run.runner import episode_runner, run_plan
 from roboirg.policies.by_name.local_policies import is_local, policy_name, spec_of
 from roboirg.util.console_width import progress_console
@@ -46,7 +45,6 @@ def play_plan(
     *,
     workers: int | None,
     progress: bool,
-    on_record: str | RecordFunction | None,
 ) -> Path:
     """Play a plan and return the folder of its records.
 
@@ -56,7 +54,6 @@ def play_plan(
         workers: processes, None for one per core. A policy that only this process knows is played
             in it.
         progress: whether to show it.
-        on_record: function, or command, that gets each stored record.
     """
     folder = (_new_folder() if out is None else Path(out)).absolute()
     if any(is_local(spec) for spec in plan.specs.values()):
@@ -68,10 +65,8 @@ def play_plan(
         workers = 0
     executor = choose_executor(workers, plan.episode_timeout_s)
     shown = ConsoleReporter(progress_console(stderr=True)) if progress else None
-    hook = CommandHook(on_record) if isinstance(on_record, str) else on_record
-    reporter = HookedReporter(shown or Reporter(), hook or (lambda _record: None))
-    with shown or contextlib.nullcontext(), reporter:
-        run_plan(plan, folder, episode_runner(plan, folder), executor, reporter=reporter)
+    with shown or contextlib.nullcontext():
+        run_plan(plan, folder, episode_runner(plan, folder), executor, reporter=shown)
     return folder
 
 
