@@ -56,7 +56,6 @@ RIGHT = {
     "leaderboard verify": ["nowhere"],
     "replay": ["nowhere"],
     "score grounding": ["nowhere", "--data", "nowhere"],
-    "records import": ["lerobot", "nowhere", "--out", "out", "--policy", "p"],
     "learn listener": ["--out", "out"],
     "learn policy": ["--out", "out"],
     "learn answers": ["nowhere", "--data", "nowhere", "--out", "out"],

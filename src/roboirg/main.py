@@ -6,7 +6,7 @@ Exit codes: 0 success; 2 invalid usage, or episodes ended in errors (one sentenc
 
 from __future__ import annotations
 
-import importlib
+import importlib.util
 import pkgutil
 import sys
 from collections.abc import Mapping
@@ -100,7 +100,9 @@ def _add_commands() -> None:
     app.add_typer(export_commands.export_app, name="export")
     app.add_typer(records_commands.records_app, name="records")
     for application in pkgutil.iter_modules(apps.__path__):
-        importlib.import_module(f"{apps.__name__}.{application.name}.commands").add_commands(app)
+        commands = f"{apps.__name__}.{application.name}.commands"
+        if importlib.util.find_spec(commands) is not None:
+            importlib.import_module(commands).add_commands(app)
 
 
 _add_commands()

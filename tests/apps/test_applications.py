@@ -96,7 +96,8 @@ def test_without_an_application_the_rest_works(application, everything, tmp_path
         for name, modules in everything[0].items()
         if all(one.startswith(own) for one in modules)
     }
-    assert everything[0].keys() - commands.keys() == lost != set()
+    assert everything[0].keys() - commands.keys() == lost
+    assert bool(lost) == (layout.PACKAGE / "apps" / application / "commands.py").exists()
     assert everything[1] - kinds == KINDS_OF.get(application, set())
     run = [
         sys.executable, "-m", "roboirg", "run", "--policy", "random", "--tasks", "StopCube",

@@ -41,7 +41,6 @@ WORDS = {
     " --out {folder}/questions",
     "replay": "--help",
     "score grounding": "--help",
-    "records import": "--help",
     "learn listener": "--help",
     "learn answers": "--help",
     "learn policy": "--help",

@@ -11,7 +11,7 @@ from roboirg.cli.options import check_output_file
 from roboirg.cli.run_commands import Folder, folder_of
 from roboirg.core.plain_text import counted
 
-records_app = typer.Typer(no_args_is_help=True, help="Merge, import and export records.")
+records_app = typer.Typer(no_args_is_help=True, help="Merge and export records.")
 
 
 @records_app.command()

@@ -1,6 +1,7 @@
 """The commands of a page, run as they stand there but for named values."""
 
 import importlib.metadata
+import json
 import os
 import re
 import subprocess
@@ -29,7 +30,7 @@ def replaced(text, values):
 
 
 def run_page(section, folder, values, page=PAGE, **variables):
-    """Run what a section says after the installation; return what it printed.
+    """Run what a section says after the installation.
 
     Args:
         section: its heading; None for the whole page, whose YAML is written to the file that its
@@ -54,12 +55,16 @@ def run_page(section, folder, values, page=PAGE, **variables):
         capture_output=True, text=True, check=False, cwd=folder, env=environment,
     )  # fmt: skip
     assert done.returncode == 0, done.stdout[-3000:] + done.stderr[-3000:]
-    return done.stdout
 
 
 def is_installation(line):
     """Whether a command makes an environment; the script that runs these tests did so."""
     return line.startswith(("pip install", "python3")) and ("venv" in line or "pip" in line)
+
+
+def read_verdicts(folder):
+    """Return what a program of the page wrote of each episode."""
+    return [json.loads(line) for line in (folder / "verdicts.jsonl").read_text().splitlines()]
 
 
 def check_versions(section, page=PAGE):

@@ -1,1 +1,1 @@
-"""RoboIRGBench in other harnesses: LeRobot, vla-eval and Inspect, and their results as records."""
+"""RoboIRGBench in other harnesses: LeRobot, vla-eval and Inspect."""
