@@ -5,7 +5,6 @@ from __future__ import annotations
 from pathlib import Path
 from types import SimpleNamespace
 
-import cv2
 import numpy as np
 import pytest
 from msgspec.structs import replace
@@ -16,13 +15,9 @@ import roboirg
 from roboirg.core.errors import InvalidValueError
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.core.subgoal_text import split_point
-from roboirg.evaluation.analysis.page.report import make_view, write_report
-from roboirg.evaluation.play.point_sheet import Pointing, write_point_sheet
 from roboirg.evaluation.play.rollout import EpisodeRunner
 from roboirg.evaluation.play.rollout_result import RolloutResult, make_record
 from roboirg.evaluation.policy_calls import policy_subgoal
-from roboirg.evaluation.records.film import points_name
-from roboirg.evaluation.records.merging import merge_runs
 from roboirg.evaluation.records.record import Job, SubgoalRecord
 from roboirg.evaluation.records.record_codec import StoreError, encode, read_record
 from roboirg.evaluation.records.store import RecordStore
@@ -81,27 +76,6 @@ def test_the_page_and_the_table_show_them(tmp_path: Path) -> None:
     assert f"{counts} 3 | 6.5 | 2.25 |" in outcome.output
 
 
-def test_the_page_shows_where_a_planner_pointed_without_a_video(tmp_path: Path) -> None:
-    run, merged = tmp_path / "run", tmp_path / "merged"
-    picture = np.full((256, 256, 3), 90, np.uint8)
-    with RecordStore(run) as store:
-        store.append(make_record(JOB, RolloutResult("failure", cause="no"), started_at="now"))
-    assert "data:image/jpeg" not in write_report(run).read_text()
-    sheet = run / points_name(JOB.slug)
-    write_point_sheet([Pointing(20, picture, (100, 60)), Pointing(40, picture, (9, 250))], sheet)
-    drawn = cv2.imread(str(sheet))
-    assert drawn.shape == (128, 512, 3)  # four pictures at half their size
-    ring = np.argwhere(np.abs(drawn[20:, :128].astype(int) - 90).max(axis=2) > 60)
-    assert len(ring) > 3
-    assert np.abs(ring - np.array((50 - 20, 30))).max() <= 4
-    assert "data:image/jpeg" in write_report(run).read_text()
-    assert sheet.relative_to(run).as_posix() in make_view(run)
-    merge_runs([run], merged)
-    assert (merged / points_name(JOB.slug)).read_bytes() == sheet.read_bytes()
-    write_point_sheet([], sheet)  # the episode was played again, and nothing was pointed at
-    assert not sheet.exists()
-
-
 class Planning:
     """Points into a corner, then says nothing new, then points at the thing."""
 
@@ -131,7 +105,6 @@ def test_a_played_episode_notes_what_is_new_with_the_stage_that_is_due(
     monkeypatch.setattr(Planning, "point", point)
     result = EpisodeRunner(Path()).play_once(JOB)
     assert result.outcome == "failure", result.cause
-    assert [(one.step, one.point) for one in result.pointings] == [(0, (0, 0)), (20, point)]
     words = "pick up the green cube for the first time"
     assert [(one.step, one.point, one.due, one.verdict) for one in result.subgoals] == [
         (0, (0, 0), words, "wrong_thing"),

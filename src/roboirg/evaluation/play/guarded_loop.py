@@ -12,10 +12,9 @@ from numpy.typing import ArrayLike, NDArray
 from roboirg.core.actions import ActionSpace
 from roboirg.core.delivery import SpokenInstruction
 from roboirg.core.inference_facts import inference_facts
-from roboirg.core.observations import FRONT, Demonstration, Observation
+from roboirg.core.observations import Demonstration, Observation
 from roboirg.core.subgoal_text import split_point
 from roboirg.evaluation.play.call_guard import CallGuard
-from roboirg.evaluation.play.point_sheet import MOST_PICTURES, Pointing
 from roboirg.evaluation.play.rollout_result import RolloutResult
 from roboirg.evaluation.play.video_writer import VideoWriter
 from roboirg.evaluation.policy_calls import check_rows, policy_metadata, policy_subgoal
@@ -24,7 +23,6 @@ from roboirg.judging import judge_subgoal, plain_subgoal
 from roboirg.policies.by_name.loading import is_foreign, is_privileged, planner_alone
 from roboirg.policies.contract.base import Policy
 from roboirg.policies.contract.play import EpisodeLoop
-from roboirg.policies.contract.policy_needs import PolicyNeeds
 
 if TYPE_CHECKING:
     from roboirg.envs.environment import RoboIRGEnv
@@ -61,7 +59,6 @@ class GuardedLoop(EpisodeLoop):
         self._result, self._guard = result, guard
         self._is_ours = not is_foreign(job.policy_spec)
         self._knows_ends = self._is_ours or planner_alone(job.policy_spec) is not None
-        self._cameras = PolicyNeeds.of(policy).cameras
         self._reports, self._ends = bool(getattr(policy, "reports", False)), 0
 
     def play(self) -> dict[str, Any]:
@@ -138,9 +135,6 @@ class GuardedLoop(EpisodeLoop):
         _, point = split_point(subgoal)
         if self._writer is not None:
             self._writer.point = point
-        shown = self._result.pointings
-        if point is not None and FRONT in self._cameras and len(shown) < MOST_PICTURES:
-            shown.append(Pointing(self._result.steps, self.env.picture(FRONT).copy(), point))
         verdict = judge_subgoal(subgoal, stage, self.env.objects_at(point) if point else None)
         found.append(
             SubgoalRecord(

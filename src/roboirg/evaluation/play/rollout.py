@@ -34,14 +34,13 @@ from roboirg.evaluation.hosting.policy_descriptions import PolicyDescription, de
 from roboirg.evaluation.play.call_guard import CallGuard
 from roboirg.evaluation.play.guarded_loop import GuardedLoop
 from roboirg.evaluation.play.job_instruction import PreparedJob
-from roboirg.evaluation.play.point_sheet import write_point_sheet
 from roboirg.evaluation.play.policy_environment import job_needs, make_env
 from roboirg.evaluation.play.prompt_shares import audit_job, too_long_text
 from roboirg.evaluation.play.rollout_result import RolloutResult, make_record, utc_now
 from roboirg.evaluation.play.video_writer import VideoWriter
 from roboirg.evaluation.policy_calls import policy_usage
 from roboirg.evaluation.records.action_log import write_actions
-from roboirg.evaluation.records.film import VIDEO_FOLDER, VideoMode, points_name
+from roboirg.evaluation.records.film import VIDEO_FOLDER, VideoMode
 from roboirg.evaluation.records.record import Job, Record
 from roboirg.policies.by_name.loading import is_privileged, needs_host, planner_alone
 from roboirg.policies.by_name.systems import SCRIPTED, make_hands
@@ -64,7 +63,7 @@ class EpisodeRunner:
     """Plays jobs with the simulator and real policies.
 
     Attributes:
-        folder: output folder of the run; videos and sheets of points go to ``videos/`` in it.
+        folder: output folder of the run; videos go to ``videos/`` in it.
         video: which episodes get a video.
         policy_timeout_s: seconds that one call of the policy may take, if a supervisor watches.
         plan: fingerprint of the plan, for the records.
@@ -104,7 +103,6 @@ class EpisodeRunner:
             writer, result = self._play(job)
         video = self._finish_video(writer, result)
         error = None if writer is None else writer.error
-        write_point_sheet(result.pointings, self.folder / points_name(job.slug))
         log = result.action_log
         return make_record(
             job,

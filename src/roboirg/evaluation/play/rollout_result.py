@@ -31,7 +31,6 @@ from roboirg.core.plain_text import clip_text
 from roboirg.evaluation.hosting.policy_descriptions import PolicyDescription, describe_policy
 from roboirg.evaluation.play.goal_outcomes import find_goal_outcomes, judged_events, name_other_goal
 from roboirg.evaluation.play.job_instruction import PreparedJob
-from roboirg.evaluation.play.point_sheet import Pointing
 from roboirg.evaluation.play.prompt_shares import audit_job, audit_prompt
 from roboirg.evaluation.records.action_log import ActionLog
 from roboirg.evaluation.records.record import (
@@ -76,7 +75,6 @@ class RolloutResult:
         events: facts that became true or ceased to be.
         original: how it ended for the scene's own goal, if the words state another one.
         subgoals: what the policy's planner named.
-        pointings: what it saw when it pointed.
         render_device: the driver's name; None if nothing was rendered.
         details: traceback of an error.
         policy: its version and whether it is privileged; None if it was never loaded.
@@ -107,7 +105,6 @@ class RolloutResult:
     events: list[EventRecord] = field(default_factory=list)
     original: str | None = None
     subgoals: list[SubgoalRecord] = field(default_factory=list)
-    pointings: list[Pointing] = field(default_factory=list)
     render_device: str | None = None
     details: str | None = None
     policy: PolicyDescription | None = None

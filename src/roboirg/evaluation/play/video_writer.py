@@ -17,7 +17,6 @@ from roboirg.core.errors import EndOfRunError
 from roboirg.core.extras import extra_needed
 from roboirg.core.observations import CAMERAS, FRONT
 from roboirg.core.subgoal_text import Point
-from roboirg.evaluation.play.point_sheet import with_ring
 from roboirg.evaluation.records.film import FRAME_RATE, FRAME_STEPS, LAST_FRAME_REPEATS, poster_name
 from roboirg.util.media import draw_text, wrap_text
 
@@ -36,6 +35,9 @@ QUALITY = 28
 BORDER = 6
 GAP = 4
 """Pixels of the black line between two pictures; even, because H.264 needs an even width."""
+
+RING_COLOR, RING_RADIUS, RING_WIDTH = (255, 230, 0), 6, 2
+"""RGB and pixels of the ring around the point of a subgoal."""
 
 _PARTIAL_SUFFIX = ".part"
 
@@ -86,6 +88,15 @@ def compose_frame(
     if not caption:
         return frame
     return np.concatenate([frame, _caption_bar(caption, frame.shape[1], longest_caption)])
+
+
+def with_ring(picture: Frame, point: Point) -> Frame:
+    """Return a copy of a picture with a ring around a point; inside it the picture is unchanged."""
+    rows, columns = np.indices(picture.shape[:2])
+    distance = np.hypot(rows - point[0], columns - point[1])
+    marked = picture.copy()
+    marked[np.abs(distance - RING_RADIUS) <= RING_WIDTH / 2] = RING_COLOR
+    return marked
 
 
 @functools.lru_cache(maxsize=8)

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from pathlib import Path, PurePosixPath
+from pathlib import PurePosixPath
 from typing import Literal, get_args
 
 VideoMode = Literal["off", "failures", "all"]
 VIDEO_MODES: tuple[VideoMode, ...] = get_args(VideoMode)
 """Which episodes get a video."""
 VIDEO_FOLDER = "videos"
-_POINTS = "-points.jpg"
 FRAME_STEPS, FRAME_RATE = 8, 10
 """Control steps between two frames (20 are one second), and frames per second: fourfold speed."""
 LAST_FRAME_REPEATS = 8
@@ -19,14 +18,3 @@ LAST_FRAME_REPEATS = 8
 def poster_name(video: str) -> str:
     """Return the path of the picture of a video's last frame."""
     return str(PurePosixPath(video).with_suffix(".jpg"))
-
-
-def points_name(slug: str) -> str:
-    """Return the path, in a run's folder, of the sheet with a planner's points in an episode."""
-    return f"{VIDEO_FOLDER}/{slug}{_POINTS}"
-
-
-def pointed_slugs(folder: Path) -> frozenset[str]:
-    """Return the slugs of a run's episodes that have such a sheet."""
-    found = (folder / VIDEO_FOLDER).glob(f"[!.]*{_POINTS}")
-    return frozenset(path.name.removesuffix(_POINTS) for path in found)

@@ -13,7 +13,7 @@ import msgspec
 from roboirg.core.errors import InvalidValueError
 from roboirg.evaluation.records.action_log import action_path
 from roboirg.evaluation.records.episode_log import log_path, logged_slugs
-from roboirg.evaluation.records.film import pointed_slugs, points_name, poster_name
+from roboirg.evaluation.records.film import poster_name
 from roboirg.evaluation.records.record import Summary
 from roboirg.evaluation.records.record_codec import (
     StoreError,
@@ -141,12 +141,10 @@ def _lines(
 
     A video whose file is missing is removed from its line.
     """
-    logs, pointed = logged_slugs(source), pointed_slugs(source)
+    logs = logged_slugs(source)
     for one, line in zip(wanted, run.lines(wanted), strict=True):
         if logs and (slug := one.slug) in logs:
             _copy_log(source, target, log_path(Path(), slug).as_posix())
-        if pointed and (slug := one.slug) in pointed:
-            _copy_present(points_name(slug), source, target)
         if one.action_log is not None:
             _copy_present(action_path(Path(), one.action_log).as_posix(), source, target)
         if one.video is None or _copy_video(one.video, source, target):

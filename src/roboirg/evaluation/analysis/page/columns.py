@@ -90,8 +90,6 @@ def make_columns(
         found.words.append(searched_texts(record, found.strings))
         text = resolved.of(entry, record)
         details = details_of(record, found.strings, video, text, embeds=videos.embeds)
-        if (points := videos.points(entry)) is not None:
-            details["points"] = points
         if (log := entry.log) is not None:
             details["log"] = log
         found.details.append(msgspec.json.encode(details).decode())

@@ -1,16 +1,15 @@
-"""Videos of the page, and sheets with the points of planners: embedded in it, or linked to."""
+"""Videos of the page: embedded in it, or linked to."""
 
 from __future__ import annotations
 
 import base64
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from dataclasses import dataclass
-from pathlib import Path
 from typing import NamedTuple
 from urllib.parse import quote
 
 from roboirg.evaluation.analysis.page.entries import EpisodeEntry
-from roboirg.evaluation.records.film import pointed_slugs, points_name, poster_name
+from roboirg.evaluation.records.film import poster_name
 from roboirg.evaluation.records.run_files import run_file
 
 MAX_EMBEDDED_BYTES = 60_000_000
@@ -31,29 +30,23 @@ class EpisodeVideos:
     Attributes:
         embeds: whether they are part of the page.
         count: number of videos.
-        pointed: slugs of the episodes with a sheet of points, by the folder of the run.
     """
 
     embeds: bool
     count: int
-    pointed: Mapping[Path, frozenset[str]]
 
     @classmethod
     def of(cls, entries: Iterable[EpisodeEntry], *, embed: bool = True) -> EpisodeVideos:
         """Embed the videos if wanted and not too large."""
-        entries = tuple(entries)
-        folders = {one.run.folder for one in entries if one.run.folder is not None}
-        pointed = {folder: pointed_slugs(folder) for folder in folders}
-        sheets = [run_file(at, points_name(slug)) for at in folders for slug in pointed[at]]
         files = [
             (path, run_file(one.run.folder, poster_name(one.record.video)))
             for one in entries
             if one.run.folder is not None and one.record.video is not None
             if (path := run_file(one.run.folder, one.record.video)).is_file()
         ]
-        paths = [*(path for pair in files for path in pair), *sheets]
+        paths = (path for pair in files for path in pair)
         size = sum(path.stat().st_size for path in paths if path.is_file())
-        return cls(embed and size <= MAX_EMBEDDED_BYTES, len(files), pointed)
+        return cls(embed and size <= MAX_EMBEDDED_BYTES, len(files))
 
     def video(self, entry: EpisodeEntry) -> EpisodeVideo | None:
         """Return the video of an episode, or None."""
@@ -62,13 +55,6 @@ class EpisodeVideos:
         if name is None or source is None:
             return None
         return EpisodeVideo(source, self._link(entry, poster_name(name), "image/jpeg"))
-
-    def points(self, entry: EpisodeEntry) -> str | None:
-        """Return the sheet with what a planner saw and where it pointed, or None."""
-        known = None if entry.run.folder is None else self.pointed.get(entry.run.folder)
-        if not known or (slug := entry.record.slug) not in known:
-            return None
-        return self._link(entry, points_name(slug), "image/jpeg")
 
     def _link(self, entry: EpisodeEntry, name: str, kind: str) -> str | None:
         if entry.run.folder is None or not (path := run_file(entry.run.folder, name)).is_file():

@@ -75,9 +75,6 @@ const detailOf = (row) => {
       hasFrame ? h("p", { class: "aside" }, "The front camera faces the robot: the robot’s left is "
         + "on the right of the image.") : null),
     timelineOf(row, details, media?.film),
-    details.points === undefined ? null : h("details", {}, h("summary", {}, "where the planner pointed"),
-      h("img", { class: "points", loading: "lazy", src: details.points,
-        alt: "The front camera's picture at each subgoal with a point, which a ring marks." })),
     details.traceback === undefined ? null
       : h("details", {}, h("summary", {}, "traceback"), h("pre", { tabindex: "0" }, strings[details.traceback])),
     details.log === undefined ? null
