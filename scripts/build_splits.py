@@ -38,7 +38,7 @@ def build_splits(
     slots = seed_selection.episode_slots(names, wanted)
     console = progress_console(stderr=True)
     count = core_count() if workers is None else workers
-    found = follow_progress(seed_selection.find_seeds(slots, count), slots, console)
+    found = follow_progress(seed_selection.find_seeds(slots, count), slots)
     print_summary(found, console)
     text = splits.splits_text(seed_selection.merge_splits(names, found, splits.shipped_splits()))
     if out is None:

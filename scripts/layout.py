@@ -222,21 +222,10 @@ def figures() -> dict[str, int]:
     }
 
 
-def lines_by_room() -> dict[str, int]:
-    """Return the lines of each room, the largest first."""
-    found: dict[str, int] = defaultdict(int)
-    for name in modules():
-        found[room_of(name)] += lines_of(name)
-    return dict(sorted(found.items(), key=lambda one: -one[1]))
-
-
 def main() -> None:
-    """Print the figures, then the lines of each room."""
+    """Print the figures."""
     for name, count in figures().items():
         print(f"{count:>7,} {name}")
-    print("\nlines by room")
-    for room, count in lines_by_room().items():
-        print(f"{count:>7,} {room}")
 
 
 if __name__ == "__main__":

@@ -7,46 +7,23 @@ from collections.abc import Iterable, Sequence
 
 from rich.console import Console
 from rich.markup import escape
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
 from seed_selection import REASONS, EpisodeSlot, SelectedSeed
 
+from roboirg.cli.progress_bar import progress_bars
 from roboirg.core.episode import DIFFICULTIES
 from roboirg.util.console_width import widen
 
-_LINE_EVERY = 50
-"""Without a terminal, print a line after this many episodes."""
-
 
 def follow_progress(
-    found: Iterable[SelectedSeed], slots: Sequence[EpisodeSlot], console: Console
+    found: Iterable[SelectedSeed], slots: Sequence[EpisodeSlot]
 ) -> tuple[SelectedSeed, ...]:
-    """Collect results in the order of the slots, and show the progress meanwhile.
-
-    Args:
-        found: results in any order.
-        slots: the episodes.
-        console: shows a bar on a terminal, a line now and then elsewhere.
-    """
-    total = len(slots)
-    bar = Progress(
-        TextColumn("[bold]episodes"),
-        BarColumn(),
-        MofNCompleteColumn(),
-        TimeElapsedColumn(),
-        TextColumn("{task.fields[last]}"),
-        console=console,
-        transient=True,
-        disable=not console.is_terminal,
-    )
+    """Collect results, which come in any order, in that of the slots; show the progress."""
     collected: dict[EpisodeSlot, SelectedSeed] = {}
-    with bar:
-        task = bar.add_task("episodes", total=total, last="")
+    with progress_bars() as report:
         for one in found:
             collected[one.slot] = one
-            bar.update(task, advance=1, last=one.slot.key)
-            if not console.is_terminal and len(collected) % _LINE_EVERY == 0:
-                console.print(f"\\[{len(collected)}/{total}] {one.slot.key}", highlight=False)
+            report("episodes", len(collected), len(slots), one.slot.key)
     return tuple(collected[slot] for slot in slots)
 
 

@@ -42,7 +42,7 @@ sys.__stdout__.write(json.dumps(found))
 """
 
 NEEDS = {
-    "bench": "sim", "run": "sim", "show": "sim", "report": "report",
+    "run": "sim", "show": "sim", "report": "report",
     "figures": "report", "compare": "report", "serve": "remote",
     "records export": "export", "real run": "sim", "real score": "pages",
     "export demonstrations": "sim", "export recordings": "sim", "export grounding": "sim",

@@ -1,4 +1,4 @@
-"""Seconds per control step and reset in other ways than a run's: undrawn, floor, exported, warm."""
+"""Seconds per control step in other ways than a run's: undrawn, floor, exported."""
 
 from __future__ import annotations
 
@@ -8,11 +8,9 @@ import time
 import zipfile
 from pathlib import Path
 
-from roboirg.apps.bench.reset_times import cache_folder, reset_time
-from roboirg.apps.bench.step_times import CHUNK, Action, Workload, median_time
+from benchmarks.step_times import CHUNK, Action, Workload, median_time
 from roboirg.apps.demonstrations.picture_coding import PictureCoding
 from roboirg.apps.demonstrations.trajectory_recorder import PictureTracks, RecordingSpec
-from roboirg.core.episode import Episode
 from roboirg.core.observations import CAMERAS
 
 
@@ -55,10 +53,3 @@ def exported_step(workload: Workload, coding: PictureCoding) -> float:
             durations.append(time.perf_counter() - start)
         tracks.finish()
     return statistics.median(durations)
-
-
-def warm_reset(episode: Episode) -> float:
-    """Return the time of a reset with everything cached by an earlier one."""
-    with tempfile.TemporaryDirectory() as folder, cache_folder(folder):
-        reset_time(episode, frames=True)
-        return reset_time(episode, frames=True)

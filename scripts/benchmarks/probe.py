@@ -14,27 +14,41 @@ import runpy
 import sys
 import time
 
+TASK = "PickXtimes"
+
+
+def _observe(path: str, index: int) -> None:
+    """Play an episode without a video until its first observation."""
+    if path == "ours":
+        from roboirg.envs.factory import make
+
+        make(TASK, episode=index).reset()
+        return
+    from benchmarks.step_times import draw_as_stock
+    from roboirg.simulation.episode_session import EpisodeSession
+    from roboirg.simulation.rendering.render_settings import STOCK
+    from roboirg.tasks.splits.splits import get_episode
+
+    session = EpisodeSession(get_episode(TASK, "test", index), visible=True, rendering=STOCK)
+    session.play_demonstration()
+    draw_as_stock(session.world.cameras)
+
 
 def _next_episode(path: str) -> dict[str, float]:
     """Return seconds to the first observation of an episode after another one."""
-    from roboirg.apps.bench.start_times import observe
-
     start = time.perf_counter()
+    _observe(path, 0)
     if path == "ours":
-        observe("ours", 0)
         start = time.perf_counter()
-        observe("ours", 1)
-    else:
-        observe("stock", 0)
+        _observe(path, 1)
     return {"seconds": time.perf_counter() - start}
 
 
 def _memory() -> dict[str, float]:
     """Return the peak memory of playing and drawing."""
-    from roboirg.apps.bench.start_times import observe
-    from roboirg.apps.bench.step_times import eager_step, over_the_table
+    from benchmarks.step_times import eager_step, over_the_table
 
-    observe("ours", 0)
+    _observe("ours", 0)
     eager_step(over_the_table())
     return {"memory_gib": _peak_memory()}
 
@@ -64,8 +78,11 @@ def _peak_memory() -> float:
 
 if __name__ == "__main__":
     what, *words = sys.argv[1:]
-    found = (
-        _command(words) if what == "command" else _memory() if what == "memory"
-        else _next_episode(*words)
-    )  # fmt: skip
+    found: dict[str, float] = {}
+    if what == "first":
+        _observe(words[0], 0)
+    elif what == "next":
+        found = _next_episode(words[0])
+    else:
+        found = _memory() if what == "memory" else _command(words)
     sys.stdout.write(json.dumps(found))

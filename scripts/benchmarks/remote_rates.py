@@ -11,8 +11,8 @@ import sys
 import time
 from typing import ClassVar
 
-from roboirg.apps.bench.step_times import CHUNK
-from roboirg.apps.bench.worker_rates import WavingPolicy
+from benchmarks.step_times import CHUNK
+from benchmarks.worker_rates import WavingPolicy
 from roboirg.core.observations import CAMERAS
 from roboirg.envs.factory import make
 from roboirg.evaluation.hosting.host_pool import HostPool, HostSettings

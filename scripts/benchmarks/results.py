@@ -1,43 +1,87 @@
-"""Results against goals: the file docs/bench.json and the table of docs/performance.md."""
+"""Measured rows: the file docs/bench.json and the table of docs/performance.md."""
 
 from __future__ import annotations
 
+import datetime as dt
 import json
+import os
 import statistics
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from benchmarks.goals import Goal
-from roboirg.apps.bench.bench_runner import MeasureResult, circumstances, format_value, write_json
+from benchmarks.measures import Measure
 from roboirg.core.errors import InvalidValueError
+from roboirg.core.version import __version__
+from roboirg.util.processor import processor_features
 
 Row = dict[str, Any]
 
+_WHOLE = 1000
+"""From here on values are shown as whole numbers."""
 
-def reaches(result: MeasureResult, goal: float) -> bool:
-    return result.value <= goal if result.ratio is None else result.ratio >= goal
+
+def run_measures(
+    measures: Sequence[Measure], rounds: int, report: Callable[[str], None]
+) -> list[Row]:
+    """Run every measure in every round, after its baseline, which is timed once per round.
+
+    Returns:
+        The row of each: all rounds, the median of ours, the ratio of the medians (greater is
+        better), the goal, the machine, the date, and the load of the five minutes before, which is
+        that of others.
+    """
+    load = os.getloadavg()[1]
+    ours: list[list[float]] = [[] for _ in measures]
+    baselines: list[list[float]] = [[] for _ in measures]
+    for number in range(1, rounds + 1):
+        timed: dict[Callable[[], float], float] = {}
+        for measure, own, base in zip(measures, ours, baselines, strict=True):
+            report(f"round {number} of {rounds}: {measure.name}")
+            if measure.baseline is not None:
+                if measure.baseline not in timed:
+                    timed[measure.baseline] = measure.baseline()
+                base.append(timed[measure.baseline])
+            own.append(measure.ours())
+    where = {
+        "date": dt.datetime.now(dt.UTC).date().isoformat(),
+        "machine": f"{os.cpu_count()} cores, {processor_features().splitlines()[0]}",
+        "load": round(load, 1),
+        "roboirg": __version__,
+    }
+    return [
+        {**_figures(measure, own, base), **where}
+        for measure, own, base in zip(measures, ours, baselines, strict=True)
+    ]
 
 
-def update_figures(
-    path: Path, goals: Sequence[Goal], results: Sequence[MeasureResult], load: float
-) -> None:
-    """Write all rounds of all results as JSON, each with its goal, machine, date and load.
+def _figures(measure: Measure, ours: list[float], baseline: list[float]) -> Row:
+    value, ratio = statistics.median(ours), None
+    if baseline:
+        ratio = value / statistics.median(baseline)
+        ratio = ratio if measure.unit.startswith("1/") else 1.0 / ratio
+    return {
+        "name": measure.name, "unit": measure.unit, "ours": ours, "baseline": baseline,
+        "against": measure.against, "value": value, "ratio": ratio, "goal": measure.goal,
+    }  # fmt: skip
+
+
+def reaches(row: Row) -> bool:
+    """Return whether a row reaches its goal."""
+    if row["ratio"] is None:
+        return bool(row["value"] <= row["goal"])
+    return bool(row["ratio"] >= row["goal"])
+
+
+def update_figures(path: Path, measured: Sequence[Row]) -> None:
+    """Write rows to a file as JSON.
 
     A file of earlier results is kept up to date: what was measured now takes the place of the row
     of the same name, other rows stay.
-
-    Args:
-        path: the file.
-        goals: what was measured.
-        results: that of each goal.
-        load: load average of the five minutes before, which is the load of others.
     """
     rows = {_key(row): row for row in read_figures(path)} if path.exists() else {}
-    for goal, result in zip(goals, results, strict=True):
-        row = {**result.as_json(), "goal": goal.least, **circumstances(load)}
-        rows[_key(row)] = row
-    write_json(list(rows.values()), path)
+    rows |= {_key(row): row for row in measured}
+    path.write_text(json.dumps({"figures": list(rows.values())}, indent=1) + "\n", "utf-8")
 
 
 def read_figures(path: Path) -> list[Row]:
@@ -50,19 +94,24 @@ def read_figures(path: Path) -> list[Row]:
 
 
 def markdown_table(figures: Sequence[Mapping[str, Any]]) -> str:
-    """Return the rows of a file of results as a table for the documents."""
+    """Return rows as a table for the documents."""
     lines = ["| measure | ours | baseline | ratio | goal | date | load |",
              "| --- | ---: | ---: | ---: | ---: | --- | ---: |"]  # fmt: skip
     for row in figures:
         base, ratio, goal = "", "", f"at most {row['goal']:g} {row['unit']}"
         if row["ratio"] is not None:
             median = statistics.median(row["baseline"])
-            base = f"{format_value(median, row['unit'])} ({row['against']})"
+            base = f"{_format_value(median, row['unit'])} ({row['against']})"
             ratio, goal = f"{row['ratio']:.3g} ×", f"{row['goal']:g} ×"
-        ours = format_value(row["value"], row["unit"])
+        ours = _format_value(row["value"], row["unit"])
         cells = (row["name"], ours, base, ratio, goal, row["date"], row["load"])
         lines.append(f"| {' | '.join(map(str, cells))} |")
     return "\n".join(lines) + "\n"
+
+
+def _format_value(value: float, unit: str) -> str:
+    shown = value * 1e3 if unit == "ms" else value  # times are in seconds
+    return f"{shown:,.0f} {unit}" if shown >= _WHOLE else f"{shown:.3g} {unit}"
 
 
 def _key(row: Mapping[str, Any]) -> tuple[str, str]:

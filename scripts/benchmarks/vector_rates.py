@@ -11,7 +11,7 @@ import numpy as np
 from gymnasium.vector import AsyncVectorEnv
 from numpy.typing import NDArray
 
-from roboirg.apps.bench.step_times import CHUNK, STEPS, over_the_table
+from benchmarks.step_times import CHUNK, STEPS, over_the_table
 from roboirg.envs.action_chunks import ActionChunks
 from roboirg.envs.factory import make
 

@@ -75,7 +75,7 @@ def test_every_kind_of_policy_and_every_application_is_there(everything):
     assert kinds == set(entry_names("roboirg.policy_kinds")) == {
         "learned", "recorded", "trained",
     }  # fmt: skip
-    assert len(APPLICATIONS) >= 10
+    assert len(APPLICATIONS) >= 8
     assert {
         "run",
         "tables",

@@ -15,7 +15,6 @@ from roboirg.evaluation.records.store import RecordStore
 from roboirg.main import app
 
 WORDS = {
-    "bench": "--rounds 1",
     "run": "--policy random --tasks PickXtimes --episodes 1 --workers 0 --settings explicit"
     " --out {folder}/out",
     "records merge": "{run} --out {folder}/merged",

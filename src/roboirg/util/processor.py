@@ -16,11 +16,6 @@ _FAMILY = ("vendor_id", "cpu family", "CPU implementer", "CPU architecture")
 """Of x86 the first two, of ARM the others."""
 
 
-def processor_model() -> str:
-    """Return the model of the processor; empty where the system does not say."""
-    return _fields().get("model name", platform.processor())
-
-
 def processor_family() -> str:
     """Return architecture, maker and family, such as ``x86_64 GenuineIntel 6``.
 

@@ -5,13 +5,14 @@ from __future__ import annotations
 import tempfile
 import time
 from collections import deque
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from roboirg.apps.bench.step_times import CHUNK
+from benchmarks.step_times import CHUNK
 from roboirg.core.observations import FRONT, Demonstration, Observation
 from roboirg.evaluation.plan.plan_maker import make_plan
 from roboirg.evaluation.play.rollout import EpisodeRunner
@@ -21,6 +22,8 @@ MAX_STEPS = 20 * CHUNK
 EPISODES = 12
 """Episodes that each worker plays, about."""
 _HOUR_S = 3600
+CALL_S = 0.05
+"""How long a call of the slow policy takes, whatever the number of episodes."""
 _SWING = 0.2
 """Radians."""
 
@@ -50,6 +53,27 @@ class WavingPolicy:
         rows = np.tile(np.append(self._start, 1.0), (CHUNK, 1))
         rows[:, 0] += _SWING * np.sin(steps / CHUNK)
         return rows
+
+
+class SlowPolicy:
+    """Swings the arm, takes batches, and thinks 50 ms about each, as a model on a GPU does."""
+
+    cameras: ClassVar[tuple[str, ...]] = (FRONT,)
+    demonstration_frames: ClassVar[str] = "none"
+    version = "1"
+
+    def begin(self, instruction: str, demonstration: Demonstration) -> WavingPolicy:
+        """Return the swing of an episode."""
+        state = WavingPolicy()
+        state.reset(instruction, demonstration)
+        return state
+
+    def act_batch(
+        self, states: Sequence[WavingPolicy], observations: Sequence[Observation]
+    ) -> list[NDArray[np.floating[Any]]]:
+        """Return the next sixteen actions of each episode."""
+        time.sleep(CALL_S)
+        return [state.act(one) for state, one in zip(states, observations, strict=True)]
 
 
 def episodes_per_hour(policy: type, workers: int) -> float:

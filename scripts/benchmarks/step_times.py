@@ -76,12 +76,23 @@ def stretch(task: str, index: int, first: int) -> Workload:
 
 def eager_step(workload: Workload, rendering: RenderSettings = FAITHFUL) -> float:
     """Time steps with both pictures after every step."""
+    return _drawn_step(workload, rendering, lambda cameras: cameras.pictures(CAMERAS))
+
+
+def stock_step(workload: Workload) -> float:
+    """Time steps as in RoboMME: draw everything, fetch color and segmentation at every step."""
+    return _drawn_step(workload, STOCK, draw_as_stock)
+
+
+def _drawn_step(
+    workload: Workload, rendering: RenderSettings, draw: Callable[[Cameras], object]
+) -> float:
     session = workload.start(rendering=rendering)
     session.world.cameras.pictures(CAMERAS)
 
     def step(action: Action) -> None:
         session.step(action)
-        session.world.cameras.pictures(CAMERAS)
+        draw(session.world.cameras)
 
     return median_time(workload, step)
 
@@ -98,18 +109,6 @@ def lazy_step(workload: Workload) -> float:
             session.world.cameras.pictures(CAMERAS)
 
     return median_time(workload, step, CHUNK)
-
-
-def stock_step(workload: Workload) -> float:
-    """Time steps as in RoboMME: draw everything, fetch color and segmentation at every step."""
-    session = workload.start(rendering=STOCK)
-    session.world.cameras.pictures(CAMERAS)
-
-    def step(action: Action) -> None:
-        session.step(action)
-        draw_as_stock(session.world.cameras)
-
-    return median_time(workload, step)
 
 
 def draw_as_stock(cameras: Cameras) -> None:

@@ -1,1 +1,0 @@
-"""How fast this machine is, compared with the floor and the stock path."""
