@@ -23,7 +23,7 @@ ROOT = Path(__file__).parent.parent
 PAGES = sorted([*ROOT.glob("*.md"), *ROOT.glob("docs/*.md")])
 README = (ROOT / "README.md").read_text()
 MOST_WORDS = 1800
-GENERATED = ("language-card.md", "methods-sections.md", "paper-tables.md")
+GENERATED = ("language-card.md", "paper-tables.md")
 """Pages that programs write, which are not read from beginning to end."""
 
 

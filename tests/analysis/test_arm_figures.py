@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import msgspec
 import pytest
 
 from roboirg.core.errors import InvalidValueError
@@ -11,7 +10,6 @@ from roboirg.evaluation.analysis.figures import draw_figure
 from roboirg.evaluation.analysis.stats.arm_figures import ArmFigure, arm_figures
 from roboirg.evaluation.analysis.stats.chance import silent_chance
 from roboirg.evaluation.analysis.stats.run_data import RunData
-from roboirg.evaluation.analysis.stats.sensitivity import families_of, try_choices
 from roboirg.evaluation.analysis.tables.arm_table import language_use_sentences, make_arm_table
 from roboirg.evaluation.records.record import GoalOutcomes, Summary
 
@@ -132,30 +130,6 @@ def test_tables_figures_and_sentences_have_each_policy_once():
     assert not [
         *language_use_sentences(sides[0], data_of(play("knows", {"told": "own"})), ("", ""))
     ]
-
-
-def test_each_figure_is_tested_again_under_other_choices():
-    """With the same verdict as the figure's own test, paraphrases and policy seeds included."""
-    acts = {**LISTENER, "paraphrase-1": "own", "paraphrase-2": "none"}
-    seeds = [
-        msgspec.structs.replace(one, policy_seed=seed)
-        for seed in (0, 1)
-        for one in play("mine", acts)
-    ]
-    data = data_of(seeds)
-    gaps, arms = families_of(data)
-    assert gaps.contrasts == ()
-    figures = arm_figures(data)
-    found = try_choices(arms.contrasts)
-    assert [one.label for one in found] == [f"{one.contrast.name}, explicit" for one in figures]
-    for one, of in zip(figures, found, strict=True):
-        clear = "higher" if one.gap.value > 0 else "lower"
-        assert of.verdict == (clear if one.p_holm <= 0.05 else "open")
-        assert of.pairs == one.gap.episodes
-        labels = {choice.label for choice in of.others}
-        assert {"seed 0", "seed 1", "unit rollout", "unit task"} <= labels
-        # Each seed alone shows the same, and two tasks are too few units.
-        assert {choice.label for choice in of.exceptions} == {"unit task"}
 
 
 def test_chance_in_silence_counts_goals_that_begin_alike():

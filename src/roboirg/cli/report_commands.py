@@ -45,13 +45,6 @@ def report(
     port: Annotated[
         int, typer.Option(help="Port on loopback for --serve; 0 chooses a free one.")
     ] = 0,
-    methods: Annotated[
-        str | None,
-        typer.Option(
-            help="Print the methods section of the run as markdown, latex or json; write no file.",
-            metavar="FORMAT",
-        ),
-    ] = None,
 ) -> None:
     """Print the table of a run and write RUN/report.html, one self-contained page.
 
@@ -62,9 +55,6 @@ def report(
     from roboirg.evaluation.analysis.page.report import check_report_support, write_report
 
     path, other = run_commands.folder_of(folder), None if against is None else Path(against)
-    if methods is not None:
-        _print_methods(path, methods)
-        return
     if serve:
         _serve(path, port, against)
         return
@@ -81,14 +71,6 @@ def report(
         )
     run_commands.print_tables_of(path, planned)
     typer.echo(page)
-
-
-def _print_methods(folder: Path, name: str) -> None:
-    from roboirg.evaluation.analysis.methods.method_sections import make_sections
-    from roboirg.evaluation.analysis.methods.method_text import FORMATS
-
-    known_names("format of a methods section", name, tuple(FORMATS))
-    typer.echo(FORMATS[name](make_sections(folder)), nl=False)
 
 
 def _serve(folder: Path, port: int, against: str | None) -> None:
@@ -158,12 +140,11 @@ def tables(
         typer.Option(
             help="main, planner, context, real, harder, other, coverage, or all that apply; or of "
             "runs alone: forms, failures, subgoals (of planners), heard (how many prompts were "
-            "cut), arms (what control arms show), sensitivity (whether gaps depend on how they "
-            "are analyzed)."
+            "cut), arms (what control arms show), facts (what a methods section needs)."
         ),
     ] = _ALL,
     format: Annotated[  # noqa: A002
-        str, typer.Option(help="terminal, markdown, latex, latex-pieces (narrow) or csv.")
+        str, typer.Option(help="terminal, markdown, latex, latex-pieces (narrow), csv or json.")
     ] = "terminal",
     published: Annotated[bool, typer.Option(help="Add the paper's rows.")] = False,
     floors: Annotated[
@@ -184,11 +165,14 @@ def tables(
 
     Example: roboirg tables runs/first --which main --published
     """
-    from roboirg.evaluation.analysis.tables.diagnostic_tables import DIAGNOSTIC_TABLES, SUBGOALS
+    from roboirg.evaluation.analysis.tables.diagnostic_tables import (
+        DIAGNOSTIC_TABLES,
+        RECORD_TABLES,
+    )
     from roboirg.evaluation.analysis.tables.rendering import get_format
 
     output = get_format(format)
-    if which in (*DIAGNOSTIC_TABLES, SUBGOALS):
+    if which in (*DIAGNOSTIC_TABLES, *RECORD_TABLES):
         if published or floors or by is not None:
             raise InvalidValueError(f"--which {which} excludes --published, --floors and --by.")
         found = [_diagnostic_table(which, runs or [])]
@@ -229,7 +213,6 @@ def compare(
     from roboirg.evaluation.analysis.stats.comparison_text import sentences
     from roboirg.evaluation.analysis.stats.headline import headline_notes
     from roboirg.evaluation.analysis.stats.run_data import RunData
-    from roboirg.evaluation.analysis.stats.sensitivity import policy_contrasts, try_choices
     from roboirg.evaluation.analysis.tables.arm_table import language_use_sentences
     from roboirg.util.console_width import widen
 
@@ -253,18 +236,15 @@ def compare(
     data = [RunData.of(*each) for each in sides]
     for sentence in language_use_sentences(data[0], data[1], (names[0], names[1])):
         console.print(Text(sentence), highlight=False)
-    results = [[one for _, one in each.told().results] for each in data]
-    tried = [one for one in try_choices(policy_contrasts(*results)) if one.others]
-    if tried:
-        console.print("\nUnder other choices of the analysis, the verdict on")
-    for one in tried:
-        console.print(Text(f"  {one.label} ({one.verdict}) {one.sentence}."), highlight=False)
 
 
 def _tables(which: str, cells: Cells, *, published: bool, floors: str | None) -> list[Table]:
     from roboirg.evaluation.analysis.published import RATE_TABLES
     from roboirg.evaluation.analysis.stats.chance import FLOORS
-    from roboirg.evaluation.analysis.tables.diagnostic_tables import DIAGNOSTIC_TABLES, SUBGOALS
+    from roboirg.evaluation.analysis.tables.diagnostic_tables import (
+        DIAGNOSTIC_TABLES,
+        RECORD_TABLES,
+    )
     from roboirg.evaluation.analysis.tables.paper_tables import WHICH, is_informative, make_table
 
     if which == _ALL:
@@ -273,7 +253,7 @@ def _tables(which: str, cells: Cells, *, published: bool, floors: str | None) ->
     elif which in WHICH:
         wanted = [which]
     else:
-        raise UnknownNameError("table", which, (*WHICH, *DIAGNOSTIC_TABLES, SUBGOALS, _ALL))
+        raise UnknownNameError("table", which, (*WHICH, *DIAGNOSTIC_TABLES, *RECORD_TABLES, _ALL))
     if which != "coverage" and not published and not cells:
         raise InvalidValueError("Tables need a run; give its folder, or --published.")
     added = () if floors is None else known_names("floor", floors, FLOORS)
@@ -302,16 +282,18 @@ def _breakdown_tables(runs: list[str], by: str) -> list[Table]:
 
 def _diagnostic_table(which: str, runs: list[str]) -> Table:
     from roboirg.evaluation.analysis.stats.run_data import RunData
-    from roboirg.evaluation.analysis.tables.diagnostic_tables import DIAGNOSTIC_TABLES, SUBGOALS
-    from roboirg.evaluation.analysis.tables.subgoal_table import make_subgoal_table
+    from roboirg.evaluation.analysis.tables.diagnostic_tables import (
+        DIAGNOSTIC_TABLES,
+        RECORD_TABLES,
+    )
     from roboirg.evaluation.records.store import iterate_records
 
     if not runs:
         raise InvalidValueError(f"The table {which!r} needs a run; give its folder.")
     data = RunData.of(*_runs(runs))
-    if which != SUBGOALS:
+    if which in DIAGNOSTIC_TABLES:
         return DIAGNOSTIC_TABLES[which](data)
-    return make_subgoal_table(
+    return RECORD_TABLES[which](
         data,
         ((run, record) for run in dict.fromkeys(runs) for record in iterate_records(Path(run))),
     )

@@ -66,8 +66,7 @@ class ArmFigure:
         policy_run: as of the arm ``told``.
         options: of the instruction.
         contrast: which figure.
-        sides: the results of the first and of the second rate.
-        cells: the same by task, in order.
+        cells: the results of the first and of the second rate by task, in order.
         intervals: of the first and the second rate.
         gap: first less second.
         p_holm: its p-value after Holm's correction over all figures of the policy run.
@@ -76,7 +75,6 @@ class ArmFigure:
     policy_run: PolicyRun
     options: InstructionOptions
     contrast: ArmContrast
-    sides: Sides
     cells: tuple[Mapping[str, CellResults], Mapping[str, CellResults]]
     intervals: tuple[Interval | None, Interval | None]
     gap: Gap
@@ -130,7 +128,7 @@ def _figure(
         clustered_interval([*second.values()], rng),
     )
     cells = first, second
-    return ArmFigure(policy_run, options, contrast, sides, cells, intervals, gap, gap.p_value)
+    return ArmFigure(policy_run, options, contrast, cells, intervals, gap, gap.p_value)
 
 
 def _cell(task: str, results: Sequence[Summary]) -> CellResults:

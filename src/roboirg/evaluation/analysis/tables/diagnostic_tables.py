@@ -1,4 +1,4 @@
-"""Tables that the paper has no numbers for: forms, failures, verdicts by other analyses."""
+"""Tables that the paper has no numbers for: forms, failures, and others of runs alone."""
 
 from __future__ import annotations
 
@@ -13,14 +13,16 @@ from roboirg.evaluation.analysis.stats.paired_tests import Gap, holm
 from roboirg.evaluation.analysis.stats.rates import points
 from roboirg.evaluation.analysis.stats.run_data import RunData
 from roboirg.evaluation.analysis.stats.run_summary import ALL_TASKS
-from roboirg.evaluation.analysis.stats.sensitivity import families_of, try_choices
 from roboirg.evaluation.analysis.tables.arm_table import make_arm_table
 from roboirg.evaluation.analysis.tables.breakdown_table import (
     corrected_p_text,
     interval_text,
 )
+from roboirg.evaluation.analysis.tables.facts_table import make_facts_table
 from roboirg.evaluation.analysis.tables.heard_table import make_heard_table
+from roboirg.evaluation.analysis.tables.subgoal_table import make_subgoal_table
 from roboirg.evaluation.analysis.tables.table import POLICY, Column, Entry, Row, Table
+from roboirg.evaluation.records.record import Record
 from roboirg.judging.failure_attribution import EXECUTION, GROUNDING
 
 FORM_COLUMNS = tuple(
@@ -35,14 +37,6 @@ _FAILURES_NOTE = (
     "Failed episodes, and how many of them failed in each way, with their share of the failures. "
     "Grounding: the policy did something else than the instruction means; execution: it did not "
     "complete what the instruction means."
-)
-_SENSITIVITY_NOTE = (
-    "A verdict says whether success is lower or higher than in explicit on the same episodes, "
-    "or, for control arms, the first rate than the second (open: the test does not decide). Next "
-    "to it stands whether it holds under the other choices of the analysis that can change it, "
-    "and the verdict where it does not. Within a choice, p-values are corrected over all "
-    "differences to explicit of the policy, or over all contrasts of its arms. An episode is a "
-    "scene, so that rollouts and tasks are the other units."
 )
 
 
@@ -135,38 +129,15 @@ def _failure_entries(trials: int, counts: Counter[str], kinds: Iterable[str]) ->
         yield Entry(word=f"{counts[kind]}{share}")
 
 
-def make_sensitivity_table(data: RunData) -> Table:
-    """Make the table of the gaps and the control arms of all policies.
-
-    Raises:
-        InvalidValueError: there is no verdict that another choice could change.
-    """
-    tested = [(of.policy, one) for of in families_of(data) for one in try_choices(of.contrasts)]
-    if not any(one.others for _, one in tested):
-        raise InvalidValueError(
-            "There are no verdicts that another choice could change: the runs need explicit and "
-            "another setting, or control arms, in several tasks or with several seeds."
-        )
-    return Table(
-        key="sensitivity",
-        title="Verdicts under other choices of the analysis",
-        heads=(POLICY, "contrast"),
-        columns=(Column("verdict"), Column("in other analyses")),
-        rows=tuple(
-            Row(name, one.label, "ours", (Entry(word=one.verdict), Entry(word=one.sentence)))
-            for name, one in tested
-        ),
-        notes=(_SENSITIVITY_NOTE,),
-    )
-
-
-SUBGOALS = "subgoals"
-"""Name of one more, which needs whole records."""
 DIAGNOSTIC_TABLES: Mapping[str, Callable[[RunData], Table]] = {
     "forms": make_forms_table,
     "failures": make_failure_table,
     "heard": make_heard_table,
     "arms": make_arm_table,
-    "sensitivity": make_sensitivity_table,
 }
 """By name, as in the command line."""
+RECORD_TABLES: Mapping[str, Callable[[RunData, Iterable[tuple[str, Record]]], Table]] = {
+    "subgoals": make_subgoal_table,
+    "facts": make_facts_table,
+}
+"""Those that need whole records too, each with the name of its run."""

@@ -96,11 +96,13 @@ class Column(NamedTuple):
         name: a task, or the name of an average.
         group: the suite, or empty.
         averages: the columns that an average is taken over; empty for a task.
+        is_text: whether its entries are texts of any length, and not rates or counts.
     """
 
     name: str
     group: str = ""
     averages: tuple[str, ...] = ()
+    is_text: bool = False
 
 
 @dataclass(frozen=True, slots=True)

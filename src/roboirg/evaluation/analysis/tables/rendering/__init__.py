@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping
 from typing import NamedTuple
 
 from roboirg.core.errors import UnknownNameError
-from roboirg.evaluation.analysis.tables.rendering.csv_lines import csv_text
+from roboirg.evaluation.analysis.tables.rendering.csv_lines import csv_text, json_text
 from roboirg.evaluation.analysis.tables.rendering.latex import latex
 from roboirg.evaluation.analysis.tables.rendering.latex_layout import PIECES
 from roboirg.evaluation.analysis.tables.rendering.markdown import markdown
@@ -33,6 +33,7 @@ FORMATS: Mapping[str, Format] = {
     "latex": Format(".tex", latex),
     "latex-pieces": Format(".tex", functools.partial(latex, layout=PIECES)),
     "csv": Format(".csv", csv_text),
+    "json": Format(".json", json_text),
 }
 
 

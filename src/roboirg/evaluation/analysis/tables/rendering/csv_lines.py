@@ -1,9 +1,10 @@
-"""Tables as comma-separated values, one line for each entry."""
+"""Tables for programs: comma-separated values, one line for each entry, or JSON."""
 
 from __future__ import annotations
 
 import csv
 import io
+import json
 
 from roboirg.evaluation.analysis.tables.table import (
     ERROR_MARK,
@@ -52,6 +53,16 @@ def csv_text(table: Table) -> str:
         for column, entry in zip(table.columns, row.entries, strict=True):
             writer.writerow(_line(table, row, column, entry))
     return file.getvalue()
+
+
+def json_text(table: Table) -> str:
+    """Return a list with an object for each row: what is printed, by heading."""
+    heads = (*table.heads, *(column.name for column in table.columns))
+    rows = [
+        (row.group, *table.names(row), *(entry.text for entry in row.entries)) for row in table.rows
+    ]
+    found = [dict(zip(heads, row, strict=True)) for row in rows]
+    return json.dumps(found, ensure_ascii=False, indent=1) + "\n"
 
 
 def _line(table: Table, row: Row, column: Column, entry: Entry) -> list[object]:

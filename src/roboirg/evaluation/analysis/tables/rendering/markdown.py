@@ -11,7 +11,8 @@ def markdown(table: Table) -> str:
     """Return title, table and notes; only the first row of a group names the group."""
     heads = [*table.heads, *(column.name for column in table.columns)]
     lines = [f"### {escaped(table.title)}", "", _line([escaped(head) for head in heads])]
-    lines.append(_line(["---"] * len(table.heads) + ["---:"] * len(table.columns)))
+    sides = ["---" if column.is_text else "---:" for column in table.columns]
+    lines.append(_line(["---"] * len(table.heads) + sides))
     for group, rows in table.groups().items():
         for number, row in enumerate(rows):
             name = "" if number else escaped(group)
@@ -26,7 +27,8 @@ def _line(cells: list[str]) -> str:
 
 
 def _cell(entry: Entry) -> str:
-    text = f"**{entry.text}**" if entry.best else entry.text
+    text = escaped(entry.text)
+    text = f"**{text}**" if entry.best else text
     return " ".join(filter(None, (text, entry.change_text, escaped(entry.signs))))
 
 

@@ -14,6 +14,9 @@ from roboirg.evaluation.analysis.tables.rendering.column_parts import BORDERS, s
 from roboirg.evaluation.analysis.tables.table import Entry, Row, Table
 from roboirg.util.console_width import LINE_WIDTH, line_width, widen
 
+_TEXT_WIDTH = 80
+"""Characters of a column of texts, which are folded."""
+
 
 def renderable(table: Table, console: Console) -> RenderableType:
     """Return the table with its notes, split to fit the console's width.
@@ -65,7 +68,11 @@ def _grid(table: Table, indices: Sequence[int]) -> Grid:
     for head in table.heads:
         grid.add_column(head, overflow="fold")
     for index in indices:
-        grid.add_column(table.columns[index].name, justify="right", no_wrap=True)
+        column = table.columns[index]
+        if column.is_text:
+            grid.add_column(column.name, overflow="fold", max_width=_TEXT_WIDTH)
+        else:
+            grid.add_column(column.name, justify="right", no_wrap=True)
     for group, rows in table.groups().items():
         grid.add_section()
         for number, row in enumerate(rows):

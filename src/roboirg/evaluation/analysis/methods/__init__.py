@@ -1,1 +1,0 @@
-"""A methods section that writes itself from the records of a run."""
