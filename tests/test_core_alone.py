@@ -45,7 +45,7 @@ NEEDS = {
     "run": "sim", "show": "sim", "report": "report",
     "figures": "report", "compare": "report", "serve": "remote",
     "records export": "export", "real run": "sim", "real score": "pages",
-    "export demonstrations": "sim", "export recordings": "sim", "export grounding": "sim",
+    "export demonstrations": "sim", "export grounding": "sim",
     "language shortcuts": "report",
 }  # fmt: skip
 """The extra of each command that cannot do its work without one; all others work."""

@@ -121,52 +121,6 @@ def export_demonstrations(
     )
 
 
-def export_recordings(
-    study: Annotated[Path, typer.Argument(help="Folder of the study, made by roboirg real plan.")],
-    dataset: Annotated[
-        str, typer.Argument(help="Folder of LeRobot's recording; DIR?front=NAME names a feature.")
-    ],
-    out: Annotated[
-        Path | None, typer.Option(help="Folder of the new dataset.  (only check)")
-    ] = None,
-    format: Annotated[  # noqa: A002
-        str, typer.Option(help="lerobot-v3, lerobot-v2.1 or robomme-hdf5.")
-    ] = "lerobot-v3",
-) -> None:
-    """Check demonstrations recorded on a robot against the study's plan, and convert them.
-
-    Example: roboirg export recordings study recorded --out data
-    """
-    from roboirg.apps.demonstrations.size_estimate import size_text
-    from roboirg.apps.demonstrations.teleoperation import recording_check
-    from roboirg.apps.demonstrations.teleoperation.recording_export import export_recording
-    from roboirg.apps.demonstrations.teleoperation.teleop_dataset import open_teleop
-    from roboirg.cli.progress_bar import progress_bars
-    from roboirg.util.processor import worker_count
-
-    recorded = open_teleop(dataset)
-    checked = recording_check.check_recording(recorded, recording_check.read_takes(study))
-    for problem in checked.problems:
-        typer.echo(f"roboirg: {problem}", err=True)
-    if checked.problems:
-        raise typer.Exit(2)
-    frames = sum(one["length"] for one in recorded.episodes)
-    typer.echo(f"{counted(len(checked.takes), 'demonstration')}, {frames} frames: as planned.")
-    if checked.moved:
-        typer.echo(
-            f"{checked.moved} were recorded out of order: demonstrations with the same words are "
-            "taken in the plan's order, and their sides cannot be checked."
-        )
-    if out is None:
-        return
-    with progress_bars() as show:
-        summary = export_recording(
-            recorded, checked.takes, out, format, worker_count(None),
-            lambda work, done, total, _: show(work, done, total, ""),
-        )  # fmt: skip
-    typer.echo(f"{counted(summary.episodes, 'episode')}, {size_text(summary.size)}: {out}")
-
-
 def _print_estimate(plan: ExportPlan) -> None:
     from roboirg.apps.demonstrations.size_estimate import estimate_size, size_text
 
@@ -223,5 +177,4 @@ def replay(
 
 def add_commands(app: typer.Typer) -> None:
     export_app.command("demonstrations")(export_demonstrations)
-    export_app.command("recordings")(export_recordings)
     app.command()(replay)

@@ -129,7 +129,7 @@ def _histogram(rows: NDArray[np.int64]) -> Iterator[str]:
 
 def _content_lines(plan: ExportPlan, facts: Sequence[TrajectoryFacts]) -> Iterator[str]:
     yield "State: seven joint angles (rad) and the first finger (m)."
-    origin = "recorded on a robot" if plan.is_teleoperated else "exactly what was executed"
+    origin = "exactly what was executed"
     if plan.disturbed:
         origin = "what the **disturbed** expert should have done; `executed_action` is what it did"
     yield f"Action: {_MEANINGS[plan.actions]}; {origin}."

@@ -36,8 +36,6 @@ Outcomes = Literal["successes", "all"]
 ORACLE = "oracle"
 SMALLEST = 16
 """Width and height of the smallest pictures that are exported, pixels."""
-TELEOPERATED = "teleoperation"
-"""The policy of trajectories that people recorded on a robot."""
 
 
 @dataclass(frozen=True)
@@ -167,11 +165,6 @@ class ExportPlan:
             )
 
     @property
-    def is_teleoperated(self) -> bool:
-        """Whether people recorded the trajectories on a robot."""
-        return self.policy.startswith(TELEOPERATED)
-
-    @property
     def recording(self) -> RecordingSpec:
         """What the trajectories must hold."""
         is_video_apart = self.video == "sidecar" and self.pictures != "png"
@@ -259,7 +252,7 @@ def recording_jobs(plan: ExportPlan) -> list[tuple[RecordingJob, tuple[TaskText,
     jobs: list[tuple[RecordingJob, tuple[TaskText, ...]]] = []
     for task, index in itertools.product(plan.tasks, plan.episodes):
         episode = get_episode(task, plan.split, index)
-        said = texts_of(plan, episode)
+        said = _texts_of(plan, episode)
         if not said:
             continue
         job = RecordingJob(
@@ -274,7 +267,7 @@ def recording_jobs(plan: ExportPlan) -> list[tuple[RecordingJob, tuple[TaskText,
     return jobs
 
 
-def texts_of(plan: ExportPlan, episode: Episode) -> tuple[TaskText, ...]:
+def _texts_of(plan: ExportPlan, episode: Episode) -> tuple[TaskText, ...]:
     """Return the instructions of an episode; an explicit one is its own resolved form."""
     found = instructions([episode], plan.settings, plan.forms, plan.options)
     explicit = instruct_with(episode, InstructionOptions(wordings=plan.options.wordings)).text

@@ -21,7 +21,6 @@ from roboirg.apps.demonstrations.export_plan import (
     ExportPlan,
     FormatName,
     RecordingJob,
-    TaskText,
     recording_jobs,
 )
 from roboirg.apps.demonstrations.formats import lerobot_v3, lerobot_v21, robomme_hdf5
@@ -55,19 +54,6 @@ WRITERS: Mapping[FormatName, DatasetWriter] = {
 
 Report = Callable[[str, int, int, int], None]
 """Called with the kind of work, how much is done, how much there is, and bytes on the disk."""
-Jobs = Sequence[tuple[RecordingJob, tuple[TaskText, ...]]]
-
-
-class TrajectorySource(NamedTuple):
-    """Where the trajectories of an export come from.
-
-    Attributes:
-        jobs: the trajectories with their instructions, in the order of the dataset.
-        record: writes the file of one into a folder; can be pickled.
-    """
-
-    jobs: Jobs
-    record: Callable[[Path, RecordingJob], None]
 
 
 class ExportSummary(NamedTuple):
@@ -92,7 +78,6 @@ def run_export(
     workers: int,
     report: Report,
     trajectories: Path | None = None,
-    source: TrajectorySource | None = None,
 ) -> ExportSummary:
     """Export a plan into a folder, or continue an export that was stopped.
 
@@ -103,7 +88,6 @@ def run_export(
         report: called with the progress.
         trajectories: folder that keeps the recorded trajectories, for other formats and settings;
             None for one in `out` that is deleted at the end.
-        source: of the trajectories; None to play the plan's episodes.
 
     Raises:
         InvalidValueError: the folder holds something else, another export uses it, or no
@@ -113,7 +97,7 @@ def run_export(
     check_parquet_support("demonstrations")
     if plan.format == "robomme-hdf5":
         check_hdf5_support()
-    jobs, record = source or _played(plan)
+    jobs = recording_jobs(plan)
     with _opened(plan, out) as work:
         folder = work / "trajectories" if trajectories is None else trajectories
         folder.mkdir(parents=True, exist_ok=True)
@@ -123,8 +107,7 @@ def run_export(
             for job, _ in jobs
             if not _is_usable(plan, job, folder, may_lack_pictures=parts_folder.exists())
         ]
-        work_on = functools.partial(record, folder)
-        _record(work_on, missing, len(jobs), folder, workers, report)
+        _record(plan, missing, len(jobs), folder, workers, report)
         facts = [load_facts(job.path(folder)) for job, _ in jobs]
         kept = [
             RecordedTexts(job.path(folder), said)
@@ -178,14 +161,8 @@ def _read_fingerprint(path: Path) -> str | None:
         return None
 
 
-def _played(plan: ExportPlan) -> TrajectorySource:
-    only_successes = plan.outcomes == "successes"
-    record = functools.partial(_record_job, only_successes=only_successes)
-    return TrajectorySource(recording_jobs(plan), record)
-
-
 def _record(
-    record: Callable[[RecordingJob], None],
+    plan: ExportPlan,
     missing: Sequence[RecordingJob],
     total: int,
     folder: Path,
@@ -194,7 +171,8 @@ def _record(
 ) -> None:
     done, size = total - len(missing), folder_size(folder)
     report("record", done, total, size)
-    for job, _ in parallel_map(record, missing, workers):
+    work = functools.partial(_record_job, folder, only_successes=plan.outcomes == "successes")
+    for job, _ in parallel_map(work, missing, workers):
         done, size = done + 1, size + job.path(folder).stat().st_size
         report("record", done, total, size)
 

@@ -125,7 +125,7 @@ def _write_setup(group: Any, trajectory: Trajectory, placed: PlacedText) -> None
     setup["seed"] = np.int64(facts.seed)
     setup["difficulty"] = facts.difficulty
     setup.create_dataset("task_goal", data=[placed.words.text], dtype=h5py.string_dtype())
-    for camera in CAMERAS if facts.depth else ():
+    for camera in CAMERAS:
         name = f"{camera}_intrinsic"
         setup[f"{camera}_camera_intrinsic"] = trajectory.calibration[name]
     setup["available_multi_choices"] = "[]"
@@ -141,8 +141,6 @@ def _write_step(
     for camera in CAMERAS:
         options = {"compression": "gzip", "compression_opts": 1}
         seen.create_dataset(f"{camera}_rgb", data=read_picture(archive, camera, row), **options)
-        if not trajectory.facts.depth:
-            continue
         seen.create_dataset(f"{camera}_depth", data=read_depth(archive, camera, row), **options)
         extrinsic = trajectory.calibration[f"{camera}_extrinsic"][row]
         seen[f"{camera}_camera_extrinsic"] = extrinsic

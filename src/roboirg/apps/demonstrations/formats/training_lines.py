@@ -3,27 +3,9 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import NamedTuple
 
 from roboirg.apps.demonstrations.export_plan import ExportPlan
 from roboirg.core.observations import CAMERAS
-
-
-class TrainingRecipe(NamedTuple):
-    """Steps of training, samples in a step, rate of learning, and steps until it is reached."""
-
-    steps: int
-    batch: int
-    rate: float
-    warmup: int
-
-
-SIMULATED = TrainingRecipe(80_000, 64, 5e-5, 10_000)
-"""As RoboMME trains its policies."""
-ON_ROBOT = TrainingRecipe(5_000, 48, 5e-5, 300)
-"""As the paper fine-tunes for its study with a real robot."""
-HORIZON = 20
-"""Actions that a policy predicts."""
 
 _LEROBOT = """\
 ```sh
@@ -48,22 +30,6 @@ _WAYPOINTS = """\
 """
 _PYAV = " --dataset.video_backend=pyav"
 """Of a dataset with videos; LeRobot's usual decoder, torchcodec, needs FFmpeg on the system."""
-
-_LEROBOT_ON_ROBOT = """\
-```sh
-lerobot-train --dataset.repo_id=local/roboirg --dataset.root={root} \\
-    --policy.type=pi05 --policy.pretrained_path=lerobot/pi05_base --policy.push_to_hub=false \\
-    --policy.device=cuda --policy.chunk_size={horizon} --policy.n_action_steps={horizon} \\
-    --policy.optimizer_lr={recipe.rate} --policy.scheduler_decay_lr={recipe.rate} \\
-    --policy.scheduler_warmup_steps={recipe.warmup} --policy.scheduler_decay_steps={recipe.steps} \\
-    --batch_size={recipe.batch} --steps={recipe.steps} --output_dir=outputs/pi05
-roboirg real plan --out study \\
-    --policy 'pi05=lerobot://outputs/pi05/checkpoints/last/pretrained_model?device=cuda'
-```
-
-Export with `--format lerobot-v2.1` to train with openpi, and with `robomme-hdf5` for MME-VLA. These
-lines have not been run here: the weights and a GPU were not at hand.
-"""
 
 _OPENPI = """\
 openpi reads this dataset with the LeRobot that it pins. Save the following as
@@ -110,14 +76,14 @@ class FirstEight(transforms.DataTransformFn):
 
 configs._CONFIGS_DICT["pi05_roboirg"] = configs.TrainConfig(
     name="pi05_roboirg",
-    model=pi0_config.Pi0Config(pi05=True, action_horizon={horizon}, max_token_len=160),
+    model=pi0_config.Pi0Config(pi05=True, action_horizon=20, max_token_len=160),
     data=RoboIRGData(repo_id="roboirg", base_config=configs.DataConfig(prompt_from_task=True)),
     weight_loader=weight_loaders.CheckpointWeightLoader(
         "gs://openpi-assets/checkpoints/pi05_base/params"),
-    num_train_steps={recipe.steps}, batch_size={recipe.batch},
+    num_train_steps=80000, batch_size=64,
     lr_schedule=optimizer.CosineDecaySchedule(
-        warmup_steps={recipe.warmup}, peak_lr={recipe.rate}, decay_steps={recipe.steps},
-        decay_lr={recipe.rate}))
+        warmup_steps=10000, peak_lr=5e-05, decay_steps=80000,
+        decay_lr=5e-05))
 runpy.run_path(sys.argv.pop(1), run_name="__main__")
 ```
 
@@ -140,9 +106,9 @@ python scripts/build_dataset.py --raw_data_path {root}
 uv run scripts/train.py mme_vla_suite --exp-name=perceptual-framesamp-modul \\
     --dataset-path=data/robomme_preprocessed_data --model.use_history \\
     --model.history_config=perceptual-framesamp-modul.yaml \\
-    --num-train-steps={recipe.steps} --batch-size={recipe.batch} \\
-    --lr-schedule.peak-lr={recipe.rate} --lr-schedule.decay-lr={recipe.rate} \\
-    --lr-schedule.warmup-steps={recipe.warmup}
+    --num-train-steps=80000 --batch-size=64 \\
+    --lr-schedule.peak-lr=5e-05 --lr-schedule.decay-lr=5e-05 \\
+    --lr-schedule.warmup-steps=10000
 ```
 
 are MME-VLA's builder, which reads these files as RoboMME's own, and its training.
@@ -161,17 +127,14 @@ def training_text(plan: ExportPlan, root: Path) -> str:
     """
     from roboirg.apps.demonstrations.frame_columns import FrameColumns
 
-    place, recipe = root.resolve(), ON_ROBOT if plan.is_teleoperated else SIMULATED
+    place = root.resolve()
     if plan.format == "robomme-hdf5":
-        return _MME_VLA.format(root=place, recipe=recipe)
+        return _MME_VLA.format(root=place)
     if plan.format == "lerobot-v2.1":
         if set(plan.cameras) < set(CAMERAS):
             return _GROOT
         keys = FrameColumns(plan).keys
-        text = _OPENPI.format(parent=place.parent, recipe=recipe, horizon=HORIZON, **keys)
-        return text + _GROOT
-    if plan.is_teleoperated:
-        return _LEROBOT_ON_ROBOT.format(root=place, recipe=recipe, horizon=HORIZON)
+        return _OPENPI.format(parent=place.parent, **keys) + _GROOT
     backend = _PYAV if FrameColumns(plan).has_videos else ""
     after = _WAYPOINTS if plan.actions == "waypoint" else _LEROBOT_RUN.format(task=plan.tasks[0])
     text = _LEROBOT.format(root=place, after=after, backend=backend)

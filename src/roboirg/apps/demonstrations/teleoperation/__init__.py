@@ -1,1 +1,0 @@
-"""Demonstrations that people recorded on a robot: read, checked and converted."""
