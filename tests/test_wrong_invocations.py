@@ -19,7 +19,7 @@ NAMES = {
     "--wordings": "nowhere.toml", "--floors": "chanse",
     "--video": "som", "--protocol": "opnpi",
     "--executor": "slurm", "--plan": "papr", "--api-key-env": "NO_SUCH_VARIABLE", "--which": "mian",
-    "--format": "pdf", "--by": "colour", "--robot": "twn", "--score": "me",
+    "--format": "pdf", "--by": "colour",
 }  # fmt: skip
 """A value that no command takes, for every option that takes names."""
 

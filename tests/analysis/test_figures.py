@@ -307,18 +307,6 @@ def test_the_command_draws_what_it_is_asked_for(tmp_path: Path) -> None:
     assert InstructionOptions("explicit") in {options for _, _, options in content().cells}
 
 
-def test_the_real_robot_s_figure_has_a_panel_per_task(
-    tmp_path: Path, published_like: Callable[..., list[Summary]]
-) -> None:
-    found = content(published_like("real"))
-    write_figures(found, tmp_path, ["real"], published=True)
-    drawn = texts(tmp_path / "real.svg")
-    for words in ("PutInBox", "PickByCount", "explicit", "success, %", "(published)"):
-        assert words in drawn
-    with pytest.raises(InvalidValueError, match="nothing to draw for real"):
-        write_figures(content(results()), tmp_path, ["real"])
-
-
 @pytest.mark.parametrize("kept", ["explicit", "direct"])
 def test_rates_without_another_setting_stand_alone(kept: str) -> None:
     assert draw_gaps(RunData.of([])) is draw_forms(RunData.of([])) is None

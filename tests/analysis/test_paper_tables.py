@@ -26,7 +26,7 @@ from roboirg.evaluation.analysis.tables.rendering import FORMATS, get_format
 from roboirg.evaluation.analysis.tables.rendering.terminal import renderable
 from roboirg.evaluation.analysis.tables.table import Entry
 from roboirg.evaluation.play.rollout_result import RolloutResult, make_record
-from roboirg.evaluation.records.record import Job, Record, real_robot
+from roboirg.evaluation.records.record import Job, Record
 from roboirg.evaluation.records.record_codec import encode, read_summary
 from roboirg.tasks import all_tasks
 
@@ -308,10 +308,7 @@ def test_tasks_outside_the_paper_have_a_table_of_their_own(result) -> None:
 
 
 def test_results_of_the_twin_are_marked_and_kept_apart_from_a_robots(result) -> None:
-    def trial(robot: object) -> dict:
-        return {"real_trial": {"robot": robot}}
-
-    def played(robot: object, outcome: str) -> Record:
+    def played(robot: str | None, outcome: str) -> Record:
         job = Job(
             policy="listener",
             task="PutInBox",
@@ -320,19 +317,15 @@ def test_results_of_the_twin_are_marked_and_kept_apart_from_a_robots(result) -> 
             options=InstructionOptions("explicit"),
         )
         course = RolloutResult(outcome, cause=None if outcome == "success" else "missed")
-        course.policy_metadata = trial(robot)
-        record = make_record(job, course, started_at="now")
-        return replace(record, robot=real_robot(course.policy_metadata["real_trial"]))
+        return replace(make_record(job, course, started_at="now"), robot=robot)
 
-    records = [played("twin", "success"), played("lerobot", "failure")]
+    records = [played(None, "success"), played("a robot", "failure")]
     stored = [read_summary(encode(one), Path("r"), 1) for one in records]
     for results in (records, stored):
         table = make_table("real", gather([("run", results)]), published=True)
         ours = {row.name: row.entries[0].text for row in table.rows if row.source == "ours"}
         assert ours == {
             "listener (privileged) (twin)": "100.00",
-            "listener, on lerobot (privileged)": "0.00",
+            "listener, on a robot (privileged)": "0.00",
         }
         assert "(twin): the study's twin, in simulation" in notes(table)
-    odd = replace(played("twin", "success"), policy_metadata={"real_trial": 3})
-    assert read_summary(encode(odd), Path("r"), 1).robot is odd.robot is None

@@ -47,7 +47,6 @@ WORDS = {
     "leaderboard verify": "--help",
     "real plan": "--policy random --tasks PutInBox --trials 1 --demonstrations 1"
     " --out {folder}/study",
-    "real run": "{folder}/study",
     "real score": "{folder}/study",
     "language import-robomme": "--help",
 }

@@ -242,8 +242,8 @@ class ForgesSeconds(Forger):
     message = ({"type": "outcome", "seconds": float("nan")},)
 
 
-class ForgesLatency(Forger):
-    message = ({"type": "outcome", "rows": bytes(64), "size": 8, "latency_s": float("nan")},)
+class ForgesSize(Forger):
+    message = ({"type": "outcome", "rows": bytes(64), "size": 0},)
 
 
 class ForgesWant(Forger):
@@ -416,7 +416,7 @@ FORGED = {
     "ForgesLost": "policy: the process sent no valid reply (Object contains unknown field ",
     "ForgesKind": "policy: the process sent no valid reply (Invalid enum value 'infrastructure",
     "ForgesSeconds": "policy: the process sent no valid reply (Object contains unknown field ",
-    "ForgesLatency": "policy: the process sent no valid reply (Expected `float` >= 0.0 - at ",
+    "ForgesSize": "policy: the process sent no valid reply (Expected `int` >= 1 - at ",
     "ForgesWant": "policy: the process sent no valid reply (Object contains unknown field `want",
     "ForgesPrivilege": "policy: the process sent no valid reply (Object contains unknown field ",
     "ForgesVersion": "policy: the process sent no valid reply (Expected `str` matching regex ",

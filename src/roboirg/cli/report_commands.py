@@ -106,7 +106,7 @@ def figures(
     which: Annotated[
         str,
         typer.Option(
-            help="gaps, forms, expressions, context, failures, arms, real, strips (a "
+            help="gaps, forms, expressions, context, failures, arms, strips (a "
             "failure in pictures), several separated by commas, or all that apply."
         ),
     ] = _ALL,

@@ -1,4 +1,4 @@
-"""Act when something takes too long: stop an arm, kill a process."""
+"""Act when something takes too long, such as killing a process."""
 
 from __future__ import annotations
 

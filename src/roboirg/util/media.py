@@ -7,7 +7,7 @@ import io
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,6 +26,8 @@ QUALITY = 23
 JPEG_QUALITY = 90
 SHEET_SIDE = 4
 """Frames in a row, and rows, of a sheet."""
+PICTURE_SIZE = 256
+"""Width and height of the pictures in observations, pixels."""
 
 
 class Picture(NamedTuple):
@@ -64,6 +66,17 @@ def sample_evenly(frames: Pixels, most: int) -> Pixels:
 def evenly_spaced(count: int, most: int) -> NDArray[np.intp]:
     """Return at most `most` of `count` places, evenly spaced, including the first and the last."""
     return np.linspace(0, count - 1, min(count, most)).round().astype(np.intp)
+
+
+def scaled_square(picture: NDArray[Any], size: int = PICTURE_SIZE) -> NDArray[Any]:
+    """Crop a picture to its central square and scale it to `size` x `size` pixels."""
+    import cv2
+
+    height, width = picture.shape[:2]
+    side = min(height, width)
+    top, left = (height - side) // 2, (width - side) // 2
+    square = picture[top : top + side, left : left + side]
+    return np.asarray(cv2.resize(square, (size, size), interpolation=cv2.INTER_AREA))
 
 
 def contact_sheets(frames: Pixels, labels: Sequence[str]) -> Iterator[Pixels]:

@@ -13,8 +13,8 @@ from pyarrow import parquet
 
 from roboirg.apps.demonstrations.dataset_reading import read_dataset
 from roboirg.language import instruct
-from roboirg.policies.lerobot_features import scaled_square
 from roboirg.tasks.splits.splits import get_episode
+from roboirg.util.media import scaled_square
 
 CAMERAS = ("front", "wrist")
 WRIST = "observation.images.wrist"

@@ -16,8 +16,8 @@ from roboirg.apps.demonstrations.trajectory_recorder import RecordingSpec, recor
 from roboirg.envs.factory import make
 from roboirg.policies import make_policy, play
 from roboirg.policies.builtin.oracle_policy import VariedOraclePolicy
-from roboirg.policies.lerobot_features import scaled_square
 from roboirg.tasks.splits.splits import get_episode
+from roboirg.util.media import scaled_square
 
 pytestmark = pytest.mark.sim
 

@@ -1,24 +1,8 @@
-"""Shared by the tests of the real-robot kit."""
-
-import sys
-from pathlib import Path
+"""Shared by the tests of studies with a real robot."""
 
 import pytest
 
 from roboirg.apps.real.study.study_plan import make_study, write_study
-
-HERE = Path(__file__).parent
-if str(HERE) not in sys.path:
-    sys.path.append(str(HERE))  # for helpers, and policies in processes that are spawned
-
-
-from real_start import end_all  # noqa: E402
-
-
-@pytest.fixture(autouse=True)
-def no_process_is_left():
-    yield
-    end_all()
 
 
 @pytest.fixture

@@ -2,13 +2,14 @@
 
 import re
 import signal
+import subprocess
+import sys
 import threading
 import urllib.error
 import urllib.parse
 import urllib.request
 
 import pytest
-from real_start import start
 
 from roboirg.apps.real.pages.score_server import ScoreServer
 from roboirg.apps.real.study.failure_choices import failure_choices
@@ -17,6 +18,26 @@ from roboirg.apps.real.study.trial_log import TrialLog, trial_metadata
 from roboirg.evaluation.records.store import read_records
 
 NARROW = {"width": 400, "height": 800}
+CLI = "import sys; from roboirg.apps.real.commands import real_app; real_app(sys.argv[1:])"
+
+
+@pytest.fixture
+def start():
+    """Start a command of ``roboirg real`` in a process of its own, which ends with the test."""
+    started = []
+
+    def call(*words):
+        process = subprocess.Popen(
+            [sys.executable, "-u", "-c", CLI, *map(str, words)],
+            text=True, stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
+        )  # fmt: skip
+        started.append(process)
+        return process
+
+    yield call
+    for process in started:
+        process.kill()
+        process.wait(timeout=600)
 
 
 @pytest.fixture
@@ -137,7 +158,7 @@ def test_what_an_operator_types_is_text(served):
     assert served.read_trial_log().newest(trial.name).video == "films/a.mp4"
 
 
-def test_a_kill_between_two_clicks_costs_nothing(small):
+def test_a_kill_between_two_clicks_costs_nothing(small, start):
     plan, folder = small
     for number, trial in enumerate(plan.trials):
         process = start("score", folder, "--operator", "ann")
@@ -171,7 +192,7 @@ def key_of(trial, choice):
 
 @pytest.mark.slow
 @pytest.mark.browser
-def test_a_study_is_scored_by_keyboard_alone_and_survives_a_kill(browser, tmp_path, wait_s):
+def test_a_study_is_scored_by_keyboard_alone_and_survives_a_kill(browser, start, tmp_path, wait_s):
     plan = make_study(
         ("listener", "forgetful"), tasks=("PutInBox", "PickByCount"), trials=1, demonstrations=0
     )

@@ -10,7 +10,6 @@ import msgspec
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from msgspec.structs import replace
 
 from roboirg import language
 from roboirg.apps.real.pages.arrangement_svg import draw_svg
@@ -24,7 +23,6 @@ from roboirg.apps.real.study.counterbalancing import (
 from roboirg.apps.real.study.failure_choices import failure_choices
 from roboirg.apps.real.study.study_csv import demonstrations_csv, trials_csv
 from roboirg.apps.real.study.study_plan import StudyPlan, make_study, read_study, write_study
-from roboirg.apps.real.study.study_run import Study
 from roboirg.core.errors import InvalidValueError, UnknownNameError
 from roboirg.language.settings import plain_settings
 
@@ -185,6 +183,18 @@ def test_a_plan_is_read_as_it_was_written_and_not_overwritten(tmp_path):
         read_study(tmp_path)
 
 
+@settings(max_examples=10)
+@given(plans)
+def test_the_plans_for_the_twin_have_the_trials_and_no_others(plan):
+    played = [
+        msgspec.structs.replace(job, spec=None)
+        for twin in plan.twin_plans.values()
+        for job in twin.jobs()
+    ]
+    assert len(played) == len(plan.trials)
+    assert set(played) == {trial.identity for trial in plan.trials}
+
+
 def test_csv_says_what_the_plan_says():
     plan = make_study(("a", "b"), tasks=TASKS, trials=2, demonstrations=2)
     rows = list(csv.DictReader(io.StringIO(trials_csv(plan))))
@@ -285,13 +295,3 @@ def test_nothing_on_the_sheet_is_cut_off_or_overlaps():
             frame = axes.get_tightbbox(renderer)
             assert not any(frame.y0 < box.y1 - 2 and box.y0 < frame.y1 and
                            frame.x0 < box.x1 and box.x0 < frame.x1 for box in boxes)  # fmt: skip
-
-
-def test_a_trial_in_turns_is_refused_before_a_robot_moves(tmp_path):
-    plan = make_study(["listener"], tasks=["PutInBox"], settings=["direct"], trials=1, seed=0)
-    first, *others = plan.trials
-    turns = replace(first, job=first.job.with_options(delivery="turns"))
-    changed = replace(plan, trials=(turns, *others))
-    with pytest.raises(InvalidValueError, match=r"has delivery='turns'.*at once \('prompt'\)"):
-        Study(changed, tmp_path, robot=None).run()
-    assert list(tmp_path.iterdir()) == []

@@ -23,8 +23,8 @@ from roboirg.language.generator import instruct_with
 from roboirg.language.instruction_row import row
 from roboirg.language.settings import all_settings
 from roboirg.language.variants import instructions
-from roboirg.policies.lerobot_features import SIZE
 from roboirg.tasks.splits.splits import get_episode
+from roboirg.util.media import PICTURE_SIZE
 from roboirg.util.short_hash import short_hash
 
 FormatName = Literal["lerobot-v3", "lerobot-v2.1", "robomme-hdf5"]
@@ -73,7 +73,7 @@ class ExportPlan:
     format: FormatName = "lerobot-v3"
     pictures: PictureCoding = "png"
     cameras: tuple[str, ...] = CAMERAS
-    size: int = SIZE
+    size: int = PICTURE_SIZE
     video: VideoTreatment = "none"
     names: KeyNames = "lerobot"
     extra_actions: tuple[ExtraAction, ...] = ()
@@ -138,15 +138,15 @@ class ExportPlan:
         check_cameras(self.cameras)
         if not self.cameras:
             raise InvalidValueError("cameras is empty; without pictures, ask for --pictures none.")
-        if self.size % 2 or not SMALLEST <= self.size <= SIZE:
+        if self.size % 2 or not SMALLEST <= self.size <= PICTURE_SIZE:
             raise InvalidValueError(
-                f"size is {self.size}; it must be an even number from {SMALLEST} to {SIZE}."
+                f"size is {self.size}; it must be an even number from {SMALLEST} to {PICTURE_SIZE}."
             )
-        is_whole = (set(self.cameras), self.size) == (set(CAMERAS), SIZE)
+        is_whole = (set(self.cameras), self.size) == (set(CAMERAS), PICTURE_SIZE)
         if not is_whole and (self.format == "robomme-hdf5" or self.names == "openpi"):
             raise InvalidValueError(
                 f"cameras is {', '.join(self.cameras)} and size {self.size}; RoboMME's format and "
-                f"openpi's names have both cameras in {SIZE} pixels."
+                f"openpi's names have both cameras in {PICTURE_SIZE} pixels."
             )
 
     def _check_hdf5(self) -> None:
@@ -229,7 +229,7 @@ class RecordingJob(NamedTuple):
         spec += ["video"] * self.spec.video + ["apart"] * self.spec.is_video_apart
         spec += ["depth"] * self.spec.depth
         spec += self.spec.cameras * (self.spec.cameras != CAMERAS)
-        spec += [str(self.spec.size)] * (self.spec.size != SIZE)
+        spec += [str(self.spec.size)] * (self.spec.size != PICTURE_SIZE)
         spec += [self.spec.actions] * (self.spec.actions != ExportPlan.actions)
         spec += ["disturbed"] * self.spec.disturbed
         name = f"{self.task}-{self.split}-{self.number:05d}-{self.variation:03d}{said}"

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 from roboirg.apps.demonstrations.export_plan import ExportPlan, recording_jobs
 from roboirg.core.observations import CAMERAS
-from roboirg.policies.lerobot_features import SIZE
+from roboirg.util.media import PICTURE_SIZE
 
 _LENGTHS: Mapping[str, tuple[int, int]] = {
     "PickXtimes": (508, 0),
@@ -65,7 +65,7 @@ def estimate_size(plan: ExportPlan) -> SizeEstimate:
         # Version 2.1 has a file for each episode; the others store pictures once.
         pictures += length * (len(said) if plan.format == "lerobot-v2.1" else 1)
     own = _HDF5_FRAME_BYTES if plan.format == "robomme-hdf5" else _FRAME_BYTES[plan.pictures]
-    share = len(plan.cameras) / len(CAMERAS) * (plan.size / SIZE) ** 2
+    share = len(plan.cameras) / len(CAMERAS) * (plan.size / PICTURE_SIZE) ** 2
     episodes = sum(len(said) for _, said in jobs)
     size = int(pictures * own * share) + frames * _ROW_BYTES
     return SizeEstimate(len(jobs), episodes, frames, size)

@@ -40,8 +40,8 @@ from roboirg.envs.factory import make
 from roboirg.policies.contract.base import Policy
 from roboirg.policies.contract.play import EpisodeLoop
 from roboirg.policies.contract.policy_needs import PolicyNeeds
-from roboirg.policies.lerobot_features import SIZE, scaled_square
 from roboirg.util.atomic_write import replacing
+from roboirg.util.media import PICTURE_SIZE, scaled_square
 
 if TYPE_CHECKING:
     from roboirg.envs.environment import RoboIRGEnv
@@ -68,7 +68,7 @@ class RecordingSpec(NamedTuple):
     is_video_apart: bool = False
     depth: bool = False
     cameras: tuple[str, ...] = CAMERAS
-    size: int = SIZE
+    size: int = PICTURE_SIZE
     actions: str = JOINT_ANGLE.name
     disturbed: bool = False
 

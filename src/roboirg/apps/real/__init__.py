@@ -1,1 +1,1 @@
-"""Studies with a real robot: plans, the operator's page, the control loop and the twin."""
+"""Studies with a real robot: plans, sheets to print, and the page for scoring."""

@@ -8,19 +8,17 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from roboirg.cli.run_commands import INTERRUPTED, USAGE_ERROR
+from roboirg.cli.run_commands import INTERRUPTED
 from roboirg.core.plain_text import counted
 
 if TYPE_CHECKING:
-    from roboirg.apps.real.pages.operator_console import OperatorConsole
     from roboirg.apps.real.study.study_plan import StudyPlan
-    from roboirg.apps.real.study.study_run import Study
 
 # Heavy modules are imported inside the commands, so that --help is fast.
 
 real_app = typer.Typer(
     name="real",
-    help="Run a study with a real robot or its simulated twin.",
+    help="Plan and score a study with a real robot.",
     no_args_is_help=True,
 )
 
@@ -42,7 +40,7 @@ def plan(
     ] = 50,
     seed: Annotated[int, typer.Option(help="Random seed of the trial order.")] = 0,
 ) -> None:
-    """Plan a study: write plan.json, CSV files and a sheet to print.
+    """Plan a study: write plan.json, CSV files, plans for the simulated twin, a sheet to print.
 
     Example: roboirg real plan --policy my_policy:MyPolicy --out study
     """
@@ -68,12 +66,14 @@ def _write(made: StudyPlan, folder: Path) -> None:
     from roboirg.apps.real.study import study_csv
     from roboirg.apps.real.study.study_plan import write_study
     from roboirg.core.errors import MissingDependencyError
+    from roboirg.evaluation.plan.plan_file import plan_text
     from roboirg.util.atomic_write import write_atomically
 
     typer.echo(write_study(made, folder))
     for name, text in (
         (study_csv.TRIALS_FILE, study_csv.trials_csv(made)),
         (study_csv.DEMONSTRATIONS_FILE, study_csv.demonstrations_csv(made)),
+        *((f"twin-{task}.yaml", plan_text(twin)) for task, twin in made.twin_plans.items()),
     ):
         if text:
             write_atomically(folder / name, text)
@@ -92,57 +92,6 @@ def _size(made: StudyPlan) -> str:
         f"{counted(len(made.trials), 'trial')} in {counted(blocks, 'block')}, "
         f"{counted(len(made.demonstrations), 'demonstration')}, plan {made.fingerprint}"
     )
-
-
-@real_app.command()
-def run(
-    folder: Folder,
-    policy: Annotated[
-        list[str] | None,
-        typer.Option(
-            help="Play only the trials of this policy (NAME or NAME=SPEC); repeatable.",
-            metavar="SPEC",
-        ),
-    ] = None,
-    robot: Annotated[
-        str, typer.Option(help="Robot: twin, twin?real_time=true, or lerobot:MODULE:FUNCTION.")
-    ] = "twin",
-    limits: Annotated[
-        Path | None, typer.Option(help="JSON file that overrides default limits.")
-    ] = None,
-    score: Annotated[
-        str, typer.Option(help="Who scores the trials: judge (only with the twin) or operator.")
-    ] = "",
-    retry_errors: Annotated[
-        bool, typer.Option(help="Play trials again that ended in an error or were declared void.")
-    ] = True,
-) -> None:
-    """Play the trials of a study in order, on a robot or its twin.
-
-    Example: roboirg real run study --robot twin
-    """
-    from roboirg.apps.real.control.control_loop import never
-    from roboirg.apps.real.control.limits import read_limits
-    from roboirg.apps.real.control.robot import JudgingRobot
-    from roboirg.apps.real.control.robot_loading import make_robot
-    from roboirg.apps.real.pages.operator_console import OperatorConsole
-    from roboirg.apps.real.study.study_plan import read_study
-    from roboirg.apps.real.study.study_run import Study, select_scorer
-
-    path = Path(folder)
-    made = read_study(path)
-    console = OperatorConsole(made)
-    device = make_robot(robot, console.request_arrangement)
-    study = Study(
-        made,
-        path,
-        device,
-        read_limits(limits),
-        select_scorer(score, device),
-        never if isinstance(device, JudgingRobot) else console.stop_requested,
-        console.report,
-    )
-    _play(study, console, policy or [], retry=retry_errors)
 
 
 @real_app.command()
@@ -172,30 +121,6 @@ def score(
         sys.exit(INTERRUPTED)
     finally:
         server.server_close()
-
-
-def _play(study: Study, console: OperatorConsole, policies: list[str], *, retry: bool) -> None:
-    """Play a study and print a summary; exits with 2 if a trial ended in an error."""
-    from roboirg.apps.real.control.control_loop import Interruption
-
-    # SIGTERM stops the run like Ctrl-C, with the arm at rest.
-    interruption = Interruption()
-    interruption.watch()
-    study.stop_requested = interruption.before(study.stop_requested)
-    try:
-        records = study.run(policies, retry_errors=retry)
-    except KeyboardInterrupt:
-        typer.echo(
-            f"Stopped; finished trials are stored in {study.folder}. Run the same command to "
-            "resume.",
-            err=True,
-        )
-        sys.exit(INTERRUPTED)
-    errors = console.errors
-    typer.echo(f"Played {counted(len(records), 'trial')}; {len(errors)} ended in an error.")
-    if errors:
-        typer.echo(f"roboirg: first error: {errors[0]}", err=True)
-        sys.exit(USAGE_ERROR)
 
 
 def add_commands(app: typer.Typer) -> None:

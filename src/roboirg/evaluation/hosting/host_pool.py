@@ -10,7 +10,6 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import Any, Self
 
-from roboirg.evaluation.episode_errors import EpisodeLostError
 from roboirg.evaluation.hosting.messages import receive_calls, send
 from roboirg.evaluation.hosting.policy_child import PolicyChild
 from roboirg.evaluation.hosting.policy_host import HostSession, PolicyHost
@@ -82,16 +81,9 @@ class HostPool:
     @property
     def pids(self) -> list[int]:
         """The process ids of the policies' processes."""
-        return [child.pid for child in self._children()]
-
-    def loss(self) -> EpisodeLostError | None:
-        """Return how a policy's process died since the last call; None if all are alive."""
-        return next(filter(None, (child.loss() for child in self._children())), None)
-
-    def _children(self) -> list[PolicyChild]:
         with self._lock:
             children = [host.child for host in self._hosts.values()]
-        return [child for child in children if child is not None]
+        return [child.pid for child in children if child is not None]
 
     def close(self) -> None:
         """End all hosts, and close the lines that `connect` returned."""

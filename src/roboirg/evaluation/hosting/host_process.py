@@ -168,12 +168,7 @@ def _observation(call: Call) -> Any:  # noqa: ANN401 - an `Observation`
 def _acted(policy: Any, space: ActionSpace, rows: Any) -> Outcome:  # noqa: ANN401
     """Return what a policy's `act` returned, checked, for a message."""
     chunk = check_rows(rows, space)
-    return Outcome(
-        rows=chunk.tobytes(),
-        size=chunk.shape[1],
-        latency_s=float(getattr(policy, "latency_s", 0.0)),
-        subgoal=policy_subgoal(policy),
-    )
+    return Outcome(rows=chunk.tobytes(), size=chunk.shape[1], subgoal=policy_subgoal(policy))
 
 
 def _failure(error: BaseException) -> Outcome:

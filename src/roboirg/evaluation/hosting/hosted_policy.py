@@ -53,8 +53,6 @@ class HostedPolicy:
         metadata: as the policy reports them, from `reset` on.
         inference: what its process computes with, from `reset` on.
         waited_s: seconds that its calls waited for others.
-        latency_s: seconds that its last actions took on the robot it is meant for, if it reports
-            them.
         subgoal: what it named after its last actions, if anything.
 
     Raises:
@@ -67,7 +65,7 @@ class HostedPolicy:
         self._spec, self._hosts = spec, hosts
         self.metadata: dict[str, JsonValue] = {}
         self.inference: InferenceFacts | None = None
-        self.waited_s = self.latency_s = 0.0
+        self.waited_s = 0.0
         self.subgoal: str | None = None
         self._demonstration: Demonstration = {}
         self._is_open = True
@@ -93,7 +91,7 @@ class HostedPolicy:
     def act(self, observation: Observation) -> NDArray[np.float64]:
         """Return the next actions (n, 8) or (n, 7)."""
         found = self._call(Call("act", value=observation))
-        self.latency_s, self.subgoal = found.latency_s, found.subgoal
+        self.subgoal = found.subgoal
         if not found.rows or len(found.rows) % (8 * found.size):
             raise EpisodeError("policy", "the policy's process sent actions in part", "")
         return np.frombuffer(found.rows, np.float64).reshape(-1, found.size).copy()

@@ -79,7 +79,6 @@ class Outcome(Struct, tag="outcome", forbid_unknown_fields=True, omit_defaults=T
         inference: what its process computes with, after `reset`.
         rows: actions as bytes of float64.
         size: numbers in an action.
-        latency_s: seconds that the actions took on the robot that the policy is meant for.
         subgoal: that the policy named with them.
     """
 
@@ -95,7 +94,6 @@ class Outcome(Struct, tag="outcome", forbid_unknown_fields=True, omit_defaults=T
     inference: InferenceFacts | None = None
     rows: bytes = b""
     size: Annotated[int, Meta(ge=1, le=64)] = 1
-    latency_s: Annotated[float, Meta(ge=0, le=1e6)] = 0.0
     subgoal: Annotated[str, Meta(max_length=MOST_SUBGOAL_LETTERS)] | None = None
 
 

@@ -293,14 +293,6 @@ class PromptAudit(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
 
 REAL_TRIAL = "real_trial"
 """Key of a study's trial in a record's ``policy_metadata``."""
-TWIN = "twin"
-"""Name of the robot of a study that is played in simulation."""
-
-
-def real_robot(trial: object) -> str | None:
-    """Return the robot of a trial's metadata; None if there is none or it is the twin."""
-    robot = trial.get("robot") if isinstance(trial, dict) else None
-    return None if robot in (None, TWIN) else str(robot)
 
 
 class Summary(Job, frozen=True, kw_only=True, gc=False):
@@ -334,7 +326,7 @@ class Summary(Job, frozen=True, kw_only=True, gc=False):
         plan: fingerprint of the plan.
         attempt: number of the attempt, from 1.
         prompt_verdict: whether all that was said reached the policy's language model.
-        robot: the real robot that played it; None in simulation, a study's twin included.
+        robot: the real robot that played it; None in simulation.
         action_log: digest of the executed actions, as in `roboirg.evaluation.records.action_log`;
             None if they were not kept.
         video: path of the video relative to the records file, or None.

@@ -21,7 +21,7 @@ from roboirg.core.instruction_options import (
 )
 from roboirg.core.observations import CAMERAS
 from roboirg.envs.env_settings import MAX_STEPS
-from roboirg.policies.lerobot_features import SIZE
+from roboirg.util.media import PICTURE_SIZE
 
 
 @EnvConfig.register_subclass("roboirg")
@@ -47,7 +47,7 @@ class RoboIRGEnvConfig(EnvConfig):  # type: ignore[misc] # LeRobot has no types
     split: str = "test"
     actions: str = "joint_angle"
     cameras: str = ",".join(CAMERAS)
-    size: int = SIZE
+    size: int = PICTURE_SIZE
     distractor: str = DEFAULT_DISTRACTOR
     frame: str = DEFAULT_FRAME
     delivery: str = DEFAULT_DELIVERY

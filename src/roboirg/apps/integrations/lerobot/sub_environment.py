@@ -16,7 +16,7 @@ from roboirg.core.observations import CAMERAS, proprioception
 from roboirg.envs.env_options import EnvOptions
 from roboirg.envs.env_settings import MAX_STEPS
 from roboirg.envs.factory import make
-from roboirg.policies.lerobot_features import SIZE, scaled_square
+from roboirg.util.media import PICTURE_SIZE, scaled_square
 
 VIDEO_DELIVERIES = ("none", "stream", "key")
 NEW_ROLLOUT = "lerobot_new_rollout"
@@ -69,7 +69,7 @@ class LeRobotSubEnvironment(gymnasium.Env[dict[str, Any], NDArray[np.floating[An
         *,
         video: str = "none",
         video_frames: int = 16,
-        size: int = SIZE,
+        size: int = PICTURE_SIZE,
         **options: Unpack[EnvOptions],
     ) -> None:
         if video not in VIDEO_DELIVERIES:
@@ -78,8 +78,10 @@ class LeRobotSubEnvironment(gymnasium.Env[dict[str, Any], NDArray[np.floating[An
             raise InvalidValueError(f"video_frames is {video_frames!r}; it must be 1 or more.")
         if not options.get("cameras", CAMERAS):
             raise InvalidValueError("cameras is empty; LeRobot needs at least one picture.")
-        if not isinstance(size, int) or not 1 <= size <= SIZE:
-            raise InvalidValueError(f"size is {size!r}; it must be a number from 1 to {SIZE}.")
+        if not isinstance(size, int) or not 1 <= size <= PICTURE_SIZE:
+            raise InvalidValueError(
+                f"size is {size!r}; it must be a number from 1 to {PICTURE_SIZE}."
+            )
         self._video, self._frames, self._size = video, video_frames, size
         usual: EnvOptions = {
             "demonstration_frames": "none" if video == "none" else "all",

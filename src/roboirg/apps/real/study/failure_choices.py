@@ -36,19 +36,17 @@ class FailureChoice(NamedTuple):
     @property
     def is_grounding(self) -> bool:
         """Whether the policy did something else than the instruction means."""
-        return self.attribution(0).kind == "grounding"
+        return self.attribution().kind == "grounding"
 
-    def attribution(self, step: int, note: str = "") -> Attribution:
-        """Return the attribution for the record.
+    def attribution(self, note: str = "") -> Attribution:
+        """Return the attribution for the record; an operator counts no steps.
 
         Args:
-            step: length of the trial, control periods.
             note: the operator's own words.
         """
         words = f"the robot {self.words}" + (f" ({note})" if note else "")
-        return Attribution(
-            **FailureAttribution.of(self.failure, self.subject, step, words)._asdict()
-        )
+        found = FailureAttribution.of(self.failure, self.subject, 0, words)._asdict()
+        return Attribution(**{**found, "step": None})
 
 
 def failure_choices(episode: Episode) -> tuple[FailureChoice, ...]:

@@ -20,7 +20,8 @@ from roboirg.core.episode import Episode
 from roboirg.core.errors import InvalidValueError, RoboIRGError, UnknownNameError
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.evaluation.plan.option_parsing import name_and_spec
-from roboirg.evaluation.records.record import DEFAULT_MAX_STEPS, Job
+from roboirg.evaluation.plan.plan import Plan
+from roboirg.evaluation.records.record import Job
 from roboirg.language.settings import plain_settings, settings_of
 from roboirg.tasks import get_task
 from roboirg.tasks.splits.splits import get_episode
@@ -101,6 +102,25 @@ class StudyPlan(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields
     demonstrations: tuple[PlannedDemonstration, ...] = ()
 
     @property
+    def twin_plans(self) -> dict[str, Plan]:
+        """For each task the plan with which ``roboirg run`` plays its trials in simulation."""
+        specs = {trial.job.policy: trial.job.spec for trial in self.trials}
+        policies = [name if specs[name] is None else f"{name}={specs[name]}" for name in specs]
+        jobs: dict[str, list[Job]] = {}
+        for trial in self.trials:
+            jobs.setdefault(trial.job.task, []).append(trial.job)
+        return {
+            task: Plan(
+                policies=tuple(sorted(policies)),
+                tasks=(task,),
+                settings=tuple(sorted({job.setting for job in own})),
+                split=TRIAL_SPLIT,
+                episodes=tuple(sorted({job.episode for job in own})),
+            )
+            for task, own in jobs.items()
+        }
+
+    @property
     def fingerprint(self) -> str:
         """Digest that identifies the plan."""
         return short_hash(msgspec.json.encode(self))
@@ -125,7 +145,6 @@ def make_study(
     trials: int = DEFAULT_TRIALS,
     demonstrations: int = DEFAULT_DEMONSTRATIONS,
     seed: int = 0,
-    max_steps: int = DEFAULT_MAX_STEPS,
 ) -> StudyPlan:
     """Return a balanced plan in a random order.
 
@@ -136,12 +155,11 @@ def make_study(
         trials: arrangements per task; each policy meets each of them in every setting.
         demonstrations: per task.
         seed: of the orders.
-        max_steps: largest number of control periods of a trial.
     """
     named = [name_and_spec(policy) for policy in policies]
     names = [name for name, _ in named]
     settings = _shared_settings(tasks) if settings is None else settings
-    _check(names, tasks, settings, trials, demonstrations, seed, max_steps)
+    _check(names, tasks, settings, trials, demonstrations, seed)
     rng = np.random.default_rng(seed)
     chosen = {task: counterbalanced_episodes(task, TRIAL_SPLIT, trials) for task in tasks}
     conditions = list(product(settings, range(len(named))))
@@ -157,7 +175,6 @@ def make_study(
                 split=TRIAL_SPLIT,
                 episode=episode,
                 options=InstructionOptions(setting),
-                max_steps=max_steps,
             )
             trial_name = f"{task}-{episode:02d}-{setting}-{LETTERS[policy]}"
             planned.append(PlannedTrial(name=trial_name, block=block, job=job))
@@ -242,7 +259,6 @@ def _check(
     trials: int,
     demonstrations: int,
     seed: int,
-    max_steps: int,
 ) -> None:
     for kind, names in (("policy", policies), ("task", tasks), ("setting", settings)):
         if not names:
@@ -256,7 +272,6 @@ def _check(
         ("trials", trials, 1),
         ("demonstrations", demonstrations, 0),
         ("seed", seed, 0),
-        ("max_steps", max_steps, 1),
     ):
         if value < minimum:
             raise InvalidValueError(f"{name} is {value}; it must be at least {minimum}.")

@@ -1,13 +1,11 @@
 """The state of every trial, read from the records alone, so that a killed process loses nothing.
 
-A played trial that waits for the operator, and one whose score was undone, have a record too: an
-error, which counts in no rate. Records are only appended. The newest record of a trial counts, in
-the tables too.
+A trial whose score was undone has a record too: an error, which counts in no rate. Records are only
+appended. The newest record of a trial counts, in the tables too.
 """
 
 from __future__ import annotations
 
-import time
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Literal
@@ -20,19 +18,17 @@ from roboirg.apps.real.study.study_plan import PlannedTrial, StudyPlan
 from roboirg.core.errors import InvalidValueError
 from roboirg.evaluation.episode_errors import format_cause
 from roboirg.evaluation.play.rollout_result import RolloutResult, make_record, utc_now
-from roboirg.evaluation.records.record import REAL_TRIAL, Record, real_robot
-from roboirg.evaluation.records.record_codec import StoreError
+from roboirg.evaluation.records.record import REAL_TRIAL, Record
 from roboirg.evaluation.records.store import RecordStore, iterate_records
 
-UNSCORED = format_cause("infrastructure", "played; waiting for the operator's verdict")
 WITHDRAWN = format_cause("infrastructure", "the operator undid the score")
 VOID = format_cause("infrastructure", "the operator declared the trial void")
 
-State = Literal["open", "waiting", "scored", "void", "error"]
-"""Not played; played but not scored; scored; declared void; ended in an error."""
+State = Literal["open", "scored", "void"]
+"""Not scored; scored; declared void."""
 
-LOCK_TIMEOUT_S = 10.0
-LOCK_RETRY_S = 0.02
+ROBOT = "a robot"
+"""Name in the records of the robot that played a trial."""
 
 SUCCESS, VOID_CHOICE = "success", "void"
 
@@ -53,7 +49,7 @@ class TrialLog:
 
     @classmethod
     def read(cls, plan: StudyPlan, folder: Path) -> TrialLog:
-        """Read the records of a folder.
+        """Read the records of a folder, but for simulated ones.
 
         Raises:
             StoreError: the records cannot be read.
@@ -62,15 +58,14 @@ class TrialLog:
         names = {trial.identity: trial.name for trial in plan.trials}
         for record in iterate_records(folder):
             name = names.get(record.identity)
-            if name is not None:
+            if name is not None and record.robot is not None:
                 trial_log._apply(name, record)
         return trial_log
 
     def _apply(self, name: str, record: Record) -> None:
         """Update the history of a trial by its next record."""
         history = self._history.setdefault(name, [])
-        action = trial_metadata(record).get("action")
-        if action == "undo":
+        if trial_metadata(record).get("action") == "undo":
             if history:
                 history.pop()
             if name in self._scored:
@@ -78,8 +73,7 @@ class TrialLog:
                 del self._scored[last]
             return
         history.append(record)
-        if action == "score":
-            self._scored.append(name)
+        self._scored.append(name)
 
     def newest(self, name: str) -> Record | None:
         """Return the record of a trial that counts; None if there is none."""
@@ -97,20 +91,11 @@ class TrialLog:
             return "open"
         if record.outcome != "error":
             return "scored"
-        cause = str(record.cause)
-        if cause == UNSCORED:
-            return "waiting"
-        if cause == WITHDRAWN:
-            return "open"
-        return "void" if cause.startswith(VOID) else "error"
+        return "void" if str(record.cause).startswith(VOID) else "open"
 
     def next_to_score(self) -> PlannedTrial | None:
-        """Return the first played trial that waits for a verdict, else the first open one."""
-        for state in ("waiting", "open"):
-            for trial in self.plan.trials:
-                if self.state(trial.name) == state:
-                    return trial
-        return None
+        """Return the first trial without a verdict."""
+        return next((one for one in self.plan.trials if self.state(one.name) == "open"), None)
 
     @property
     def last_scored(self) -> str | None:
@@ -151,7 +136,7 @@ class TrialLog:
                     f"A trial of {trial.job.task} cannot fail by {choice!r}; its failures are "
                     f"{', '.join(choices)}."
                 )
-            found = choices[choice].attribution(base.steps, note)
+            found = choices[choice].attribution(note)
             changes |= {"outcome": "failure", "cause": found.sentence, "attribution": found}
         return self._append(trial, msgspec.structs.replace(base, **changes), metadata)
 
@@ -165,32 +150,17 @@ class TrialLog:
             The trial's name.
 
         Raises:
-            InvalidValueError: there is no score, or the trial has been played again since.
+            InvalidValueError: there is no score.
             StoreError: the record cannot be written.
         """
         name = self.last_scored
         if name is None:
             raise InvalidValueError("There is no score to undo.")
         history = self._history[name]
-        if trial_metadata(history[-1]).get("action") != "score":
-            raise InvalidValueError(f"{name} has been played again since it was scored.")
         previous = history[-2] if len(history) > 1 else _withdrawn(history[-1])
         metadata = {**trial_metadata(previous), "action": "undo", "operator": operator}
         self._append(self.plan.trial(name), previous, metadata)
         return name
-
-    def add(self, trial: PlannedTrial, record: Record, metadata: dict[str, Any]) -> Record:
-        """Store the record of a trial that was played.
-
-        Args:
-            trial: that was played.
-            record: without metadata of the real trial.
-            metadata: to add to the record.
-
-        Raises:
-            StoreError: the record cannot be written.
-        """
-        return self._append(trial, record, {"action": "play", **metadata})
 
     def _append(self, trial: PlannedTrial, record: Record, metadata: dict[str, Any]) -> Record:
         merged: dict[str, JsonValue] = {
@@ -200,10 +170,11 @@ class TrialLog:
         complete = msgspec.structs.replace(
             record,
             policy_metadata={**record.policy_metadata, REAL_TRIAL: merged},
-            robot=real_robot(merged),
+            robot=ROBOT,
             plan=self.plan.fingerprint,
         )
-        _append_record(self.folder, complete)
+        with RecordStore(self.folder) as store:
+            store.append(complete)
         self._apply(trial.name, complete)
         return complete
 
@@ -212,21 +183,6 @@ def trial_metadata(record: Record) -> dict[str, JsonValue]:
     """Return the metadata of a real trial in its record; empty for other records."""
     metadata = record.policy_metadata.get(REAL_TRIAL)
     return dict(metadata) if isinstance(metadata, dict) else {}
-
-
-def _append_record(folder: Path, record: Record) -> None:
-    """Append a record; wait while another process writes, such as the robot's loop or the page."""
-    deadline = time.monotonic() + LOCK_TIMEOUT_S
-    while True:
-        try:
-            with RecordStore(folder) as store:
-                store.append(record)
-        except StoreError:
-            if time.monotonic() > deadline:
-                raise
-            time.sleep(LOCK_RETRY_S)
-        else:
-            return
 
 
 def _withdrawn(record: Record) -> Record:

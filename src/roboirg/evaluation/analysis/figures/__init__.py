@@ -13,7 +13,7 @@ from roboirg.evaluation.analysis.stats.run_data import RunData
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-FIGURES = ("gaps", "forms", "expressions", "context", "failures", "arms", "real", "strips")
+FIGURES = ("gaps", "forms", "expressions", "context", "failures", "arms", "strips")
 
 
 def write_figures(
@@ -82,12 +82,11 @@ def _drawn(name: str, content: RunData, *, published: bool) -> Figure | None:
     from roboirg.evaluation.analysis.figures.failures import draw_failures
     from roboirg.evaluation.analysis.figures.forms import draw_forms
     from roboirg.evaluation.analysis.figures.gaps import draw_gaps
-    from roboirg.evaluation.analysis.figures.real_robot import draw_real_robot
 
     if name == "arms":
         return draw_arms(content)
     content = content.told()
-    with_published = {"gaps": draw_gaps, "context": draw_context, "real": draw_real_robot}
+    with_published = {"gaps": draw_gaps, "context": draw_context}
     if name in with_published:
         return with_published[name](content, published=published)
     return draw_forms(content) if name == "forms" else draw_failures(content)

@@ -74,7 +74,8 @@ def shown_steps(record: Record) -> list[int]:
 
 def _strips(folder: Path) -> Iterable[Strip]:
     """Return the strips of a run, the explicit one before each failure."""
-    results = [one for one in read_results(folder) if one.video is not None]
+    filmed = [one for one in read_results(folder) if one.video is not None]
+    results = [one for one in filmed if one.robot is None]  # other films have times of their own
     explicit = {_scene(one): one for one in results if one.column == REFERENCE}
     chosen: dict[str, Summary] = {}
     for one in sorted(results, key=_place):
@@ -128,17 +129,14 @@ def _subgoal(record: Record, step: int) -> str | None:
 
 
 def _pictures(path: Path, record: Record, steps: Sequence[int]) -> list[NDArray[np.uint8]]:
-    """Return the pictures of a film at some control steps; of ours, the front camera's."""
+    """Return the front camera's pictures at some control steps of a film."""
     with extra_needed("Strips need PyAV", "sim"):
         import av
     with av.open(str(path)) as film:
         frames = [
             frame.to_ndarray(format="rgb24").astype(np.uint8) for frame in film.decode(video=0)
         ]
-    if record.robot is not None:  # filmed by hand, from the first step to the last
-        last, every = len(frames) - 1, max(record.steps, 1) / max(len(frames) - 1, 1)
-    else:
-        last, every = len(frames) - 1 - LAST_FRAME_REPEATS, float(FRAME_STEPS)
-        frames = [frame[:PICTURE_PIXELS, :PICTURE_PIXELS] for frame in frames]
-    places = (round(last - (record.steps - step) / every) for step in steps)
-    return [frames[min(max(place, 0), len(frames) - 1)] for place in places]
+    last = len(frames) - 1 - LAST_FRAME_REPEATS
+    places = (round(last - (record.steps - step) / FRAME_STEPS) for step in steps)
+    shown = (frames[min(max(place, 0), len(frames) - 1)] for place in places)
+    return [frame[:PICTURE_PIXELS, :PICTURE_PIXELS] for frame in shown]

@@ -1,1 +1,0 @@
-"""Control a real robot or its simulated twin."""

@@ -1,0 +1,33 @@
+"""The trials of a study in simulation: planned by one command, played by the ordinary run."""
+
+import pytest
+from typer.testing import CliRunner
+
+from roboirg.apps.real.study.study_plan import read_study
+from roboirg.evaluation.records.store import read_records
+from roboirg.main import app
+
+pytestmark = pytest.mark.sim
+
+
+def test_run_plays_the_trials_of_a_study(tmp_path):
+    def call(*words):
+        done = CliRunner().invoke(app, [*map(str, words)])
+        assert done.exit_code == 0, done.output
+        return done.output
+
+    study, twin = tmp_path / "study", tmp_path / "study" / "twin"
+    said = ("--settings", "explicit,reasoning", "--trials", 1, "--demonstrations", 2)
+    printed = call("real", "plan", "--policy", "mine=listener", *said, "--out", study)
+    assert {path.name for path in study.iterdir()} == {
+        "plan.json", "trials.csv", "demonstrations.csv", "sheet.pdf",
+        "twin-PutInBox.yaml", "twin-PickByCount.yaml",
+    }  # fmt: skip
+    assert str(study / "twin-PickByCount.yaml") in printed
+    for task in ("PutInBox", "PickByCount"):
+        call("run", "--plan", study / f"twin-{task}.yaml", "--workers", 0, "--out", twin)
+    records = read_records(twin)
+    assert {one.identity for one in records} == {one.identity for one in read_study(study).trials}
+    assert [one.outcome for one in records] == ["success"] * 4
+    table = call("tables", twin, "--which", "real", "--format", "csv")
+    assert table.count("mine (privileged) (twin)") == 6  # two settings, two tasks and their average
