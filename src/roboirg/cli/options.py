@@ -27,7 +27,6 @@ Settings = Annotated[
         help="Comma-separated settings; all means the five main ones, every adds the rest."
     ),
 ]
-Forms = Annotated[str, typer.Option(help="implicit, resolved, or both separated by a comma.")]
 Split = Annotated[str, typer.Option(help="train, val, test or random.")]
 AnySplit = Annotated[str, typer.Option(help="train, val, test or all.")]
 Workers = Annotated[

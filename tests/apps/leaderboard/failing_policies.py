@@ -7,8 +7,6 @@ import time
 
 import numpy as np
 
-STAY = {"joint_angle": 8, "ee_pose": 7, "waypoint": 7}
-
 
 class Failing:
     """Holds still; `fail` is called in the phase `when`, at call number `at` of it."""
