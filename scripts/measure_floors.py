@@ -29,7 +29,6 @@ from roboirg.shortcuts.shortcut_scores import counted_slots
 from roboirg.shortcuts.shortcut_tables import (
     LEARNING_SCENES,
     MARGIN,
-    Excess,
     Group,
     ShortcutRow,
     excess_text,
@@ -102,7 +101,7 @@ def _by_setting(floors: Floors) -> str:
     for key in keys:
         one, test = floors[key], floors[key._replace(split=stored.TEST)]
         cells = (f"{_percent(one, name)} ({_percent(test, name)})" for name in stored.NAMES)
-        excess = _excess(one.excess, len(keys))
+        excess = excess_text(one.excess, len(keys))
         lines.append(f"| `{key.setting}` | {one.count:,} | {' | '.join(cells)} | {excess} |")
     return "\n".join(lines)
 
@@ -130,15 +129,6 @@ def _by_task(floors: Floors) -> str:
 
 def _percent(row: ShortcutRow, name: str) -> str:
     return f"{100 * (row.shares[name].slots or 0):.0f}"
-
-
-def _excess(excess: Excess | None, count: int) -> str:
-    """Return it with its interval; with one more digit where rounding hides that it is above."""
-    text = excess_text(excess, count)
-    least = f"{100 * MARGIN:+.1f}"
-    if excess is None or excess.value <= MARGIN or not text.startswith(f"{least} "):
-        return text
-    return text.replace(least, f"{100 * excess.value:+.2f}", 1)
 
 
 def _claims(floors: Floors) -> str:

@@ -47,9 +47,7 @@ def language_card() -> str:
         parts.append(f"## {task.name}")
         parts += [_example(task.name, one.setting) for one in variants if one.task == task.name]
     parts += [_patterns_by_task(), _phrases()]
-    parts.append(
-        "## Harder settings\n\nWith a rival, with open reasoning, and grounded in what is seen."
-    )
+    parts.append("## Harder settings\n\nWith a rival, and grounded in what is seen.")
     parts += [_harder_example(*one) for one in _harder_variants()]
     return "\n\n".join(parts) + "\n"
 
@@ -127,18 +125,10 @@ def _example(task: str, setting: str) -> str:
 
 
 def _harder_variants() -> Iterator[tuple[str, str]]:
-    """Yield tasks with their harder settings, but contextual-rival.
-
-    Its introduction and command are those of direct-rival.
-    """
+    """Yield tasks with their harder settings."""
     for task in all_tasks().values():
         for setting in settings_of(task):
-            rule = all_settings()[setting]
-            if (
-                rule.plain is not None
-                and "stages" not in rule.reads
-                and _has_example(task, setting)
-            ):
+            if all_settings()[setting].plain is not None and _has_example(task, setting):
                 yield task.name, setting
 
 

@@ -36,7 +36,6 @@ LENT = {
 """Names of other packages' classes."""
 
 SPOKEN = (
-    "src/roboirg/language/open_reasoning/open_templates.py",
     "src/roboirg/language/rivals/rival_templates.py",
     "src/roboirg/language/templates/",
     "src/roboirg/policies/vlm/prompts/grounding_questions.toml",

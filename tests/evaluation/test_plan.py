@@ -126,7 +126,7 @@ def test_turns_are_other_jobs_where_there_is_more_than_one_utterance() -> None:
 def test_harder_settings_are_played_only_where_they_are_named() -> None:
     told = {job.setting for job in make_plan(["random"], tasks="StopCube,VideoUnmask").jobs()}
     assert told == set(plain_settings())
-    named = ("explicit", "direct-rival", "reasoning-open", "contextual-rival")
+    named = ("explicit", "direct-rival")
     jobs = make_plan(["random"], tasks="StopCube", settings=",".join(named)).checked().jobs()
     assert {job.setting for job in jobs} == set(named)
 
@@ -139,7 +139,7 @@ def test_every_setting_is_the_harder_ones_too() -> None:
         assert job.setting in expressible(get_episode(job.task, "test", job.episode))
     told = {job.setting for job in plan.jobs()}
     assert told > set(plain_settings()) - {"spatial"}
-    assert {"direct-rival", "reasoning-open"} <= told
+    assert "direct-rival" in told
 
 
 def test_settings_in_turns_are_played_in_both_ways() -> None:
@@ -163,8 +163,8 @@ def test_episodes_without_a_rival_are_left_out() -> None:
     assert [job.episode for job in jobs if job.setting == "explicit"] == list(range(8))
     with pytest.raises(InvalidValueError, match="nothing to play: grounded cannot"):
         make_plan(["random"], tasks="PickXtimes", settings="grounded", episodes="1").checked()
-    with pytest.raises(InvalidValueError, match="PutInBox has no reasoning-open setting"):
-        make_plan(["random"], tasks="PutInBox", settings="reasoning-open").checked()
+    with pytest.raises(InvalidValueError, match="StopCube has no spatial setting"):
+        make_plan(["random"], tasks="StopCube", settings="spatial").checked()
 
 
 def test_jobs_are_ordered_and_named_uniquely() -> None:

@@ -18,7 +18,7 @@ from roboirg.core.instruction_options import InstructionOptions
 from roboirg.core.word_pools import POOLS, Pools
 from roboirg.language import instruct, instruct_with
 from roboirg.language.generator import find_refusal
-from roboirg.language.rivals import RIVAL_SETTINGS, rival_templates
+from roboirg.language.rivals import rival_templates
 from roboirg.language.settings import settings_of
 from roboirg.reader import interpret
 from roboirg.reader.selections import read_selection
@@ -28,22 +28,15 @@ from roboirg.shortcuts.command_chance import blind_goals, right_share
 from roboirg.tasks import all_tasks, get_task
 from roboirg.tasks.splits.splits import get_episode
 
-SETTINGS = RIVAL_SETTINGS
-CELLS = [
-    (name, setting)
-    for name in TASKS
-    for setting in SETTINGS
-    if setting in settings_of(get_task(name))
-]
+RIVAL = InstructionOptions("direct-rival")
 POINTERS = {"former": 0, "first": 0, "latter": 1, "second": 1, "last": 1}
 
 
-def told(task, setting, split="test", count=40, **options):
+def told(task, split="test", count=40):
     """Episodes with a rival, each with its instruction."""
-    wanted = dataclasses.replace(InstructionOptions(setting), **options)
     for episode in first_episodes(task, split, count):
-        if find_refusal(episode, wanted) is None:
-            yield episode, instruct_with(episode, wanted)
+        if find_refusal(episode, RIVAL) is None:
+            yield episode, instruct_with(episode, RIVAL)
 
 
 def remark(instruction):
@@ -51,13 +44,12 @@ def remark(instruction):
     return re.split(r"(?<=[.?]) ", instruction.command)[0]
 
 
-@given(st.sampled_from(CELLS), st.integers(0, 10_000), st.sampled_from(POOLS))
+@given(st.sampled_from(TASKS), st.integers(0, 10_000), st.sampled_from(POOLS))
 @settings(max_examples=150, deadline=None)
-def test_random_episodes_are_read_back(cell, index, pool):
+def test_random_episodes_are_read_back(task, index, pool):
     """Exactly one goal with the context, two or more without; resolved, the command alone."""
-    task, setting = cell
     episode = get_episode(task, "random", index)
-    options = InstructionOptions(setting, wordings=pool)
+    options = dataclasses.replace(RIVAL, wordings=pool)
     if find_refusal(episode, options) is not None:
         return
     said = instruct_with(episode, options)
@@ -71,9 +63,9 @@ def test_random_episodes_are_read_back(cell, index, pool):
     assert resolved.turns[:-1] == said.turns[:-1]
 
 
-@pytest.mark.parametrize(("task", "setting"), CELLS)
-def test_the_notes_are_those_of_the_words(task, setting):
-    for episode, said in told(task, setting):
+@pytest.mark.parametrize("task", TASKS)
+def test_the_notes_are_those_of_the_words(task):
+    for episode, said in told(task):
         notes = said.metadata
         slot = notes["rival_slot"]
         meant = episode.goal[slot]
@@ -98,54 +90,43 @@ def contents(goal, slot):
     return value if isinstance(value, tuple) else (value,)
 
 
-@pytest.mark.parametrize("task", TASKS)
-def test_direct_and_contextual_share_introduction_and_command(task):
-    for episode, direct in told(task, "direct-rival", count=12):
-        contextual = instruct(episode, "contextual-rival")
-        assert (contextual.turns[0], contextual.turns[-1]) == (direct.turns[0], direct.turns[-1])
-        short = instruct(episode, "contextual-rival", stages=(1, 5))
-        assert short.turns == direct.turns
-
-
-def test_only_these_settings_have_a_rival():
+def test_no_other_setting_has_a_rival():
     for task in TASKS:
         episode = get_episode(task, "test", 3)
-        for setting in set(settings_of(get_task(task))) - {*SETTINGS, "reasoning-open", "grounded"}:
+        for setting in set(settings_of(get_task(task))) - {"direct-rival", "grounded"}:
             assert instruct(episode, setting).metadata["rival"] is None
 
 
-def test_a_competing_distractor_would_name_one_value_too_many():
-    episode = get_episode("StopCube", "test", 0)
-    neutral, competing = (
-        instruct(episode, "contextual-rival", distractor=one) for one in ("neutral", "competing")
-    )
-    assert neutral == competing
+def test_what_cannot_have_a_rival_is_refused_by_name():
+    episodes = (get_episode("BinFill", "test", index) for index in itertools.count())
+    episode = next(one for one in episodes if one.difficulty == "hard")
+    reason = "The direct-rival setting cannot express .*counts cubes of several colors"
+    with pytest.raises(InvalidValueError, match=reason):
+        instruct(episode, "direct-rival")
 
 
-@pytest.mark.parametrize(
-    ("task", "difficulty", "setting", "reason"),
-    [
-        ("PickXtimes", "easy", "spatial-rival", "no second value that the goal could ask for"),
-        ("BinFill", "hard", "direct-rival", "counts cubes of several colors leaves no rival"),
-    ],
-)
-def test_what_cannot_have_a_rival_is_refused_by_name(task, difficulty, setting, reason):
-    episodes = (get_episode(task, "test", index) for index in itertools.count())
-    episode = next(one for one in episodes if one.difficulty == difficulty)
-    with pytest.raises(InvalidValueError, match=f"The {setting} setting cannot express .*{reason}"):
-        instruct(episode, setting)
+def all_told():
+    return [one for task in all_tasks() for one in told(task, "train", 100)]
 
 
-def all_told(setting, split="train", count=100):
-    tasks = [task for task in all_tasks() if (task, setting) in CELLS]
-    return [one for task in tasks for one in told(task, setting, split, count)]
+def test_a_block_of_four_has_every_order():
+    for task in ("StopCube", "VideoRepick"):
+        drawn = [instruct(get_episode(task, "test", index), "direct-rival") for index in range(8)]
+        for block in (drawn[:4], drawn[4:]):
+            noted = {
+                entry
+                for said in block
+                for entry in said.metadata["templates"]
+                if entry.startswith("rival order/")
+            }
+            assert len(noted) == 4
 
 
 def test_each_value_is_meant_equally_often():
     """Whatever the episode: in blocks of four, each order comes with each kind of pointer once."""
-    found = Counter(said.metadata["rival_position"] for _, said in all_told("direct-rival"))
+    found = Counter(said.metadata["rival_position"] for _, said in all_told())
     assert abs(found["first"] / found.total() - 0.5) < 0.01
-    kinds = Counter(said.metadata["rival_reference"] for _, said in all_told("direct-rival"))
+    kinds = Counter(said.metadata["rival_reference"] for _, said in all_told())
     assert set(kinds) == {"alone", "set aside", *rival_templates.CHOICES}
     assert min(kinds.values()) > 0.08 * kinds.total()
 
@@ -154,7 +135,7 @@ def test_no_pointer_with_any_key_words_tells_the_value():
     """The first or last pointer, turned over by any of *other*, *not* and *no*: at chance."""
     remarks = [
         (re.findall("[a-z]+", remark(said).lower()), said.metadata["rival_position"] == "first")
-        for _, said in all_told("direct-rival")
+        for _, said in all_told()
     ]
     for place, count in itertools.product((0, -1), range(4)):
         for words in itertools.combinations(("other", "not", "no"), count):
@@ -165,9 +146,8 @@ def test_no_pointer_with_any_key_words_tells_the_value():
             assert abs(right / len(remarks) - 0.5) < 0.05, (place, words)
 
 
-@pytest.mark.parametrize("setting", SETTINGS)
-def test_no_rule_is_above_chance(setting):
-    episodes = all_told(setting)
+def test_no_rule_is_above_chance():
+    episodes = all_told()
     chance = sum(right_share(blind_goals(said, one), one) for one, said in episodes)
     assert chance == Fraction(len(episodes), 2)
     for rule in SURFACE_RULES:
@@ -210,9 +190,8 @@ def pools(module):
     for name, value in vars(module).items():
         if isinstance(value, Pools):
             yield name, value
-        elif name in ("CHOICES", "PREFERENCES"):
-            groups = value.values() if isinstance(value, dict) else (value,)
-            for group in groups:
+        elif name == "CHOICES":
+            for group in value.values():
                 yield (
                     name,
                     Pools(*(tuple(itertools.chain(*one)) for one in zip(*group, strict=True))),

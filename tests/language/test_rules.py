@@ -28,17 +28,15 @@ from roboirg.tasks.splits.splits import get_episode
 COLOR_NAMES = frozenset(ALL_COLORS)
 SAID_AS = {
     "that": ("that", *SAME_NUMBER.everything),
-    "them": ("them", "those", "these", "both", "numbers", "values"),
+    "them": ("them", "those", "these"),
 }
 """The words for a class of expressions, if they are not its name."""
 OF_SEVERAL = ("them", "each")
 """Expressions that refer to all colors of the goal."""
 
 
-UNNAMED = ("pair", "other", "choice", "total", "difference")
+UNNAMED = ("pair", "other", "choice")
 """Expression classes whose name need not be in the words."""
-DERIVED = ("other", "total", "difference")
-"""Classes whose value need not be introduced: it follows from others."""
 
 
 def words_of(text):
@@ -99,19 +97,14 @@ def values_of(goal, mention):
 
 def referents(mention):
     """The values that must be introduced before an anaphor."""
-    if mention.expression in DERIVED:
-        return set()  # derived: the goal's value itself never was
+    if mention.expression == "other":
+        return set()  # it follows from others, and was never introduced itself
     several = mention.expression in OF_SEVERAL
     values = mention.value.split(" and ") if several else [mention.value]
     return {(mention.slot, value) for value in values}
 
 
 def check_other(instruction, mention):
-    if instruction.setting == "reasoning-open" or mention.slot == "reference":
-        assert (mention.slot, mention.value) in {
-            (one.slot, one.value) for one in instruction.mentions if one.role == "antecedent"
-        } or mention.slot == "relation"
-        return
     *pair, chosen = (one for one in instruction.mentions if one.utterance == 0)
     assert {one.slot for one in (*pair, chosen)} == {"reference"}
     values = {value for one in pair for value in str(one.value).split(" and ")}
@@ -388,6 +381,6 @@ def test_metadata_is_plain_and_complete(task):
             keys = keys or set(metadata)
             assert set(metadata) == keys
             assert metadata["language_version"] == LANGUAGE_VERSION
-            assert (metadata["frame"] is not None) == options.setting.startswith("spatial")
-            if options.setting.startswith("contextual"):
+            assert (metadata["frame"] is not None) == (options.setting == "spatial")
+            if options.setting == "contextual":
                 assert tuple(metadata["stages"]) in STAGE_SETS

@@ -22,8 +22,8 @@ def test_every_variant_has_an_example():
     assert page.count("| explicit | ") == 40
     options = page.split("## Harder settings\n")[1]
     assert page.count("| resolved | ") == 40 + options.count("### ")
-    assert options.count("-rival\n") == 18
-    assert options.count("-open\n") == 11
+    assert options.count(", direct-rival\n") == 11
+    assert options.count(", grounded\n") == 10
 
 
 def test_marks_are_around_the_mentions():

@@ -158,7 +158,7 @@ def test_rivals_are_candidates_in_the_order_of_mention():
         for one in (get_episode("PickXtimes", "random", index) for index in range(40))
         if len(get_task("PickXtimes").goals(one.scene)) > 5
     )
-    said = instruct(episode, "spatial-rival")
+    said = instruct(episode, "direct-rival")
     assert Heard.of((episode, said)).candidates == {
         slot: tuple(values) for slot, values in said.metadata["candidates"].items()
     }

@@ -51,9 +51,7 @@ def test_it_is_found_beside_the_benchmark(task):
     assert tasks.find_tasks([NAME]) == tasks.find_tasks([task.suite]) == (NAME,)
     assert NAME not in tasks.find_tasks(["all"])
     assert plain_settings(task) == ("explicit", "direct", "reasoning", "contextual")
-    assert set(settings_of(task)) - set(plain_settings(task)) == {
-        "direct-rival", "reasoning-open", "contextual-rival", "grounded"
-    }  # fmt: skip
+    assert set(settings_of(task)) - set(plain_settings(task)) == {"direct-rival", "grounded"}
 
 
 def test_its_scenes_fit_and_its_instructions_are_valid(task):

@@ -13,8 +13,7 @@ UtteranceStage = Literal["introduction", "reinforcement", "distractor", "cue", "
 Role = Literal["antecedent", "anaphor"]
 Expression = Literal[
     "it", "them", "one", "former", "latter", "first", "second", "third",
-    "that", "then", "there", "pair", "each", "other", "before", "after",
-    "last", "earlier", "later", "choice", "total", "difference",
+    "that", "then", "there", "pair", "each", "other", "last", "choice",
 ]  # fmt: skip
 
 FORMS: tuple[Form, ...] = get_args(Form)

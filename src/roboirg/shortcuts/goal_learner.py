@@ -52,7 +52,7 @@ class Heard(NamedTuple):
         text: all of its words.
         open: the slots that the command does not state.
         candidates: by slot, the values that the text introduces on equal terms, in the order of
-            mention; who looks knows them even where the words give places only.
+            mention.
         facts: of the scene; none for learners of the words.
     """
 

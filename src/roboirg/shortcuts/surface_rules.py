@@ -21,9 +21,6 @@ MORE = frozenset({"more", "later", "after", "following"})
 FEWER = frozenset({"fewer", "less", "earlier", "before", "preceding"})
 ONLY_ORDINAL = frozenset({"before", "after", "following", "preceding"})
 """Next to other numbers these words are about time."""
-TOTALS = frozenset({"total", "sum", "together"})
-DIFFERENCES = frozenset({"difference", "gap"})
-"""Made of two named numbers. A rule takes one step: it does not go on to *one fewer than that*."""
 REST = frozenset({"other", "others", "left", "remaining"})
 """Words for what remains when one of two is taken."""
 PAIR = 2
@@ -100,9 +97,6 @@ def take_by_cues(words: SlotWords) -> list[Candidates]:
     pointed = _pointed_values(words, pair)
     if pointed:
         return pointed[: words.parts]
-    if words.is_number and not (TOTALS | DIFFERENCES).isdisjoint(words.command):
-        left, right = (int(one) for one in (*words.named, 0, 0)[:PAIR])
-        return [(abs(left - right if TOTALS.isdisjoint(words.command) else left + right),)]
     if words.is_number:
         change = _change(words)
         first = [one for (one,) in take_first(words)]

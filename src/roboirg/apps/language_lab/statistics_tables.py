@@ -13,7 +13,6 @@ from roboirg.evaluation.analysis.figures.expressions import (
     expression_order,
 )
 from roboirg.language.instruction import Instruction
-from roboirg.language.open_reasoning import open_templates
 from roboirg.language.settings import setting_names
 from roboirg.language.templates.derivations import COUNTED_STEPS, RELATIONS, STEPS
 from roboirg.language.token_counts import SHORT_LIMIT, USUAL_LIMIT
@@ -37,18 +36,7 @@ def overview_tables(instructions: Sequence[Instruction]) -> Iterator[Table]:
             yield _count_table(title, "task", counts, [*every_task()], order or _found(counts))
 
 
-_RELATIONS = [
-    *(one.name for one in (*RELATIONS, *COUNTED_STEPS, *STEPS)),
-    "neighbor",
-    *(
-        f"{one.name}, {step}"
-        for step in open_templates.COMBINATIONS
-        for one in open_templates.SECOND_STEPS
-    ),
-    *(one.words for one in open_templates.COMPARATIVES.everything),
-    "favorite",
-    "not the favorite",
-]
+_RELATIONS = [*(one.name for one in (*RELATIONS, *COUNTED_STEPS, *STEPS)), "neighbor"]
 
 
 def expression_table(counts: ClassCounts) -> Table:

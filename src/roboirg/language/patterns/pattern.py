@@ -18,13 +18,11 @@ class Derived(NamedTuple):
         context: the introduction.
         fields: the fields of the command that point at the introduction.
         notes: entries of the metadata.
-        remark: a sentence right before the command, which leads on from the introduction.
     """
 
     context: Phrase
     fields: Fields
     notes: Mapping[str, object]
-    remark: Phrase = ()
 
 
 @dataclass(frozen=True, slots=True)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
 from roboirg.language.instruction import REFERENCE
 from roboirg.language.number_words import ordinal as ordinal_word
@@ -53,16 +53,6 @@ def _steps(request: InstructionRequest, goal_value: GoalValue) -> list[derivatio
     return steps(goal_value.number, length, _choices(request, goal_value))
 
 
-def _steps_to_all(request: InstructionRequest, goal_value: GoalValue) -> list[derivations.Step]:
-    """Return the steps that lead to every position that is possible in the scene."""
-    length, choices = ordinal.series_length(request, goal_value), _choices(request, goal_value)
-    return [
-        step
-        for step in _steps(request, goal_value)
-        if all(_leads(step, choice, length) for choice in choices)
-    ]
-
-
 def _counted_steps(request: InstructionRequest) -> list[derivations.Step]:
     """Return the steps that are said as numbers: *one visit earlier than that*."""
     return [
@@ -82,17 +72,6 @@ def _goal_values(request: InstructionRequest) -> list[GoalValue]:
     return [*request.values_of("visit"), *request.values_of("placement")]
 
 
-Steps = Callable[[InstructionRequest, GoalValue], list[derivations.Step]]
-
-
-def _rule(steps_of: Steps) -> Pattern:
-    """Return the rule that derives an element from its distance: *right before that*."""
-    return Pattern(
-        lambda request: any(steps_of(request, one) for one in _goal_values(request)),
-        lambda request: _ordinal(request, steps_of),
-    )
-
-
 def _reference(request: InstructionRequest, position: int) -> Phrase:
     named = f"the {ordinal_word(position)}"
     return request.refer("that", "that", REFERENCE, position, resolved=named)
@@ -108,9 +87,10 @@ def _derived(
     return Derived(context, fields, notes)
 
 
-def _ordinal(request: InstructionRequest, steps_of: Steps) -> Derived:
+def _ordinal(request: InstructionRequest) -> Derived:
+    """Derive an element from its distance: *right before that*."""
     (goal_value,) = _goal_values(request)
-    step = request.sampler.pick("relation", steps_of(request, goal_value))
+    step = request.sampler.pick("relation", _steps(request, goal_value))
     reference = _reference(request, goal_value.number - step.offset)
     element = (
         *plain(f"the {goal_value.slot_type} "),
@@ -133,7 +113,7 @@ def _counted(request: InstructionRequest) -> Derived:
     return _derived(request, "number deduction", step, fields)
 
 
-ORDINAL = _rule(_steps)
-OPEN_ORDINAL = _rule(_steps_to_all)
-"""By steps that lead to every element that a goal of the scene can ask for."""
+ORDINAL = Pattern(
+    lambda request: any(_steps(request, one) for one in _goal_values(request)), _ordinal
+)
 COUNTED = Pattern(lambda request: bool(_counted_steps(request)), _counted)

@@ -14,7 +14,7 @@ from typing import NamedTuple
 from roboirg.core.episode import SPLITS, Difficulty, Split
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.language.request import InstructionRequest
-from roboirg.language.rivals.value_pair import Locate, ValuePair, rival_pairs
+from roboirg.language.rivals.value_pair import ValuePair, rival_pairs
 from roboirg.language.template_sampler import sampler_of
 from roboirg.tasks import get_task
 from roboirg.tasks.splits.splits import split_episodes
@@ -39,14 +39,12 @@ class SplitEntry(NamedTuple):
     rivals: frozenset[tuple[str, str | int]]
 
 
-def balanced_rival(
-    request: InstructionRequest, pairs: list[ValuePair], locate: Locate | None
-) -> ValuePair:
+def balanced_rival(request: InstructionRequest, pairs: list[ValuePair]) -> ValuePair:
     """Return one of the pairs of a value: that of the partner, or of a likely one."""
     episode, slot, meant = request.episode, pairs[0].slot, pairs[0].meant.value
     by_value = {pair.rival.value: pair for pair in pairs}
     split = episode.split if episode.split in SPLITS else REFERENCE_SPLIT
-    entries, partners = _partners(request.task.name, split, locate, request.options.frame)
+    entries, partners = _partners(request.task.name, split)
     entry = entries.get(episode.index)
     if episode.split == split and entry is not None and entry.seed == episode.seed:
         likely = [partners[episode.index]] if episode.index in partners else []
@@ -62,18 +60,16 @@ def balanced_rival(
 
 
 @functools.cache
-def _partners(
-    task: str, split: Split, locate: Locate | None, frame: str
-) -> tuple[Mapping[int, SplitEntry], Mapping[int, str | int]]:
+def _partners(task: str, split: Split) -> tuple[Mapping[int, SplitEntry], Mapping[int, str | int]]:
     """Return the episodes of a split that can have a rival, and the rivals of those with partners.
 
     Partners are found among the values that are left most often, so that few are left over.
     """
     entries: dict[int, SplitEntry] = {}
     for episode in split_episodes([task], [split]):
-        options = InstructionOptions(frame=frame)
-        request = InstructionRequest(episode, get_task(task), options, sampler_of(episode))
-        pairs = rival_pairs(request, locate)
+        sampler = sampler_of(episode)
+        request = InstructionRequest(episode, get_task(task), InstructionOptions(), sampler)
+        pairs = rival_pairs(request)
         if pairs:
             (slot, meant), rivals = (pairs[0].slot, pairs[0].meant.value), pairs
             values = frozenset((slot, pair.rival.value) for pair in rivals)

@@ -2,16 +2,29 @@
 
 from __future__ import annotations
 
+import itertools
 from typing import Literal, NamedTuple
 
 from roboirg.core.goal_slots import COLOR_SLOTS
-from roboirg.language.balanced_draw import draw_balanced
 from roboirg.language.request import GoalValue, InstructionRequest
 from roboirg.language.rivals import rival_templates as templates
 from roboirg.language.rivals.balanced_rivals import balanced_rival
-from roboirg.language.rivals.value_pair import Locate, ValuePair, rival_pairs
+from roboirg.language.rivals.value_pair import ValuePair, rival_pairs
+from roboirg.language.template_sampler import TemplateSampler
+from roboirg.language.templates import DRAWS
 
 Fill = Literal["other", "both"]
+
+
+class PairOrder(NamedTuple):
+    """Whether the value that is meant is introduced first, and whether the remark points at it."""
+
+    meant_first: bool
+    points_at_meant: bool
+
+
+_ORDERS = tuple(itertools.starmap(PairOrder, itertools.product((True, False), repeat=2)))
+BLOCK = len(_ORDERS)
 
 
 class PairDraw(NamedTuple):
@@ -43,32 +56,43 @@ class PairDraw(NamedTuple):
         return (meant, rival) if self.meant_first else (rival, meant)
 
 
-def draw_pair(request: InstructionRequest, locate: Locate | None = None) -> PairDraw:
-    """Draw a slot, its rival, and the words that choose.
-
-    `locate` returns landmarks, where both values must have one; None for all slots.
-    """
-    pairs = rival_pairs(request, locate)
+def draw_pair(request: InstructionRequest) -> PairDraw:
+    """Draw a slot, its rival, and the words that choose."""
+    pairs = rival_pairs(request)
     slot = pairs[0].slot
-    pair = balanced_rival(request, pairs, locate)
-    bits = draw_balanced(request, "rival order")
-    kind, text, fill = _remark(request, points_at_meant=bits.second)
+    pair = balanced_rival(request, pairs)
+    order = _draw_order(request)
+    kind, text, fill = _remark(request, points_at_meant=order.points_at_meant)
     if slot not in COLOR_SLOTS:
         fill = "both"  # "The former, not the other number" is hard to hear
     pointers: tuple[templates.Pointers, ...] = (templates.RANKS,)
     if slot in COLOR_SLOTS:
-        pointers = (templates.ORDER if locate else templates.RANKS, templates.ORDER)
+        pointers = (templates.RANKS, templates.ORDER)
         if kind in ("alone", "set aside"):  # next to another they are too long
             pointers += templates.MENTIONED.of(request.pool)
     return PairDraw(
         pair,
-        bits.first,
+        order.meant_first,
         kind,
         text,
         fill,
-        bits.second,
+        order.points_at_meant,
         request.sampler.pick("rival pointers", pointers),
     )
+
+
+def _draw_order(request: InstructionRequest) -> PairOrder:
+    """Draw the order for an episode; each block of four episodes has every one once.
+
+    With independent draws a split of fifty could favor the value named first by chance.
+    """
+    episode = request.episode
+    block, place = divmod(episode.index, BLOCK)
+    key = f"{DRAWS}|{episode.task}|{episode.split}|{block}"
+    cycle = TemplateSampler(key).cycle("rival order", _ORDERS)
+    found = next(itertools.islice(cycle, place, None))
+    request.sampler.log.append(f"rival order/{_ORDERS.index(found)}")
+    return found
 
 
 def _remark(

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 
 from roboirg.core.word_pools import Pools
-from roboirg.language.instruction import REFERENCE, Expression
+from roboirg.language.instruction import Expression
 from roboirg.language.number_words import cardinal, ordinal, plural
 from roboirg.language.phrases import Phrase, anaphor, antecedent, fill, plain, sentences
 from roboirg.language.request import GoalValue, InstructionRequest, UtteranceSpec
@@ -15,9 +15,6 @@ from roboirg.language.rivals.value_pair import ValuePair
 from roboirg.language.slot_types import Fields, amount, described, relation, stated
 from roboirg.language.slot_types.ordinal import wrapped
 from roboirg.language.templates.derivations import MOMENTS
-
-Name = Callable[[GoalValue], str]
-"""Returns the full words for a value: ``the red cube``."""
 
 INTRODUCTIONS: Mapping[str, Pools[str]] = {
     "color": templates.THING_PAIRS,
@@ -43,17 +40,9 @@ def pair_introduction(request: InstructionRequest, draw: PairDraw) -> UtteranceS
     return UtteranceSpec("introduction", words)
 
 
-def pair_reinforcement(request: InstructionRequest, draw: PairDraw) -> UtteranceSpec:
-    """Return one more remark on both values."""
-    values = " and ".join(str(value.value) for value in draw.introduced)
-    ref = anaphor("both", "them", REFERENCE, values)
-    template = request.pick("pair reinforcement", templates.PAIR_REINFORCEMENTS)
-    return UtteranceSpec("reinforcement", fill(template, {"ref": ref}))
-
-
 def pair_command(request: InstructionRequest, draw: PairDraw) -> UtteranceSpec:
     """Return the remark that chooses, and a command that states the other slots."""
-    remark = choosing_remark(request, draw, lambda value: value_name(request, draw.pair, value))
+    remark = _choosing_remark(request, draw)
     fields = stated(request)
     if draw.pair.slot == "counts":
         fields |= _counted(request, draw)
@@ -62,14 +51,9 @@ def pair_command(request: InstructionRequest, draw: PairDraw) -> UtteranceSpec:
     return UtteranceSpec("command", sentences([remark, request.command(fields)]))
 
 
-def choosing_remark(
-    request: InstructionRequest, draw: PairDraw, name: Name, thing: str | None = None
-) -> Phrase:
-    """Return the remark that chooses one value; resolved, both have their names.
-
-    `thing` is the noun for a value; None for that of its kind.
-    """
-    thing = thing or pair_noun(request, draw.pair)
+def _choosing_remark(request: InstructionRequest, draw: PairDraw) -> Phrase:
+    """Return the remark that chooses one value; resolved, both have their names."""
+    thing = pair_noun(request, draw.pair)
     meant, rival = draw.pair
     at_meant = draw.fill == "both" or draw.points_at_meant
     at_rival = draw.fill == "both" or not draw.points_at_meant
@@ -79,19 +63,19 @@ def choosing_remark(
     }
     if request.resolved:
         words = {
-            field: antecedent(name(value), value.slot, value.value)
+            field: antecedent(value_name(request, draw.pair, value), value.slot, value.value)
             for field, value in (("yes", meant), ("no", rival))
         }
     return fill(draw.text, words)
 
 
-def chosen(request: InstructionRequest, draw: PairDraw, words: str) -> Phrase:
+def _chosen(request: InstructionRequest, draw: PairDraw, words: str) -> Phrase:
     """Return ``the cube I mean`` for a noun phrase such as ``the cube``."""
     clause = request.pick("rival clause", templates.CLAUSES)
     return anaphor(f"{words} {clause}", "choice", draw.pair.meant.slot, draw.pair.meant.value)
 
 
-def the_other(value: GoalValue, words: str) -> Phrase:
+def _the_other(value: GoalValue, words: str) -> Phrase:
     """Return words for the value that is not meant."""
     return anaphor(words, "other", value.slot, value.value)
 
@@ -134,7 +118,7 @@ def _pointer(draw: PairDraw, value: GoalValue, thing: str, *, points: bool) -> P
     if not points:
         if draw.pair.word_kind in ("color", "amount"):
             thing = "ones" if several else "one"
-        return the_other(value, f"the other {thing}")
+        return _the_other(value, f"the other {thing}")
     first, second, first_many, second_many = draw.pointers
     if several:
         first, second = first_many, second_many
@@ -161,19 +145,19 @@ def _chosen_fields(request: InstructionRequest, draw: PairDraw) -> Fields:
     """Return the fields of the command that point at the choice."""
     kind, (meant, rival) = draw.pair.word_kind, draw.pair
     if kind == "color":
-        words = chosen(request, draw, f"the {pair_noun(request, draw.pair)}")
+        words = _chosen(request, draw, f"the {pair_noun(request, draw.pair)}")
         fields = {meant.field: request.by_color(meant, words)}
         if draw.pair.ordered:
-            fields[rival.field] = request.by_color(rival, the_other(rival, "the other one"))
+            fields[rival.field] = request.by_color(rival, _the_other(rival, "the other one"))
         return fields
     if kind == "amount":
-        words = chosen(request, draw, f"of the {pair_noun(request, draw.pair)}")
+        words = _chosen(request, draw, f"of the {pair_noun(request, draw.pair)}")
         return described(request, [words])
     if kind == "number":
-        return {meant.field: chosen(request, draw, "the number of times")}
+        return {meant.field: _chosen(request, draw, "the number of times")}
     if kind == "relation":
-        return relation.placed(request, meant, chosen(request, draw, "at the moment"))
-    return wrapped(request, meant, chosen(request, draw, f"the {meant.slot_type}"))
+        return relation.placed(request, meant, _chosen(request, draw, "at the moment"))
+    return wrapped(request, meant, _chosen(request, draw, f"the {meant.slot_type}"))
 
 
 def _counted(request: InstructionRequest, draw: PairDraw) -> Fields:

@@ -45,36 +45,6 @@ THING_PAIRS = Pools(
         "I considered {things}.",
     ),
 )
-PLACE_PAIRS = Pools(
-    train=(
-        "I see {things}.",
-        "Look at {things}.",
-        "I am looking at {things}.",
-        "We can see {things}.",
-        "We talked about {things}.",
-        "I was looking at {things}.",
-        "Have a look at {things}.",
-        "I am thinking of {things}.",
-        "I was thinking of {things}.",
-        "I like {things}.",
-        "I have my eye on {things}.",
-        "{things} caught my eye.",
-    ),
-    test=(
-        "I spotted {things}.",
-        "I noticed {things}.",
-        "I considered {things}.",
-        "I thought about {things}.",
-        "I can see {things}.",
-        "I found {things}.",
-        "I was talking about {things}.",
-        "I have noticed {things}.",
-        "I have in mind {things}.",
-        "I was pointing at {things}.",
-        "{things} stand out.",
-        "{things} look nice.",
-    ),
-)
 NUMBER_PAIRS = Pools(
     train=(
         "I rolled {things}.",
@@ -133,11 +103,6 @@ MOMENT_PAIRS = Pools(
         "I have in mind the moments {things}.",
     ),
 )
-PAIR_REINFORCEMENTS = Pools(
-    train=("{ref} would work.", "{ref} are fine.", "I like {ref}.", "{ref} sound good."),
-    test=("{ref} would do.", "I could use {ref}.", "{ref} seem fine.", "{ref} are good."),
-)
-"""One more remark about both values; short, as two remarks and a command come with it."""
 
 
 class Pointers(NamedTuple):
@@ -159,7 +124,7 @@ class Pointers(NamedTuple):
 RANKS = Pointers("the former", "the latter", "the former", "the latter")
 """For every kind of value; both pools have them, as there are no other such words."""
 ORDER = Pointers("the first one", "the second one", "the first ones", "the second ones")
-"""For things, which have no ordinals of their own; after long phrases they are easier to hear."""
+"""For things, which have no ordinals of their own."""
 MENTIONED = Pools(
     train=(
         Pointers(

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator
 from typing import NamedTuple
 
 from roboirg.core.episode import Difficulty, Split, values_in
 from roboirg.core.goal_slots import COLOR_SLOTS
 from roboirg.language.instruction import REFERENCE
-from roboirg.language.landmarks import Landmark
 from roboirg.language.request import GoalValue, InstructionRequest
 from roboirg.tasks import get_task
 from roboirg.tasks.splits.splits import split_episodes
@@ -17,9 +16,6 @@ from roboirg.tasks.splits.splits import split_episodes
 SPLIT: Split = "train"
 """Its goals show which numbers are usual for a difficulty."""
 NUMBER_SLOTS = ("repeats", "counts", "visit", "placement")
-
-Locate = Callable[[InstructionRequest, GoalValue], Mapping[int, list[Landmark]]]
-"""Returns the landmarks of a thing of a color, by class."""
 
 
 class ValuePair(NamedTuple):
@@ -50,23 +46,18 @@ class ValuePair(NamedTuple):
         return self.rival.slot == self.meant.slot
 
 
-def pair_refusal(request: InstructionRequest, locate: Locate | None = None) -> str | None:
+def pair_refusal(request: InstructionRequest) -> str | None:
     """Return why an episode can have no rival; None if it can."""
     if request.wordings is not None:
         return "commands from a wording file have no rivals"
-    return None if rival_pairs(request, locate) else _lack(request, locate)
-
-
-def _lack(request: InstructionRequest, locate: Locate | None) -> str:
-    """Return what a scene lacks for a rival."""
+    if rival_pairs(request):
+        return None
     if len(request.values_of("amount")) > 2:  # noqa: PLR2004 - a color and its count
         return "a goal that counts cubes of several colors leaves no rival"
-    if locate is None or not any(pair.slot in COLOR_SLOTS for pair in possible_pairs(request)):
-        return "the scene has no second value that the goal could ask for"
-    return "no landmark singles out a second thing that the goal could ask for"
+    return "the scene has no second value that the goal could ask for"
 
 
-def rival_pairs(request: InstructionRequest, locate: Locate | None) -> list[ValuePair]:
+def rival_pairs(request: InstructionRequest) -> list[ValuePair]:
     """Draw one of the slots that can have a rival, and return all pairs of its value.
 
     A color that the video gives away has none: its words would tell nothing.
@@ -74,9 +65,7 @@ def rival_pairs(request: InstructionRequest, locate: Locate | None) -> list[Valu
     found = [
         pair
         for pair in possible_pairs(request)
-        if (locate is None or pair.slot in COLOR_SLOTS)
-        and not (pair.slot in COLOR_SLOTS and request.shows_color)
-        and (locate is None or all(locate(request, value) for value in pair))
+        if not (pair.slot in COLOR_SLOTS and request.shows_color)
     ]
     if not found:
         return []

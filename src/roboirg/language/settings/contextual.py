@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from typing import NamedTuple
 
 from roboirg.core.instruction_options import InstructionOptions
@@ -27,40 +27,17 @@ MANY_DISTRACTORS = 4
 """Length of the context that must begin with the distractors of the default one."""
 
 
-Say = Callable[[InstructionRequest], UtteranceSpec]
-
-
 def say(request: InstructionRequest) -> InstructionSpec:
     """Return the requested stages; 1 and 5 alone are the direct instruction."""
-    kind = request.options.distractor
-    return discourse(request, direct.introduction, reinforcement, direct.command, kind)
-
-
-def discourse(
-    request: InstructionRequest,
-    introduce: Say,
-    reinforce: Say,
-    command: Say,
-    distractor: str,
-    longest: int = 100,
-) -> InstructionSpec:
-    """Return the requested stages.
-
-    `introduce` says the first stage, `reinforce` one more remark on what was introduced, and
-    `command` the last stage; distractor and cue have at most the number `longest` of
-    words.
-    """
-    stages = request.options.stages
-    utterances = [introduce(request)]
+    stages, distractor = request.options.stages, request.options.distractor
+    utterances = [direct.introduction(request)]
     if REINFORCEMENT in stages:
-        utterances.append(reinforce(request))
-    distracting = distractors(request, distractor, longest) if DISTRACTOR in stages else ()
+        utterances.append(_reinforcement(request))
+    distracting = _distractors(request, distractor) if DISTRACTOR in stages else ()
     utterances += [UtteranceSpec("distractor", phrase) for phrase, _ in distracting]
     if CUE in stages:
-        cues = [one for one in remarks.CUES.of(request.pool) if _length(one) <= longest]
-        cue = request.sampler.pick("cue", cues)
-        utterances.append(UtteranceSpec("cue", plain(cue)))
-    utterances.append(command(request))
+        utterances.append(UtteranceSpec("cue", plain(request.pick("cue", remarks.CUES))))
+    utterances.append(direct.command(request))
     notes: dict[str, object] = {"stages": list(stages)}
     if distracting:
         says_it = _says_it(utterances[-1])
@@ -69,7 +46,7 @@ def discourse(
     return InstructionSpec(tuple(utterances), notes)
 
 
-def reinforcement(request: InstructionRequest) -> UtteranceSpec:
+def _reinforcement(request: InstructionRequest) -> UtteranceSpec:
     """Return one more remark on the last one of the referents."""
     *_, (slot_type, goal_values) = slot_types_in(request)
     template = request.pick(f"{slot_type.name} reinforcement", slot_type.reinforcements)
@@ -83,11 +60,9 @@ class _Distractor(NamedTuple):
     thing: str | None
 
 
-def distractors(
-    request: InstructionRequest, kind: str, longest: int = 100
-) -> tuple[_Distractor, ...]:
+def _distractors(request: InstructionRequest, kind: str) -> tuple[_Distractor, ...]:
     """Return the requested number of remarks; a longer list begins with every shorter one."""
-    source = _competing(request) if kind == "competing" else _neutral(request, longest)
+    source = _competing(request) if kind == "competing" else _neutral(request)
     return tuple(itertools.islice(source, request.options.distractors))
 
 
@@ -96,15 +71,10 @@ def _says_it(command: UtteranceSpec) -> bool:
     return any(piece.tag is not None and piece.tag.expression == "it" for piece in command.phrase)
 
 
-def _length(remark: str) -> int:
-    return len(remark.split())
-
-
-def _neutral(request: InstructionRequest, longest: int) -> Iterator[_Distractor]:
+def _neutral(request: InstructionRequest) -> Iterator[_Distractor]:
     known = remarks.NEUTRAL_DISTRACTORS.of(request.pool)
-    short = [one for one in known if _length(one.text) <= longest]
     # The order stays the same in each cycle, so that repetitions are as far apart as possible.
-    for remark in request.sampler.cycle("distractor", short):
+    for remark in request.sampler.cycle("distractor", known):
         yield _Distractor(plain(remark.text), remark.thing)
 
 

@@ -6,10 +6,9 @@ that the pattern does not cover.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 from roboirg.language.patterns import PATTERNS, Pattern
-from roboirg.language.phrases import sentences
 from roboirg.language.request import InstructionRequest, InstructionSpec, UtteranceSpec
 from roboirg.language.settings.setting import Setting
 from roboirg.language.slot_types import stated
@@ -22,47 +21,36 @@ NamedPattern = tuple[str, Sequence[Pattern]]
 """The name of a reasoning pattern, and its rules, each of which derives the goal."""
 
 
-def turn_of(request: InstructionRequest, possible: Sequence[NamedPattern]) -> NamedPattern:
+def _turn_of(request: InstructionRequest) -> NamedPattern:
     """Return an episode's main pattern.
 
     Cycle through the patterns that the episode allows, so that none takes the turns of another.
     Move on by one more after each block of four episodes: otherwise a task with two patterns
     would use only one of them in its hard episodes.
     """
-    index = request.episode.index
+    possible, index = possible_patterns(request), request.episode.index
     return possible[(index + index // BLOCK) % len(possible)]
 
 
 def say(request: InstructionRequest) -> InstructionSpec:
     """Return an intermediate reference, and a command that derives the goal from it."""
-    return say_pattern(request, *turn_of(request, possible_patterns(request)))
-
-
-def possible_patterns(
-    request: InstructionRequest, patterns: Mapping[str, Sequence[Pattern]] = PATTERNS
-) -> list[NamedPattern]:
-    """Return the patterns that the episode allows, each with the rules that derive its goal."""
-    found = [
-        (name, [one for one in rules if one.allows(request)]) for name, rules in patterns.items()
-    ]
-    return [(name, rules) for name, rules in found if rules]
-
-
-def say_pattern(
-    request: InstructionRequest, name: str, rules: Sequence[Pattern]
-) -> InstructionSpec:
-    """Return the context of one of a pattern's rules, and the command that follows from it."""
+    name, rules = _turn_of(request)
     rule = rules[0] if len(rules) == 1 else request.sampler.pick(f"{name} rule", rules)
     derived = rule.derive(request)
-    command = request.command(stated(request) | derived.fields)
-    if derived.remark:
-        command = sentences([derived.remark, command])
     utterances = (
         UtteranceSpec("introduction", derived.context),
-        UtteranceSpec("command", command),
+        UtteranceSpec("command", request.command(stated(request) | derived.fields)),
     )
     notes = {"pattern": name, **derived.notes}
     return InstructionSpec(utterances, notes)
+
+
+def possible_patterns(request: InstructionRequest) -> list[NamedPattern]:
+    """Return the patterns that the episode allows, each with the rules that derive its goal."""
+    found = [
+        (name, [one for one in rules if one.allows(request)]) for name, rules in PATTERNS.items()
+    ]
+    return [(name, rules) for name, rules in found if rules]
 
 
 SETTING = Setting(

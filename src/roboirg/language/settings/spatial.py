@@ -8,7 +8,6 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 
-from roboirg.core.word_pools import Pools
 from roboirg.language.instruction import Expression
 from roboirg.language.landmarks import FRAMES, SIMPLE, Landmark, landmarks
 from roboirg.language.number_words import plural
@@ -30,12 +29,11 @@ PAIR = 2
 _NOUN = re.compile(r"^the \w+")
 _TIME = re.compile(r" now\b")
 """Said of the first of two things, it goes for both."""
-NO_LANDMARK = "no landmark singles out a target"
 LONGEST = {1: 12, 2: 6, 3: 5}
 """The length that a landmark should have next to others, in `_length`; see `templates`."""
 
 
-def usable(
+def _usable(
     request: InstructionRequest, goal_value: GoalValue, places: int
 ) -> Mapping[int, list[Landmark]]:
     """Return the landmarks that may locate a thing of this color, by class.
@@ -67,37 +65,33 @@ def _length(landmark: Landmark) -> int:
 def refusal(request: InstructionRequest) -> str | None:
     """Return a reason if some color of the goal has no thing with a landmark."""
     places = len(request.color_values)
-    if all(usable(request, goal_value, places) for goal_value in request.color_values):
+    if all(_usable(request, goal_value, places) for goal_value in request.color_values):
         return None
-    return NO_LANDMARK
+    return "no landmark singles out a target"
 
 
 def say(request: InstructionRequest) -> InstructionSpec:
     """Return an introduction with a landmark for each color, and a command that points there."""
     colors = request.color_values
-    marks = [draw_landmark(request, one, usable(request, one, len(colors))) for one in colors]
+    marks = [_draw_landmark(request, one, _usable(request, one, len(colors))) for one in colors]
     things = [
         _pointed(request, color, landmark, pointer)
         for color, landmark, pointer in zip(colors, marks, POINTING[len(colors)], strict=True)
     ]
     fields = stated(request) | described(request, things)
     utterances = (
-        introduction(request, colors, marks),
+        _introduction(request, colors, marks),
         UtteranceSpec("command", request.command(fields)),
     )
-    return InstructionSpec(utterances, landmark_notes(request, marks))
-
-
-def landmark_notes(request: InstructionRequest, landmarks: Sequence[Landmark]) -> dict[str, object]:
-    """Return the entries of the metadata."""
-    return {
-        "landmarks": [landmark.phrase for landmark in landmarks],
-        "landmark_classes": [landmark.level for landmark in landmarks],
+    notes: dict[str, object] = {
+        "landmarks": [landmark.phrase for landmark in marks],
+        "landmark_classes": [landmark.level for landmark in marks],
         "frame": request.frame,
     }
+    return InstructionSpec(utterances, notes)
 
 
-def draw_landmark(
+def _draw_landmark(
     request: InstructionRequest, color: GoalValue, classes: Mapping[int, list[Landmark]]
 ) -> Landmark:
     """Draw the class first, or most landmarks would be extremes."""
@@ -111,7 +105,7 @@ def _pointed(
     """Return the command's words for a thing, which name its place or point at it."""
     words, expression = pointer
     if expression != "there":
-        return at_place(request, color, landmark, anaphor(words, expression, *_of(color)))
+        return _at_place(request, color, landmark, anaphor(words, expression, *_of(color)))
     place = request.refer(words, expression, *_of(color), resolved=landmark.phrase)
     template = None
     stands_last = _STANDS_LAST.fullmatch(request.task.commands.by_place)
@@ -132,7 +126,7 @@ def _of(color: GoalValue) -> tuple[str, str | int]:
     return color.slot, color.value
 
 
-def at_place(
+def _at_place(
     request: InstructionRequest, value: GoalValue, landmark: Landmark, words: Phrase
 ) -> Phrase:
     """Return the command's words for one of several things; resolved, they name its place."""
@@ -149,11 +143,8 @@ def at_place(
     return request.by_place(value, place, plural=request.count_of(value) > 1, template=template)
 
 
-def introduction(
-    request: InstructionRequest,
-    colors: Sequence[GoalValue],
-    marks: Sequence[Landmark],
-    sentences: Pools[str] = introductions.PLACE_INTRODUCTIONS,
+def _introduction(
+    request: InstructionRequest, colors: Sequence[GoalValue], marks: Sequence[Landmark]
 ) -> UtteranceSpec:
     """Name the places."""
     first = request.task.commands.things_at
@@ -164,7 +155,7 @@ def introduction(
         fill(template, {"place": antecedent(landmark.phrase, color.slot, color.value)})
         for template, color, landmark in zip((first, rest, rest), colors, marks, strict=False)
     ]
-    sentence = request.pick("place introduction", sentences)
+    sentence = request.pick("place introduction", introductions.PLACE_INTRODUCTIONS)
     words = fill(sentence, {"things": listed(things)}, plural=len(marks) > 1)
     return UtteranceSpec("introduction", words)
 

@@ -8,7 +8,6 @@ from typing import cast
 
 from roboirg.core.episode import ALL_COLORS, Goal, SlotValue
 from roboirg.language.instruction import Instruction, hidden_slots
-from roboirg.language.settings import reasoning_open
 from roboirg.language.worded_command import FIELD
 from roboirg.language.wordings.wording_store import find_wordings
 
@@ -33,18 +32,11 @@ def find_leaks(instruction: Instruction, goal: Goal) -> frozenset[str]:
     text = _without_pointers(instruction).lower().replace("before or after", "")
     words = frozenset(re.findall(r"[a-z0-9]+", text))
     hidden = hidden_slots(instruction, goal)
-    words -= _template_words(instruction, hidden) | _relation_words(instruction)
+    words -= _template_words(instruction, hidden)
     found = [words & _spellings(goal[slot]) for slot in hidden]
     places = cast("list[str]", instruction.metadata["landmarks"])
     named = [place for place in places if place in instruction.command]
     return frozenset(named).union(*found)
-
-
-def _relation_words(instruction: Instruction) -> frozenset[str]:
-    """Return the words of an open relation, which go with every result: *two fewer*, *twice*."""
-    if instruction.setting != reasoning_open.SETTING.name:
-        return frozenset()
-    return frozenset(re.findall(r"[a-z]+", str(instruction.metadata["relation"])))
 
 
 def _template_words(instruction: Instruction, hidden: Collection[str]) -> frozenset[str]:

@@ -13,7 +13,6 @@ from roboirg.core.episode import Episode, Split
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.core.word_pools import POOLS, PoolName
 from roboirg.language import FORMS
-from roboirg.language.rivals import RIVAL_SETTINGS
 from roboirg.language.settings import all_settings, plain_settings
 from roboirg.language.variants import instructions
 from roboirg.policies.vlm.goal_schema import goal_schema
@@ -30,6 +29,8 @@ WORK = "listener-work"
 """Folder next to trained listeners for pictures, detectors and readers on the way."""
 TEST: Split = "test"
 HELD_OUT: PoolName = "test"
+RIVAL = "direct-rival"
+"""The setting that introduces a rival."""
 
 
 class StudyVariant(NamedTuple):
@@ -57,7 +58,7 @@ class StudyVariant(NamedTuple):
 VARIANTS = (
     StudyVariant("all", "all settings", {}),
     StudyVariant("explicit", "explicit only", {"settings": ("explicit",)}),
-    StudyVariant("rivals", "all settings, rivals too", {}, RIVAL_SETTINGS),
+    StudyVariant("rivals", "all settings, rivals too", {}, (RIVAL,)),
     StudyVariant("no-video", "without video", {"without": "video"}),
     StudyVariant("no-pictures", "without pictures", {"without": "pictures"}),
     StudyVariant("no-words", "without words", {"without": "words"}),
@@ -152,5 +153,4 @@ def told_options() -> Iterator[InstructionOptions]:
     for setting in plain_settings():
         for pool in POOLS:
             yield InstructionOptions(setting, wordings=pool)
-    for setting in RIVAL_SETTINGS:
-        yield InstructionOptions(setting, wordings=HELD_OUT)
+    yield InstructionOptions(RIVAL, wordings=HELD_OUT)

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from roboirg.apps.learning.listener.listener_study import HELD_OUT, VARIANTS, StudyAnswer
+from roboirg.apps.learning.listener.listener_study import HELD_OUT, RIVAL, VARIANTS, StudyAnswer
 from roboirg.core.plain_text import counted
 from roboirg.evaluation.analysis.figures.figure_style import (
     draw_point,
@@ -24,7 +24,6 @@ from roboirg.evaluation.analysis.figures.figure_style import (
 from roboirg.evaluation.analysis.stats.intervals import ALPHA, Interval, without_spread
 from roboirg.evaluation.analysis.tables.rendering.markdown import markdown
 from roboirg.evaluation.analysis.tables.table import NOT_APPLICABLE, Column, Entry, Row, Table
-from roboirg.language.rivals import RIVAL_SETTINGS
 from roboirg.language.settings import all_settings
 from roboirg.util.atomic_write import write_atomically
 
@@ -149,7 +148,7 @@ def _settings(
     found: Mapping[ListenerCell, TrainedRate], pool: str, *, has_rival: bool
 ) -> list[str]:
     asked = {setting for _, words, setting in found if words == pool}
-    return [one for one in all_settings() if one in asked and (one in RIVAL_SETTINGS) == has_rival]
+    return [one for one in all_settings() if one in asked and (one == RIVAL) == has_rival]
 
 
 def _rows(
