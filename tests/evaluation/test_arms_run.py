@@ -17,7 +17,7 @@ from roboirg.evaluation.plan.plan_maker import make_plan
 from roboirg.evaluation.plan.stored_plans import read_plan, write_plan
 from roboirg.evaluation.records.merging import merge_runs
 from roboirg.evaluation.records.parquet import write_parquet
-from roboirg.evaluation.records.record_codec import encode, identity_key, read_record
+from roboirg.evaluation.records.record_codec import identity_key
 from roboirg.evaluation.records.store import RECORDS_FILE, RecordStore, read_records
 from roboirg.evaluation.run.executor import InProcess
 from roboirg.evaluation.run.runner import run_plan
@@ -71,16 +71,6 @@ def test_arms_of_the_command_line_and_of_plan_files(tmp_path: Path) -> None:
               "--episodes", "2", "--settings", "direct", "--out", str(tmp_path / "x"), "--dry-run"]
     )  # fmt: skip
     assert "other-goal: 2 episodes left out." in result.output, result.output
-
-
-def test_a_record_without_an_arm_is_told(tmp_path: Path) -> None:
-    record = FakePlay()(plan_of("told").jobs()[0])
-    fields = json.loads(encode(record))
-    del fields["arm"], fields["goals"]
-    old = read_record(json.dumps(fields).encode(), tmp_path / "records.jsonl", 1)
-    assert (old.arm, old.goals) == ("told", None)
-    assert identity_key(old) == identity_key(record)
-    assert old.slug == record.slug
 
 
 def test_a_run_resumes_with_more_arms(tmp_path: Path) -> None:

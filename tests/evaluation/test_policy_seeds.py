@@ -4,6 +4,7 @@ import json
 
 import pytest
 
+from roboirg.evaluation.plan.plan_file import read_plan_file
 from roboirg.evaluation.plan.plan_maker import make_plan
 from roboirg.evaluation.plan.stored_plans import read_plan, write_plan
 from roboirg.evaluation.play.job_instruction import PreparedJob
@@ -32,6 +33,8 @@ def test_a_stored_plan_may_still_have_the_secret_of_its_run(tmp_path):
     fields = {"seed_secret": "of the run", **json.loads(path.read_text())}
     path.write_text(json.dumps(fields))
     assert read_plan(tmp_path) == a_plan()
+    again = read_plan_file(str(path))
+    assert make_plan(again.pop("policies"), **again) == a_plan()
 
 
 def test_settings_and_forms_of_a_scene_share_the_seed_and_scenes_do_not():

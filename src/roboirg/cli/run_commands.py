@@ -279,13 +279,13 @@ def _print_model_calls(todo: Sequence[Job], console: Console) -> None:
     table.add_column("calls", justify="right")
     for (policy, setting), calls in least_calls(todo).items():
         table.add_row(policy, setting, f"{calls:,}")
-    table.caption = (
-        "one for each episode of a listener and for each subgoal of a planner; a planner that is "
-        "asked before every chunk, second questions and retried episodes need more"
-    )
     if table.row_count:
         widen(console, table)
         console.print(table)
+        console.print(
+            "A listener is asked once an episode, a planner at least once a subgoal; planners that "
+            "are asked before every chunk, second questions and retried episodes need more."
+        )
 
 
 def _print_prompt_shares(

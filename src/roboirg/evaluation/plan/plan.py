@@ -52,7 +52,7 @@ from roboirg.evaluation.records.record import (
     ErrorKind,
     Job,
 )
-from roboirg.evaluation.records.record_codec import RecordKey, identity_key, with_nested_options
+from roboirg.evaluation.records.record_codec import RecordKey, identity_key
 from roboirg.language.generator import check_options, find_refusal
 from roboirg.language.settings import EXPLICIT, SETTING_GROUPS, all_settings, expand_settings
 from roboirg.language.wordings.wording_store import open_wordings
@@ -460,4 +460,6 @@ def _names_the_goal(options: InstructionOptions) -> bool:
 
 def nest_options(fields: Mapping[str, Any]) -> dict[str, Any]:
     """Return the fields of a plan, with the options of instructions among them in `options`."""
-    return with_nested_options(fields, SINGLE_OPTIONS)
+    options = {name: value for name, value in fields.items() if name in SINGLE_OPTIONS}
+    others = {name: value for name, value in fields.items() if name not in SINGLE_OPTIONS}
+    return {**others, "options": {**fields.get("options", {}), **options}}

@@ -4,16 +4,14 @@ from __future__ import annotations
 
 import operator
 import re
-from collections.abc import Collection, Mapping
 from dataclasses import astuple
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import TypeVar
 
 import msgspec
 
 from roboirg.core.errors import RoboIRGError
 from roboirg.core.field_types import MOST_NAME_LETTERS, NAME
-from roboirg.core.instruction_options import OPTION_NAMES
 from roboirg.evaluation.records.record import IDENTITY, SCHEMA_VERSION, Record, Summary
 from roboirg.evaluation.records.run_files import RELATIVE_PATH
 
@@ -119,12 +117,3 @@ def _words(error: Exception) -> str:
     for pattern, meaning in _MEANINGS.items():
         words = words.replace(f"matching regex {pattern!r}", meaning)
     return words
-
-
-def with_nested_options(
-    data: Mapping[str, Any], names: Collection[str] = OPTION_NAMES
-) -> dict[str, Any]:
-    """Return fields, with the options of instructions of these names among them in ``options``."""
-    options = {name: value for name, value in data.items() if name in names}
-    others = {name: value for name, value in data.items() if name not in names}
-    return {**others, "options": {**data.get("options", {}), **options}}
