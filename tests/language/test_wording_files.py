@@ -1,4 +1,4 @@
-"""Wording files: by hand, bad ones, their identity, and writing them."""
+"""Wording files: by hand, bad ones, and their identity."""
 
 import dataclasses
 import re
@@ -6,11 +6,8 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 from wording_stand_ins import same_number, train_episodes
 
-from roboirg.apps.language_lab.robomme.wording_writer import wording_text
 from roboirg.apps.language_lab.validation import episode_checks
 from roboirg.apps.language_lab.validation.episode_checks import check_episode, unpaired
 from roboirg.apps.language_lab.validation.leaks import find_leaks
@@ -262,44 +259,6 @@ def test_a_changed_file_is_other_wordings(tmp_path):
     with pytest.raises(InvalidValueError, match="are not open"):
         instruct_with(episode_with("PickXtimes"), InstructionOptions(wordings=gone))
     assert open_wordings(None) is None
-
-
-TEXT = st.text(st.characters(min_codepoint=32, max_codepoint=126, exclude_characters="[]{}"))
-WORDS = TEXT.filter(str.strip)
-BEFORE = TEXT.filter(lambda text: not text.endswith(" "))
-PHRASES = st.builds(StatedPhrase, BEFORE, WORDS, TEXT)
-
-
-@given(
-    WORDS,
-    st.dictionaries(st.sampled_from(["red", "green", "blue"]), PHRASES, min_size=1),
-    st.dictionaries(st.sampled_from(["red", "green", "blue"]), PHRASES, min_size=1),
-    st.sets(st.sampled_from(["direct", "spatial"])),
-    st.sets(st.sampled_from(["colors.0", "colors.1"])),
-    st.text(st.characters(codec="utf-8", exclude_categories=["C"])),
-)
-def test_what_is_written_is_read_again(words, first, second, own, pointed, source):
-    commands = (
-        WordedCommand(f"{{colors.0}}{words}", {"colors": ("red",)}, {"colors.0": first}),
-        WordedCommand(
-            f"{words}{{colors.0}}{{colors.1}}",
-            {},
-            {"colors.0": first, "colors.1": second},
-            frozenset(pointed),
-        ),
-    )
-    text = wording_text("a", source, {"VideoUnmask": TaskWordings(commands, frozenset(own))})
-    read = parse_wordings(text, "file")
-    assert (read.name, read.source) == ("a", source)
-    found = read.tasks["VideoUnmask"]
-    assert found.own == own
-    assert [(one.text, one.when, one.pointed) for one in found.commands] == [
-        (one.text, one.when, one.pointed) for one in commands
-    ]
-    for before, after in zip(commands, found.commands, strict=True):
-        for field, table in before.phrases.items():
-            for value, phrase in table.items():
-                assert after.phrase(field, value) == phrase
 
 
 def test_a_count_and_a_cube_may_be_one_phrase():

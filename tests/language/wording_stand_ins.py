@@ -6,15 +6,14 @@ import shutil
 from collections.abc import Iterator
 from pathlib import Path
 
-from roboirg.apps.language_lab.robomme import goal_sentences
+from roboirg.apps.language_lab import robomme_import
 from roboirg.core.episode import Episode, Goal
 from roboirg.language.instruction import Instruction
 from roboirg.language.slot_types.number import SAME_NUMBER
-from roboirg.tasks import all_tasks, get_task
+from roboirg.tasks import get_task
 from roboirg.tasks.splits.published_episodes import published_episode
 
 STYLES = ("sentences_in_words", "sentences_in_digits")
-TASKS = tuple(all_tasks())
 
 
 def sentence_file(style: str) -> Path:
@@ -24,7 +23,7 @@ def sentence_file(style: str) -> Path:
 
 def make_clone(folder: Path, style: str) -> Path:
     """A folder with the stand-in in the place of RoboMME's file."""
-    place = folder / goal_sentences.FILE
+    place = folder / robomme_import.FILE
     place.parent.mkdir(parents=True)
     shutil.copy(sentence_file(style), place)
     return folder
@@ -38,7 +37,7 @@ def sentence(style: str, task: str, goal: Goal, difficulty: str = "hard") -> str
     assert spec.loader is not None
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
-    stand_in = goal_sentences.stand_in(goal, difficulty)
+    stand_in = robomme_import.stand_in(goal, difficulty)
     return str(module.get_language_goal(stand_in, task)[0])
 
 

@@ -1,8 +1,8 @@
 """The request to put an episode into words, and what a setting returns for it.
 
-The command's words are ours, or "from outside": those of a wording file, such as RoboMME's. In
-words from outside the phrase of a field has a core that names the value, and words around it: *the
-container hiding* **the red cube**. A referring expression replaces the core; the rest stays.
+The command's words are ours, or "from outside": those of a wording file. In words from outside the
+phrase of a field has a core that names the value, and words around it: *the container hiding* **the
+red cube**. A referring expression replaces the core; the rest stays.
 """
 
 from __future__ import annotations

@@ -245,27 +245,19 @@ def import_robomme(
     out: Annotated[Path, typer.Option(help="Wording file to write, TOML.")],
     name: Annotated[str, typer.Option(help="Name of the wordings, for records.")] = "robomme",
 ) -> None:
-    """Make a wording file of RoboMME's sentences; exit code 2 if one cannot be read back.
+    """Make a wording file of RoboMME's sentences, for explicit; implicit settings keep our words.
 
     Example: roboirg language import-robomme robomme --out robomme.toml
     """
-    from roboirg.apps.language_lab.robomme.robomme_import import import_robomme as make_wordings
-    from roboirg.apps.language_lab.robomme.robomme_import import summary
+    from roboirg.apps.language_lab.robomme_import import import_robomme as make_wordings
     from roboirg.util.atomic_write import write_atomically
 
     check_output_file(out)
-    found = make_wordings(path, name)
-    for task, case, reason in found.refused:
-        typer.echo(f"Refused {task} ({case}): {reason}", err=True)
-    if found.wordings is None:
-        raise RoboIRGError(f"No sentence of {str(path)!r} can be used; {out} was not written.")
-    write_atomically(out, found.text)
-    for line in summary(found.wordings):
-        typer.echo(line)
-    typer.echo(f"Wrote {found.wordings.identity}: {out}")
-    if found.refused:
-        count = counted(len(found.refused), "template")
-        raise RoboIRGError(f"{count} could not be read back; {out} has the rest.")
+    text, wordings = make_wordings(path, name)
+    write_atomically(out, text)
+    for task, found in wordings.tasks.items():
+        typer.echo(f"{task}: {counted(len(found.commands), 'command')}")
+    typer.echo(f"Wrote {wordings.identity}: {out}")
 
 
 def add_commands(app: typer.Typer) -> None:

@@ -48,11 +48,6 @@ def register_wordings(wordings: Wordings) -> str:
     return wordings.identity
 
 
-def forget_wordings(identity: str) -> None:
-    """Make wordings unknown to this process again."""
-    _OPEN.pop(identity, None)
-
-
 def find_wordings(identity: str) -> Wordings:
     """Return wordings that this process has opened."""
     if identity not in _OPEN:

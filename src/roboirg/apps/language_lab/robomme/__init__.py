@@ -1,1 +1,0 @@
-"""RoboMME's sentences as a wording file."""

@@ -1,0 +1,162 @@
+"""Make a wording file of RoboMME's sentences: a literal command for each goal of its scenes.
+
+Only one file of RoboMME's repository is loaded, by its path: the one with the function
+``get_language_goal``. It gets a stand-in for RoboMME's objects, with the attributes that it reads.
+"""
+
+from __future__ import annotations
+
+import importlib.util
+import json
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from types import ModuleType, SimpleNamespace
+
+from roboirg.core.episode import COLORS, DIFFICULTIES, Goal
+from roboirg.core.errors import InvalidValueError
+from roboirg.language.settings import EXPLICIT, plain_settings
+from roboirg.language.worded_command import (
+    ROBOMME_NAME,
+    Wordings,
+    describe_goal,
+    goal_fields,
+)
+from roboirg.language.wordings.robomme_sentences import check_robomme_name
+from roboirg.language.wordings.wording_file import check_name, parse_wordings
+from roboirg.tasks import Task, all_tasks
+from roboirg.tasks.splits.published_episodes import published_episode
+from roboirg.tasks.splits.splits import SIZES
+
+FILE = Path("src/robomme/robomme_env/utils/task_goal.py")
+FUNCTION = "get_language_goal"
+_MODULE = "roboirg_robomme_task_goal"
+
+SentenceFunction = Callable[[object, str], object]
+"""``get_language_goal(self, env)``, where ``env`` is a task's name."""
+
+
+def import_robomme(root: Path, name: str = ROBOMME_NAME) -> tuple[str, Wordings]:
+    """Return the text and the content of a wording file with RoboMME's sentences.
+
+    Implicit settings keep our own words: a literal sentence has no words to replace.
+
+    Args:
+        root: folder of a clone of RoboMME's repository.
+        name: of the wordings.
+
+    Raises:
+        InvalidValueError: the folder lacks the file, the file cannot be loaded or lacks the
+            function, the function does not give one usable sentence for each goal, or the
+            sentences are not those of the published evaluation and yet named after it.
+    """
+    where = "imported wording file"
+    check_name(name, where)
+    text = _wording_text(_load_function(root), name)
+    wordings = parse_wordings(text, where)
+    check_robomme_name(wordings, where)
+    return text, wordings
+
+
+def _wording_text(function: SentenceFunction, name: str) -> str:
+    source = f"The first sentences of {FUNCTION} in RoboMME's repository."
+    lines = [f"name = {json.dumps(name)}", f"source = {json.dumps(source)}"]
+    for task in all_tasks().values():
+        own = [setting for setting in plain_settings(task) if setting != EXPLICIT]
+        lines += ["", f"[{task.name}]", f"own = {json.dumps(own)}"]
+        for goal, sentence in _sentences(function, task).items():
+            slots = (f"{slot} = {json.dumps(value)}" for slot, value in goal.slots)
+            lines += ["", f"[[{task.name}.commands]]", f"when = {{ {', '.join(slots)} }}"]
+            lines.append(f"text = {json.dumps(sentence)}")
+    return "\n".join(lines) + "\n"
+
+
+def _load_function(root: Path) -> SentenceFunction:
+    """Load the function from a clone of RoboMME's repository."""
+    path = root / FILE
+    if not path.is_file():
+        raise InvalidValueError(
+            f"There is no {FILE} in {str(root)!r}; name the folder of a clone of RoboMME's "
+            "repository."
+        )
+    function = getattr(_load(path), FUNCTION, None)
+    if not callable(function):
+        raise InvalidValueError(f"{str(path)!r} has no function {FUNCTION}.")
+    return function  # type: ignore[no-any-return]
+
+
+def _load(path: Path) -> ModuleType:
+    spec = importlib.util.spec_from_file_location(_MODULE, path)
+    if spec is None or spec.loader is None:
+        raise InvalidValueError(f"{str(path)!r} is no Python file.")
+    module = importlib.util.module_from_spec(spec)
+    wrote = sys.dont_write_bytecode
+    sys.dont_write_bytecode = True  # the folder is not ours
+    try:
+        spec.loader.exec_module(module)
+    except Exception as error:
+        raise InvalidValueError(
+            f"{str(path)!r} cannot be loaded: {type(error).__name__}: {error}."
+        ) from error
+    finally:
+        sys.dont_write_bytecode = wrote
+    return module
+
+
+def _sentences(function: SentenceFunction, task: Task) -> dict[Goal, str]:
+    """Return the sentence of every goal that the published scenes of a task allow."""
+    found: dict[Goal, str] = {}
+    for split, size in SIZES.items():
+        for index in range(size):
+            episode = published_episode(task.name, split, index)
+            if episode is None:
+                continue
+            fields = len(goal_fields(episode.goal))
+            for goal in task.goals(episode.scene):
+                # A difficulty has as many picks or colors as its episodes.
+                if len(goal_fields(goal)) == fields:
+                    said = _ask(function, task.name, goal, episode.difficulty)
+                    if found.setdefault(goal, said) != said:
+                        raise InvalidValueError(
+                            f"RoboMME has two sentences for a goal of {task.name} "
+                            f"({describe_goal(goal)}): {found[goal]!r} and {said!r}."
+                        )
+    return found
+
+
+def _ask(function: SentenceFunction, task: str, goal: Goal, difficulty: str) -> str:
+    """Return the first sentence for a goal."""
+    about = f"RoboMME's {FUNCTION}, asked for a goal of {task} ({describe_goal(goal)}),"
+    try:
+        said = function(stand_in(goal, difficulty), task)
+    except Exception as error:
+        raise InvalidValueError(f"{about} raised {type(error).__name__}: {error}.") from error
+    first = said[0] if isinstance(said, (list, tuple)) and said else said
+    if not isinstance(first, str):
+        raise InvalidValueError(f"{about} returned {said!r}; it must be a list of sentences.")
+    return first
+
+
+def stand_in(goal: Goal, difficulty: str) -> SimpleNamespace:
+    """Return an object with what RoboMME's function reads of a task, for a goal of ours."""
+    slots = goal.as_mapping()
+    found: dict[str, object] = {"difficulty": difficulty}
+    if "counts" in slots:
+        counts = dict(zip(goal.texts("colors"), goal.numbers("counts"), strict=True))
+        found |= {f"{color}_cubes_target_number": counts.get(color, 0) for color in COLORS}
+    elif "colors" in slots:
+        colors = goal.texts("colors")
+        found["color_names"] = [*colors, *(one for one in COLORS if one not in colors)]
+        found["pick_times"] = len(colors)
+        found["configs"] = {one: {"pick": len(colors)} for one in DIFFICULTIES}
+    names = {
+        "color": "target_color_name",
+        "repeats": "num_repeats",
+        "visit": "stop_time",
+        "relation": "target_target_language",
+        "placement": "which_in_subset",
+    }
+    found |= {names[slot]: value for slot, value in slots.items() if slot in names}
+    task = SimpleNamespace(**found)
+    task.env = task.unwrapped = task
+    return task
