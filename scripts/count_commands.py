@@ -12,7 +12,7 @@ import typer.main
 
 from roboirg.main import app
 
-MOST_ENTRIES, MOST_COMMANDS, MOST_PARAMETERS = 26, 40, 200
+MOST_ENTRIES, MOST_COMMANDS, MOST_PARAMETERS = 19, 30, 150
 """What a reader can find their way in: entries of ``roboirg --help``, commands in all, options and
 arguments in all."""
 
