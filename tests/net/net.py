@@ -3,7 +3,7 @@
     python tests/net/net.py make [PART ...]      writes what the code gives now
     python tests/net/net.py compare [PART ...]   prints what differs from what is stored
 
-Parts: words, printed, runs, packs; without any, all. `make net` compares them all, in minutes.
+Parts: words, printed, golden, packs; without any, all. `make net` compares them all, in minutes.
 """
 
 from __future__ import annotations
@@ -28,13 +28,13 @@ MOST_LINES = 40
 PARTS: Mapping[str, Callable[[Path], dict[str, str]]] = {
     "words": net_words.texts,
     "printed": net_printed.results,
-    "runs": net_runs.episodes,
+    "golden": net_runs.episodes,
     "packs": net_printed.verified_packs,
 }
 """What makes the texts of each part, by name, in an empty folder."""
 PROCESSOR = "processor"
 PORTABLE: Mapping[str, Callable[[str], str]] = {
-    "runs": net_runs.without_motion,
+    "golden": net_runs.without_motion,
     "packs": lambda text: text.partition(";")[0],
 }
 """What is comparable of the parts that are simulated, if processors of two families did it."""
