@@ -12,9 +12,13 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import NamedTuple
 
 from roboirg.core.episode import Goal, Scene, SlotValue
-from roboirg.reader.calculations import read_calculation, with_calculation
 from roboirg.reader.command import is_command, read_command
-from roboirg.reader.comprehension import ComprehensionGap, find_gaps, is_unknown_command
+from roboirg.reader.comprehension import (
+    CALCULATIONS,
+    ComprehensionGap,
+    find_gaps,
+    is_unknown_command,
+)
 from roboirg.reader.constraints import goal_constraints
 from roboirg.reader.discourse_context import names_camera, read_discourse, read_remark
 from roboirg.reader.leftovers import left_over
@@ -27,7 +31,6 @@ from roboirg.reader.repetitions import added_up
 from roboirg.reader.selections import (
     read_selection,
     unsettled_choice,
-    with_preference,
     with_selection,
 )
 from roboirg.reader.temporal_relations import mentioned_times
@@ -83,9 +86,8 @@ def interpret(text: str, scene: Scene, task: str) -> Interpretation:
             _distinct(word for gap in gaps for word in gap.words),
         )
     before = sentences[:first]
-    said = tuple(words for words in before if read_calculation(words) is None)
-    introduced = with_preference(read_discourse(said), said)
-    context = with_calculation(with_selection(introduced, said), before)
+    introduced = read_discourse(before)
+    context = with_selection(introduced, before)
     slots = candidates[0].as_mapping() if candidates else {}
     words, unread = _settled(_joined(sentences[first:last]), scene, slots)
     if unread:
@@ -137,7 +139,7 @@ def _possible_goals(scene: Scene, task: str) -> tuple[Goal, ...]:
 
 def _commands(words: Sentence) -> bool:
     """Return whether a sentence gives a command, understood or not."""
-    if words[:2] in _CALLS or read_calculation(words) is not None:
+    if words[:2] in _CALLS:
         return False
     if is_command(words) or is_negated_command(words):
         return True
@@ -167,6 +169,12 @@ def _command_gaps(sentences: tuple[Sentence, ...], first: int, last: int) -> lis
     gaps += [
         ComprehensionGap(f'does not read what follows the command: "{" ".join(words)}"')
         for words in following
+    ]
+    gaps += [
+        # Its numbers are none of the goal's.
+        ComprehensionGap(f'does not calculate: "{" ".join(words)}"')
+        for words in sentences[:first]
+        if not CALCULATIONS.isdisjoint(words)
     ]
     for words in (*negated, *(sentences[first:last] or sentences[-1:]), *following):
         gaps += find_gaps(words)

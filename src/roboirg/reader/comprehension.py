@@ -47,15 +47,16 @@ _AFTER_VERB = Phrases({
 })  # fmt: skip
 _BEFORE_UNKNOWN_VERB = BEFORE_VERB | {"you"}
 _COMPARISON = Phrases({
-    "fewer than three": r"\b(?P<word>more|fewer|less)\b(?: than \w+)?",
-    "two cubes than the difference":
+    "fewer than three": r"\b(?P<word>more|fewer|less|further)\b(?: than \w+)?",
+    "two cubes than that":
         r"\b(?<!other )(?<!rather )(?<!different )(?<!later )(?<!earlier )(?<!moment )"
         r"(?P<than>than)\b",
-    "take the difference": r"(?<!in )(?<!times )(?<!cycles )\b(?P<sum>total|sum|difference|gap)\b",
+    "take the total": r"(?<!in )(?<!times )(?<!cycles )\b(?P<sum>total)\b",
     "half as many": r"\b(?P<part>half|double|triple)\b(?: as)?(?: many| often)?",
 })  # fmt: skip
 _SWINGING = word_set("swing swinging forth")
-_DIFFERENCES = word_set("difference gap")
+CALCULATIONS = word_set("total sum difference gap")
+"""What is made of other numbers, which then say nothing about the goal."""
 _BOTH_TARGETS = Phrases(
     {
         "both targets": r"(?:target|disc)s\b",
@@ -194,10 +195,8 @@ def _locates(words: Sentence, at: int) -> bool:
     following = words[at + 1 : at + 2]
     if words[at] in ("left", "right"):
         return following == ("of",)
-    if words[at] == "between" and not (_SWINGING | _DIFFERENCES).isdisjoint(words):
-        # The way of a cube, or the difference between two numbers.
-        after = " ".join(words[at + 1 :])
-        return _BOTH_TARGETS.match(after) is None and words[at - 1] not in _DIFFERENCES
+    if words[at] == "between" and not _SWINGING.isdisjoint(words):
+        return _BOTH_TARGETS.match(" ".join(words[at + 1 :])) is None  # the way of a cube
     if words[at] in _BELOW and following == ("which",):
         return False  # the container under which the red cube is
     if words[at] in _BELOW and following in _AFTER_BELOW:

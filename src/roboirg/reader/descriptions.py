@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from typing import Literal, NamedTuple
 
-from roboirg.reader.comparisons import PlaceComparison, read_comparison
 from roboirg.reader.phrases import Phrases
 from roboirg.reader.places import NamedPlace, read_places
 from roboirg.reader.temporal_relations import Time, mentioned_times
@@ -49,7 +48,6 @@ DescriptionKind = Literal[
     "place",
     "introduced",
     "introduced place",
-    "compared",
     "remaining",
 ]
 
@@ -61,13 +59,12 @@ class Description(NamedTuple):
         kind: ``any`` describes nothing; ``color`` names a color; ``not`` excludes colors; ``other``
             is the remaining one of some colors; ``place`` names a place; ``introduced`` and
             ``introduced place`` point at an earlier color or place; ``remaining`` is the other one
-            of two introduced ones; ``compared`` is the foremost one of those that ``not`` leaves.
+            of two introduced ones.
         colors: named colors; empty if the words point at those of the context.
         excluded: for ``other``, the excluded color; None if the words only point at it.
         place: the named place.
         times: whether the place is the one before or after things move.
         position: index of the introduced value; None for any of them.
-        comparison: for ``compared``, the order.
     """
 
     kind: DescriptionKind
@@ -76,7 +73,6 @@ class Description(NamedTuple):
     place: NamedPlace | None = None
     times: frozenset[Time] = frozenset()
     position: int | None = None
-    comparison: PlaceComparison | None = None
 
 
 _THAN = Phrases(
@@ -115,9 +111,6 @@ def describe(words: Sentence) -> Description:
     """Return the description that the words for one thing give."""
     text = " ".join(words)
     colors = colors_in(words)
-    comparison = read_comparison(text)
-    if comparison is not None and (not colors or _THAN.search(text)):
-        return Description("compared", colors, comparison=comparison)
     places = read_places(words)
     if places:
         return Description("place", place=places[0], times=mentioned_times(text))

@@ -69,8 +69,6 @@ _READ_ELSEWHERE = Phrases({
     "Put it where it was at whichever of the two I did not choose.":
         r"\bwhichever\b.*?\bnot\b",
     "Do not forget to press the button.": rf"\bnot {_REMARK}",
-    "Put it where it was at the moment she did not choose.":
-        r"\b(?:she|he) (?:would|did|does) not\b",
     "Stop the cube on visit no 3.": rf"\b(?:visit|pass|placement|time|stay|number) no {NUMBER}\b",
     "Take a cube of any color except red.":
         r"\b(?:color|cube|one|box|tape) (?:except|apart from|outside)\b"

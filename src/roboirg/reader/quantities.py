@@ -5,7 +5,7 @@ from __future__ import annotations
 import functools
 import re
 from collections.abc import Callable, Iterable
-from typing import Literal, NamedTuple
+from typing import NamedTuple
 
 from roboirg.reader.phrases import Phrases
 from roboirg.reader.tokens import COLOR, NUMBER, THING, THINGS, Sentence, number_of
@@ -14,20 +14,15 @@ _CONCEIVABLE = range(1, 11)
 """The values that a quantity may have if no text introduces it."""
 
 
-Combination = Literal["total", "difference"]
-
-
 class CountExpression(NamedTuple):
     """The number ``factor * quantity + offset``; the context gives a missing quantity.
 
-    With a combination, the missing quantity is the total or difference of two introduced numbers;
-    a remaining one is the other of two.
+    A remaining one is the other of two.
     """
 
     factor: float = 1.0
     offset: int = 0
     quantity: int | None = None
-    combination: Combination | None = None
     remaining: bool = False
 
     @property
@@ -40,10 +35,6 @@ class CountExpression(NamedTuple):
         quantities = [self.quantity] if self.quantity is not None else list(introduced)
         if not quantities and not self.derived:
             return None
-        if self.combination is not None and quantities:
-            first, *others = quantities
-            total, difference = sum(quantities), abs(first - sum(others))
-            quantities = [total if self.combination == "total" else difference]
         results = [self.factor * one + self.offset for one in quantities or _CONCEIVABLE]
         return {int(result) for result in results if result.is_integer()}
 
@@ -58,11 +49,7 @@ class Quantity(NamedTuple):
 
 
 _NOUNS = rf"(?: (?:times?|{THING}|{THINGS}|ones?|visits?|{COLOR}|such|of|the|them))"
-_TO = (
-    r"(?:(?:the|their|that|this) (?:combined )?(?P<combined>total|sum|difference|gap)\b"
-    rf"(?: between them| (?:of|between) (?P<left>{NUMBER}) and (?P<right>{NUMBER}))?"
-    rf"|(?P<quantity>that|it|this|the(?! (?:target|disc|video|button|left|right)\b)|{NUMBER})\b)"
-)
+_TO = rf"(?P<quantity>that|it|this|the(?! (?:target|disc|video|button|left|right)\b)|{NUMBER})\b"
 _MORE = "more|larger|greater|higher|bigger|above|over"
 _LESS = "fewer|less|smaller|lower|below|under"
 _STEP = Phrases({
@@ -113,7 +100,6 @@ _SINGLE = Phrases({
         r"(?<!\bas )(?<!\bthan )(?<!\bto )(?<!\bfrom )(?<!\bof )(?<!\bhides )(?<!\bover )"
         rf"\b(?:an?|the)(?: single)? (?={COLOR} (?:{THING}|one)\b)",
 })  # fmt: skip
-_TOTALS = ("total", "sum")
 _FACTORS = {"twice": 2.0, "double": 2.0, "thrice": 3.0, "triple": 3.0, "half": 0.5}
 ADVERBS = {"once": 1, "twice": 2, "thrice": 3}
 """Numbers of repetitions in one word."""
@@ -134,16 +120,8 @@ def _scaled(found: re.Match[str]) -> CountExpression:
 
 
 def _expression(found: re.Match[str], *, factor: float = 1.0, offset: int = 0) -> CountExpression:
-    """Return the expression for a quantity that a text names, points at, or combines."""
-    words = found.groupdict()
-    combined = words.get("combined")
-    if combined is None:
-        return CountExpression(factor, offset, number_of(words["quantity"]))
-    way: Combination = "total" if combined in _TOTALS else "difference"
-    left, right = number_of(words["left"] or ""), number_of(words["right"] or "")
-    if left is None or right is None:
-        return CountExpression(factor, offset, combination=way)
-    return CountExpression(factor, offset, left + right if way == "total" else abs(left - right))
+    """Return the expression for a quantity that a text names or points at."""
+    return CountExpression(factor, offset, number_of(found["quantity"]))
 
 
 _DERIVED: tuple[Reading, ...] = ((_STEP, _stepped, False), (_PLUS, _stepped, False),

@@ -8,7 +8,6 @@ from typing import TypeVar
 from roboirg.core.episode import ObjectKind, Scene
 from roboirg.core.motions import Shuttle
 from roboirg.reader.command import Item
-from roboirg.reader.comparisons import compared_colors
 from roboirg.reader.descriptions import Description
 from roboirg.reader.discourse_context import DiscourseContext
 from roboirg.reader.object_positions import objects_at
@@ -163,10 +162,6 @@ class ReferenceResolver:
 
     def _derived(self, thing: Description) -> set[str] | None:
         named = set(thing.colors or self._context.colors)
-        if thing.comparison is not None:
-            if not named:
-                self._complain("the excluded color")
-            return compared_colors(thing.comparison, self._scene, named)
         if thing.kind == "not":
             if not named:
                 self._complain("the excluded colors")

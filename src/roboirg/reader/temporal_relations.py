@@ -36,7 +36,6 @@ NOT_THAT = r"\bnot (?:at |in )?(?:that|this|it|the one|the moment|when)\b(?! pai
 """A regular expression for ``not at that moment``."""
 NOT_NAMED = r"\bnot (?:the |one |right |just |moment |at |directly )*(before|after)\b"
 """A regular expression for ``not the one right before the press``; a group has the moment."""
-_LEAVE = r"(?:skip|give up|gave up|leave out|left out|drop|trade|trade away)\b"
 _OTHER = Phrases({
     "at the other of the two moments":
         r"(?<!\bcolor )(?<!\bthem )(?<!\btwo )\bother (?:one |moment )?"
@@ -46,16 +45,12 @@ _OTHER = Phrases({
         r"\b(?:at|in|during) the other one\b",
     "not at that moment": NOT_THAT,
     "at whichever he would not choose": r"\bwhichever\b.*\bnot\b",
-    "at the moment she would skip":
-        r"\bthe moment s?he (?:(?:would|did|does) not"
-        rf"(?! {_LEAVE})|(?:would )?(?:{_LEAVE}|miss out))\b",
 })  # fmt: skip
 _NOT = Phrases({"when it was not before but after the press": NOT_NAMED})
 _POINTER = Phrases({
     "at that very moment":
         r"\b(?:that|this|the same) (?:very )?(?:moment|time|point|instant|part|placement|one)\b",
-    "at the moment of her choice": r"\bthe moment (?:i|s?he|of (?:her|his) choice)\b",
-    "at his favorite moment": r"\b(?:her|his) (?:favorite|preferred) moment\b",
+    "at the moment I chose": r"\bthe moment i\b",
     "where it was then": r"\bthen\b(?! (?:press|take|put|place|set|to|go|pick|lift|push)\b)",
 })  # fmt: skip
 

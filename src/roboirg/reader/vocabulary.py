@@ -55,7 +55,7 @@ _NOUNS = word_set(
     "table robot video camera picture beginning start outset end pair couple color colors amount "
     "place places spot position location press presses swaps swap order way hand mind "
     "neighbor neighbors action actions motion motions movement task process steps sequence "
-    "demonstration side total whole object objects cycle cycles sum difference gap exact "
+    "demonstration side total whole object objects cycle cycles exact "
     "desired agreed"
 )
 _PRONOUNS = word_set(
@@ -65,7 +65,7 @@ _PRONOUNS = word_set(
 _VERB_FORMS = word_set(
     "trade asked decided settled selected opted favor favorite own special prefers skip give gave "
     "choice left pick "
-    "combined remaining named mentioned spoke others new distinct alternative separate "
+    "remaining named mentioned spoke others new distinct alternative separate "
     "is are was were be been am do does did done has had have stops stopped hides hid hidden "
     "covers covered picked lifted raised placed moved moves pressed presses swapped changed "
     "exchanged shuffled started began stands stood happened showed shown saw seen went goes go "
@@ -78,7 +78,7 @@ _VERB_FORMS = word_set(
     "  recalling returns returned according based initial original correct"
 )
 _COMPARISONS = word_set(
-    "nearer closer farther further away "
+    "further away "
     "many often much more less fewer larger greater higher bigger smaller lower than as half "
     "double triple thrice twice once plus minus different unlike differs other except apart "
     "outside neither either former latter last final next very previous following preceding "
