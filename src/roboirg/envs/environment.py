@@ -385,9 +385,6 @@ class RoboIRGEnv(gymnasium.Env[dict[str, Any], NDArray[np.floating[Any]]]):
             demonstration: whether the step belongs to the video.
         """
         self._current.after_step(stage)
-        self._call_hook(demonstration=demonstration)
-
-    def _call_hook(self, *, demonstration: bool) -> None:
         due = self.session.world.elapsed % self._hook_period == 0
         if self._frame_hook is not None and (due or self.status != "ongoing"):
             self._frame_hook(self, demonstration)
