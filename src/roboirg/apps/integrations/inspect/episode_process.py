@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from roboirg.core.errors import PolicyConnectionError
 from roboirg.evaluation.records.record import Job
 from roboirg.evaluation.records.record_codec import encode
+from roboirg.policies.by_name.policy_specs import PRIVILEGED
 from roboirg.policies.vlm.models import ModelOptions, ModelQuery, ModelReply
 from roboirg.policies.vlm.models.openai_compatible import chat_messages
 from roboirg.policies.vlm.vlm_listener import ListenerOptions, VLMListener
@@ -81,4 +82,4 @@ def play(pipe: Pipe, job: Job, options: ListenerOptions) -> None:
     pipe.send(encode(record).decode())
 
 
-SPEC = f"{PipedListener.__module__}:{PipedListener.__name__}"
+SPEC = f"{PRIVILEGED}{PipedListener.__module__}:{PipedListener.__name__}"
