@@ -40,7 +40,7 @@ def plan(
     ] = 50,
     seed: Annotated[int, typer.Option(help="Random seed of the trial order.")] = 0,
 ) -> None:
-    """Plan a study: write plan.json, CSV files, plans for the simulated twin, a sheet to print.
+    """Plan a study: write plan.json, CSV files, plans for the twin, and a sheet to print.
 
     Example: roboirg real plan --policy my_policy:MyPolicy --out study
     """
