@@ -1,1 +1,1 @@
-"""Pages and their servers: connections, requests, keys and what the pages share."""
+"""Pages and their servers: connections, requests, keys and templates."""

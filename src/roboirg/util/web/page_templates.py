@@ -1,4 +1,4 @@
-"""Templates of pages, read from a package's folder ``templates``, and what all pages share."""
+"""Templates of pages, read from a package's folder ``templates``."""
 
 from __future__ import annotations
 
@@ -9,18 +9,13 @@ from roboirg.core.extras import extra_needed
 if TYPE_CHECKING:
     import jinja2
 
-_SHARED = "roboirg.util.web"
-
 
 def template_environment(package: str) -> jinja2.Environment:
-    """Return the environment of a package's templates: all that is filled in is escaped.
-
-    A style or script that the package lacks is the one that all pages share.
-    """
+    """Return the environment of a package's templates: all that is filled in is escaped."""
     import jinja2
 
     return jinja2.Environment(
-        loader=jinja2.ChoiceLoader([jinja2.PackageLoader(one) for one in (package, _SHARED)]),
+        loader=jinja2.PackageLoader(package),
         autoescape=True,
         undefined=jinja2.StrictUndefined,
         trim_blocks=True,
