@@ -92,7 +92,7 @@ def pack_run(folder: Path, out: Path, *, videos: bool = False, logs: bool = Fals
         package_version=__version__,
         records=len(entries),
         policies=tuple(sorted({one.policy for one in entries})),
-        files={name: file_hash(path) for name, path in paths.items()},
+        files={name: _file_hash(path) for name, path in paths.items()},
     )
     with replacing(out) as part, zipfile.ZipFile(part, "w", zipfile.ZIP_DEFLATED) as archive:
         archive.writestr(zipfile.ZipInfo(MANIFEST, _EPOCH), manifest.model_dump_json(indent=1))
@@ -179,7 +179,7 @@ def _safe(name: str, path: Path) -> str:
     return name
 
 
-def file_hash(path: Path) -> str:
+def _file_hash(path: Path) -> str:
     """Return the SHA-256 of a file, in hexadecimal.
 
     Raises:

@@ -38,11 +38,8 @@ def read_plans(folder: Path) -> tuple[Plan, ...]:
     That is the newest, or in a merged run those of its parts.
     """
     newest = read_plan(folder)
-    return read_earlier_plans(folder) if newest is None else (newest,)
-
-
-def read_earlier_plans(folder: Path) -> tuple[Plan, ...]:
-    """Return the plans of earlier commands, or of merged runs, that can be read."""
+    if newest is not None:
+        return (newest,)
     found = map(_parse, _stored(earlier_plans(folder)))
     return tuple(plan for plan in found if plan is not None)
 

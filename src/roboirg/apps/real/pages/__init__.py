@@ -1,1 +1,1 @@
-"""Pages for operators and readers: the score page, printed sheets and figures."""
+"""Pages for operators: the score page and printed sheets."""

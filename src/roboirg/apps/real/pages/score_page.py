@@ -12,7 +12,7 @@ from roboirg.apps.real.study.study_plan import PlannedTrial
 from roboirg.apps.real.study.trial_log import SUCCESS, VOID_CHOICE, TrialLog, trial_metadata
 from roboirg.apps.real.study.trial_text import describe_positions, explicit_command, spoken_turns
 from roboirg.evaluation.records.record import Record
-from roboirg.util.web.page_templates import check_page_support, template_environment
+from roboirg.util.web.page_templates import template_environment
 
 if TYPE_CHECKING:
     import jinja2
@@ -121,7 +121,6 @@ def _present_choice(trial: PlannedTrial, record: Record | None, state: str) -> s
 
 @functools.cache
 def _template() -> jinja2.Template:
-    check_page_support("The page")
     from markupsafe import Markup
 
     def svg(text: str) -> Markup:

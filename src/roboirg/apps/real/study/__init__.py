@@ -1,1 +1,1 @@
-"""Plan and run a study, and log its trials."""
+"""Plan a study, and log its trials."""

@@ -124,7 +124,7 @@ class TrialLog:
         )
         changes: dict[str, Any] = {
             "outcome": "success", "error": None, "cause": None, "attribution": None,
-            "video": video or base.video, "details": None,
+            "video": video or base.video,
         }  # fmt: skip
         if choice == VOID_CHOICE:
             cause = f"{VOID}; {note}" if note else VOID
