@@ -238,20 +238,6 @@ def test_errors_are_told_and_are_exit_code_2(
     assert roboirg(*command).code == 0
 
 
-def test_missing_graphics_are_one_sentence(
-    roboirg, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    from roboirg.core.errors import RenderDeviceError
-
-    def fail(_self: CannedPlayer, _job: Job) -> None:
-        raise RenderDeviceError("No Vulkan device can render; install Mesa.")
-
-    monkeypatch.setattr("roboirg.evaluation.run.runner.EpisodeRunner", CannedPlayer)
-    monkeypatch.setattr(CannedPlayer, "__call__", fail)
-    said = roboirg(*RUN, "--workers", "0", "--out", tmp_path)
-    assert (said.code, said.err) == (2, "roboirg: No Vulkan device can render; install Mesa.\n")
-
-
 @pytest.mark.usefixtures("canned", "in_this_process")
 def test_the_demo_plays_three_policies(roboirg, tmp_path: Path) -> None:
     said = roboirg("run", "--plan", "demo", "--video", "off", "--out", tmp_path)

@@ -5,14 +5,12 @@ from __future__ import annotations
 import os
 import sys
 import time
-from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from roboirg.evaluation.hosting.host_pool import HostSettings
 from roboirg.evaluation.plan.plan import Plan
 from roboirg.evaluation.play import rollout
 from roboirg.evaluation.play.job_instruction import instruct_job
@@ -203,8 +201,6 @@ def paper_runner(plan: Plan, folder: Path, seconds: float = 0.0) -> PaperRunner:
         notes=folder,
     )
 
-
-Make = Callable[[HostSettings | None], PaperRunner]
 
 if __name__ == "__main__":
     out, count = Path(sys.argv[1]), int(sys.argv[2])

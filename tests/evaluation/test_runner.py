@@ -156,11 +156,6 @@ def test_a_folder_may_get_more_and_fewer_jobs(tmp_path: Path) -> None:
     assert read_plan(tmp_path) == small_plan(1)
 
 
-def test_a_second_run_in_the_same_folder_is_refused(tmp_path: Path) -> None:
-    with RecordStore(tmp_path), pytest.raises(StoreError, match="being written by another run"):
-        run_plan(small_plan(), tmp_path, FakePlay(), InProcess())
-
-
 def test_words_of_two_versions_are_not_mixed(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

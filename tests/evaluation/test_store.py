@@ -21,7 +21,9 @@ from roboirg.evaluation.records.store import (
     TORN_FILE,
     RecordStore,
     iterate_records,
+    read_index,
     read_records,
+    read_results,
 )
 from roboirg.util.atomic_write import write_atomically
 
@@ -152,8 +154,9 @@ def test_a_line_that_is_no_record_is_told_with_its_number(
     tmp_path: Path, line: bytes, sentence: str
 ) -> None:
     (tmp_path / RECORDS_FILE).write_bytes(line + b"\n")
-    with pytest.raises(StoreError, match=sentence):
-        read_records(tmp_path)
+    for read in (read_records, read_results, read_index):
+        with pytest.raises(StoreError, match=sentence):
+            read(tmp_path)
 
 
 def test_the_newest_record_of_a_job_wins(tmp_path: Path) -> None:

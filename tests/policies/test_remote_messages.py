@@ -15,7 +15,7 @@ from roboirg.policies import Policy, make_policy
 from roboirg.policies.contract.base import SubgoalFollower
 
 CAPTURES = Path(__file__).with_name("captures")
-NOW, LATER, LATEST = moment(3, history=()), moment(4), moment(5, history=(moment(4), moment(5)))
+NOW, LATEST = moment(3, history=()), moment(5, history=(moment(4), moment(5)))
 
 
 def captured(protocol):

@@ -185,8 +185,6 @@ def test_other_options_and_folders_are_refused(tmp_path, export, make_plan, monk
 
 
 def test_plans_that_make_no_sense_are_refused(make_plan):
-    with pytest.raises(UnknownNameError, match=r"Did you mean 'lerobot-v3'\?"):
-        make_plan(format="lerobot-v4")
     with pytest.raises(InvalidValueError, match="variations is 0; it must be at least 1"):
         make_plan(variations=0)
     with pytest.raises(
@@ -197,14 +195,10 @@ def test_plans_that_make_no_sense_are_refused(make_plan):
         make_plan(language_columns=True, format="lerobot-v2.1")
     with pytest.raises(InvalidValueError, match="holds lossless pictures"):
         make_plan(format="robomme-hdf5", pictures="lossy-video")
-    with pytest.raises(InvalidValueError, match="size is 95; it must be an even number from 16"):
-        make_plan(size=95)
     with pytest.raises(InvalidValueError, match="size is 8; it must be an even number from 16"):
         make_plan(size=8)
     with pytest.raises(InvalidValueError, match="cameras is empty; without pictures, ask for"):
         make_plan(cameras=())
-    with pytest.raises(UnknownNameError, match=r"Did you mean 'wrist'\?"):
-        make_plan(cameras=("wrists",))
     with pytest.raises(InvalidValueError, match="only the oracle is disturbed"):
         make_plan(disturbed=True, policy="random")
     with pytest.raises(InvalidValueError, match="no place for one that was not executed"):

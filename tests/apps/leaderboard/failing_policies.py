@@ -46,6 +46,16 @@ class Failing:
         self._maybe("close")
 
 
+class Posing(Failing):
+    """Moves the tool, and raises after some answers."""
+
+    actions, at = "ee_pose", 3
+
+    def act(self, observation):
+        self._maybe("act")
+        return np.append(observation["end_effector"] + 0.001, 1.0)
+
+
 def _exit(self):
     raise SystemExit(3)
 
@@ -103,7 +113,7 @@ IN_PROCESS = [
 ] + [
     _failing(f"{fail.__name__.strip('_').title()}_{at}", fail=fail, at=at)
     for fail in (_exit, _nan, _narrow, _text, _empty, _beyond, _half) for at in (1, 2)
-]  # fmt: skip
+] + ["Posing"]  # fmt: skip
 HOSTED = [
     _failing(f"{fail.__name__.strip('_').title()}_{when}", fail=fail, when=when)
     for fail in (_die, _kill, _sleep) for when in ("reset", "act")

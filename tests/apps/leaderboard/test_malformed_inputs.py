@@ -13,10 +13,9 @@ import json
 import os
 import re
 import shutil
-import signal
 import struct
 import zipfile
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -46,8 +45,6 @@ from roboirg.language.wordings.wording_file import read_wordings
 
 CANARY = "canary of another folder"
 LONGEST_MESSAGE = 1_500
-PATIENCE_S = 600
-"""Far more than any of these takes; a reader that blocks on a pipe would never end."""
 
 Change = Callable[[Path], object]
 Reader = Callable[[Path], object]
@@ -83,18 +80,6 @@ def honest(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def run(honest: Path, tmp_path: Path) -> Path:
     (tmp_path / "secret.txt").write_text(CANARY)
     return Path(shutil.copytree(honest, tmp_path / "run"))
-
-
-@pytest.fixture(autouse=True)
-def _patience() -> Iterator[None]:
-    def stop(*_: object) -> None:
-        raise AssertionError("the reader blocks")
-
-    before = signal.signal(signal.SIGALRM, stop)
-    signal.alarm(PATIENCE_S)
-    yield
-    signal.alarm(0)
-    signal.signal(signal.SIGALRM, before)
 
 
 def pack(run: Path) -> Path:

@@ -22,16 +22,6 @@ def planted(check, words, verdict=WARN):
     return note
 
 
-@planted("reset forgets", "differs by up to", FAIL)
-class KeepsMemory(Honest):
-    total = 0.0
-
-    def reset(self, instruction, demonstration):
-        super().reset(instruction, demonstration)
-        self.total += 1e-3
-        self.memory += self.total * 1e5
-
-
 @planted("reset forgets", "a queue of actions outlives the episode", FAIL)
 class KeepsQueue(OneByOne):
     def __init__(self, seed=0):
@@ -58,12 +48,6 @@ class InvertsGripper(Honest):
 class GripperFromZero(Honest):
     def gripper(self, observation):
         return (super().gripper(observation) + 1) / 2
-
-
-@planted("gripper", "stretch the range")
-class GripperInMeters(Honest):
-    def gripper(self, observation):
-        return 0.04 * (super().gripper(observation) > 0)
 
 
 def results_of(kind, **options):
