@@ -96,7 +96,7 @@ def too_long_text(audit: PromptAudit, verdict: PromptVerdict) -> str | None:
         return None
     return (
         f"the instruction needs {audit.needed_text} tokens, but the policy's model reads "
-        f"{audit.limit}; --long-prompts send plays the episode anyway"
+        f"{audit.limit}; long_prompts: send in the plan plays the episode anyway"
     )
 
 
