@@ -11,15 +11,14 @@ from typing import Annotated
 
 import seed_selection
 import typer
-from seed_summary import follow_progress, print_summary
 
 from roboirg.cli.options import Tasks, Workers
+from roboirg.cli.progress_bar import progress_bars
 from roboirg.core.errors import InvalidValueError, RoboIRGError
 from roboirg.evaluation.plan.option_parsing import parse_names, parse_splits
 from roboirg.tasks import find_tasks
 from roboirg.tasks.splits import splits
 from roboirg.util.atomic_write import write_atomically
-from roboirg.util.console_width import progress_console
 from roboirg.util.processor import core_count
 
 
@@ -36,10 +35,15 @@ def build_splits(
     if out is not None and not Path(out).parent.is_dir():
         raise InvalidValueError(f"There is no folder for {out!r}; create it first.")
     slots = seed_selection.episode_slots(names, wanted)
-    console = progress_console(stderr=True)
     count = core_count() if workers is None else workers
-    found = follow_progress(seed_selection.find_seeds(slots, count), slots)
-    print_summary(found, console)
+    found: list[seed_selection.SelectedSeed] = []
+    with progress_bars() as report:
+        for one in seed_selection.find_seeds(slots, count):
+            found.append(one)
+            report("episodes", len(found), len(slots), one.slot.key)
+    for one in found:
+        for seed, reason, cause in one.rejections:
+            typer.echo(f"{one.slot.key}: seed {seed} is rejected, {reason}: {cause}", err=True)
     text = splits.splits_text(seed_selection.merge_splits(names, found, splits.shipped_splits()))
     if out is None:
         typer.echo(text, nl=False)

@@ -1,4 +1,4 @@
-"""Print the figures of the package's layout, read from its imports.
+"""The package's layout, read from its imports.
 
 A room is a folder or module at the top of `src/roboirg`; an arrow says that one room imports
 another, at any level of nesting. Inside a room, an import runs back up where folders or files
@@ -17,8 +17,6 @@ from typing import NamedTuple
 ROOT = Path(__file__).parents[1]
 PACKAGE = ROOT / "src" / "roboirg"
 APPS = "roboirg.apps"
-SMALL = 50
-"""Lines below which a module is counted as small."""
 
 Graph = Mapping[str, Iterable[str]]
 
@@ -193,40 +191,3 @@ def floors(graph: Graph) -> dict[str, int]:
     for node in graph:
         floor(node)
     return found
-
-
-def lines_of(module: str) -> int:
-    """Return the number of lines of a module."""
-    return modules()[module].read_text(encoding="utf-8").count("\n")
-
-
-def figures() -> dict[str, int]:
-    """Return the figures of the layout by what they count."""
-    sizes = {name: lines_of(name) for name, path in modules().items()}
-    return {
-        "rooms": len(arrows()),
-        "arrows between rooms": sum(map(len, arrows().values())),
-        "circles of rooms": len(circles(arrows())),
-        "circles of files": len(file_circles()),
-        "imports back up inside rooms": len(imports_back_up()),
-        "importers of applications": len(importers_of_applications()),
-        "imports between applications": len(imports_between_applications()),
-        "files": len(sizes),
-        f"files under {SMALL} lines": sum(
-            size < SMALL for name, size in sizes.items() if modules()[name].name != "__init__.py"
-        ),
-        "lines": sum(sizes.values()),
-        "lines without applications": sum(
-            size for name, size in sizes.items() if not _within(name, APPS)
-        ),
-    }
-
-
-def main() -> None:
-    """Print the figures."""
-    for name, count in figures().items():
-        print(f"{count:>7,} {name}")
-
-
-if __name__ == "__main__":
-    main()

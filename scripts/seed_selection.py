@@ -32,7 +32,6 @@ from roboirg.tasks.splits.splits import (
 from roboirg.util.parallel_map import parallel_map
 
 Reason = Literal["no room", "not expressible", "oracle failed"]
-REASONS: tuple[Reason, ...] = ("no room", "not expressible", "oracle failed")
 
 
 class Rejection(NamedTuple):

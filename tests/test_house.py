@@ -131,7 +131,6 @@ def test_circles_are_found():
 
 
 def test_rooms_and_arrows_are_few():
-    print("\n".join(f"{n:>7,} {name}" for name, n in layout.figures().items()))  # noqa: T201
     assert len(layout.arrows()) <= MOST_ROOMS, sorted(layout.arrows())
     assert sum(map(len, layout.arrows().values())) <= MOST_ARROWS, {
         room: sorted(others) for room, others in layout.arrows().items()
