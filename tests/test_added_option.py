@@ -20,7 +20,8 @@ CHANGES = {
             "    delivery: Name = field(",
             (
                 "    greeting: Name = field(\n"
-                '        default="none", metadata=_help("hello: the robot is greeted; or none.")\n'
+                '        default="none",\n'
+                '        metadata=described("hello: the robot is greeted; or none."),\n'
                 "    )\n"
                 "    delivery: Name = field("
             ),

@@ -17,10 +17,10 @@ from selection import slow_but
 
 import roboirg
 from roboirg.core.actions import ACTION_SPACES
+from roboirg.core.environment_options import ENVIRONMENT_OPTIONS
 from roboirg.core.errors import InvalidActionError, InvalidValueError, UnknownNameError
 from roboirg.core.instruction_options import OPTION_NAMES, InstructionOptions
-from roboirg.envs.env_options import EnvOptions
-from roboirg.envs.env_settings import EnvSettings
+from roboirg.envs.env_settings import EnvOptions, EnvSettings
 from roboirg.envs.environment import RoboIRGEnv
 from roboirg.envs.registration import environment_id
 from roboirg.evaluation.play.job_instruction import PreparedJob
@@ -161,10 +161,12 @@ def test_subgoals_change_one_step_after_their_stage_and_only_pointing_ones_are_g
 
 def test_make_is_typed_with_the_options_of_the_environment():
     typed = {name: hint.__forward_arg__ for name, hint in EnvOptions.__annotations__.items()}
-    own = {name: hint for name, hint in typed.items() if name not in OPTION_NAMES}
+    shared = {*OPTION_NAMES, *ENVIRONMENT_OPTIONS}
+    own = {name: hint for name, hint in typed.items() if name not in shared}
     settings = {option.name: option.type for option in dataclasses.fields(EnvSettings)}
-    assert own == {name: hint for name, hint in settings.items() if name != "words"}
-    assert typed.keys() == {*own, *OPTION_NAMES}
+    nested = ("words", "environment")
+    assert own == {name: hint for name, hint in settings.items() if name not in nested}
+    assert typed.keys() == {*own, *shared}
     documented = inspect.getdoc(roboirg.make).partition("Keyword Args:")[2].partition("Raises:")[0]
     assert re.findall(r"^    (\w+): ", documented, re.MULTILINE) == list(own)
     for made in (roboirg.make, RoboIRGEnv):

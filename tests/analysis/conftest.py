@@ -8,8 +8,9 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
+from flat_jobs import nested
 
-from roboirg.core.instruction_options import OPTION_NAMES, InstructionOptions
+from roboirg.core.instruction_options import InstructionOptions
 from roboirg.evaluation.analysis.published import TRIALS, published_rows
 from roboirg.evaluation.records.record import Summary
 
@@ -17,7 +18,7 @@ MakeResult = Callable[..., Summary]
 
 
 def make_result(outcome: str = "success", episode: int = 0, **fields: object) -> Summary:
-    usual = {
+    usual = nested(**{
         "policy": "listener",
         "task": "PickXtimes",
         "split": "test",
@@ -30,10 +31,8 @@ def make_result(outcome: str = "success", episode: int = 0, **fields: object) ->
         "started_at": "now",
         "duration_s": 0.0,
         **fields,
-    }
+    })  # fmt: skip
     error = {"error": "policy"} if outcome == "error" else {}
-    words = {name: usual.pop(name) for name in OPTION_NAMES if name in usual}
-    usual.setdefault("options", InstructionOptions(**words))  # type: ignore[arg-type]
     return Summary(outcome=outcome, episode=episode, **error, **usual)  # type: ignore[arg-type]
 
 

@@ -10,8 +10,8 @@ from types import SimpleNamespace
 import msgspec
 import numpy as np
 import pytest
+from flat_jobs import job_of
 
-from roboirg.core.instruction_options import InstructionOptions, split_options
 from roboirg.evaluation.analysis.stats.chance import CHANCE, FLOORS, floor_level
 from roboirg.evaluation.play.job_instruction import instruct_job
 from roboirg.evaluation.records.record import Job
@@ -27,9 +27,8 @@ DOCS = Path(__file__).parents[2] / "docs" / "statistics.md"
 
 
 def job(task: str, setting: str, episode: int = 2, **fields: object) -> Job:
-    words, others = split_options({"setting": setting, **fields})
-    usual = {"policy": "any", "split": "test", **others}
-    return Job(task=task, episode=episode, **usual, options=InstructionOptions(**words))  # type: ignore[arg-type]
+    usual = {"policy": "any", "split": "test", **fields}
+    return job_of(task=task, setting=setting, episode=episode, **usual)
 
 
 @pytest.mark.parametrize("task", all_tasks())

@@ -9,6 +9,7 @@ from pathlib import Path
 import own_planners
 import pytest
 
+from roboirg.core.environment_options import EnvironmentOptions
 from roboirg.core.errors import InvalidValueError
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.evaluation.hosting.host_pool import HostPool, HostSettings
@@ -25,7 +26,8 @@ def _can_be_imported(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def job_of(spec: str) -> Job:
-    return Job(policy=spec, task="VideoUnmask", split="test", episode=0, max_steps=60,
+    return Job(policy=spec, task="VideoUnmask", split="test", episode=0,
+              environment=EnvironmentOptions(60),
               options=InstructionOptions("explicit"))  # fmt: skip
 
 

@@ -9,6 +9,7 @@ import pytest
 from evaluation_fakes import FakePlay, small_plan
 from msgspec.structs import replace
 
+from roboirg.core.environment_options import ENVIRONMENT_OPTIONS, EnvironmentOptions
 from roboirg.core.errors import InvalidValueError
 from roboirg.core.instruction_options import OPTION_NAMES
 from roboirg.evaluation.records.parquet import write_parquet
@@ -21,7 +22,7 @@ def test_a_table_holds_every_field_of_every_record(tmp_path: Path) -> None:
     records[0] = replace(
         records[0],
         attribution=why,
-        demonstration_frames=4,
+        environment=EnvironmentOptions(demonstration_frames=4),
         usage={"calls": 2.0},
         error="connection",
     )
@@ -32,8 +33,8 @@ def test_a_table_holds_every_field_of_every_record(tmp_path: Path) -> None:
     path = tmp_path / "records.parquet"
     assert write_parquet(iter(records), path) == len(records)
     table = pd.read_parquet(path)
-    fields = [name for name in Record.__struct_fields__ if name != "options"]
-    assert set(table.columns) == {*fields, *OPTION_NAMES}
+    fields = {*Record.__struct_fields__} - {"options", "environment"}
+    assert set(table.columns) == {*fields, *OPTION_NAMES, *ENVIRONMENT_OPTIONS}
     for row, record in zip(table.to_dict("records"), records, strict=True):
         assert (row["policy"], row["episode"], row["outcome"]) == (
             record.policy,

@@ -10,13 +10,13 @@ from pathlib import Path
 
 import msgspec
 import pytest
+from flat_jobs import job_of
 from plan_files import plan_file
 from rich.console import Console
 from typer.testing import CliRunner
 
 from roboirg import main
 from roboirg.core.errors import UnknownNameError
-from roboirg.core.instruction_options import InstructionOptions, split_options
 from roboirg.evaluation.analysis.stats.cells import PolicyRun
 from roboirg.evaluation.analysis.stats.heard_rates import count_heard
 from roboirg.evaluation.analysis.tables.run_tables import make_run_tables, print_run_tables
@@ -46,8 +46,7 @@ LONG = {"setting": "contextual", "distractors": 16}
 
 def job(**fields: object) -> Job:
     usual = {"policy": "p", "task": "PickXtimes", "split": "test", "episode": 0}
-    words, others = split_options({**usual, "setting": "direct", **fields})
-    return Job(**others, options=InstructionOptions(**words))
+    return job_of(**{**usual, "setting": "direct", **fields})
 
 
 def test_no_system_of_the_paper_cuts_an_instruction_of_the_papers_plan() -> None:

@@ -11,6 +11,7 @@ import pytest
 from evaluation_fakes import FakePlay, small_plan
 from msgspec.structs import replace
 
+from roboirg.core.environment_options import EnvironmentOptions
 from roboirg.evaluation.records.record import Job, Summary
 from roboirg.evaluation.records.record_codec import encode, identity_key
 from roboirg.evaluation.records.store import (
@@ -55,7 +56,8 @@ def test_the_index_knows_a_job_by_all_its_fields() -> None:
     assert identity_key(job.with_options(stages=(1, 5))) != identity_key(job)
     others = {"demonstration_frames": 4, "actions": "ee_pose", "meshes": "light"}
     for name, value in others.items():
-        assert identity_key(replace(job, **{name: value})) != identity_key(job)
+        other = replace(job, environment=EnvironmentOptions(**{name: value}))
+        assert identity_key(other) != identity_key(job)
     assert identity_key(replace(job, spec="openpi://elsewhere")) == identity_key(job)
 
 

@@ -13,6 +13,7 @@ import pytest
 from evaluation_fakes import comparable
 from msgspec.structs import replace
 
+from roboirg.core.environment_options import EnvironmentOptions
 from roboirg.core.errors import (
     InvalidActionError,
     MissingDependencyError,
@@ -146,7 +147,7 @@ def test_all_rows_are_played_until_the_end(stage: Callable[..., RolloutResult]) 
 def test_a_record_holds_what_the_job_prescribes_instead_of_the_policy(
     stage: Callable[..., RolloutResult],
 ) -> None:
-    job = replace(JOB, demonstration_frames=4)
+    job = replace(JOB, environment=EnvironmentOptions(demonstration_frames=4))
     needs = stage(PaperWorld(), PaperPolicy(), job).needs
     assert (needs["demonstration_frames"], needs["cameras"]) == (4, [])
 

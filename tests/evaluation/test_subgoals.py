@@ -12,6 +12,7 @@ from page_text import render
 from typer.testing import CliRunner
 
 import roboirg
+from roboirg.core.environment_options import EnvironmentOptions
 from roboirg.core.errors import InvalidValueError
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.core.subgoal_text import split_point
@@ -29,7 +30,7 @@ JOB = Job(
     split="test",
     episode=0,
     options=InstructionOptions("direct"),
-    max_steps=30,
+    environment=EnvironmentOptions(max_steps=30),
 )
 SAID = (
     SubgoalRecord(

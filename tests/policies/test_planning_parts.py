@@ -10,8 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from planning_fakes import decoded
 
+from roboirg.core.environment_options import DemonstrationFrames
 from roboirg.core.errors import InvalidValueError
-from roboirg.core.observations import DemonstrationFrames
 from roboirg.core.subgoal_text import MOST_SUBGOAL_LETTERS, split_point
 from roboirg.policies.contract.policy_needs import (
     merge_cameras,

@@ -103,7 +103,8 @@ def test_a_tokenizer_that_is_no_path_matters_where_prompts_are_counted():
 
 def test_the_environment_has_an_option_for_each_of_its_needs():
     options = PolicyNeeds.of(Demanding()).env_options
-    assert asdict(EnvSettings(**options)).items() >= options.items()
+    made = asdict(EnvSettings.of(options))
+    assert {**made, **made["environment"]}.items() >= options.items()
     assert set(options) < {one.name for one in fields(PolicyNeeds)}
 
 

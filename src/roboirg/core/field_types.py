@@ -26,6 +26,11 @@ MOST_CAUSE_LETTERS = 10_000
 Cause = Annotated[str, msgspec.Meta(max_length=MOST_CAUSE_LETTERS)]
 
 
+def described(text: str) -> dict[str, str]:
+    """Return the metadata of an option's field with what the option means."""
+    return {"help": text}
+
+
 def as_name(text: str) -> str:
     """Return the text of a stranger as a name: what a name may not hold is written as escapes."""
     shown = re.sub(f"[{CONTROLS}]", lambda one: ascii(one[0])[1:-1], text)

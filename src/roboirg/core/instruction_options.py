@@ -7,17 +7,13 @@ from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import Any, TypedDict
 
-from roboirg.core.field_types import Name, Stages, Whole
+from roboirg.core.field_types import Name, Stages, Whole, described
 
 ALL_STAGES = (1, 2, 3, 4, 5)
 DEFAULT_DISTRACTOR = "neutral"
 DEFAULT_DISTRACTORS = 1
 DEFAULT_FRAME = "robot"
 DEFAULT_DELIVERY = "prompt"
-
-
-def _help(text: str) -> dict[str, str]:
-    return {"help": text}
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,43 +31,43 @@ class InstructionOptions:
         delivery: see `roboirg.core.delivery`.
     """
 
-    setting: Name = field(default="explicit", metadata=_help("Name of the setting."))
+    setting: Name = field(default="explicit", metadata=described("Name of the setting."))
     form: Name = field(
         default="implicit",
-        metadata=_help(
+        metadata=described(
             "implicit; or resolved, with the command's referring expressions replaced by what they "
             "mean."
         ),
     )
     stages: Stages = field(
         default=ALL_STAGES,
-        metadata=_help(
+        metadata=described(
             "Stages of the contextual setting, such as 1,5: 1 introduction, 2 reinforcement, "
             "3 distractor, 4 cue, 5 command."
         ),
     )
     distractor: Name = field(
         default=DEFAULT_DISTRACTOR,
-        metadata=_help("Distractors of the contextual setting: neutral or competing."),
+        metadata=described("Distractors of the contextual setting: neutral or competing."),
     )
     distractors: Whole = field(
         default=DEFAULT_DISTRACTORS,
-        metadata=_help("Number of distractors in the contextual setting."),
+        metadata=described("Number of distractors in the contextual setting."),
     )
     frame: Name = field(
         default=DEFAULT_FRAME,
-        metadata=_help("Whose left and right the spatial setting uses: robot or camera."),
+        metadata=described("Whose left and right the spatial setting uses: robot or camera."),
     )
     wordings: Name | None = field(
         default=None,
-        metadata=_help(
+        metadata=described(
             "Wording file whose commands are used instead of our own; or train or test: our words "
             "of that pool in every split."
         ),
     )
     delivery: Name = field(
         default=DEFAULT_DELIVERY,
-        metadata=_help(
+        metadata=described(
             "prompt: the whole instruction at once; turns: one utterance after another."
         ),
     )
@@ -99,12 +95,6 @@ OPTION_NAMES = tuple(one.name for one in fields(InstructionOptions))
 """The names of all options."""
 OPTION_HELP = {one.name: str(one.metadata["help"]) for one in fields(InstructionOptions)}
 """What each option means."""
-
-
-def split_options(given: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, Any]]:
-    """Return the options of instructions among some keyword arguments, and the others."""
-    options = {name: value for name, value in given.items() if name in OPTION_NAMES}
-    return options, {name: value for name, value in given.items() if name not in OPTION_NAMES}
 
 
 def as_fields(given: Mapping[str, Any]) -> dict[str, Any]:

@@ -13,9 +13,6 @@ from roboirg.core.errors import InvalidValueError, UnknownNameError
 FRONT, WRIST = "front", "wrist"
 CAMERAS = (FRONT, WRIST)
 
-DemonstrationFrames = Literal["all", "none"] | int
-"""Which frames of the video are included: all, none, or every n-th, the first included."""
-
 DemonstrationSource = Literal["none", "recorded", "planned"]
 """Who moves the robot in a demonstration: RoboMME's recorded actions, or the oracle; ``none``
 without a demonstration."""
@@ -41,37 +38,6 @@ def check_cameras(cameras: object) -> tuple[str, ...]:
         if cameras.count(camera) > 1:
             raise InvalidValueError(f"cameras names {camera!r} twice.")
     return tuple(cameras)
-
-
-def check_demonstration_frames(value: object) -> DemonstrationFrames:
-    """Return a value as a choice of frames of the video.
-
-    Raises:
-        InvalidValueError: it is neither ``"all"`` nor ``"none"`` nor a whole number from 1 on.
-    """
-    if value == "all":
-        return "all"
-    if value == "none":
-        return "none"
-    if type(value) is int and value >= 1:
-        return value
-    raise InvalidValueError(
-        f"demonstration_frames is {value!r}; it must be 'all', 'none' or a whole number of at "
-        "least 1."
-    )
-
-
-def check_observe_every(value: object) -> int | None:
-    """Return a value as the number of control steps between observations within a chunk.
-
-    Raises:
-        InvalidValueError: it is neither None nor a whole number from 1 on.
-    """
-    if value is None or (type(value) is int and value >= 1):
-        return value
-    raise InvalidValueError(
-        f"observe_every is {value!r}; it must be None or a whole number of at least 1."
-    )
 
 
 class Observation(TypedDict):

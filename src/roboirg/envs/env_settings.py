@@ -8,26 +8,46 @@ from typing import Any
 
 from roboirg.core.actions import JOINT_ANGLE
 from roboirg.core.arms import TOLD, check_arm
+from roboirg.core.environment_options import (
+    ENVIRONMENT_OPTIONS,
+    EnvironmentKeywords,
+    EnvironmentOptions,
+    check_demonstration_frames,
+)
 from roboirg.core.episode import Episode
 from roboirg.core.errors import InvalidValueError, UnknownNameError
 from roboirg.core.instruction_options import (
     OPTION_NAMES,
+    InstructionKeywords,
     InstructionOptions,
     as_fields,
-    split_options,
 )
-from roboirg.core.observations import CAMERAS, DemonstrationFrames
+from roboirg.core.observations import CAMERAS
 from roboirg.language.wordings.wording_store import open_wordings
 from roboirg.simulation.observation_builder import ObservationSpec
 from roboirg.simulation.rendering.render_settings import find_render_settings
 from roboirg.tasks.splits.splits import get_episode, split_size
 
-MAX_STEPS = 1300
-"""Control steps a policy has, as in RoboMME's published experiments."""
 EXPLICIT_WORDS = InstructionOptions()
+USUAL = EnvironmentOptions(actions=JOINT_ANGLE.name, demonstration_frames="all")
+"""Without the wishes of a policy."""
 RENDER_MODES = ("rgb_array",)
 RESET_OPTIONS = ("split", "episode", "arm", *OPTION_NAMES)
 """Options that `reset` takes: which episode is played, and in which words."""
+
+
+class EnvOptions(InstructionKeywords, EnvironmentKeywords, total=False):
+    """Keyword arguments of `make`, which documents them; `EnvSettings` has the defaults."""
+
+    split: str
+    episode: int | None
+    arm: str
+    cameras: Sequence[str]
+    depth: bool
+    calibration: bool
+    grounded: bool
+    history_cameras: Sequence[str] | None
+    render_mode: str | None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -36,6 +56,7 @@ class EnvSettings:
 
     Attributes:
         words: of the instruction; the file of its wordings has been opened.
+        environment: how it is played; none of it is left to a policy.
 
     Raises:
         UnknownNameError: there is no such render mode or arm.
@@ -43,19 +64,15 @@ class EnvSettings:
     """
 
     words: InstructionOptions = EXPLICIT_WORDS
+    environment: EnvironmentOptions = USUAL
     split: str = "test"
     episode: int | None = 0
     arm: str = TOLD
-    actions: str = JOINT_ANGLE.name
     cameras: Sequence[str] = CAMERAS
     depth: bool = False
     calibration: bool = False
     grounded: bool = False
-    demonstration_frames: DemonstrationFrames = "all"
-    observe_every: int | None = None
     history_cameras: Sequence[str] | None = None
-    meshes: str = "faithful"
-    max_steps: int = MAX_STEPS
     render_mode: str | None = None
 
     @classmethod
@@ -65,11 +82,12 @@ class EnvSettings:
         Raises:
             InvalidValueError: a value is invalid, or the wording file cannot be read.
         """
-        return replace(cls(), **_nested(EXPLICIT_WORDS, options))
+        return cls().with_options(options)
 
     def __post_init__(self) -> None:
-        if not isinstance(self.max_steps, int) or self.max_steps < 1:
-            raise InvalidValueError(f"max_steps is {self.max_steps!r}; it must be an integer >= 1.")
+        limit = self.environment.max_steps
+        if not isinstance(limit, int) or limit < 1:
+            raise InvalidValueError(f"max_steps is {limit!r}; it must be an integer >= 1.")
         if self.render_mode is not None and self.render_mode not in RENDER_MODES:
             raise UnknownNameError("render mode", self.render_mode, RENDER_MODES)
         check_arm(self.arm)
@@ -89,10 +107,10 @@ class EnvSettings:
             self.cameras,
             self.depth,
             self.calibration,
-            self.demonstration_frames,
-            self.observe_every,
+            check_demonstration_frames(self.environment.demonstration_frames),
+            self.environment.observe_every,
             self.history_cameras,
-            find_render_settings(self.meshes),
+            find_render_settings(self.environment.meshes),
         ).validated()
 
     def with_reset_options(self, options: Mapping[str, Any]) -> EnvSettings:
@@ -104,20 +122,24 @@ class EnvSettings:
         for name in options:
             if name not in RESET_OPTIONS:
                 raise UnknownNameError("reset option", name, RESET_OPTIONS)
-        return replace(self, **_nested(self.words, options))
+        return self.with_options(options)
+
+    def with_options(self, options: Mapping[str, Any]) -> EnvSettings:
+        """Return the settings with other values of keyword arguments; opens the wording file."""
+        words = as_fields({name: options[name] for name in OPTION_NAMES if name in options})
+        if "wordings" in words:
+            words["wordings"] = open_wordings(words["wordings"])
+        played = {name: options[name] for name in ENVIRONMENT_OPTIONS if name in options}
+        return replace(
+            self,
+            words=replace(self.words, **words),
+            environment=replace(self.environment, **played),
+            **{name: one for name, one in options.items() if name not in {*words, *played}},
+        )
 
     def find_episode(self, task: str | Episode, index: int) -> Episode:
         """Return the episode to play: number `index`, or `task` itself if it is an episode."""
         return task if isinstance(task, Episode) else get_episode(task, self.split, index)
-
-
-def _nested(words: InstructionOptions, options: Mapping[str, Any]) -> dict[str, Any]:
-    """Return keyword arguments of `EnvSettings`, in which `words` holds those of the words."""
-    chosen, others = split_options(options)
-    chosen = as_fields(chosen)
-    if "wordings" in chosen:
-        chosen["wordings"] = open_wordings(chosen["wordings"])
-    return {**others, "words": replace(words, **chosen)}
 
 
 def choose_index(settings: EnvSettings, seed: int | None, last: int | None) -> int:

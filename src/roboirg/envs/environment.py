@@ -18,8 +18,7 @@ from roboirg.core.errors import InvalidValueError, MotionPlanningError
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.core.observations import CAMERAS
 from roboirg.core.subgoal_text import Point
-from roboirg.envs.env_options import EnvOptions
-from roboirg.envs.env_settings import RENDER_MODES, EnvSettings, choose_index
+from roboirg.envs.env_settings import RENDER_MODES, EnvOptions, EnvSettings, choose_index
 from roboirg.envs.episode_state import EpisodeState
 from roboirg.envs.observation_spaces import make_observation_space
 from roboirg.judging import Event, Status, plain_subgoal
@@ -105,7 +104,7 @@ class RoboIRGEnv(gymnasium.Env[dict[str, Any], NDArray[np.floating[Any]]]):
         self.instruction: Instruction
         self.original: Episode | None
         self._select_episode(self._settings, choose_index(self._settings, None, None))
-        self._space = find_action_space(self._settings.actions)
+        self._space = find_action_space(self._settings.environment.actions)
         self._spec = self._settings.observation_spec()
         self.actions, self.cameras = self._space.name, tuple(self._spec.cameras)
         self.depth, self.calibration = self._spec.depth, self._spec.calibration
@@ -113,7 +112,8 @@ class RoboIRGEnv(gymnasium.Env[dict[str, Any], NDArray[np.floating[Any]]]):
         self.observe_every = self._spec.observe_every
         self.history_cameras = tuple(self._spec.for_history.cameras)
         self.grounded = self._settings.grounded
-        self.max_steps, self.render_mode = self._settings.max_steps, self._settings.render_mode
+        self.max_steps = self._settings.environment.max_steps
+        self.render_mode = self._settings.render_mode
         self.draws = True
         self.observation_space = make_observation_space(self._spec)
         self.action_space = spaces.Box(self._space.low, self._space.high, dtype=np.float64)
@@ -331,7 +331,7 @@ class RoboIRGEnv(gymnasium.Env[dict[str, Any], NDArray[np.floating[Any]]]):
             self.episode, self.instruction, self.original = say_arm(*chosen)
             self._instructed = chosen
         self.delivery = settings.words.delivery
-        is_choice = settings.actions == CHOICE.name
+        is_choice = settings.environment.actions == CHOICE.name
         self.choices = choices_of(self.episode) if is_choice else ()
 
     def _play_demonstration(self, recording: Recording | None) -> Recording:

@@ -6,11 +6,11 @@ import importlib
 from typing import TYPE_CHECKING, Unpack
 
 from roboirg.core.extras import extra_needed
-from roboirg.envs.env_options import EnvOptions
 
 if TYPE_CHECKING:
     # Not at run time: these load NumPy and SAPIEN, which `import roboirg` must not.
     from roboirg.core.episode import Episode
+    from roboirg.envs.env_settings import EnvOptions
     from roboirg.envs.environment import RoboIRGEnv
 
 
@@ -24,22 +24,18 @@ def make(task: str | Episode, **options: Unpack[EnvOptions]) -> RoboIRGEnv:
 
     Keyword Args:
         setting, form, …: the fields of `InstructionOptions`, which choose the words.
+        actions, max_steps, …: the fields of `EnvironmentOptions`; what these leave to the policy is
+            joint_angle for actions, and all frames of the demonstration.
         split: train, val, test or random.
         episode: index of the episode in the split, from 0; None if the seed of each reset
             chooses it.
         arm: told, or a control arm: other words, or another goal, for the same scene
             (docs/controls.md).
-        actions: joint_angle, ee_pose, waypoint or choice.
         cameras: cameras whose pictures observations hold; () renders nothing.
         depth: add depth for the same cameras.
         calibration: add extrinsic and intrinsic matrices for the same cameras.
         grounded: add the pixel of the subgoal's object to info; costs rendering.
-        demonstration_frames: pictures in the video: "all", "none", or n for every n-th.
-        observe_every: n adds `history` to each observation: the observations after every n-th
-            control step since the last one.
         history_cameras: cameras in the history; None for those of observations.
-        meshes: "faithful", or "light" for faster pictures that differ slightly from RoboMME's.
-        max_steps: number of control steps the policy has.
         render_mode: None or "rgb_array" (front and wrist side by side).
 
     Raises:

@@ -9,13 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from roboirg.core.actions import JOINT_LOW, POSE_SIZE
-from roboirg.core.errors import InvalidValueError
-from roboirg.core.observations import (
+from roboirg.core.environment_options import (
     DemonstrationFrames,
-    check_cameras,
     check_demonstration_frames,
     check_observe_every,
 )
+from roboirg.core.errors import InvalidValueError
+from roboirg.core.observations import check_cameras
 from roboirg.simulation.proprioception import Proprioception
 from roboirg.simulation.rendering.render_settings import FAITHFUL, RenderSettings
 from roboirg.simulation.rendering.viewpoint import SIZE

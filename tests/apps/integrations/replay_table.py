@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 
 import roboirg
+from roboirg.core.environment_options import EnvironmentOptions
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.evaluation.play.rollout import EpisodeRunner
 from roboirg.evaluation.records.record import Job
@@ -125,8 +126,7 @@ def own_outcomes(spec, meshes=MESHES):
             task=task,
             split="test",
             episode=episode,
-            max_steps=MAX_STEPS,
-            meshes=meshes,
+            environment=EnvironmentOptions(MAX_STEPS, meshes=meshes),
             options=InstructionOptions(SETTING),
         )
         one = EpisodeRunner(Path()).play_once(job)

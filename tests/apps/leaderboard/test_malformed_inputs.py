@@ -184,7 +184,10 @@ def planned(**changes: object) -> Change:
 
 
 REFUSED_RECORDS: Mapping[str, tuple[Change, str]] = {
-    "step limit of 10**30": (record(max_steps=10**30), r"\$\.max_steps"),
+    "step limit of 10**30": (
+        record(environment={"max_steps": 10**30}),
+        r"\$\.environment\.max_steps",
+    ),
     "seed of 10**40": (record(seed=10**40), r"\$\.seed"),
     "step 10**25": (record(steps=10**25), r"\$\.steps"),
     "a million stages": (option(stages=[1] * 1_000_000), "length <= 100"),

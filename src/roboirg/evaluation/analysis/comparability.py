@@ -9,12 +9,12 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping
 
 from roboirg.core.arms import TOLD
+from roboirg.core.environment_options import DEFAULT_MESHES
 from roboirg.core.episode import ENVIRONMENT_VERSION
 from roboirg.core.plain_text import counted
 from roboirg.evaluation.analysis.published import MAX_STEPS, TRIALS, published_tasks
 from roboirg.evaluation.analysis.stats.cells import CellKey, CellResults, PolicyRun
 from roboirg.evaluation.analysis.stats.option_labels import words_label
-from roboirg.evaluation.records.record import DEFAULT_MESHES
 from roboirg.language.settings import EXPLICIT
 from roboirg.language.worded_command import ROBOMME_NAME
 
@@ -112,6 +112,7 @@ def _text(tasks: Mapping[str, Differences]) -> str:
 
 def _explicit_differences(policy_run: PolicyRun, cell: CellResults) -> Iterator[str]:
     conditions, versions = policy_run.conditions, policy_run.versions
+    environment = conditions.environment
     if not is_robomme(conditions.wordings):
         yield words_label(conditions.wordings)
     episodes = range(TRIALS["main"][0])
@@ -122,12 +123,12 @@ def _explicit_differences(policy_run: PolicyRun, cell: CellResults) -> Iterator[
         yield f"split {conditions.split}"
     elif played < len(episodes):
         yield f"{played} of {counted(len(episodes), 'episode')}"
-    if conditions.max_steps != MAX_STEPS:
-        yield f"{conditions.max_steps} steps instead of {MAX_STEPS}"
-    if conditions.meshes != DEFAULT_MESHES:
-        yield f"{conditions.meshes} meshes"
-    if conditions.demonstration_frames not in (None, "all"):
-        yield f"frames of the video: {conditions.demonstration_frames}"
+    if environment.max_steps != MAX_STEPS:
+        yield f"{environment.max_steps} steps instead of {MAX_STEPS}"
+    if environment.meshes != DEFAULT_MESHES:
+        yield f"{environment.meshes} meshes"
+    if environment.demonstration_frames not in (None, "all"):
+        yield f"frames of the video: {environment.demonstration_frames}"
     if versions is not None and versions.environment != ENVIRONMENT_VERSION:
         yield f"environment version {versions.environment}"
     if cell.errors:

@@ -87,7 +87,8 @@ class Results:
         frame = pd.DataFrame(
             [
                 {
-                    **{name: getattr(one, name) for name in COLUMNS},
+                    **{name: getattr(one, name) for name in COLUMNS if name != "max_steps"},
+                    "max_steps": one.environment.max_steps,
                     "failure": None if one.attribution is None else one.attribution.failure,
                 }
                 for one in self.summaries

@@ -25,6 +25,15 @@ from roboirg import language, policies, tasks
 from roboirg.core.actions import find_action_space
 from roboirg.core.arms import TOLD, check_arm
 from roboirg.core.delivery import TURNS
+from roboirg.core.environment_options import (
+    DEFAULT_MESHES,
+    ENVIRONMENT_OPTIONS,
+    MAX_STEPS,
+    DemonstrationFrames,
+    EnvironmentOptions,
+    check_demonstration_frames,
+    check_observe_every,
+)
 from roboirg.core.errors import InvalidValueError
 from roboirg.core.field_types import CONTROLS, NAME
 from roboirg.core.instruction_options import (
@@ -32,11 +41,6 @@ from roboirg.core.instruction_options import (
     DEFAULT_FRAME,
     OPTION_NAMES,
     InstructionOptions,
-)
-from roboirg.core.observations import (
-    DemonstrationFrames,
-    check_demonstration_frames,
-    check_observe_every,
 )
 from roboirg.core.plain_text import is_encodable
 from roboirg.core.word_pools import POOLS
@@ -47,8 +51,6 @@ from roboirg.evaluation.plan.worker_needs import WorkerNeeds
 from roboirg.evaluation.play.job_instruction import instruct_job
 from roboirg.evaluation.records.film import VideoMode
 from roboirg.evaluation.records.record import (
-    DEFAULT_MAX_STEPS,
-    DEFAULT_MESHES,
     ErrorKind,
     Job,
 )
@@ -116,7 +118,7 @@ class Plan(BaseModel):
     wordings: str | None = None
     """Wording file whose commands are used; or train or test: our words of that pool in every
     split."""
-    max_steps: int = DEFAULT_MAX_STEPS
+    max_steps: int = MAX_STEPS
     """Limit of an episode in control steps, 20 per second."""
     actions: str | None = None
     """Required action space; without one, each policy's own."""
@@ -351,6 +353,7 @@ class Plan(BaseModel):
     ) -> Iterator[Job]:
         name, spec = policy
         said = [options for setting in settings for options in self._options_of(setting)]
+        environment = EnvironmentOptions(**{one: getattr(self, one) for one in ENVIRONMENT_OPTIONS})
         for options in sorted(said, key=_names_the_goal):
             if self._is_left_out(task, episode, options):
                 continue
@@ -361,11 +364,7 @@ class Plan(BaseModel):
                 episode=episode,
                 options=replace(options, wordings=self.options.wordings),
                 wordings_file=self.wordings,
-                max_steps=self.max_steps,
-                actions=self.actions,
-                demonstration_frames=self.demonstration_frames,
-                observe_every=self.observe_every,
-                meshes=self.meshes,
+                environment=environment,
                 spec=None if spec == name else spec,
             )
             # Copying is faster, and there may be very many.

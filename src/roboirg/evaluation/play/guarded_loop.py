@@ -64,7 +64,8 @@ class GuardedLoop(EpisodeLoop):
     def play(self) -> dict[str, Any]:
         """Play the episode, and record its status."""
         info, result = super().play(), self._result
-        if not result.record_status(info["status"], info.get("cause"), self._job.max_steps):
+        limit = self._job.environment.max_steps
+        if not result.record_status(info["status"], info.get("cause"), limit):
             result.cause = f"environment: the episode ended with status {info['status']!r}"
         return info
 

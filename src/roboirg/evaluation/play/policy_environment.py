@@ -10,7 +10,7 @@ from roboirg.envs.factory import make
 from roboirg.evaluation.play.job_instruction import PreparedJob
 from roboirg.evaluation.records.record import Job
 from roboirg.policies.contract.base import Policy
-from roboirg.policies.contract.policy_needs import PolicyNeeds
+from roboirg.policies.contract.policy_needs import ENV_NEEDS, PolicyNeeds
 
 if TYPE_CHECKING:
     from roboirg.envs.environment import RoboIRGEnv
@@ -23,17 +23,13 @@ def job_needs(policy: Policy, job: Job) -> PolicyNeeds:
         InvalidValueError: an attribute of the policy has an invalid value, or the job prescribes
             another action space than the policy's.
     """
-    needs = PolicyNeeds.of(policy)
-    if job.actions not in (None, needs.actions):
+    needs, prescribed = PolicyNeeds.of(policy), job.environment.prescribed
+    actions = prescribed.get("actions", needs.actions)
+    if actions != needs.actions:
         raise InvalidValueError(
-            f"the policy's action space is {needs.actions!r}, but the plan requires "
-            f"{job.actions!r}."
+            f"the policy's action space is {needs.actions!r}, but the plan requires {actions!r}."
         )
-    if job.demonstration_frames is not None:
-        needs = replace(needs, demonstration_frames=job.demonstration_frames)
-    if job.observe_every is not None:
-        needs = replace(needs, observe_every=job.observe_every)
-    return needs
+    return replace(needs, **{name: prescribed[name] for name in ENV_NEEDS if name in prescribed})
 
 
 def make_env(prepared: PreparedJob, needs: PolicyNeeds) -> RoboIRGEnv:
@@ -46,9 +42,8 @@ def make_env(prepared: PreparedJob, needs: PolicyNeeds) -> RoboIRGEnv:
     job = prepared.job
     options = {
         **asdict(job.options),
+        **job.environment.prescribed,
         **needs.env_options,
         "arm": job.arm,
-        "meshes": job.meshes,
-        "max_steps": job.max_steps,
     }
     return make(prepared.scene_episode, **options)

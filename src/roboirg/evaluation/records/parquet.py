@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import json
+import operator
 from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -11,7 +12,6 @@ from typing import TYPE_CHECKING, Any
 import msgspec
 from msgspec import inspect
 
-from roboirg.core.instruction_options import OPTION_NAMES
 from roboirg.evaluation.records.record import Record
 from roboirg.util.atomic_write import replacing
 from roboirg.util.parquet_support import check_parquet_support
@@ -25,9 +25,9 @@ _BATCH_ROWS = 5_000
 def write_parquet(records: Iterable[Record], path: Path) -> int:
     """Write records to a Parquet file, which appears complete or not at all.
 
-    The columns are the fields of a record and its instruction options. ``instruction``,
-    ``mentions``, ``prompt``, ``events`` and ``attribution`` are nested; dictionaries, whose keys
-    depend on the task or the policy, are JSON texts.
+    The columns are the fields of a record and the options of its instruction and environment.
+    ``instruction``, ``mentions``, ``prompt``, ``events`` and ``attribution`` are nested;
+    dictionaries, whose keys depend on the task or the policy, are JSON texts.
 
     Returns:
         Number of rows.
@@ -36,7 +36,7 @@ def write_parquet(records: Iterable[Record], path: Path) -> int:
     import pyarrow as pa
     from pyarrow import parquet
 
-    columns = {name: _arrow_type(kind) for name, kind in _COLUMNS.items()}
+    columns = {name.rpartition(".")[2]: _arrow_type(kind) for name, kind in _COLUMNS.items()}
     schema, count = pa.schema(columns), 0
     rows = map(_row, records)
     with (
@@ -51,7 +51,7 @@ def write_parquet(records: Iterable[Record], path: Path) -> int:
 
 def _row(record: Record) -> dict[str, Any]:
     return {
-        name: _fit(getattr(record.options if name in OPTION_NAMES else record, name), kind)
+        name.rpartition(".")[2]: _fit(operator.attrgetter(name)(record), kind)
         for name, kind in _COLUMNS.items()
     }
 
@@ -98,14 +98,14 @@ def _without_none(kind: inspect.Type) -> inspect.Type:
 
 
 def _columns() -> dict[str, inspect.Type]:
-    """Return the type of each field of a record; each instruction option is one."""
+    """Return the type of each field of a record; those of options have dotted names."""
     record = inspect.type_info(Record)
     if not isinstance(record, inspect.StructType):
         raise TypeError(f"{Record} is no struct")
     found: dict[str, inspect.Type] = {}
     for one in record.fields:
         if isinstance(one.type, inspect.DataclassType):
-            found |= {option.name: option.type for option in one.type.fields}
+            found |= {f"{one.name}.{option.name}": option.type for option in one.type.fields}
         else:
             found[one.name] = one.type
     return found

@@ -18,10 +18,11 @@ import msgspec
 
 from roboirg.core.arms import TOLD
 from roboirg.core.delivery import PromptVerdict
+from roboirg.core.environment_options import EnvironmentOptions
 from roboirg.core.field_types import Cause, Name, Subgoal, Whole
 from roboirg.core.inference_facts import InferenceFacts
 from roboirg.core.instruction_options import InstructionOptions
-from roboirg.core.observations import DemonstrationFrames, DemonstrationSource
+from roboirg.core.observations import DemonstrationSource
 from roboirg.evaluation.records.run_files import RELATIVE_PATH
 from roboirg.util.short_hash import short_hash
 
@@ -42,9 +43,6 @@ ERROR_KINDS: tuple[ErrorKind, ...] = get_args(ErrorKind)
 
 FailureKind = Literal["grounding", "execution"]
 OriginalStatus = Literal["success", "failure", "undecided"]
-
-DEFAULT_MAX_STEPS = 1300
-DEFAULT_MESHES = "faithful"
 
 NON_DETERMINISTIC_FIELDS = frozenset(
     {
@@ -78,11 +76,7 @@ class Job(msgspec.Struct, frozen=True, kw_only=True, gc=False):
         options: of its instruction; those that the setting does not read have their defaults. The
             explicit setting is its own resolved form and is always played as ``implicit``.
         policy_seed: seed chosen for the run; the policy's seed is derived from it and the episode.
-        max_steps: the policy's limit, control steps.
-        actions: required action space; None for the policy's own.
-        demonstration_frames: which frames of the video the policy gets; None for its own choice.
-        observe_every: control steps between observations; None for the policy's own choice.
-        meshes: faithful or light.
+        environment: how the episode is played.
         arm: which control arm it is, as in `roboirg.core.arms`; ``told`` for the episode's words.
         wordings_file: path of the wording file in `options`; not part of the identity, because a
             file may be moved.
@@ -96,11 +90,7 @@ class Job(msgspec.Struct, frozen=True, kw_only=True, gc=False):
     episode: Whole
     options: InstructionOptions
     policy_seed: Whole = 0
-    max_steps: Whole = DEFAULT_MAX_STEPS
-    actions: Name | None = None
-    demonstration_frames: DemonstrationFrames | None = None
-    observe_every: Whole | None = None
-    meshes: Name = DEFAULT_MESHES
+    environment: EnvironmentOptions = EnvironmentOptions()
     arm: Name = TOLD
     wordings_file: str | None = None
     spec: str | None = None

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import operator
-import re
-from dataclasses import astuple
 from pathlib import Path
 from typing import TypeVar
 
@@ -39,7 +37,6 @@ class _Version(msgspec.Struct):
     schema_version: int
 
 
-_is_name = re.compile(NAME).fullmatch
 _encoder = msgspec.json.Encoder()
 _record_decoder = msgspec.json.Decoder(Record)
 _summary_decoder = msgspec.json.Decoder(Summary)
@@ -90,10 +87,6 @@ def _read(decoder: msgspec.json.Decoder[Stored], line: bytes, path: Path, number
     if stored.outcome == "success" and stored.cause is not None:
         problem = f"a success has no cause, but there is {stored.cause!r}"
         raise StoreError(f"{path} line {number} is not a record: {problem}.")
-    for value in astuple(stored.options):
-        if isinstance(value, str) and not _is_name(value):
-            problem = f"{value[:80]!r} is not a value of an instruction option"
-            raise StoreError(f"{path} line {number} is not a record: {problem}.")
     return stored
 
 

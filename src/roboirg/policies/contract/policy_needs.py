@@ -15,14 +15,13 @@ from functools import partial
 from typing import Any, Self
 
 from roboirg.core.actions import JOINT_ANGLE, ActionSpace, find_action_space
-from roboirg.core.errors import InvalidValueError
-from roboirg.core.observations import (
-    CAMERAS,
+from roboirg.core.environment_options import (
     DemonstrationFrames,
-    check_cameras,
     check_demonstration_frames,
     check_observe_every,
 )
+from roboirg.core.errors import InvalidValueError
+from roboirg.core.observations import CAMERAS, check_cameras
 
 _MISSING = object()
 

@@ -8,7 +8,8 @@ from typing import Any, ClassVar, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from roboirg.core.observations import Demonstration, DemonstrationFrames, Observation
+from roboirg.core.environment_options import DemonstrationFrames
+from roboirg.core.observations import Demonstration, Observation
 from roboirg.policies.contract.base import SubgoalEnd
 from roboirg.policies.vlm.model_content import ChatTurn, Part, summary_clip
 from roboirg.policies.vlm.models import ModelQuery

@@ -7,7 +7,8 @@ from typing import Any, cast
 
 from numpy.typing import NDArray
 
-from roboirg.core.observations import CAMERAS, Demonstration, DemonstrationFrames, Observation
+from roboirg.core.environment_options import DemonstrationFrames
+from roboirg.core.observations import CAMERAS, Demonstration, Observation
 
 PICTURE_FIELDS = tuple(f"{camera}_{kind}" for camera in CAMERAS for kind in ("rgb", "depth"))
 """Fields of a demonstration that may have only every n-th frame."""

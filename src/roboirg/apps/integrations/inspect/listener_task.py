@@ -29,10 +29,11 @@ from inspect_ai.solver import Generate, Solver, TaskState, solver
 from inspect_ai.util import JSONSchema
 
 from roboirg.apps.integrations.inspect.episode_process import SPEC, ModelRequest, play
+from roboirg.core.environment_options import MAX_STEPS, EnvironmentOptions
 from roboirg.core.episode import ENVIRONMENT_VERSION
 from roboirg.core.errors import RoboIRGError
 from roboirg.core.instruction_options import DEFAULT_DELIVERY, InstructionOptions
-from roboirg.evaluation.records.record import DEFAULT_MAX_STEPS, Job
+from roboirg.evaluation.records.record import Job
 from roboirg.policies.vlm.models import ModelOptions
 from roboirg.policies.vlm.vlm_listener import ListenerOptions
 from roboirg.tasks import find_tasks
@@ -53,7 +54,7 @@ def listener(
     split: str = "test",
     episodes: int = 50,
     delivery: str = DEFAULT_DELIVERY,
-    max_steps: int = DEFAULT_MAX_STEPS,
+    max_steps: int = MAX_STEPS,
     frames: int = 16,
     think: bool = False,
     structured: bool = True,
@@ -75,7 +76,8 @@ def listener(
     jobs = [
         Job(
             policy="vlm-listener", spec=SPEC, task=name, split=split, episode=index,
-            options=InstructionOptions(setting, delivery=delivery), max_steps=max_steps,
+            options=InstructionOptions(setting, delivery=delivery),
+            environment=EnvironmentOptions(max_steps),
         )
         for name in find_tasks(tasks.split(",") if isinstance(tasks, str) else tasks)
         for index in range(count)

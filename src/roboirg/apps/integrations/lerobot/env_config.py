@@ -13,6 +13,7 @@ from lerobot.envs.utils import _LazyAsyncVectorEnv
 from roboirg.apps.integrations.lerobot.sub_environment import STATE_SIZE, LeRobotSubEnvironment
 from roboirg.apps.integrations.lerobot.vector import make_batch, sub_environments
 from roboirg.core.actions import find_action_space
+from roboirg.core.environment_options import DEFAULT_MESHES, MAX_STEPS
 from roboirg.core.errors import InvalidValueError
 from roboirg.core.instruction_options import (
     DEFAULT_DELIVERY,
@@ -20,7 +21,6 @@ from roboirg.core.instruction_options import (
     DEFAULT_FRAME,
 )
 from roboirg.core.observations import CAMERAS
-from roboirg.envs.env_settings import MAX_STEPS
 from roboirg.util.media import PICTURE_SIZE
 
 
@@ -51,7 +51,7 @@ class RoboIRGEnvConfig(EnvConfig):  # type: ignore[misc] # LeRobot has no types
     distractor: str = DEFAULT_DISTRACTOR
     frame: str = DEFAULT_FRAME
     delivery: str = DEFAULT_DELIVERY
-    meshes: str = "faithful"
+    meshes: str = DEFAULT_MESHES
     video: str = "none"
     video_frames: int = 16
     fps: int = 20

@@ -11,10 +11,10 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
+from roboirg.core.environment_options import MAX_STEPS
 from roboirg.core.errors import InvalidActionError, InvalidValueError, UnknownNameError
 from roboirg.core.observations import CAMERAS, proprioception
-from roboirg.envs.env_options import EnvOptions
-from roboirg.envs.env_settings import MAX_STEPS
+from roboirg.envs.env_settings import EnvOptions
 from roboirg.envs.factory import make
 from roboirg.util.media import PICTURE_SIZE, scaled_square
 

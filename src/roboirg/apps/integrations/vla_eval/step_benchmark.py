@@ -11,6 +11,7 @@ from vla_eval.render import configure_sapien_render
 from vla_eval.specs import IMAGE_RGB, LANGUAGE, DimSpec
 
 from roboirg.core.actions import JOINT_ANGLE, find_action_space
+from roboirg.core.environment_options import DEFAULT_MESHES, MAX_STEPS
 from roboirg.core.instruction_options import DEFAULT_DELIVERY
 from roboirg.core.observations import FRONT, WRIST, proprioception
 from roboirg.tasks import ALL, find_tasks
@@ -18,8 +19,6 @@ from roboirg.tasks import ALL, find_tasks
 if TYPE_CHECKING:
     from roboirg.envs.environment import RoboIRGEnv
 
-MAX_STEPS = 1300
-"""As in RoboMME's protocol; vla-eval's own default is 300."""
 TOLD_TASK = {"name": "RoboIRGBench"}
 """All that a policy learns of the task besides the observations."""
 ICD_VARIABLE = "ROBOIRG_LAVAPIPE_ICD"
@@ -67,7 +66,7 @@ class RoboIRGBenchmark(StepBenchmark):  # type: ignore[misc] # vla-eval has no t
         action_space: str = JOINT_ANGLE.name,
         max_steps: int = MAX_STEPS,
         delivery: str = DEFAULT_DELIVERY,
-        meshes: str = "faithful",
+        meshes: str = DEFAULT_MESHES,
         send_wrist_image: bool = True,
         send_state: bool = True,
         send_video_history: bool = True,

@@ -193,7 +193,7 @@ def _row(
 def _fairness(record: Summary) -> tuple[object, ...]:
     """Return what two episodes must share to be compared, besides scene and instruction."""
     conditions = EvalConditions.of(record)
-    return tuple(getattr(conditions, name) for name in FAIRNESS)
+    return tuple(conditions.value(name) for name in FAIRNESS)
 
 
 def setting_label(options: InstructionOptions) -> str:

@@ -171,13 +171,13 @@ def _value(value: object) -> str:
 def _conditions(record: Record) -> str:
     parts = [
         f"{record.split} split",
-        f"at most {record.max_steps} steps",
+        f"at most {record.environment.max_steps} steps",
         f"in {words_label(record.options.wordings)}",
     ]
     parts += [
-        f"{name.replace('_', ' ')} {getattr(record, name)}"
+        f"{name.replace('_', ' ')} {value}"
         for name in ("actions", "demonstration_frames", "observe_every")
-        if getattr(record, name) is not None
+        if (value := getattr(record.environment, name)) is not None
     ]
     server = "" if record.server_version is None else f" (server {record.server_version})"
     versions = (

@@ -16,8 +16,8 @@ from typing import NamedTuple
 import numpy as np
 
 from roboirg.core.arms import TOLD
+from roboirg.core.environment_options import ENVIRONMENT_OPTIONS, EnvironmentOptions
 from roboirg.core.instruction_options import InstructionOptions
-from roboirg.core.observations import DemonstrationFrames
 from roboirg.core.subgoal_text import BETWEEN_VERSIONS, SCRIPTED_HANDS
 from roboirg.evaluation.analysis.stats.intervals import (
     DRAWS,
@@ -28,7 +28,7 @@ from roboirg.evaluation.analysis.stats.intervals import (
     wilson_interval,
 )
 from roboirg.evaluation.analysis.stats.option_labels import options_sort_key, words_label
-from roboirg.evaluation.records.record import DEFAULT_MAX_STEPS, DEFAULT_MESHES, Job, Summary
+from roboirg.evaluation.records.record import Job, Summary
 from roboirg.evaluation.records.record_codec import RecordKey, identity_key
 from roboirg.tasks import all_tasks
 
@@ -44,11 +44,7 @@ class EvalConditions(NamedTuple):
     """The conditions under which a policy plays."""
 
     split: str
-    max_steps: int = DEFAULT_MAX_STEPS
-    actions: str | None = None
-    demonstration_frames: DemonstrationFrames | None = None
-    observe_every: int | None = None
-    meshes: str = DEFAULT_MESHES
+    environment: EnvironmentOptions = EnvironmentOptions()
     wordings: str | None = None
     arm: str = TOLD
 
@@ -56,9 +52,13 @@ class EvalConditions(NamedTuple):
     def of(cls, job: Job) -> EvalConditions:
         return cls._make(_read_conditions(job))
 
+    def value(self, name: str) -> object:
+        """Return one of `CONDITIONS`."""
+        return getattr(self.environment if name in ENVIRONMENT_OPTIONS else self, name)
+
     def text(self, name: str) -> str:
         """Return the value of a condition in words."""
-        return words_label(self.wordings) if name == "wordings" else str(getattr(self, name))
+        return words_label(self.wordings) if name == "wordings" else str(self.value(name))
 
     def label(self, name: str) -> str:
         """Return a condition with its value."""
@@ -66,9 +66,9 @@ class EvalConditions(NamedTuple):
         return before + self.text(name)
 
 
-_read_conditions = operator.attrgetter(
-    *("options.wordings" if name == "wordings" else name for name in EvalConditions._fields)
-)
+_read_conditions = operator.attrgetter("split", "environment", "options.wordings", "arm")
+CONDITIONS = ("split", *ENVIRONMENT_OPTIONS, "wordings", "arm")
+"""The names of all conditions."""
 
 FAIRNESS = {
     "split": "splits",
@@ -334,8 +334,8 @@ def _label(policy_run: PolicyRun, policy_runs: Sequence[PolicyRun]) -> str:
     parts = [policy_run.policy]
     parts += [
         policy_run.conditions.label(name)
-        for name in EvalConditions._fields
-        if len({getattr(other.conditions, name) for other in policy_runs}) > 1
+        for name in CONDITIONS
+        if len({other.conditions.value(name) for other in policy_runs}) > 1
     ]
     parts += _version_labels(policy_run, policy_runs)
     if policy_run.robot is not None:

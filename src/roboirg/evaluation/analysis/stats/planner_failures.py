@@ -52,7 +52,7 @@ def planner_failure(record: Record) -> str | None:
     if record.outcome == "error":
         return "no answer" if record.error in ("timeout", "connection") else None
     found = record.attribution
-    timed_out = record.steps >= record.max_steps
+    timed_out = record.steps >= record.environment.max_steps
     if not timed_out:
         named = "" if found is None else _OF_ATTRIBUTION.get(found.failure, "hands")
         return named or _last_verdict(record) or "hands"

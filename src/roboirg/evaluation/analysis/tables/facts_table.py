@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import operator
 from collections import Counter, defaultdict
 from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
@@ -31,7 +32,7 @@ _OF_RUN = {
     "tasks": "task",
     "split": "split",
     "control arms": "arm",
-    "meshes": "meshes",
+    "meshes": "environment.meshes",
     "processor": "processor",
     "render device": "render_device",
 }
@@ -97,8 +98,11 @@ def make_facts_table(data: RunData, records: Iterable[tuple[str, Record]]) -> Ta
 def _of_run(data: RunData) -> Facts:
     results: list[Summary] = [one for _, one in data.results]
     for name, field in _OF_RUN.items():
-        yield name, (getattr(one, field) for one in results)
-    yield "step limit", (f"{one.max_steps} at {CONTROL_RATE} a second" for one in results)
+        yield name, map(operator.attrgetter(field), results)
+    yield (
+        "step limit",
+        (f"{one.environment.max_steps} at {CONTROL_RATE} a second" for one in results),
+    )
     settings = sorted({one.column for one in results}, key=options_sort_key)
     yield "settings", map(options_label, settings)
     yield "words", (words_label(one.options.wordings) for one in results)

@@ -10,6 +10,7 @@ from roboirg.core.plain_text import counted, verb_for
 from roboirg.evaluation.analysis.comparability import AllDifferences, comparison_notes
 from roboirg.evaluation.analysis.published import TRIALS, RateTable, published_rows
 from roboirg.evaluation.analysis.stats.cells import (
+    CONDITIONS,
     FAIRNESS,
     CellResults,
     Cells,
@@ -236,7 +237,7 @@ def _version_notes(policy_runs: Sequence[PolicyRun]) -> list[str]:
             notes.append(
                 f"Several versions of {policy} ({', '.join(versions)}) have separate rows."
             )
-    others = [name for name in EvalConditions._fields if name not in FAIRNESS]
+    others = [name for name in CONDITIONS if name not in FAIRNESS]
     for own in by_policy.values():
         if any(len(_distinct([one.conditions for one in own], name)) > 1 for name in others):
             notes.append("Results under different conditions have separate rows.")
