@@ -11,8 +11,8 @@ A world of paper is played. A first job fills the caches; the second is followed
 - Entries into one room in a row are one stay.
 - A stay is a climb if its room is above that of the stay before and the job was there already, so
   that a room is asked again. A room is above all that it imports, directly or through others.
-- A room that is called from below was handed down, such as the methods that a subclass replaces;
-  this is a callback, not a climb.
+- What the caller's file imports nothing of was handed to it, such as a policy object or a method
+  that a subclass replaces. Such a stay is marked, and is no climb.
 """
 
 from __future__ import annotations
@@ -81,7 +81,7 @@ class Stay(NamedTuple):
 
     Attributes:
         room: the room.
-        kind: ``climb``, ``callback``, or empty for one that is neither.
+        kind: ``climb``, ``handed``, or empty for one that is neither.
         entries: the functions that were called, each with its caller.
     """
 
@@ -148,14 +148,17 @@ def stays(calls: Iterable[tuple[CodeType, CodeType]]) -> list[Stay]:
     """Return the stays of a job, in order."""
     found: list[Stay] = []
     height, seen = floors(), set[str]()
+    imported = {
+        (str(layout.modules()[source]), room_of(layout.modules()[target]))
+        for source, target in layout.imports()
+    }
     for called, caller in calls:
-        room, below = (str(room_of(one)) for one in (called, caller))
+        room = str(room_of(called))
         functions = [f"{Path(one.co_filename).stem}.{one.co_qualname}" for one in (called, caller)]
-        if height[room] > height[below]:
-            found.append(Stay(room, "callback", []))
-        elif not found or room != found[-1].room:
-            is_climb = room in seen and height[room] > height[found[-1].room]
-            found.append(Stay(room, "climb" if is_climb else "", []))
+        if not found or room != found[-1].room:
+            is_above = room in seen and height[room] > height[found[-1].room]
+            is_known = (caller.co_filename, room) in imported
+            found.append(Stay(room, ("climb" if is_above else "") if is_known else "handed", []))
         found[-1].entries.append(" <- ".join(functions))
         seen.add(room)
     return found
@@ -183,6 +186,6 @@ if __name__ == "__main__":
         print(f"{number:3} {stay.room:24} {stay.kind:8} {', '.join(stay.entries)}")
     kinds, rooms = Counter(stay.kind for stay in found), {stay.room for stay in found}
     print(
-        f"{len(found)} stays in {len(rooms)} rooms, {kinds['climb']} climbs, "
-        f"{kinds['callback']} callbacks"
+        f"{len(found)} stays in {len(rooms)} rooms, {kinds['climb']} climbs; "
+        f"{kinds['handed']} were handed"
     )
