@@ -8,13 +8,15 @@ import signal
 import subprocess
 import sys
 import time
+from collections.abc import Mapping
 from importlib.metadata import version
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 import typer.main
-from msgspec.structs import replace
+from made_records import make_record
 from plan_files import plan_file
 
 from roboirg import main as cli
@@ -22,7 +24,6 @@ from roboirg.cli.progress_bar import progress_bars
 from roboirg.cli.run_commands import report_problems
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.evaluation.plan.stored_plans import read_plan
-from roboirg.evaluation.play.rollout_result import RolloutResult, make_record
 from roboirg.evaluation.records.record import Job
 from roboirg.evaluation.records.store import RecordStore
 from roboirg.evaluation.run.runner import RunSummary
@@ -56,19 +57,19 @@ def roboirg(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str])
 class CannedPlayer:
     """Stands in for `EpisodeRunner`: no simulator, and the outcome that the test asks for."""
 
-    result = RolloutResult("success", cause=None, steps=7)
+    result: Mapping[str, Any] = {"outcome": "success", "steps": 7}
 
     def __init__(self, folder: Path, video: str, **_options: object) -> None:
         del folder, video
 
     def __call__(self, job: Job):
-        return make_record(job, self.result, started_at="now")
+        return make_record(job, **self.result)
 
 
 @pytest.fixture
 def canned(monkeypatch: pytest.MonkeyPatch) -> type[CannedPlayer]:
     monkeypatch.setattr("roboirg.evaluation.run.runner.EpisodeRunner", CannedPlayer)
-    monkeypatch.setattr(CannedPlayer, "result", RolloutResult("success", cause=None, steps=7))
+    monkeypatch.setattr(CannedPlayer, "result", {"outcome": "success", "steps": 7})
     return CannedPlayer
 
 
@@ -182,7 +183,7 @@ def test_lost_videos_are_reported_once(
     roboirg, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, canned: type[CannedPlayer]
 ) -> None:
     def play(_self: CannedPlayer, job: Job):
-        return make_record(job, canned.result, started_at="now", video_error="OSError: disk full")
+        return make_record(job, **canned.result, video_error="OSError: disk full")
 
     monkeypatch.setattr(CannedPlayer, "__call__", play)
     words = (*RUN, "--episodes", "2", "--workers", "0", "--video", "all", "--out", tmp_path)
@@ -226,15 +227,14 @@ def test_run_then_report(roboirg, tmp_path: Path) -> None:
 def test_errors_are_told_and_are_exit_code_2(
     roboirg, tmp_path: Path, canned: type[CannedPlayer]
 ) -> None:
-    canned.result = RolloutResult(
-        "error", "invalid_action", "invalid action: Action value 3 is nan", steps=2
-    )
+    cause = "invalid action: Action value 3 is nan"
+    canned.result = {"outcome": "error", "error": "invalid_action", "cause": cause, "steps": 2}
     command = (*RUN, "--episodes", "1", "--workers", "0", "--out", tmp_path)
     said = roboirg(*command)
     assert said.code == 2
     assert "5 of 5 episodes ended in an error" in said.err
     assert "Action value 3 is nan" in said.err
-    canned.result = RolloutResult("success", cause=None)
+    canned.result = {"outcome": "success"}
     assert roboirg(*command).code == 0
 
 
@@ -266,7 +266,7 @@ def test_instructions_are_printed(roboirg) -> None:
 def test_failures_are_named_below_the_table(
     roboirg, tmp_path: Path, canned: type[CannedPlayer]
 ) -> None:
-    canned.result = RolloutResult("failure", cause="pressed the button too early")
+    canned.result = {"outcome": "failure", "cause": "pressed the button too early"}
     said = roboirg(*RUN, "--episodes", "3", "--workers", "0", "--out", tmp_path)
     assert said.code == 0
     assert "random: 15 episodes without success" in said.out
@@ -478,8 +478,7 @@ def test_a_dry_run_checks_what_a_run_checks(
         options=InstructionOptions("direct"),
     )
     with RecordStore(other) as store:
-        result = RolloutResult("success", cause=None, steps=7)
-        store.append(replace(make_record(job, result, started_at="now"), language_version="1.1"))
+        store.append(make_record(job, "success", steps=7, language_version="1.1"))
     places = {"file": file, "other": other}
     given = [word.format(**places) for word in words]
     before = sorted(tmp_path.rglob("*"))

@@ -9,10 +9,13 @@ import tempfile
 import time
 from pathlib import Path
 
+import msgspec
+
 from roboirg.evaluation.plan.plan import Plan
 from roboirg.evaluation.plan.plan_maker import make_plan
+from roboirg.evaluation.play.episode_record import begin_record, describe
+from roboirg.evaluation.play.job_instruction import PreparedJob
 from roboirg.evaluation.play.rollout import EpisodeRunner
-from roboirg.evaluation.play.rollout_result import RolloutResult, make_record, utc_now
 from roboirg.evaluation.records.record import EventRecord, Job, Record
 from roboirg.evaluation.records.record_codec import encode
 from roboirg.evaluation.records.store import RECORDS_FILE, RecordStore
@@ -71,8 +74,10 @@ class _RecordClock(Reporter):
 
 def _unplayed_record(job: Job) -> Record:
     event = EventRecord(step=1, kind="picked", subject="cube_red")
-    result = RolloutResult("success", cause=None, events=[event] * _EVENTS)
-    return make_record(job, result, started_at=utc_now())
+    record = begin_record(PreparedJob(job), describe(job))
+    return msgspec.structs.replace(
+        record, outcome="success", error=None, cause=None, events=(event,) * _EVENTS
+    )
 
 
 def temporary_folder() -> Path:

@@ -18,7 +18,8 @@ from roboirg.core.episode import Episode, Stage
 from roboirg.evaluation.plan.plan import Plan
 from roboirg.evaluation.plan.plan_maker import make_plan
 from roboirg.evaluation.plan.stored_plans import write_plan
-from roboirg.evaluation.play.rollout_result import RolloutResult, make_record
+from roboirg.evaluation.play.episode_record import begin_record, describe
+from roboirg.evaluation.play.job_instruction import PreparedJob
 from roboirg.evaluation.records.record import Attribution, EventRecord, Job, Outcome, Record
 from roboirg.evaluation.records.record_codec import encode
 from roboirg.evaluation.records.store import RECORDS_FILE
@@ -64,8 +65,12 @@ def _records(jobs: Iterable[Job], rng: np.random.Generator) -> Iterator[Record]:
     for job in jobs:
         key = msgspec.structs.replace(job, policy=POLICIES[0], policy_seed=0)
         if key not in by_instruction:
-            result = RolloutResult("success", cause=None)
-            by_instruction[key] = make_record(job, result, started_at=STARTED_AT)
+            by_instruction[key] = msgspec.structs.replace(
+                begin_record(PreparedJob(job), describe(job)),
+                error=None,
+                cause=None,
+                started_at=STARTED_AT,
+            )
         episode = get_episode(job.task, job.split, job.episode)
         yield _varied(by_instruction[key], job, episode, rng)
 

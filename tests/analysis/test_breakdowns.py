@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 import pytest
 import typer
+from made_records import make_record
 from msgspec.structs import replace
 from page_text import render
 from typer.testing import CliRunner
@@ -39,7 +40,6 @@ from roboirg.evaluation.analysis.stats.paired_tests import Pairs, measure_gap
 from roboirg.evaluation.analysis.tables.breakdown_table import make_breakdown_table
 from roboirg.evaluation.plan.plan import Plan
 from roboirg.evaluation.plan.stored_plans import write_plan
-from roboirg.evaluation.play.rollout_result import RolloutResult, make_record
 from roboirg.evaluation.records.record import Job, Record
 from roboirg.evaluation.records.record_codec import encode
 from roboirg.evaluation.records.store import (
@@ -63,7 +63,7 @@ PLAN = Plan(
 
 def played(job: Job) -> Record:
     """The forgetful policy fails in every implicit instruction that says *it*, and in no other."""
-    record = make_record(job, RolloutResult("success", cause=None), started_at="now")
+    record = make_record(job, "success")
     says_it = any(one.expression == "it" for one in record.mentions)
     if job.policy == "listener" or not says_it:
         return record
@@ -194,8 +194,7 @@ def test_only_the_command_s_expressions_count(records: tuple[Record, ...]) -> No
     assert "them" in said - found, "said of the referents in a reinforcement"
     resolved = make_record(
         PLAN.jobs()[0].with_options(setting="contextual", form="resolved"),
-        RolloutResult("success", cause=None),
-        started_at="now",
+        "success",
     )
     assert any(mention.expression for mention in resolved.mentions)
     assert BREAKDOWNS["expression"].labels(resolved) == ()

@@ -7,9 +7,9 @@ import sys
 from pathlib import Path
 from types import SimpleNamespace
 
-import msgspec
 import pytest
 from flat_jobs import job_of
+from made_records import make_record
 from typer.testing import CliRunner
 
 from roboirg.core.inference_facts import InferenceFacts, inference_facts
@@ -17,7 +17,6 @@ from roboirg.evaluation.analysis.tables.facts_table import NOT_APPLICABLE, NOT_R
 from roboirg.evaluation.analysis.tables.rendering import FORMATS
 from roboirg.evaluation.plan.plan_maker import make_plan
 from roboirg.evaluation.plan.stored_plans import write_plan
-from roboirg.evaluation.play.rollout_result import RolloutResult, make_record
 from roboirg.evaluation.records.record import Record
 from roboirg.evaluation.records.store import RecordStore
 from roboirg.main import app
@@ -27,11 +26,9 @@ Facts = dict[str, dict[str, str]]
 
 def record(episode: int, outcome: str = "success", **fields) -> Record:
     setting = fields.pop("setting", "explicit")
-    changes = {name: fields.pop(name) for name in ("steps", "attempt", "calls") if name in fields}
     job = job_of(policy="mine", task="PickXtimes", split="test", episode=episode, setting=setting)
-    result = RolloutResult(outcome, cause=None if outcome == "success" else "why", **fields)  # type: ignore[arg-type]
-    made = make_record(job, result, started_at=f"{episode}{setting}{outcome}")
-    return msgspec.structs.replace(made, **changes)
+    cause, start = None if outcome == "success" else "why", f"{episode}{setting}{outcome}"
+    return make_record(job, outcome, cause, started_at=start, **fields)
 
 
 def facts(folder: Path, *records: Record) -> Facts:

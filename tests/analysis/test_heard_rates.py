@@ -10,6 +10,7 @@ from typing import Any
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from made_records import make_record
 from rich.console import Console
 from typer.testing import CliRunner
 
@@ -24,7 +25,8 @@ from roboirg.evaluation.analysis.stats.run_data import RunData
 from roboirg.evaluation.analysis.tables.heard_table import make_heard_table
 from roboirg.evaluation.analysis.tables.rendering import get_format
 from roboirg.evaluation.analysis.tables.run_tables import make_run_tables, print_run_tables
-from roboirg.evaluation.play.rollout_result import RolloutResult, make_record
+from roboirg.evaluation.play.episode_record import audit_record
+from roboirg.evaluation.play.job_instruction import PreparedJob
 from roboirg.evaluation.records.record import Job, Record, Summary
 from roboirg.evaluation.records.store import RecordStore
 from roboirg.policies.prompt_length.prompt_audit import PromptLimit, most_tokens
@@ -117,8 +119,10 @@ def long_record(policy: str, tokens: int | None, **fields: object) -> Record:
         options=InstructionOptions("contextual", distractors=16),
     )
     limit = None if tokens is None else PromptLimit(tokens, 0, most_tokens, "some.model")
-    result = RolloutResult("failure", cause="because", prompt_limit=limit)
-    return make_record(job, result, started_at="2026-01-02T03:04:05+00:00")
+    record = make_record(job, "failure", "because", started_at="2026-01-02T03:04:05+00:00")
+    if limit is not None:
+        audit_record(record, PreparedJob(job), limit)
+    return record
 
 
 @pytest.fixture

@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from made_records import make_record
 from msgspec.structs import replace
 from page_text import render
 
@@ -19,7 +20,6 @@ from roboirg.evaluation.analysis.page.entries import Run
 from roboirg.evaluation.analysis.page.page_server import PageServer
 from roboirg.evaluation.analysis.page.report import make_view, render_runs, write_report
 from roboirg.evaluation.plan.plan import Plan
-from roboirg.evaluation.play.rollout_result import RolloutResult, make_record
 from roboirg.evaluation.play.video_writer import VideoWriter
 from roboirg.evaluation.records.episode_log import EpisodeLog, log_path
 from roboirg.evaluation.records.record import Attribution, EventRecord, Record
@@ -45,7 +45,7 @@ def records() -> list[Record]:
     """The listener succeeds, the forgetful fails where it must remember; one error."""
     found = []
     for index, job in enumerate(PLAN.jobs()):
-        success = make_record(job, RolloutResult("success", cause=None), started_at="now")
+        success = make_record(job, "success")
         subject = f"cube_{success.goal.get('color', 'red')}"
         events = [
             EventRecord(step=-20, kind="still", subject="robot"),
@@ -53,16 +53,14 @@ def records() -> list[Record]:
             EventRecord(step=40, kind="picked", subject=subject),
             EventRecord(step=60, kind="picked", subject=subject, holds=False),
         ]
-        course = RolloutResult(
-            "success", cause=None, steps=80, demonstration_steps=20, events=events
-        )
+        course: dict[str, Any] = {
+            "outcome": "success", "steps": 80, "demonstration_steps": 20, "events": tuple(events),
+        }  # fmt: skip
         if job.policy == "forgetful" and job.form == "implicit" and job.setting != "explicit":
-            course.outcome, course.cause = "failure", "picked up the wrong cube"
+            course |= {"outcome": "failure", "cause": "picked up the wrong cube"}
         if index == len(PLAN.jobs()) - 1:
-            course = RolloutResult(
-                "error", error="policy", cause="policy: broke", details=TRACEBACK
-            )
-        record = make_record(job, course, started_at="2026-01-02T03:04:05+00:00")
+            course = {"error": "policy", "cause": "policy: broke", "details": TRACEBACK}
+        record = make_record(job, **course, started_at="2026-01-02T03:04:05+00:00")
         wrong = Attribution(
             kind="execution" if index % 4 == 0 else "grounding",
             failure="dropped" if index % 4 == 0 else "wrong_object",

@@ -14,11 +14,11 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from made_records import make_record
 
 from roboirg.core.errors import RoboIRGError
 from roboirg.evaluation.analysis.page.page_server import PageServer
 from roboirg.evaluation.plan.plan_maker import make_plan
-from roboirg.evaluation.play.rollout_result import RolloutResult, make_record
 from roboirg.evaluation.records.record import Record
 from roboirg.evaluation.records.store import RecordStore
 
@@ -30,7 +30,7 @@ FILM = bytes(range(256)) * 1000
 def record(episode: int) -> Record:
     plan = make_plan(("listener",), tasks="PickXtimes", settings="explicit", episodes="4")
     job = plan.jobs()[episode]
-    return make_record(job, RolloutResult("success", cause=None, steps=9), started_at="now")
+    return make_record(job, "success", steps=9)
 
 
 @pytest.fixture

@@ -12,6 +12,7 @@ from pathlib import Path
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from made_records import make_record
 from msgspec.structs import replace
 from rich.console import Console
 
@@ -25,7 +26,6 @@ from roboirg.evaluation.analysis.tables.paper_tables import is_informative, make
 from roboirg.evaluation.analysis.tables.rendering import FORMATS, get_format
 from roboirg.evaluation.analysis.tables.rendering.terminal import renderable
 from roboirg.evaluation.analysis.tables.table import Entry
-from roboirg.evaluation.play.rollout_result import RolloutResult, make_record
 from roboirg.evaluation.records.record import Job, Record
 from roboirg.evaluation.records.record_codec import encode, read_summary
 from roboirg.tasks import all_tasks
@@ -316,8 +316,8 @@ def test_results_of_the_twin_are_marked_and_kept_apart_from_a_robots(result) -> 
             episode=0,
             options=InstructionOptions("explicit"),
         )
-        course = RolloutResult(outcome, cause=None if outcome == "success" else "missed")
-        return replace(make_record(job, course, started_at="now"), robot=robot)
+        cause = None if outcome == "success" else "missed"
+        return make_record(job, outcome, cause, robot=robot)
 
     records = [played(None, "success"), played("a robot", "failure")]
     stored = [read_summary(encode(one), Path("r"), 1) for one in records]

@@ -11,6 +11,7 @@ from typing import Any
 
 import pytest
 import typer
+from made_records import make_record
 from msgspec.structs import replace
 from page_text import render
 from typer.testing import CliRunner
@@ -23,7 +24,6 @@ from roboirg.evaluation.analysis.page.entries import Run
 from roboirg.evaluation.analysis.page.report import make_view, render_runs, write_report
 from roboirg.evaluation.plan.plan import Plan
 from roboirg.evaluation.plan.stored_plans import write_plan
-from roboirg.evaluation.play.rollout_result import RolloutResult, make_record
 from roboirg.evaluation.records.episode_log import EpisodeLog, log_path
 from roboirg.evaluation.records.record import (
     Attribution,
@@ -102,17 +102,14 @@ class Page(HTMLParser):
 def records(plan: Plan = PLAN) -> list[Record]:
     found = []
     for index, job in enumerate(plan.jobs()):
-        events = [EventRecord(step=40, kind="picked", subject="cube_red")]
-        course = RolloutResult("success", cause=None, steps=80, events=events)
+        events = (EventRecord(step=40, kind="picked", subject="cube_red"),)
+        course: dict[str, Any] = {"outcome": "success", "steps": 80, "events": events}
         if index % 3 == 1:
-            course = RolloutResult(
-                "failure", cause="picked the wrong cube", steps=50, events=events
-            )
+            course |= {"outcome": "failure", "cause": "picked the wrong cube", "steps": 50}
         if index % 7 == 6:
-            course = RolloutResult(
-                "error", error="policy", cause="policy: ValueError: </script><b>&", details="T <x>"
-            )
-        record = make_record(job, course, started_at="2026-01-02T03:04:05+00:00")
+            cause = "policy: ValueError: </script><b>&"
+            course = {"error": "policy", "cause": cause, "details": "T <x>"}
+        record = make_record(job, **course, started_at="2026-01-02T03:04:05+00:00")
         if record.outcome == "failure" and index % 2:
             record = replace(record, attribution=WRONG)
         elif record.outcome == "failure":
@@ -225,14 +222,12 @@ def test_stages_are_found_again_from_the_events() -> None:
         policies=("listener",), tasks=("PickXtimes",), episodes=(0,), settings=("explicit",)
     )
     (job,) = plan.jobs()
-    color = make_record(job, RolloutResult(), started_at="now").goal["color"]
+    color = make_record(job).goal["color"]
     events = [
         EventRecord(step=-1, kind="still", subject="robot"),
         EventRecord(step=30, kind="picked", subject=f"cube_{color}"),
     ]
-    record = make_record(
-        job, RolloutResult("failure", cause="x", steps=50, events=events), started_at="now"
-    )
+    record = make_record(job, "failure", "x", steps=50, events=events)
     (details,) = Page(text := render([record])).details
     steps = [step for _, step in details["stages"]]
     assert steps[0] == 30
@@ -303,7 +298,7 @@ def test_cells_say_how_sure_they_are_and_each_difficulty_has_its_own() -> None:
     assert "95 % interval" in note
     assert "points to explicit on the same" in note
     lost = [
-        make_record(job, RolloutResult("failure", cause="it fell"), started_at="now")
+        make_record(job, "failure", "it fell")
         for job in PLAN.jobs()
         if job.setting in {"explicit", "direct"}
     ]
@@ -469,10 +464,7 @@ def test_no_records_is_one_sentence(tmp_path: Path) -> None:
 
 def test_the_first_pair_has_something_to_show() -> None:
     plan = PLAN.model_copy(update={"policies": ("oracle", "listener", "forgetful")})
-    won = [
-        make_record(job, RolloutResult("success", cause=None), started_at="now")
-        for job in plan.jobs()
-    ]
+    won = [make_record(job, "success") for job in plan.jobs()]
     even = Page(render(won))
     assert (even.data["sides"], even.data["change"]) == ([0, 1], "all")
     lost = {"outcome": "failure", "cause": "fell"}

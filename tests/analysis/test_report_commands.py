@@ -6,13 +6,13 @@ from pathlib import Path
 
 import pytest
 import typer
+from made_records import make_record
 from typer.testing import CliRunner
 
 from roboirg.cli.report_commands import compare, figures, tables
 from roboirg.core.errors import InvalidValueError, UnknownNameError
 from roboirg.evaluation.plan.plan_maker import make_plan
 from roboirg.evaluation.plan.stored_plans import write_plan
-from roboirg.evaluation.play.rollout_result import RolloutResult, make_record
 from roboirg.evaluation.records.record_codec import StoreError
 from roboirg.evaluation.records.store import RecordStore
 
@@ -31,8 +31,7 @@ def write_run(folder: Path, policies: tuple[str, ...], leave_out: int = 0) -> No
         jobs = plan.jobs()
         for job in jobs[: len(jobs) - leave_out]:
             won = job.policy == "listener" or job.setting == "explicit"
-            course = RolloutResult("success" if won else "failure", cause=None if won else "wrong")
-            store.append(make_record(job, course, started_at="now"))
+            store.append(make_record(job, *(("success",) if won else ("failure", "wrong"))))
     write_plan(plan, folder)
 
 

@@ -6,6 +6,7 @@ import io
 
 import pytest
 from flat_jobs import job_of
+from made_records import make_record
 from rich.console import Console
 
 from roboirg.core.instruction_options import InstructionOptions
@@ -20,7 +21,6 @@ from roboirg.evaluation.analysis.tables.run_tables import (
     print_failures,
     print_run_tables,
 )
-from roboirg.evaluation.play.rollout_result import RolloutResult, make_record
 from roboirg.evaluation.records.record import Job, Record
 
 DIRECT = InstructionOptions("direct")
@@ -45,7 +45,7 @@ def record(
         }
     )
     cause = None if outcome == "success" else cause
-    return make_record(job, RolloutResult(outcome, cause=cause), started_at="now")  # type: ignore[arg-type]
+    return make_record(job, outcome, cause=cause)  # type: ignore[arg-type]
 
 
 def printed(records: list[Record], planned: tuple[Job, ...] = ()) -> str:

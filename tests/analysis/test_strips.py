@@ -6,13 +6,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from made_records import make_record
 from msgspec.structs import replace
 
 from roboirg.evaluation.analysis.figures import write_figures
 from roboirg.evaluation.analysis.figures.strips import PICTURES, draw_strips, shown_steps
 from roboirg.evaluation.analysis.stats.run_data import RunData
 from roboirg.evaluation.plan.plan import Plan
-from roboirg.evaluation.play.rollout_result import RolloutResult, make_record
 from roboirg.evaluation.play.video_writer import VideoWriter
 from roboirg.evaluation.records.record import Attribution, Record, SubgoalRecord
 from roboirg.evaluation.records.store import RecordStore
@@ -55,10 +55,8 @@ def records() -> list[Record]:
     found = []
     for job in sorted(PLAN.jobs(), key=lambda one: one.setting != "explicit"):
         lost = job.setting != "explicit"
-        result = RolloutResult("success", steps=STEPS, cause=None)
-        if lost:
-            result = RolloutResult("failure", steps=STEPS, cause="picked the wrong")
-        made = make_record(job, result, started_at="2026-01-02T03:04:05+00:00")
+        outcome = ("failure", "picked the wrong") if lost else ("success",)
+        made = make_record(job, *outcome, steps=STEPS, started_at="2026-01-02T03:04:05+00:00")
         wrong = Attribution(kind="grounding", failure="wrong_object", step=MOMENT, sentence="So.")
         subgoal = SubgoalRecord(step=50, text="lift the red cube", verdict="wrong_thing")
         found.append(

@@ -3,13 +3,13 @@
 from functools import cache
 
 import typer.main
+from made_records import make_record
 from msgspec.structs import replace
 from plan_files import plan_file
 
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.evaluation.plan.plan_maker import make_plan
 from roboirg.evaluation.plan.stored_plans import write_plan
-from roboirg.evaluation.play.rollout_result import RolloutResult, make_record
 from roboirg.evaluation.records.record import Job
 from roboirg.evaluation.records.store import RecordStore
 from roboirg.main import app
@@ -77,11 +77,9 @@ def make_run(folder):
                 episode=number // 2,
                 options=InstructionOptions("direct"),
             )
-            result = RolloutResult("failure", cause="timeout", steps=7)
-            if number % 2:
-                job = replace(job, policy="oracle")
-                result = RolloutResult("success", cause=None, steps=7)
-            store.append(make_record(job, result, started_at="now"))
+            outcome = ("success",) if number % 2 else ("failure", "timeout")
+            job = replace(job, policy="oracle") if number % 2 else job
+            store.append(make_record(job, *outcome, steps=7))
     plan = make_plan(["random", "oracle"], tasks="PickXtimes", settings="direct", episodes="3")
     write_plan(plan, folder)
     return folder

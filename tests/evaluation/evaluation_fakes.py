@@ -11,11 +11,11 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import msgspec
+from made_records import make_record
 
 from roboirg.core.errors import RenderDeviceError
 from roboirg.core.waiting import waiting
 from roboirg.evaluation.plan.plan import Plan
-from roboirg.evaluation.play.rollout_result import RolloutResult, make_record
 from roboirg.evaluation.play.watchdog import watched
 from roboirg.evaluation.records.record import NON_DETERMINISTIC_FIELDS, EventRecord, Job, Record
 from roboirg.evaluation.run.executor import LocalProcesses
@@ -54,7 +54,7 @@ class FakePlay:
         time.sleep(self.seconds)
         while self.endless is not None and job.episode >= self.endless:
             time.sleep(1.0)
-        return make_record(job, fake_result(job), started_at=started_at, duration_s=self.seconds)
+        return fake_record(job, started_at=started_at, duration_s=self.seconds)
 
     def _dies(self, job: Job) -> bool:
         return self.folder is None or len(starts(self.folder, job)) <= self.deaths
@@ -115,12 +115,12 @@ class WaitingPlay:
         raise AssertionError("it was not killed")
 
 
-def fake_result(job: Job) -> RolloutResult:
+def fake_record(job: Job, **fields: object) -> Record:
     luck = hashlib.sha256(job.slug.encode()).digest()[0]
-    events = [EventRecord(step=luck, kind="picked", subject="cube_red")]
-    if luck % 2 or job.setting == "explicit":
-        return RolloutResult("success", cause=None, steps=luck, events=events)
-    return RolloutResult("failure", cause="picked the wrong cube", steps=luck, events=events)
+    events = (EventRecord(step=luck, kind="picked", subject="cube_red"),)
+    wins = luck % 2 or job.setting == "explicit"
+    outcome = ("success",) if wins else ("failure", "picked the wrong cube")
+    return make_record(job, *outcome, steps=luck, events=events, **fields)
 
 
 def comparable(record: Record) -> dict[str, object]:

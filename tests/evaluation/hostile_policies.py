@@ -65,10 +65,10 @@ class Patcher(Hostile):
     """Makes every episode a success."""
 
     def act(self, observation: Any) -> Any:
-        from roboirg.evaluation.play import rollout_result
+        from roboirg.evaluation.records import record
         from roboirg.judging import Judge
 
-        patched: Any = rollout_result.RolloutResult
+        patched: Any = record.Record
         patched.record_status = lambda self, *_: setattr(self, "outcome", "success")
         judge: Any = Judge
         judge.status = "success"

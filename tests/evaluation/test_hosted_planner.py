@@ -15,8 +15,7 @@ from roboirg.core.instruction_options import InstructionOptions
 from roboirg.evaluation.hosting.host_pool import HostPool, HostSettings
 from roboirg.evaluation.hosting.policy_descriptions import describe_policy
 from roboirg.evaluation.play.rollout import EpisodeRunner
-from roboirg.evaluation.play.rollout_result import RolloutResult
-from roboirg.evaluation.records.record import Job
+from roboirg.evaluation.records.record import Job, Record
 from roboirg.policies.by_name.loading import is_privileged, make_policy, needs_host
 
 
@@ -31,9 +30,9 @@ def job_of(spec: str) -> Job:
               options=InstructionOptions("explicit"))  # fmt: skip
 
 
-def play(spec: str) -> RolloutResult:
+def play(spec: str) -> Record:
     with HostPool(HostSettings()) as pool, pool.connect() as line:
-        return EpisodeRunner(Path(), hosts=line).play_once(job_of(spec))
+        return EpisodeRunner(Path(), hosts=line).play_once(job_of(spec))[0]
 
 
 @pytest.mark.sim
@@ -53,8 +52,8 @@ def test_it_sees_pictures_and_words_only() -> None:
     assert result.policy_metadata["planner"] == {"world": False}
     # The whole is marked as it acts by the simulator's state, and described alike beforehand.
     known = describe_policy(spec)
-    assert result.policy is not None
-    assert known[:2] == result.policy[:2] == ("mine-1 + scripted hands", True)
+    assert known[:2] == (result.policy_version, result.privileged)
+    assert known[:2] == ("mine-1 + scripted hands", True)
     assert is_privileged(spec)
 
 
@@ -70,10 +69,9 @@ def test_one_that_is_declared_runs_next_to_the_world() -> None:
     assert not needs_host(spec)
     assert play(spec).usage["process"] == os.getpid()
     # So does any in a run whose policies share the worker's process.
-    shared = EpisodeRunner(Path()).play_once(job_of("planner:own_planners:Pointer"))
+    shared = EpisodeRunner(Path()).play_once(job_of("planner:own_planners:Pointer"))[0]
     assert (shared.usage["process"], len(shared.subgoals)) == (os.getpid(), 2)
-    assert shared.policy is not None
-    assert shared.policy.version == "mine-1 + scripted hands"
+    assert shared.policy_version == "mine-1 + scripted hands"
     with pytest.raises(InvalidValueError, match="has attach"):
         make_policy("planner:own_planners:Insider", 0)
 

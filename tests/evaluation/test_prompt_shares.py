@@ -11,6 +11,7 @@ from pathlib import Path
 import msgspec
 import pytest
 from flat_jobs import job_of
+from made_records import make_record
 from plan_files import plan_file
 from rich.console import Console
 from typer.testing import CliRunner
@@ -22,7 +23,8 @@ from roboirg.evaluation.analysis.stats.heard_rates import count_heard
 from roboirg.evaluation.analysis.tables.run_tables import make_run_tables, print_run_tables
 from roboirg.evaluation.plan.plan_file import read_plan_file
 from roboirg.evaluation.plan.plan_maker import make_plan
-from roboirg.evaluation.play.job_instruction import instruct_job
+from roboirg.evaluation.play.episode_record import audit_record, utterances_at
+from roboirg.evaluation.play.job_instruction import PreparedJob, instruct_job
 from roboirg.evaluation.play.prompt_shares import (
     audit_job,
     prompt_shares,
@@ -32,7 +34,6 @@ from roboirg.evaluation.play.prompt_shares import (
     warning_lines,
 )
 from roboirg.evaluation.play.rollout import EpisodeRunner
-from roboirg.evaluation.play.rollout_result import RolloutResult, make_record
 from roboirg.evaluation.records.record import IDENTITY, Job, Record
 from roboirg.evaluation.records.record_codec import encode, read_record
 from roboirg.evaluation.records.store import read_records
@@ -108,8 +109,8 @@ def test_in_turns_each_message_has_the_whole_budget() -> None:
 
 
 def test_a_record_says_what_was_cut() -> None:
-    result = RolloutResult("failure", cause="because", prompt_limit=EXACT)
-    record = make_record(job(**LONG), result, started_at="now")
+    record = make_record(job(**LONG), "failure", "because")
+    audit_record(record, PreparedJob(job(**LONG)), EXACT)
     audit = record.prompt
     assert audit is not None
     assert record.prompt_verdict == "cut"
@@ -129,7 +130,7 @@ def test_a_record_says_what_was_cut() -> None:
 
 
 def test_records_without_a_limit_and_old_ones_are_unknown() -> None:
-    record = make_record(job(), RolloutResult("success", cause=None), started_at="now")
+    record = make_record(job(), "success")
     assert (record.prompt, record.prompt_verdict) == (None, "unknown")
     old = msgspec.to_builtins(record)
     del old["prompt"], old["prompt_verdict"]
@@ -138,16 +139,15 @@ def test_records_without_a_limit_and_old_ones_are_unknown() -> None:
 
 def test_what_was_not_said_yet_is_neither_heard_nor_lost() -> None:
     played = job(setting="contextual", delivery="turns")
-    result = RolloutResult("failure", cause="because", prompt_limit=EXACT._replace(tokens=3))
-    result.heard = [{"text": "", "step": 0}]
-    record = make_record(played, result, started_at="now")
+    prepared, limit = PreparedJob(played), EXACT._replace(tokens=3)
+    record = make_record(played, "failure", "because", instruction=utterances_at(prepared, [0]))
+    audit_record(record, prepared, limit)
     assert record.prompt is not None
     assert len(record.prompt.reached) == 1 < len(record.instruction)
     assert all(record.mentions[index].utterance == 0 for index in record.prompt.lost)
-    result.heard = []
-    planned = make_record(played, result, started_at="now").prompt
-    assert planned is not None
-    assert len(planned.reached) == len(record.instruction)
+    record.instruction = utterances_at(prepared, [])
+    audit_record(record, prepared, limit)
+    assert len(record.prompt.reached) == len(record.instruction)
 
 
 def test_a_long_prompt_is_refused_before_it_is_played(tmp_path: Path) -> None:

@@ -11,6 +11,7 @@ import msgspec
 import numpy as np
 import pytest
 from evaluation_fakes import comparable
+from made_records import make_record
 from msgspec.structs import replace
 
 from roboirg.core.environment_options import EnvironmentOptions
@@ -25,9 +26,8 @@ from roboirg.evaluation.episode_errors import one_line
 from roboirg.evaluation.play import rollout
 from roboirg.evaluation.play.job_instruction import instruct_job
 from roboirg.evaluation.play.rollout import EpisodeRunner
-from roboirg.evaluation.play.rollout_result import RolloutResult
 from roboirg.evaluation.play.video_writer import VideoWriter
-from roboirg.evaluation.records.record import EventRecord, Job
+from roboirg.evaluation.records.record import EventRecord, Job, Record
 from roboirg.evaluation.records.record_codec import encode, read_record
 from roboirg.tasks.splits import splits
 
@@ -125,15 +125,15 @@ class PaperInsider(PaperPolicy):
 
 @pytest.fixture
 def stage(monkeypatch: pytest.MonkeyPatch) -> Callable[..., Any]:
-    def play(world: PaperWorld, policy: Any, job: Job = JOB) -> RolloutResult:
+    def play(world: PaperWorld, policy: Any, job: Job = JOB) -> Record:
         monkeypatch.setattr(rollout, "make_env", lambda _job, _needs: world)
         monkeypatch.setattr(rollout, "load_policy", lambda _job: policy)
-        return EpisodeRunner(Path()).play_once(job)
+        return EpisodeRunner(Path()).play_once(job)[0]
 
     return play
 
 
-def test_all_rows_are_played_until_the_end(stage: Callable[..., RolloutResult]) -> None:
+def test_all_rows_are_played_until_the_end(stage: Callable[..., Record]) -> None:
     policy, world = PaperPolicy(), PaperWorld(length=5)
     course = stage(world, policy)
     assert (course.outcome, course.cause, course.steps) == ("success", None, 5)
@@ -145,25 +145,25 @@ def test_all_rows_are_played_until_the_end(stage: Callable[..., RolloutResult]) 
 
 
 def test_a_record_holds_what_the_job_prescribes_instead_of_the_policy(
-    stage: Callable[..., RolloutResult],
+    stage: Callable[..., Record],
 ) -> None:
     job = replace(JOB, environment=EnvironmentOptions(demonstration_frames=4))
     needs = stage(PaperWorld(), PaperPolicy(), job).needs
     assert (needs["demonstration_frames"], needs["cameras"]) == (4, [])
 
 
-def test_one_row_is_a_chunk_of_one(stage: Callable[..., RolloutResult]) -> None:
+def test_one_row_is_a_chunk_of_one(stage: Callable[..., Record]) -> None:
     assert stage(PaperWorld(2), PaperPolicy(np.zeros(8))).steps == 2
 
 
-def test_an_insider_is_attached_before_reset(stage: Callable[..., RolloutResult]) -> None:
+def test_an_insider_is_attached_before_reset(stage: Callable[..., Record]) -> None:
     policy = PaperInsider()
     stage(PaperWorld(), policy, msgspec.structs.replace(JOB, policy="oracle"))
     assert policy.heard == ["PaperWorld", instruct_job(JOB).text, 3]
 
 
 def test_a_policy_that_is_not_declared_privileged_is_never_attached(
-    stage: Callable[..., RolloutResult],
+    stage: Callable[..., Record],
 ) -> None:
     policy = PaperInsider()
     stage(PaperWorld(), policy, JOB)
@@ -178,7 +178,7 @@ def test_a_policy_that_is_not_declared_privileged_is_never_attached(
     ],
 )
 def test_the_judge_decides(
-    stage: Callable[..., RolloutResult],
+    stage: Callable[..., Record],
     status: str,
     given: str | None,
     outcome: str,
@@ -201,7 +201,7 @@ def test_the_judge_decides(
     ],
 )
 def test_a_fault_of_the_policy_is_an_error_not_a_failure(
-    stage: Callable[..., RolloutResult], answer: Any, cause: str
+    stage: Callable[..., Record], answer: Any, cause: str
 ) -> None:
     world = PaperWorld()
     course = stage(world, PaperPolicy(answer))
@@ -219,7 +219,7 @@ def test_a_fault_of_the_policy_is_an_error_not_a_failure(
     ],
 )
 def test_a_fault_of_the_world_is_an_error(
-    stage: Callable[..., RolloutResult], trouble: Exception, cause: str
+    stage: Callable[..., Record], trouble: Exception, cause: str
 ) -> None:
     world = PaperWorld()
     world.trouble = trouble
@@ -230,13 +230,13 @@ def test_a_fault_of_the_world_is_an_error(
 
 @pytest.mark.parametrize("error", [RenderDeviceError("no"), MissingDependencyError("no")])
 def test_what_ends_every_episode_ends_the_run(
-    stage: Callable[..., RolloutResult], error: Exception
+    stage: Callable[..., Record], error: Exception
 ) -> None:
     with pytest.raises(type(error)):
         stage(PaperWorld(), PaperPolicy(error))
 
 
-def test_ctrl_c_is_no_episode_error(stage: Callable[..., RolloutResult]) -> None:
+def test_ctrl_c_is_no_episode_error(stage: Callable[..., Record]) -> None:
     policy = PaperPolicy()
     policy.act = lambda _observation: (_ for _ in ()).throw(KeyboardInterrupt)  # type: ignore[method-assign]
     with pytest.raises(KeyboardInterrupt):
@@ -313,7 +313,7 @@ def test_a_video_folder_that_is_a_file_does_not_change_the_verdict(
 
 
 def test_wrong_cameras_of_an_object_are_the_policys_fault(
-    stage: Callable[..., RolloutResult],
+    stage: Callable[..., Record],
 ) -> None:
     policy = PaperPolicy()
     policy.cameras = "front"  # type: ignore[assignment]
@@ -323,21 +323,17 @@ def test_wrong_cameras_of_an_object_are_the_policys_fault(
 
 def test_a_record_says_what_is_in_the_words_and_who_cheats() -> None:
     job = replace(JOB.with_options(setting="reasoning"), policy="oracle")
-    record = rollout.make_record(job, RolloutResult("success", cause=None), started_at="now")
+    record = make_record(job, "success")
     assert record.metadata["pattern"]
     assert record.metadata["templates"]
     assert record.privileged
-    assert not rollout.make_record(JOB, RolloutResult(), started_at="now").privileged
+    assert not make_record(JOB).privileged
     assert read_record(encode(record), Path(), 1) == record
 
 
 def test_a_record_has_the_words_that_were_spoken() -> None:
-    spoken = instruct_job(JOB.with_options(setting="spatial"))
-    result = RolloutResult("success", cause=None, instruction=spoken)
-    record = rollout.make_record(JOB, result, started_at="now")
-    assert record.instruction[-1].text == spoken.utterances[-1].text
     # An episode that did not begin has the words that it would have had.
-    record = rollout.make_record(JOB, RolloutResult(), started_at="now")
+    record = make_record(JOB)
     assert record.instruction[-1].text == instruct_job(JOB).utterances[-1].text != record.command
 
 
@@ -359,11 +355,8 @@ def test_a_record_tells_a_mirrored_pick_where_the_words_name_a_side(
         episode=18,
         options=InstructionOptions(setting, frame=frame),
     )
-    events = [EventRecord(step=9, kind="picked", subject="cube_red")]
-    result = RolloutResult(
-        "failure", None, "picked up the red cube", elapsed_steps=9, events=events
-    )
-    record = rollout.make_record(job, result, started_at="now")
+    events = (EventRecord(step=9, kind="picked", subject="cube_red"),)
+    record = make_record(job, "failure", "picked up the red cube", steps=9, events=events)
     assert record.attribution is not None
     assert (record.attribution.failure, record.attribution.subject) == (failure, "cube_red")
 
@@ -471,6 +464,6 @@ def test_what_a_policy_raises_while_it_hears_is_its_error(
 
     monkeypatch.setattr(rollout, "make_env", lambda _job, _needs: TellingWorld((0, 3), 9))
     monkeypatch.setattr(rollout, "load_policy", lambda _job: Deaf())
-    result = EpisodeRunner(Path()).play_once(TURNS)
+    result, _ = EpisodeRunner(Path()).play_once(TURNS)
     assert (result.outcome, result.error) == ("error", "policy")
     assert "no ears for" in str(result.cause)

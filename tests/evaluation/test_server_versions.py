@@ -6,12 +6,12 @@ from pathlib import Path
 
 import pytest
 from evaluation_fakes import FakePlay
+from made_records import make_record
 from wire_servers import ChallengeServer
 
 from roboirg.evaluation.analysis.stats.cells import Versions, gather, labels
 from roboirg.evaluation.plan.plan import Plan
 from roboirg.evaluation.plan.plan_maker import make_plan
-from roboirg.evaluation.play.rollout_result import RolloutResult, make_record
 from roboirg.evaluation.records.merging import merge_runs
 from roboirg.evaluation.records.record import Job, Record
 from roboirg.evaluation.records.record_codec import StoreError
@@ -36,11 +36,10 @@ class Told:
     def __call__(self, job: Job) -> Record:
         version = self.versions.pop(0)
         if version == "refused":
-            result = RolloutResult("error", "connection", "connection: refused")
-            return make_record(job, result, started_at="now")
+            return make_record(job, cause="connection: refused", error="connection")
         metadata = {"server": "localhost:1"} | ({} if version is None else {"version": version})
-        result = RolloutResult("success", cause=None, policy_metadata=metadata)
-        return make_record(job, result, started_at="now")
+        told = server_version(metadata)
+        return make_record(job, "success", policy_metadata=metadata, server_version=told)
 
 
 def versions(folder: Path) -> list[str | None]:

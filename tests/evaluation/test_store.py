@@ -8,12 +8,11 @@ import tempfile
 from pathlib import Path
 
 import pytest
-from evaluation_fakes import fake_result, small_plan
+from evaluation_fakes import fake_record, small_plan
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from msgspec.structs import replace
 
-from roboirg.evaluation.play.rollout_result import make_record
 from roboirg.evaluation.records.record import EventRecord, Record
 from roboirg.evaluation.records.record_codec import StoreError, encode, identity_key
 from roboirg.evaluation.records.store import (
@@ -30,9 +29,7 @@ from roboirg.util.atomic_write import write_atomically
 
 @functools.cache
 def some_records() -> tuple[Record, ...]:
-    return tuple(
-        make_record(job, fake_result(job), started_at="now") for job in small_plan().jobs()
-    )
+    return tuple(fake_record(job) for job in small_plan().jobs())
 
 
 def fill(folder: Path, records: tuple[Record, ...]) -> bytes:

@@ -7,6 +7,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from made_records import make_record
 from msgspec.structs import replace
 from page_text import render
 from typer.testing import CliRunner
@@ -17,7 +18,6 @@ from roboirg.core.errors import InvalidValueError
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.core.subgoal_text import split_point
 from roboirg.evaluation.play.rollout import EpisodeRunner
-from roboirg.evaluation.play.rollout_result import RolloutResult, make_record
 from roboirg.evaluation.policy_calls import policy_subgoal
 from roboirg.evaluation.records.record import Job, SubgoalRecord
 from roboirg.evaluation.records.record_codec import StoreError, encode, read_record
@@ -54,8 +54,7 @@ def test_a_subgoal_is_optional() -> None:
 
 
 def test_records_keep_them_and_refuse_others() -> None:
-    course = RolloutResult("failure", cause="no", subgoals=list(SAID))
-    record = make_record(JOB, course, started_at="now")
+    record = make_record(JOB, "failure", "no", subgoals=SAID)
     assert read_record(encode(record), Path("r"), 1).subgoals == SAID
     long = replace(record, subgoals=(replace(SAID[0], text="x" * 301),))
     with pytest.raises(StoreError, match="text"):
@@ -64,8 +63,7 @@ def test_records_keep_them_and_refuse_others() -> None:
 
 def test_the_page_and_the_table_show_them(tmp_path: Path) -> None:
     spent = {"calls": 3.0, "answered_s": 6.5, "waited_s": 2.25}
-    course = RolloutResult("failure", cause="no", subgoals=list(SAID), usage=spent)
-    record = make_record(JOB, course, started_at="now")
+    record = make_record(JOB, "failure", "no", subgoals=SAID, usage=spent)
     with RecordStore(tmp_path) as store:
         store.append(record)
     page = render([record])
@@ -104,7 +102,7 @@ def test_a_played_episode_notes_what_is_new_with_the_stage_that_is_due(
     env.close()
     assert point is not None
     monkeypatch.setattr(Planning, "point", point)
-    result = EpisodeRunner(Path()).play_once(JOB)
+    result, _ = EpisodeRunner(Path()).play_once(JOB)
     assert result.outcome == "failure", result.cause
     words = "pick up the green cube for the first time"
     assert [(one.step, one.point, one.due, one.verdict) for one in result.subgoals] == [

@@ -6,6 +6,7 @@ import re
 import numpy as np
 import planner_faults
 import pytest
+from made_records import make_record
 from planning_fakes import fake_vlm, words_of
 from selection import slow_but
 
@@ -13,7 +14,6 @@ import roboirg
 from roboirg.core.actions import choice_action
 from roboirg.core.errors import InvalidActionError, InvalidValueError
 from roboirg.evaluation.analysis.stats.planner_failures import planner_failure
-from roboirg.evaluation.play.rollout_result import RolloutResult, make_record
 from roboirg.judging import plain_subgoal
 from roboirg.policies import make_policy, play
 from roboirg.policies.by_name.loading import is_privileged, needs_host
@@ -237,7 +237,7 @@ def test_a_record_without_a_planner_has_no_planners_failure():
         policy="random", task="PickXtimes", split="test", episode=0,
         options=planner_faults.InstructionOptions("explicit"),
     )  # fmt: skip
-    record = make_record(job, RolloutResult("failure", cause="no"), started_at="now")
+    record = make_record(job, "failure", "no")
     assert planner_failure(record) is None
 
 

@@ -129,7 +129,7 @@ def own_outcomes(spec, meshes=MESHES):
             environment=EnvironmentOptions(MAX_STEPS, meshes=meshes),
             options=InstructionOptions(SETTING),
         )
-        one = EpisodeRunner(Path()).play_once(job)
+        one, _ = EpisodeRunner(Path()).play_once(job)
         assert one.outcome in ("success", "failure"), one
         played.append((task, episode, one.outcome == "success", one.steps))
     for task in PLAYED:

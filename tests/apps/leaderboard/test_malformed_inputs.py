@@ -21,7 +21,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from evaluation_fakes import fake_result, small_plan
+from evaluation_fakes import fake_record, small_plan
 
 from roboirg.apps.leaderboard.packing import MANIFEST, opened_run, pack_run
 from roboirg.apps.leaderboard.run_verification import verify_run
@@ -29,7 +29,6 @@ from roboirg.core.errors import RoboIRGError
 from roboirg.evaluation.analysis.page.report import write_report
 from roboirg.evaluation.plan.plan_file import read_plan_file
 from roboirg.evaluation.plan.stored_plans import read_plans, write_plan
-from roboirg.evaluation.play.rollout_result import make_record
 from roboirg.evaluation.records.action_log import ActionLog, read_actions, write_actions
 from roboirg.evaluation.records.episode_log import log_path
 from roboirg.evaluation.records.merging import merge_runs
@@ -59,9 +58,8 @@ def honest(tmp_path_factory: pytest.TempPathFactory) -> Path:
             log = ActionLog("joint_angle", np.ones((3, 8)), np.zeros(1, np.int32), np.ones(2))
             video = f"videos/{job.slug}.mp4"
             digest = write_actions(log, folder)
-            record = make_record(
+            record = fake_record(
                 job,
-                fake_result(job),
                 started_at="2026-11-23T12:00:00+00:00",
                 video=video,
                 plan=plan.fingerprint,

@@ -8,12 +8,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from evaluation_fakes import fake_result
+from evaluation_fakes import fake_record
 
 from roboirg.apps.leaderboard.packing import MANIFEST, opened_run, pack_run
 from roboirg.core.errors import RoboIRGError
 from roboirg.core.instruction_options import InstructionOptions
-from roboirg.evaluation.play.rollout_result import make_record
 from roboirg.evaluation.records.action_log import ActionLog, write_actions
 from roboirg.evaluation.records.record import Job
 from roboirg.evaluation.records.record_codec import StoreError
@@ -34,11 +33,7 @@ def run(tmp_path: Path) -> Path:
                 episode=episode,
                 options=InstructionOptions("direct"),
             )
-            store.append(
-                make_record(
-                    job, fake_result(job), started_at="", action_log=write_actions(log, folder)
-                )
-            )
+            store.append(fake_record(job, started_at="", action_log=write_actions(log, folder)))
     (folder / "videos").mkdir()
     (folder / "videos" / "one.mp4").write_bytes(b"video")
     (folder / "secret.txt").write_text("not packed")

@@ -3,6 +3,7 @@
 from pathlib import Path
 
 import pytest
+from made_records import make_record
 from page_text import render
 
 from roboirg.apps.real.study.failure_choices import failure_choices
@@ -10,7 +11,6 @@ from roboirg.apps.real.study.trial_log import VOID, WITHDRAWN, TrialLog, trial_m
 from roboirg.core.errors import InvalidValueError
 from roboirg.evaluation.analysis.stats.cells import gather
 from roboirg.evaluation.analysis.tables.paper_tables import make_table
-from roboirg.evaluation.play.rollout_result import RolloutResult, make_record
 from roboirg.evaluation.records.record_codec import encode, read_record
 from roboirg.evaluation.records.store import RecordStore, read_records, read_results
 
@@ -93,7 +93,7 @@ def test_trials_come_in_order_and_void_is_a_verdict(small):
 
 def test_what_simulation_played_is_no_score(small):
     plan, folder = small
-    record = make_record(plan.trials[0].job, RolloutResult("success", cause=None), started_at="now")
+    record = make_record(plan.trials[0].job, "success")
     with RecordStore(folder) as store:
         store.append(record)
     assert read(plan, folder).state(plan.trials[0].name) == "open"

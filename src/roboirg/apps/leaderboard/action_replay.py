@@ -13,8 +13,9 @@ from roboirg.core.observations import Observation
 from roboirg.evaluation.episode_errors import EpisodeError
 from roboirg.evaluation.hosting.policy_descriptions import PolicyDescription
 from roboirg.evaluation.play.call_guard import CallGuard
+from roboirg.evaluation.play.episode_record import begin_record
+from roboirg.evaluation.play.job_instruction import PreparedJob
 from roboirg.evaluation.play.rollout import play_with
-from roboirg.evaluation.play.rollout_result import RolloutResult, make_record
 from roboirg.evaluation.records.action_log import ActionLog
 from roboirg.evaluation.records.record import Job, Record
 from roboirg.policies.contract.policy_needs import PolicyNeeds
@@ -55,7 +56,7 @@ class ReplayPolicy:
 
 def unplayed(record: Record) -> Record:
     """Return the record of the same job before anything is played."""
-    return make_record(_job(record), _unknown_policy(), started_at=record.started_at)
+    return _begin(PreparedJob(_job(record)))
 
 
 def replay(record: Record, log: ActionLog) -> tuple[Record, ActionLog | None]:
@@ -67,17 +68,17 @@ def replay(record: Record, log: ActionLog) -> tuple[Record, ActionLog | None]:
     Raises:
         InvalidValueError: the job's wording file is missing or has changed.
     """
-    job, policy, result = _job(record), ReplayPolicy(log), _unknown_policy()
+    prepared, policy = PreparedJob(_job(record)), ReplayPolicy(log)
+    again, played = _begin(prepared), None
     needs = PolicyNeeds(cameras=(), actions=log.space)
     try:
-        play_with(policy, job, needs, result, CallGuard(result, None))
+        played = play_with(policy, prepared, needs, again, CallGuard(again.timings, None))
     except EpisodeError as error:
-        result.record_error(error.kind, error.cause)
-        if policy.is_used_up and record.outcome == "error":
-            result.error, result.cause = record.error, record.cause
-    played = result.action_log
-    digest = None if played is None else played.digest
-    return make_record(job, result, started_at=record.started_at, action_log=digest), played
+        again.record_error(error.kind, error.cause)
+    if policy.is_used_up and record.outcome == "error":
+        again.error, again.cause = record.error, record.cause
+    again.action_log = None if played is None else played.digest
+    return again, played
 
 
 def _job(record: Record) -> Job:
@@ -85,6 +86,6 @@ def _job(record: Record) -> Job:
     return msgspec.structs.replace(record.identity, wordings_file=record.wordings_file)
 
 
-def _unknown_policy() -> RolloutResult:
-    """Return an empty result whose policy is not looked up: the name may be anyone's module."""
-    return RolloutResult(policy=PolicyDescription("unknown", is_privileged=False))
+def _begin(prepared: PreparedJob) -> Record:
+    """Return a record whose policy is not looked up: the name may be anyone's module."""
+    return begin_record(prepared, PolicyDescription("unknown", is_privileged=False))

@@ -8,7 +8,6 @@ from collections.abc import Iterator
 
 from roboirg.core.waiting import queued_seconds
 from roboirg.evaluation.episode_errors import attribute_errors
-from roboirg.evaluation.play.rollout_result import RolloutResult
 from roboirg.evaluation.play.watchdog import Phase, watched
 
 
@@ -16,17 +15,19 @@ class CallGuard:
     """Attributes errors of policy and environment calls, watches their time and measures it.
 
     Args:
-        result: gets the times.
+        timings: gets the seconds, by name.
         policy_timeout_s: seconds that one call of the policy may take; None for no limit.
         is_hosted: whether the policy's host watches the time instead.
     """
 
     def __init__(
-        self, result: RolloutResult, policy_timeout_s: float | None, *, is_hosted: bool = False
+        self,
+        timings: dict[str, float],
+        policy_timeout_s: float | None,
+        *,
+        is_hosted: bool = False,
     ) -> None:
-        self._timings = result.timings
-        self._limit_s = policy_timeout_s
-        self._is_hosted = is_hosted
+        self._timings, self._limit_s, self._is_hosted = timings, policy_timeout_s, is_hosted
 
     @contextlib.contextmanager
     def policy(self, phase: Phase, name: str) -> Iterator[None]:

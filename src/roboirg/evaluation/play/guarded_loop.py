@@ -1,4 +1,4 @@
-"""The loop of a rollout: guarded calls that fill the result and the video."""
+"""The loop of a rollout: guarded calls that fill the record and the video."""
 
 from __future__ import annotations
 
@@ -9,18 +9,25 @@ import numpy as np
 from msgspec.structs import replace
 from numpy.typing import ArrayLike, NDArray
 
-from roboirg.core.actions import ActionSpace
+from roboirg.core.actions import CHOICE, ActionSpace
 from roboirg.core.delivery import SpokenInstruction
 from roboirg.core.inference_facts import inference_facts
 from roboirg.core.observations import Demonstration, Observation
 from roboirg.core.subgoal_text import split_point
 from roboirg.evaluation.play.call_guard import CallGuard
-from roboirg.evaluation.play.rollout_result import RolloutResult
+from roboirg.evaluation.play.episode_record import conclude, utterances_at
+from roboirg.evaluation.play.job_instruction import PreparedJob
 from roboirg.evaluation.play.video_writer import VideoWriter
 from roboirg.evaluation.policy_calls import check_rows, policy_metadata, policy_subgoal
-from roboirg.evaluation.records.record import Job, SubgoalRecord
+from roboirg.evaluation.records.action_log import ActionLog
+from roboirg.evaluation.records.record import EventRecord, Record, SubgoalRecord
 from roboirg.judging import judge_subgoal, plain_subgoal
-from roboirg.policies.by_name.loading import is_foreign, is_privileged, planner_alone
+from roboirg.policies.by_name.loading import (
+    is_foreign,
+    is_privileged,
+    planner_alone,
+    server_version,
+)
 from roboirg.policies.contract.base import Policy
 from roboirg.policies.contract.play import EpisodeLoop
 
@@ -37,44 +44,51 @@ class GuardedLoop(EpisodeLoop):
     Args:
         env: the environment of the job.
         policy: answers the observations.
-        job: what is played.
+        prepared: what is played.
         space: of the policy's actions.
-        result: is filled in.
+        record: is filled in.
         guard: attributes errors and measures calls.
         writer: gets the frames of a video.
+
+    Attributes:
+        has_begun: whether the policy's turn came.
+        answers: what was executed of each answer of the policy, (n, size).
     """
 
     def __init__(
         self,
         env: RoboIRGEnv,
         policy: Policy,
-        job: Job,
+        prepared: PreparedJob,
         space: ActionSpace,
-        result: RolloutResult,
+        record: Record,
         guard: CallGuard,
         writer: VideoWriter | None = None,
     ) -> None:
         super().__init__(env, policy)
-        self._job, self._space, self._writer = job, space, writer
-        self._result, self._guard = result, guard
-        self._is_ours = not is_foreign(job.policy_spec)
-        self._knows_ends = self._is_ours or planner_alone(job.policy_spec) is not None
+        self._prepared, self._space, self._writer = prepared, space, writer
+        self._record, self._guard = record, guard
+        self._is_ours = not is_foreign(record.policy_spec)
+        self._knows_ends = self._is_ours or planner_alone(record.policy_spec) is not None
         self._reports, self._ends = bool(getattr(policy, "reports", False)), 0
+        self._start, self._heard = 0, list[Mapping[str, Any]]()
+        self.has_begun, self.answers = False, list[NDArray[np.float64]]()
 
     def play(self) -> dict[str, Any]:
-        """Play the episode, and record its status."""
-        info, result = super().play(), self._result
-        limit = self._job.environment.max_steps
-        if not result.record_status(info["status"], info.get("cause"), limit):
-            result.cause = f"environment: the episode ended with status {info['status']!r}"
+        """Play the episode, and record how it ended and why."""
+        info, record = super().play(), self._record
+        if not record.record_status(info["status"], info.get("cause")):
+            record.cause = f"environment: the episode ended with status {info['status']!r}"
+            return info
+        timed_out, original = info["status"] == "timeout", info.get("original")
+        conclude(record, self._prepared, self._start, timed_out=timed_out, original=original)
         return info
 
     def begin(self) -> tuple[dict[str, Any], dict[str, Any]]:
         """Start the episode and the policy."""
-        env, result, writer = self.env, self._result, self._writer
+        env, record, writer = self.env, self._record, self._writer
         with self._guard.environment("env_reset"):
-            result.instruction = env.instruction
-            first = SpokenInstruction(env.instruction.turns, self._job.options.delivery).prompt
+            first = SpokenInstruction(env.instruction.turns, record.options.delivery).prompt
             if writer is not None:
                 writer.caption, writer.longest_caption = first, env.instruction.text
                 env.set_frame_hook(writer.add_frame, every=writer.every)
@@ -82,25 +96,47 @@ class GuardedLoop(EpisodeLoop):
             if writer is not None:
                 writer.add_frame(env)  # the policy's first observation
             device = str(env.render_device)
-            result.render_device = None if device == NO_RENDER_DEVICE else device
-            result.demonstration_steps = len(info["demonstration"]["joint_positions"])
-            result.demonstration_source = info["demonstration_source"]
-            result.policy_start_step = int(info["elapsed_steps"])
-            result.add_events(info)
-            result.heard += info["heard"]
+            record.render_device = None if device == NO_RENDER_DEVICE else device
+            record.demonstration_steps = len(info["demonstration"]["joint_positions"])
+            record.demonstration_source = info["demonstration_source"]
+            self._start = int(info["elapsed_steps"])
+            self._add_events(info)
+            self._add_heard(info["heard"])
         with self._guard.policy("policy's reset()", "policy_reset"):
             self.start_policy(first, info["demonstration"])
-            result.policy_metadata = policy_metadata(self.policy, is_ours=self._is_ours)
-            result.inference = inference_facts(self.policy)
-        result.action_space = self._space.name
+            self._read_metadata()
+            record.inference = inference_facts(self.policy)
+        record.privileged |= self._space is CHOICE
+        self.has_begun = True
         return observation, info
 
     def start_policy(self, instruction: str, demonstration: Demonstration) -> None:
         """Start the policy, which gets the world only if its spec declares that."""
-        if is_privileged(self._job.policy_spec):
+        if is_privileged(self._record.policy_spec):
             super().start_policy(instruction, demonstration)
         else:
             self.policy.reset(instruction, demonstration)
+
+    def _read_metadata(self) -> None:
+        found = policy_metadata(self.policy, is_ours=self._is_ours)
+        self._record.policy_metadata, self._record.server_version = found, server_version(found)
+
+    def _add_events(self, info: Mapping[str, Any]) -> None:
+        self._record.events += tuple(
+            EventRecord(
+                step=int(event["step"]) - self._start,
+                kind=str(event["kind"]),
+                subject=str(event["subject"]),
+                place=None if event.get("place") is None else str(event["place"]),
+                holds=bool(event.get("holds", True)),
+            )
+            for event in info.get("events", ())
+        )
+
+    def _add_heard(self, utterances: Sequence[Mapping[str, Any]]) -> None:
+        self._heard += utterances
+        steps = [int(one["step"]) for one in self._heard]
+        self._record.instruction = utterances_at(self._prepared, steps)
 
     def act(self, observation: dict[str, Any]) -> NDArray[np.float64]:
         """Return the policy's next actions, checked."""
@@ -117,16 +153,17 @@ class GuardedLoop(EpisodeLoop):
         """Keep how subgoals ended, and those that were refused meanwhile."""
         ends = getattr(self.policy, "endings", ()) if self._knows_ends else ()
         for end in ends[self._ends :]:
-            found = self._result.subgoals
             if end.how == "refused":
                 self._note_subgoal(end.subgoal)
-            if found and found[-1].text == end.subgoal and found[-1].ended is None:
-                found[-1] = replace(found[-1], ended=end.how, why=end.why or None, thing=end.thing)
+            *before, last = self._record.subgoals or (None,)
+            if last is not None and last.text == end.subgoal and last.ended is None:
+                ended = replace(last, ended=end.how, why=end.why or None, thing=end.thing)
+                self._record.subgoals = (*before, ended)
         self._ends = len(ends)
 
     def _note_subgoal(self, subgoal: str) -> None:
         """Keep a subgoal if it or the stage that is due is new."""
-        stage, found = self.env.due_stage, self._result.subgoals
+        stage, found = self.env.due_stage, self._record.subgoals
         due = None if stage is None else plain_subgoal(stage)
         if found and self._reports and found[-1].text == subgoal and found[-1].ended is None:
             return  # it is still being done
@@ -137,28 +174,35 @@ class GuardedLoop(EpisodeLoop):
         if self._writer is not None:
             self._writer.point = point
         verdict = judge_subgoal(subgoal, stage, self.env.objects_at(point) if point else None)
-        found.append(
+        self._record.subgoals += (
             SubgoalRecord(
-                step=self._result.steps, text=subgoal, point=point, due=due, verdict=verdict
-            )
+                step=self._record.steps, text=subgoal, point=point, due=due, verdict=verdict
+            ),
         )
 
     def execute(self, actions: ArrayLike) -> tuple[dict[str, Any], dict[str, Any]]:
         """Execute actions, and keep those that were executed."""
-        rows, result = np.asarray(actions), self._result
+        rows, record = np.asarray(actions), self._record
         with self._guard.environment("env_step"):
             done = self.env.executed_actions
             observation, info = super().execute(rows)
-            result.answers.append(rows[: self.env.executed_actions - done])
-        result.steps = int(info["steps"])
-        result.add_events(info)
+            self.answers.append(rows[: self.env.executed_actions - done])
+        record.steps, record.calls = int(info["steps"]), len(self.answers)
+        self._add_events(info)
         return observation, info
 
     def hear(self, utterances: Sequence[Mapping[str, Any]]) -> None:
         """Let the policy hear what has just been said, and write it under the video."""
-        self._result.heard += utterances
+        self._add_heard(utterances)
         if self._writer is not None:
-            self._writer.caption = " ".join(one["text"] for one in self._result.heard)
+            self._writer.caption = " ".join(one["text"] for one in self._heard)
         with self._guard.policy("policy's hear()", "policy_hear"):
             super().hear(utterances)
-            self._result.policy_metadata = policy_metadata(self.policy, is_ours=self._is_ours)
+            self._read_metadata()
+
+    def action_log(self) -> ActionLog:
+        """Return the executed actions, and where they left the world; record its hash."""
+        numbers, self._record.end_state = self.env.end_state()
+        starts = np.cumsum([0, *map(len, self.answers)], dtype=np.int32)[:-1]
+        rows = np.concatenate([np.empty((0, self._space.size)), *self.answers])
+        return ActionLog(self._space.name, rows, starts, numbers)

@@ -22,24 +22,26 @@ from pathlib import Path
 from socket import socket
 
 from roboirg import policies
-from roboirg.evaluation.episode_errors import (
-    EpisodeError,
-    EpisodeLostError,
-    format_cause,
-    one_line,
-)
+from roboirg.core.errors import InvalidValueError
+from roboirg.evaluation.episode_errors import EpisodeError, EpisodeLostError, one_line
 from roboirg.evaluation.hosting.host_pool import HostSettings
 from roboirg.evaluation.hosting.hosted_policy import HostedPlanner, HostedPolicy
 from roboirg.evaluation.hosting.policy_descriptions import PolicyDescription, describe_here
 from roboirg.evaluation.play.call_guard import CallGuard
+from roboirg.evaluation.play.episode_record import (
+    audit_record,
+    begin_record,
+    describe,
+    lost_record,
+    utc_now,
+)
 from roboirg.evaluation.play.guarded_loop import GuardedLoop
 from roboirg.evaluation.play.job_instruction import PreparedJob
 from roboirg.evaluation.play.policy_environment import job_needs, make_env
 from roboirg.evaluation.play.prompt_shares import audit_job, too_long_text
-from roboirg.evaluation.play.rollout_result import RolloutResult, make_record, utc_now
 from roboirg.evaluation.play.video_writer import VideoWriter
 from roboirg.evaluation.policy_calls import policy_usage
-from roboirg.evaluation.records.action_log import write_actions
+from roboirg.evaluation.records.action_log import ActionLog, write_actions
 from roboirg.evaluation.records.film import VIDEO_FOLDER, VideoMode
 from roboirg.evaluation.records.record import Job, Record
 from roboirg.policies.by_name.loading import is_privileged, needs_host, planner_alone
@@ -48,6 +50,7 @@ from roboirg.policies.contract.base import Policy, close_policy
 from roboirg.policies.contract.policy_needs import PolicyNeeds
 from roboirg.policies.contract.random_state import episode_policy_seed
 from roboirg.policies.planners.hierarchical_policy import HierarchicalPolicy, with_planner
+from roboirg.policies.prompt_length.prompt_audit import PromptLimit
 from roboirg.policies.prompt_length.tokenizer_file import prompt_limit
 from roboirg.policies.vlm.models.reply_store import ReplySettings, use_replies
 
@@ -100,22 +103,17 @@ class EpisodeRunner:
         """
         started_at, start = utc_now(), time.monotonic()
         with use_replies(self.replies, job.slug):
-            writer, result = self._play(job)
-        video = self._finish_video(writer, result)
-        error = None if writer is None else writer.error
-        log = result.action_log
-        return make_record(
-            job,
-            result,
-            video=video,
-            video_error=None if error is None else one_line(error),
-            started_at=started_at,
-            duration_s=round(time.monotonic() - start, 3),
-            plan=self.plan,
-            action_log=None if log is None else write_actions(log, self.folder),
-        )
+            record, log, writer = self._play(job)
+        record.video = self._finish_video(writer, record)
+        if writer is not None and writer.error is not None:
+            record.video_error = one_line(writer.error)
+        if log is not None:
+            record.action_log = write_actions(log, self.folder)
+        record.started_at, record.plan = started_at, self.plan
+        record.duration_s = round(time.monotonic() - start, 3)
+        return record
 
-    def _play(self, job: Job) -> tuple[VideoWriter | None, RolloutResult]:
+    def _play(self, job: Job) -> tuple[Record, ActionLog | None, VideoWriter | None]:
         """Play a job, again from its beginning if the policy's process is lost meanwhile."""
         alone, attempt = False, 0
         while True:
@@ -124,27 +122,31 @@ class EpisodeRunner:
             if self.video != "off":
                 writer = VideoWriter(self.folder / VIDEO_FOLDER / f"{job.slug}.mp4")
             try:
-                result = self.play_once(job, writer, alone=alone)
+                record, log = self.play_once(job, writer, alone=alone)
             except EpisodeLostError as error:
                 if attempt < MAX_LOSSES:
                     alone = alone or error.alone
                     if writer is not None:
                         writer.discard()
                     continue
-                result, message = RolloutResult(), f"{error}, {attempt} times in a row"
-                result.record_error(error.kind, format_cause(error.kind, message))
-            result.attempt = attempt
-            return writer, result
+                message = f"{error}, {attempt} times in a row"
+                record, log = lost_record(job, error.kind, message), None
+            record.attempt = attempt
+            return record, log, writer
 
     def play_once(
         self, job: Job, writer: VideoWriter | None = None, *, alone: bool = False
-    ) -> RolloutResult:
-        """Play one job once; errors of the policy or the environment end up in the result.
+    ) -> tuple[Record, ActionLog | None]:
+        """Play one job once; errors of the policy or the environment end up in the record.
 
         Args:
             job: what to play.
             writer: gets the frames of a video.
             alone: whether a hosted policy must not be asked about it together with others.
+
+        Returns:
+            The record, and the actions, which are not stored yet; None if the policy's turn never
+            came, or the world broke.
 
         Raises:
             EpisodeLostError: the policy's process was lost; the episode can be played again.
@@ -152,42 +154,45 @@ class EpisodeRunner:
             MissingDependencyError: a package has to be installed first.
             InvalidValueError: the job's wording file is missing or has changed.
         """
-        prepared = PreparedJob(job)
-        prepared.open_wordings()
-        result = RolloutResult(prepared=prepared)
-        hosts = self.hosts if needs_host(job.policy_spec) else None
-        guard = CallGuard(result, self.policy_timeout_s, is_hosted=hosts is not None)
+        prepared, hosts = PreparedJob(job), self.hosts if needs_host(job.policy_spec) else None
+        unknown = PolicyDescription("unknown", is_privileged(job.policy_spec))
+        record = begin_record(prepared, unknown if hosts else describe_here(job.policy_spec))
+        guard = CallGuard(record.timings, self.policy_timeout_s, is_hosted=hosts is not None)
         policy: Policy | None = None
+        limit: PromptLimit | None = None
+        log = None
         try:
-            if hosts is None:
-                result.policy = describe_here(job.policy_spec)
             with guard.policy("policy's constructor", "policy_load"):
                 if hosts is None:
                     policy = load_policy(prepared)
                 else:
                     seed = _policy_seed(prepared)
                     policy = load_hosted_policy(hosts, job.policy_spec, seed, alone=alone)
-                    privileged = is_privileged(job.policy_spec)
-                    result.policy = PolicyDescription(policy.version, privileged)
+                    record.policy_version = policy.version
                 needs = job_needs(policy, job)
-                result.prompt_limit = prompt_limit(needs)
-                if self.refuse_long and result.prompt_limit is not None:
-                    audit = audit_job(job, result.prompt_limit, prepared.instruction)
+                limit = prompt_limit(needs)
+                if self.refuse_long and limit is not None:
+                    audit = audit_job(job, limit, prepared.instruction)
                     if message := too_long_text(*audit):
                         raise EpisodeError("prompt", message, "")
-            play_with(policy, job, needs, result, guard, writer)
+            log = play_with(policy, prepared, needs, record, guard, writer)
         except EpisodeError as error:
-            result.record_error(error.kind, error.cause, error.details)
+            record.record_error(error.kind, error.cause, error.details)
+            if policy is None and hosts is not None:
+                record.policy_version = describe(job).version
         finally:
             if policy is not None:
-                _close_policy(policy, result, guard)
-        return result
+                _close_policy(policy, record, guard)
+        if limit is not None:
+            with contextlib.suppress(InvalidValueError):
+                audit_record(record, prepared, limit)
+        return record, log
 
-    def _finish_video(self, writer: VideoWriter | None, result: RolloutResult) -> str | None:
+    def _finish_video(self, writer: VideoWriter | None, record: Record) -> str | None:
         """Keep or discard the video; return its path relative to the folder, or None."""
         if writer is None:
             return None
-        wanted = self.video == "all" or result.outcome != "success"
+        wanted = self.video == "all" or record.outcome != "success"
         if wanted and writer.finish():
             return writer.path.relative_to(self.folder).as_posix()
         writer.discard()
@@ -196,41 +201,41 @@ class EpisodeRunner:
 
 def play_with(
     policy: Policy,
-    job: Job,
+    prepared: PreparedJob,
     needs: PolicyNeeds,
-    result: RolloutResult,
+    record: Record,
     guard: CallGuard,
     writer: VideoWriter | None = None,
-) -> None:
-    """Play one job with a loaded policy, which is not closed.
+) -> ActionLog | None:
+    """Play one job with a loaded policy, which is not closed; its errors end up in the record.
 
     Args:
         policy: answers the observations.
-        job: what to play.
+        prepared: what to play.
         needs: what the environment offers.
-        result: is filled in.
+        record: is filled in.
         guard: attributes errors and measures calls.
         writer: gets the frames of a video.
 
+    Returns:
+        The executed actions; None if the policy's turn never came, or the world broke.
+
     Raises:
-        EpisodeError: the environment raised, or the policy, or an action cannot be executed.
+        EpisodeError: the environment cannot be made, or its last state cannot be read.
     """
-    env, stands = None, False
-    try:
-        with guard.environment("env_reset"):
-            result.prepared = result.prepared or PreparedJob(job)
-            env = make_env(result.prepared, needs)
-            result.needs = needs.declared
-        GuardedLoop(env, policy, job, needs.action_space, result, guard, writer).play()
-        stands = True
-    except EpisodeError as error:
-        stands = error.kind != "environment"
-        raise
-    finally:
-        if env is not None:
-            with contextlib.closing(env), guard.environment("env_step"):
-                if result.action_space is not None and stands:
-                    result.end_state = env.end_state()
+    with guard.environment("env_reset"):
+        env = make_env(prepared, needs)
+        record.needs = needs.declared
+    with contextlib.closing(env):
+        loop = GuardedLoop(env, policy, prepared, needs.action_space, record, guard, writer)
+        try:
+            loop.play()
+        except EpisodeError as error:
+            record.record_error(error.kind, error.cause, error.details)
+        if not loop.has_begun or record.error == "environment":
+            return None
+        with guard.environment("env_step"):
+            return loop.action_log()
 
 
 def load_policy(prepared: PreparedJob) -> Policy:
@@ -253,7 +258,7 @@ def _policy_seed(prepared: PreparedJob) -> int:
     return episode_policy_seed(job.policy_seed, prepared.scene_episode.seed, job.arm)
 
 
-def _close_policy(policy: Policy, result: RolloutResult, guard: CallGuard) -> None:
+def _close_policy(policy: Policy, record: Record, guard: CallGuard) -> None:
     """Read the policy's costs and close it; errors there do not change the outcome.
 
     Raises:
@@ -262,11 +267,11 @@ def _close_policy(policy: Policy, result: RolloutResult, guard: CallGuard) -> No
     try:
         with guard.policy("policy's close()", "policy_close"):
             try:
-                result.usage = policy_usage(policy)
+                record.usage = policy_usage(policy)
             finally:
                 close_policy(policy)
     except EpisodeError as error:
-        result.details = result.details or error.details
+        record.details = record.details or error.details
     hosted = getattr(policy, "planner", policy)
     if isinstance(hosted, HostedPolicy):
-        result.timings["policy_wait"] = round(hosted.waited_s, 6)
+        record.timings["policy_wait"] = round(hosted.waited_s, 6)

@@ -19,10 +19,11 @@ import msgspec
 from roboirg.core.arms import TOLD
 from roboirg.core.delivery import PromptVerdict
 from roboirg.core.environment_options import EnvironmentOptions
-from roboirg.core.field_types import Cause, Name, Subgoal, Whole
+from roboirg.core.field_types import MOST_CAUSE_LETTERS, Cause, Name, Subgoal, Whole
 from roboirg.core.inference_facts import InferenceFacts
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.core.observations import DemonstrationSource
+from roboirg.core.plain_text import clip_text
 from roboirg.evaluation.records.run_files import RELATIVE_PATH
 from roboirg.util.short_hash import short_hash
 
@@ -285,7 +286,8 @@ REAL_TRIAL = "real_trial"
 """Key of a study's trial in a record's ``policy_metadata``."""
 
 
-class Summary(Job, frozen=True, kw_only=True, gc=False):
+# Checkers see no use in a struct of which a part is frozen: what was played, not how it went.
+class Summary(Job, frozen=False, kw_only=True, gc=False):  # type: ignore[misc]
     """How a job went, without instruction and events: everything that rates are computed from.
 
     Read instead of whole records to save time and memory.
@@ -362,8 +364,10 @@ class Summary(Job, frozen=True, kw_only=True, gc=False):
         return Job(**{name: getattr(self, name) for name in IDENTITY})
 
 
-class Record(Summary, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """Everything that is stored of an episode.
+class Record(Summary, kw_only=True, forbid_unknown_fields=True):  # type: ignore[misc]
+    """Everything that is stored of an episode; filled in while it is played, and stored once.
+
+    So an error keeps what came before.
 
     Attributes:
         instruction: the utterances that the policy was given.
@@ -404,3 +408,24 @@ class Record(Summary, frozen=True, kw_only=True, forbid_unknown_fields=True):
     timings: dict[str, float] = {}
     video_error: str | None = None
     details: str | None = None
+
+    def record_error(self, kind: ErrorKind, cause: str, details: str | None = None) -> None:
+        """Record that the episode ended in an error and cannot be judged."""
+        self.outcome, self.error, self.details = "error", kind, details
+        self.cause, self.goals, self.attribution = clip_text(cause, MOST_CAUSE_LETTERS), None, None
+
+    def record_status(self, status: str, cause: str | None) -> bool:
+        """Record the final status. Returns False while the episode is running.
+
+        Args:
+            status: as the environment reports it.
+            cause: of a failure, if the environment gives one.
+        """
+        if status not in ("success", "failure", "timeout"):
+            return False
+        self.outcome, self.error, self.cause = "success", None, None
+        if status != "success":
+            late = f"not done after {self.environment.max_steps} steps"
+            cause = cause or (late if status == "timeout" else "the judge gave no cause")
+            self.outcome, self.cause = "failure", clip_text(cause, MOST_CAUSE_LETTERS)
+        return True

@@ -20,10 +20,9 @@ from typing import Any, cast
 
 from roboirg.core.errors import RoboIRGError
 from roboirg.core.plain_text import counted
-from roboirg.evaluation.episode_errors import format_cause
 from roboirg.evaluation.plan.worker_needs import WorkerNeeds
+from roboirg.evaluation.play.episode_record import lost_record
 from roboirg.evaluation.play.rollout import PlayJob
-from roboirg.evaluation.play.rollout_result import RolloutResult, make_record, utc_now
 from roboirg.evaluation.records.record import Job, Record
 from roboirg.evaluation.run.executor import Warn
 from roboirg.evaluation.run.ray_machines import (
@@ -319,7 +318,8 @@ class RayPool:
         for worker in workers:
             if worker.job is not None:
                 self._lost_at.setdefault(worker.job, set()).add(machine.node)
-                yield _lost_record(worker.job, machine.name, reason)
+                where = f"the machine or process that played it was lost ({machine.name}, {reason})"
+                yield lost_record(worker.job, "infrastructure", where)
 
     def _end(self, worker: _Worker) -> None:
         """Kill a worker, even one that is frozen."""
@@ -433,10 +433,3 @@ def _reason(error: BaseException) -> str:
     """Return what Ray says of a loss; the last line of its message is the exception itself."""
     lines = [line.strip() for line in str(error).strip().splitlines() if line.strip()]
     return f"{type(error).__name__}: {lines[-1]}" if lines else type(error).__name__
-
-
-def _lost_record(job: Job, machine: str, reason: str) -> Record:
-    result = RolloutResult()
-    message = f"the machine or process that played it was lost ({machine}, {reason})"
-    result.record_error("infrastructure", format_cause("infrastructure", message))
-    return make_record(job, result, started_at=utc_now())

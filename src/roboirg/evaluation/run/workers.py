@@ -17,10 +17,9 @@ from multiprocessing.connection import Connection, wait
 from typing import NamedTuple, cast
 
 from roboirg.core.errors import EndOfRunError, RoboIRGError
-from roboirg.evaluation.episode_errors import format_cause
 from roboirg.evaluation.hosting.host_pool import Connect
+from roboirg.evaluation.play.episode_record import lost_record, utc_now
 from roboirg.evaluation.play.rollout import EpisodeRunner, PlayJob
-from roboirg.evaluation.play.rollout_result import RolloutResult, make_record, utc_now
 from roboirg.evaluation.play.watchdog import Phase, Watchdog, use_watchdog, watched
 from roboirg.evaluation.records.episode_log import log_path, logged_output
 from roboirg.evaluation.records.record import ErrorKind, Job, Record
@@ -134,10 +133,10 @@ class Worker:
         return self.is_dead and self.watchdog.phase == "worker startup"
 
     def _error_record(self, kind: ErrorKind, message: str) -> Record:
-        result = RolloutResult()
-        result.record_error(kind, format_cause(kind, message))
-        spent = round(time.monotonic() - self.started, 3)
-        return make_record(self.job, result, started_at=self.started_at, duration_s=spent)
+        record = lost_record(self.job, kind, message)
+        record.started_at = self.started_at
+        record.duration_s = round(time.monotonic() - self.started, 3)
+        return record
 
 
 class WorkerSlot:

@@ -74,11 +74,9 @@ def play(pipe: Pipe, job: Job, options: ListenerOptions) -> None:
         options: of the listener.
     """
     from roboirg.evaluation.play.rollout import EpisodeRunner
-    from roboirg.evaluation.play.rollout_result import make_record, utc_now
 
     PipedListener.pipe, PipedListener.chosen = pipe, options
-    started = utc_now()
-    record = make_record(job, EpisodeRunner(Path()).play_once(job), started_at=started)
+    record, _ = EpisodeRunner(Path()).play_once(job)
     pipe.send(encode(record).decode())
 
 

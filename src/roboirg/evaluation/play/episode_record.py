@@ -1,0 +1,169 @@
+"""The record of an episode: begun before it is played, and concluded from its events."""
+
+from __future__ import annotations
+
+import datetime as dt
+import functools
+import hashlib
+import importlib.metadata
+import json
+from collections.abc import Sequence
+from dataclasses import asdict
+from itertools import zip_longest
+from pathlib import Path
+
+import msgspec
+
+from roboirg import language
+from roboirg.core.arms import TOLD
+from roboirg.core.delivery import TURNS
+from roboirg.core.episode import ENVIRONMENT_VERSION
+from roboirg.core.errors import InvalidValueError, MissingDependencyError
+from roboirg.evaluation.episode_errors import format_cause
+from roboirg.evaluation.hosting.policy_descriptions import PolicyDescription, describe_policy
+from roboirg.evaluation.play.goal_outcomes import find_goal_outcomes, judged_events, name_other_goal
+from roboirg.evaluation.play.job_instruction import PreparedJob
+from roboirg.evaluation.play.prompt_shares import audit_job, audit_prompt
+from roboirg.evaluation.records.record import (
+    Attribution,
+    ErrorKind,
+    Job,
+    MentionSpan,
+    Record,
+    UtteranceRecord,
+)
+from roboirg.judging import attribute_failure
+from roboirg.judging.episode_replay import decide
+from roboirg.language.settings import EXPLICIT
+from roboirg.policies.prompt_length.prompt_audit import PromptLimit
+from roboirg.util.processor import processor_family
+from roboirg.util.short_hash import DIGITS
+
+
+def begin_record(prepared: PreparedJob, policy: PolicyDescription) -> Record:
+    """Return the record of an episode that has not begun; needs no simulator.
+
+    It has the words that are to be said.
+
+    Args:
+        prepared: what is to be played.
+        policy: who plays it.
+    """
+    job, episode, instruction = prepared.job, prepared.episode, prepared.instruction
+    is_explicit = job.setting == EXPLICIT and job.arm == TOLD
+    return Record(
+        **msgspec.structs.asdict(job),
+        seed=episode.seed,
+        difficulty=episode.difficulty,
+        outcome="error",
+        error="environment",
+        cause=format_cause("environment", "the episode did not begin"),
+        instruction=utterances_at(prepared, ()),
+        mentions=tuple(MentionSpan(**asdict(one)) for one in instruction.mentions),
+        command=(instruction if is_explicit else prepared.explicit).text,
+        goal=dict(episode.goal.as_mapping()),
+        # Exactly what a reader of the file gets.
+        metadata=json.loads(json.dumps(dict(instruction.metadata))),
+        privileged=policy.is_privileged,
+        policy_version=policy.version,
+        language_version=str(language.LANGUAGE_VERSION),
+        environment_version=ENVIRONMENT_VERSION,
+        package_version=importlib.metadata.version("roboirgbench"),
+        code=code_fingerprint(),
+        processor=processor_family(),
+        started_at=utc_now(),
+        duration_s=0.0,
+    )
+
+
+def lost_record(job: Job, kind: ErrorKind, message: str) -> Record:
+    """Return the record of an episode of which nothing is known but why it ended."""
+    record = begin_record(PreparedJob(job), describe(job))
+    record.record_error(kind, format_cause(kind, message))
+    return record
+
+
+def describe(job: Job) -> PolicyDescription:
+    """Return the description of a job's policy; ``unknown`` if it cannot be loaded."""
+    try:
+        return describe_policy(job.policy_spec)
+    except (InvalidValueError, MissingDependencyError):
+        return PolicyDescription("unknown", is_privileged=False)
+
+
+def utterances_at(prepared: PreparedJob, heard: Sequence[int]) -> tuple[UtteranceRecord, ...]:
+    """Return the utterances of a job, given the steps at which those so far were heard."""
+    utterances = prepared.instruction.utterances
+    steps = heard if prepared.job.options.delivery == TURNS else [0] * len(utterances)
+    return tuple(
+        UtteranceRecord(**asdict(one), step=step) for one, step in zip_longest(utterances, steps)
+    )
+
+
+def audit_record(record: Record, prepared: PreparedJob, limit: PromptLimit) -> None:
+    """Record what of the instruction reaches a policy's model: all of it if nothing was said yet.
+
+    Raises:
+        InvalidValueError: the policy's tokenizer does not read this text.
+    """
+    steps, words = [one.step for one in record.instruction], prepared.instruction
+    is_silent = steps == [None] * len(steps)
+    record.prompt, record.prompt_verdict = (
+        audit_job(record, limit, words) if is_silent else audit_prompt(words, steps, limit)
+    )
+
+
+def conclude(
+    record: Record,
+    prepared: PreparedJob,
+    start: int,
+    *,
+    timed_out: bool = False,
+    original: str | None = None,
+) -> None:
+    """Record which goals an episode reached, and why it failed, if that is clear.
+
+    Args:
+        record: with a verdict; without events nothing can be concluded.
+        prepared: its job.
+        start: control steps of the episode before the policy's turn.
+        timed_out: whether the policy used up its steps.
+        original: how it ended for the scene's own goal, if the words state another one.
+    """
+    if not record.events:
+        return
+    episode, elapsed = prepared.episode, start + record.steps
+    events, instruction = judged_events(record.events, start), prepared.instruction
+    decision = decide(episode, events, elapsed)
+    goals = record.goals = find_goal_outcomes(episode, events, elapsed, decision, original)
+    if record.outcome != "failure":
+        return
+    found = attribute_failure(
+        episode,
+        [event for event in events if event.step <= decision.step],
+        timed_out=timed_out,
+        policy_start_step=start,
+        elapsed_steps=decision.step,
+        cause=record.cause,
+        # What mentions nothing, such as a scrambled text, has no sides to exchange.
+        mirrored=language.mirrored_objects(episode, instruction) if instruction.mentions else None,
+    )
+    if found is not None and goals.original is not None:
+        found = name_other_goal(found, prepared.scene_episode, goals)
+    record.attribution = None if found is None else Attribution(**found._asdict())
+
+
+def utc_now() -> str:
+    """Return the time in ISO 8601, to the second."""
+    return dt.datetime.now(dt.UTC).isoformat(timespec="seconds")
+
+
+@functools.cache
+def code_fingerprint() -> str:
+    """Return a shortened SHA-256 of the names and bytes of the package's Python files."""
+    digest = hashlib.sha256()
+    root = Path(__file__).parents[2]
+    for path in sorted(root.rglob("*.py")):
+        digest.update(f"{path.relative_to(root).as_posix()}\0".encode())
+        digest.update(path.read_bytes() + b"\0")
+    return digest.hexdigest()[:DIGITS]

@@ -1,0 +1,26 @@
+"""Records of episodes that nobody played."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import msgspec
+
+from roboirg.evaluation.play.episode_record import begin_record, conclude, describe
+from roboirg.evaluation.play.job_instruction import PreparedJob
+from roboirg.evaluation.records.record import Job, Outcome, Record
+
+
+def make_record(
+    job: Job, outcome: Outcome = "error", cause: str | None = None, **fields: Any
+) -> Record:
+    """Return the record of a job that ended this way, with its other fields as given."""
+    prepared = PreparedJob(job)
+    record = begin_record(prepared, describe(job))
+    known = {"outcome": outcome, "cause": cause or record.cause, "started_at": "now", **fields}
+    if outcome != "error":
+        known |= {"error": None, "cause": cause}
+    record = msgspec.structs.replace(record, **known)
+    if outcome != "error":
+        conclude(record, prepared, 0)
+    return record
