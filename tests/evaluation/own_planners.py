@@ -3,6 +3,8 @@
 import gc
 import os
 
+import numpy as np
+
 
 class Pointer:
     """Names two subgoals of a form, and then the second again."""
@@ -23,7 +25,7 @@ class Pointer:
     @property
     def metadata(self):
         kinds = {type(one).__name__ for one in gc.get_objects()}
-        return {"world": bool(kinds & {"World", "RoboIRGEnv", "Goal"})}
+        return {"world": np.bool_(kinds & {"World", "RoboIRGEnv", "Goal"})}
 
     def usage(self):
         named = sum(one.thing is not None for one in self.ends)

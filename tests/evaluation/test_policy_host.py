@@ -118,8 +118,8 @@ class It:
         self.metadata["instruction"] = instruction
         self.metadata["fields"] = list(demonstration)
         self.video = demonstration["front_rgb"]
-        self.metadata["sum"] = int(self.video.sum(dtype=np.int64))
-        self.metadata["shape"] = list(self.video.shape)
+        self.metadata["sum"] = self.video.sum(dtype=np.int64)
+        self.metadata["shape"] = np.array(self.video.shape)
     def hear(self, text, step):
         self.metadata["heard"] = [text, step]
     def act(self, observation):

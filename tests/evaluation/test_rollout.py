@@ -212,6 +212,35 @@ def test_a_fault_of_the_policy_is_an_error_not_a_failure(
 
 
 @pytest.mark.parametrize(
+    ("value", "stored"),
+    [
+        (np.float32(0.5), 0.5),
+        (np.int64(3), 3),
+        (np.str_("adam"), "adam"),
+        (Path("a/b"), "a/b"),
+        (np.eye(2), [[1.0, 0.0], [0.0, 1.0]]),
+        ((np.bool_(True), {Path("x"): None}), [True, {"x": None}]),
+        (np.zeros((9, 9)), "array of shape (9, 9), float64"),
+        (np.float32("nan"), "'deep.value' is nan; it must be a text, a finite number"),
+        ({"more": [0, b"x"]}, "'deep.value.more[1]' is b'x'; it must be"),
+        ({(1, 2): 3}, "'deep.value' is (1, 2); it must be"),
+    ],
+    ids=str,
+)
+def test_metadata_become_json_or_one_sentence_that_names_the_key(
+    stage: Callable[..., Record], value: object, stored: object
+) -> None:
+    policy = PaperPolicy()
+    policy.metadata = {"deep": {"value": value}}  # type: ignore[attr-defined]
+    record = stage(PaperWorld(), policy)
+    if record.outcome == "success":
+        assert record.policy_metadata == {"deep": {"value": stored}}
+        assert read_record(encode(record), Path(), 1) == record
+    else:
+        assert str(record.cause).startswith(f"policy: the policy's metadata: {stored}")
+
+
+@pytest.mark.parametrize(
     ("trouble", "cause"),
     [
         (RuntimeError("physics\nexploded"), "environment: RuntimeError: physics exploded"),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+from collections.abc import Mapping
 from typing import Any, cast
 
 import numpy as np
@@ -17,6 +18,7 @@ from roboirg.core.plain_text import clip_text, is_encodable
 from roboirg.core.subgoal_text import MOST_SUBGOAL_LETTERS
 from roboirg.evaluation.records.record import REAL_TRIAL
 from roboirg.policies.contract.base import Policy
+from roboirg.policies.contract.json_values import as_json
 
 MAX_ROWS = 10_000
 """Most actions that a policy may return at once; an episode has 1300 steps."""
@@ -66,7 +68,7 @@ def policy_subgoal(policy: Policy) -> str | None:
         )
     if not is_encodable(subgoal):
         raise InvalidValueError("The policy's subgoal has lone surrogates.")
-    return subgoal
+    return str.__str__(subgoal)  # of a subclass, too
 
 
 def policy_metadata(policy: Policy, *, is_ours: bool = True) -> dict[str, JsonValue]:
@@ -77,29 +79,36 @@ def policy_metadata(policy: Policy, *, is_ours: bool = True) -> dict[str, JsonVa
         is_ours: whether it is our own code, which may name its ``server``.
 
     Raises:
-        InvalidValueError: they are too long or too deep, their text is not Unicode, or a key is
-            reserved.
-        TypeError: they hold something that JSON does not.
-        ValueError: they hold a number that is not finite.
+        InvalidValueError: they hold something that is not JSON, are too long or too deep, their
+            text is not Unicode, or a key is reserved.
     """
-    return read_metadata(dump_metadata(policy), is_ours=is_ours)
+    metadata = getattr(policy, "metadata", {})
+    try:
+        found = as_json(metadata, _METADATA) if isinstance(metadata, Mapping) else metadata
+    except RecursionError:
+        raise InvalidValueError(f"{_METADATA} are nested too deep.") from None
+    return _checked(found, is_ours=is_ours)
 
 
 def dump_metadata(policy: Policy) -> str:
     """Return the policy's metadata as JSON; raises like `policy_metadata`."""
-    metadata = dict(getattr(policy, "metadata", {}))
-    text = json.dumps(metadata, allow_nan=False, ensure_ascii=False)
-    read_metadata(text, is_ours=True)
-    return text
+    return json.dumps(policy_metadata(policy), ensure_ascii=False)
 
 
-def read_metadata(text: str, *, is_ours: bool) -> dict[str, JsonValue]:
-    """Return the metadata in a JSON text, checked; raises like `policy_metadata`."""
+def read_metadata(text: str) -> dict[str, JsonValue]:
+    """Return the metadata in a JSON text of a policy's process; raises like `policy_metadata`."""
     try:
         found = json.loads(text)
-        plain = json.dumps(found, allow_nan=False, ensure_ascii=False)
     except RecursionError:
         raise InvalidValueError(f"{_METADATA} are nested too deep.") from None
+    return _checked(found, is_ours=False)
+
+
+def _checked(found: object, *, is_ours: bool) -> dict[str, JsonValue]:
+    if not isinstance(found, dict):
+        raise InvalidValueError(f"{_METADATA} are a {type(found).__name__}, not a dict.")
+    _check_values(found)
+    plain = json.dumps(found, allow_nan=False, ensure_ascii=False)
     if len(plain) > MAX_METADATA_LENGTH:
         raise InvalidValueError(
             f"{_METADATA} have {len(plain)} characters of JSON; "
@@ -107,9 +116,6 @@ def read_metadata(text: str, *, is_ours: bool) -> dict[str, JsonValue]:
         )
     if not is_encodable(plain):
         raise InvalidValueError(f"{_METADATA} hold text with lone surrogates.")
-    if not isinstance(found, dict):
-        raise InvalidValueError(f"{_METADATA} are a {type(found).__name__}, not a dict.")
-    _check_values(found)
     _check_keys(found, is_ours=is_ours)
     return cast("dict[str, JsonValue]", found)
 
@@ -143,10 +149,18 @@ def policy_usage(policy: Policy) -> dict[str, float]:
     """Return the costs that a policy reports; those below 0 or beyond reason are left out.
 
     Raises:
-        InvalidValueError: there are too many, or a name is not a short text.
+        InvalidValueError: there are too many, a name is not a short text, or a cost no number.
     """
     reported = policy.usage() if hasattr(policy, "usage") else {}
-    usage = {str(name): float(value) for name, value in reported.items()}
+    usage: dict[str, float] = {}
+    for name, value in reported.items():
+        try:
+            usage[str(name)] = float(value)
+        except (TypeError, ValueError):
+            shown = clip_text(repr(value), MAX_COSTS)
+            raise InvalidValueError(
+                f"usage() has {shown} as {name!r}; it must be a number."
+            ) from None
     if len(usage) > MAX_COSTS or not all(
         len(name) <= MAX_COSTS and is_encodable(name) for name in usage
     ):

@@ -18,6 +18,7 @@ from roboirg.policies.by_name.loading import (
     policy_version,
 )
 from roboirg.policies.contract.base import Policy
+from roboirg.policies.contract.json_values import as_json
 from roboirg.policies.remote.endpoints import Endpoint
 from roboirg.policies.remote.protocols import protocols_by_scheme
 from roboirg.policies.remote.server_options import ServerOptions
@@ -90,8 +91,10 @@ def open_server(
 
     found = protocols[protocol]
     process = inference_facts(None)
+    if not isinstance(declared, Mapping):
+        declared = {}  # a property is of an object
     metadata = {
-        **(declared if isinstance(declared, Mapping) else {}),  # a property is of an object
+        **as_json(declared, "the policy's metadata"),
         "policy": spec,
         "version": policy_version(spec),
         "protocol": protocol,

@@ -21,7 +21,7 @@ class Sound:
     observe_every = 1
 
     def __init__(self, seed=0):
-        self.seed = seed
+        self.seed, self.metadata = seed, {"rate": np.float32(0.5)}
 
     def reset(self, instruction, demonstration):
         self.memory = float(len(instruction) + demonstration["front_rgb"].sum(dtype=float) % 97)
@@ -105,6 +105,17 @@ class Videophobe(Sound):
         self.memory = 0
 
 
+class Unwritable(Sound):
+    def reset(self, instruction, demonstration):
+        super().reset(instruction, demonstration)
+        self.metadata["rate"] = np.float32("nan")
+
+
+class Priceless(Sound):
+    def usage(self):
+        return {"calls": None}
+
+
 class Reckless(Sound):
     def act(self, observation):
         return np.full((4, 8), 9.0)
@@ -129,6 +140,7 @@ def test_a_sound_policy_passes_everything():
         "version",
         "acts without a video",
         "acts with a video",
+        "reports",
         "deterministic",
         "reset forgets",
     ]
@@ -149,6 +161,8 @@ def test_a_sound_policy_passes_everything():
         (Dice, "deterministic", "Two equal episodes differ by up to"),
         (Growing, "deterministic", "the number of actions"),
         (Videophobe, "acts with a video", "no films, please"),
+        (Unwritable, "reports", "the policy's metadata: 'rate' is nan; it must be a text"),
+        (Priceless, "reports", "usage() has None as 'calls'; it must be a number."),
     ],
 )
 def test_what_is_wrong_is_found(kind, check, words):

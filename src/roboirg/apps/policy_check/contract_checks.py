@@ -25,7 +25,8 @@ from roboirg.apps.policy_check.policy_player import (
 from roboirg.core.actions import ActionSpace
 from roboirg.core.errors import MissingDependencyError, RoboIRGError
 from roboirg.core.plain_text import counted, verb_for
-from roboirg.policies.by_name.loading import policy_version
+from roboirg.evaluation.policy_calls import policy_metadata, policy_subgoal, policy_usage
+from roboirg.policies.by_name.loading import is_foreign, policy_version
 from roboirg.policies.contract.batch_policy import BatchedEpisode
 from roboirg.policies.contract.policy_needs import PolicyNeeds
 
@@ -112,6 +113,21 @@ def _describe_actions(
             f"{outside} of {counted(sum(sizes), 'action')} {have} a number outside the usual "
             f"range of {space.name}; the robot executes them as well as it can.",
         )
+
+
+def check_reports(player: PolicyPlayer) -> Iterator[CheckResult]:
+    """Check what records get from the policy besides its actions."""
+    policy, source = player.policy, player.source
+    is_ours = isinstance(source, str) and not is_foreign(source)
+    try:
+        metadata = policy_metadata(policy, is_ours=is_ours)
+        policy_subgoal(policy)
+        policy_usage(policy)
+    except Exception as error:  # noqa: BLE001 - a property may raise anything
+        yield CheckResult("reports", FAIL, describe_error(error))
+        return
+    if metadata:
+        yield CheckResult("reports", PASS, f"Records hold its {', '.join(metadata)}.")
 
 
 def check_determinism(player: PolicyPlayer) -> Iterator[CheckResult]:

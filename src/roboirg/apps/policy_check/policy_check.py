@@ -18,6 +18,7 @@ from roboirg.apps.policy_check.contract_checks import (
     check_acting_after_video,
     check_determinism,
     check_loading,
+    check_reports,
     check_requirements,
     check_reset,
     check_version,
@@ -39,6 +40,7 @@ CHECKS: tuple[Check, ...] = (
     check_version,
     check_acting,
     check_acting_after_video,
+    check_reports,
     check_determinism,
     check_reset,
 )

@@ -166,7 +166,7 @@ class HostedPolicy:
 
     def _take_metadata(self, found: Outcome) -> None:
         try:
-            self.metadata = read_metadata(found.metadata, is_ours=False)
+            self.metadata = read_metadata(found.metadata)
         except (InvalidValueError, ValueError) as error:
             raise EpisodeError("policy", str(error), "") from error
 

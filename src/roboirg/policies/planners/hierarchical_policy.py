@@ -97,8 +97,8 @@ class HierarchicalPolicy:
         """The metadata of both."""
         return {
             "system": self.name,
-            "planner": dict(getattr(self.planner, "metadata", {})),
-            "policy": dict(getattr(self.policy, "metadata", {})),
+            "planner": getattr(self.planner, "metadata", {}),
+            "policy": getattr(self.policy, "metadata", {}),
         }
 
     def reset(self, instruction: str, demonstration: Demonstration) -> None:

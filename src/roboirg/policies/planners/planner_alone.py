@@ -31,9 +31,9 @@ class PlannerAlone:
         self.subgoal: str | None = None
 
     @property
-    def metadata(self) -> dict[str, Any]:
+    def metadata(self) -> Any:  # noqa: ANN401 - of any class
         """The planner's."""
-        return dict(getattr(self._planner, "metadata", {}))
+        return getattr(self._planner, "metadata", {})
 
     def reset(self, instruction: str, demonstration: Demonstration) -> None:
         """Begin an episode."""

@@ -14,16 +14,13 @@ from numpy.typing import NDArray
 from roboirg.core.actions import JOINT_ANGLE, check_chunk, find_action_space
 from roboirg.core.errors import InvalidActionError, PolicyReplyError
 from roboirg.core.observations import CAMERAS, Demonstration, Observation
-from roboirg.core.plain_text import printable
+from roboirg.policies.contract.json_values import as_json
 from roboirg.policies.contract.policy_urls import read_options, split_url
 from roboirg.policies.remote.client.server_session import ServerSession
 from roboirg.policies.remote.endpoints import RemoteOptions, read_endpoints
 from roboirg.policies.remote.transport import WEBSOCKET, Transport
 
 UNKNOWN_VERSION = "unknown"
-_MAX_LISTED = 64
-"""Numbers of an array that are written out in the metadata."""
-_MAX_TEXT_LENGTH = 1000
 
 
 class RemotePolicy(ABC):
@@ -168,19 +165,3 @@ class RemotePolicy(ABC):
         except Exception:
             self.close()
             raise
-
-
-def as_json(value: object) -> Any:  # noqa: ANN401 - JSON has no narrower type
-    """Return a message's content as JSON values; large arrays are described, long texts cut."""
-    if isinstance(value, Mapping):
-        return {printable(str(key)): as_json(held) for key, held in value.items()}
-    if isinstance(value, np.ndarray) and value.size > _MAX_LISTED:
-        return f"array of shape {value.shape}, {value.dtype}"
-    if isinstance(value, np.ndarray | np.generic):
-        return as_json(value.tolist())
-    if isinstance(value, list | tuple):
-        return [as_json(held) for held in value]
-    plain = value is None or isinstance(value, bool | int)
-    if plain or (isinstance(value, float) and np.isfinite(value)):
-        return value
-    return printable(str(value)[:_MAX_TEXT_LENGTH])
