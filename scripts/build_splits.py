@@ -19,7 +19,7 @@ from roboirg.evaluation.plan.option_parsing import parse_names, parse_splits
 from roboirg.tasks import find_tasks
 from roboirg.tasks.splits import splits
 from roboirg.util.atomic_write import write_atomically
-from roboirg.util.processor import core_count
+from roboirg.util.processor import worker_count
 
 
 def build_splits(
@@ -35,7 +35,7 @@ def build_splits(
     if out is not None and not Path(out).parent.is_dir():
         raise InvalidValueError(f"There is no folder for {out!r}; create it first.")
     slots = seed_selection.episode_slots(names, wanted)
-    count = core_count() if workers is None else workers
+    count = worker_count(workers)
     found: list[seed_selection.SelectedSeed] = []
     with progress_bars() as report:
         for one in seed_selection.find_seeds(slots, count):

@@ -21,7 +21,7 @@ import functools
 import sys
 import tempfile
 from collections import Counter, defaultdict, deque
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from types import CodeType, FrameType
 from typing import Any, NamedTuple
@@ -36,7 +36,7 @@ from roboirg.evaluation.play import rollout
 from roboirg.evaluation.play.job_instruction import PreparedJob
 from roboirg.evaluation.play.rollout import PlayJob
 from roboirg.evaluation.records.record import Job, Record
-from roboirg.evaluation.run.executor import InProcess, Warn
+from roboirg.evaluation.run.executor import InProcess, Records, Warn
 from roboirg.evaluation.run.progress import Reporter
 from roboirg.evaluation.run.runner import episode_runner, run_plan
 
@@ -101,7 +101,7 @@ class Follower(Reporter):
         self.calls: dict[tuple[CodeType, CodeType], None] = {}
         self._played = 0
 
-    def run(self, jobs: deque[Job], play: PlayJob, warn: Warn, /) -> Iterator[Record]:
+    def run(self, jobs: deque[Job], play: PlayJob, warn: Warn, /) -> Records:
         """Yield one record for each job."""
         records = InProcess().run(jobs, play, warn)
         while jobs:

@@ -140,8 +140,6 @@ def test_what_ends_a_search_is_named():
         list(find_seeds(slots[:1], 1, refuse))
     with pytest.raises(RoboIRGError, match="worker process died"):
         list(find_seeds(slots, 1, die))
-    with pytest.raises(InvalidValueError, match="workers is -1"):
-        list(find_seeds(slots, -1))
 
 
 def test_only_sampled_episodes_need_a_seed():

@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterator, Sequence
 from multiprocessing.connection import Connection, wait
 from typing import TypeVar, cast
 
-from roboirg.core.errors import InvalidValueError, RoboIRGError
+from roboirg.core.errors import RoboIRGError
 from roboirg.util.child_process import ChildExit, ChildProcess, serve
 
 Item = TypeVar("Item")
@@ -30,8 +30,6 @@ def parallel_map(
         items: its arguments, one for each call.
         workers: number of processes; 0 runs all calls in this process.
     """
-    if workers < 0:
-        raise InvalidValueError(f"workers is {workers}; it must be at least 0 (this process only).")
     if workers == 0:
         yield from ((item, work(item)) for item in items)
         return

@@ -58,8 +58,10 @@ def worker_count(typed: int | None = None) -> int:
         typed: as typed; None for the number in ``ROBOIRG_WORKERS``, or one per core without it.
 
     Raises:
-        InvalidValueError: the variable does not hold a number.
+        InvalidValueError: the number is negative, or the variable does not hold one.
     """
+    if typed is not None and typed < 0:
+        raise InvalidValueError(f"workers is {typed}; it must be at least 0 (this process only).")
     text = os.environ.get(WORKERS_VARIABLE)
     if typed is not None or not text:
         return core_count() if typed is None else typed

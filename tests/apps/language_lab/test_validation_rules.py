@@ -172,8 +172,6 @@ def test_batches_cover_everything_once():
     for seeds in (-1, 0):
         with pytest.raises(InvalidValueError):
             batches(("PickXtimes",), (), seeds)
-    with pytest.raises(InvalidValueError, match="workers"):
-        list(parallel_map(validate_batch, work, -1))
 
 
 def test_the_tables_count_what_failed():

@@ -8,13 +8,14 @@ puts jobs back into the queue. To write your own, implement `Executor`;
 
 from __future__ import annotations
 
+import itertools
 from collections import deque
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Generator, Iterable
 from dataclasses import dataclass
 from multiprocessing.connection import wait
 from typing import Protocol
 
-from roboirg.core.errors import InvalidValueError, RoboIRGError
+from roboirg.core.errors import RoboIRGError
 from roboirg.evaluation.hosting.host_pool import Connect, open_hosts
 from roboirg.evaluation.play.rollout import PlayJob
 from roboirg.evaluation.records.record import Job, Record
@@ -23,6 +24,8 @@ from roboirg.util.processor import core_count, worker_count
 
 NO_TIMEOUT_S = float("inf")
 
+Records = Generator[Record, None, None]
+"""Yields records; unlike those of an iterator, its end can be brought about: it can be closed."""
 
 Warn = Callable[[str], None]
 """Shows a sentence that the user should read now."""
@@ -31,8 +34,8 @@ Warn = Callable[[str], None]
 class Executor(Protocol):
     """Interface of an executor."""
 
-    def run(self, jobs: deque[Job], play: PlayJob, warn: Warn, /) -> Iterator[Record]:
-        """Yield one record for each job as they finish; closing the iterator stops the rest.
+    def run(self, jobs: deque[Job], play: PlayJob, warn: Warn, /) -> Records:
+        """Yield one record for each job as they finish; closing the generator stops the rest.
 
         Args:
             jobs: the jobs, from which the caller may remove some, and to which it may add some
@@ -52,7 +55,7 @@ class InProcess:
     There is no supervisor: a crash ends the run, and a hanging call is never ended.
     """
 
-    def run(self, jobs: deque[Job], play: PlayJob, _warn: Warn = print, /) -> Iterator[Record]:
+    def run(self, jobs: deque[Job], play: PlayJob, _warn: Warn = print, /) -> Records:
         """Yield one record for each job, in order."""
         with open_hosts(play) as connect, connected(play, connect) as hosted:
             while jobs:
@@ -69,19 +72,12 @@ class LocalProcesses:
     Args:
         workers: most worker processes at a time, at least 1.
         episode_timeout_s: how long an episode may take.
-
-    Raises:
-        InvalidValueError: fewer than one worker.
     """
 
     workers: int
     episode_timeout_s: float = NO_TIMEOUT_S
 
-    def __post_init__(self) -> None:
-        if self.workers < 1:
-            raise InvalidValueError(f"workers is {self.workers}; it must be at least 1.")
-
-    def run(self, jobs: deque[Job], play: PlayJob, _warn: Warn = print, /) -> Iterator[Record]:
+    def run(self, jobs: deque[Job], play: PlayJob, _warn: Warn = print, /) -> Records:
         """Yield one record for each job as they finish.
 
         Raises:
@@ -90,7 +86,7 @@ class LocalProcesses:
         with open_hosts(play) as connect:
             yield from self._run(jobs, play, connect)
 
-    def _run(self, jobs: deque[Job], play: PlayJob, connect: Connect | None) -> Iterator[Record]:
+    def _run(self, jobs: deque[Job], play: PlayJob, connect: Connect | None) -> Records:
         failed_starts = 0
         # With a process on every core, more threads in Mesa would not help.
         limit_threads = self.workers >= core_count()
@@ -101,7 +97,11 @@ class LocalProcesses:
                 while jobs and len(active) < self.workers:
                     job = take_job(jobs, active)
                     active.append(Worker.start(play, job, connect, limit_threads=limit_threads))
-                for worker, record in self._finished(active):
+                wait([worker.child.connection for worker in active], POLL_S)
+                for worker in tuple(active):
+                    record = worker.poll(self.episode_timeout_s)
+                    if record is None:
+                        continue
                     failed_starts = failed_starts + 1 if worker.failed_to_start else 0
                     if failed_starts >= MAX_FAILED_STARTS * self.workers:
                         raise RoboIRGError(f"No worker process can start ({record.cause}).")
@@ -120,15 +120,6 @@ class LocalProcesses:
             for worker in (*active, *released):
                 worker.child.close()
 
-    def _finished(self, active: list[Worker]) -> Iterator[tuple[Worker, Record]]:
-        """Wait up to `POLL_S`; yield every worker whose job has finished or timed out."""
-        ready = wait([worker.child.connection for worker in active], POLL_S)
-        for worker in tuple(active):
-            if worker.child.connection in ready:
-                yield worker, worker.receive()
-            elif (record := worker.kill_if_overdue(self.episode_timeout_s)) is not None:
-                yield worker, record
-
 
 def take_job(jobs: deque[Job], others: Iterable[Worker]) -> Job:
     """Remove the next job for a worker from the queue and return it.
@@ -140,14 +131,10 @@ def take_job(jobs: deque[Job], others: Iterable[Worker]) -> Job:
         jobs: the queue, not empty; the jobs of a scene are next to each other.
         others: all workers but the one that the job is for.
     """
-    played = {_scene_of(one.job) for one in others}
-    policy, place = jobs[0].policy, 0
-    for index, job in enumerate(jobs):
-        if job.policy != policy:
-            break  # policies play one after the other
-        if _scene_of(job) not in played:
-            place = index
-            break
+    played, policy = {_scene_of(one.job) for one in others}, jobs[0].policy
+    # Policies play one after the other.
+    candidates = enumerate(itertools.takewhile(lambda job: job.policy == policy, jobs))
+    place = next((place for place, job in candidates if _scene_of(job) not in played), 0)
     job = jobs[place]
     del jobs[place]
     return job
@@ -166,6 +153,4 @@ def choose_executor(
         InvalidValueError: a negative number.
     """
     count = worker_count(workers)
-    if count < 0:
-        raise InvalidValueError(f"workers is {count}; it must be at least 0 (this process only).")
     return LocalProcesses(count, episode_timeout_s) if count else InProcess()

@@ -38,49 +38,13 @@ class Reporter:
         """Show a sentence that the user should read now."""
 
 
-class ProgressCounter:
-    """Counts successes and valid episodes per setting and errors, and measures the pace."""
-
-    def __init__(self) -> None:
-        self.successes: Counter[str] = Counter()
-        self.valid: Counter[str] = Counter()
-        self.errors = 0
-        self.played = 0
-        self._start = time.monotonic()
-
-    def add(self, record: Record) -> None:
-        self.played += 1
-        if record.outcome == "error":
-            self.errors += 1
-            return
-        self.valid[record.setting] += 1
-        self.successes[record.setting] += record.outcome == "success"
-
-    def pace(self) -> float:
-        """Return the episodes per minute since the start."""
-        return _MINUTE * self.played / max(time.monotonic() - self._start, 1e-9)
-
-    def time_left(self, remaining: int) -> str:
-        """Return the remaining time at this pace as ``m:ss``."""
-        if not self.played:
-            return "-:--"
-        seconds = round(_MINUTE * remaining / self.pace())
-        return f"{seconds // _MINUTE}:{seconds % _MINUTE:02d}"
-
-    def summary(self) -> str:
-        """Return the successes per setting in one line."""
-        parts = [f"{name} {self.successes[name]}/{count}" for name, count in self.valid.items()]
-        if self.errors:
-            parts.append(f"errors {self.errors}")
-        return " · ".join(parts)
-
-
 class ConsoleReporter(Reporter):
     """Progress bar on a terminal, one line per episode elsewhere; a context manager."""
 
     def __init__(self, console: Console) -> None:
         self._console = console
-        self._counter = ProgressCounter()
+        self._counts: Counter[tuple[str, str]] = Counter()  # by setting and outcome
+        self._total, self._done, self._start = 0, 0, time.monotonic()
         self._bar = Progress(
             TextColumn("[bold]{task.description}"),
             BarColumn(),
@@ -92,12 +56,10 @@ class ConsoleReporter(Reporter):
         self._task = self._bar.add_task("episodes", total=None, left="-:--", pace=0.0)
         # The successes have their own line, because the bar fills a narrow terminal.
         self._live = Live(console=console, get_renderable=self._render)
-        self._total = self._done = 0
 
     def start(self, total: int, done: int) -> None:
         """Start counting; the pace is that of this run only."""
-        self._counter = ProgressCounter()
-        self._total, self._done = total, done
+        self._total, self._done, self._start = total, done, time.monotonic()
         self._bar.update(self._task, total=total, completed=done)
         if done:
             self._console.print(f"{done} of {counted(total, 'episode')} already stored.")
@@ -105,15 +67,12 @@ class ConsoleReporter(Reporter):
     def advance(self, record: Record, *, is_new: bool = True) -> None:
         """Advance the bar, or print a line."""
         self._done += is_new
-        self._counter.add(record)
-        left = self._counter.time_left(self._total - self._done)
+        self._counts[record.setting, record.outcome] += 1
+        pace = _MINUTE * self._counts.total() / max(time.monotonic() - self._start, 1e-9)
+        seconds = round(_MINUTE * (self._total - self._done) / pace)
+        left = f"{seconds // _MINUTE}:{seconds % _MINUTE:02d}"
         if self._console.is_terminal:
-            self._bar.update(
-                self._task,
-                completed=self._done,
-                left=left,
-                pace=self._counter.pace(),
-            )
+            self._bar.update(self._task, completed=self._done, left=left, pace=pace)
             return
         self._console.print(
             f"\\[{self._done}/{self._total}] {escape(printable(_summary(record)))} ({left} left)",
@@ -134,7 +93,16 @@ class ConsoleReporter(Reporter):
         self._live.stop()
 
     def _render(self) -> RenderableType:
-        return Group(self._bar, Text(self._counter.summary(), "dim"))
+        return Group(self._bar, Text(self._score(), "dim"))
+
+    def _score(self) -> str:
+        """Return the successes per setting, of the valid episodes, and the errors in one line."""
+        counts = self._counts
+        valid = {name: counts[name, "success"] + counts[name, "failure"] for name, _ in counts}
+        parts = [f"{name} {counts[name, 'success']}/{valid[name]}" for name in valid if valid[name]]
+        if errors := sum(counts[one] for one in counts if one[1] == "error"):
+            parts.append(f"errors {errors}")
+        return " · ".join(parts)
 
 
 def _summary(record: Record) -> str:

@@ -24,8 +24,8 @@ from roboirg.core.errors import InvalidValueError, RoboIRGError
 from roboirg.core.extras import extra_needed
 from roboirg.evaluation.plan.worker_needs import WorkerNeeds
 from roboirg.evaluation.play.rollout import PlayJob
-from roboirg.evaluation.records.record import Job, Record
-from roboirg.evaluation.run.executor import NO_TIMEOUT_S, Warn
+from roboirg.evaluation.records.record import Job
+from roboirg.evaluation.run.executor import NO_TIMEOUT_S, Records, Warn
 from roboirg.evaluation.run.ray_pool import RayPool
 
 CONNECT_S = 10.0
@@ -58,7 +58,7 @@ class RayCluster:
             raise InvalidValueError(f"workers is {self.workers}; Ray needs at least 1.")
         import_ray()
 
-    def run(self, jobs: deque[Job], play: PlayJob, warn: Warn, /) -> Iterator[Record]:
+    def run(self, jobs: deque[Job], play: PlayJob, warn: Warn, /) -> Records:
         """Yield one record for each job as they finish.
 
         Raises:
@@ -70,10 +70,8 @@ class RayCluster:
         with _connected(ray, self.address, self.needs.working_dir):
             limit = self.episode_timeout_s
             pool = RayPool(ray, play, limit, self.workers, self.needs, environment, warn)
-            try:
+            with contextlib.closing(pool):
                 yield from pool.play_all(jobs)
-            finally:
-                pool.close()
 
 
 def import_ray() -> ModuleType:

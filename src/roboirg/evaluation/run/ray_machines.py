@@ -18,10 +18,9 @@ import signal
 import socket
 import tempfile
 import threading
-import time
 from collections.abc import Mapping
 from pathlib import Path
-from typing import NamedTuple, Protocol, Self, cast, runtime_checkable
+from typing import NamedTuple, cast
 
 from roboirg.core.episode import ENVIRONMENT_VERSION
 from roboirg.core.errors import RoboIRGError
@@ -31,7 +30,7 @@ from roboirg.evaluation.hosting.host_pool import HostPool, HostSettings
 from roboirg.evaluation.hosting.policy_descriptions import describe_policy
 from roboirg.evaluation.play.rollout import PlayJob
 from roboirg.evaluation.records.record import Job, Record
-from roboirg.evaluation.run.workers import WorkerSlot
+from roboirg.evaluation.run.workers import POLL_S, Worker
 from roboirg.language import LANGUAGE_VERSION
 from roboirg.tasks.splits.private_splits import use_salt
 
@@ -40,21 +39,6 @@ KEY_S = 1.0
 
 _PID_SUFFIX = ".pid"
 """Of empty files named after the processes of a run on a machine."""
-
-
-@runtime_checkable
-class VideoRecorder(Protocol):
-    """A function that plays jobs and writes videos to a folder that can be changed."""
-
-    folder: Path
-
-    def in_folder(self, folder: Path) -> Self:
-        """Return a copy that writes its videos to another folder."""
-
-
-def video_recorder(play: object) -> VideoRecorder | None:
-    """Return what plays jobs, if it writes videos."""
-    return play if isinstance(play, VideoRecorder) else None
 
 
 class MachineVersions(NamedTuple):
@@ -218,14 +202,21 @@ class RemoteWorker:
         play: plays one job.
         episode_timeout_s: how long an episode may take.
         salt: of the private split, if one is known.
+        machine: that was found fit.
     """
 
-    def __init__(self, play: PlayJob, episode_timeout_s: float, salt: str | None) -> None:
+    def __init__(
+        self, play: PlayJob, episode_timeout_s: float, salt: str | None, machine: CheckedMachine
+    ) -> None:
         if salt is not None:
             use_salt(salt)
-        self._play, self._episode_timeout_s = play, episode_timeout_s
-        self._slot: WorkerSlot | None = None
-        self._started: float | None = None
+        _register(machine.folder)
+        self._folder = Path(tempfile.mkdtemp(dir=machine.folder))
+        self._play = play.in_folder(self._folder) if hasattr(play, "in_folder") else play
+        self._connect = None if machine.hosts is None else machine.hosts.connect
+        self._episode_timeout_s = episode_timeout_s
+        self._worker: Worker | None = None
+        self._playing: Worker | None = None
 
     def pid(self) -> int:
         """Return the number of this process as soon as it runs."""
@@ -233,36 +224,32 @@ class RemoteWorker:
 
     def beat(self) -> float:
         """Return the seconds of the job under way, without those that it waited for its turn."""
-        started, slot = self._started, self._slot
-        if started is None or slot is None:
-            return 0.0
-        return time.monotonic() - started - slot.queued_s
+        playing = self._playing
+        return 0.0 if playing is None else playing.spent_s
 
-    def play(self, job: Job, machine: CheckedMachine) -> RemoteResult:
-        """Play a job on a machine that was found fit; it remains the same."""
-        if self._slot is None:
-            self._slot = self._new_slot(machine)
-        self._started = time.monotonic()
+    def play(self, job: Job) -> RemoteResult:
+        """Play a job in a supervised process, which is kept for the next one unless it dies."""
+        record = None
         try:
-            record = self._slot.play(job)
+            if self._worker is None:
+                self._worker = Worker.start(self._play, job, self._connect, limit_threads=True)
+            else:
+                self._worker.assign(job)
+            self._playing = worker = self._worker
+            while record is None:
+                record = worker.poll(self._episode_timeout_s, POLL_S)
         except RoboIRGError as error:  # it would end every other job here, too
             return RemoteResult(None, one_line(error))
         finally:
-            self._started = None
+            self._playing = None
+        if worker.is_dead:
+            self._worker = None
         files = {}
         for path in sorted(self._folder.rglob("*")):
             if path.is_file():
                 files[path.relative_to(self._folder).as_posix()] = path.read_bytes()
                 path.unlink()
         return RemoteResult(record, files=files)
-
-    def _new_slot(self, machine: CheckedMachine) -> WorkerSlot:
-        _register(machine.folder)
-        self._folder = Path(tempfile.mkdtemp(dir=machine.folder))
-        recorder = video_recorder(self._play)
-        own = self._play if recorder is None else cast("PlayJob", recorder.in_folder(self._folder))
-        connect = None if machine.hosts is None else machine.hosts.connect
-        return WorkerSlot(own, self._episode_timeout_s, connect)
 
 
 def _register(folder: Path) -> None:

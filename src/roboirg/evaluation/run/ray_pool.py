@@ -22,7 +22,7 @@ from roboirg.core.errors import RoboIRGError
 from roboirg.core.plain_text import counted
 from roboirg.evaluation.plan.worker_needs import WorkerNeeds
 from roboirg.evaluation.play.episode_record import lost_record
-from roboirg.evaluation.play.rollout import PlayJob
+from roboirg.evaluation.play.rollout import EpisodeRunner, PlayJob
 from roboirg.evaluation.records.record import Job, Record
 from roboirg.evaluation.run.executor import Warn
 from roboirg.evaluation.run.ray_machines import (
@@ -31,7 +31,6 @@ from roboirg.evaluation.run.ray_machines import (
     MachineVersions,
     RemoteResult,
     RemoteWorker,
-    video_recorder,
 )
 from roboirg.tasks.splits.private_splits import known_salt
 
@@ -56,26 +55,22 @@ MAX_LOSSES = 3
 """Losses in a row, for each of its workers, after which a machine is left out."""
 
 
-_GONE = "it has left the cluster"
+@dataclass(eq=False, kw_only=True)
+class _Watched:
+    """An actor: when it was heard, and the question that it has not answered."""
 
-
-@dataclass(eq=False)
-class _Pulse:
-    """Whether an actor answers: when it was heard, and the question that it has not answered."""
-
+    actor: Any = None
     heard: float = field(default_factory=time.monotonic)
     question: Any = None
 
 
-@dataclass(eq=False)
-class _Machine:
-    """A machine of the cluster; without `checked`, its check is under way."""
+@dataclass(eq=False, kw_only=True)
+class _Machine(_Watched):
+    """A machine of the cluster and its agent; without `checked`, its check is under way."""
 
     node: str
     name: str
     slots: int
-    actor: Any = None
-    pulse: _Pulse = field(default_factory=_Pulse)
     checked: CheckedMachine | None = None
     losses: int = 0
     fault: str | None = None
@@ -85,16 +80,14 @@ class _Machine:
         return self.checked is not None and self.fault is None
 
 
-@dataclass(eq=False)
-class _Worker:
+@dataclass(eq=False, kw_only=True)
+class _Worker(_Watched):
     """A worker; without `pid`, it waits for a CPU or starts."""
 
     machine: _Machine
-    actor: Any
     pid: int | None = None
     job: Job | None = None
     started: float = field(default_factory=time.monotonic)
-    pulse: _Pulse = field(default_factory=_Pulse)
 
 
 class RayPool:
@@ -131,7 +124,7 @@ class RayPool:
         self._workers: list[_Worker] = []
         self._run = secrets.token_hex(8)
         self._lost_at: dict[Job, set[str]] = {}
-        self._looked = self._beaten = 0.0
+        self._looked = 0.0
         self._active = self._warned = self._reached = time.monotonic()
         self._address = ray.get_runtime_context().gcs_address
 
@@ -204,13 +197,12 @@ class RayPool:
         self._looked = now
         alive = {node["NodeID"]: node for node in self._ray.nodes() if node["Alive"]}
         for name in set(self._machines) - set(alive):
-            if self._machines[name].fault is None:
-                self._machines[name].fault = _GONE
+            self._machines.pop(name).fault = "it has left the cluster"
         self._check_any_left()
         for name, node in alive.items():
             slots = self._needs.slots(node)
             if name not in self._machines and slots:
-                self._machines[name] = _Machine(name, _shown(node), slots)
+                self._machines[name] = _Machine(node=name, name=_shown(node), slots=slots)
         for machine in self._machines.values():
             if machine.actor is None and machine.fault is None:
                 self._start_agent(machine, versions)
@@ -221,7 +213,7 @@ class RayPool:
         # In /tmp, because the path of a socket may have 100 characters only.
         folder = Path("/tmp") / f"roboirg-{self._run}-{machine.node[:8]}"  # noqa: S108 - made with mode 700
         machine.actor = actor.remote(folder, getattr(self._play, "hosting", None))
-        machine.pulse = _Pulse()
+        machine.heard, machine.question = time.monotonic(), None
         self._calls[machine.actor.check.remote(versions)] = machine
 
     def _start_workers(self, waiting: int) -> None:
@@ -234,30 +226,31 @@ class RayPool:
             free = [
                 (counts[node], node)
                 for node, machine in self._machines.items()
-                if machine.fault is None and counts[node] < machine.slots
+                if machine.is_fit and counts[node] < machine.slots
             ]
             if not free:
                 return
             machine = self._machines[min(free)[1]]
             remote = self._remote(**self._needs.options(), scheduling_strategy=_there(machine))
-            actor = remote(RemoteWorker).remote(self._play, self._episode_timeout_s, known_salt())
-            self._workers.append(_Worker(machine, actor))
+            actor = remote(RemoteWorker).remote(
+                self._play, self._episode_timeout_s, known_salt(), machine.checked
+            )
+            self._workers.append(_Worker(actor=actor, machine=machine))
             self._calls[actor.pid.remote()] = self._workers[-1]
 
     def _assign(self, jobs: deque[Job]) -> None:
         """Give jobs to idle workers, lost ones to those of another machine."""
         for worker in self._workers:
-            machine = worker.machine.checked
-            if worker.pid is None or worker.job is not None or machine is None:
+            if worker.pid is None or worker.job is not None:
                 continue
             node = worker.machine.node
             others = any(one.pid and one.machine is not worker.machine for one in self._workers)
             for place, job in enumerate(jobs):
                 if not others or node not in self._lost_at.get(job, ()):
                     del jobs[place]
-                    worker.job, worker.pulse = job, _Pulse()
-                    self._active = self._warned = worker.pulse.heard
-                    self._calls[worker.actor.play.remote(job, machine)] = worker
+                    worker.job = job
+                    self._active = self._warned = worker.heard = time.monotonic()
+                    self._calls[worker.actor.play.remote(job)] = worker
                     break
 
     def _receive(self, reference: object, jobs: deque[Job]) -> Iterator[Record]:
@@ -270,7 +263,12 @@ class RayPool:
         except self._ray.exceptions.RayError as error:
             yield from self._lose(called, _reason(error))
             return
-        if isinstance(called, _Machine):
+        if isinstance(reply, float):
+            called.heard, called.question = time.monotonic(), None
+            if reply > self._episode_timeout_s + LATE_S:
+                reason = f"it did not end an episode that took {reply:.0f} s"
+                yield from self._lose(called, reason)
+        elif isinstance(called, _Machine):
             called.checked = reply
             if reply.fault is not None:
                 self._leave_out(called, reply.fault)
@@ -281,21 +279,21 @@ class RayPool:
             started = sum(worker.pid is not None for worker in self._workers)
             if self._most is not None and started > self._most:
                 self._end(called)  # others have taken its place while it waited
-        if isinstance(called, _Worker) and called.machine.fault is not None:
+        if isinstance(called, _Worker) and called.job is None and called.machine.fault is not None:
             self._end(called)
 
     def _finish(self, worker: _Worker, reply: RemoteResult, jobs: deque[Job]) -> Iterator[Record]:
         """Store the files of a record, and yield it."""
-        job, worker.job = cast("Job", worker.job), None
+        self._calls.pop(worker.question, None)  # it was about this job
+        job, worker.job, worker.question = cast("Job", worker.job), None, None
         if reply.record is None:
             jobs.appendleft(job)
             self._leave_out(worker.machine, reply.fault)
             return
-        if (recorder := video_recorder(self._play)) is not None:
-            for name, data in reply.files.items():
-                path = recorder.folder / name
-                path.parent.mkdir(parents=True, exist_ok=True)
-                path.write_bytes(data)
+        for name, data in reply.files.items():
+            path = cast("EpisodeRunner", self._play).folder / name
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.write_bytes(data)
         yield reply.record
         if reply.record.error not in ("infrastructure", "environment"):
             worker.machine.losses = 0
@@ -354,46 +352,28 @@ class RayPool:
         self._check_any_left()
 
     def _check_any_left(self) -> None:
-        """Stop if machines are left out and no other is there; those that left may come again."""
+        """Stop if machines are left out and no other is there."""
         faults = {one.name: one.fault for one in self._machines.values()}
-        if None not in faults.values() and set(faults.values()) - {_GONE}:
+        if faults and None not in faults.values():
             shown = "; ".join(f"{name}: {fault}" for name, fault in faults.items())
             raise RoboIRGError(f"No machine of the Ray cluster can play ({shown}).")
 
     def _end_silent(self) -> Iterator[Record]:
-        """Give up what does not answer, or takes too long."""
+        """Ask agents and busy workers whether they are alive; give up those that do not answer."""
         now = time.monotonic()
-        if now - self._beaten < POLL_S:
-            return
-        self._beaten = now
         asked: list[_Machine | _Worker] = [
             one for one in self._machines.values() if one.actor is not None and one.fault is None
         ]
         asked += [worker for worker in self._workers if worker.job is not None]
         for one in asked:
-            if one not in self._workers and one not in self._machines.values():
+            if isinstance(one, _Worker) and one not in self._workers:
                 continue  # it was lost with its machine's agent
-            reason = self._feel(one.pulse, one.actor)
-            if reason is not None:
+            if one.question is None and now - one.heard > BEAT_S:
+                one.question = one.actor.beat.options(concurrency_group="beat").remote()
+                self._calls[one.question] = one
+            elif now - one.heard > SILENCE_S and not self._ray.wait([one.question], timeout=0)[0]:
+                reason = f"its process has not answered for {SILENCE_S:g} s"
                 yield from self._lose(one, reason)
-
-    def _feel(self, pulse: _Pulse, actor: Any) -> str | None:  # noqa: ANN401 - a handle of Ray
-        """Ask an actor whether it is alive; return why it is given up, if it is."""
-        now = time.monotonic()
-        if pulse.question is None:
-            if now - pulse.heard > BEAT_S:
-                pulse.question = actor.beat.options(concurrency_group="beat").remote()
-            return None
-        if not self._ray.wait([pulse.question], timeout=0)[0]:
-            is_silent = now - pulse.heard > SILENCE_S
-            return f"its process has not answered for {SILENCE_S:g} s" if is_silent else None
-        try:
-            spent_s = self._ray.get(pulse.question)
-        except self._ray.exceptions.RayError as error:
-            return _reason(error)
-        pulse.question, pulse.heard = None, now
-        is_late = spent_s > self._episode_timeout_s + LATE_S
-        return f"it did not end an episode that took {spent_s:.0f} s" if is_late else None
 
     def _check_waiting(self, left: int) -> None:
         """Warn the user while nothing is played, and stop if that takes too long."""

@@ -7,12 +7,10 @@ import os
 import signal
 import threading
 from collections import Counter, deque
-from collections.abc import Generator, Iterable, Iterator, Sequence
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from pathlib import Path
 from types import FrameType
 from typing import NamedTuple
-
-import msgspec
 
 from roboirg.core.episode import ENVIRONMENT_VERSION
 from roboirg.core.errors import InvalidValueError
@@ -32,7 +30,7 @@ from roboirg.evaluation.records.store import (
     RecordStore,
     read_index,
 )
-from roboirg.evaluation.run.executor import Executor, Warn
+from roboirg.evaluation.run.executor import Executor
 from roboirg.evaluation.run.progress import Reporter
 from roboirg.language import LANGUAGE_VERSION
 from roboirg.policies.vlm.models.reply_store import ReplySettings
@@ -98,8 +96,7 @@ def run_plan(
     films = without_unfinished_videos(folder / VIDEO_FOLDER)
     with _sigterm_interrupts(), RecordStore(folder) as store, films:
         _report_damage(store, reporter)
-        _check_versions(store.stored.values(), folder)
-        _check_policies(plan, store.stored.values(), folder)
+        _check_versions(plan, store.stored.values(), folder)
         write_plan(plan, folder)
         keys = [identity_key(job) for job in jobs]
         todo = [
@@ -144,9 +141,7 @@ def check_run(plan: Plan, folder: Path) -> None:
             language, environment, scene or policy.
     """
     _check_writable(folder)
-    records = read_index(folder).values()
-    _check_versions(records, folder)
-    _check_policies(plan, records, folder)
+    _check_versions(plan, read_index(folder).values(), folder)
 
 
 def _check_writable(folder: Path) -> None:
@@ -180,12 +175,11 @@ class _RunLoop:
     def play(self, todo: Sequence[Job], play: PlayJob, executor: Executor) -> None:
         """Play jobs, and retry those that ended in an error of a retryable kind."""
         waiting, by_key = deque(todo), {identity_key(job): job for job in todo}
-        with contextlib.closing(_iterate(executor, waiting, play, self._reporter.warn)) as records:
+        with contextlib.closing(executor.run(waiting, play, self._reporter.warn)) as records:
             for record in records:
                 job = by_key[identity_key(record)]
                 self._store_record(job, record)
-                if self._count_connection_error(record):
-                    self._report_unreachable(record)
+                if self._is_unreachable(record):
                     # In place: the executor takes its next job from here.
                     left = [one for one in waiting if one.policy != record.policy]
                     waiting.clear()
@@ -199,11 +193,12 @@ class _RunLoop:
 
     def _store_record(self, job: Job, record: Record) -> None:
         _check_record_version(record)
-        record = _refuse_contradiction(record)
-        before = self._store.stored.get(identity_key(job))
-        if before is not None:
-            attempt = before.attempt + record.attempt
-            record = msgspec.structs.replace(record, attempt=attempt)
+        # Only code in the world's process can write this, such as a policy that patches the judge.
+        if record.outcome == "success" and record.cause is not None:
+            cause = format_cause("policy", f"a success came with a cause ({record.cause})")
+            record.record_error("policy", cause[:MAX_CAUSE_LENGTH])
+        if (before := self._store.stored.get(identity_key(job))) is not None:
+            record.attempt += before.attempt
         self._store.append(record)
         self.tries[job] += 1
         self._reporter.advance(record, is_new=self.tries[job] == 1)
@@ -217,20 +212,18 @@ class _RunLoop:
             and job.policy not in self.unreachable
         )
 
-    def _count_connection_error(self, record: Record) -> bool:
+    def _is_unreachable(self, record: Record) -> bool:
         """Count consecutive connection errors of a policy. Returns True once, at the limit."""
-        if record.error == "connection":
-            self._connection_errors[record.policy] += 1
-        else:
-            self._connection_errors[record.policy] = 0
-        return self._connection_errors[record.policy] == UNREACHABLE_AFTER
-
-    def _report_unreachable(self, record: Record) -> None:
+        count = 1 + self._connection_errors[record.policy] if record.error == "connection" else 0
+        self._connection_errors[record.policy] = count
+        if count != UNREACHABLE_AFTER:
+            return False
         self.unreachable.append(record.policy)
         self._reporter.warn(
             f"{record.policy} could not be reached in {UNREACHABLE_AFTER} episodes in a row "
             f"({record.cause}); this run skips its remaining episodes."
         )
+        return True
 
 
 def _check_record_version(record: Record) -> None:
@@ -241,18 +234,6 @@ def _check_record_version(record: Record) -> None:
                 f"A worker returned {record.slug} with {what} version {version}, but this roboirg "
                 f"has version {ours}; the record was not stored."
             )
-
-
-def _refuse_contradiction(record: Record) -> Record:
-    """Return a record; a success with a cause becomes an error.
-
-    Only code in the world's process can write one, such as a policy that patches the judge.
-    """
-    if record.outcome != "success" or record.cause is None:
-        return record
-    cause = format_cause("policy", f"a success came with a cause ({record.cause})")
-    refused = {"outcome": "error", "error": "policy", "cause": cause[:MAX_CAUSE_LENGTH]}
-    return msgspec.structs.replace(record, **refused)
 
 
 def _report_damage(store: RecordStore, reporter: Reporter) -> None:
@@ -268,9 +249,8 @@ def _report_damage(store: RecordStore, reporter: Reporter) -> None:
         )
 
 
-def _check_versions(records: Iterable[Summary], folder: Path) -> None:
-    """Refuse records of another language or environment version: rates must not mix them."""
-    records = tuple(records)
+def _check_versions(plan: Plan, records: Collection[Summary], folder: Path) -> None:
+    """Refuse records of other versions of words, scenes or policies: rates must not mix them."""
     for what, ours in _OUR_VERSIONS.items():
         for version in {getattr(record, f"{what}_version") for record in records} - {ours}:
             raise StoreError(
@@ -280,12 +260,15 @@ def _check_versions(records: Iterable[Summary], folder: Path) -> None:
     for task, split, episode, seed in {
         (record.task, record.split, record.episode, record.seed) for record in records
     }:
-        expected = _seed(task, split, episode)
+        expected: str | int = "no such episode"
+        with contextlib.suppress(InvalidValueError):
+            expected = get_episode(task, split, episode).seed
         if seed != expected:
             raise StoreError(
                 f"{folder} holds {task} {split}/{episode} with scene seed {seed}, but this roboirg "
                 f"has {expected}; choose another --out."
             )
+    _check_policies(plan, records, folder)
 
 
 def _check_policies(plan: Plan, records: Iterable[Summary], folder: Path) -> None:
@@ -298,21 +281,6 @@ def _check_policies(plan: Plan, records: Iterable[Summary], folder: Path) -> Non
                 f"{folder} holds episodes of {policy} version {version}, but the policy is now "
                 f"version {now}; choose another --out."
             )
-
-
-def _seed(task: str, split: str, episode: int) -> str | int:
-    """Return the seed of an episode's scene, or a phrase if there is no such episode."""
-    try:
-        return get_episode(task, split, episode).seed
-    except InvalidValueError:
-        return "no such episode"
-
-
-def _iterate(
-    executor: Executor, jobs: deque[Job], play: PlayJob, warn: Warn
-) -> Generator[Record, None, None]:
-    """Yield an executor's records. Unlike an iterator, a generator can be closed."""
-    yield from executor.run(jobs, play, warn)
 
 
 @contextlib.contextmanager

@@ -13,8 +13,8 @@ import os
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass
-from multiprocessing.connection import Connection, wait
-from typing import NamedTuple, cast
+from multiprocessing.connection import Connection
+from typing import cast
 
 from roboirg.core.errors import EndOfRunError, RoboIRGError
 from roboirg.evaluation.hosting.host_pool import Connect
@@ -30,15 +30,6 @@ MAX_FAILED_STARTS = 3
 
 POLL_S = 0.25
 """How often a supervisor checks deadlines."""
-
-_FATAL_ERRORS = {error.__name__: error for error in EndOfRunError.__subclasses__()}
-
-
-class _FatalError(NamedTuple):
-    """An error that ends the run, as a worker sends it."""
-
-    kind: str
-    message: str
 
 
 @dataclass
@@ -89,28 +80,33 @@ class Worker:
         self.watchdog.begin_job()
         self.child.send(job)
 
-    def receive(self) -> Record:
-        """Return the record of the job once the connection is readable.
+    @property
+    def spent_s(self) -> float:
+        """Seconds that the job has taken, without those that it waited for its turn."""
+        return time.monotonic() - self.started - self.watchdog.queued_s
 
-        The worker may be dead afterwards.
+    def poll(self, episode_timeout_s: float, wait_s: float = 0.0) -> Record | None:
+        """Return the record of the job, or None if it goes on; then the worker may be dead.
+
+        A process whose job exceeds a time limit is killed, and the record is an error.
+
+        Args:
+            episode_timeout_s: how long the job may take.
+            wait_s: how long to wait for its end.
 
         Raises:
             RoboIRGError: an error that would end every other job too (no Vulkan device, …).
         """
-        reply = self.child.receive()
-        if isinstance(reply, ChildExit):
-            return self._error_record(*_explain_exit(self.watchdog.phase, reply))
-        if isinstance(reply, _FatalError):
-            raise _FATAL_ERRORS.get(reply.kind, RoboIRGError)(reply.message)
-        if not isinstance(reply, Record):
-            raise TypeError(f"a worker sent {type(reply).__name__}, not a Record")
-        return reply
-
-    def kill_if_overdue(self, episode_timeout_s: float) -> Record | None:
-        """Kill the process and return an error record if its job has exceeded a time limit."""
+        if self.child.connection.poll(wait_s):
+            reply = self.child.receive()
+            if isinstance(reply, RoboIRGError):
+                raise reply
+            if isinstance(reply, ChildExit):
+                return self._error_record(*_explain_exit(self.watchdog.phase, reply))
+            return cast("Record", reply)
         if self.watchdog.is_overdue:
             message = f"the {self.watchdog.phase} did not return within {self.watchdog.limit_s:g} s"
-        elif time.monotonic() - self.started - self.watchdog.queued_s > episode_timeout_s:
+        elif self.spent_s > episode_timeout_s:
             message = (
                 f"the episode took longer than {episode_timeout_s:g} s "
                 f"(now in the {self.watchdog.phase})"
@@ -139,47 +135,6 @@ class Worker:
         return record
 
 
-class WorkerSlot:
-    """Plays one job after the other in a supervised process, replaced when it dies.
-
-    Args:
-        play: plays one job.
-        episode_timeout_s: how long an episode may take.
-        connect: returns a process's line to the policy hosts; None if it needs none.
-    """
-
-    def __init__(
-        self, play: PlayJob, episode_timeout_s: float, connect: Connect | None = None
-    ) -> None:
-        self._play, self._episode_timeout_s, self._connect = play, episode_timeout_s, connect
-        self._worker: Worker | None = None
-
-    def play(self, job: Job) -> Record:
-        """Play a job; the process is kept for the next one.
-
-        Raises:
-            RoboIRGError: an error that would end every other job too (no Vulkan device, …).
-        """
-        if self._worker is None:
-            self._worker = Worker.start(self._play, job, self._connect, limit_threads=True)
-        else:
-            self._worker.assign(job)
-        worker, record = self._worker, None
-        while record is None:
-            if wait([worker.child.connection], POLL_S):
-                record = worker.receive()
-            else:
-                record = worker.kill_if_overdue(self._episode_timeout_s)
-        if worker.is_dead:
-            self._worker = None
-        return record
-
-    @property
-    def queued_s(self) -> float:
-        """Seconds that the current job has waited for its turn."""
-        return 0.0 if self._worker is None else self._worker.watchdog.queued_s
-
-
 @contextlib.contextmanager
 def connected(play: PlayJob, connect: Connect | None) -> Iterator[PlayJob]:
     """Yield what plays jobs, with a line of its own to the policy hosts, closed here at the end."""
@@ -205,12 +160,14 @@ def _work(connection: Connection, watchdog: Watchdog, play: PlayJob, limit_threa
     serve(connection, functools.partial(_play, play))
 
 
-def _play(play: PlayJob, job: Job) -> Record | _FatalError:
+def _play(play: PlayJob, job: Job) -> Record | RoboIRGError:
     try:
         with watched("environment"), _logged(play, job):
             return play(job)
     except RoboIRGError as error:
-        return _FatalError(type(error).__name__, str(error))
+        # Its own class may be one that cannot be sent.
+        kind = type(error) if isinstance(error, EndOfRunError) else RoboIRGError
+        return kind(str(error))
 
 
 def _logged(play: PlayJob, job: Job) -> contextlib.AbstractContextManager[None]:
