@@ -173,7 +173,7 @@ def test_a_worker_gets_what_the_plan_asks_for(
     folder.mkdir()
     (folder / "note.txt").write_text("copied")
     here = Path(ray_fakes.__file__).parent
-    for module in ("ray_fakes.py", "evaluation_fakes.py"):
+    for module in ("ray_fakes.py", "evaluation_fakes.py", "made_records.py"):
         (folder / module).write_text((here / module).read_text())
     for rack in ("a", "b"):
         cluster.add_node(num_cpus=2, num_gpus=1, labels={"rack": rack}, env_vars={"RACK": rack})
