@@ -16,7 +16,7 @@ from multiprocessing.connection import wait
 from typing import Protocol
 
 from roboirg.core.errors import RoboIRGError
-from roboirg.evaluation.hosting.host_pool import Connect, open_hosts
+from roboirg.evaluation.hosting.host_pool import open_hosts
 from roboirg.evaluation.play.rollout import PlayJob
 from roboirg.evaluation.records.record import Job, Record
 from roboirg.evaluation.run.workers import MAX_FAILED_STARTS, POLL_S, Worker, connected
@@ -83,42 +83,41 @@ class LocalProcesses:
         Raises:
             RoboIRGError: no worker can start, or an error would end every other job too.
         """
-        with open_hosts(play) as connect:
-            yield from self._run(jobs, play, connect)
-
-    def _run(self, jobs: deque[Job], play: PlayJob, connect: Connect | None) -> Records:
         failed_starts = 0
         # With a process on every core, more threads in Mesa would not help.
         limit_threads = self.workers >= core_count()
         active: list[Worker] = []
         released: list[Worker] = []
-        try:
-            while jobs or active:
-                while jobs and len(active) < self.workers:
-                    job = take_job(jobs, active)
-                    active.append(Worker.start(play, job, connect, limit_threads=limit_threads))
-                wait([worker.child.connection for worker in active], POLL_S)
-                for worker in tuple(active):
-                    record = worker.poll(self.episode_timeout_s)
-                    if record is None:
-                        continue
-                    failed_starts = failed_starts + 1 if worker.failed_to_start else 0
-                    if failed_starts >= MAX_FAILED_STARTS * self.workers:
-                        raise RoboIRGError(f"No worker process can start ({record.cause}).")
-                    if worker.is_dead:
-                        active.remove(worker)
-                    elif jobs:
-                        worker.assign(take_job(jobs, [one for one in active if one is not worker]))
-                    else:
-                        active.remove(worker)
-                        released.append(worker)
-                        worker.child.connection.close()  # it may exit
-                    yield record
-        finally:
-            for worker in active:
-                worker.child.kill()
-            for worker in (*active, *released):
-                worker.child.close()
+        with open_hosts(play) as connect:
+            try:
+                while jobs or active:
+                    while jobs and len(active) < self.workers:
+                        job = take_job(jobs, active)
+                        active.append(Worker.start(play, job, connect, limit_threads=limit_threads))
+                    wait([worker.child.connection for worker in active], POLL_S)
+                    for worker in tuple(active):
+                        record = worker.poll(self.episode_timeout_s)
+                        if record is None:
+                            continue
+                        failed_starts = failed_starts + 1 if worker.failed_to_start else 0
+                        if failed_starts >= MAX_FAILED_STARTS * self.workers:
+                            raise RoboIRGError(f"No worker process can start ({record.cause}).")
+                        if worker.is_dead:
+                            active.remove(worker)
+                        elif jobs:
+                            worker.assign(
+                                take_job(jobs, [one for one in active if one is not worker])
+                            )
+                        else:
+                            active.remove(worker)
+                            released.append(worker)
+                            worker.child.connection.close()  # it may exit
+                        yield record
+            finally:
+                for worker in active:
+                    worker.child.kill()
+                for worker in (*active, *released):
+                    worker.child.close()
 
 
 def take_job(jobs: deque[Job], others: Iterable[Worker]) -> Job:

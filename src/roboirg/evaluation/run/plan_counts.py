@@ -13,8 +13,9 @@ from roboirg.policies.by_name.policy_specs import LISTENER
 
 def cell_sizes(jobs: Iterable[Job]) -> Mapping[tuple[str, str], Mapping[str, Counter[str]]]:
     """Return the number of episodes by (policy, task), then by setting, then by form."""
-    sizes: defaultdict[tuple[str, str], defaultdict[str, Counter[str]]]
-    sizes = defaultdict(lambda: defaultdict(Counter))
+    sizes = defaultdict[tuple[str, str], defaultdict[str, Counter[str]]](
+        lambda: defaultdict(Counter)
+    )
     for job in jobs:
         sizes[job.policy, job.task][job.setting][job.form] += 1
     return sizes

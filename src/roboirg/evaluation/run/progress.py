@@ -107,9 +107,7 @@ class ConsoleReporter(Reporter):
 
 def _summary(record: Record) -> str:
     where = f"{record.policy} {record.task} {record.split}/{record.episode} {record.setting}"
-    if record.form != "implicit":
-        where += f" ({record.form})"
-    if record.arm != TOLD:
-        where += f" ({record.arm})"
-    verdict = record.outcome if record.cause is None else f"{record.outcome}: {record.cause}"
-    return f"{where}: {verdict}"
+    form = "" if record.form == "implicit" else f" ({record.form})"
+    arm = "" if record.arm == TOLD else f" ({record.arm})"
+    cause = "" if record.cause is None else f": {record.cause}"
+    return f"{where}{form}{arm}: {record.outcome}{cause}"

@@ -68,8 +68,9 @@ class RayCluster:
         ray = import_ray()
         environment = _runtime_environment(self.needs)
         with _connected(ray, self.address, self.needs.working_dir):
-            limit = self.episode_timeout_s
-            pool = RayPool(ray, play, limit, self.workers, self.needs, environment, warn)
+            pool = RayPool(
+                ray, play, self.episode_timeout_s, self.workers, self.needs, environment, warn
+            )
             with contextlib.closing(pool):
                 yield from pool.play_all(jobs)
 

@@ -20,7 +20,7 @@ import tempfile
 import threading
 from collections.abc import Mapping
 from pathlib import Path
-from typing import NamedTuple, cast
+from typing import NamedTuple
 
 from roboirg.core.episode import ENVIRONMENT_VERSION
 from roboirg.core.errors import RoboIRGError
@@ -138,7 +138,7 @@ class MachineAgent:
         self._door = socket.socket(socket.AF_UNIX)
         self._door.bind(path)
         self._door.listen()
-        threading.Thread(target=self._open_lines, daemon=True).start()
+        threading.Thread(target=self._open_lines, args=(self._address.key,), daemon=True).start()
 
     def check(self, versions: MachineVersions) -> CheckedMachine:
         """Check that the machine has the same versions as the driver and can load the policies."""
@@ -164,9 +164,8 @@ class MachineAgent:
             self._pool.close()
         shutil.rmtree(self._folder, ignore_errors=True)
 
-    def _open_lines(self) -> None:
+    def _open_lines(self, key: bytes) -> None:
         """Serve everyone who has the key; who does not send it at once is sent away."""
-        address = cast("HostAddress", self._address)
         while True:
             try:
                 line, _ = self._door.accept()
@@ -174,7 +173,7 @@ class MachineAgent:
                 return
             line.settimeout(KEY_S)
             with contextlib.suppress(OSError):
-                if secrets.compare_digest(line.recv(len(address.key)), address.key):
+                if secrets.compare_digest(line.recv(len(key)), key):
                     line.settimeout(None)
                     self._pool.serve(line)
                     continue

@@ -184,12 +184,9 @@ class _RunLoop:
                     left = [one for one in waiting if one.policy != record.policy]
                     waiting.clear()
                     waiting.extend(left)
-                elif not self._should_retry(job, record):
-                    continue
-                elif record.error == "infrastructure":
-                    waiting.appendleft(job)  # what was lost with a machine can be played at once
-                else:
-                    waiting.append(job)
+                elif self._should_retry(job, record):
+                    # What was lost with a machine can be played at once.
+                    waiting.insert(0 if record.error == "infrastructure" else len(waiting), job)
 
     def _store_record(self, job: Job, record: Record) -> None:
         _check_record_version(record)
