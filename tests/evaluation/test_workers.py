@@ -234,7 +234,7 @@ def test_time_in_a_queue_has_a_timing_of_its_own() -> None:
 
 
 def test_an_overdue_worker_is_killed() -> None:
-    worker = Worker.start(sleepy, small_plan(1).jobs()[0])
+    worker = Worker(sleepy, small_plan(1).jobs()[0])
     assert worker.poll(3600) is None
     record = worker.poll(0.0)
     assert record is not None

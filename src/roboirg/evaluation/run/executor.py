@@ -93,13 +93,14 @@ class LocalProcesses:
                 while jobs or active:
                     while jobs and len(active) < self.workers:
                         job = take_job(jobs, active)
-                        active.append(Worker.start(play, job, connect, limit_threads=limit_threads))
+                        active.append(Worker(play, job, connect, limit_threads=limit_threads))
                     wait([worker.child.connection for worker in active], POLL_S)
                     for worker in tuple(active):
                         record = worker.poll(self.episode_timeout_s)
                         if record is None:
                             continue
-                        failed_starts = failed_starts + 1 if worker.failed_to_start else 0
+                        is_lost = worker.is_dead and worker.watchdog.phase == "worker startup"
+                        failed_starts = failed_starts + 1 if is_lost else 0
                         if failed_starts >= MAX_FAILED_STARTS * self.workers:
                             raise RoboIRGError(f"No worker process can start ({record.cause}).")
                         if worker.is_dead:

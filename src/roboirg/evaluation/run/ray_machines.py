@@ -231,7 +231,7 @@ class RemoteWorker:
         record = None
         try:
             if self._worker is None:
-                self._worker = Worker.start(self._play, job, self._connect, limit_threads=True)
+                self._worker = Worker(self._play, job, self._connect, limit_threads=True)
             else:
                 self._worker.assign(job)
             self._playing = worker = self._worker

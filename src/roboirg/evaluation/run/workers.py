@@ -12,7 +12,6 @@ import functools
 import os
 import time
 from collections.abc import Iterator
-from dataclasses import dataclass
 from multiprocessing.connection import Connection
 from typing import cast
 
@@ -32,9 +31,14 @@ POLL_S = 0.25
 """How often a supervisor checks deadlines."""
 
 
-@dataclass
 class Worker:
     """A worker process and its current job.
+
+    Args:
+        play: plays one job.
+        job: the first job.
+        connect: returns the process's line to the policy hosts; None if it needs none.
+        limit_threads: render with one thread, because every core has its own process.
 
     Attributes:
         child: plays the jobs; its channel is readable when there is a record or it has died.
@@ -44,35 +48,18 @@ class Worker:
         started_at: the same for records.
     """
 
-    child: ChildProcess
-    watchdog: Watchdog
-    job: Job
-    started: float = 0.0
-    started_at: str = ""
-
-    @classmethod
-    def start(
-        cls,
+    def __init__(
+        self,
         play: PlayJob,
         job: Job,
         connect: Connect | None = None,
         *,
         limit_threads: bool = False,
-    ) -> Worker:
-        """Start a process and assign its first job.
-
-        Args:
-            play: plays one job.
-            job: the first job.
-            connect: returns the process's line to the policy hosts; None if it needs none.
-            limit_threads: render with one thread, because every core has its own process.
-        """
-        watchdog = Watchdog()
+    ) -> None:
+        self.watchdog = Watchdog()
         with connected(play, connect) as hosted:
-            child = ChildProcess.spawn(_work, watchdog, hosted, limit_threads)
-        worker = cls(child, watchdog, job)
-        worker.assign(job)
-        return worker
+            self.child = ChildProcess.spawn(_work, self.watchdog, hosted, limit_threads)
+        self.assign(job)
 
     def assign(self, job: Job) -> None:
         """Send the next job to an idle worker."""
@@ -123,11 +110,6 @@ class Worker:
         """Whether the process has died or been killed."""
         return self.child.connection.closed
 
-    @property
-    def failed_to_start(self) -> bool:
-        """Whether the process died before it played anything."""
-        return self.is_dead and self.watchdog.phase == "worker startup"
-
     def _error_record(self, kind: ErrorKind, message: str) -> Record:
         record = lost_record(self.job, kind, message)
         record.started_at = self.started_at
@@ -161,17 +143,13 @@ def _work(connection: Connection, watchdog: Watchdog, play: PlayJob, limit_threa
 
 
 def _play(play: PlayJob, job: Job) -> Record | RoboIRGError:
+    log: contextlib.AbstractContextManager[None] = contextlib.nullcontext()
+    if isinstance(play, EpisodeRunner):  # it has a folder
+        log = logged_output(log_path(play.folder, job.slug))
     try:
-        with watched("environment"), _logged(play, job):
+        with watched("environment"), log:
             return play(job)
     except RoboIRGError as error:
         # Its own class may be one that cannot be sent.
         kind = type(error) if isinstance(error, EndOfRunError) else RoboIRGError
         return kind(str(error))
-
-
-def _logged(play: PlayJob, job: Job) -> contextlib.AbstractContextManager[None]:
-    """Send what is printed during a job to its log, if the run has a folder."""
-    if isinstance(play, EpisodeRunner):
-        return logged_output(log_path(play.folder, job.slug))
-    return contextlib.nullcontext()
