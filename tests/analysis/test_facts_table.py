@@ -77,7 +77,8 @@ def test_what_a_policy_declares_and_its_process_reports_is_there(tmp_path: Path)
             python="3.12.1", libraries={"torch": "2.9"}, dtypes=("bfloat16",), devices=("cuda:0",)
         ),
     }
-    played = record(0, steps=30, calls=3, **known), record(1, steps=10, calls=1, **known)
+    long, short = {"steps": 30, "calls": 3, "executed": 16}, {"steps": 10, "calls": 1}
+    played = record(0, **long, **known), record(1, **short, executed=10, **known)
     found = facts(tmp_path, *played)["mine"]
     expected = {
         "cameras": "front",
@@ -91,6 +92,7 @@ def test_what_a_policy_declares_and_its_process_reports_is_there(tmp_path: Path)
         "libraries": "torch 2.9",
         "python": "3.12.1",
         "control steps per call, mean": "10.0",
+        "actions executed per call, most": "16",
     }
     assert found.items() >= expected.items()
 

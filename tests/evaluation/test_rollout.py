@@ -137,6 +137,7 @@ def test_all_rows_are_played_until_the_end(stage: Callable[..., Record]) -> None
     policy, world = PaperPolicy(), PaperWorld(length=5)
     course = stage(world, policy)
     assert (course.outcome, course.cause, course.steps) == ("success", None, 5)
+    assert (course.calls, course.executed) == (2, 3)
     assert course.demonstration_steps == 3
     assert [event.step for event in course.events] == [-1, 5]
     assert course.render_device is None

@@ -279,11 +279,14 @@ def test_the_http_interface_tells_what_is_wrong():
         ({"protocol": "mmevla"}, UnknownNameError, "Did you mean 'mme-vla'"),
         ({"protocol": "vla-eval"}, InvalidValueError, "vla-eval:// is for clients only"),
         ({"port": 70000}, InvalidValueError, "port is 70000"),
+        ({"timeout_s": 1e30}, InvalidValueError, "at most 2,147,483 seconds"),
         ({"host": "192.0.2.1"}, InvalidValueError, "Cannot listen on 192"),
     ],
 )
 def test_what_cannot_be_served_is_told(options, error, words):
-    place = ServerOptions(**{name: options[name] for name in options if name in ("host", "port")})
+    place = ServerOptions(
+        **{name: options[name] for name in options if name in ("host", "port", "timeout_s")}
+    )
     with pytest.raises(error, match=words):
         open_server(options.get("spec", "random"), options.get("protocol", "openpi"), place)
 

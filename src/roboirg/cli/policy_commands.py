@@ -13,6 +13,7 @@ from typer.core import TyperCommand
 
 from roboirg.cli.options import add_working_directory
 from roboirg.core.errors import InvalidValueError, RoboIRGError
+from roboirg.core.field_types import MOST_SECONDS
 from roboirg.util.web.listening import TIMEOUT_S
 from roboirg.util.web.request_origin import LOOPBACK, LOOPBACK_NAMES
 
@@ -60,6 +61,7 @@ def serve(
         float,
         typer.Option(
             min=1,
+            max=MOST_SECONDS,
             help="Seconds for which a connection may be idle or a message may take to arrive.",
         ),
     ] = TIMEOUT_S,

@@ -20,6 +20,8 @@ Subgoal = Annotated[str, msgspec.Meta(pattern=SUBGOAL)]
 Name = Annotated[str, msgspec.Meta(pattern=NAME)]
 Whole = Annotated[int, msgspec.Meta(ge=-(2**63), le=2**63 - 1)]
 """A whole number that tables and NumPy can hold."""
+MOST_SECONDS = 2_147_483
+"""Of a time limit, 24 days: systems wait for at most 2 ** 31 ms."""
 MOST_STAGES = 100
 Stages = Annotated[tuple[Whole, ...], msgspec.Meta(max_length=MOST_STAGES)]
 MOST_CAUSE_LETTERS = 10_000

@@ -10,6 +10,7 @@ from collections.abc import Mapping
 from typing import NamedTuple
 
 from roboirg.core.errors import InvalidValueError, UnknownNameError
+from roboirg.core.field_types import MOST_SECONDS
 from roboirg.core.inference_facts import inference_facts
 from roboirg.policies.by_name.loading import (
     is_privileged,
@@ -79,6 +80,11 @@ def open_server(
         raise InvalidValueError(f"{protocol}:// is for clients only: no policy is served with it.")
     if not 0 <= options.port <= _MAX_PORT:
         raise InvalidValueError(f"The port is {options.port}; it must be 0 to {_MAX_PORT}.")
+    if not 0 < options.timeout_s <= MOST_SECONDS:
+        raise InvalidValueError(
+            f"timeout_s is {options.timeout_s}; it must be more than 0 and at most "
+            f"{MOST_SECONDS:,} seconds."
+        )
     declared = getattr(load_policy_class(spec), "metadata", {})
     if is_privileged(spec):
         raise InvalidValueError(

@@ -35,7 +35,7 @@ from roboirg.core.environment_options import (
     check_observe_every,
 )
 from roboirg.core.errors import InvalidValueError
-from roboirg.core.field_types import CONTROLS, NAME
+from roboirg.core.field_types import CONTROLS, MOST_SECONDS, NAME
 from roboirg.core.instruction_options import (
     ALL_STAGES,
     DEFAULT_FRAME,
@@ -421,9 +421,10 @@ class Plan(BaseModel):
             if getattr(self, name) < 1:
                 raise InvalidValueError(f"{name} is {getattr(self, name)}; it must be at least 1.")
         for name in ("policy_timeout_s", "episode_timeout_s"):
-            if not getattr(self, name) > 0:
+            if not 0 < getattr(self, name) <= MOST_SECONDS:
                 raise InvalidValueError(
-                    f"{name} is {getattr(self, name)}; it must be more than 0 seconds."
+                    f"{name} is {getattr(self, name)}; it must be more than 0 and at most "
+                    f"{MOST_SECONDS:,} seconds."
                 )
         if self.actions is not None:
             find_action_space(self.actions)

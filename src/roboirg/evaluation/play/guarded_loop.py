@@ -188,6 +188,7 @@ class GuardedLoop(EpisodeLoop):
             observation, info = super().execute(rows)
             self.answers.append(rows[: self.env.executed_actions - done])
         record.steps, record.calls = int(info["steps"]), len(self.answers)
+        record.executed = max(record.executed, len(self.answers[-1]))
         self._add_events(info)
         return observation, info
 

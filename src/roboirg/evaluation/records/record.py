@@ -379,6 +379,8 @@ class Record(Summary, kw_only=True, forbid_unknown_fields=True):  # type: ignore
         policy_metadata: what the policy reports about itself: checkpoint, server, model, ….
         needs: what it declares that it needs, or the job prescribes instead, as in `PolicyNeeds`.
         calls: how often it was asked for actions.
+        executed: the most actions of one answer that were executed; a server may send fewer than
+            its client's option ``execute`` allows.
         inference: what its process computes with; None if it was not asked.
         end_state: hash of the state in which the episode left the world and the judge; None if it
             did not come to an end.
@@ -400,6 +402,7 @@ class Record(Summary, kw_only=True, forbid_unknown_fields=True):  # type: ignore
     policy_metadata: dict[str, Any] = {}
     needs: dict[str, Any] = {}
     calls: Whole = 0
+    executed: Whole = 0
     inference: InferenceFacts | None = None
     end_state: str | None = None
     events: tuple[EventRecord, ...] = ()

@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
-from typing import Any, TypeVar
+from typing import Annotated, Any, TypeVar
 
-from pydantic import BaseModel, ValidationError
+from pydantic import BaseModel, Field, ValidationError
 
 from roboirg.core.errors import InvalidValueError, UnknownNameError
+from roboirg.core.field_types import MOST_SECONDS
 
 Options = TypeVar("Options", bound=BaseModel)
+Seconds = Annotated[float, Field(le=MOST_SECONDS)]
+"""A time limit in an option."""
 
 
 def check_options(kind: type[Options], values: Mapping[str, Any], origin: str) -> Options:

@@ -11,6 +11,7 @@ from pydantic import AfterValidator, Field
 
 from roboirg.core.actions import find_action_space
 from roboirg.core.errors import InvalidValueError
+from roboirg.policies.contract.option_checking import Seconds
 from roboirg.policies.contract.policy_urls import PolicyUrl, UrlOptions
 from roboirg.util.web.request_origin import LOOPBACK_NAMES
 
@@ -54,9 +55,9 @@ class RemoteOptions(UrlOptions):
         tokenizer: file of the model's tokenizer.
     """
 
-    timeout: float = Field(60.0, gt=0)
-    connect: float = Field(60.0, gt=0)
-    wait: float = Field(3600.0, ge=0)
+    timeout: Seconds = Field(60.0, gt=0)
+    connect: Seconds = Field(60.0, gt=0)
+    wait: Seconds = Field(3600.0, ge=0)
     shared: bool = False
     tls: bool = False
     api_key_env: str | None = Field(None, min_length=1)

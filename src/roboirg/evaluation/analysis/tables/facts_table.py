@@ -75,12 +75,16 @@ def make_facts_table(data: RunData, records: Iterable[tuple[str, Record]]) -> Ta
         if (record.slug, record.started_at) in kept:  # without what was played again
             for name, value in _of_policy(record):
                 known[record.policy, name] |= dict.fromkeys(_words(value))
-            totals[record.policy].update(steps=record.steps, calls=record.calls)
+            total = totals[record.policy]
+            total.update(steps=record.steps, calls=record.calls)
+            total["executed"] = max(total["executed"], record.executed)
     for name, values in _of_run(data):
         known[RUN, name] |= dict.fromkeys(word for value in values for word in _words(value))
     for policy, total in totals.items():
         mean = f"{total['steps'] / total['calls']:.1f}" if total["calls"] else ""
         known[policy, "control steps per call, mean"] |= dict.fromkeys(_words(mean))
+        most = total["executed"] or None
+        known[policy, "actions executed per call, most"] |= dict.fromkeys(_words(most))
     return Table(
         key="facts",
         title="Facts of the run",

@@ -16,6 +16,7 @@ from pydantic import Field
 from roboirg.core.errors import InvalidValueError
 from roboirg.core.observations import CAMERAS, Demonstration, Observation
 from roboirg.policies.contract.base import Policy, close_policy
+from roboirg.policies.contract.option_checking import Seconds
 from roboirg.policies.remote.client.remote_policy import RemotePolicy
 from roboirg.policies.remote.endpoints import ActionSpaceName, RemoteOptions
 from roboirg.policies.remote.protocol import Protocol
@@ -51,7 +52,7 @@ class ChallengeOptions(RemoteOptions):
         calibration: whether to send the cameras' matrices.
     """
 
-    timeout: float = Field(120.0, gt=0)
+    timeout: Seconds = Field(120.0, gt=0)
     actions: ActionSpaceName = "joint_angle"
     depth: bool = False
     calibration: bool = False

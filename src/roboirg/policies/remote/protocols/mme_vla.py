@@ -24,6 +24,7 @@ from pydantic import Field
 from roboirg.core.errors import InvalidValueError
 from roboirg.core.observations import Demonstration, Observation, proprioception
 from roboirg.policies.contract.base import Policy, close_policy
+from roboirg.policies.contract.option_checking import Seconds
 from roboirg.policies.remote.client.remote_policy import RemotePolicy
 from roboirg.policies.remote.endpoints import RemoteOptions
 from roboirg.policies.remote.protocol import Protocol
@@ -60,7 +61,7 @@ class MmeVlaOptions(RemoteOptions):
         part: frames per message.
     """
 
-    timeout: float = Field(600.0, gt=0)
+    timeout: Seconds = Field(600.0, gt=0)
     execute: int = Field(EXECUTED, ge=1)
     history: bool = True
     subgoals: SubgoalField = "grounded"

@@ -18,6 +18,7 @@ from pydantic import Field
 from roboirg.core.errors import PolicyConnectionError
 from roboirg.core.observations import Demonstration, Observation, proprioception
 from roboirg.policies.contract.base import Policy, close_policy
+from roboirg.policies.contract.option_checking import Seconds
 from roboirg.policies.remote.client.remote_policy import RemotePolicy
 from roboirg.policies.remote.endpoints import MIB, ActionSpaceName, RemoteOptions
 from roboirg.policies.remote.protocol import Protocol
@@ -36,7 +37,7 @@ class OpenpiOptions(RemoteOptions):
         prompt: key of the instruction.
     """
 
-    timeout: float = Field(120.0, gt=0)
+    timeout: Seconds = Field(120.0, gt=0)
     shared: bool = True
     execute: int | None = Field(None, ge=1)
     actions: ActionSpaceName = "joint_angle"

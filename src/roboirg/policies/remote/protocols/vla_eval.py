@@ -17,6 +17,7 @@ from pydantic import Field
 
 from roboirg.core.errors import InvalidValueError, PolicyReplyError, RoboIRGError
 from roboirg.core.observations import Demonstration, Observation, proprioception
+from roboirg.policies.contract.option_checking import Seconds
 from roboirg.policies.remote.client.remote_policy import RemotePolicy
 from roboirg.policies.remote.endpoints import ActionSpaceName, RemoteOptions
 from roboirg.policies.remote.protocol import Protocol
@@ -42,7 +43,7 @@ class VlaEvalOptions(RemoteOptions):
         video: likewise the demonstration.
     """
 
-    timeout: float = Field(120.0, gt=0)
+    timeout: Seconds = Field(120.0, gt=0)
     actions: ActionSpaceName = "joint_angle"
     wrist: bool = True
     state: bool = True

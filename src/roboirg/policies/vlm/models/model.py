@@ -11,6 +11,7 @@ from urllib.parse import urlsplit
 from pydantic import BaseModel, ConfigDict, Field, field_validator
 
 from roboirg.core.errors import MissingDependencyError
+from roboirg.policies.contract.option_checking import Seconds
 from roboirg.policies.vlm.model_content import ChatTurn
 from roboirg.util.short_hash import short_hash
 
@@ -51,10 +52,10 @@ class ModelOptions(BaseModel):
     model: str = Field(min_length=1)
     base_url: str | None = None
     api_key_env: str | None = None
-    timeout_s: float = Field(default=120.0, gt=0)
+    timeout_s: Seconds = Field(default=120.0, gt=0)
     retries: int = Field(default=2, ge=0, le=10)
-    patience_s: float = Field(default=300.0, ge=0)
-    requests_per_minute: float | None = Field(default=None, gt=0)
+    patience_s: Seconds = Field(default=300.0, ge=0)
+    requests_per_minute: float | None = Field(default=None, ge=0.001)
     temperature: float | None = Field(default=0.0, ge=0)
     max_output_tokens: int | None = Field(default=None, ge=1)
     input_price: float | None = Field(default=None, ge=0)
