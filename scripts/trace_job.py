@@ -39,6 +39,7 @@ from roboirg.evaluation.records.record import Job, Record
 from roboirg.evaluation.run.executor import InProcess, Records, Warn
 from roboirg.evaluation.run.progress import Reporter
 from roboirg.evaluation.run.runner import episode_runner, run_plan
+from roboirg.policies.by_name.finding import read_policy
 
 DIVIDED = {"apps", "evaluation", "policies"}
 """Folders whose folders are rooms."""
@@ -167,7 +168,7 @@ def stays(calls: Iterable[tuple[CodeType, CodeType]]) -> list[Stay]:
 def follow(policy_process: PolicyProcessMode = "own") -> list[Stay]:
     """Play two jobs, and return the stays of the second."""
     plan = Plan(
-        policies=("benchmarks.worker_rates:WavingPolicy",),
+        policies=(read_policy("benchmarks.worker_rates:WavingPolicy"),),
         tasks=("PickXtimes",),
         settings=("direct",),
         episodes=(0, 1),

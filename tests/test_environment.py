@@ -20,6 +20,7 @@ from roboirg.core.actions import ACTION_SPACES
 from roboirg.core.environment_options import ENVIRONMENT_OPTIONS
 from roboirg.core.errors import InvalidActionError, InvalidValueError, UnknownNameError
 from roboirg.core.instruction_options import OPTION_NAMES, InstructionOptions
+from roboirg.core.policy_needs import PolicyNeeds
 from roboirg.envs.env_settings import EnvOptions, EnvSettings
 from roboirg.envs.environment import RoboIRGEnv
 from roboirg.envs.registration import environment_id
@@ -28,7 +29,7 @@ from roboirg.evaluation.play.policy_environment import make_env
 from roboirg.evaluation.records.record import Job
 from roboirg.policies import make_policy, play
 from roboirg.policies.builtin.scripted import ScriptedPolicy
-from roboirg.policies.contract.policy_needs import PolicyNeeds
+from roboirg.policies.by_name.finding import read_policy
 from roboirg.simulation.cameras import Cameras
 from roboirg.simulation.physics_settings import HOME_ACTION
 from roboirg.tasks import every_task, get_task
@@ -194,6 +195,7 @@ def test_an_environment_without_what_a_policy_looks_at_is_refused(attribute):
 def test_runs_give_policies_their_action_space():
     job = Job(
         policy="random",
+        ref=read_policy("random"),
         task="PickXtimes",
         split="test",
         episode=2,
@@ -379,7 +381,8 @@ def test_policies_are_shown_what_they_ask_for():
     with pytest.raises(InvalidValueError, match=r"needs observe_every=5, but .* has None"):
         play(wrong, policy)
     job = Job(
-        policy=f"{__name__}:Choosy",
+        policy="mine",
+        ref=read_policy(f"{__name__}:Choosy"),
         task="PickXtimes",
         split="test",
         episode=2,

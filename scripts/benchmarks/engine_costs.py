@@ -13,7 +13,7 @@ import msgspec
 
 from roboirg.evaluation.plan.plan import Plan
 from roboirg.evaluation.plan.plan_maker import make_plan
-from roboirg.evaluation.play.episode_record import begin_record, describe
+from roboirg.evaluation.play.episode_record import begin_record
 from roboirg.evaluation.play.job_instruction import PreparedJob
 from roboirg.evaluation.play.rollout import EpisodeRunner
 from roboirg.evaluation.records.record import EventRecord, Job, Record
@@ -74,7 +74,7 @@ class _RecordClock(Reporter):
 
 def _unplayed_record(job: Job) -> Record:
     event = EventRecord(step=1, kind="picked", subject="cube_red")
-    record = begin_record(PreparedJob(job), describe(job))
+    record = begin_record(PreparedJob(job))
     return msgspec.structs.replace(
         record, outcome="success", error=None, cause=None, events=(event,) * _EVENTS
     )

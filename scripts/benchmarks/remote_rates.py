@@ -14,11 +14,12 @@ from typing import ClassVar
 from benchmarks.step_times import CHUNK
 from benchmarks.worker_rates import WavingPolicy
 from roboirg.core.observations import CAMERAS
+from roboirg.core.policy_needs import PolicyNeeds
 from roboirg.envs.factory import make
 from roboirg.evaluation.hosting.host_pool import HostPool, HostSettings
 from roboirg.evaluation.hosting.hosted_policy import HostedPolicy
 from roboirg.policies import Policy, make_policy, play
-from roboirg.policies.contract.policy_needs import PolicyNeeds
+from roboirg.policies.by_name.finding import read_policy
 
 CHUNKS = 12
 EPISODES = 7
@@ -44,7 +45,7 @@ def over_loopback() -> float:
 def hosted() -> float:
     """Return steps per second with the same policy in a process of its own."""
     with HostPool(HostSettings()) as pool:
-        policy = HostedPolicy(pool.connect(), POLICY, 0)
+        policy = HostedPolicy(pool.connect(), read_policy(POLICY), 0)
         try:
             return steps_per_second(policy)
         finally:

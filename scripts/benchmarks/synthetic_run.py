@@ -18,7 +18,7 @@ from roboirg.core.episode import Episode, Stage
 from roboirg.evaluation.plan.plan import Plan
 from roboirg.evaluation.plan.plan_maker import make_plan
 from roboirg.evaluation.plan.stored_plans import write_plan
-from roboirg.evaluation.play.episode_record import begin_record, describe
+from roboirg.evaluation.play.episode_record import begin_record
 from roboirg.evaluation.play.job_instruction import PreparedJob
 from roboirg.evaluation.records.record import Attribution, EventRecord, Job, Outcome, Record
 from roboirg.evaluation.records.record_codec import encode
@@ -66,7 +66,7 @@ def _records(jobs: Iterable[Job], rng: np.random.Generator) -> Iterator[Record]:
         key = msgspec.structs.replace(job, policy=POLICIES[0], policy_seed=0)
         if key not in by_instruction:
             by_instruction[key] = msgspec.structs.replace(
-                begin_record(PreparedJob(job), describe(job)),
+                begin_record(PreparedJob(job)),
                 error=None,
                 cause=None,
                 started_at=STARTED_AT,
@@ -90,7 +90,7 @@ def _varied(record: Record, job: Job, episode: Episode, rng: np.random.Generator
     update: dict[str, object] = {
         "policy": job.policy,
         "policy_seed": job.policy_seed,
-        "spec": job.spec,
+        "ref": job.ref,
         "outcome": outcome,
         "events": tuple(events),
         "steps": steps,

@@ -10,12 +10,12 @@ from roboirg.core.version import __version__
 if TYPE_CHECKING:
     from roboirg.envs.factory import make
     from roboirg.evaluation.api.evaluate import evaluate
-    from roboirg.policies.by_name.local_policies import Privileged
+    from roboirg.policies.by_name.finding import Privileged
 
 __all__ = ["Privileged", "__version__", "evaluate", "make"]
 
 _HOMES = {
-    "Privileged": "roboirg.policies.by_name.local_policies",
+    "Privileged": "roboirg.policies.by_name.finding",
     "evaluate": "roboirg.evaluation.api.evaluate",
     "make": "roboirg.envs.factory",
 }

@@ -6,6 +6,7 @@ import pytest
 
 from roboirg.core.errors import InvalidValueError
 from roboirg.core.instruction_options import InstructionOptions
+from roboirg.core.policy_ref import unknown_policy
 from roboirg.evaluation.analysis.figures import draw_figure
 from roboirg.evaluation.analysis.stats.arm_figures import ArmFigure, arm_figures
 from roboirg.evaluation.analysis.stats.chance import silent_chance
@@ -26,7 +27,7 @@ def result(outcome: str, episode: int, **fields: object) -> Summary:
         split="test",
         seed=episode,
         difficulty="easy",
-        privileged=False,
+        ref=unknown_policy(str(fields["policy"])),
         language_version="1",
         environment_version=1,
         package_version="0",

@@ -11,6 +11,7 @@ from rich.console import Console
 
 from roboirg.core.episode import ENVIRONMENT_VERSION
 from roboirg.core.instruction_options import InstructionOptions
+from roboirg.core.policy_ref import unknown_policy
 from roboirg.evaluation.analysis.comparability import IMPLICIT, REAL, differences_of, merged
 from roboirg.evaluation.analysis.published import MAX_STEPS
 from roboirg.evaluation.analysis.stats.cells import gather
@@ -88,7 +89,7 @@ def test_errors_and_unplayed_trials_are_named(result) -> None:
 
 def test_a_trial_is_played_wherever_policy_and_wordings_come_from(result) -> None:
     played = play(result)
-    elsewhere = {"spec": "openpi://other:1", "wordings_file": "elsewhere.toml"}
+    elsewhere = {"ref": unknown_policy("openpi://other:1"), "wordings_file": "elsewhere.toml"}
     planned = [replace(one.identity, **elsewhere) for one in played]
     assert differences(played, planned) == ()
 

@@ -17,7 +17,6 @@ from roboirg.evaluation.plan.plan import Plan
 from roboirg.evaluation.plan.stored_plans import read_plan
 from roboirg.evaluation.records.record import Job, Record
 from roboirg.evaluation.records.store import read_records
-from roboirg.policies.by_name.local_policies import is_local, spec_of
 
 
 class Still:
@@ -134,12 +133,12 @@ def test_privilege_is_declared(unplayed: None, tmp_path: Path, policy) -> None:
 
 def test_what_can_be_imported_has_a_spec_as_on_the_command_line() -> None:
     from roboirg.policies.builtin.random_policy import RandomPolicy
+    from roboirg.policies.by_name.finding import policy_of, read_policy
 
-    assert spec_of("oracle") == "oracle"
-    assert spec_of(RandomPolicy) == "roboirg.policies.builtin.random_policy:RandomPolicy"
-    assert not is_local(spec_of(RandomPolicy))
-    assert is_local(spec_of(RandomPolicy(seed=1)))
-    assert is_local(spec_of(type("Made", (Still,), {})))
+    assert policy_of("oracle") == read_policy("oracle")
+    assert policy_of(RandomPolicy).spec == "roboirg.policies.builtin.random_policy:RandomPolicy"
+    given = (RandomPolicy, RandomPolicy(seed=1), type("Made", (Still,), {}))
+    assert [policy_of(one).place for one in given] == ["own", "python", "python"]
 
 
 def test_options_are_those_of_a_plan(unplayed: None, tmp_path: Path) -> None:

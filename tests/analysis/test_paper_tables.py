@@ -10,6 +10,7 @@ from fractions import Fraction
 from pathlib import Path
 
 import pytest
+from flat_jobs import with_version
 from hypothesis import given
 from hypothesis import strategies as st
 from made_records import make_record
@@ -28,6 +29,7 @@ from roboirg.evaluation.analysis.tables.rendering.terminal import renderable
 from roboirg.evaluation.analysis.tables.table import Entry
 from roboirg.evaluation.records.record import Job, Record
 from roboirg.evaluation.records.record_codec import encode, read_summary
+from roboirg.policies.by_name.finding import read_policy
 from roboirg.tasks import all_tasks
 
 
@@ -169,7 +171,7 @@ def test_only_informative_tables_are_wanted(result) -> None:
     assert is_informative("context", both)
     two = [*whole(result), *whole(result, "b")]
     assert not is_informative("planner", gather([("run", two)]))
-    two[0] = replace(two[0], policy_version="planner + scripted hands")
+    two[0] = with_version(two[0], "planner + scripted hands")
     assert is_informative("planner", gather([("run", two)]))
     real = gather([("run", [result(task="PutInBox")])])
     assert is_informative("real", real)
@@ -311,6 +313,7 @@ def test_results_of_the_twin_are_marked_and_kept_apart_from_a_robots(result) -> 
     def played(robot: str | None, outcome: str) -> Record:
         job = Job(
             policy="listener",
+            ref=read_policy("listener"),
             task="PutInBox",
             split="test",
             episode=0,

@@ -11,6 +11,7 @@ from typing import Any
 
 import pytest
 import typer
+from flat_jobs import with_version
 from made_records import make_record
 from msgspec.structs import replace
 from page_text import render
@@ -34,6 +35,7 @@ from roboirg.evaluation.records.record import (
 )
 from roboirg.evaluation.records.record_codec import StoreError
 from roboirg.evaluation.records.store import RecordStore
+from roboirg.policies.by_name.finding import read_policy
 from roboirg.tasks.splits.splits import get_episode
 
 pytest.importorskip("jinja2")
@@ -145,7 +147,7 @@ def test_every_episode_is_there_and_nothing_comes_from_outside() -> None:
 
 def test_columns_have_the_order_of_the_overview_and_do_not_depend_on_the_file() -> None:
     page = Page(render(records()[::-1], planned=PLAN.jobs()))
-    policies = [f"{name} (privileged)" for name in PLAN.policies]
+    policies = [f"{one.name} (privileged)" for one in PLAN.policies]
     assert list(dict.fromkeys(page.column("policy"))) == policies == page.data["matrix"]["policies"]
     assert page.column("setting")[:2] == ["explicit", "direct"]
     assert render(records()[::-1], planned=PLAN.jobs()) == usual()
@@ -257,7 +259,7 @@ def test_versions_that_differ_stand_apart() -> None:
     page = Page(render(mixed))
     assert any("Mixed versions of the language" in words for _, words in page.warnings)
     assert len(page.data["matrix"]["policies"]) == 2
-    again = [one, replace(one, policy_version="2", episode=9)]
+    again = [one, with_version(replace(one, episode=9), "2")]
     assert any(
         "several versions: 2, built-in" in words for _, words in Page(render(again)).warnings
     )
@@ -463,7 +465,9 @@ def test_no_records_is_one_sentence(tmp_path: Path) -> None:
 
 
 def test_the_first_pair_has_something_to_show() -> None:
-    plan = PLAN.model_copy(update={"policies": ("oracle", "listener", "forgetful")})
+    plan = PLAN.model_copy(
+        update={"policies": tuple(map(read_policy, ("oracle", "listener", "forgetful")))}
+    )
     won = [make_record(job, "success") for job in plan.jobs()]
     even = Page(render(won))
     assert (even.data["sides"], even.data["change"]) == ([0, 1], "all")

@@ -26,7 +26,7 @@ from importlib.metadata import entry_points
 import typer
 from roboirg.core.errors import RoboIRGError
 from roboirg.main import app
-from roboirg.policies.by_name.policy_specs import find_kind
+from roboirg.policies.by_name.policy_kinds import find_kind
 
 def applications(command, prefix=""):
     # The modules that add each command; of a group, those of its commands.

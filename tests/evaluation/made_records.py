@@ -6,7 +6,7 @@ from typing import Any
 
 import msgspec
 
-from roboirg.evaluation.play.episode_record import begin_record, conclude, describe
+from roboirg.evaluation.play.episode_record import begin_record, conclude
 from roboirg.evaluation.play.job_instruction import PreparedJob
 from roboirg.evaluation.records.record import Job, Outcome, Record
 
@@ -16,7 +16,7 @@ def make_record(
 ) -> Record:
     """Return the record of a job that ended this way, with its other fields as given."""
     prepared = PreparedJob(job)
-    record = begin_record(prepared, describe(job))
+    record = begin_record(prepared)
     known = {"outcome": outcome, "cause": cause or record.cause, "started_at": "now", **fields}
     if outcome != "error":
         known |= {"error": None, "cause": cause}

@@ -13,10 +13,10 @@ from roboirg.core.environment_options import EnvironmentOptions
 from roboirg.core.errors import InvalidValueError
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.evaluation.hosting.host_pool import HostPool, HostSettings
-from roboirg.evaluation.hosting.policy_descriptions import describe_policy
+from roboirg.evaluation.hosting.policy_opening import open_policy
 from roboirg.evaluation.play.rollout import EpisodeRunner
 from roboirg.evaluation.records.record import Job, Record
-from roboirg.policies.by_name.loading import is_privileged, make_policy, needs_host
+from roboirg.policies.by_name.finding import make_policy, read_policy
 
 
 @pytest.fixture(autouse=True)
@@ -25,7 +25,7 @@ def _can_be_imported(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def job_of(spec: str) -> Job:
-    return Job(policy=spec, task="VideoUnmask", split="test", episode=0,
+    return Job(policy=spec, ref=read_policy(spec), task="VideoUnmask", split="test", episode=0,
               environment=EnvironmentOptions(60),
               options=InstructionOptions("explicit"))  # fmt: skip
 
@@ -38,7 +38,7 @@ def play(spec: str) -> Record:
 @pytest.mark.sim
 def test_it_sees_pictures_and_words_only() -> None:
     spec = "planner:own_planners:Pointer"
-    assert needs_host(spec)
+    assert read_policy(spec).is_hosted
     result = play(spec)
     assert result.outcome == "failure", result.cause
     assert [(one.text, one.ended) for one in result.subgoals] == [
@@ -51,10 +51,10 @@ def test_it_sees_pictures_and_words_only() -> None:
     assert spent["pictures"] == 1 + 5  # one where it named the first, and five refusals
     assert result.policy_metadata["planner"] == {"world": False}
     # The whole is marked as it acts by the simulator's state, and described alike beforehand.
-    known = describe_policy(spec)
-    assert known[:2] == (result.policy_version, result.privileged)
-    assert known[:2] == ("mine-1 + scripted hands", True)
-    assert is_privileged(spec)
+    known = open_policy(read_policy(spec))
+    assert known.version == result.policy_version == "mine-1 + scripted hands"
+    assert known.is_privileged
+    assert result.privileged
 
 
 @pytest.mark.sim
@@ -66,7 +66,7 @@ def test_what_it_breaks_ends_its_own_episode() -> None:
 @pytest.mark.sim
 def test_one_that_is_declared_runs_next_to_the_world() -> None:
     spec = "privileged:planner:own_planners:Insider"
-    assert not needs_host(spec)
+    assert not read_policy(spec).is_hosted
     assert play(spec).usage["process"] == os.getpid()
     # So does any in a run whose policies share the worker's process.
     shared = EpisodeRunner(Path()).play_once(job_of("planner:own_planners:Pointer"))[0]
@@ -87,4 +87,4 @@ def test_one_that_is_declared_runs_next_to_the_world() -> None:
 )
 def test_wrong_ones_are_one_sentence(spec: str, words: str) -> None:
     with pytest.raises(InvalidValueError, match=re.escape(words)):
-        describe_policy(spec)
+        open_policy(read_policy(spec))

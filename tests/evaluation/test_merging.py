@@ -4,6 +4,7 @@ from pathlib import Path
 
 import pytest
 from evaluation_fakes import FakePlay, small_plan
+from flat_jobs import with_version
 from msgspec.structs import replace
 
 from roboirg.core.errors import InvalidValueError
@@ -98,7 +99,8 @@ def test_logs_are_copied_with_the_records_that_are_kept(tmp_path: Path) -> None:
 )
 def test_versions_are_not_mixed(tmp_path: Path, field: str, value: object, words: str) -> None:
     record = some()[0]
-    odd = replace(record, **{field: value})
+    is_policy = field == "policy_version"
+    odd = with_version(record, "old") if is_policy else replace(record, **{field: value})
     with pytest.raises(StoreError, match=f"cannot be merged: the {words}"):
         merge_runs([fill(tmp_path / "a", record), fill(tmp_path / "b", odd)], tmp_path / "out")
     assert not (tmp_path / "out").exists()

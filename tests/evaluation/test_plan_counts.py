@@ -6,6 +6,7 @@ from msgspec.structs import replace
 
 from roboirg.evaluation.plan.plan_maker import make_plan
 from roboirg.evaluation.run.plan_counts import cell_sizes, least_calls
+from roboirg.policies.by_name.finding import read_policy
 from roboirg.tasks import get_task
 from roboirg.tasks.splits.splits import get_episode
 
@@ -39,7 +40,7 @@ def test_a_listener_asks_once_an_episode_and_a_planner_once_a_subgoal() -> None:
         "without": "system:pi0.5",
         "blind": "random",
     }
-    jobs = [replace(one, policy=name, spec=spec) for name, spec in specs.items()
+    jobs = [replace(one, policy=name, ref=read_policy(spec)) for name, spec in specs.items()
             for one in plan.jobs()]  # fmt: skip
     episodes = [get_episode(task, "test", index) for task in tasks.split(",") for index in range(3)]
     subgoals = sum(len(get_task(one.task).stages(one.scene, one.goal)) for one in episodes)

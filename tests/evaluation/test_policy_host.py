@@ -24,19 +24,18 @@ from hosting_fakes import PaperRunner, paper_plan, paper_runner
 from selection import slow_but
 
 from roboirg.core.errors import InvalidValueError, MissingDependencyError
+from roboirg.core.policy_needs import PolicyNeeds
 from roboirg.evaluation.episode_errors import EpisodeError, EpisodeLostError
-from roboirg.evaluation.hosting import policy_descriptions
 from roboirg.evaluation.hosting.host_pool import HostPool, HostSettings
 from roboirg.evaluation.hosting.hosted_policy import HostedPolicy
 from roboirg.evaluation.hosting.messages import Call, receive_calls, send
-from roboirg.evaluation.hosting.policy_descriptions import describe_policy
+from roboirg.evaluation.hosting.policy_opening import open_policy
 from roboirg.evaluation.plan.plan import Plan
 from roboirg.evaluation.records.record import Job, Record
 from roboirg.evaluation.records.store import iterate_records, read_records
 from roboirg.evaluation.run.executor import Executor, InProcess, LocalProcesses
 from roboirg.evaluation.run.runner import run_plan
-from roboirg.policies.by_name.loading import is_foreign, needs_host
-from roboirg.policies.contract.policy_needs import PolicyNeeds
+from roboirg.policies.by_name.finding import read_policy
 
 KILLS = int(os.environ.get("ROBOIRG_TEST_KILLS", "24"))
 
@@ -132,7 +131,7 @@ class It:
         return {"calls": 2, "cost": float("nan")}
 """,
     )
-    policy = HostedPolicy(pool.connect(), spec, 5)
+    policy = HostedPolicy(pool.connect(), read_policy(spec), 5)
     assert PolicyNeeds.of(policy) == PolicyNeeds(observe_every=4, depth=True, prompt_tokens=7)
     frames = np.random.default_rng(0).integers(0, 255, (30, 256, 256, 3), np.uint8)
     policy.reset("Pick it.", {"front_rgb": frames, "joint_positions": np.zeros((30, 7))})
@@ -185,7 +184,7 @@ class It:
         video = Video(front_rgb=np.zeros((2, 4, 4, 3), np.uint8), joint_positions=np.zeros((2, 7)))
         video["wrist_rgb"] = video["wrist_depth"] = np.zeros((2, 4, 4, 3), np.uint8)
         video.drawn = []
-        policy = HostedPolicy(pool.connect(), spec, 0)
+        policy = HostedPolicy(pool.connect(), read_policy(spec), 0)
         policy.reset("Pick it.", video)
         drawn.append(list(video.drawn))
         policy.act({})  # type: ignore[typeddict-item]
@@ -308,21 +307,20 @@ def test_which_policies_get_a_process(tmp_path: Path) -> None:
         'name = "mine"\nabout = "Mine."\npolicy = "somewhere:Mine"\n'
     )
     foreign = ["somewhere:Mine", f"system:{tmp_path}/mine.toml"]
-    ours = ["oracle", "random", "openpi://localhost:1", "system:GroundSG-QwenVL", "unknown"]
-    assert [is_foreign(one) for one in foreign] == [True, True]
-    assert [needs_host(one) for one in foreign] == [True, True]
-    assert not any(map(needs_host, ours))
-    assert needs_host("lerobot://some/checkpoint")
-    assert not is_foreign("lerobot://some/checkpoint")
+    ours = ["oracle", "random", "openpi://localhost:1", "system:GroundSG-QwenVL"]
+    assert [read_policy(one).is_foreign for one in foreign] == [True, True]
+    assert [read_policy(one).is_hosted for one in foreign] == [True, True]
+    assert not any(read_policy(one).is_hosted for one in ours)
+    assert read_policy("lerobot://some/checkpoint").is_hosted
+    assert not read_policy("lerobot://some/checkpoint").is_foreign
 
 
 def test_an_import_that_never_ends_is_ended(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(policy_descriptions, "LIMIT_S", 0.5)
     spec = write_policy(tmp_path, monkeypatch, "endless", "import time\ntime.sleep(3600)")
-    with pytest.raises(InvalidValueError, match=r"not imported within 0[.]5 s"):
-        describe_policy(spec)
+    with pytest.raises(InvalidValueError, match=r"not opened within 0[.]5 s"):
+        open_policy(read_policy(spec), 0.5)
 
 
 def test_a_policy_is_described_without_being_imported(
@@ -341,12 +339,12 @@ class It:
     def act(self, observation): pass
 """,
     )
-    found = describe_policy(spec)
-    assert found.version == "step-?" + "7" * 194
-    assert found.needs == PolicyNeeds(prompt_tokens=9)
+    found = open_policy(read_policy(spec))
+    assert found.version.startswith("step-?" + "7" * 194 + "…")
+    assert found.needs == PolicyNeeds(prompt_tokens=9, cameras=("front",))
     assert not found.is_privileged
     assert "versioned" not in sys.modules
-    assert describe_policy("oracle").is_privileged
+    assert open_policy(read_policy("oracle")).is_privileged
 
 
 @pytest.mark.parametrize(
@@ -390,7 +388,7 @@ class It:
         return np.zeros((1, 8))
 """,
     )
-    good, bad, over, late = (HostedPolicy(pool.connect(), spec, 0) for _ in range(4))
+    good, bad, over, late = (HostedPolicy(pool.connect(), read_policy(spec), 0) for _ in range(4))
     good.reset("live", {})
     bad.reset("die", {})
     assert good.act({}).shape == (1, 8)  # type: ignore[typeddict-item]
@@ -404,7 +402,7 @@ class It:
         over.usage()  # what it has cost is lost
     for one in (good, bad, over, late):
         one.close()
-    again = HostedPolicy(pool.connect(), spec, 0)  # in a new process
+    again = HostedPolicy(pool.connect(), read_policy(spec), 0)  # in a new process
     again.reset("live", {})
     assert again.act({}).shape == (1, 8)  # type: ignore[typeddict-item]
     again.close()
@@ -413,10 +411,10 @@ class It:
 def test_a_world_that_dies_in_a_call_does_not_stop_the_host(pool: HostPool) -> None:
     spec = f"{Path(hosting_fakes.__file__).stem}:Dice"
     line = pool.connect()
-    HostedPolicy(line, spec, 0)
+    HostedPolicy(line, read_policy(spec), 0)
     line.sendall((1000).to_bytes(8, "big") + b"half a message")
     line.close()
-    after = HostedPolicy(pool.connect(), spec, 1)
+    after = HostedPolicy(pool.connect(), read_policy(spec), 1)
     after.close()
 
 

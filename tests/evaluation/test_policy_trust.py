@@ -25,6 +25,8 @@ from roboirg.core.errors import InvalidValueError
 from roboirg.evaluation.episode_errors import EpisodeError, Terminated, attribute_errors
 from roboirg.evaluation.hosting.host_pool import HostPool, HostSettings
 from roboirg.evaluation.hosting.hosted_policy import HostedPolicy
+from roboirg.evaluation.hosting.policy_opening import open_policy
+from roboirg.evaluation.plan.option_parsing import name_and_spec
 from roboirg.evaluation.plan.plan import Plan
 from roboirg.evaluation.plan.plan_maker import make_plan
 from roboirg.evaluation.records.episode_log import MAX_LOG_BYTES, log_path, logged_slugs
@@ -33,7 +35,7 @@ from roboirg.evaluation.records.record_codec import StoreError, encode, read_rec
 from roboirg.evaluation.records.store import read_records
 from roboirg.evaluation.run.executor import InProcess, LocalProcesses
 from roboirg.evaluation.run.runner import run_plan
-from roboirg.util.short_hash import short_hash
+from roboirg.policies.by_name.finding import read_policy
 
 HONEST = "hosting_fakes:Dice"
 
@@ -46,7 +48,8 @@ def _fakes_can_be_imported(monkeypatch: pytest.MonkeyPatch) -> None:
 def play(folder: Path, names: tuple[str, ...], **options: Any) -> dict[str, list[Record]]:
     """Play two episodes of each policy, and an honest one between and after them."""
     specs = [spec for name in names for spec in (hostile_policies.SPEC(name), f"{name}+1={HONEST}")]
-    plan = paper_plan("Dice", 2).model_copy(update={"policies": tuple(specs), **options})
+    refs = tuple(read_policy(*reversed(name_and_spec(spec))) for spec in specs)
+    plan = paper_plan("Dice", 2).model_copy(update={"policies": refs, **options})
     folder.mkdir()
     run_plan(plan, folder, paper_runner(plan, folder), LocalProcesses(2))
     found: dict[str, list[Record]] = {}
@@ -151,7 +154,7 @@ def test_a_run_needs_no_short_temporary_folder_and_few_descriptors(
 @pytest.mark.skipif(sys.platform != "linux", reason="reads /proc")
 def test_nobody_can_connect_to_the_supervisor() -> None:
     with HostPool(HostSettings()) as pool:
-        policy = HostedPolicy(pool.connect(), HONEST, 0)
+        policy = HostedPolicy(pool.connect(), read_policy(HONEST), 0)
         ours = {
             str(path.readlink()) for path in Path("/proc/self/fd").iterdir() if path.is_socket()
         }
@@ -168,7 +171,7 @@ def test_an_episode_begins_where_the_run_began(
     monkeypatch.chdir(tmp_path)
     with HostPool(HostSettings()) as pool:
         for _ in range(2):  # the first one left for elsewhere
-            policy = HostedPolicy(pool.connect(), hostile_policies.SPEC("Wanderer"), 0)
+            policy = HostedPolicy(pool.connect(), read_policy(hostile_policies.SPEC("Wanderer")), 0)
             policy.reset("Pick it.", {})
             policy.act({})  # type: ignore[typeddict-item]
             policy.hear("The red one.", 1)
@@ -205,12 +208,13 @@ def test_a_policy_is_imported_only_in_its_own_process(
 
 def test_a_version_never_controls_a_terminal_nor_closes_the_folder(tmp_path: Path) -> None:
     specs = tuple(map(hostile_policies.SPEC, ("TerminalVersion", "ChangingVersion")))
+    opened = tuple(open_policy(read_policy(spec)) for spec in specs)
     for episodes in (1, 2):  # the second run goes on with the first one's folder
-        plan = paper_plan("Dice", episodes).model_copy(update={"policies": specs})
+        plan = paper_plan("Dice", episodes).model_copy(update={"policies": opened})
         run_plan(plan, tmp_path, paper_runner(plan, tmp_path), InProcess())
-    versions = {record.policy: record.policy_version for record in read_records(tmp_path)}
-    assert versions[specs[0]].startswith(r"\x1b[2J\u202e\n999")
-    assert versions[specs[1]] == short_hash(Path(hostile_policies.__file__).read_bytes())
+    found = {record.policy: record for record in read_records(tmp_path)}
+    assert found[specs[0]].policy_version.startswith(r"\x1b[2J\u202e\n999")
+    assert "must be the same in every process" in str(found[specs[1]].cause)
 
 
 @pytest.mark.parametrize("module", ["json", "multiprocessing", "numpy", "roboirg"])
@@ -228,7 +232,7 @@ def test_files_beside_a_policy_are_imported_in_no_process_but_its_own(
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(sys, "path", [path for path in sys.path if path])
     add_working_directory(last=True)
-    plan = paper_plan("Dice", 1).model_copy(update={"policies": ("neighbor:It",)})
+    plan = paper_plan("Dice", 1).model_copy(update={"policies": (read_policy("neighbor:It"),)})
     run_plan(plan, tmp_path / "run", paper_runner(plan, tmp_path / "run"), LocalProcesses(1))
     (record,) = read_records(tmp_path / "run")
     assert (record.error, record.policy_metadata) == (None, {"first": True})
@@ -259,7 +263,7 @@ def test_the_memory_of_a_host_holds_no_goal_scene_or_seed() -> None:
     world = PaperWorld(job)
     _, info = world.reset()
     with HostPool(HostSettings()) as pool:
-        policy = HostedPolicy(pool.connect(), HONEST, 3)
+        policy = HostedPolicy(pool.connect(), read_policy(HONEST), 3)
         policy.reset("Pick the needle in the haystack.", info["demonstration"])
         policy.act(world.observation())  # type: ignore[arg-type]
         (pid,) = pool.pids
@@ -272,7 +276,7 @@ def test_the_memory_of_a_host_holds_no_goal_scene_or_seed() -> None:
 
 def test_a_policy_has_no_terminal() -> None:
     with HostPool(HostSettings()) as pool:
-        policy = HostedPolicy(pool.connect(), hostile_policies.SPEC("Wanderer"), 0)
+        policy = HostedPolicy(pool.connect(), read_policy(hostile_policies.SPEC("Wanderer")), 0)
         policy.reset("Pick it.", {})
         (pid,) = pool.pids  # the first of a session, without a terminal, as is its guard
         assert os.getsid(pid) == pid
@@ -337,7 +341,7 @@ def test_records_of_honest_policies_are_the_same_beside_any_cheat(tmp_path: Path
     beside = play(tmp_path / "beside", ("Leaker",))["Leaker+1"]
     plan = paper_plan("Dice", 2)
     alone = InProcess().run(deque(plan.jobs()), paper_runner(plan, tmp_path))
-    changed = {"policy": "", "policy_version": ""}
+    changed = {"policy": "", "ref": None}
     assert sorted((comparable(one) | changed for one in beside), key=str) == sorted(
         (comparable(one) | changed for one in alone), key=str
     )

@@ -37,6 +37,7 @@ from roboirg.evaluation.play.rollout import EpisodeRunner
 from roboirg.evaluation.records.record import IDENTITY, Job, Record
 from roboirg.evaluation.records.record_codec import encode, read_record
 from roboirg.evaluation.records.store import read_records
+from roboirg.policies.by_name.finding import read_policy
 from roboirg.policies.by_name.systems import all_systems
 from roboirg.policies.prompt_length.prompt_audit import PromptLimit, most_tokens
 
@@ -46,7 +47,7 @@ LONG = {"setting": "contextual", "distractors": 16}
 
 
 def job(**fields: object) -> Job:
-    usual = {"policy": "p", "task": "PickXtimes", "split": "test", "episode": 0}
+    usual = {"policy": "random", "task": "PickXtimes", "split": "test", "episode": 0}
     return job_of(**{**usual, "setting": "direct", **fields})
 
 
@@ -154,7 +155,7 @@ def test_a_long_prompt_is_refused_before_it_is_played(tmp_path: Path) -> None:
     spec = "openpi://localhost:1?prompt_tokens=64&connect=1"  # nobody listens there
     for delivery in ("prompt", "turns"):
         record = EpisodeRunner(tmp_path, refuse_long=True)(
-            job(**LONG, spec=spec, delivery=delivery)
+            job(**LONG, ref=read_policy(spec), delivery=delivery)
         )
         if delivery == "prompt":
             assert (record.outcome, record.error, record.steps) == ("error", "prompt", 0)

@@ -23,6 +23,7 @@ from roboirg.evaluation.run.executor import InProcess, LocalProcesses
 from roboirg.evaluation.run.ray_cluster import RayCluster
 from roboirg.evaluation.run.ray_machines import MachineAgent, MachineVersions
 from roboirg.evaluation.run.runner import run_plan
+from roboirg.policies.by_name.finding import read_policy
 
 pytestmark = pytest.mark.slow
 
@@ -156,7 +157,7 @@ def test_no_workers_is_one_sentence() -> None:
 
 def test_only_who_has_the_key_reaches_the_hosts_of_a_machine(tmp_path: Path) -> None:
     hosts = MachineAgent(tmp_path / "agent", HostSettings())
-    address = hosts.check(MachineVersions.here(())).hosts
+    address = hosts.check(MachineVersions.expected(())).hosts
     assert address is not None
     try:
         with address._replace(key=b"x" * 32).connect() as stranger:
@@ -165,7 +166,7 @@ def test_only_who_has_the_key_reaches_the_hosts_of_a_machine(tmp_path: Path) -> 
             idle.connect(address.path)
             assert idle.recv(1) == b""
         with address.connect() as line:
-            HostedPolicy(line, "hosting_fakes:Dice", 0).close()
+            HostedPolicy(line, read_policy("hosting_fakes:Dice"), 0).close()
     finally:
         hosts.close()
     assert not Path(address.path).exists()

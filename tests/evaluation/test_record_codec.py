@@ -12,6 +12,7 @@ from evaluation_fakes import FakePlay, small_plan
 from msgspec.structs import replace
 
 from roboirg.core.environment_options import EnvironmentOptions
+from roboirg.core.policy_ref import unknown_policy
 from roboirg.evaluation.records.record import Job, Summary
 from roboirg.evaluation.records.record_codec import encode, identity_key
 from roboirg.evaluation.records.store import (
@@ -51,14 +52,14 @@ def test_results_are_records_without_the_course(tmp_path: Path) -> None:
 
 def test_the_index_knows_a_job_by_all_its_fields() -> None:
     job = small_plan().jobs()[0]
-    not_counted = {"spec", "wordings_file"}
+    not_counted = {"ref", "wordings_file"}
     assert len(identity_key(job)) == len(set(Job.__struct_fields__) - not_counted)
     assert identity_key(job.with_options(stages=(1, 5))) != identity_key(job)
     others = {"demonstration_frames": 4, "actions": "ee_pose", "meshes": "light"}
     for name, value in others.items():
         other = replace(job, environment=EnvironmentOptions(**{name: value}))
         assert identity_key(other) != identity_key(job)
-    assert identity_key(replace(job, spec="openpi://elsewhere")) == identity_key(job)
+    assert identity_key(replace(job, ref=unknown_policy("openpi://elsewhere"))) == identity_key(job)
 
 
 MANY = 100_000

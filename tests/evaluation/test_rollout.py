@@ -29,10 +29,12 @@ from roboirg.evaluation.play.rollout import EpisodeRunner
 from roboirg.evaluation.play.video_writer import VideoWriter
 from roboirg.evaluation.records.record import EventRecord, Job, Record
 from roboirg.evaluation.records.record_codec import encode, read_record
+from roboirg.policies.by_name.finding import read_policy
 from roboirg.tasks.splits import splits
 
 JOB = Job(
     policy="random",
+    ref=read_policy("random"),
     task="PickXtimes",
     split="test",
     episode=2,
@@ -159,7 +161,11 @@ def test_one_row_is_a_chunk_of_one(stage: Callable[..., Record]) -> None:
 
 def test_an_insider_is_attached_before_reset(stage: Callable[..., Record]) -> None:
     policy = PaperInsider()
-    stage(PaperWorld(), policy, msgspec.structs.replace(JOB, policy="oracle"))
+    stage(
+        PaperWorld(),
+        policy,
+        msgspec.structs.replace(JOB, policy="oracle", ref=read_policy("oracle")),
+    )
     assert policy.heard == ["PaperWorld", instruct_job(JOB).text, 3]
 
 
@@ -352,7 +358,7 @@ def test_wrong_cameras_of_an_object_are_the_policys_fault(
 
 
 def test_a_record_says_what_is_in_the_words_and_who_cheats() -> None:
-    job = replace(JOB.with_options(setting="reasoning"), policy="oracle")
+    job = replace(JOB.with_options(setting="reasoning"), policy="oracle", ref=read_policy("oracle"))
     record = make_record(job, "success")
     assert record.metadata["pattern"]
     assert record.metadata["templates"]
@@ -379,7 +385,7 @@ def test_a_record_tells_a_mirrored_pick_where_the_words_name_a_side(
     setting: str, frame: str, failure: str
 ) -> None:
     job = Job(
-        policy="p",
+        policy="random",
         task="PickXtimes",
         split="test",
         episode=18,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import signal
 import subprocess
 import sys
@@ -12,6 +13,7 @@ from pathlib import Path
 import evaluation_fakes
 import pytest
 from evaluation_fakes import FakePlay, comparable, is_alive, small_plan, starts, worker_pids
+from flat_jobs import with_version
 from msgspec.structs import replace
 
 from roboirg.core.errors import InvalidValueError, RenderDeviceError
@@ -28,6 +30,7 @@ from roboirg.evaluation.run import runner
 from roboirg.evaluation.run.executor import InProcess, LocalProcesses, choose_executor
 from roboirg.evaluation.run.progress import Reporter
 from roboirg.evaluation.run.runner import RunSummary, run_plan
+from roboirg.policies.by_name.finding import read_policy
 
 WAIT_S = 300.0
 
@@ -180,7 +183,9 @@ def test_words_of_two_versions_are_not_mixed(
 def test_worlds_of_two_versions_are_not_mixed(
     tmp_path: Path, name: str, value: object, sentence: str
 ) -> None:
-    record = replace(FakePlay()(small_plan(1).jobs()[0]), **{name: value})
+    played = FakePlay()(small_plan(1).jobs()[0])
+    is_policy = name == "policy_version"
+    record = with_version(played, "old") if is_policy else replace(played, **{name: value})
     with RecordStore(tmp_path) as store:
         store.append(record)
     with pytest.raises(StoreError, match=sentence):
@@ -266,11 +271,12 @@ def test_what_was_lost_is_retried_at_once_and_errors_after_all_others(
 def test_machines_of_other_versions_are_named() -> None:
     from roboirg.evaluation.run.ray_machines import MachineVersions
 
-    here = MachineVersions.here(("random",))
-    assert here.difference(MachineVersions.here(("random",))) is None
+    random = read_policy("random")
+    here = MachineVersions.expected((random,))
+    assert here.difference(MachineVersions.expected((random,))) is None
     there = here._replace(language="2.0.1")
     assert here.difference(there) == (
         f"its language has version 2.0.1 there and {here.language} here"
     )
-    other = here._replace(policies={"random": "old"})
+    other = here._replace(policies=(dataclasses.replace(random, version="old"),))
     assert str(here.difference(other)).startswith("random has version old there")

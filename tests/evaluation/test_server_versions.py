@@ -19,7 +19,7 @@ from roboirg.evaluation.records.store import RecordStore, read_records, read_res
 from roboirg.evaluation.run.executor import InProcess
 from roboirg.evaluation.run.runner import run_plan
 from roboirg.policies import make_policy
-from roboirg.policies.by_name.loading import server_version
+from roboirg.policies.by_name.finding import server_version
 from roboirg.policies.planners.hierarchical_policy import HierarchicalPolicy
 
 

@@ -23,9 +23,11 @@ from roboirg.evaluation.records.record import Job, SubgoalRecord
 from roboirg.evaluation.records.record_codec import StoreError, encode, read_record
 from roboirg.evaluation.records.store import RecordStore
 from roboirg.main import app
+from roboirg.policies.by_name.finding import read_policy
 
 JOB = Job(
     policy="random",
+    ref=read_policy("random"),
     task="PickXtimes",
     split="test",
     episode=0,

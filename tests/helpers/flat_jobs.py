@@ -2,16 +2,29 @@
 
 from __future__ import annotations
 
-from dataclasses import fields
+from dataclasses import fields, replace
+from typing import TypeVar
+
+import msgspec
 
 from roboirg.core.environment_options import EnvironmentOptions
 from roboirg.core.instruction_options import InstructionOptions
-from roboirg.evaluation.records.record import Job
+from roboirg.core.policy_ref import unknown_policy
+from roboirg.evaluation.records.record import Job, Summary
+from roboirg.policies.builtin import BUILTIN
+from roboirg.policies.by_name.finding import read_policy
+
+Stored = TypeVar("Stored", bound=Summary)
 
 
 def nested(**given: object) -> dict[str, object]:
     """Return fields of a job, in which options have their places."""
     others = dict(given)
+    version, privileged = others.pop("policy_version", None), others.pop("privileged", None)
+    if version is not None or privileged is not None:
+        ref = unknown_policy(str(others.get("policy", "")))
+        version = ref.version if version is None else str(version)
+        others["ref"] = replace(ref, version=version, is_privileged=bool(privileged))
     for name, kind in (("options", InstructionOptions), ("environment", EnvironmentOptions)):
         names = [one.name for one in fields(kind)]
         own = {one: others.pop(one) for one in names if one in others}
@@ -20,4 +33,12 @@ def nested(**given: object) -> dict[str, object]:
 
 
 def job_of(**given: object) -> Job:
-    return Job(**nested(**given))
+    """Return a job, for one of our policies or for one of that name."""
+    name = str(given["policy"])
+    ref = read_policy(name) if name in BUILTIN or ":" in name else unknown_policy(name)
+    return Job(**{"ref": ref, **nested(**given)})
+
+
+def with_version(record: Stored, version: str) -> Stored:
+    """Return the record of another version of its policy."""
+    return msgspec.structs.replace(record, ref=replace(record.ref, version=version))

@@ -8,6 +8,7 @@ from roboirg.core.episode import Goal
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.evaluation.play.rollout import EpisodeRunner
 from roboirg.evaluation.records.record import Job
+from roboirg.policies.by_name.finding import read_policy
 from roboirg.tasks import get_task
 from roboirg.tasks.splits.splits import get_episode
 
@@ -61,6 +62,6 @@ def record_of(fault, index):
         seconds = 1 if fault in ("never", "late") else 60
         model = f"base_url={server.url}/v1&model=stub&timeout_s={seconds}&retries=0"
         spec = f"planner:stateless?{model}&observe_every=400"  # few pictures are drawn
-        job = Job(policy=spec, task=TASK, split="test", episode=index,
+        job = Job(policy=spec, ref=read_policy(spec), task=TASK, split="test", episode=index,
                   options=InstructionOptions("explicit"))  # fmt: skip
         return EpisodeRunner(Path()).play_once(job)[0]

@@ -175,8 +175,8 @@ class Costly:
 
 @pytest.mark.parametrize("scheme", WEBSOCKETS)
 def test_connections_without_a_message_make_no_policy(scheme):
-    Costly.made = 0
     server = open_server(f"{__name__}:Costly", scheme)
+    Costly.made = 0
     thread = threading.Thread(target=server.listening.serve_forever)
     thread.start()
     policies = [make_policy(f"{server.url}?shared=yes", 0) for _ in range(3)]

@@ -14,8 +14,7 @@ from wire_episode import INSTRUCTION, moment, video
 
 from roboirg.core.errors import InvalidValueError, MissingDependencyError, UnknownNameError
 from roboirg.core.inference_facts import inference_facts
-from roboirg.policies import Policy, load_policy_class, make_policy
-from roboirg.policies.by_name.loading import policy_version
+from roboirg.policies import Policy, find_policy, make_policy
 from roboirg.policies.lerobot_policy import load
 
 STATE = "observation.state"
@@ -24,14 +23,14 @@ WRIST = "observation.images.wrist"
 
 
 def test_a_url_is_checked_without_loading(tmp_path):
-    load_policy_class("lerobot://lerobot/some-checkpoint?device=cpu&execute=8")
+    find_policy("lerobot://lerobot/some-checkpoint?device=cpu&execute=8")
     folder = write_checkpoint(tmp_path / "last")
     policy = make_policy(f"lerobot://{folder}?version=step-3", 0)
     assert isinstance(policy, Policy)
     assert (policy.version, policy.place) == ("step-3", str(folder))
-    assert policy_version("lerobot://x/y") == "unknown"
+    assert find_policy("lerobot://x/y").version == "unknown"
     with pytest.raises(UnknownNameError, match=r"Did you mean 'device'\?"):
-        load_policy_class("lerobot://x/y?devise=cpu")
+        find_policy("lerobot://x/y?devise=cpu")
 
 
 def test_without_lerobot_one_sentence_says_so(monkeypatch):

@@ -4,8 +4,7 @@ import pytest
 from checkpoint_folders import FILES, pictures, write_checkpoint
 
 from roboirg.core.errors import InvalidValueError
-from roboirg.policies import load_policy_class
-from roboirg.policies.by_name.loading import policy_needs
+from roboirg.policies import find_policy
 from roboirg.policies.lerobot_checkpoint import read_facts
 
 SQUARE = [3, 96, 96]
@@ -16,10 +15,10 @@ def test_a_checkpoint_asks_for_its_own_cameras_and_sizes(tmp_path):
     both = write_checkpoint(tmp_path / "both", pictures(wrist=[3, 256, 256], front=SQUARE))
     none = write_checkpoint(tmp_path / "none")
     assert read_facts(str(one)) == ({"front": 96}, 48)
-    assert policy_needs(f"lerobot://{one}").cameras == ("front",)
-    assert policy_needs(f"lerobot://{both}").cameras == ("front", "wrist")
-    assert policy_needs(f"lerobot://{none}").cameras == ()
-    assert policy_needs("lerobot://somebody/elsewhere").cameras == ("front", "wrist")
+    assert find_policy(f"lerobot://{one}").needs.cameras == ("front",)
+    assert find_policy(f"lerobot://{both}").needs.cameras == ("front", "wrist")
+    assert find_policy(f"lerobot://{none}").needs.cameras == ()
+    assert find_policy("lerobot://somebody/elsewhere").needs.cameras == ("front", "wrist")
 
 
 def test_folders_that_are_no_checkpoints_are_one_sentence_each(tmp_path, monkeypatch):
@@ -46,7 +45,7 @@ def test_folders_that_are_no_checkpoints_are_one_sentence_each(tmp_path, monkeyp
         "foreign": "does not describe a LeRobot policy",
     }.items():
         with pytest.raises(InvalidValueError) as caught:
-            load_policy_class(f"lerobot://{place}")
+            find_policy(f"lerobot://{place}")
         assert said in str(caught.value)
         assert "\n" not in str(caught.value)
 

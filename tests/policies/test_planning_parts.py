@@ -12,12 +12,12 @@ from planning_fakes import decoded
 
 from roboirg.core.environment_options import DemonstrationFrames
 from roboirg.core.errors import InvalidValueError
-from roboirg.core.subgoal_text import MOST_SUBGOAL_LETTERS, split_point
-from roboirg.policies.contract.policy_needs import (
+from roboirg.core.policy_needs import (
     merge_cameras,
     merge_demonstration_frames,
     merge_observe_every,
 )
+from roboirg.core.subgoal_text import MOST_SUBGOAL_LETTERS, split_point
 from roboirg.policies.planners.memories import merge_keyframes
 from roboirg.policies.planners.memory import MAX_GAP
 from roboirg.policies.planners.observation_merging import (

@@ -5,6 +5,7 @@ import re
 import subprocess
 import sys
 from pathlib import Path
+from urllib.parse import urlencode
 
 import pytest
 from planning_fakes import KEY, fake_vlm, stand_in
@@ -12,11 +13,10 @@ from wire_servers import MmeVlaServer, unpack
 
 import roboirg
 from roboirg.core.errors import InvalidValueError, UnknownNameError
-from roboirg.policies import Policy, PrivilegedPolicy, load_policy_class, make_policy, play
-from roboirg.policies.by_name import policy_specs
-from roboirg.policies.by_name.loading import is_privileged, policy_version
-from roboirg.policies.by_name.systems import all_systems, find_system, load_system
-from roboirg.policies.contract.policy_needs import PolicyNeeds
+from roboirg.core.policy_needs import PolicyNeeds
+from roboirg.policies import Policy, PrivilegedPolicy, find_policy, make_policy, play
+from roboirg.policies.by_name.finding import read_policy
+from roboirg.policies.by_name.systems import all_systems, find_system
 from roboirg.policies.planners.hierarchical_policy import HierarchicalPolicy
 from roboirg.policies.vlm.vlm_listener import VLMListener
 from roboirg.tasks.splits.splits import get_episode
@@ -39,6 +39,12 @@ FACTS = {
     "MemER": ("mme_vla_suite", "symbolic-grounded-subgoal", "--args.use-memer"),
 }
 LISTENER = "vlm-listener:openai?base_url=http://localhost:8000/v1&model=qwen"
+
+
+def load_system(name, overrides=None, seed=0):
+    return make_policy(
+        f"system:{name}?{urlencode(overrides)}" if overrides else f"system:{name}", seed
+    )
 
 
 def test_the_papers_systems_are_at_hand():
@@ -92,12 +98,12 @@ def test_a_spec_overrides_entries():
 
 
 @pytest.mark.parametrize("spec", [*(f"system:{name}" for name in PAPER), LISTENER])
-def test_a_factory_has_what_a_class_would_have(spec):
-    factory, policy = load_policy_class(spec), make_policy(spec, 5)
-    assert PolicyNeeds.of(factory) == PolicyNeeds.of(policy)
-    assert hasattr(factory, "attach") == hasattr(policy, "attach") == is_privileged(spec)
-    assert policy_version(spec) == factory.version == policy.version != "unknown"
-    assert factory.version == load_policy_class(spec).version
+def test_what_a_policy_needs_is_known_from_its_name(spec):
+    known, policy = read_policy(spec), make_policy(spec, 5)
+    assert known.needs == PolicyNeeds.of(policy)
+    assert known.is_privileged == hasattr(policy, "attach")
+    assert known.version == policy.version != "unknown"
+    assert known == find_policy(spec)
 
 
 def test_the_page_s_code_runs():
@@ -113,7 +119,7 @@ def test_a_listener_by_its_spec():
     assert isinstance(policy, VLMListener)
     assert (policy.options.frames, policy.options.reasoning) == (4, True)
     assert policy.options.model.timeout_s == 9
-    assert is_privileged(LISTENER)
+    assert read_policy(LISTENER).is_privileged
 
 
 @pytest.mark.parametrize(
@@ -155,12 +161,7 @@ def test_a_listener_by_its_spec():
 )
 def test_wrong_specs_are_explained(spec, error, words):
     with pytest.raises(error, match=words):
-        load_policy_class(spec)
-
-
-def test_other_specs_are_not_ours():
-    for spec in ("oracle", "package.module:Class", "mme-vla://localhost:8001", "x"):
-        assert policy_specs.find_policy_factory(spec) is None
+        find_policy(spec)
 
 
 def test_own_systems_are_files(tmp_path):
@@ -188,11 +189,11 @@ def test_nothing_is_asked_of_libraries_before_the_first_question():
         "        if name.split('.')[0] in ('openai', 'google', 'av', 'sapien'):\n"
         "            raise ImportError(name)\n"
         "sys.meta_path.insert(0, Refuse())\n"
-        "from roboirg.policies import load_policy_class\n"
+        "from roboirg.policies import make_policy\n"
         "from roboirg.policies.by_name.systems import all_systems\n"
         f"specs = [{LISTENER!r}, 'vlm-listener:google?model=x']\n"
         "specs += [f'system:{name}' for name in all_systems()]\n"
-        "made = [load_policy_class(spec)(seed=1) for spec in specs]\n"
+        "made = [make_policy(spec, 1) for spec in specs]\n"
         "from types import SimpleNamespace\n"
         "from roboirg.core.errors import MissingDependencyError\n"
         "from roboirg.policies.vlm.models import make_model, ModelOptions\n"
@@ -219,7 +220,7 @@ def test_a_spec_drives_a_listener_and_its_records_hold_no_key(monkeypatch):
         policy.reset("Stop it.", {})
         assert policy.metadata["understood"] == {"visit": 3}
         assert KEY in json.dumps(server.headers)
-        assert KEY not in json.dumps([policy.metadata, policy.usage(), policy_version(spec)])
+        assert KEY not in json.dumps([policy.metadata, policy.usage(), find_policy(spec).version])
         policy.close()
 
 

@@ -6,12 +6,12 @@ import pytest
 import roboirg
 from roboirg.core.actions import JOINT_ANGLE, WAYPOINT, check_chunk
 from roboirg.core.errors import InvalidValueError, UnknownNameError
+from roboirg.core.policy_needs import PolicyNeeds
 from roboirg.language.settings import plain_settings
-from roboirg.policies import Policy, PrivilegedPolicy, load_policy_class, make_policy
+from roboirg.policies import Policy, PrivilegedPolicy, find_policy, make_policy
 from roboirg.policies.builtin import BUILTIN
 from roboirg.policies.builtin.listeners import ForgetfulPolicy, ListenerPolicy
-from roboirg.policies.by_name.loading import is_privileged, policy_version
-from roboirg.policies.contract.policy_needs import PolicyNeeds
+from roboirg.policies.by_name.finding import read_policy
 from roboirg.tasks import every_task
 
 
@@ -55,13 +55,6 @@ class Deaf:
         pass
 
 
-class Needy(Silent):
-    """Cannot be made without an argument."""
-
-    def __init__(self, weights, seed):
-        self.weights, self.seed = weights, seed
-
-
 class OldReset(Silent):
     """Has another signature."""
 
@@ -80,21 +73,18 @@ def test_an_edited_policy_has_another_version(tmp_path, monkeypatch):
     monkeypatch.syspath_prepend(tmp_path)
     body = "class It:\n    def reset(self, a, b): pass\n    def act(self, o): pass\n"
     file.write_text(body)
-    first = policy_version("edited_policy:It")
-    assert policy_version("edited_policy:It") == first
+    first = find_policy("edited_policy:It").version
+    assert find_policy("edited_policy:It").version == first
     file.write_text(body + "    gain = 2\n")
-    assert policy_version("edited_policy:It") != first
-    monkeypatch.setattr(load_policy_class("edited_policy:It"), "version", "step-7", raising=False)
-    assert policy_version("edited_policy:It") == "step-7"
-    assert policy_version("oracle") == "built-in"
-    assert policy_version("no_such_module:It") == "unknown"
+    assert find_policy("edited_policy:It").version != first
+    assert find_policy("oracle").version == "built-in"
 
 
 def test_a_missing_library_of_a_policy_comes_with_a_way_out(tmp_path, monkeypatch):
     (tmp_path / "needing_policy.py").write_text("import no_such_library\n")
     monkeypatch.syspath_prepend(tmp_path)
     with pytest.raises(InvalidValueError, match="-m pip install no_such_library"):
-        load_policy_class("needing_policy:It")
+        find_policy("needing_policy:It")
 
 
 def test_own_policies_are_named_by_import_path():
@@ -122,22 +112,12 @@ def test_own_policies_are_named_by_import_path():
             "'loads' in module json is of type function, not a class",
         ),
         (f"{__name__}:pytest", InvalidValueError, "'pytest' .* of type module"),
-        (
-            f"{__name__}:Needy",
-            InvalidValueError,
-            r"Needy\(\) .* needs 'weights'; give it a default",
-        ),
         (f"{__name__}:Numb", InvalidValueError, "act of class Numb is not a method"),
-        (
-            "roboirg.policies.builtin.scripted:ScriptedPolicy",
-            InvalidValueError,
-            "is abstract; it lacks decide",
-        ),
     ],
 )
 def test_wrong_specs_are_explained(spec, error, words):
     with pytest.raises(error, match=words):
-        load_policy_class(spec)
+        find_policy(spec)
 
 
 @pytest.mark.parametrize(
@@ -153,12 +133,12 @@ def test_wrong_specs_are_explained(spec, error, words):
 def test_wrong_cameras_are_told_before_anything_starts(monkeypatch, cameras, words):
     monkeypatch.setattr(Silent, "cameras", cameras, raising=False)
     with pytest.raises(InvalidValueError, match=f"{__name__}:Silent'.*{words}"):
-        load_policy_class(f"{__name__}:Silent")
+        find_policy(f"{__name__}:Silent")
 
 
 def test_cameras_may_be_a_list_or_a_property(monkeypatch):
     monkeypatch.setattr(Silent, "cameras", ["wrist"], raising=False)
-    assert PolicyNeeds.of(load_policy_class(f"{__name__}:Silent")).cameras == ("wrist",)
+    assert find_policy(f"{__name__}:Silent").needs.cameras == ("wrist",)
     monkeypatch.setattr(Silent, "cameras", property(lambda _self: ("front",)))
     assert PolicyNeeds.of(make_policy(f"{__name__}:Silent", 0)).cameras == ("front",)
     assert PolicyNeeds.of(Deaf).cameras == ("front", "wrist")
@@ -167,14 +147,14 @@ def test_cameras_may_be_a_list_or_a_property(monkeypatch):
 def test_a_policy_says_in_which_action_space_it_acts(monkeypatch):
     assert PolicyNeeds.of(Silent).action_space is JOINT_ANGLE
     monkeypatch.setattr(Silent, "actions", "waypoint", raising=False)
-    assert PolicyNeeds.of(load_policy_class(f"{__name__}:Silent")).action_space is WAYPOINT
+    assert find_policy(f"{__name__}:Silent").needs.action_space is WAYPOINT
     monkeypatch.setattr(Silent, "actions", property(lambda _self: "waypoint"))
     assert PolicyNeeds.of(make_policy(f"{__name__}:Silent", 0)).action_space is WAYPOINT
 
 
 @pytest.mark.parametrize("name", BUILTIN)
 def test_built_in_policies_move_joints(name):
-    assert PolicyNeeds.of(load_policy_class(name)).action_space is JOINT_ANGLE
+    assert find_policy(name).needs.action_space is JOINT_ANGLE
 
 
 @pytest.mark.parametrize(
@@ -187,7 +167,7 @@ def test_built_in_policies_move_joints(name):
 def test_a_wrong_action_space_is_told_before_anything_starts(monkeypatch, actions, words):
     monkeypatch.setattr(Silent, "actions", actions, raising=False)
     with pytest.raises(InvalidValueError, match=f"{__name__}:Silent'.*{words}"):
-        load_policy_class(f"{__name__}:Silent")
+        find_policy(f"{__name__}:Silent")
 
 
 @pytest.mark.parametrize(
@@ -206,14 +186,14 @@ def test_a_wrong_wish_for_frames_is_told_before_anything_starts(
 ):
     monkeypatch.setattr(Silent, attribute, wish, raising=False)
     with pytest.raises(InvalidValueError, match=f"{__name__}:Silent'.*{words}"):
-        load_policy_class(f"{__name__}:Silent")
+        find_policy(f"{__name__}:Silent")
 
 
 def test_a_policy_says_which_frames_it_wants(monkeypatch):
     assert PolicyNeeds.of(Silent) == PolicyNeeds()
     for wish in ("none", 4):
         monkeypatch.setattr(Silent, "demonstration_frames", wish, raising=False)
-        assert PolicyNeeds.of(load_policy_class(f"{__name__}:Silent")).demonstration_frames == wish
+        assert find_policy(f"{__name__}:Silent").needs.demonstration_frames == wish
     monkeypatch.setattr(Silent, "observe_every", property(lambda _self: 8), raising=False)
     assert PolicyNeeds.of(make_policy(f"{__name__}:Silent", 0)).observe_every == 8
 
@@ -222,16 +202,15 @@ def test_a_policy_says_which_frames_it_wants(monkeypatch):
 def test_depth_and_matrices_are_wishes_and_need_a_camera(monkeypatch, attribute):
     assert not getattr(PolicyNeeds.of(Silent), attribute)
     monkeypatch.setattr(Silent, attribute, True, raising=False)
-    assert getattr(PolicyNeeds.of(load_policy_class(f"{__name__}:Silent")), attribute)
+    assert getattr(find_policy(f"{__name__}:Silent").needs, attribute)
     monkeypatch.setattr(Silent, "cameras", (), raising=False)
     with pytest.raises(InvalidValueError, match=f"{attribute} is True, but cameras is "):
-        load_policy_class(f"{__name__}:Silent")
+        find_policy(f"{__name__}:Silent")
 
 
 def test_privileged_policies_are_known_by_name():
-    assert [is_privileged(name) for name in ("oracle", "forgetful", "random", "unknown")] == [
-        True, True, False, False,
-    ]  # fmt: skip
+    names = ("oracle", "forgetful", "random")
+    assert [read_policy(name).is_privileged for name in names] == [True, True, False]
 
 
 def test_a_module_that_exits_or_complains_at_length_is_one_sentence(tmp_path, monkeypatch):
@@ -239,16 +218,16 @@ def test_a_module_that_exits_or_complains_at_length_is_one_sentence(tmp_path, mo
     (tmp_path / "wordy_policy.py").write_text("raise RuntimeError('one\\n  two\\n\\nthree')\n")
     monkeypatch.syspath_prepend(tmp_path)
     with pytest.raises(InvalidValueError, match=r"\(SystemExit: no GPU\)"):
-        load_policy_class("exiting_policy:It")
+        find_policy("exiting_policy:It")
     with pytest.raises(InvalidValueError, match=r"\(RuntimeError: one two three\)"):
-        load_policy_class("wordy_policy:It")
+        find_policy("wordy_policy:It")
 
 
 def test_a_module_that_breaks_is_named_with_what_broke(tmp_path, monkeypatch):
     (tmp_path / "broken_policy.py").write_text("1 / 0\n")
     monkeypatch.syspath_prepend(tmp_path)
     with pytest.raises(InvalidValueError, match=r"broken_policy.*ZeroDivisionError"):
-        load_policy_class("broken_policy:It")
+        find_policy("broken_policy:It")
 
 
 def decided(policy_class, task, setting, episode, seed=0):

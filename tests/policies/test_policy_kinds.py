@@ -10,8 +10,8 @@ import pytest
 from roboirg.core.errors import InvalidValueError, UnknownNameError
 from roboirg.policies import make_policy
 from roboirg.policies.builtin.random_policy import RandomPolicy
-from roboirg.policies.by_name import policy_specs
-from roboirg.policies.by_name.loading import is_foreign, needs_host
+from roboirg.policies.by_name import policy_kinds
+from roboirg.policies.by_name.finding import read_policy
 
 PAGE = (Path(__file__).parents[2] / "docs" / "add-protocol.md").read_text(encoding="utf-8")
 
@@ -24,7 +24,7 @@ def fenced(language, word):
 @pytest.fixture
 def lab(tmp_path, monkeypatch):
     """Install the recipe as a package of its own, next to an entry point without its module."""
-    for cached in (policy_specs.find_kind, policy_specs.comes_with_us):
+    for cached in (policy_kinds.find_kind, policy_kinds.known_kinds):
         cached.cache_clear()
     (tmp_path / "lab_kind.py").write_text(fenced("python", "PolicyKind("))
     ((group, entries),) = tomllib.loads(fenced("toml", "policy_kinds"))["project"][
@@ -38,16 +38,16 @@ def lab(tmp_path, monkeypatch):
     monkeypatch.syspath_prepend(tmp_path)
     yield
     sys.modules.pop("lab_kind", None)
-    for cached in (policy_specs.find_kind, policy_specs.comes_with_us):
+    for cached in (policy_kinds.find_kind, policy_kinds.known_kinds):
         cached.cache_clear()
 
 
 @pytest.mark.usefixtures("lab")
 def test_the_recipe_makes_policies_in_a_process_of_their_own():
     assert isinstance(make_policy("lab:walk?fast=yes", 3), RandomPolicy)
-    assert is_foreign("lab:walk")
-    assert needs_host("lab:walk")
-    assert not is_foreign("recorded:folder")
+    assert read_policy("lab:walk").is_foreign
+    assert read_policy("lab:walk").is_hosted
+    assert policy_kinds.known_kinds()["recorded"]
     with pytest.raises(UnknownNameError, match="lab:…"):
         make_policy("nothing", 0)
 

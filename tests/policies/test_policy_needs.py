@@ -7,9 +7,9 @@ from types import SimpleNamespace
 import pytest
 
 from roboirg.core.errors import InvalidValueError, UnknownNameError
+from roboirg.core.policy_needs import PolicyNeeds, need_rules
 from roboirg.envs.env_settings import EnvSettings
 from roboirg.policies import play
-from roboirg.policies.contract.policy_needs import PolicyNeeds, need_rules
 from roboirg.policies.planners.hierarchical_policy import HierarchicalPolicy
 from roboirg.policies.remote.service import act
 

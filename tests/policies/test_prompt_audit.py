@@ -11,10 +11,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from roboirg.core.errors import InvalidValueError, MissingDependencyError, UnknownNameError
+from roboirg.core.policy_needs import PolicyNeeds
 from roboirg.language.token_counts import count_tokens
-from roboirg.policies.by_name.loading import policy_needs
+from roboirg.policies.by_name.finding import find_policy
 from roboirg.policies.by_name.systems import all_systems
-from roboirg.policies.contract.policy_needs import PolicyNeeds
 from roboirg.policies.lerobot_policy import LeRobotPolicy
 from roboirg.policies.prompt_length.prompt_audit import (
     PromptLimit,
@@ -35,7 +35,7 @@ ORDER = ("cut", "unknown", "heard")
 
 
 def prompt_limit_of(spec):
-    return prompt_limit(policy_needs(spec))
+    return prompt_limit(find_policy(spec).needs)
 
 
 def halves(text):
@@ -262,9 +262,9 @@ def test_a_lerobot_checkpoint_says_its_limit_itself(tmp_path):
 
 def test_optional_libraries_are_imported_when_they_are_used():
     code = (
-        "import sys; from roboirg.policies.by_name.loading import policy_needs;"
+        "import sys; from roboirg.policies.by_name.finding import find_policy;"
         "from roboirg.policies.prompt_length.tokenizer_file import prompt_limit;"
-        "prompt_limit(policy_needs('openpi://localhost:1?prompt_tokens=64'));"
+        "prompt_limit(find_policy('openpi://localhost:1?prompt_tokens=64').needs);"
         "sys.exit(bool({'sentencepiece', 'tokenizers'} & set(sys.modules)))"
     )
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0

@@ -84,7 +84,7 @@ def test_the_recipe_serves_and_plays_over_loopback():
     assert "tiny" in url_schemes()
     with served("random", "tiny") as url:
         assert url.startswith("tiny://127.0.0.1:")
-        assert {result.verdict for result in check_policy(url)} == {"pass", "note"}
+        assert {result.verdict for result in check_policy(url)} <= {"pass", "note"}
         client, here = make_policy(url, 0), make_policy("random", 0)
         for policy in (client, here):
             policy.reset(INSTRUCTION, {})
@@ -167,12 +167,12 @@ import sys
 for name in ("websockets", "msgpack", "httpx"):
     sys.modules[name] = None  # an import raises ImportError
 from roboirg.core.errors import MissingDependencyError
-from roboirg.policies import load_policy_class
+from roboirg.policies import find_policy
 from roboirg.policies.remote.protocols import protocols_by_scheme
 schemes = list(protocols_by_scheme())
 for scheme in schemes:
     try:
-        load_policy_class(f"{scheme}://localhost:1")
+        find_policy(f"{scheme}://localhost:1")
     except MissingDependencyError as error:
         assert "[remote]'" in str(error), error
     else:

@@ -13,11 +13,11 @@ from selection import slow_but
 import roboirg
 from roboirg.core.actions import choice_action
 from roboirg.core.errors import InvalidActionError, InvalidValueError
+from roboirg.core.policy_needs import PolicyNeeds
 from roboirg.evaluation.analysis.stats.planner_failures import planner_failure
 from roboirg.judging import plain_subgoal
 from roboirg.policies import make_policy, play
-from roboirg.policies.by_name.loading import is_privileged, needs_host
-from roboirg.policies.contract.policy_needs import PolicyNeeds
+from roboirg.policies.by_name.finding import read_policy
 from roboirg.policies.hands.scripted_hands import ScriptedHands
 from roboirg.policies.hands.subgoal_words import read_subgoal
 from roboirg.policies.planners import make_planner
@@ -252,8 +252,8 @@ def test_specs_name_planners_and_hands(model):
             f"system:MemER?hands=scripted&vlm={server.url}/v1{model}",
             f"system:GroundSG-Gemini?hands=scripted{model}",
         ):
-            assert is_privileged(spec)
-            assert not needs_host(spec)
+            assert read_policy(spec).is_privileged
+            assert not read_policy(spec).is_hosted
             policy = make_policy(spec, 0)
             assert "scripted hands" in policy.version
             assert policy.metadata["policy"] == {"hands": "scripted"}

@@ -103,7 +103,7 @@ def test_a_served_policy_gets_what_the_client_was_given(protocol, monkeypatch):
             assert client.metadata["libraries"]["numpy"] == np.__version__
             assert client.metadata["python"] == platform.python_version()
             assert client.metadata["flags"] == "XLA_FLAGS=--xla_gpu_autotune_level=0"
-    one, two = Recorder.episodes
+    _opened, one, two = Recorder.episodes
     assert (one.seed, two.seed) == (7, 7)
     for policy in (one, two):
         assert policy.instruction == (INSTRUCTION.lower() if protocol == "mme-vla" else INSTRUCTION)
@@ -132,7 +132,7 @@ def test_a_served_policy_hears_what_the_prompt_says_next(protocol):
         for text, seen in zip([said[1], said[1], said[2]], chunks, strict=True):
             client.act({**seen[-1], "history": seen, "instruction": text})
         client.close()
-    (policy,) = Recorder.episodes
+    _opened, policy = Recorder.episodes
     assert [one["instruction"] for one in policy.calls] == [said[0], said[1], said[1], said[2]]
     if protocol == "openpi":  # has no reset: a new prompt is a new episode
         assert (policy.instruction, policy.heard) == (said[2], [])
@@ -150,7 +150,7 @@ def test_a_served_policy_gets_depth_and_matrices_if_the_client_sends_them(protoc
         client.act({**moments[3], "history": ()})
         client.act({**moments[5], "history": (moments[4], moments[5])})
         client.close()
-    (policy,) = Recorder.episodes
+    _opened, policy = Recorder.episodes
     same(video(3, sensors=True), policy.demonstration, shown)
     same(moments[3], policy.calls[0], shown)
     for given, kept in zip(moments[4:], policy.calls[1]["history"], strict=True):
@@ -200,7 +200,7 @@ def test_mme_vla_has_one_memory_for_all_connections():
             reply = unpack(other.recv())
             assert reply["actions"].shape == (4, 8)
             assert set(reply) == {"actions", "infer_time_ms"}
-    (policy,) = Recorder.episodes
+    _opened, policy = Recorder.episodes
     assert np.array_equal(policy.demonstration["front_rgb"], frames[:2, 0])
     assert policy.subgoals == ["pick up the cube at <1, 2>"]
 

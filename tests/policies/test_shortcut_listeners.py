@@ -8,7 +8,7 @@ import pytest
 import roboirg
 from roboirg.policies import make_policy, play
 from roboirg.policies.builtin import BUILTIN, listeners
-from roboirg.policies.by_name.loading import is_privileged, policy_version
+from roboirg.policies.by_name.finding import find_policy, read_policy
 from roboirg.shortcuts import SURFACE_RULES
 from roboirg.tasks.splits.splits import get_episode
 
@@ -21,8 +21,8 @@ def test_every_rule_is_a_policy_of_its_name():
         policy = make_policy(rule, 3)
         assert isinstance(policy, listeners.ShortcutPolicy)
         assert (policy.rule, policy.seed, policy.cameras) == (rule, 3, ())
-        assert is_privileged(rule)
-        assert policy_version(rule) == "built-in"
+        assert read_policy(rule).is_privileged
+        assert find_policy(rule).version == "built-in"
 
 
 def test_what_the_words_leave_open_is_drawn_by_seed():

@@ -17,6 +17,7 @@ import roboirg
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.evaluation.play.rollout import EpisodeRunner
 from roboirg.evaluation.records.record import Job
+from roboirg.policies.by_name.finding import read_policy
 from roboirg.simulation.cameras import Cameras
 from roboirg.simulation.episode_session import EpisodeSession
 from roboirg.simulation.expert.primitives import MotionPrimitives
@@ -203,7 +204,8 @@ def story(task=SHORT):
     """Everything that an environment and a run return."""
     _, observation, info = reset(task, cameras=("front", "wrist"), depth=True, grounded=True)
     job = Job(
-        policy=f"{__name__}:Viewer",
+        policy="mine",
+        ref=read_policy(f"{__name__}:Viewer"),
         task=task,
         split="test",
         episode=1,

@@ -12,12 +12,9 @@ from typing import NamedTuple
 from roboirg.core.errors import InvalidValueError, UnknownNameError
 from roboirg.core.field_types import MOST_SECONDS
 from roboirg.core.inference_facts import inference_facts
-from roboirg.policies.by_name.loading import (
-    is_privileged,
-    load_policy_class,
-    make_policy,
-    policy_version,
-)
+from roboirg.policies.by_name.finding import make_policy, opened, read_policy
+from roboirg.policies.by_name.policy_classes import find_class
+from roboirg.policies.by_name.policy_kinds import CLASS
 from roboirg.policies.contract.base import Policy
 from roboirg.policies.contract.json_values import as_json
 from roboirg.policies.remote.endpoints import Endpoint
@@ -85,24 +82,28 @@ def open_server(
             f"timeout_s is {options.timeout_s}; it must be more than 0 and at most "
             f"{MOST_SECONDS:,} seconds."
         )
-    declared = getattr(load_policy_class(spec), "metadata", {})
-    if is_privileged(spec):
+    policy = read_policy(spec)
+    if policy.is_privileged:
         raise InvalidValueError(
             f"Policy {spec!r} is privileged: it reads the simulator in its own process, so it "
             "cannot be served."
         )
 
+    if policy.is_foreign:
+        policy = opened(policy, seed)
+
     def make() -> Policy:
-        return make_policy(spec, seed)
+        return make_policy(policy, seed)
 
     found = protocols[protocol]
     process = inference_facts(None)
+    declared = getattr(find_class(policy.body), "metadata", {}) if policy.kind == CLASS else {}
     if not isinstance(declared, Mapping):
         declared = {}  # a property is of an object
     metadata = {
         **as_json(declared, "the policy's metadata"),
         "policy": spec,
-        "version": policy_version(spec),
+        "version": policy.version,
         "protocol": protocol,
         "python": process.python,
         "libraries": process.libraries,

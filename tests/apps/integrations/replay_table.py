@@ -17,6 +17,7 @@ from roboirg.core.instruction_options import InstructionOptions
 from roboirg.evaluation.play.rollout import EpisodeRunner
 from roboirg.evaluation.records.record import Job
 from roboirg.policies import make_policy
+from roboirg.policies.by_name.finding import read_policy
 
 TASKS = ("VideoUnmask", "ButtonUnmask", "VideoUnmaskSwap", "StopCube", "VideoPlaceOrder")
 SETTING = "contextual"
@@ -122,7 +123,7 @@ def own_outcomes(spec, meshes=MESHES):
     for task, episode in cases():
         job = Job(
             policy="replay",
-            spec=spec,
+            ref=read_policy(spec, "replay"),
             task=task,
             split="test",
             episode=episode,

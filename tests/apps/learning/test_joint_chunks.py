@@ -5,10 +5,10 @@ import pytest
 
 from roboirg.apps.learning.policy.joint_chunks import JointChunks
 from roboirg.apps.learning.policy.learned_policy import LearnedPolicy
+from roboirg.core.policy_needs import PolicyNeeds
 from roboirg.envs.factory import make
 from roboirg.policies import play
 from roboirg.policies.builtin.waypoint_expert import WaypointExpert
-from roboirg.policies.contract.policy_needs import PolicyNeeds
 from roboirg.simulation.physics_settings import HOME
 from roboirg.tasks.splits.splits import get_episode
 

@@ -22,7 +22,7 @@ from roboirg.apps.learning.listener.study_report import trained_rate
 from roboirg.apps.learning.listener.vocabulary import parts_of, split_words
 from roboirg.core.errors import InvalidValueError, MissingDependencyError
 from roboirg.main import app
-from roboirg.policies.by_name.loading import is_privileged, make_policy
+from roboirg.policies.by_name.finding import make_policy, read_policy
 from roboirg.policies.vlm.goal_schema import goal_schema
 from roboirg.tasks import get_task
 from roboirg.tasks.splits.splits import get_episode
@@ -250,7 +250,7 @@ def test_it_plays_with_the_hands_of_the_oracle(trained):
 
     _, path = trained
     spec = f"learned:{path}"
-    assert is_privileged(spec)
+    assert read_policy(spec).is_privileged
     policy = make_policy(spec, 0)
     env = roboirg.make("StopCube", setting="explicit", split="train", episode=1, cameras=("front",))
     observation, info = env.reset()

@@ -24,7 +24,7 @@ from roboirg.evaluation.records.store import read_records
 from roboirg.main import app
 from roboirg.policies import play
 from roboirg.policies.builtin.waypoint_expert import Disturbance, WaypointExpert
-from roboirg.policies.by_name.loading import is_privileged, make_policy, needs_host
+from roboirg.policies.by_name.finding import make_policy, read_policy
 from roboirg.tasks.splits.splits import get_episode
 from roboirg.util.atomic_write import locked
 
@@ -276,8 +276,8 @@ def test_the_command_makes_a_policy_that_plays_by_pictures_alone(folder, tmp_pat
     path = folder[0] / "recurrent-explicit-0.pt"
     spec = f"trained:{path}"
     policy = make_policy(spec, 0)
-    assert not is_privileged(spec)
-    assert needs_host(spec)
+    assert not read_policy(spec).is_privileged
+    assert read_policy(spec).is_hosted
     assert not hasattr(policy, "attach")
     out = tmp_path / "runs"
     call = ["run", "--policy", spec, "--tasks", "ButtonUnmask", "--settings", "explicit,direct"]

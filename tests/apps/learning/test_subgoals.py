@@ -221,13 +221,13 @@ def test_hands_follow_any_planner_and_name_their_own_subgoals_without_one(saved)
 def test_a_learned_planner_leads_the_scripted_hands_and_others_lead_learned_ones(saved):
     from roboirg.apps.learning.policy.subgoal_following import LearnedHands, LearnedPlanner
     from roboirg.core.errors import InvalidValueError
-    from roboirg.policies.by_name.loading import is_privileged, make_policy, needs_host
+    from roboirg.policies.by_name.finding import make_policy, read_policy
 
     own, scripted = f"trained:{saved}", f"trained:{saved}?hands=scripted"
-    assert needs_host(own)
-    assert not is_privileged(own)
-    assert is_privileged(scripted)
-    assert not needs_host(scripted)
+    assert read_policy(own).is_hosted
+    assert not read_policy(own).is_privileged
+    assert read_policy(scripted).is_privileged
+    assert not read_policy(scripted).is_hosted
     policy = make_policy(scripted, 0)
     assert isinstance(policy.planner, LearnedPlanner)
     assert "front" in policy.cameras
@@ -247,7 +247,7 @@ def test_a_learned_planner_leads_the_scripted_hands_and_others_lead_learned_ones
 @pytest.mark.parametrize("protocol", ["openpi", "mme-vla"])
 def test_behind_a_server_hands_do_in_joint_angles_what_they_do_here(saved, protocol):
     pytest.importorskip("websockets")
-    from roboirg.policies.by_name.loading import make_policy
+    from roboirg.policies.by_name.finding import make_policy
     from roboirg.policies.policy_server import open_server
 
     spec = f"trained:{saved}?actions=joint_angle"

@@ -10,7 +10,7 @@ import numpy as np
 
 from roboirg.apps.policy_check.expert_episode import ExpertEpisode, ExpertMoment
 from roboirg.core.actions import JOINT_HIGH, JOINT_LOW
-from roboirg.policies.contract.policy_needs import PolicyNeeds
+from roboirg.core.policy_needs import PolicyNeeds
 
 MOMENTS, ROWS = 20, 16
 REST = np.array([0.0, 0.2, 0.0, -2.1, 0.0, 2.4, 0.8])

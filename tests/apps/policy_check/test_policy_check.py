@@ -10,9 +10,9 @@ from typer.testing import CliRunner
 from roboirg.apps.policy_check.check_result import FAIL, NOTE, PASS
 from roboirg.apps.policy_check.commands import check_policy as command
 from roboirg.apps.policy_check.policy_check import check_policy
-from roboirg.apps.policy_check.synthetic_episodes import SyntheticEpisodes
 from roboirg.core.observations import CAMERAS
-from roboirg.policies.contract.policy_needs import PolicyNeeds
+from roboirg.core.policy_needs import PolicyNeeds
+from roboirg.policies.contract.synthetic_episodes import SyntheticEpisodes
 
 
 class Sound:

@@ -187,7 +187,7 @@ def test_a_plan_is_read_as_it_was_written_and_not_overwritten(tmp_path):
 @given(plans)
 def test_the_plans_for_the_twin_have_the_trials_and_no_others(plan):
     played = [
-        msgspec.structs.replace(job, spec=None)
+        msgspec.structs.replace(job, ref=None)
         for twin in plan.twin_plans.values()
         for job in twin.jobs()
     ]

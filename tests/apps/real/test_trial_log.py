@@ -29,18 +29,18 @@ def test_a_score_is_a_record_like_any_other(small):
     trial_log.score(third, "dropped", operator="ann", note="slipped")
     found = {record.identity: record for record in read_records(folder)}
     assert len(found) == 3
-    record = found[first.job]
+    record = found[first.identity]
     assert (record.outcome, record.attribution, record.events) == ("success", None, ())
     assert record.robot == "a robot"
     assert trial_metadata(record) == {
         "action": "score", "operator": "ann", "note": "shaky", "trial": first.name,
         "plan": plan.fingerprint,
     }  # fmt: skip
-    record = found[second.job]
+    record = found[second.identity]
     assert (record.outcome, record.attribution.failure) == ("failure", "wrong_place")
     assert (record.attribution.kind, record.attribution.step) == ("grounding", None)
     assert record.cause == record.attribution.sentence
-    record = found[third.job]
+    record = found[third.identity]
     assert (record.attribution.kind, record.attribution.failure) == ("execution", "dropped")
     assert "slipped" in record.cause
     assert record.plan == plan.fingerprint
@@ -69,7 +69,7 @@ def test_undo_brings_back_what_was_before(small):
         assert read(plan, folder).undo(operator="bob") == name
         now = read(plan, folder)
         assert now.state(name) == state
-        newest = {one.identity: one for one in read_records(folder)}[plan.trial(name).job]
+        newest = {one.identity: one for one in read_records(folder)}[plan.trial(name).identity]
         assert newest.outcome == outcome
     # An undone score counts in no rate.
     assert newest.cause == WITHDRAWN

@@ -79,12 +79,12 @@ def export_demonstrations(
     from roboirg.cli.names import known_settings
     from roboirg.cli.progress_bar import progress_bars
     from roboirg.evaluation.plan.option_parsing import parse_episodes, parse_names
-    from roboirg.policies import load_policy_class
+    from roboirg.policies import find_policy
     from roboirg.tasks import find_tasks
     from roboirg.util.processor import worker_count
 
     chosen = words.choices(ExportPlan)
-    load_policy_class(chosen.get("policy", ExportPlan.policy))
+    find_policy(chosen.get("policy", ExportPlan.policy))
     chosen.setdefault("video", "prefix" if format == "robomme-hdf5" else "none")
     # Pictures in the tables of this format are read by openpi alone.
     openpi = (format, pictures) == ("lerobot-v2.1", "png")

@@ -15,7 +15,7 @@ from roboirg.core.observations import Demonstration, Observation
 from roboirg.evaluation.records.action_log import read_actions
 from roboirg.evaluation.records.record import Record
 from roboirg.evaluation.records.store import read_records
-from roboirg.policies.by_name.policy_specs import PolicyKind, PolicyMaker
+from roboirg.policies.by_name.policy_kinds import PolicyKind, PolicyMaker
 from roboirg.tasks.choices import choices_of
 
 if TYPE_CHECKING:

@@ -35,11 +35,11 @@ from roboirg.core.episode import ENVIRONMENT_VERSION, Episode
 from roboirg.core.errors import InvalidValueError, MotionPlanningError
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.core.observations import CAMERAS
+from roboirg.core.policy_needs import PolicyNeeds
 from roboirg.core.subgoal_text import split_point
 from roboirg.envs.factory import make
 from roboirg.policies.contract.base import Policy
 from roboirg.policies.contract.play import EpisodeLoop
-from roboirg.policies.contract.policy_needs import PolicyNeeds
 from roboirg.util.atomic_write import replacing
 from roboirg.util.media import PICTURE_SIZE, scaled_square
 

@@ -10,15 +10,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from roboirg.core.observations import Observation
+from roboirg.core.policy_needs import PolicyNeeds
 from roboirg.evaluation.episode_errors import EpisodeError
-from roboirg.evaluation.hosting.policy_descriptions import PolicyDescription
 from roboirg.evaluation.play.call_guard import CallGuard
 from roboirg.evaluation.play.episode_record import begin_record
 from roboirg.evaluation.play.job_instruction import PreparedJob
 from roboirg.evaluation.play.rollout import play_with
 from roboirg.evaluation.records.action_log import ActionLog
 from roboirg.evaluation.records.record import Job, Record
-from roboirg.policies.contract.policy_needs import PolicyNeeds
 
 
 class ReplayPolicy:
@@ -56,7 +55,7 @@ class ReplayPolicy:
 
 def unplayed(record: Record) -> Record:
     """Return the record of the same job before anything is played."""
-    return _begin(PreparedJob(_job(record)))
+    return begin_record(PreparedJob(_job(record)))
 
 
 def replay(record: Record, log: ActionLog) -> tuple[Record, ActionLog | None]:
@@ -69,7 +68,7 @@ def replay(record: Record, log: ActionLog) -> tuple[Record, ActionLog | None]:
         InvalidValueError: the job's wording file is missing or has changed.
     """
     prepared, policy = PreparedJob(_job(record)), ReplayPolicy(log)
-    again, played = _begin(prepared), None
+    again, played = begin_record(prepared), None
     needs = PolicyNeeds(cameras=(), actions=log.space)
     try:
         played = play_with(policy, prepared, needs, again, CallGuard(again.timings, None))
@@ -84,8 +83,3 @@ def replay(record: Record, log: ActionLog) -> tuple[Record, ActionLog | None]:
 def _job(record: Record) -> Job:
     """Return what was played, without the address of the policy."""
     return msgspec.structs.replace(record.identity, wordings_file=record.wordings_file)
-
-
-def _begin(prepared: PreparedJob) -> Record:
-    """Return a record whose policy is not looked up: the name may be anyone's module."""
-    return begin_record(prepared, PolicyDescription("unknown", is_privileged=False))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Iterator
 from typing import Any
 
@@ -23,12 +24,14 @@ from roboirg.apps.policy_check.policy_player import (
     describe_difference,
 )
 from roboirg.core.actions import ActionSpace
-from roboirg.core.errors import MissingDependencyError, RoboIRGError
+from roboirg.core.errors import InvalidValueError, MissingDependencyError, RoboIRGError
 from roboirg.core.plain_text import counted, verb_for
+from roboirg.core.policy_needs import PolicyNeeds
+from roboirg.core.policy_ref import UNKNOWN_VERSION
 from roboirg.evaluation.policy_calls import policy_metadata, policy_subgoal, policy_usage
-from roboirg.policies.by_name.loading import is_foreign, policy_version
+from roboirg.policies.by_name.finding import look_up, read_policy
 from roboirg.policies.contract.batch_policy import BatchedEpisode
-from roboirg.policies.contract.policy_needs import PolicyNeeds
+from roboirg.policies.contract.policy_version import read_version
 
 
 def check_loading(player: PolicyPlayer) -> Iterator[CheckResult]:
@@ -68,17 +71,32 @@ def check_requirements(player: PolicyPlayer) -> Iterator[CheckResult]:
 
 def check_version(player: PolicyPlayer) -> Iterator[CheckResult]:
     """Check that records can tell the policy from an earlier one of the same name."""
-    source, own = player.source, getattr(player.policy, "version", "unknown")
-    known = policy_version(source) if isinstance(source, str) else str(own)
-    if known == "unknown":
+    source = player.source
+    try:
+        episode = copy.deepcopy(player.without_video)
+        player.policy.reset(episode.instruction, episode.demonstration)
+        own = read_version(player.policy)
+    except InvalidValueError as error:
+        raise CheckAbortedError("version", FAIL, str(error)) from error
+    except Exception as error:  # the policy's own code runs here
+        raise CheckAbortedError("version", FAIL, f"reset(): {describe_error(error)}") from error
+    known = look_up(read_policy(source)).version if isinstance(source, str) else UNKNOWN_VERSION
+    if own is not None and own != UNKNOWN_VERSION:
+        yield CheckResult("version", PASS, f"Records name the version that it has: {own}.")
+    elif known != UNKNOWN_VERSION:
+        yield CheckResult(
+            "version",
+            PASS,
+            f"It has no version, so records name a fingerprint of its file: {known}. A policy that "
+            "loads a checkpoint needs the checkpoint's name as its version.",
+        )
+    else:
         yield CheckResult(
             "version",
             NOTE,
             "It is unknown, so records of a changed policy look the same; set the attribute "
             "version, or version=… in the URL of a server.",
         )
-    else:
-        yield CheckResult("version", PASS, f"Records name version {known}.")
 
 
 def check_acting(player: PolicyPlayer) -> Iterator[CheckResult]:
@@ -118,7 +136,7 @@ def _describe_actions(
 def check_reports(player: PolicyPlayer) -> Iterator[CheckResult]:
     """Check what records get from the policy besides its actions."""
     policy, source = player.policy, player.source
-    is_ours = isinstance(source, str) and not is_foreign(source)
+    is_ours = isinstance(source, str) and not read_policy(source).is_foreign
     try:
         metadata = policy_metadata(policy, is_ours=is_ours)
         policy_subgoal(policy)

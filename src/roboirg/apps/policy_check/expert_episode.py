@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 
 from roboirg.core.actions import JOINT_ANGLE
 from roboirg.core.observations import Observation
+from roboirg.core.policy_needs import PolicyNeeds
 from roboirg.policies.builtin.oracle_policy import OraclePolicy
 from roboirg.policies.contract.base import Policy
-from roboirg.policies.contract.policy_needs import PolicyNeeds
 
 if TYPE_CHECKING:
     from roboirg.envs.environment import RoboIRGEnv

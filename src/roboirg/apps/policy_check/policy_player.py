@@ -11,11 +11,11 @@ from numpy.typing import NDArray
 
 from roboirg.apps.policy_check.check_result import FAIL, CheckAbortedError, describe_error
 from roboirg.apps.policy_check.expert_episode import ExpertEpisode
-from roboirg.apps.policy_check.synthetic_episodes import SyntheticEpisode, SyntheticEpisodes
 from roboirg.core.actions import ActionSpace, check_chunk
-from roboirg.policies.by_name.loading import make_policy
+from roboirg.core.policy_needs import PolicyNeeds
+from roboirg.policies.by_name.finding import make_policy
 from roboirg.policies.contract.base import Policy, close_policy
-from roboirg.policies.contract.policy_needs import PolicyNeeds
+from roboirg.policies.contract.synthetic_episodes import SyntheticEpisode, SyntheticEpisodes
 
 CALLS = 3
 """Calls of `act` in a synthetic episode."""

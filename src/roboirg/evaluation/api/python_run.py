@@ -9,13 +9,13 @@ from pathlib import Path
 from typing import Any
 
 from roboirg.core.errors import InvalidValueError
-from roboirg.evaluation.hosting.policy_descriptions import know_policy
+from roboirg.core.policy_ref import PolicyRef
 from roboirg.evaluation.plan.plan import Plan
 from roboirg.evaluation.plan.plan_maker import make_plan
 from roboirg.evaluation.run.executor import choose_executor
 from roboirg.evaluation.run.progress import ConsoleReporter
 from roboirg.evaluation.run.runner import episode_runner, run_plan
-from roboirg.policies.by_name.local_policies import is_local, policy_name, spec_of
+from roboirg.policies.by_name.finding import policy_of
 from roboirg.util.console_width import progress_console
 
 AnyPolicy = str | type[Any] | object
@@ -28,15 +28,11 @@ def python_plan(
     policies: AnyPolicy | Sequence[AnyPolicy] | Mapping[str, AnyPolicy], **options: object
 ) -> Plan:
     """Return a checked plan; options may be Python values or text as on the command line."""
-    named = _named(policies)
-    specs = {name: spec_of(policy) for name, policy in named.items()}
-    for spec in specs.values():
-        if is_local(spec):
-            options["policy_process"] = "shared"
-            know_policy(spec)
-    texts = [name if name == spec else f"{name}={spec}" for name, spec in specs.items()]
+    refs = _named(policies)
+    if any(one.place == "python" for one in refs):
+        options["policy_process"] = "shared"
     typed = {name: _typed(name, value) for name, value in options.items() if value is not None}
-    return make_plan(texts, **typed)  # type: ignore[arg-type]
+    return make_plan(refs, **typed)  # type: ignore[arg-type]
 
 
 def play_plan(
@@ -56,7 +52,7 @@ def play_plan(
         progress: whether to show it.
     """
     folder = (_new_folder() if out is None else Path(out)).absolute()
-    if any(is_local(spec) for spec in plan.specs.values()):
+    if any(one.place == "python" for one in plan.policies):
         if workers:
             raise InvalidValueError(
                 f"workers is {workers}, but the policy exists in this process only; put its class "
@@ -72,17 +68,18 @@ def play_plan(
 
 def _named(
     policies: AnyPolicy | Sequence[AnyPolicy] | Mapping[str, AnyPolicy],
-) -> dict[str, AnyPolicy]:
+) -> list[PolicyRef]:
     if isinstance(policies, Mapping):
-        return dict(policies)
-    found = policies if isinstance(policies, (list, tuple)) else [policies]
-    names = [policy_name(policy) for policy in found]
+        return [policy_of(policy, name) for name, policy in policies.items()]
+    given = policies if isinstance(policies, (list, tuple)) else [policies]
+    found = [policy_of(policy) for policy in given]
+    names = [one.name for one in found]
     if len(set(names)) < len(names):
         raise InvalidValueError(
             f"Two policies have the same name ({', '.join(names)}); give a mapping from names of "
             "your own to policies."
         )
-    return dict(zip(names, found, strict=True))
+    return found
 
 
 def _typed(name: str, value: object) -> object:

@@ -10,6 +10,7 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import Any, Self
 
+from roboirg.core.policy_ref import PolicyRef
 from roboirg.evaluation.hosting.messages import receive_calls, send
 from roboirg.evaluation.hosting.policy_child import PolicyChild
 from roboirg.evaluation.hosting.policy_host import HostSession, PolicyHost
@@ -59,7 +60,7 @@ class HostPool:
 
     def __init__(self, settings: HostSettings) -> None:
         self._settings = settings
-        self._hosts: dict[tuple[str, str | None], PolicyHost] = {}
+        self._hosts: dict[tuple[PolicyRef | None, str | None], PolicyHost] = {}
         self._lines: list[socket.socket] = []
         self._far_ends: list[socket.socket] = []
         self._lock, self._is_closed = threading.Lock(), False
@@ -119,7 +120,7 @@ class HostPool:
                             if host is not None:  # the world gave up the episode before
                                 host.leave(session)
                             session = HostSession(line, call.alone)
-                            host = self._host_for(call.spec, session)
+                            host = self._host_for(call.policy, session)
                         if host is None:
                             return
                         send(line, host.call(session, call))
@@ -129,21 +130,21 @@ class HostPool:
                 if host is not None:
                     host.leave(session)
 
-    def _host_for(self, spec: str, session: HostSession) -> PolicyHost | None:
+    def _host_for(self, policy: PolicyRef | None, session: HostSession) -> PolicyHost | None:
         """Return the host of a policy with the fewest episodes, and end what is not needed."""
         with self._lock:
             if self._is_closed:
                 return None
             for device in self._settings.devices or (None,):
-                if (spec, device) not in self._hosts:
-                    self._hosts[spec, device] = self._new_host(device)
+                if (policy, device) not in self._hosts:
+                    self._hosts[policy, device] = self._new_host(device)
             # A run plays one policy after the other: what has no episodes is over, most likely.
             for other, device in tuple(self._hosts):
-                if other != spec and not self._hosts[other, device].sessions:
+                if other != policy and not self._hosts[other, device].sessions:
                     over = self._hosts.pop((other, device))
                     threading.Thread(target=over.stop, name="policy end", daemon=True).start()
             chosen = min(
-                (host for (name, _), host in self._hosts.items() if name == spec),
+                (host for (name, _), host in self._hosts.items() if name == policy),
                 key=lambda host: len(host.sessions),
             )
             chosen.sessions.add(session)

@@ -24,6 +24,8 @@ from roboirg.core.actions import ActionSpace
 from roboirg.core.errors import MissingDependencyError
 from roboirg.core.inference_facts import inference_facts
 from roboirg.core.observations import FetchedDemonstration
+from roboirg.core.policy_needs import PolicyNeeds
+from roboirg.core.policy_ref import PolicyRef
 from roboirg.evaluation.episode_errors import describe_error, one_line
 from roboirg.evaluation.hosting.messages import (
     MAX_TEXT,
@@ -34,9 +36,9 @@ from roboirg.evaluation.hosting.messages import (
     send,
 )
 from roboirg.evaluation.policy_calls import check_rows, dump_metadata, policy_subgoal, policy_usage
-from roboirg.policies.by_name.loading import make_policy, policy_needs, policy_version
+from roboirg.policies.by_name.finding import look_up, make_policy, opened
 from roboirg.policies.contract.base import close_policy, tell_policy
-from roboirg.policies.contract.policy_needs import PolicyNeeds
+from roboirg.policies.contract.policy_version import read_version
 from roboirg.policies.contract.random_state import RandomState
 
 
@@ -76,7 +78,12 @@ class HostProcess:
     def _outcome(self, call: Call) -> Outcome:
         try:
             if call.method == "describe":
-                return Outcome(needs=policy_needs(call.spec), version=policy_version(call.spec))
+                found = opened(_policy(call))
+                return Outcome(
+                    message=found.problem or "",
+                    needs=found.needs or PolicyNeeds(),
+                    version=found.version,
+                )
             if call.method == "open":
                 return self._open(call)
             return self._carry_out(call, *self._episodes[call.session])
@@ -87,13 +94,13 @@ class HostProcess:
         """Begin an episode with a policy of its own; returns what the world must know of it."""
         random = RandomState(call.seed)
         with random:
-            policy: Any = make_policy(call.spec, call.seed)
+            policy: Any = make_policy(_policy(call), call.seed)
         # Pixels of subgoals are for privileged policies, and those have no host.
         needs = replace(PolicyNeeds.of(policy), grounded=False)
         self._episodes[call.session] = policy, random, needs.action_space
         return Outcome(
             needs=needs,
-            version=policy_version(call.spec),
+            version=_fallback(_policy(call)),
             together=callable(getattr(policy, "act_together", None)),
             reads=tuple(self._read_fields),
         )
@@ -114,7 +121,9 @@ class HostProcess:
                     video = FetchedDemonstration(fields, arrays, fetch)
                     policy.reset(call.value["instruction"], video)
                     return Outcome(
-                        metadata=dump_metadata(policy), inference=inference_facts(policy)
+                        metadata=dump_metadata(policy),
+                        inference=inference_facts(policy),
+                        version=read_version(policy) or "",
                     )
                 case "hear":
                     tell_policy(policy, call.value)
@@ -156,6 +165,18 @@ class HostProcess:
             raise RuntimeError("the episode has ended")
         found: Mapping[str, NDArray[Any]] = answer.value
         return found
+
+
+def _policy(call: Call) -> PolicyRef:
+    if call.policy is None:
+        raise ValueError(f"{call.method} names no policy")
+    return call.policy
+
+
+@functools.cache
+def _fallback(ref: PolicyRef) -> str:
+    """Return the version of a policy that declares none."""
+    return look_up(ref).version
 
 
 def _observation(call: Call) -> Any:  # noqa: ANN401 - an `Observation`

@@ -21,6 +21,7 @@ from pydantic import JsonValue
 from roboirg.core.errors import InvalidValueError, MissingDependencyError
 from roboirg.core.inference_facts import InferenceFacts
 from roboirg.core.observations import Demonstration, Observation
+from roboirg.core.policy_ref import PolicyRef
 from roboirg.evaluation.episode_errors import EpisodeError, EpisodeLostError, attribute_errors
 from roboirg.evaluation.hosting.messages import (
     Call,
@@ -33,7 +34,6 @@ from roboirg.evaluation.hosting.messages import (
 )
 from roboirg.evaluation.policy_calls import read_metadata
 from roboirg.policies.contract.base import SubgoalEnd
-from roboirg.policies.contract.policy_urls import is_url
 
 _DRAWN = ("_rgb", "_depth")
 """How the fields of a demonstration end that are drawn when they are read."""
@@ -44,12 +44,12 @@ class HostedPolicy:
 
     Args:
         hosts: the line on which to ask for its host, of `HostPool.connect`.
-        spec: of the policy.
+        ref: the policy, or the part of it that has a process of its own.
         seed: of its random choices.
         alone: whether it must not be asked about this episode together with others.
 
     Attributes:
-        version: of the policy.
+        version: that the policy declares when its `reset` has ended, else a fingerprint.
         metadata: as the policy reports them, from `reset` on.
         inference: what its process computes with, from `reset` on.
         waited_s: seconds that its calls waited for others.
@@ -61,15 +61,17 @@ class HostedPolicy:
         MissingDependencyError: a package that one of our own policies needs is not installed.
     """
 
-    def __init__(self, hosts: socket.socket, spec: str, seed: int, *, alone: bool = False) -> None:
-        self._spec, self._hosts = spec, hosts
+    def __init__(
+        self, hosts: socket.socket, ref: PolicyRef, seed: int, *, alone: bool = False
+    ) -> None:
+        self._ref, self._hosts = ref, hosts
         self.metadata: dict[str, JsonValue] = {}
         self.inference: InferenceFacts | None = None
         self.waited_s = 0.0
         self.subgoal: str | None = None
         self._demonstration: Demonstration = {}
         self._is_open = True
-        found = self._call(Call("open", spec=spec, seed=seed, alone=alone))
+        found = self._call(Call("open", policy=ref, seed=seed, alone=alone))
         found.needs.declare_on(self)
         self.version, self._reads = found.version, found.reads
 
@@ -86,7 +88,7 @@ class HostedPolicy:
         }
         found = self._call(Call("reset", value=value))
         self._take_metadata(found)
-        self.inference = found.inference
+        self.inference, self.version = found.inference, found.version or self.version
 
     def act(self, observation: Observation) -> NDArray[np.float64]:
         """Return the next actions (n, 8) or (n, 7)."""
@@ -157,9 +159,10 @@ class HostedPolicy:
             case None:
                 return EpisodeError(reply.kind, reply.message, "")
             case Outcome(error="missing", message=words):
-                # Only our own client of a URL can ask the user to install something.
-                known = is_url(self._spec)
-                return MissingDependencyError(words) if known else EpisodeError("policy", words, "")
+                # Only our own code can ask the user to install something.
+                if self._ref.is_foreign:
+                    return EpisodeError("policy", words, "")
+                return MissingDependencyError(words)
             case Outcome(error, message, details):
                 kind: Any = error
                 return EpisodeError(kind, message, details)
@@ -182,8 +185,10 @@ class HostedPolicy:
 class HostedPlanner(HostedPolicy):
     """A planner in its host's process, whose hands are in this one."""
 
-    def __init__(self, hosts: socket.socket, spec: str, seed: int, *, alone: bool = False) -> None:
-        super().__init__(hosts, spec, seed, alone=alone)
+    def __init__(
+        self, hosts: socket.socket, ref: PolicyRef, seed: int, *, alone: bool = False
+    ) -> None:
+        super().__init__(hosts, ref, seed, alone=alone)
         self._ends: list[SubgoalEnd] = []
 
     def learn(self, end: SubgoalEnd) -> None:

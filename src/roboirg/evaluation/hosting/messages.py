@@ -17,11 +17,12 @@ from msgspec.msgpack import Ext
 
 from roboirg.core.field_types import Name
 from roboirg.core.inference_facts import InferenceFacts
+from roboirg.core.policy_needs import PolicyNeeds
+from roboirg.core.policy_ref import PolicyRef
 from roboirg.core.subgoal_text import MOST_SUBGOAL_LETTERS
 from roboirg.evaluation.episode_errors import MAX_DETAILS_LENGTH
 from roboirg.evaluation.policy_calls import MAX_COSTS, MAX_METADATA_LENGTH
 from roboirg.evaluation.records.record import ErrorKind
-from roboirg.policies.contract.policy_needs import PolicyNeeds
 
 MAX_MESSAGE = 16 * 2**20
 """Largest message that is read from a policy; 10,000 actions have 640,000 bytes."""
@@ -43,13 +44,13 @@ class Call(Struct, forbid_unknown_fields=True, omit_defaults=True):
     Attributes:
         method: of the policy; or ``open``, ``describe``, ``answer``, ``gone``.
         session: number of the episode.
-        spec: of the policy, as are its `seed` and whether it is asked `alone`.
+        policy: that is meant, as are its `seed` and whether it is asked `alone`.
         value: what the method gets: maps, sequences, texts, numbers and arrays.
     """
 
     method: str
     session: int = 0
-    spec: str = ""
+    policy: PolicyRef | None = None
     seed: int = 0
     alone: bool = False
     value: Any = None

@@ -21,7 +21,7 @@ from pydantic import (
     model_validator,
 )
 
-from roboirg import language, policies, tasks
+from roboirg import language, tasks
 from roboirg.core.actions import find_action_space
 from roboirg.core.arms import TOLD, check_arm
 from roboirg.core.delivery import TURNS
@@ -43,10 +43,11 @@ from roboirg.core.instruction_options import (
     InstructionOptions,
 )
 from roboirg.core.plain_text import is_encodable
+from roboirg.core.policy_ref import PolicyRef
 from roboirg.core.word_pools import POOLS
 from roboirg.evaluation.hosting.host_pool import DEFAULT_BATCH, HostSettings
-from roboirg.evaluation.hosting.policy_descriptions import describe_policy
-from roboirg.evaluation.plan.option_parsing import check_names, name_and_spec
+from roboirg.evaluation.hosting.policy_opening import open_policy
+from roboirg.evaluation.plan.option_parsing import check_names, name_and_spec, parse_policies
 from roboirg.evaluation.plan.worker_needs import WorkerNeeds
 from roboirg.evaluation.play.job_instruction import instruct_job
 from roboirg.evaluation.records.film import VideoMode
@@ -58,6 +59,7 @@ from roboirg.evaluation.records.record_codec import RecordKey, identity_key
 from roboirg.language.generator import check_options, find_refusal
 from roboirg.language.settings import EXPLICIT, SETTING_GROUPS, all_settings, expand_settings
 from roboirg.language.wordings.wording_store import open_wordings
+from roboirg.policies.by_name.finding import read_policy
 from roboirg.tasks.splits import splits
 from roboirg.tasks.splits.private_splits import MissingSaltError, is_private
 from roboirg.util.short_hash import short_hash
@@ -89,7 +91,7 @@ class Plan(BaseModel):
 
     model_config = ConfigDict(frozen=True, extra="forbid", use_attribute_docstrings=True)
 
-    policies: tuple[str, ...]
+    policies: tuple[PolicyRef, ...]
     """Built-in names, package.module:Class, or addresses; NAME=SPEC gives one a name of its own."""
     tasks: tuple[str, ...]
     """Tasks or suites; all for the whole benchmark."""
@@ -172,6 +174,19 @@ class Plan(BaseModel):
         options = {**options, "wordings": path if path in POOLS else open_wordings(path)}
         return {**fields, "wordings": path, "options": options}
 
+    @field_validator("policies", mode="before")
+    @classmethod
+    def _read_policies(cls, given: Any) -> Any:  # noqa: ANN401 - whatever is to be validated
+        if not isinstance(given, list | tuple) or not any(isinstance(one, str) for one in given):
+            return given
+        names = [parse_policies([one]) if isinstance(one, str) else [one] for one in given]
+        found = [
+            read_policy(*reversed(name_and_spec(one))) if isinstance(one, str) else one
+            for several in names
+            for one in several
+        ]
+        return tuple(dict.fromkeys(found))
+
     @field_serializer("options")
     def _write_options(self, options: InstructionOptions) -> dict[str, Any]:
         return {name: value for name, value in asdict(options).items() if name not in AXES}
@@ -207,21 +222,6 @@ class Plan(BaseModel):
         return self
 
     @property
-    def specs(self) -> dict[str, str]:
-        """The spec of each policy by name.
-
-        Raises:
-            InvalidValueError: two policies have the same name.
-        """
-        specs: dict[str, str] = {}
-        for name, spec in map(name_and_spec, self.policies):
-            if specs.setdefault(name, spec) != spec:
-                raise InvalidValueError(
-                    f"Two policies are named {name!r}: {specs[name]} and {spec}."
-                )
-        return specs
-
-    @property
     def setting_names(self) -> tuple[str, ...]:
         """The settings that may be played."""
         return expand_settings(self._setting_words)
@@ -255,7 +255,9 @@ class Plan(BaseModel):
                 nearest.
             InvalidValueError: a number is out of range, or a task lacks a setting.
         """
-        for name, spec in self.specs.items():
+        specs: dict[str, str] = {}
+        for one in self.policies:
+            name, spec = one.name, one.spec
             if not is_encodable(f"{name}={spec}"):
                 raise InvalidValueError(f"Policy {name!r} is not text: it has lone surrogates.")
             if not re.fullmatch(NAME, name):
@@ -263,10 +265,10 @@ class Plan(BaseModel):
                     f"Policy {name[:80]!r} has no valid name for records: at most 1,000 "
                     "characters, without control characters."
                 )
-            if self.policy_process == "own":
-                describe_policy(spec, again=True)
-            else:
-                policies.load_policy_class(spec)
+            if specs.setdefault(name, spec) != spec:
+                raise InvalidValueError(
+                    f"Two policies are named {name!r}: {specs[name]} and {spec}."
+                )
         self._check_options()
         if is_private(self.split) and self.policy_process == "shared":
             raise InvalidValueError(
@@ -285,7 +287,9 @@ class Plan(BaseModel):
                 f"There is nothing to play: {', '.join(self._setting_words)} cannot express any of "
                 "these episodes."
             )
-        return self
+        device = next(iter(self.devices), None)
+        opened = [open_policy(one, self.policy_timeout_s, device) for one in self.policies]
+        return self.model_copy(update={"policies": tuple(opened)})
 
     def jobs(self) -> tuple[Job, ...]:
         """Return every job, ordered by policy, task, episode, setting, form, stages and seed.
@@ -301,7 +305,7 @@ class Plan(BaseModel):
         }
         return tuple(
             job
-            for policy in self.specs.items()
+            for policy in self.policies
             for where, expressible in settings.items()
             for job in self._jobs_of(policy, *where, expressible, self.arms, self.policy_seeds)
         )
@@ -344,32 +348,31 @@ class Plan(BaseModel):
 
     def _jobs_of(
         self,
-        policy: tuple[str, str],
+        policy: PolicyRef | None,
         task: str,
         episode: int,
         settings: Iterable[str],
         arms: tuple[str, ...],
         seeds: tuple[int, ...],
     ) -> Iterator[Job]:
-        name, spec = policy
         said = [options for setting in settings for options in self._options_of(setting)]
         environment = EnvironmentOptions(**{one: getattr(self, one) for one in ENVIRONMENT_OPTIONS})
         for options in sorted(said, key=_names_the_goal):
             if self._is_left_out(task, episode, options):
                 continue
             job = Job(
-                policy=name,
+                policy="" if policy is None else policy.name,
                 task=task,
                 split=self.split,
                 episode=episode,
                 options=replace(options, wordings=self.options.wordings),
                 wordings_file=self.wordings,
                 environment=environment,
-                spec=None if spec == name else spec,
+                ref=policy,
             )
             # Copying is faster, and there may be very many.
             for arm in arms:
-                if arm == TOLD or _has_arm(msgspec.structs.replace(job, policy="", spec=None), arm):
+                if arm == TOLD or _has_arm(msgspec.structs.replace(job, policy="", ref=None), arm):
                     for seed in seeds:
                         yield msgspec.structs.replace(job, policy_seed=seed, arm=arm)
 
@@ -407,7 +410,7 @@ class Plan(BaseModel):
         for task in self.tasks:
             for episode in self.episodes[:1] if usual else self.episodes:
                 settings = self.settings_of(task, episode)
-                yield from self._jobs_of(("", ""), task, episode, settings, (TOLD,), (0,))
+                yield from self._jobs_of(None, task, episode, settings, (TOLD,), (0,))
 
     def _check_options(self) -> None:
         for form, stages in itertools.product(self.forms, self.stages):

@@ -132,12 +132,19 @@ def _as_typed(key: str, value: object) -> object:
     if not isinstance(value, list):
         return [str(value)] if key == "policies" else str(value)
     if key == "policies":
-        return [str(one) for one in value]
+        return [_named(one) for one in value]
     if key == "stages" and any(isinstance(one, list) for one in value):
         return ";".join(str(_as_typed(key, one)) for one in value)
     typed = ",".join(map(str, value)) or ("none" if key == "retry_on" else "")
     # A single number without a comma would mean the first n episodes.
     return f"{typed}," if key == "episodes" and len(value) == 1 else typed
+
+
+def _named(policy: object) -> str:
+    """Return a policy as typed; what a run's plan.json knew of it may have changed."""
+    if isinstance(policy, Mapping):
+        return f"{policy.get('name')}={policy.get('spec')}"
+    return str(policy)
 
 
 def plan_text(plan: Plan) -> str:
@@ -155,6 +162,8 @@ def _fields(plan: Plan) -> Iterator[tuple[str, object, str]]:
         if name == "options":
             for option in SINGLE_OPTIONS:
                 yield option, getattr(plan.options, option), OPTION_HELP[option]
+        elif name == "policies":
+            yield name, [one.text for one in plan.policies], str(field.description)
         elif name == "episodes":
             yield name, _ranges(plan.episodes), str(field.description)
         else:

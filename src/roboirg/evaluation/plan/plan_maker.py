@@ -12,6 +12,7 @@ from roboirg import tasks as task_registry
 from roboirg.core.arms import TOLD
 from roboirg.core.errors import InvalidValueError
 from roboirg.core.instruction_options import InstructionOptions
+from roboirg.core.policy_ref import PolicyRef
 from roboirg.evaluation.plan.option_parsing import (
     ALL,
     check_names,
@@ -19,7 +20,6 @@ from roboirg.evaluation.plan.option_parsing import (
     parse_episodes,
     parse_names,
     parse_numbers,
-    parse_policies,
     parse_stage_sets,
 )
 from roboirg.evaluation.plan.plan import (
@@ -37,7 +37,7 @@ from roboirg.language.settings import SETTING_GROUPS, find_settings
 
 
 def make_plan(
-    policies: Iterable[str],
+    policies: Iterable[str | PolicyRef],
     *,
     tasks: str = ALL,
     settings: str = ALL,
@@ -84,7 +84,7 @@ def make_plan(
     check_names("way to handle long prompts", [options.get("long_prompts", "send")], LONG_PROMPTS)
     try:
         plan = Plan(
-            policies=parse_policies(policies),
+            policies=tuple(policies),  # type: ignore[arg-type]
             tasks=names,
             settings=_settings(settings),
             forms=parse_names("form", forms),

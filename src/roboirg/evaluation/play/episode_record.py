@@ -8,7 +8,7 @@ import hashlib
 import importlib.metadata
 import json
 from collections.abc import Sequence
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from itertools import zip_longest
 from pathlib import Path
 
@@ -18,9 +18,8 @@ from roboirg import language
 from roboirg.core.arms import TOLD
 from roboirg.core.delivery import TURNS
 from roboirg.core.episode import ENVIRONMENT_VERSION
-from roboirg.core.errors import InvalidValueError, MissingDependencyError
+from roboirg.core.policy_ref import unknown_policy
 from roboirg.evaluation.episode_errors import format_cause
-from roboirg.evaluation.hosting.policy_descriptions import PolicyDescription, describe_policy
 from roboirg.evaluation.play.goal_outcomes import find_goal_outcomes, judged_events, name_other_goal
 from roboirg.evaluation.play.job_instruction import PreparedJob
 from roboirg.evaluation.play.prompt_shares import audit_job, audit_prompt
@@ -40,19 +39,17 @@ from roboirg.util.processor import processor_family
 from roboirg.util.short_hash import DIGITS
 
 
-def begin_record(prepared: PreparedJob, policy: PolicyDescription) -> Record:
+def begin_record(prepared: PreparedJob) -> Record:
     """Return the record of an episode that has not begun; needs no simulator.
 
-    It has the words that are to be said.
-
-    Args:
-        prepared: what is to be played.
-        policy: who plays it.
+    It has the words that are to be said, and the policy without its needs, as those with which it
+    is played are a field of their own.
     """
     job, episode, instruction = prepared.job, prepared.episode, prepared.instruction
     is_explicit = job.setting == EXPLICIT and job.arm == TOLD
+    policy = job.ref or unknown_policy(job.policy)
     return Record(
-        **msgspec.structs.asdict(job),
+        **{**msgspec.structs.asdict(job), "ref": replace(policy, needs=None, problem=None)},
         seed=episode.seed,
         difficulty=episode.difficulty,
         outcome="error",
@@ -64,8 +61,6 @@ def begin_record(prepared: PreparedJob, policy: PolicyDescription) -> Record:
         goal=dict(episode.goal.as_mapping()),
         # Exactly what a reader of the file gets.
         metadata=json.loads(json.dumps(dict(instruction.metadata))),
-        privileged=policy.is_privileged,
-        policy_version=policy.version,
         language_version=str(language.LANGUAGE_VERSION),
         environment_version=ENVIRONMENT_VERSION,
         package_version=importlib.metadata.version("roboirgbench"),
@@ -78,17 +73,9 @@ def begin_record(prepared: PreparedJob, policy: PolicyDescription) -> Record:
 
 def lost_record(job: Job, kind: ErrorKind, message: str) -> Record:
     """Return the record of an episode of which nothing is known but why it ended."""
-    record = begin_record(PreparedJob(job), describe(job))
+    record = begin_record(PreparedJob(job))
     record.record_error(kind, format_cause(kind, message))
     return record
-
-
-def describe(job: Job) -> PolicyDescription:
-    """Return the description of a job's policy; ``unknown`` if it cannot be loaded."""
-    try:
-        return describe_policy(job.policy_spec)
-    except (InvalidValueError, MissingDependencyError):
-        return PolicyDescription("unknown", is_privileged=False)
 
 
 def utterances_at(prepared: PreparedJob, heard: Sequence[int]) -> tuple[UtteranceRecord, ...]:

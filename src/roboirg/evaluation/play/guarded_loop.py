@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, cast
 
@@ -11,8 +12,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from roboirg.core.actions import CHOICE, ActionSpace
 from roboirg.core.delivery import SpokenInstruction
+from roboirg.core.errors import InvalidValueError
 from roboirg.core.inference_facts import inference_facts
 from roboirg.core.observations import Demonstration, Observation
+from roboirg.core.policy_ref import UNKNOWN_VERSION
 from roboirg.core.subgoal_text import split_point
 from roboirg.evaluation.play.call_guard import CallGuard
 from roboirg.evaluation.play.episode_record import conclude, utterances_at
@@ -22,14 +25,10 @@ from roboirg.evaluation.policy_calls import check_rows, policy_metadata, policy_
 from roboirg.evaluation.records.action_log import ActionLog
 from roboirg.evaluation.records.record import EventRecord, Record, SubgoalRecord
 from roboirg.judging import judge_subgoal, plain_subgoal
-from roboirg.policies.by_name.loading import (
-    is_foreign,
-    is_privileged,
-    planner_alone,
-    server_version,
-)
+from roboirg.policies.by_name.finding import server_version
 from roboirg.policies.contract.base import Policy
 from roboirg.policies.contract.play import EpisodeLoop
+from roboirg.policies.contract.policy_version import read_version
 
 if TYPE_CHECKING:
     from roboirg.envs.environment import RoboIRGEnv
@@ -68,8 +67,9 @@ class GuardedLoop(EpisodeLoop):
         super().__init__(env, policy)
         self._prepared, self._space, self._writer = prepared, space, writer
         self._record, self._guard = record, guard
-        self._is_ours = not is_foreign(record.policy_spec)
-        self._knows_ends = self._is_ours or planner_alone(record.policy_spec) is not None
+        ref = prepared.job.ref
+        self._is_ours = ref is None or not ref.is_foreign
+        self._knows_ends = ref is None or not ref.is_foreign or ref.place == "split"
         self._reports, self._ends = bool(getattr(policy, "reports", False)), 0
         self._start, self._heard = 0, list[Mapping[str, Any]]()
         self.has_begun, self.answers = False, list[NDArray[np.float64]]()
@@ -104,15 +104,17 @@ class GuardedLoop(EpisodeLoop):
             self._add_heard(info["heard"])
         with self._guard.policy("policy's reset()", "policy_reset"):
             self.start_policy(first, info["demonstration"])
+            self._note_version()
             self._read_metadata()
             record.inference = inference_facts(self.policy)
-        record.privileged |= self._space is CHOICE
+        if self._space is CHOICE:
+            record.ref = dataclasses.replace(record.ref, is_privileged=True)
         self.has_begun = True
         return observation, info
 
     def start_policy(self, instruction: str, demonstration: Demonstration) -> None:
         """Start the policy, which gets the world only if its spec declares that."""
-        if is_privileged(self._record.policy_spec):
+        if self._record.ref.is_privileged:
             super().start_policy(instruction, demonstration)
         else:
             self.policy.reset(instruction, demonstration)
@@ -137,6 +139,23 @@ class GuardedLoop(EpisodeLoop):
         self._heard += utterances
         steps = [int(one["step"]) for one in self._heard]
         self._record.instruction = utterances_at(self._prepared, steps)
+
+    def _note_version(self) -> None:
+        """Keep the version that a policy of the user's declares now that its `reset` has ended.
+
+        Raises:
+            InvalidValueError: it is no version, or not the one with which the run began.
+        """
+        ref = self._record.ref
+        if not (ref.is_foreign or ref.is_hosted):
+            return
+        version = read_version(self.policy) or ref.version
+        if ref.version not in (UNKNOWN_VERSION, version):
+            raise InvalidValueError(
+                f"the policy's version is {version!r}, but it was {ref.version!r} when the run "
+                "began; it must be the same in every process, such as the name of a checkpoint."
+            )
+        self._record.ref = dataclasses.replace(ref, version=version)
 
     def act(self, observation: dict[str, Any]) -> NDArray[np.float64]:
         """Return the policy's next actions, checked."""

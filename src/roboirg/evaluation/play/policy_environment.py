@@ -6,11 +6,11 @@ from dataclasses import asdict, replace
 from typing import TYPE_CHECKING
 
 from roboirg.core.errors import InvalidValueError
+from roboirg.core.policy_needs import ENV_NEEDS, PolicyNeeds
 from roboirg.envs.factory import make
 from roboirg.evaluation.play.job_instruction import PreparedJob
 from roboirg.evaluation.records.record import Job
 from roboirg.policies.contract.base import Policy
-from roboirg.policies.contract.policy_needs import ENV_NEEDS, PolicyNeeds
 
 if TYPE_CHECKING:
     from roboirg.envs.environment import RoboIRGEnv

@@ -9,7 +9,6 @@ from operator import itemgetter
 from typing import NamedTuple
 
 from roboirg.core.delivery import PromptVerdict, utterance_steps
-from roboirg.evaluation.hosting.policy_descriptions import describe_policy
 from roboirg.evaluation.play.job_instruction import instruct_job
 from roboirg.evaluation.records.record import Job, PromptAudit
 from roboirg.language.instruction import Instruction
@@ -107,7 +106,8 @@ def prompt_shares(jobs: Iterable[Job]) -> tuple[PromptShares, ...]:
     verdicts: dict[tuple[object, ...], PromptVerdict] = {}
     for job in jobs:
         if job.policy not in limits:
-            limits[job.policy] = prompt_limit(describe_policy(job.policy_spec).needs)
+            needs = None if job.ref is None else job.ref.needs
+            limits[job.policy] = None if needs is None else prompt_limit(needs)
         limit = limits[job.policy]
         verdict: PromptVerdict = "unknown"
         if limit is not None:

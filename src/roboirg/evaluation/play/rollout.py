@@ -21,17 +21,16 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from socket import socket
 
-from roboirg import policies
 from roboirg.core.errors import InvalidValueError
+from roboirg.core.policy_needs import PolicyNeeds
+from roboirg.core.policy_ref import SCRIPTED, PolicyRef
 from roboirg.evaluation.episode_errors import EpisodeError, EpisodeLostError, one_line
 from roboirg.evaluation.hosting.host_pool import HostSettings
 from roboirg.evaluation.hosting.hosted_policy import HostedPlanner, HostedPolicy
-from roboirg.evaluation.hosting.policy_descriptions import PolicyDescription, describe_here
 from roboirg.evaluation.play.call_guard import CallGuard
 from roboirg.evaluation.play.episode_record import (
     audit_record,
     begin_record,
-    describe,
     lost_record,
     utc_now,
 )
@@ -44,10 +43,9 @@ from roboirg.evaluation.policy_calls import policy_usage
 from roboirg.evaluation.records.action_log import ActionLog, write_actions
 from roboirg.evaluation.records.film import VIDEO_FOLDER, VideoMode
 from roboirg.evaluation.records.record import Job, Record
-from roboirg.policies.by_name.loading import is_privileged, needs_host, planner_alone
-from roboirg.policies.by_name.systems import SCRIPTED, make_hands
+from roboirg.policies.by_name.finding import make_policy
+from roboirg.policies.by_name.policy_kinds import make_follower
 from roboirg.policies.contract.base import Policy, close_policy
-from roboirg.policies.contract.policy_needs import PolicyNeeds
 from roboirg.policies.contract.random_state import episode_policy_seed
 from roboirg.policies.planners.hierarchical_policy import HierarchicalPolicy, with_planner
 from roboirg.policies.prompt_length.prompt_audit import PromptLimit
@@ -154,9 +152,9 @@ class EpisodeRunner:
             MissingDependencyError: a package has to be installed first.
             InvalidValueError: the job's wording file is missing or has changed.
         """
-        prepared, hosts = PreparedJob(job), self.hosts if needs_host(job.policy_spec) else None
-        unknown = PolicyDescription("unknown", is_privileged(job.policy_spec))
-        record = begin_record(prepared, unknown if hosts else describe_here(job.policy_spec))
+        prepared = PreparedJob(job)
+        hosts = self.hosts if job.ref is not None and job.ref.is_hosted else None
+        record = begin_record(prepared)
         guard = CallGuard(record.timings, self.policy_timeout_s, is_hosted=hosts is not None)
         policy: Policy | None = None
         limit: PromptLimit | None = None
@@ -166,9 +164,7 @@ class EpisodeRunner:
                 if hosts is None:
                     policy = load_policy(prepared)
                 else:
-                    seed = _policy_seed(prepared)
-                    policy = load_hosted_policy(hosts, job.policy_spec, seed, alone=alone)
-                    record.policy_version = policy.version
+                    policy = load_hosted_policy(hosts, prepared, alone=alone)
                 needs = job_needs(policy, job)
                 limit = prompt_limit(needs)
                 if self.refuse_long and limit is not None:
@@ -178,8 +174,6 @@ class EpisodeRunner:
             log = play_with(policy, prepared, needs, record, guard, writer)
         except EpisodeError as error:
             record.record_error(error.kind, error.cause, error.details)
-            if policy is None and hosts is not None:
-                record.policy_version = describe(job).version
         finally:
             if policy is not None:
                 _close_policy(policy, record, guard)
@@ -240,22 +234,26 @@ def play_with(
 
 def load_policy(prepared: PreparedJob) -> Policy:
     """Return a new policy object, so that no state of an earlier episode remains."""
-    return policies.make_policy(prepared.job.policy_spec, seed=_policy_seed(prepared))
+    return make_policy(*_policy_and_seed(prepared))
 
 
 def load_hosted_policy(
-    hosts: socket, spec: str, seed: int, *, alone: bool = False
+    hosts: socket, prepared: PreparedJob, *, alone: bool = False
 ) -> HostedPolicy | HierarchicalPolicy:
     """Return a policy in a process of its own; scripted hands of a user's planner are in this."""
-    if (planner := planner_alone(spec)) is None:
-        return HostedPolicy(hosts, spec, seed, alone=alone)
-    hosted = HostedPlanner(hosts, planner, seed, alone=alone)
-    return with_planner(hosted, make_hands(SCRIPTED, seed), spec.partition("?")[0])
+    ref, seed = _policy_and_seed(prepared)
+    if ref.place != "split":
+        return HostedPolicy(hosts, ref, seed, alone=alone)
+    hosted = HostedPlanner(hosts, ref.hosted_part, seed, alone=alone)
+    return with_planner(hosted, make_follower(SCRIPTED, seed), ref.body.partition("?")[0])
 
 
-def _policy_seed(prepared: PreparedJob) -> int:
+def _policy_and_seed(prepared: PreparedJob) -> tuple[PolicyRef, int]:
+    """Return the policy of a job, and its seed in the episode."""
     job = prepared.job
-    return episode_policy_seed(job.policy_seed, prepared.scene_episode.seed, job.arm)
+    if job.ref is None:
+        raise ValueError(f"{job.slug} names no policy to play it")
+    return job.ref, episode_policy_seed(job.policy_seed, prepared.scene_episode.seed, job.arm)
 
 
 def _close_policy(policy: Policy, record: Record, guard: CallGuard) -> None:

@@ -20,13 +20,14 @@ if TYPE_CHECKING:
     from pyarrow import DataType
 
 _BATCH_ROWS = 5_000
+_NESTED = (inspect.StructType, inspect.DataclassType)
 
 
 def write_parquet(records: Iterable[Record], path: Path) -> int:
     """Write records to a Parquet file, which appears complete or not at all.
 
     The columns are the fields of a record and the options of its instruction and environment.
-    ``instruction``, ``mentions``, ``prompt``, ``events`` and ``attribution`` are nested;
+    ``ref``, ``instruction``, ``mentions``, ``prompt``, ``events`` and ``attribution`` are nested;
     dictionaries, whose keys depend on the task or the policy, are JSON texts.
 
     Returns:
@@ -65,7 +66,7 @@ def _fit(value: Any, kind: inspect.Type) -> Any:  # noqa: ANN401 - a value of th
         return json.dumps(msgspec.to_builtins(value), ensure_ascii=False)
     if isinstance(kind, inspect.UnionType):
         return str(value)
-    if isinstance(kind, inspect.StructType):
+    if isinstance(kind, _NESTED):
         return {one.name: _fit(getattr(value, one.name), one.type) for one in kind.fields}
     if isinstance(kind, inspect.VarTupleType):
         return [_fit(one, kind.item_type) for one in value]
@@ -77,7 +78,7 @@ def _arrow_type(kind: inspect.Type) -> DataType:
     import pyarrow as pa
 
     kind = _without_none(kind)
-    if isinstance(kind, inspect.StructType):
+    if isinstance(kind, _NESTED):
         return pa.struct({one.name: _arrow_type(one.type) for one in kind.fields})
     if isinstance(kind, inspect.VarTupleType):
         return pa.list_(_arrow_type(kind.item_type))
@@ -104,7 +105,7 @@ def _columns() -> dict[str, inspect.Type]:
         raise TypeError(f"{Record} is no struct")
     found: dict[str, inspect.Type] = {}
     for one in record.fields:
-        if isinstance(one.type, inspect.DataclassType):
+        if isinstance(one.type, inspect.DataclassType) and one.name != "ref":
             found |= {f"{one.name}.{option.name}": option.type for option in one.type.fields}
         else:
             found[one.name] = one.type

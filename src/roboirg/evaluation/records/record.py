@@ -24,6 +24,7 @@ from roboirg.core.inference_facts import InferenceFacts
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.core.observations import DemonstrationSource
 from roboirg.core.plain_text import clip_text
+from roboirg.core.policy_ref import PolicyRef
 from roboirg.evaluation.records.run_files import RELATIVE_PATH
 from roboirg.util.short_hash import short_hash
 
@@ -54,7 +55,7 @@ NON_DETERMINISTIC_FIELDS = frozenset(
         "inference",
         "plan",
         "processor",
-        "spec",
+        "ref",
         "started_at",
         "timings",
         "usage",
@@ -67,10 +68,10 @@ NON_DETERMINISTIC_FIELDS = frozenset(
 
 
 class Job(msgspec.Struct, frozen=True, kw_only=True, gc=False):
-    """One episode to play. All fields but `spec` and `wordings_file` identify its record.
+    """One episode to play. All fields but `ref` and `wordings_file` identify its record.
 
     Attributes:
-        policy: name of the policy, often its spec.
+        policy: name of the policy.
         task: name of the task.
         split: train, val, test or random.
         episode: 0-based position in the split.
@@ -81,8 +82,8 @@ class Job(msgspec.Struct, frozen=True, kw_only=True, gc=False):
         arm: which control arm it is, as in `roboirg.core.arms`; ``told`` for the episode's words.
         wordings_file: path of the wording file in `options`; not part of the identity, because a
             file may be moved.
-        spec: spec of the policy if that is not its name; not part of the identity, because an
-            address may change.
+        ref: the policy; not part of the identity, because an address may change. None where no
+            policy plays.
     """
 
     policy: Name
@@ -94,7 +95,7 @@ class Job(msgspec.Struct, frozen=True, kw_only=True, gc=False):
     environment: EnvironmentOptions = EnvironmentOptions()
     arm: Name = TOLD
     wordings_file: str | None = None
-    spec: str | None = None
+    ref: PolicyRef | None = None
 
     @property
     def setting(self) -> str:
@@ -118,11 +119,6 @@ class Job(msgspec.Struct, frozen=True, kw_only=True, gc=False):
         return msgspec.structs.replace(self, options=replace(self.options, **changes))
 
     @property
-    def policy_spec(self) -> str:
-        """Spec of the policy: a built-in name, ``package.module:Class``, or an address."""
-        return self.spec or self.policy
-
-    @property
     def slug(self) -> str:
         """Short unique name that is safe in file names."""
         words = [self.policy, self.task, self.split, self.episode, self.setting, self.form]
@@ -136,7 +132,7 @@ class Job(msgspec.Struct, frozen=True, kw_only=True, gc=False):
         return f"{readable}-{short_hash(msgspec.json.encode(identity))}"
 
 
-IDENTITY = tuple(name for name in Job.__struct_fields__ if name not in {"spec", "wordings_file"})
+IDENTITY = tuple(name for name in Job.__struct_fields__ if name not in {"ref", "wordings_file"})
 """The fields that identify a job."""
 
 
@@ -307,8 +303,7 @@ class Summary(Job, frozen=False, kw_only=True, gc=False):  # type: ignore[misc]
             0 without a video.
         demonstration_source: whose actions the video shows: RoboMME's (``recorded``), the oracle's
             (``planned``), or ``none``.
-        privileged: whether the policy has access to the simulator's state.
-        policy_version: distinguishes versions of a policy of the same name.
+        ref: the policy as it played, with the version that it declared then.
         server_version: that the policy's server reported; None if there is no server, if it
             reported none, or if the episode ended before.
         language_version: version of the instruction generator.
@@ -340,8 +335,7 @@ class Summary(Job, frozen=False, kw_only=True, gc=False):  # type: ignore[misc]
     steps: Whole = 0
     demonstration_steps: Whole = 0
     demonstration_source: DemonstrationSource = "none"
-    privileged: bool
-    policy_version: Name = "unknown"
+    ref: PolicyRef
     server_version: Name | None = None
     language_version: Name
     environment_version: Whole
@@ -359,8 +353,18 @@ class Summary(Job, frozen=False, kw_only=True, gc=False):  # type: ignore[misc]
     duration_s: float
 
     @property
+    def privileged(self) -> bool:
+        """Whether the policy had access to the simulator's state."""
+        return self.ref.is_privileged
+
+    @property
+    def policy_version(self) -> str:
+        """Distinguishes versions of a policy of the same name."""
+        return self.ref.version
+
+    @property
     def identity(self) -> Job:
-        """Its job, without the policy's spec."""
+        """Its job, without the policy."""
         return Job(**{name: getattr(self, name) for name in IDENTITY})
 
 

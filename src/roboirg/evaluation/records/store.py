@@ -3,7 +3,7 @@
 Guaranteed on a local POSIX file system, besides what `line_file` guarantees:
 
 - A damaged line in the middle is skipped and reported; all other lines are read.
-- Verdicts of two versions of a policy's server do not get into one file.
+- Verdicts of two versions of a policy, or of its server, do not get into one file.
 
 Not guaranteed: anything on network file systems whose `flock` or fsync do not work as specified;
 that lines are in the order of the plan (they are in the order in which episodes finished).
@@ -13,7 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from pathlib import Path
-from typing import Generic, Self, TypeVar
+from typing import Generic, NamedTuple, Self, TypeVar
 
 import msgspec
 
@@ -35,6 +35,13 @@ _BUFFER = 1 << 20
 """Bytes to read at a time."""
 
 Stored = TypeVar("Stored", bound=Summary)
+
+
+class ToldVersions(NamedTuple):
+    """The version of a policy, and that of its server; None if there is none or it told none."""
+
+    policy: str
+    server: str | None
 
 
 class RecordStore:
@@ -59,15 +66,15 @@ class RecordStore:
         self.folder = folder
         self.path = folder / RECORDS_FILE
         self.stored: dict[RecordKey, Summary] = {}
-        self._told: dict[str, str | None] = {}
+        self._told: dict[str, ToldVersions] = {}
         self._file = AppendFile(folder, RECORDS_FILE, TORN_FILE, self._read)
 
     def append(self, record: Record) -> None:
         """Write one record; when this returns, it is on disk.
 
         Raises:
-            StoreError: the record cannot be written, or the policy's server is now another version
-                than in earlier verdicts; the file is unchanged.
+            StoreError: the record cannot be written, or the policy or its server is now another
+                version than in earlier verdicts; the file is unchanged.
         """
         self.extend([encode(record)])
 
@@ -75,8 +82,8 @@ class RecordStore:
         """Write records as JSON lines, without newlines; when this returns, all are on disk.
 
         Raises:
-            StoreError: a record cannot be written, a line is not one, or a policy's server is now
-                another version than in earlier verdicts; the file is unchanged.
+            StoreError: a record cannot be written, a line is not one, or a policy or its server is
+                now another version than in earlier verdicts; the file is unchanged.
         """
         added: dict[RecordKey, Summary] = {}
         told = dict(self._told)
@@ -206,12 +213,16 @@ class StoredRun(Generic[Stored]):
             yield read_record(line, self._path, self._places[identity_key(one)].number)
 
 
-def told_versions(records: Iterable[Summary]) -> dict[str, str | None]:
-    """Return the version of each policy's server, of those with a verdict; None if unreported."""
-    return {one.policy: one.server_version for one in records if one.outcome != "error"}
+def told_versions(records: Iterable[Summary]) -> dict[str, ToldVersions]:
+    """Return the versions of each policy and its server, of those with a verdict."""
+    return {
+        one.policy: ToldVersions(one.policy_version, one.server_version)
+        for one in records
+        if one.outcome != "error"
+    }
 
 
-def check_told_version(folder: Path, told: Mapping[str, str | None], record: Summary) -> None:
+def check_told_version(folder: Path, told: Mapping[str, ToldVersions], record: Summary) -> None:
     """Refuse a verdict of another version than the folder's.
 
     Args:
@@ -222,11 +233,19 @@ def check_told_version(folder: Path, told: Mapping[str, str | None], record: Sum
     Raises:
         StoreError: the version differs.
     """
-    before, now = told.get(record.policy, record.server_version), record.server_version
-    if record.outcome != "error" and before != now:
+    before = told.get(record.policy)
+    if before is None or record.outcome == "error":
+        return
+    if before.server != record.server_version:
         raise StoreError(
-            f"{folder} holds episodes of {record.policy} whose server reported {_name(before)}, "
-            f"but now it reports {_name(now)}; choose another --out."
+            f"{folder} holds episodes of {record.policy} whose server reported "
+            f"{_name(before.server)}, but now it reports {_name(record.server_version)}; choose "
+            "another --out."
+        )
+    if before.policy != record.policy_version:
+        raise StoreError(
+            f"{folder} holds episodes of {record.policy} {_name(before.policy)}, but what played "
+            f"{record.slug} has {_name(record.policy_version)}; choose another --out."
         )
 
 
@@ -235,8 +254,8 @@ def adopt_told_versions(records: Iterable[Stored]) -> tuple[Stored, ...]:
     found = list(records)
     told = told_versions(found)
     return tuple(
-        msgspec.structs.replace(one, server_version=told[one.policy])
-        if one.outcome == "error" and one.server_version is None and told.get(one.policy)
+        msgspec.structs.replace(one, server_version=told[one.policy].server)
+        if one.outcome == "error" and one.server_version is None and one.policy in told
         else one
         for one in found
     )

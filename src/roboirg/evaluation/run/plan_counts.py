@@ -7,8 +7,6 @@ from collections.abc import Iterable, Mapping
 
 from roboirg.evaluation.play.job_instruction import PreparedJob
 from roboirg.evaluation.records.record import Job
-from roboirg.policies.by_name.loading import model_asker
-from roboirg.policies.by_name.policy_specs import LISTENER
 
 
 def cell_sizes(jobs: Iterable[Job]) -> Mapping[tuple[str, str], Mapping[str, Counter[str]]]:
@@ -29,8 +27,8 @@ def least_calls(jobs: Iterable[Job]) -> Mapping[tuple[str, str], int]:
     """
     calls: Counter[tuple[str, str]] = Counter()
     for job in jobs:
-        asker = model_asker(job.policy_spec)
-        if asker is not None:
-            count = 1 if asker == LISTENER else len(PreparedJob(job).episode.stages)
+        asks = None if job.ref is None else job.ref.asks
+        if asks is not None:
+            count = 1 if asks == "listener" else len(PreparedJob(job).episode.stages)
             calls[job.policy, job.setting] += count
     return calls

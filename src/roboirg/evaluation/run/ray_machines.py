@@ -24,10 +24,11 @@ from typing import NamedTuple
 
 from roboirg.core.episode import ENVIRONMENT_VERSION
 from roboirg.core.errors import RoboIRGError
+from roboirg.core.policy_ref import UNKNOWN_VERSION, PolicyRef
 from roboirg.core.version import __version__
 from roboirg.evaluation.episode_errors import one_line
 from roboirg.evaluation.hosting.host_pool import HostPool, HostSettings
-from roboirg.evaluation.hosting.policy_descriptions import describe_policy
+from roboirg.evaluation.hosting.policy_opening import open_policy
 from roboirg.evaluation.play.rollout import PlayJob
 from roboirg.evaluation.records.record import Job, Record
 from roboirg.evaluation.run.workers import POLL_S, Worker
@@ -48,22 +49,17 @@ class MachineVersions(NamedTuple):
         roboirg: version of the package.
         language: version of the instructions.
         environment: version of the environment.
-        policies: versions of the run's policies, by what names them.
+        policies: of the run, with their versions.
     """
 
     roboirg: str
     language: str
     environment: int
-    policies: Mapping[str, str] = {}
+    policies: tuple[PolicyRef, ...] = ()
 
     @classmethod
-    def here(cls, specs: tuple[str, ...]) -> MachineVersions:
-        """Return those of this machine.
-
-        Raises:
-            RoboIRGError: a policy cannot be loaded.
-        """
-        policies = {spec: describe_policy(spec).version for spec in specs}
+    def expected(cls, policies: tuple[PolicyRef, ...]) -> MachineVersions:
+        """Return those of this machine, with policies as they were opened where the run began."""
         return cls(__version__, LANGUAGE_VERSION, ENVIRONMENT_VERSION, policies)
 
     def difference(self, there: MachineVersions) -> str | None:
@@ -72,7 +68,11 @@ class MachineVersions(NamedTuple):
             ("roboirg", self.roboirg, there.roboirg),
             ("its language", self.language, there.language),
             ("its environment", self.environment, there.environment),
-            *((spec, mine, there.policies[spec]) for spec, mine in self.policies.items()),
+            *(
+                (mine.spec, mine.version, theirs.version)
+                for mine, theirs in zip(self.policies, there.policies, strict=True)
+                if mine.version != UNKNOWN_VERSION
+            ),
         ]
         for what, mine, theirs in pairs:
             if mine != theirs:
@@ -143,7 +143,8 @@ class MachineAgent:
     def check(self, versions: MachineVersions) -> CheckedMachine:
         """Check that the machine has the same versions as the driver and can load the policies."""
         try:
-            fault = versions.difference(MachineVersions.here(tuple(versions.policies)))
+            policies = tuple(map(open_policy, versions.policies))
+            fault = versions.difference(MachineVersions.expected(policies))
         except RoboIRGError as error:
             fault = one_line(error)
         return CheckedMachine(fault, self._folder, self._address)

@@ -130,9 +130,8 @@ class RayPool:
 
     def play_all(self, jobs: deque[Job]) -> Iterator[Record]:
         """Yield one record for each job as they finish."""
-        versions = MachineVersions.here(
-            tuple(dict.fromkeys(job.spec or job.policy for job in jobs))
-        )
+        refs = dict.fromkeys(job.ref for job in jobs if job.ref is not None)
+        versions = MachineVersions.expected(tuple(refs))
         while jobs or self._busy():
             if time.monotonic() - self._reached > POLL_S and not self._is_reachable():
                 self._check_head(len(jobs))

@@ -15,8 +15,8 @@ from typing import NamedTuple
 from roboirg.core.episode import ENVIRONMENT_VERSION
 from roboirg.core.errors import InvalidValueError
 from roboirg.core.plain_text import counted
+from roboirg.core.policy_ref import UNKNOWN_VERSION
 from roboirg.evaluation.episode_errors import MAX_CAUSE_LENGTH, Terminated, format_cause
-from roboirg.evaluation.hosting.policy_descriptions import describe_policy
 from roboirg.evaluation.plan.plan import Plan
 from roboirg.evaluation.plan.stored_plans import write_plan
 from roboirg.evaluation.play.rollout import EpisodeRunner, PlayJob
@@ -270,13 +270,20 @@ def _check_versions(plan: Plan, records: Collection[Summary], folder: Path) -> N
 
 def _check_policies(plan: Plan, records: Iterable[Summary], folder: Path) -> None:
     """Refuse records of another version of a policy of the same name."""
-    specs = plan.specs
-    for policy, version in {(record.policy, record.policy_version) for record in records}:
-        now = describe_policy(specs[policy]).version if policy in specs else version
-        if version != now:
+    known = {one.name: one for one in plan.policies}
+    for policy, version in {(one.policy, one.policy_version) for one in records}:
+        now = known.get(policy)
+        if now is None or version == now.version:
+            continue
+        if now.problem is not None:
+            raise StoreError(
+                f"{folder} holds episodes of {policy} version {version}, but the policy cannot be "
+                f"opened to read its version now ({now.problem}); choose another --out."
+            )
+        if now.version != UNKNOWN_VERSION:
             raise StoreError(
                 f"{folder} holds episodes of {policy} version {version}, but the policy is now "
-                f"version {now}; choose another --out."
+                f"version {now.version}; choose another --out."
             )
 
 

@@ -14,10 +14,10 @@ from types import ModuleType
 from typing import Any
 
 from roboirg.core.errors import InvalidValueError, MissingDependencyError, UnknownNameError
+from roboirg.core.policy_needs import PolicyNeeds
 from roboirg.policies.builtin import BUILTIN
 from roboirg.policies.contract.base import Policy
 from roboirg.policies.contract.batch_policy import make_batched, parameters_of, takes_batches
-from roboirg.policies.contract.policy_needs import PolicyNeeds
 from roboirg.policies.contract.policy_urls import is_url
 from roboirg.policies.planners.planner import Planner
 from roboirg.policies.remote.protocols import protocols_by_scheme
@@ -55,7 +55,7 @@ def find_class(spec: str) -> type[Any]:
     """
     if is_url(spec):
         policy_class = _url_class(spec)
-        _check_needs(spec, policy_class(spec))
+        check_policy(spec, policy_class(spec), ("reset", "act"))
         return policy_class
     return _import_class(spec, ("reset", "act"))
 
@@ -100,7 +100,7 @@ def _import_class(spec: str, methods: tuple[str, ...]) -> type[Any]:
             f"Policy {spec!r}: {name!r} in module {module_name} is of type "
             f"{type(found).__name__}, not a class."
         )
-    _check_class(spec, found, methods)
+    check_policy(spec, found, methods)
     return found
 
 
@@ -127,37 +127,32 @@ def _construct(spec: str, policy_class: type[Any], seed: int) -> Any:  # noqa: A
     return policy_class(seed=seed) if "seed" in parameters_of(policy_class) else policy_class()
 
 
-def _check_class(spec: str, policy_class: type[Any], methods: tuple[str, ...]) -> None:
-    """Raise for a class with which every episode would end in an error."""
-    name = policy_class.__name__
-    if takes_batches(policy_class) and hasattr(policy_class, "attach"):
+def check_policy(spec: str, policy: object, methods: tuple[str, ...]) -> None:
+    """Raise for a class of policies, or a policy, with which every episode would end in an error.
+
+    What only shows when it is made, such as a missing argument, shows when it is opened.
+    """
+    kind = policy if isinstance(policy, type) else type(policy)
+    if takes_batches(policy) and hasattr(policy, "attach"):
         raise InvalidValueError(
-            f"Policy {spec!r}: class {name} has attach() and act_batch(); a privileged policy is "
-            "asked about one episode at a time."
+            f"Policy {spec!r}: class {kind.__name__} has attach() and act_batch(); a privileged "
+            "policy is asked about one episode at a time."
         )
-    for method in () if takes_batches(policy_class) else methods:
-        if not hasattr(policy_class, method):
-            raise InvalidValueError(f"Policy {spec!r}: class {name} has no method {method}().")
-        if not callable(getattr(policy_class, method)):
-            raise InvalidValueError(f"Policy {spec!r}: {method} of class {name} is not a method.")
-        if method in ARGUMENTS:
-            _check_arguments(spec, getattr(policy_class, method), ARGUMENTS[method])
-    if inspect.isabstract(policy_class):
-        missing = sorted(policy_class.__abstractmethods__)
-        raise InvalidValueError(
-            f"Policy {spec!r}: class {name} is abstract; it lacks {', '.join(missing)}."
-        )
-    for parameter in parameters_of(policy_class).values():
-        optional = parameter.default is not parameter.empty or parameter.kind in (
-            parameter.VAR_POSITIONAL,
-            parameter.VAR_KEYWORD,
-        )
-        if not optional and parameter.name != "seed":
+    for method in () if takes_batches(policy) else methods:
+        if not hasattr(policy, method):
             raise InvalidValueError(
-                f"Policy {spec!r}: {name}() is called with seed= at most, but needs "
-                f"{parameter.name!r}; give it a default, such as an environment variable's value."
+                f"Policy {spec!r}: class {kind.__name__} has no method {method}()."
             )
-    _check_needs(spec, policy_class)
+        if not callable(getattr(policy, method)):
+            raise InvalidValueError(
+                f"Policy {spec!r}: {method} of class {kind.__name__} is not a method."
+            )
+        if policy is kind and method in ARGUMENTS:
+            _check_arguments(spec, getattr(policy, method), ARGUMENTS[method])
+    try:
+        PolicyNeeds.of(policy)
+    except InvalidValueError as error:
+        raise InvalidValueError(f"Policy {spec!r}: {error}") from error
 
 
 def _check_arguments(spec: str, method: Callable[..., Any], takes: tuple[str, ...]) -> None:
@@ -171,14 +166,6 @@ def _check_arguments(spec: str, method: Callable[..., Any], takes: tuple[str, ..
             f"Policy {spec!r}: {method.__qualname__}{inspect.signature(method)} must take "
             f"{' and '.join(takes)}."
         ) from error
-
-
-def _check_needs(spec: str, policy: object) -> None:
-    """Raise if the needs of a class, or of a policy, are invalid."""
-    try:
-        PolicyNeeds.of(policy)
-    except InvalidValueError as error:
-        raise InvalidValueError(f"Policy {spec!r}: {error}") from error
 
 
 def _url_class(spec: str) -> type[Any]:

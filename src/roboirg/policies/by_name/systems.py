@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from importlib import resources
 from pathlib import Path
 from typing import Any
@@ -12,23 +12,17 @@ from urllib.parse import urlencode
 from pydantic import BaseModel, ConfigDict
 
 from roboirg.core.errors import InvalidValueError, UnknownNameError
-from roboirg.policies.by_name.policy_classes import find_class, make_from_class
-from roboirg.policies.contract.base import Policy
+from roboirg.core.policy_ref import HANDS
 from roboirg.policies.contract.option_checking import check_options
 from roboirg.policies.contract.policy_urls import is_url, split_url
-from roboirg.policies.planners import make_planner
-from roboirg.policies.planners.hierarchical_policy import with_planner
 
 PACKAGE, FOLDER = "roboirg.policies.by_name", "system_files"
 SUFFIX = ".toml"
 
-SERVER, VLM, MODEL, HANDS = "server", "vlm", "model", "hands"
-SCRIPTED, ELSEWHERE = "scripted", "elsewhere"
-"""Hands next to the world; and none, as a planner's own process has none."""
+SERVER, VLM, MODEL = "server", "vlm", "model"
 POLICY, PLANNER = "policy.", "planner."
 SHORTCUTS: Mapping[str, str] = {VLM: "planner.model.base_url", MODEL: "planner.model.model"}
 """Short names of options, and the entries that they set."""
-HANDS_CLASS = "roboirg.policies.hands.scripted_hands:ScriptedHands"
 OPTIONS = (SERVER, HANDS, *SHORTCUTS, "policy.OPTION", "planner.OPTION", "planner.model.OPTION")
 
 
@@ -72,26 +66,6 @@ class System(BaseModel):
     published: Published | None = None
 
 
-def load_system(
-    name_or_file: str, overrides: Mapping[str, str] | None = None, seed: int = 0
-) -> Policy:
-    """Load a system as a policy; nothing is connected.
-
-    Args:
-        name_or_file: a name such as ``GroundSG-QwenVL``, or a TOML file with the same entries.
-        overrides: ``server`` (host:port of the policy), ``vlm`` (URL of the planner's model),
-            ``model`` (its name), ``hands`` (``scripted``, or the spec of a policy that follows
-            subgoals, instead of its own), ``policy.OPTION``, ``planner.OPTION``,
-            ``planner.model.OPTION``.
-        seed: of the policy's own random choices.
-
-    Raises:
-        UnknownNameError: there is no such system or option.
-        InvalidValueError: the file cannot be read, or an option has an invalid value.
-    """
-    return build_system(find_system(name_or_file, overrides or {}), seed)
-
-
 def all_systems() -> tuple[str, ...]:
     """Return the names of the systems in this package."""
     files = resources.files(PACKAGE).joinpath(FOLDER).iterdir()
@@ -100,7 +74,19 @@ def all_systems() -> tuple[str, ...]:
 
 
 def find_system(name_or_file: str, overrides: Mapping[str, str]) -> System:
-    """Load a system with some entries overridden; see `load_system`."""
+    """Load the configuration of a system.
+
+    Args:
+        name_or_file: a name such as ``GroundSG-QwenVL``, or a TOML file with the same entries.
+        overrides: ``server`` (host:port of the policy), ``vlm`` (URL of the planner's model),
+            ``model`` (its name), ``hands`` (``scripted``, or the spec of a policy that follows
+            subgoals, instead of its own), ``policy.OPTION``, ``planner.OPTION``,
+            ``planner.model.OPTION``.
+
+    Raises:
+        UnknownNameError: there is no such system or option.
+        InvalidValueError: the file cannot be read, or an option has an invalid value.
+    """
     if name_or_file in all_systems():
         file = resources.files(PACKAGE).joinpath(FOLDER, f"{name_or_file}{SUFFIX}")
         content = file.read_bytes()
@@ -117,25 +103,6 @@ def find_system(name_or_file: str, overrides: Mapping[str, str]) -> System:
         raise InvalidValueError(f"System {name_or_file!r} is not TOML ({error}).") from error
     origin = f"system {name_or_file}"
     return _overridden(check_options(System, entries, origin), overrides, origin)
-
-
-def build_system(
-    system: System, seed: int, make: Callable[[str, int], Policy] | None = None
-) -> Policy:
-    """Make the policy of a system, by `make_hands` unless something else makes it from its spec."""
-    policy = (make or make_hands)(system.policy, seed)
-    if system.planner is None:
-        return policy
-    options = dict(system.planner)
-    kind = str(options.pop("kind", ""))
-    planner = make_planner(kind, options, f"the planner of system {system.name}", seed)
-    return with_planner(planner, policy, system.name)
-
-
-def make_hands(spec: str, seed: int) -> Policy:
-    """Make the policy of a spec, or the scripted hands; nothing is connected."""
-    spec = HANDS_CLASS if spec == SCRIPTED else spec
-    return make_from_class(spec, find_class(spec), seed)
 
 
 def _overridden(system: System, overrides: Mapping[str, str], origin: str) -> System:

@@ -9,8 +9,8 @@ from numpy.typing import ArrayLike
 
 from roboirg.core.errors import InvalidValueError
 from roboirg.core.observations import Demonstration, Observation
+from roboirg.core.policy_needs import ENV_NEEDS, PolicyNeeds
 from roboirg.policies.contract.base import Policy, PrivilegedPolicy, tell_policy
-from roboirg.policies.contract.policy_needs import ENV_NEEDS, PolicyNeeds
 
 if TYPE_CHECKING:
     from roboirg.envs.environment import RoboIRGEnv

@@ -10,6 +10,8 @@ from numpy.typing import NDArray
 
 from roboirg.core.errors import InvalidValueError
 from roboirg.core.observations import Demonstration, Observation
+from roboirg.core.policy_needs import PolicyNeeds
+from roboirg.core.policy_ref import UNKNOWN_VERSION
 from roboirg.core.subgoal_text import BETWEEN_VERSIONS
 from roboirg.policies.contract.base import (
     Policy,
@@ -19,7 +21,7 @@ from roboirg.policies.contract.base import (
     close_policy,
     tell_policy,
 )
-from roboirg.policies.contract.policy_needs import PolicyNeeds
+from roboirg.policies.contract.policy_version import read_version
 from roboirg.policies.planners.observation_merging import (
     DemonstrationSubset,
     select_history,
@@ -192,7 +194,7 @@ class PrivilegedHierarchicalPolicy(HierarchicalPolicy):
 
 def joint_version(*parts: object) -> str:
     """Return the versions of a planner and its policy as one."""
-    return BETWEEN_VERSIONS.join(str(getattr(one, "version", "unknown")) for one in parts)
+    return BETWEEN_VERSIONS.join(read_version(one) or UNKNOWN_VERSION for one in parts)
 
 
 def with_planner(planner: Planner, policy: Policy, name: str | None = None) -> HierarchicalPolicy:

@@ -8,8 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from roboirg.core.observations import Demonstration, Observation
+from roboirg.core.policy_needs import PolicyNeeds
+from roboirg.core.policy_ref import UNKNOWN_VERSION
 from roboirg.policies.contract.base import SubgoalEnd, close_policy, tell_policy
-from roboirg.policies.contract.policy_needs import PolicyNeeds
+from roboirg.policies.contract.policy_version import read_version
 from roboirg.policies.planners.planner import Planner
 
 
@@ -27,8 +29,12 @@ class PlannerAlone:
         self._planner: Any = planner
         planner.reports = True  # type: ignore[attr-defined]
         PolicyNeeds.of_planner(planner).declare_on(self)
-        self.version = str(getattr(planner, "version", "unknown"))
         self.subgoal: str | None = None
+
+    @property
+    def version(self) -> str:
+        """The planner's, which it may set until its `reset` ends."""
+        return read_version(self._planner) or UNKNOWN_VERSION
 
     @property
     def metadata(self) -> Any:  # noqa: ANN401 - of any class

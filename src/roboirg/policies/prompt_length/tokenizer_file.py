@@ -11,7 +11,7 @@ from typing import Any
 
 from roboirg.core.errors import InvalidValueError, RoboIRGError
 from roboirg.core.extras import extra_needed
-from roboirg.policies.contract.policy_needs import PolicyNeeds
+from roboirg.core.policy_needs import PolicyNeeds
 from roboirg.policies.prompt_length.prompt_audit import (
     LINE_BREAK_TOKENS,
     PromptLimit,

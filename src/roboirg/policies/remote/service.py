@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 
 from roboirg.core.actions import check_chunk
 from roboirg.core.observations import Observation
+from roboirg.core.policy_needs import PolicyNeeds
 from roboirg.policies.contract.base import Policy, tell_policy
-from roboirg.policies.contract.policy_needs import PolicyNeeds
 from roboirg.policies.remote.endpoints import MIB
 
 Message = Mapping[str, Any]

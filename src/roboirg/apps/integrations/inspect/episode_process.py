@@ -8,9 +8,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from roboirg.core.errors import PolicyConnectionError
+from roboirg.core.policy_ref import PRIVILEGED
 from roboirg.evaluation.records.record import Job
 from roboirg.evaluation.records.record_codec import encode
-from roboirg.policies.by_name.policy_specs import PRIVILEGED
 from roboirg.policies.vlm.models import ModelOptions, ModelQuery, ModelReply
 from roboirg.policies.vlm.models.openai_compatible import chat_messages
 from roboirg.policies.vlm.vlm_listener import ListenerOptions, VLMListener

@@ -34,6 +34,7 @@ from roboirg.core.episode import ENVIRONMENT_VERSION
 from roboirg.core.errors import RoboIRGError
 from roboirg.core.instruction_options import DEFAULT_DELIVERY, InstructionOptions
 from roboirg.evaluation.records.record import Job
+from roboirg.policies.by_name.finding import read_policy
 from roboirg.policies.vlm.models import ModelOptions
 from roboirg.policies.vlm.vlm_listener import ListenerOptions
 from roboirg.tasks import find_tasks
@@ -73,9 +74,10 @@ def listener(
         structured: whether to send the JSON schema of the answer.
     """
     count = min(episodes, split_size(split))
+    listener = read_policy(SPEC, "vlm-listener")
     jobs = [
         Job(
-            policy="vlm-listener", spec=SPEC, task=name, split=split, episode=index,
+            policy=listener.name, ref=listener, task=name, split=split, episode=index,
             options=InstructionOptions(setting, delivery=delivery),
             environment=EnvironmentOptions(max_steps),
         )

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from roboirg.core.errors import InvalidValueError, UnknownNameError
-from roboirg.policies.by_name.policy_specs import PolicyKind, PolicyMaker
+from roboirg.policies.by_name.policy_kinds import PolicyKind, PolicyMaker
 
 
 def _learned(spec: str, name: str, options: Mapping[str, str]) -> PolicyMaker:

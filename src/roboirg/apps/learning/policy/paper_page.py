@@ -108,7 +108,8 @@ def answers_text(found: Mapping[str, Cells]) -> str:
 def _of_row(result: Summary) -> Summary:
     """Return the result of a policy as one of its row: a training seed counts as a policy seed."""
     row, seed = row_of(result.policy)
-    return msgspec.structs.replace(result, policy=row, policy_seed=seed, policy_version="trained")
+    trained = replace(result.ref, version="trained")
+    return msgspec.structs.replace(result, policy=row, policy_seed=seed, ref=trained)
 
 
 def _questions(main: Cells) -> Iterator[str]:

@@ -13,8 +13,8 @@ from roboirg.apps.learning.policy.learned_policy import LearnedPolicy
 from roboirg.apps.learning.policy.subgoal_following import LearnedHands, LearnedPlanner
 from roboirg.core.actions import JOINT_ANGLE, WAYPOINT
 from roboirg.core.errors import InvalidValueError, UnknownNameError
-from roboirg.policies.by_name.policy_specs import PolicyKind, PolicyMaker, make_follower
-from roboirg.policies.by_name.systems import HANDS
+from roboirg.core.policy_ref import HANDS
+from roboirg.policies.by_name.policy_kinds import PolicyKind, PolicyMaker, make_follower
 from roboirg.policies.planners.hierarchical_policy import HierarchicalPolicy, with_planner
 
 if TYPE_CHECKING:

@@ -8,6 +8,7 @@ are between neighbors. The seed decides the orders and nothing else.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from itertools import product
 from pathlib import Path
 from typing import Literal
@@ -19,6 +20,7 @@ from roboirg.apps.real.study.counterbalancing import counterbalanced_episodes, t
 from roboirg.core.episode import Episode
 from roboirg.core.errors import InvalidValueError, RoboIRGError, UnknownNameError
 from roboirg.core.instruction_options import InstructionOptions
+from roboirg.core.policy_ref import unknown_policy
 from roboirg.evaluation.plan.option_parsing import name_and_spec
 from roboirg.evaluation.plan.plan import Plan
 from roboirg.evaluation.records.record import Job
@@ -56,7 +58,7 @@ class PlannedTrial(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fie
     @property
     def identity(self) -> Job:
         """The job without the policy's spec."""
-        return msgspec.structs.replace(self.job, spec=None)
+        return msgspec.structs.replace(self.job, ref=None)
 
     @property
     def episode(self) -> Episode:
@@ -104,14 +106,13 @@ class StudyPlan(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields
     @property
     def twin_plans(self) -> dict[str, Plan]:
         """For each task the plan with which ``roboirg run`` plays its trials in simulation."""
-        specs = {trial.job.policy: trial.job.spec for trial in self.trials}
-        policies = [name if specs[name] is None else f"{name}={specs[name]}" for name in specs]
+        policies = {one.job.policy: one.job.ref for one in self.trials if one.job.ref is not None}
         jobs: dict[str, list[Job]] = {}
         for trial in self.trials:
             jobs.setdefault(trial.job.task, []).append(trial.job)
         return {
             task: Plan(
-                policies=tuple(sorted(policies)),
+                policies=tuple(policies[name] for name in sorted(policies)),
                 tasks=(task,),
                 settings=tuple(sorted({job.setting for job in own})),
                 split=TRIAL_SPLIT,
@@ -170,7 +171,8 @@ def make_study(
             name, spec = named[policy]
             job = Job(
                 policy=name,
-                spec=None if spec == name else spec,
+                # Unread, as it may be a label of what other software runs.
+                ref=replace(unknown_policy(name), spec=spec),
                 task=task,
                 split=TRIAL_SPLIT,
                 episode=episode,

@@ -17,7 +17,7 @@ from roboirg.apps.real.study.failure_choices import failure_choices
 from roboirg.apps.real.study.study_plan import PlannedTrial, StudyPlan
 from roboirg.core.errors import InvalidValueError
 from roboirg.evaluation.episode_errors import format_cause
-from roboirg.evaluation.play.episode_record import begin_record, describe
+from roboirg.evaluation.play.episode_record import begin_record
 from roboirg.evaluation.play.job_instruction import PreparedJob
 from roboirg.evaluation.records.record import REAL_TRIAL, Record
 from roboirg.evaluation.records.store import RecordStore, iterate_records
@@ -120,7 +120,7 @@ class TrialLog:
             StoreError: the record cannot be written.
         """
         metadata = {"action": "score", "operator": operator, "note": note}
-        base = self.newest(trial.name) or begin_record(PreparedJob(trial.job), describe(trial.job))
+        base = self.newest(trial.name) or begin_record(PreparedJob(trial.job))
         changes: dict[str, Any] = {
             "outcome": "success", "error": None, "cause": None, "attribution": None,
             "video": video or base.video,

@@ -8,7 +8,7 @@ import numpy as np
 
 from roboirg.core.actions import ARM_JOINTS, JOINT_HIGH, JOINT_LOW, REACH_HIGH, REACH_LOW
 from roboirg.core.observations import Observation
-from roboirg.policies.contract.policy_needs import PolicyNeeds
+from roboirg.core.policy_needs import PolicyNeeds
 
 PICTURE, DEPTH = (256, 256, 3), (256, 256, 1)
 MAX_DEPTH = 2000

@@ -1,0 +1,252 @@
+"""Find a policy by its name, or make one known that Python code hands over."""
+
+from __future__ import annotations
+
+import contextlib
+import importlib
+import inspect
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from roboirg.core.errors import InvalidValueError, RoboIRGError
+from roboirg.core.field_types import as_name
+from roboirg.core.plain_text import clip_text
+from roboirg.core.policy_needs import PolicyNeeds
+from roboirg.core.policy_ref import (
+    ELSEWHERE,
+    PRIVILEGED,
+    SCRIPTED,
+    UNKNOWN_VERSION,
+    Asker,
+    Place,
+    PolicyRef,
+)
+from roboirg.policies.builtin import BUILTIN
+from roboirg.policies.by_name.policy_classes import check_policy, find_class
+from roboirg.policies.by_name.policy_kinds import (
+    CLASS,
+    LISTENER,
+    LIVE,
+    asks_model,
+    find_kind,
+    known_kinds,
+    live,
+    maker_of,
+    split_spec,
+    system_of,
+)
+from roboirg.policies.contract.base import Policy, close_policy
+from roboirg.policies.contract.policy_urls import is_url
+from roboirg.policies.contract.policy_version import read_version
+from roboirg.policies.contract.synthetic_episodes import SyntheticEpisodes
+from roboirg.util.short_hash import short_hash
+
+FIRST_WORDS = "Put the red cube on the target."
+VIDEO_STEPS = 4
+_MOST_WORDS = 300
+
+
+@dataclass(frozen=True)
+class Privileged:
+    """Declares that a policy may read the simulator's state: its ``attach`` gets the environment.
+
+    Attributes:
+        policy: a spec, class or object.
+    """
+
+    policy: str | type[Any] | object
+
+
+def read_policy(spec: str, name: str | None = None) -> PolicyRef:
+    """Return the policy of a spec. Code of ours is asked what it needs; no other is imported.
+
+    Args:
+        spec: a name in `BUILTIN`, such as ``oracle``; ``package.module:Class``; a URL; or one of
+            `roboirg.policies.by_name.policy_kinds`.
+        name: in records; the spec by default.
+
+    Raises:
+        UnknownNameError: there is no such built-in policy, scheme or option.
+        InvalidValueError: an option or the URL is malformed, or a policy of ours is declared
+            privileged.
+        MissingDependencyError: a library that the URL's scheme needs is not installed.
+    """
+    ref = split_spec(spec if name is None else name, spec)
+    system, kind = system_of(ref), ref.kind
+    is_foreign = not known_kinds().get(kind, True) or (kind == CLASS and ":" in ref.body)
+    is_split = False
+    asks: Asker | None = "listener" if kind == LISTENER else None
+    if system is not None:
+        has_own_planner = ":" in str((system.planner or {}).get("kind"))
+        is_split = has_own_planner and system.policy == SCRIPTED
+        has_hands = system.policy not in (SCRIPTED, ELSEWHERE)
+        is_foreign = has_own_planner or (has_hands and read_policy(system.policy).is_foreign)
+        asks = "planner" if asks_model(system) else None
+    ref = replace(ref, asks=asks, is_foreign=is_foreign, is_privileged=ref.is_declared)
+    if ref.is_declared and not is_foreign:
+        raise InvalidValueError(
+            f"Policy {ref.body!r} is not a class of your own; leave out {PRIVILEGED!r}."
+        )
+    if is_foreign:
+        place: Place = "world" if ref.is_declared else "split" if is_split else "own"
+        return replace(ref, place=place, is_privileged=ref.is_declared or is_split)
+    known = look_up(ref)
+    if find_kind(kind).has_weights:
+        # What acts on the world by its state is next to it, even if it is trained.
+        return replace(known, place="world" if known.is_privileged else "own")
+    return replace(known, place="server" if is_url(spec) else "world")
+
+
+def policy_of(policy: str | type[Any] | object, name: str | None = None) -> PolicyRef:
+    """Return the policy that Python code hands over.
+
+    Args:
+        policy: a spec; a class; an object; or any of them as `Privileged`. An object, and a class
+            that cannot be imported elsewhere, plays in this process only; nothing but an object's
+            own ``reset`` clears what it remembers.
+        name: in records; the spec, or the name of the class, by default.
+    """
+    declaration = PRIVILEGED if isinstance(policy, Privileged) else ""
+    given = policy.policy if isinstance(policy, Privileged) else policy
+    if isinstance(given, str):
+        return read_policy(declaration + given, name)
+    kind = given if isinstance(given, type) else type(given)
+    name = name or kind.__name__
+    if given is kind and _can_be_imported(kind):
+        return read_policy(f"{declaration}{kind.__module__}:{kind.__name__}", name)
+    check_policy(name, given, ("reset", "act"))
+    live[name] = given
+    ref = split_spec(name, f"{declaration}{LIVE}:{name}")
+    return replace(ref, place="python", is_foreign=True, is_privileged=ref.is_declared)
+
+
+def make_policy(policy: str | PolicyRef, seed: int) -> Policy:
+    """Make a policy.
+
+    Args:
+        policy: or its spec, as in `read_policy`. A class is called with ``seed=`` if it takes it,
+            else without arguments.
+        seed: of the policy's own random choices.
+
+    Raises:
+        UnknownNameError: there is no such built-in policy, scheme or option.
+        InvalidValueError: the module or class cannot be imported or is not a policy, it has
+            ``attach`` and is not declared privileged, or the URL is malformed.
+        MissingDependencyError: a library that the URL's scheme needs is not installed.
+    """
+    ref = read_policy(policy) if isinstance(policy, str) else policy
+    made = maker_of(ref)(seed)
+    _refuse_undeclared(ref, made)
+    return made
+
+
+def find_policy(spec: str) -> PolicyRef:
+    """Return a policy with what its class declares; its module is imported.
+
+    Raises:
+        UnknownNameError, InvalidValueError, MissingDependencyError: as `make_policy`.
+    """
+    return look_up(read_policy(spec))
+
+
+def look_up(ref: PolicyRef) -> PolicyRef:
+    """Return a policy with what its code declares, without opening it; raises like `find_policy`.
+
+    Of code of others, the version is a fingerprint of the file that defines it.
+    """
+    if ref.kind == CLASS:
+        declaring: object = find_class(ref.body)
+    else:
+        declaring = live[ref.target] if ref.kind == LIVE else maker_of(ref)(0)
+    _refuse_undeclared(ref, declaring)
+    if ref.body in BUILTIN:
+        version: str | None = "built-in"
+    else:
+        version = _fingerprint(declaring) if ref.is_foreign else read_version(declaring)
+    return replace(
+        ref,
+        needs=PolicyNeeds.of(declaring),
+        version=version or UNKNOWN_VERSION,
+        is_privileged=ref.is_privileged or (not ref.is_foreign and hasattr(declaring, "attach")),
+    )
+
+
+def opened(ref: PolicyRef, seed: int = 0) -> PolicyRef:
+    """Make a policy, begin a synthetic episode, and return what is known of it then.
+
+    If its ``reset`` raises, which the synthetic words may be to blame for, it has a `problem`.
+
+    Raises:
+        InvalidValueError: it cannot be made, or its version is no version; and as `make_policy`.
+        MissingDependencyError: a library that it needs is not installed.
+    """
+    ref = look_up(ref)
+    try:
+        policy = make_policy(ref, seed)
+        needs = PolicyNeeds.of(policy)
+    except RoboIRGError:
+        raise
+    except (Exception, SystemExit) as error:  # the policy's own code runs here
+        raise InvalidValueError(f"Policy {ref.spec!r} cannot be made: {_words(error)}.") from error
+    try:
+        episode = SyntheticEpisodes(needs).episode(FIRST_WORDS, VIDEO_STEPS)
+        policy.reset(episode.instruction, episode.demonstration)
+    except (Exception, SystemExit) as error:  # noqa: BLE001 - likewise
+        return replace(ref, version=UNKNOWN_VERSION, problem=f"reset(): {_words(error)}")
+    try:
+        return replace(ref, needs=needs, version=read_version(policy) or ref.version)
+    finally:
+        with contextlib.suppress(Exception):  # how it ends does not count
+            close_policy(policy)
+
+
+def _words(error: BaseException) -> str:
+    words = " ".join(f"{type(error).__name__}: {error}".split())
+    return clip_text(as_name(words), _MOST_WORDS).rstrip(".")
+
+
+def _refuse_undeclared(ref: PolicyRef, made: object) -> None:
+    """Raise if a policy of others has ``attach``, which its spec does not declare."""
+    # With scripted hands the whole has attach; the planner, which is all that is foreign, must not.
+    part = getattr(made, "planner", None) if ref.place == "split" else made
+    if ref.is_foreign and not ref.is_declared and hasattr(part, "attach"):
+        raise InvalidValueError(
+            f"Policy {ref.spec!r} has attach(), with which a policy reads the simulator's state; "
+            f"declare that as {PRIVILEGED + ref.spec!r}, in Python with roboirg.Privileged(policy),"
+            " or remove attach()."
+        )
+
+
+def _fingerprint(declaring: object) -> str | None:
+    """Return a hash of the file that defines a class, or an object's; None if there is none."""
+    kind = declaring if isinstance(declaring, type) else type(declaring)
+    try:
+        return short_hash(Path(inspect.getfile(kind)).read_bytes())
+    except (OSError, TypeError):
+        return None
+
+
+def _can_be_imported(policy: type[Any]) -> bool:
+    if policy.__module__ == "__main__":
+        return False
+    try:
+        module = importlib.import_module(policy.__module__)
+    except ImportError:
+        return False
+    return getattr(module, policy.__name__, None) is policy
+
+
+def server_version(metadata: Mapping[str, Any]) -> str | None:
+    """Return the version that a policy's server reported; None without a server or a version.
+
+    Args:
+        metadata: of the policy, or of a planner and a policy, after `reset`. Those of clients hold
+            the address of the ``server`` and what it reported, such as its ``version``.
+    """
+    for told in (metadata, metadata.get("policy")):
+        if isinstance(told, Mapping) and "server" in told:
+            version = told.get("version")
+            return None if version in (None, "", "unknown") else as_name(str(version))
+    return None

@@ -1,0 +1,204 @@
+"""Kinds of policies: what the text before the colon of a spec means.
+
+| spec | meaning |
+| --- | --- |
+| ``oracle`` | a built-in policy |
+| ``package.module:Class`` | a class of the user's own |
+| ``openpi://host:port?name=value`` | a policy on a server, or a checkpoint, by its scheme |
+| ``system:NAME?server=host:port&vlm=URL`` | a system of the paper, or of a file |
+| ``planner:KIND?hands=scripted&model=NAME`` | a planner, and the scripted expert as its hands |
+| ``planner:package.module:Class?hands=scripted`` | a planner of the user's own |
+| ``vlm-listener:PROVIDER?model=NAME&base_url=URL`` | a model names the goal |
+
+Installed packages add kinds through entry points of the group ``roboirg.policy_kinds``: an entry
+point has the name of the kind, and names a `PolicyKind` or a module with one as ``KIND``.
+
+Values that contain ``&`` or ``#`` are percent-encoded.
+"""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Callable, Mapping
+from typing import Any, NamedTuple
+
+from roboirg.core.errors import InvalidValueError, UnknownNameError
+from roboirg.core.policy_ref import ELSEWHERE, HANDS, PRIVILEGED, SCRIPTED, PolicyRef
+from roboirg.policies.by_name.policy_classes import (
+    CHECKPOINTS,
+    KINDS_GROUP,
+    find_class,
+    make_from_class,
+    make_planner_of_class,
+)
+from roboirg.policies.by_name.systems import System, find_system
+from roboirg.policies.contract.base import Policy
+from roboirg.policies.contract.batch_policy import make_batched, takes_batches
+from roboirg.policies.contract.option_checking import check_options
+from roboirg.policies.contract.policy_urls import is_url, parse_query, split_url
+from roboirg.policies.planners import OF_MODELS, make_planner
+from roboirg.policies.planners.hierarchical_policy import with_planner
+from roboirg.policies.planners.planner_alone import PlannerAlone
+from roboirg.policies.vlm.models import ModelOptions
+from roboirg.policies.vlm.vlm_listener import ListenerOptions, VLMListener
+from roboirg.util.discovery import entry_names, find_entry
+
+CLASS, LIVE, LISTENER, PLANNER, SYSTEM = "class", "live", "vlm-listener", "planner", "system"
+PolicyMaker = Callable[[int], Policy]
+"""Makes a policy from a seed, without network or the libraries of providers."""
+
+SCRIPTED_HANDS = "roboirg.policies.hands.scripted_hands:ScriptedHands"
+
+live: dict[str, Any] = {}
+"""The classes and objects that this process alone has, by the names of the policies."""
+
+
+class PolicyKind(NamedTuple):
+    """One kind of spec.
+
+    Attributes:
+        name: what stands before the colon.
+        read: returns what makes the policies of a spec. It is called with the whole spec, with what
+            stands between the colon and the question mark, and with the options behind that.
+        has_weights: whether its policies are trained networks, which get a process of their own.
+    """
+
+    name: str
+    read: Callable[[str, str, Mapping[str, str]], PolicyMaker]
+    has_weights: bool = False
+
+
+def split_spec(name: str, spec: str) -> PolicyRef:
+    """Return kind, target and options of a spec; nothing of it is imported.
+
+    Raises:
+        InvalidValueError: the options are malformed.
+    """
+    body = spec.removeprefix(PRIVILEGED)
+    kind, colon, rest = body.partition(":")
+    target, _, query = rest.partition("?")
+    options = {}
+    if is_url(body):
+        url = split_url(body)
+        target, options = url.place, dict(url.options)
+    elif colon and kind in known_kinds():
+        options = parse_query(body, query)
+    else:
+        kind, target = CLASS, body
+    pairs = tuple(options.items())
+    return PolicyRef(name=name, spec=spec, kind=kind, target=target, options=pairs)
+
+
+@functools.cache
+def known_kinds() -> Mapping[str, bool]:
+    """Return the names of all kinds, and whether their code comes with us; imports none."""
+    ours = (*OURS, *entry_names(KINDS_GROUP, package="roboirg"))
+    return {name: name in ours for name in (*OURS, *entry_names(KINDS_GROUP))}
+
+
+@functools.cache
+def find_kind(name: str) -> PolicyKind:
+    """Return the kind of a name; a scheme of URLs means a class. Others are not imported."""
+    found = OURS.get(name) or find_entry(name, "KIND", PolicyKind, KINDS_GROUP)
+    return found or PolicyKind(name, _of_class, has_weights=name in CHECKPOINTS)
+
+
+def maker_of(ref: PolicyRef) -> PolicyMaker:
+    """Return what makes a policy; its module is imported.
+
+    Raises:
+        UnknownNameError: there is no such policy, scheme or option.
+        InvalidValueError: the module or class cannot be imported or is not a policy, or an option
+            is malformed.
+        MissingDependencyError: a library that it needs is not installed.
+    """
+    return find_kind(ref.kind).read(ref.body, ref.target, dict(ref.options))
+
+
+def system_of(ref: PolicyRef) -> System | None:
+    """Return the planner and the hands that a spec puts together; None if it is no such spec."""
+    options = dict(ref.options)
+    if ref.kind == SYSTEM and not ref.target:
+        raise InvalidValueError(f"Policy {ref.spec!r} names no system.")
+    if ref.kind == SYSTEM:
+        return find_system(ref.target, options)
+    if ref.kind != PLANNER:
+        return None
+    if ":" in ref.target and (others := sorted(options.keys() - {HANDS})):
+        raise UnknownNameError(f"option of {ref.body}:", others[0], [HANDS])
+    # The options of a planner's model stand next to its own.
+    of_model = {key: value for key, value in options.items() if key in ModelOptions.model_fields}
+    own: dict[str, Any] = {key: value for key, value in options.items() if key not in of_model}
+    hands = own.pop(HANDS, SCRIPTED)
+    planner = {"kind": ref.target, **own, **({"model": of_model} if of_model else {})}
+    return System(name=f"{PLANNER}:{ref.target}", about="", policy=hands, planner=planner)
+
+
+def asks_model(system: System) -> bool:
+    """Return whether the planner of a system is ours, and asks a model."""
+    return system.planner is not None and system.planner.get("kind") in OF_MODELS
+
+
+def make_follower(spec: str, seed: int) -> Policy:
+    """Make what follows a planner: any policy, or the scripted hands; nothing is connected."""
+    return maker_of(split_spec(spec, SCRIPTED_HANDS if spec == SCRIPTED else spec))(seed)
+
+
+def _build(system: System | None, seed: int) -> Policy:
+    if system is None:
+        raise ValueError("not a system")
+    if system.planner is None:
+        return make_follower(system.policy, seed)
+    options = dict(system.planner)
+    kind = str(options.pop("kind", ""))
+    if ":" in kind:
+        planner = make_planner_of_class(kind, seed)
+    else:
+        planner = make_planner(kind, options, f"the planner of system {system.name}", seed)
+    if system.policy == ELSEWHERE:
+        return PlannerAlone(planner)
+    return with_planner(planner, make_follower(system.policy, seed), system.name)
+
+
+def _of_class(spec: str, _target: str, _options: Mapping[str, str]) -> PolicyMaker:
+    return functools.partial(make_from_class, spec, find_class(spec))
+
+
+def _of_system(spec: str, _target: str, _options: Mapping[str, str]) -> PolicyMaker:
+    return functools.partial(_build, system_of(split_spec(spec, spec)))
+
+
+def _of_listener(_spec: str, name: str, options: Mapping[str, str]) -> PolicyMaker:
+    """Return what makes VLM listeners; its options and its model's stand side by side."""
+    own = [option for option in ListenerOptions.model_fields if option != "model"]
+    of_model = [option for option in ModelOptions.model_fields if option != "provider"]
+    for option in options:
+        if option not in (*own, *of_model):
+            raise UnknownNameError(f"option of {LISTENER}:", option, [*own, *of_model])
+    values: dict[str, Any] = {key: value for key, value in options.items() if key in own}
+    model: dict[str, Any] = {key: value for key, value in options.items() if key not in own}
+    origin = f"policy {LISTENER}:{name}"
+    values["model"] = check_options(ModelOptions, {"provider": name, **model}, origin)
+    checked = check_options(ListenerOptions, values, origin)
+    return functools.partial(VLMListener, checked)
+
+
+def _of_process(spec: str, name: str, _options: Mapping[str, str]) -> PolicyMaker:
+    """Return what makes the policies of a class, or returns an object again and again."""
+    found = live[name]
+    if isinstance(found, type):
+        return functools.partial(make_from_class, spec, found)
+    if takes_batches(found):
+        return functools.partial(make_batched, (spec, id(found)), lambda: found)
+    return lambda _seed: found
+
+
+OURS = {
+    one.name: one
+    for one in (
+        PolicyKind(SYSTEM, _of_system),
+        PolicyKind(PLANNER, _of_system),
+        PolicyKind(LISTENER, _of_listener),
+        PolicyKind(LIVE, _of_process),
+    )
+}

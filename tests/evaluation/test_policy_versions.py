@@ -1,0 +1,111 @@
+"""A checkpoint's results are never another's: which version a policy has, and what refuses it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from evaluation_fakes import comparable
+from hosting_fakes import paper_plan, paper_runner
+
+from roboirg.core.errors import InvalidValueError
+from roboirg.core.policy_ref import PolicyRef
+from roboirg.evaluation.hosting.policy_opening import open_policy
+from roboirg.evaluation.plan.plan_maker import make_plan
+from roboirg.evaluation.records.record_codec import StoreError
+from roboirg.evaluation.records.store import read_records
+from roboirg.evaluation.run.executor import InProcess
+from roboirg.evaluation.run.runner import run_plan
+from roboirg.policies.by_name.finding import read_policy
+
+BODY = """
+import os, pathlib
+import numpy as np
+
+class It:
+    cameras = ()
+    demonstration_frames = "none"
+    {on_class}
+    def __init__(self): {made}
+    def reset(self, instruction, demonstration): {reset}
+    def act(self, observation): return np.ones((24, 8))
+"""
+CHECKPOINT = 'os.environ["CKPT"]'
+SPELLINGS = {
+    "on the object": {"made": f"self.version = {CHECKPOINT}"},
+    "a property": {"on_class": f"version = property(lambda self: {CHECKPOINT})"},
+    "a NumPy number": {"made": f"self.version = np.int64({CHECKPOINT})"},
+    "a path": {"reset": f"self.version = pathlib.Path('ckpts', {CHECKPOINT})"},
+    "a number behind a class's text": {
+        "on_class": "version = 'base'", "reset": f"self.version = float({CHECKPOINT})",
+    },
+}  # fmt: skip
+FOUND = {"on the object": "7", "a property": "7", "a NumPy number": "7", "a path": "ckpts/7",
+         "a number behind a class's text": "7.0"}  # fmt: skip
+
+
+@pytest.fixture
+def write(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.setenv("CKPT", "7")
+
+    def write_policy(**parts: str) -> PolicyRef:
+        usual = {"on_class": "", "made": "pass", "reset": "pass"}
+        (tmp_path / "checkpointed.py").write_text(BODY.format(**{**usual, **parts}))
+        return read_policy("checkpointed:It", "mine")
+
+    return write_policy
+
+
+def play(folder: Path) -> None:
+    plan = paper_plan("mine=checkpointed:It", 2)
+    plan = plan.model_copy(update={"policies": tuple(map(open_policy, plan.policies))})
+    run_plan(plan, folder, paper_runner(plan, folder), InProcess())
+
+
+@pytest.mark.parametrize("spelling", SPELLINGS)
+def test_another_checkpoint_does_not_get_into_the_folder(
+    spelling: str, write, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    ref = write(**SPELLINGS[spelling])
+    assert open_policy(ref).version == FOUND[spelling]
+    for _ in range(2):  # the same one goes on
+        play(tmp_path / "run")
+    before = read_records(tmp_path / "run")
+    assert {record.policy_version for record in before} == {FOUND[spelling]}
+    monkeypatch.setenv("CKPT", "8")
+    with pytest.raises(StoreError, match=rf"version {FOUND[spelling]}, but the policy is now vers"):
+        play(tmp_path / "run")
+    assert list(map(comparable, read_records(tmp_path / "run"))) == list(map(comparable, before))
+
+
+@pytest.mark.parametrize("value", ["None", "''", "(1, 2)", "True", "object()"])
+def test_what_is_no_version_is_one_sentence(value: str, write) -> None:
+    for parts in ({"made": f"self.version = {value}"}, {"on_class": f"version = {value}"}):
+        with pytest.raises(InvalidValueError, match=r"version of It is .*; it must be a text, num"):
+            open_policy(write(**parts))
+
+
+def test_one_that_differs_in_each_process_gives_no_verdict(write, tmp_path: Path) -> None:
+    write(made="self.version = os.getpid()")
+    play(tmp_path)
+    assert {record.outcome for record in read_records(tmp_path)} == {"error"}
+    assert "must be the same in every process" in str(read_records(tmp_path)[0].cause)
+
+
+def test_a_policy_that_cannot_begin_is_not_taken_for_an_earlier_one(write, tmp_path: Path) -> None:
+    write(made="self.version = 'a'")
+    play(tmp_path)
+    ref = open_policy(write(made="self.version = 'b'", reset="raise KeyError('front')"))
+    assert (ref.version, ref.problem) == ("unknown", "reset(): KeyError: 'front'")
+    with pytest.raises(StoreError, match=r"version a, but the policy cannot be opened .*KeyError"):
+        play(tmp_path)
+    with pytest.raises(InvalidValueError, match=r"cannot be made: ValueError: no GPU"):
+        open_policy(write(made="raise ValueError('no GPU')"))
+
+
+def test_a_command_opens_each_policy_once(write, tmp_path: Path) -> None:
+    note = tmp_path / "opened"
+    write(reset=f"open({str(note)!r}, 'a').write(instruction)")
+    make_plan(["mine=checkpointed:It", "random"], tasks="PickXtimes", episodes="2")
+    assert note.read_text() == "Put the red cube on the target."
