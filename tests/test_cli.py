@@ -559,37 +559,6 @@ def test_a_name_that_is_no_name_is_told(roboirg, tmp_path: Path) -> None:
     assert "The name of a policy is '../../x' (in '../../x=random')" in said.err
 
 
-@pytest.mark.parametrize("word", ["my_policy", "my_policy.py", "folder/other", "folder.other"])
-def test_a_module_without_a_class_gets_a_hint(
-    roboirg, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, word: str
-) -> None:
-    (tmp_path / "folder").mkdir()
-    for path in (tmp_path / "my_policy.py", tmp_path / "folder" / "other.py"):
-        path.write_text("raise SystemExit('not imported')\nclass Mine:\n    pass\nclass _X: pass\n")
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(sys, "path", list(sys.path))
-    monkeypatch.delitem(sys.modules, "my_policy", raising=False)  # another test's
-    said = roboirg("run", "--policy", word, "--out", tmp_path / "out")
-    assert said.code == 2
-    name = word.removesuffix(".py").replace("/", ".")
-    assert said.err.endswith(f"Policy {word!r} is a module; name its class, {name}:Mine.\n")
-
-
-@pytest.mark.parametrize(
-    ("word", "meant"),
-    [
-        ("p15.py:Reach", "p15:Reach"),
-        ("./p15.py:Reach", "p15:Reach"),
-        ("folder/p15:Reach", "folder.p15:Reach"),
-        ("/elsewhere/p15.py:Reach", "p15:Reach"),
-    ],
-)
-def test_a_file_with_a_class_gets_a_hint(roboirg, tmp_path: Path, word: str, meant: str) -> None:
-    said = roboirg("run", "--policy", word, "--out", tmp_path / "out")
-    assert said.code == 2
-    assert said.err == f"roboirg: Policy {word!r} names a file; name its module: {meant}.\n"
-
-
 def test_runs_are_merged_and_exported(roboirg, tmp_path: Path, canned: type[CannedPlayer]) -> None:
     del canned
     for name, episodes in (("a", "0-2"), ("b", "2-4")):

@@ -13,7 +13,7 @@ from pydantic import JsonValue
 
 from roboirg.core.actions import ActionSpace, check_chunk
 from roboirg.core.errors import InvalidActionError, InvalidValueError
-from roboirg.core.field_types import SUBGOAL
+from roboirg.core.field_types import SUBGOAL, as_name
 from roboirg.core.plain_text import clip_text, is_encodable
 from roboirg.core.subgoal_text import MOST_SUBGOAL_LETTERS
 from roboirg.evaluation.records.record import REAL_TRIAL
@@ -169,3 +169,17 @@ def policy_usage(policy: Policy) -> dict[str, float]:
             f"most {MAX_COSTS} characters."
         )
     return {name: cost for name, cost in usage.items() if 0 <= cost < _TOO_LARGE}
+
+
+def server_version(metadata: Mapping[str, Any]) -> str | None:
+    """Return the version that a policy's server reported; None without a server or a version.
+
+    Args:
+        metadata: of the policy, or of a planner and a policy, after `reset`. Those of clients hold
+            the address of the ``server`` and what it reported, such as its ``version``.
+    """
+    for told in (metadata, metadata.get("policy")):
+        if isinstance(told, Mapping) and "server" in told:
+            version = told.get("version")
+            return None if version in (None, "", "unknown") else as_name(str(version))
+    return None

@@ -12,11 +12,12 @@ from typing import NamedTuple
 from roboirg.core.errors import InvalidValueError, UnknownNameError
 from roboirg.core.field_types import MOST_SECONDS
 from roboirg.core.inference_facts import inference_facts
-from roboirg.policies.by_name.finding import make_policy, opened, read_policy
+from roboirg.policies.by_name.finding import make_policy, read_policy
 from roboirg.policies.by_name.policy_classes import find_class
 from roboirg.policies.by_name.policy_kinds import CLASS
 from roboirg.policies.contract.base import Policy
 from roboirg.policies.contract.json_values import as_json
+from roboirg.policies.opening import opened
 from roboirg.policies.remote.endpoints import Endpoint
 from roboirg.policies.remote.protocols import protocols_by_scheme
 from roboirg.policies.remote.server_options import ServerOptions

@@ -47,9 +47,7 @@ def test_a_score_is_a_record_like_any_other(small):
     # All that reads records reads these.
     assert read_record(encode(record), Path(), 1) == record
     table = make_table("real", gather([("run", read_results(folder))]))
-    assert {row.name for row in table.rows} == {
-        f"{name}, on a robot (privileged)" for name in plan.policies
-    }
+    assert {row.name for row in table.rows} == {f"{name}, on a robot" for name in plan.policies}
     assert "slipped" in render(read_records(folder))
 
 

@@ -10,8 +10,8 @@ from roboirg.core.policy_ref import SCRIPTED, PolicyRef
 from roboirg.evaluation.episode_errors import EpisodeLostError
 from roboirg.evaluation.hosting.messages import Call
 from roboirg.evaluation.hosting.policy_child import PolicyChild
-from roboirg.policies.by_name.finding import opened
 from roboirg.policies.by_name.policy_kinds import make_follower
+from roboirg.policies.opening import opened
 from roboirg.policies.planners.hierarchical_policy import joint_version
 from roboirg.util.deadline_watch import DeadlineWatch
 

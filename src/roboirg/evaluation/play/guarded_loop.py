@@ -21,11 +21,15 @@ from roboirg.evaluation.play.call_guard import CallGuard
 from roboirg.evaluation.play.episode_record import conclude, utterances_at
 from roboirg.evaluation.play.job_instruction import PreparedJob
 from roboirg.evaluation.play.video_writer import VideoWriter
-from roboirg.evaluation.policy_calls import check_rows, policy_metadata, policy_subgoal
+from roboirg.evaluation.policy_calls import (
+    check_rows,
+    policy_metadata,
+    policy_subgoal,
+    server_version,
+)
 from roboirg.evaluation.records.action_log import ActionLog
 from roboirg.evaluation.records.record import EventRecord, Record, SubgoalRecord
 from roboirg.judging import judge_subgoal, plain_subgoal
-from roboirg.policies.by_name.finding import server_version
 from roboirg.policies.contract.base import Policy
 from roboirg.policies.contract.play import EpisodeLoop
 from roboirg.policies.contract.policy_version import read_version

@@ -2,17 +2,13 @@
 
 from __future__ import annotations
 
-import contextlib
 import importlib
 import inspect
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from roboirg.core.errors import InvalidValueError, RoboIRGError
-from roboirg.core.field_types import as_name
-from roboirg.core.plain_text import clip_text
+from roboirg.core.errors import InvalidValueError
 from roboirg.core.policy_needs import PolicyNeeds
 from roboirg.core.policy_ref import (
     ELSEWHERE,
@@ -24,12 +20,11 @@ from roboirg.core.policy_ref import (
     PolicyRef,
 )
 from roboirg.policies.builtin import BUILTIN
-from roboirg.policies.by_name.policy_classes import check_policy, find_class
+from roboirg.policies.by_name.policy_classes import find_class
 from roboirg.policies.by_name.policy_kinds import (
     CLASS,
     LISTENER,
     LIVE,
-    asks_model,
     find_kind,
     known_kinds,
     live,
@@ -37,15 +32,12 @@ from roboirg.policies.by_name.policy_kinds import (
     split_spec,
     system_of,
 )
-from roboirg.policies.contract.base import Policy, close_policy
+from roboirg.policies.contract.base import Policy
+from roboirg.policies.contract.contract_check import check_policy
 from roboirg.policies.contract.policy_urls import is_url
 from roboirg.policies.contract.policy_version import read_version
-from roboirg.policies.contract.synthetic_episodes import SyntheticEpisodes
+from roboirg.policies.planners import OF_MODELS
 from roboirg.util.short_hash import short_hash
-
-FIRST_WORDS = "Put the red cube on the target."
-VIDEO_STEPS = 4
-_MOST_WORDS = 300
 
 
 @dataclass(frozen=True)
@@ -79,11 +71,12 @@ def read_policy(spec: str, name: str | None = None) -> PolicyRef:
     is_split = False
     asks: Asker | None = "listener" if kind == LISTENER else None
     if system is not None:
-        has_own_planner = ":" in str((system.planner or {}).get("kind"))
+        planner = (system.planner or {}).get("kind")
+        has_own_planner = ":" in str(planner)
         is_split = has_own_planner and system.policy == SCRIPTED
         has_hands = system.policy not in (SCRIPTED, ELSEWHERE)
         is_foreign = has_own_planner or (has_hands and read_policy(system.policy).is_foreign)
-        asks = "planner" if asks_model(system) else None
+        asks = "planner" if planner in OF_MODELS else None
     ref = replace(ref, asks=asks, is_foreign=is_foreign, is_privileged=ref.is_declared)
     if ref.is_declared and not is_foreign:
         raise InvalidValueError(
@@ -173,40 +166,6 @@ def look_up(ref: PolicyRef) -> PolicyRef:
     )
 
 
-def opened(ref: PolicyRef, seed: int = 0) -> PolicyRef:
-    """Make a policy, begin a synthetic episode, and return what is known of it then.
-
-    If its ``reset`` raises, which the synthetic words may be to blame for, it has a `problem`.
-
-    Raises:
-        InvalidValueError: it cannot be made, or its version is no version; and as `make_policy`.
-        MissingDependencyError: a library that it needs is not installed.
-    """
-    ref = look_up(ref)
-    try:
-        policy = make_policy(ref, seed)
-        needs = PolicyNeeds.of(policy)
-    except RoboIRGError:
-        raise
-    except (Exception, SystemExit) as error:  # the policy's own code runs here
-        raise InvalidValueError(f"Policy {ref.spec!r} cannot be made: {_words(error)}.") from error
-    try:
-        episode = SyntheticEpisodes(needs).episode(FIRST_WORDS, VIDEO_STEPS)
-        policy.reset(episode.instruction, episode.demonstration)
-    except (Exception, SystemExit) as error:  # noqa: BLE001 - likewise
-        return replace(ref, version=UNKNOWN_VERSION, problem=f"reset(): {_words(error)}")
-    try:
-        return replace(ref, needs=needs, version=read_version(policy) or ref.version)
-    finally:
-        with contextlib.suppress(Exception):  # how it ends does not count
-            close_policy(policy)
-
-
-def _words(error: BaseException) -> str:
-    words = " ".join(f"{type(error).__name__}: {error}".split())
-    return clip_text(as_name(words), _MOST_WORDS).rstrip(".")
-
-
 def _refuse_undeclared(ref: PolicyRef, made: object) -> None:
     """Raise if a policy of others has ``attach``, which its spec does not declare."""
     # With scripted hands the whole has attach; the planner, which is all that is foreign, must not.
@@ -236,17 +195,3 @@ def _can_be_imported(policy: type[Any]) -> bool:
     except ImportError:
         return False
     return getattr(module, policy.__name__, None) is policy
-
-
-def server_version(metadata: Mapping[str, Any]) -> str | None:
-    """Return the version that a policy's server reported; None without a server or a version.
-
-    Args:
-        metadata: of the policy, or of a planner and a policy, after `reset`. Those of clients hold
-            the address of the ``server`` and what it reported, such as its ``version``.
-    """
-    for told in (metadata, metadata.get("policy")):
-        if isinstance(told, Mapping) and "server" in told:
-            version = told.get("version")
-            return None if version in (None, "", "unknown") else as_name(str(version))
-    return None

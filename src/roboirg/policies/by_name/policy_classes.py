@@ -2,22 +2,20 @@
 
 from __future__ import annotations
 
-import ast
 import importlib
 import importlib.util
 import inspect
 import pkgutil
-import sys
-from collections.abc import Callable, Mapping
-from pathlib import Path, PurePath
+from collections.abc import Mapping
+from pathlib import Path
 from types import ModuleType
 from typing import Any
 
 from roboirg.core.errors import InvalidValueError, MissingDependencyError, UnknownNameError
-from roboirg.core.policy_needs import PolicyNeeds
 from roboirg.policies.builtin import BUILTIN
 from roboirg.policies.contract.base import Policy
 from roboirg.policies.contract.batch_policy import make_batched, parameters_of, takes_batches
+from roboirg.policies.contract.contract_check import check_policy
 from roboirg.policies.contract.policy_urls import is_url
 from roboirg.policies.planners.planner import Planner
 from roboirg.policies.remote.protocols import protocols_by_scheme
@@ -25,13 +23,6 @@ from roboirg.util.discovery import entry_names
 from roboirg.util.short_hash import short_hash
 
 _MAX_SHOWN, _MAX_NAMED = 3, 20
-ARGUMENTS: Mapping[str, tuple[str, ...]] = {
-    "reset": ("instruction", "demonstration"),
-    "act": ("observation",),
-    "plan": ("observation", "step"),
-}
-"""What the methods of a policy or a planner are called with."""
-
 CHECKPOINTS: Mapping[str, str] = {"lerobot": "roboirg.policies.lerobot_policy:LeRobotPolicy"}
 """Policies of this process that a URL names, by its scheme; called with ``(url, seed=)``."""
 
@@ -74,19 +65,8 @@ def make_planner_of_class(spec: str, seed: int) -> Planner:
 
 def _import_class(spec: str, methods: tuple[str, ...]) -> type[Any]:
     if spec not in BUILTIN and ":" not in spec:
-        if (hint := _describe_module(spec)) is not None:
-            raise InvalidValueError(f"Policy {spec!r} {hint}")
-        module_name, _, name = spec.rpartition(".")
-        if name.isidentifier() and module_name and _describe_module(module_name) is not None:
-            raise InvalidValueError(
-                f"Policy {spec!r} lacks the colon before its class; name {module_name}:{name}."
-            )
         raise UnknownNameError("policy", spec, [*BUILTIN, "package.module:Class", *_examples()])
     module_name, _, name = BUILTIN.get(spec, spec).partition(":")
-    if module_name.endswith(".py") or "/" in module_name:
-        raise InvalidValueError(
-            f"Policy {spec!r} names a file; name its module: {_module_of(module_name)}:{name}."
-        )
     module = _module(spec, module_name)
     if not hasattr(module, name):
         names = [key for key, one in vars(module).items() if inspect.isclass(one)]
@@ -127,47 +107,6 @@ def _construct(spec: str, policy_class: type[Any], seed: int) -> Any:  # noqa: A
     return policy_class(seed=seed) if "seed" in parameters_of(policy_class) else policy_class()
 
 
-def check_policy(spec: str, policy: object, methods: tuple[str, ...]) -> None:
-    """Raise for a class of policies, or a policy, with which every episode would end in an error.
-
-    What only shows when it is made, such as a missing argument, shows when it is opened.
-    """
-    kind = policy if isinstance(policy, type) else type(policy)
-    if takes_batches(policy) and hasattr(policy, "attach"):
-        raise InvalidValueError(
-            f"Policy {spec!r}: class {kind.__name__} has attach() and act_batch(); a privileged "
-            "policy is asked about one episode at a time."
-        )
-    for method in () if takes_batches(policy) else methods:
-        if not hasattr(policy, method):
-            raise InvalidValueError(
-                f"Policy {spec!r}: class {kind.__name__} has no method {method}()."
-            )
-        if not callable(getattr(policy, method)):
-            raise InvalidValueError(
-                f"Policy {spec!r}: {method} of class {kind.__name__} is not a method."
-            )
-        if policy is kind and method in ARGUMENTS:
-            _check_arguments(spec, getattr(policy, method), ARGUMENTS[method])
-    try:
-        PolicyNeeds.of(policy)
-    except InvalidValueError as error:
-        raise InvalidValueError(f"Policy {spec!r}: {error}") from error
-
-
-def _check_arguments(spec: str, method: Callable[..., Any], takes: tuple[str, ...]) -> None:
-    """Raise for a method that cannot be called with the arguments that it gets."""
-    try:
-        inspect.signature(method).bind(None, *takes)
-    except ValueError:  # a method written in C may have no signature
-        return
-    except TypeError as error:
-        raise InvalidValueError(
-            f"Policy {spec!r}: {method.__qualname__}{inspect.signature(method)} must take "
-            f"{' and '.join(takes)}."
-        ) from error
-
-
 def _url_class(spec: str) -> type[Any]:
     """Return the class of a URL's scheme."""
     scheme = spec.partition("://")[0]
@@ -178,31 +117,6 @@ def _url_class(spec: str) -> type[Any]:
     if scheme not in protocols:
         raise UnknownNameError("policy scheme", scheme, url_schemes())
     return protocols[scheme].clients[scheme]
-
-
-def _describe_module(spec: str) -> str | None:
-    """Return what a spec is if it names a module and no class, and how to name one; else None."""
-    try:
-        found = importlib.util.find_spec(spec.removesuffix(".py").replace("/", "."))
-        source = Path(found.origin).read_bytes() if found and found.origin else None
-        tree = None if source is None else ast.parse(source)
-    except (ImportError, ValueError, AttributeError, OSError, SyntaxError):
-        return None
-    if found is None:
-        return None
-    classes = [] if tree is None else [one for one in tree.body if isinstance(one, ast.ClassDef)]
-    shown = [f"{found.name}:{one.name}" for one in classes if not one.name.startswith("_")]
-    return (
-        "is a module; name its class, "
-        f"{' or '.join(shown[:_MAX_SHOWN]) or f'such as {found.name}:MyPolicy'}."
-    )
-
-
-def _module_of(file: str) -> str:
-    """Return the name by which Python imports a file; of a file elsewhere, from its folder."""
-    path = PurePath(file.removesuffix(".py"))
-    is_here = not path.is_absolute() and ".." not in path.parts
-    return ".".join(path.parts) if is_here else path.name
 
 
 def _examples() -> list[str]:
@@ -221,8 +135,6 @@ def _module(spec: str, name: str) -> ModuleType:
         if isinstance(error, ModuleNotFoundError) and error.name == name.partition(".")[0]:
             here = ", ".join(sorted(path.stem for path in Path.cwd().glob("*.py"))) or "none"
             hint = f"; modules in {str(Path.cwd())!r}: {here}"
-        elif isinstance(error, ModuleNotFoundError):
-            hint = f"; install its package, such as by {sys.executable} -m pip install {error.name}"
         raise InvalidValueError(
             f"Policy {spec!r}: module {name!r} cannot be imported ({words}){hint}."
         ) from error

@@ -31,14 +31,14 @@ from roboirg.policies.by_name.policy_classes import (
     make_from_class,
     make_planner_of_class,
 )
-from roboirg.policies.by_name.systems import System, find_system
 from roboirg.policies.contract.base import Policy
 from roboirg.policies.contract.batch_policy import make_batched, takes_batches
 from roboirg.policies.contract.option_checking import check_options
 from roboirg.policies.contract.policy_urls import is_url, parse_query, split_url
-from roboirg.policies.planners import OF_MODELS, make_planner
+from roboirg.policies.planners import make_planner
 from roboirg.policies.planners.hierarchical_policy import with_planner
 from roboirg.policies.planners.planner_alone import PlannerAlone
+from roboirg.policies.systems import System, find_system
 from roboirg.policies.vlm.models import ModelOptions
 from roboirg.policies.vlm.vlm_listener import ListenerOptions, VLMListener
 from roboirg.util.discovery import entry_names, find_entry
@@ -132,11 +132,6 @@ def system_of(ref: PolicyRef) -> System | None:
     hands = own.pop(HANDS, SCRIPTED)
     planner = {"kind": ref.target, **own, **({"model": of_model} if of_model else {})}
     return System(name=f"{PLANNER}:{ref.target}", about="", policy=hands, planner=planner)
-
-
-def asks_model(system: System) -> bool:
-    """Return whether the planner of a system is ours, and asks a model."""
-    return system.planner is not None and system.planner.get("kind") in OF_MODELS
 
 
 def make_follower(spec: str, seed: int) -> Policy:

@@ -1,0 +1,59 @@
+"""Checks of the contract that need no episode: what a class, or an object, must have."""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable, Mapping
+from typing import Any
+
+from roboirg.core.errors import InvalidValueError
+from roboirg.core.policy_needs import PolicyNeeds
+from roboirg.policies.contract.batch_policy import takes_batches
+
+ARGUMENTS: Mapping[str, tuple[str, ...]] = {
+    "reset": ("instruction", "demonstration"),
+    "act": ("observation",),
+    "plan": ("observation", "step"),
+}
+"""What the methods of a policy or a planner are called with."""
+
+
+def check_policy(spec: str, policy: object, methods: tuple[str, ...]) -> None:
+    """Raise for a class of policies, or a policy, with which every episode would end in an error.
+
+    What only shows when it is made, such as a missing argument, shows when it is opened.
+    """
+    kind = policy if isinstance(policy, type) else type(policy)
+    if takes_batches(policy) and hasattr(policy, "attach"):
+        raise InvalidValueError(
+            f"Policy {spec!r}: class {kind.__name__} has attach() and act_batch(); a privileged "
+            "policy is asked about one episode at a time."
+        )
+    for method in () if takes_batches(policy) else methods:
+        if not hasattr(policy, method):
+            raise InvalidValueError(
+                f"Policy {spec!r}: class {kind.__name__} has no method {method}()."
+            )
+        if not callable(getattr(policy, method)):
+            raise InvalidValueError(
+                f"Policy {spec!r}: {method} of class {kind.__name__} is not a method."
+            )
+        if policy is kind and method in ARGUMENTS:
+            _check_arguments(spec, getattr(policy, method), ARGUMENTS[method])
+    try:
+        PolicyNeeds.of(policy)
+    except InvalidValueError as error:
+        raise InvalidValueError(f"Policy {spec!r}: {error}") from error
+
+
+def _check_arguments(spec: str, method: Callable[..., Any], takes: tuple[str, ...]) -> None:
+    """Raise for a method that cannot be called with the arguments that it gets."""
+    try:
+        inspect.signature(method).bind(None, *takes)
+    except ValueError:  # a method written in C may have no signature
+        return
+    except TypeError as error:
+        raise InvalidValueError(
+            f"Policy {spec!r}: {method.__qualname__}{inspect.signature(method)} must take "
+            f"{' and '.join(takes)}."
+        ) from error

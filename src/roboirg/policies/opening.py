@@ -1,0 +1,54 @@
+"""Open a policy in this process: its version and needs are those of the object that plays."""
+
+from __future__ import annotations
+
+import contextlib
+from dataclasses import replace
+
+from roboirg.core.errors import InvalidValueError, RoboIRGError
+from roboirg.core.field_types import as_name
+from roboirg.core.plain_text import clip_text
+from roboirg.core.policy_needs import PolicyNeeds
+from roboirg.core.policy_ref import UNKNOWN_VERSION, PolicyRef
+from roboirg.policies.by_name.finding import look_up, make_policy
+from roboirg.policies.contract.base import close_policy
+from roboirg.policies.contract.policy_version import read_version
+from roboirg.policies.contract.synthetic_episodes import SyntheticEpisodes
+
+FIRST_WORDS = "Put the red cube on the target."
+VIDEO_STEPS = 4
+_MOST_WORDS = 300
+
+
+def opened(ref: PolicyRef, seed: int = 0) -> PolicyRef:
+    """Make a policy, begin a synthetic episode, and return what is known of it then.
+
+    If its ``reset`` raises, which the synthetic words may be to blame for, it has a `problem`.
+
+    Raises:
+        InvalidValueError: it cannot be made, or its version is no version; and as `make_policy`.
+        MissingDependencyError: a library that it needs is not installed.
+    """
+    ref = look_up(ref)
+    try:
+        policy = make_policy(ref, seed)
+        needs = PolicyNeeds.of(policy)
+    except RoboIRGError:
+        raise
+    except (Exception, SystemExit) as error:  # the policy's own code runs here
+        raise InvalidValueError(f"Policy {ref.spec!r} cannot be made: {_words(error)}.") from error
+    try:
+        episode = SyntheticEpisodes(needs).episode(FIRST_WORDS, VIDEO_STEPS)
+        policy.reset(episode.instruction, episode.demonstration)
+    except (Exception, SystemExit) as error:  # noqa: BLE001 - likewise
+        return replace(ref, version=UNKNOWN_VERSION, problem=f"reset(): {_words(error)}")
+    try:
+        return replace(ref, needs=needs, version=read_version(policy) or ref.version)
+    finally:
+        with contextlib.suppress(Exception):  # how it ends does not count
+            close_policy(policy)
+
+
+def _words(error: BaseException) -> str:
+    words = " ".join(f"{type(error).__name__}: {error}".split())
+    return clip_text(as_name(words), _MOST_WORDS).rstrip(".")
