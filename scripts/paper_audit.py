@@ -32,7 +32,7 @@ from roboirg.core.word_pools import POOLS
 from roboirg.language.instruction import Instruction
 from roboirg.language.variants import instructions
 from roboirg.policies import make_policy
-from roboirg.policies.systems import all_systems, find_system
+from roboirg.policies.planners.systems import all_systems, find_system
 from roboirg.tasks import LEFT_OUT, all_tasks, every_task, find_tasks
 from roboirg.tasks.splits.splits import split_episodes
 

@@ -38,8 +38,8 @@ from roboirg.evaluation.records.record import IDENTITY, Job, Record
 from roboirg.evaluation.records.record_codec import encode, read_record
 from roboirg.evaluation.records.store import read_records
 from roboirg.policies.by_name.finding import read_policy
+from roboirg.policies.planners.systems import all_systems
 from roboirg.policies.prompt_length.prompt_audit import PromptLimit, most_tokens
-from roboirg.policies.systems import all_systems
 
 SYSTEMS = [f"system:{name}" for name in all_systems()]
 EXACT = PromptLimit(64, 0, most_tokens, "some.model")

@@ -17,7 +17,7 @@ from roboirg.core.policy_needs import PolicyNeeds
 from roboirg.policies import Policy, PrivilegedPolicy, find_policy, make_policy, play
 from roboirg.policies.by_name.finding import read_policy
 from roboirg.policies.planners.hierarchical_policy import HierarchicalPolicy
-from roboirg.policies.systems import all_systems, find_system
+from roboirg.policies.planners.systems import all_systems, find_system
 from roboirg.policies.vlm.vlm_listener import VLMListener
 from roboirg.tasks.splits.splits import get_episode
 
@@ -190,7 +190,7 @@ def test_nothing_is_asked_of_libraries_before_the_first_question():
         "            raise ImportError(name)\n"
         "sys.meta_path.insert(0, Refuse())\n"
         "from roboirg.policies import make_policy\n"
-        "from roboirg.policies.systems import all_systems\n"
+        "from roboirg.policies.planners.systems import all_systems\n"
         f"specs = [{LISTENER!r}, 'vlm-listener:google?model=x']\n"
         "specs += [f'system:{name}' for name in all_systems()]\n"
         "made = [make_policy(spec, 1) for spec in specs]\n"

@@ -15,6 +15,7 @@ from roboirg.core.policy_needs import PolicyNeeds
 from roboirg.language.token_counts import count_tokens
 from roboirg.policies.by_name.finding import find_policy
 from roboirg.policies.lerobot_policy import LeRobotPolicy
+from roboirg.policies.planners.systems import all_systems
 from roboirg.policies.prompt_length.prompt_audit import (
     PromptLimit,
     Tokens,
@@ -25,7 +26,6 @@ from roboirg.policies.prompt_length.prompt_audit import (
     most_tokens,
 )
 from roboirg.policies.prompt_length.tokenizer_file import prompt_limit, read_tokenizer
-from roboirg.policies.systems import all_systems
 
 WORDS = ["Put", "the", "red", "cube", "into", "bin.", "Remember:", "green_one", "Zürich", "quokka"]
 TEXTS = st.lists(st.sampled_from(WORDS), min_size=1, max_size=30).map(" ".join)

@@ -12,7 +12,7 @@ from wire_servers import CHUNK, MmeVlaServer
 
 from roboirg.apps.policy_check.check_result import NOTE, PASS
 from roboirg.apps.policy_check.policy_check import check_policy
-from roboirg.policies.systems import all_systems
+from roboirg.policies.planners.systems import all_systems
 
 REMEMBER = {"TTT-Expert", "FrameS-Modul"}
 REPLIES = {

@@ -38,7 +38,7 @@ from roboirg.policies.contract.policy_urls import is_url, parse_query, split_url
 from roboirg.policies.planners import make_planner
 from roboirg.policies.planners.hierarchical_policy import with_planner
 from roboirg.policies.planners.planner_alone import PlannerAlone
-from roboirg.policies.systems import System, find_system
+from roboirg.policies.planners.systems import System, find_system
 from roboirg.policies.vlm.models import ModelOptions
 from roboirg.policies.vlm.vlm_listener import ListenerOptions, VLMListener
 from roboirg.util.discovery import entry_names, find_entry

@@ -16,7 +16,7 @@ from roboirg.core.policy_ref import HANDS
 from roboirg.policies.contract.option_checking import check_options
 from roboirg.policies.contract.policy_urls import is_url, split_url
 
-PACKAGE, FOLDER = "roboirg.policies", "system_files"
+PACKAGE, FOLDER = "roboirg.policies.planners", "system_files"
 SUFFIX = ".toml"
 
 SERVER, VLM, MODEL = "server", "vlm", "model"
