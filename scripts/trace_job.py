@@ -31,7 +31,8 @@ import layout
 import numpy as np
 from numpy.typing import NDArray
 
-from roboirg.evaluation.plan.plan import Plan, PolicyProcessMode
+from roboirg.evaluation.plan.plan import Plan
+from roboirg.evaluation.plan.plan_sections import Hosting, PolicyProcessMode
 from roboirg.evaluation.play import rollout
 from roboirg.evaluation.play.job_instruction import PreparedJob
 from roboirg.evaluation.play.rollout import PlayJob
@@ -172,7 +173,7 @@ def follow(policy_process: PolicyProcessMode = "own") -> list[Stay]:
         tasks=("PickXtimes",),
         settings=("direct",),
         episodes=(0, 1),
-        policy_process=policy_process,
+        hosting=Hosting(policy_process=policy_process),
     )
     follower = Follower()
     with tempfile.TemporaryDirectory() as name, mock.patch.object(rollout, "make_env", PaperWorld):

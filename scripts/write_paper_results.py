@@ -47,7 +47,7 @@ def played() -> Mapping[str, Cells]:
 
 def _planners_of_main(results: Iterable[Summary]) -> list[Summary]:
     """Return the results with which those with other planners or hands are compared."""
-    tasks = read_plan_file("paper-planners")["tasks"].split(",")
+    tasks = read_plan_file("paper-planners")["tasks"]
     rows = {row_name(memory) for memory in PLANNERS}
     return [
         one

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import shlex
+from pathlib import Path
 from typing import get_type_hints
 
 import count_commands
@@ -12,15 +13,15 @@ import typer.main
 from all_commands import all_commands
 
 from roboirg.core.instruction_options import (
-    OPTION_HELP,
     OPTION_NAMES,
     InstructionKeywords,
 )
-from roboirg.evaluation.plan.plan import Plan
+from roboirg.evaluation.plan.plan import plan_options
 from roboirg.evaluation.plan.plan_file import plan_text, read_plan_file
 from roboirg.evaluation.plan.plan_maker import make_plan
 from roboirg.main import app
 
+RUNNING = Path(__file__).parent.parent / "docs" / "running.md"
 LINES, LINES_OF_RUN, COLUMNS = 45, 60, 100
 
 
@@ -58,20 +59,26 @@ def test_a_plan_explains_all_of_its_fields_and_is_read_back(tmp_path):
         video="failures", devices="0,1", retry_on="none", wordings="train",
     )  # fmt: skip
     text = plan_text(plan)
-    for name, field in Plan.model_fields.items():
-        assert field.description, name
-        assert name == "options" or f"\n{name}:" in f"\n{text}"
-    for episodes in ("0-2,7", "3,", "1", "0,2,4"):
-        one = plan.model_copy(
-            update={"episodes": make_plan(["oracle"], episodes=episodes).episodes}
-        )
+    for one in plan_options():
+        assert one.help in " ".join(text.replace("\n# ", " ").split())
+        assert f"\n{one.name}:" in text
+    for episodes in ((0, 1, 2, 7), (3,), (0,), (0, 2, 4)):
+        one = plan.model_copy(update={"episodes": episodes})
         (tmp_path / "plan.yaml").write_text(plan_text(one))
         fields = read_plan_file(str(tmp_path / "plan.yaml"))
         assert make_plan(fields.pop("policies"), **fields) == one
 
 
+def test_the_page_lists_all_keys_of_a_plan():
+    page = RUNNING.read_text()
+    for one in plan_options():
+        row = f"| `{one.name}` | {one.help} |"
+        option = f"| `--{one.name.replace('_', '-')}".replace("policies", "policy")
+        assert (row in page) != (option in page) or one.name == "cluster", row
+
+
 def test_options_of_instructions_are_listed_once():
-    assert set(get_type_hints(InstructionKeywords)) == set(OPTION_NAMES) == set(OPTION_HELP)
+    assert set(get_type_hints(InstructionKeywords)) == set(OPTION_NAMES)
     (shown,) = (one.parameters for one in count_commands.commands() if one.words == "show")
     own = {"setting", "form", "delivery"}
     assert {f"--{name}" for name in OPTION_NAMES if name not in own} <= set(shown)

@@ -91,7 +91,7 @@ def episodes_per_hour(policy: type, workers: int) -> float:
     first, last = 4 * workers, count - workers
     times = []
     with tempfile.TemporaryDirectory() as folder:
-        runner = EpisodeRunner(Path(folder), hosting=plan.hosting)
+        runner = EpisodeRunner(Path(folder), hosting=plan.hosting.settings)
         for record in LocalProcesses(workers).run(deque(plan.jobs()), runner):
             times.append(time.perf_counter())
             if record.outcome == "error":

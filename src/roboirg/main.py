@@ -16,6 +16,7 @@ import typer
 
 from roboirg import apps
 from roboirg.cli import (
+    declared_options,
     export_commands,
     look_commands,
     policy_commands,
@@ -85,8 +86,8 @@ def _options(*, version: _Version = False) -> None:
 
 def _add_commands() -> None:
     """Add the commands of the core, then those of the applications that are installed."""
+    app.command(cls=declared_options.RunCommand)(run_commands.run)
     for command in (
-        run_commands.run,
         look_commands.doctor,
         report_commands.report,
         report_commands.tables,

@@ -103,7 +103,7 @@ def test_classes_and_objects_play_in_this_process(unplayed: None, tmp_path: Path
     results = roboirg.evaluate({"mine": given, "class": Still}, out=tmp_path, **QUICK)
     plan = read_plan(tmp_path)
     assert plan is not None
-    assert plan.policy_process == "shared"
+    assert plan.hosting.policy_process == "shared"
     assert {one.policy for one in results.records} == {"mine", "class"}
     assert roboirg.evaluate({"mine": given}, out=tmp_path, **QUICK).errors == 0
     with pytest.raises(InvalidValueError, match="exists in this process only"):
@@ -146,7 +146,7 @@ def test_options_are_those_of_a_plan(unplayed: None, tmp_path: Path) -> None:
         "oracle", tasks=["PickXtimes"], settings="contextual", episodes=[2],
         policy_seeds=(7, 42), stages=[(1, 5), (1, 2, 5)], max_steps=600, wordings=None,
     )  # fmt: skip
-    assert (plan.episodes, plan.policy_seeds, plan.max_steps) == ((2,), (7, 42), 600)
+    assert (plan.episodes, plan.policy_seeds, plan.environment.max_steps) == ((2,), (7, 42), 600)
     assert plan.stages == ((1, 5), (1, 2, 5))
     assert python_run.python_plan("oracle", tasks="all", episodes=3).episodes == (0, 1, 2)
     with pytest.raises(UnknownNameError, match="PickXtimes"):

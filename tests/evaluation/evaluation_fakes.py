@@ -156,6 +156,11 @@ def small_plan(episodes: int = 4, policies: tuple[str, ...] = ("random",), seeds
     )
 
 
+def changed(plan: Plan, **options: object) -> Plan:
+    """Return a plan with other options, which may stand in sections of it."""
+    return Plan.model_validate({**plan.model_dump(), **options})
+
+
 if __name__ == "__main__":
     folder = Path(sys.argv[1])
     episodes = int(sys.argv[2]) if len(sys.argv) > 2 else 8

@@ -195,8 +195,8 @@ def paper_plan(policy: str, episodes: int = 8, seeds: int = 1, **options: Any) -
 def paper_runner(plan: Plan, folder: Path, seconds: float = 0.0) -> PaperRunner:
     return PaperRunner(
         folder,
-        policy_timeout_s=plan.policy_timeout_s,
-        hosting=plan.hosting,
+        policy_timeout_s=plan.hosting.policy_timeout_s,
+        hosting=plan.hosting.settings,
         seconds=seconds,
         notes=folder,
     )

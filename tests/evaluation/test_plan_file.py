@@ -39,7 +39,7 @@ def test_every_named_plan_can_be_played(name: str) -> None:
 
 def test_the_challenge_has_its_own_limit() -> None:
     plan = make_plan(["random"], **read_plan_file("challenge"))
-    assert (plan.max_steps, len(plan.episodes), plan.split) == (1500, 10, "test")
+    assert (plan.environment.max_steps, len(plan.episodes), plan.split) == (1500, 10, "test")
     assert {job.setting for job in plan.jobs()} == {"explicit"}
     assert len(plan.jobs()) == 10 * len(all_tasks())
 
@@ -50,7 +50,7 @@ def test_the_papers_protocol_is_the_papers() -> None:
     assert (plan.settings, plan.forms) == ("all", ("implicit", "resolved"))
     assert plan.policy_seeds == (7, 42, 0)
     assert plan.episodes == tuple(range(50))
-    assert plan.max_steps == 1300
+    assert plan.environment.max_steps == 1300
     told = {(job.task, job.setting, job.form) for job in plan.jobs()}
     # 40 implicit variants and their resolved forms, and the explicit setting once.
     assert len(told) == 40 + 40 + 11
@@ -64,7 +64,8 @@ def test_the_standard_protocol_has_every_setting_and_direct_in_turns() -> None:
     plan = make_plan(["random"], **options)
     assert plan.tasks == tuple(all_tasks())
     assert (plan.episodes, plan.policy_seeds) == (tuple(range(50)), (0,))
-    assert (plan.split, plan.forms, plan.max_steps) == ("test", ("implicit",), 1300)
+    assert (plan.split, plan.forms) == ("test", ("implicit",))
+    assert plan.environment.max_steps == 1300
     few = make_plan(["random"], **options | {"episodes": "4"}).jobs()
     found = {(job.task, job.setting, job.options.delivery) for job in few}
     assert {setting for _, setting, _ in found} == set(all_settings())
@@ -84,20 +85,26 @@ def test_the_standard_protocol_has_every_setting_and_direct_in_turns() -> None:
         ("episodes: 4", {"episodes": "4"}),
         ("episodes: [7]", {"episodes": "7,"}),
         ("episodes: [0, 3]", {"episodes": "0,3"}),
+        ("episodes: [easy, hard]", {"episodes": "easy,hard"}),
         ("policies: oracle", {"policies": ["oracle"]}),
-        ("policies: [oracle, 'a,b:C']", {"policies": ["oracle", "a,b:C"]}),
+        ("policies: [oracle, random]", {"policies": ["oracle,random"]}),
         ("stages: [1, 5]", {"stages": "1,5"}),
         ("stages: [[1, 5], [1, 2, 5]]", {"stages": "1,5;1,2,5"}),
         ("video: off", {"video": "off"}),
-        ("max_steps: 20", {"max_steps": 20}),
+        ("max_steps: 20", {"environment": {"max_steps": "20"}}),
+        ("{max_steps: 20, environment: {max_steps: 30, meshes: light}}",
+         {"max_steps": 20, "meshes": "light"}),
         ("actions: null", {}),
         ("settings: [direct, spatial]", {"settings": "direct,spatial"}),
+        ("retry_on: []", {"retry_on": "none"}),
     ],
-)
+)  # fmt: skip
 def test_values_are_those_that_would_be_typed(
-    tmp_path: Path, text: str, typed: dict[str, object]
+    tmp_path: Path, text: str, typed: dict[str, Any]
 ) -> None:
-    assert read_plan_file(write(tmp_path, text)) == typed
+    few: dict[str, Any] = {"policies": "random", "tasks": "PickXtimes"}
+    read = read_plan_file(write(tmp_path, text))
+    assert make_plan(**few | read) == make_plan(**few | typed)
 
 
 @pytest.mark.parametrize(

@@ -81,7 +81,9 @@ def test_a_relative_path_is_made_absolute(
     wording_file: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(wording_file.parent)
-    assert a_plan(Path("test.toml")).wordings == str(wording_file)
+    found = a_plan(Path("test.toml")).wordings
+    assert found is not None
+    assert found.file == str(wording_file)
 
 
 @pytest.mark.usefixtures("forgetful")

@@ -1,15 +1,10 @@
 """Policies' seeds: from policy seed and scene alone; and no command of a scene is heard early."""
 
-import json
-
 import pytest
 
-from roboirg.evaluation.plan.plan_file import read_plan_file
 from roboirg.evaluation.plan.plan_maker import make_plan
-from roboirg.evaluation.plan.stored_plans import read_plan, write_plan
 from roboirg.evaluation.play.job_instruction import PreparedJob
 from roboirg.evaluation.play.rollout import load_policy
-from roboirg.evaluation.records.run_files import PLAN_FILE
 from roboirg.policies.contract.random_state import episode_policy_seed
 from roboirg.tasks.splits.splits import SIZES, get_episode
 
@@ -25,16 +20,6 @@ def test_every_scene_policy_seed_and_only_the_arm_again_have_a_seed_of_their_own
     assert len({episode_policy_seed(*case) for case in cases}) == len(cases)
     for arm in ("other-goal", "silent", "paraphrase-1"):
         assert episode_policy_seed(0, scenes[0], arm) == episode_policy_seed(0, scenes[0])
-
-
-def test_a_stored_plan_may_still_have_the_secret_of_its_run(tmp_path):
-    write_plan(a_plan(), tmp_path)
-    path = tmp_path / PLAN_FILE
-    fields = {"seed_secret": "of the run", **json.loads(path.read_text())}
-    path.write_text(json.dumps(fields))
-    assert read_plan(tmp_path) == a_plan()
-    again = read_plan_file(str(path))
-    assert make_plan(again.pop("policies"), **again) == a_plan()
 
 
 def test_settings_and_forms_of_a_scene_share_the_seed_and_scenes_do_not():

@@ -16,7 +16,7 @@ from typing import Any
 import hostile_policies
 import hosting_fakes
 import pytest
-from evaluation_fakes import FakePlay, comparable, is_alive, small_plan
+from evaluation_fakes import FakePlay, changed, comparable, is_alive, small_plan
 from hosting_fakes import PaperRunner, PaperWorld, paper_plan, paper_runner
 from msgspec.structs import replace
 
@@ -26,7 +26,6 @@ from roboirg.evaluation.episode_errors import EpisodeError, Terminated, attribut
 from roboirg.evaluation.hosting.host_pool import HostPool, HostSettings
 from roboirg.evaluation.hosting.hosted_policy import HostedPolicy
 from roboirg.evaluation.hosting.policy_opening import open_policy
-from roboirg.evaluation.plan.option_parsing import name_and_spec
 from roboirg.evaluation.plan.plan import Plan
 from roboirg.evaluation.plan.plan_maker import make_plan
 from roboirg.evaluation.records.episode_log import MAX_LOG_BYTES, log_path, logged_slugs
@@ -48,8 +47,7 @@ def _fakes_can_be_imported(monkeypatch: pytest.MonkeyPatch) -> None:
 def play(folder: Path, names: tuple[str, ...], **options: Any) -> dict[str, list[Record]]:
     """Play two episodes of each policy, and an honest one between and after them."""
     specs = [spec for name in names for spec in (hostile_policies.SPEC(name), f"{name}+1={HONEST}")]
-    refs = tuple(read_policy(*reversed(name_and_spec(spec))) for spec in specs)
-    plan = paper_plan("Dice", 2).model_copy(update={"policies": refs, **options})
+    plan = changed(paper_plan("Dice", 2), policies=specs, **options)
     folder.mkdir()
     run_plan(plan, folder, paper_runner(plan, folder), LocalProcesses(2))
     found: dict[str, list[Record]] = {}

@@ -202,7 +202,7 @@ def test_no_policy_and_no_file_has_the_salt(
         max_steps=10,
         video="all",
     )
-    runner = EpisodeRunner(run, plan.video, plan=plan.fingerprint, hosting=plan.hosting)
+    runner = EpisodeRunner(run, plan.video, plan=plan.fingerprint, hosting=plan.hosting.settings)
     run_plan(plan, run, runner, LocalProcesses(1))
     assert [one.outcome for one in read_records(run)] == ["failure", "failure"]
     assert {one.split for one in read_records(run)} == {split}

@@ -17,7 +17,7 @@ from rich.console import Console
 from typer.testing import CliRunner
 
 from roboirg import main
-from roboirg.core.errors import UnknownNameError
+from roboirg.core.errors import InvalidValueError
 from roboirg.evaluation.analysis.stats.cells import PolicyRun
 from roboirg.evaluation.analysis.stats.heard_rates import count_heard
 from roboirg.evaluation.analysis.tables.run_tables import make_run_tables, print_run_tables
@@ -171,7 +171,7 @@ def test_a_long_prompt_is_refused_before_it_is_played(tmp_path: Path) -> None:
 def test_only_what_is_certainly_cut_is_refused() -> None:
     for verdict in ("heard", "unknown"):
         assert too_long_text(audit_job(job(), EXACT)[0], verdict) is None
-    with pytest.raises(UnknownNameError, match="known: send, refuse"):
+    with pytest.raises(InvalidValueError, match="should be 'send' or 'refuse'"):
         make_plan(["random"], long_prompts="cut")
 
 

@@ -12,7 +12,7 @@ from typing import Any
 
 import hosting_fakes
 import pytest
-from evaluation_fakes import FakePlayer, comparable, is_alive, small_plan, worker_pids
+from evaluation_fakes import FakePlayer, changed, comparable, is_alive, small_plan, worker_pids
 from hosting_fakes import PatientRunner, paper_plan, paper_runner
 
 from roboirg.core.errors import InvalidValueError, RoboIRGError
@@ -80,7 +80,7 @@ def test_records_are_those_of_one_process_even_if_a_node_is_killed_half_way(
     killer = threading.Thread(target=kill, daemon=True)
     killer.start()
     summary = run_plan(
-        PLAN.model_copy(update={"tries": 3}),
+        changed(PLAN, tries=3),
         tmp_path,
         FakePlayer(tmp_path, gate=tmp_path / "gate", closed=2),
         RayCluster(),
@@ -110,7 +110,12 @@ def test_the_workers_of_a_machine_share_its_policy_hosts(
     run_plan(plan, local, paper_runner(plan, local), LocalProcesses(2))
     cluster.add_node(num_cpus=2)
     ray.init(address=cluster.address, log_to_driver=False)
-    run_plan(plan, far, PatientRunner(far, hosting=plan.hosting, notes=far, wanted=3), RayCluster())
+    run_plan(
+        plan,
+        far,
+        PatientRunner(far, hosting=plan.hosting.settings, notes=far, wanted=3),
+        RayCluster(),
+    )
 
     assert [one | {"usage": None} for one in all_comparable(far)] == [
         one | {"usage": None} for one in all_comparable(local)

@@ -14,11 +14,11 @@ from typing import Any
 
 import pytest
 import ray_fakes
-from evaluation_fakes import FakePlayer, small_plan
+from evaluation_fakes import FakePlayer, changed, small_plan
 from ray_fakes import BAD_MACHINE, NotingPlace, WithoutModule, WithoutVulkan
 
 from roboirg.core.errors import InvalidValueError, RoboIRGError
-from roboirg.evaluation.plan.worker_needs import WorkerNeeds
+from roboirg.evaluation.plan.plan_sections import WorkerNeeds
 from roboirg.evaluation.records.store import RECORDS_FILE, read_records
 from roboirg.evaluation.run import ray_pool
 from roboirg.evaluation.run.progress import Reporter
@@ -29,7 +29,7 @@ pytestmark = pytest.mark.slow
 
 ray = pytest.importorskip("ray")
 
-PLAN = small_plan(8).model_copy(update={"tries": 3})
+PLAN = changed(small_plan(8), tries=3)
 
 
 class Warnings(Reporter):
@@ -96,7 +96,7 @@ def test_a_bad_machine_is_left_out_and_named_once(
 ) -> None:
     cluster.add_node(num_cpus=1, env_vars={BAD_MACHINE: "1"})
     warnings = Warnings()
-    plan = small_plan(8, (policy,)).model_copy(update={"tries": 3})
+    plan = changed(small_plan(8, (policy,)), tries=3)
     summary = run_plan(
         plan, tmp_path, play(tmp_path, 0.3), RayCluster(address=cluster.address), reporter=warnings
     )

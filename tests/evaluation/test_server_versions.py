@@ -23,8 +23,9 @@ from roboirg.policies import make_policy
 from roboirg.policies.planners.hierarchical_policy import HierarchicalPolicy
 
 
-def plan_of(episodes: int) -> Plan:
-    return make_plan(("random",), tasks="PickXtimes", settings="explicit", episodes=str(episodes))
+def plan_of(episodes: int, **options: object) -> Plan:
+    few = {"tasks": "PickXtimes", "settings": "explicit", "episodes": episodes}
+    return make_plan("random", **few, **options)
 
 
 class Told:
@@ -65,7 +66,7 @@ def test_a_version_that_controls_a_terminal_stops_no_run(tmp_path: Path) -> None
 
 
 def test_errors_before_the_server_told_its_version_do_not_count(tmp_path: Path) -> None:
-    plan = plan_of(3).model_copy(update={"tries": 1})
+    plan = plan_of(3, tries=1)
     run_plan(plan, tmp_path, Told("refused", "a", "refused"), InProcess())
     assert versions(tmp_path) == ["a"] * 3
     cells = gather([("run", read_results(tmp_path))])
@@ -75,7 +76,7 @@ def test_errors_before_the_server_told_its_version_do_not_count(tmp_path: Path) 
 
 
 def test_a_folder_of_errors_takes_any_version(tmp_path: Path) -> None:
-    plan = plan_of(2).model_copy(update={"tries": 1})
+    plan = plan_of(2, tries=1)
     run_plan(plan, tmp_path, Told("refused", "refused"), InProcess())
     assert versions(tmp_path) == [None, None]
     run_plan(plan, tmp_path, Told("b", "b"), InProcess())

@@ -13,7 +13,7 @@ from types import SimpleNamespace
 
 import chaos_policy
 import pytest
-from evaluation_fakes import FakePlay, WaitingPlay, comparable, small_plan
+from evaluation_fakes import FakePlay, WaitingPlay, changed, comparable, small_plan
 from hypothesis import given
 from hypothesis import strategies as st
 from msgspec.structs import replace
@@ -63,7 +63,9 @@ def plan_of_chaos() -> Plan:
 
 
 def play(plan: Plan, folder: Path) -> tuple[RunSummary, dict[Job, Record]]:
-    player = EpisodeRunner(folder, policy_timeout_s=plan.policy_timeout_s, hosting=plan.hosting)
+    player = EpisodeRunner(
+        folder, policy_timeout_s=plan.hosting.policy_timeout_s, hosting=plan.hosting.settings
+    )
     summary = run_plan(plan, folder, player, LocalProcesses(2, episode_timeout_s=600))
     return summary, {record.identity: record for record in read_records(folder)}
 
@@ -71,7 +73,7 @@ def play(plan: Plan, folder: Path) -> tuple[RunSummary, dict[Job, Record]]:
 @pytest.fixture(params=["own", pytest.param("shared", marks=pytest.mark.slow)])
 def plan(monkeypatch: pytest.MonkeyPatch, request: pytest.FixtureRequest) -> Plan:
     monkeypatch.syspath_prepend(Path(chaos_policy.__file__).parent)
-    return plan_of_chaos().model_copy(update={"policy_process": request.param})
+    return changed(plan_of_chaos(), policy_process=request.param)
 
 
 @pytest.mark.slow
@@ -177,8 +179,7 @@ def test_processes_that_cannot_start_end_the_run(tmp_path: Path) -> None:
 def test_a_queue_is_not_the_policys_time_and_a_timeout_says_what_was_waited_for(
     tmp_path: Path,
 ) -> None:
-    plan = small_plan(episodes=2)
-    plan = plan.model_copy(update={"settings": ("explicit",), "tries": 1})
+    plan = changed(small_plan(episodes=2), settings="explicit", tries=1)
     play = WaitingPlay(queued_episode=0, queue_s=7.0, limit_s=5.0)
     run_plan(plan, tmp_path, play, LocalProcesses(1, episode_timeout_s=600))
     queued, stuck = sorted(read_records(tmp_path), key=lambda record: record.episode)

@@ -16,6 +16,7 @@ from wire_servers import ChallengeServer, unpack
 
 import roboirg
 from roboirg.apps.policy_check.policy_check import check_policy
+from roboirg.core.environment_options import EnvironmentOptions
 from roboirg.core.errors import InvalidValueError, UnknownNameError
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.evaluation.play.job_instruction import PreparedJob
@@ -114,7 +115,7 @@ def test_a_challenge_server_is_shown_what_the_options_ask_for():
             task="VideoUnmask",
             split="test",
             episode=0,
-            max_steps=4,
+            environment=EnvironmentOptions(max_steps=4),
             options=InstructionOptions("direct"),
         )
         env = make_env(PreparedJob(job), job_needs(client, job))

@@ -10,25 +10,25 @@ from roboirg.core.errors import UnknownNameError
 Name = TypeVar("Name", bound=str)
 
 
-def known_tasks(text: str, wordings: str | None = None) -> tuple[str, ...]:
-    """Return the tasks that were typed; of all, those that open wordings have commands of."""
+def known_tasks(given: object, wordings: str | None = None) -> tuple[str, ...]:
+    """Return tasks as typed or in a plan; of all, those that open wordings have commands of."""
     from roboirg.core.word_pools import POOLS
     from roboirg.evaluation.plan.option_parsing import means_all, parse_names
     from roboirg.language.wordings.wording_store import find_wordings
     from roboirg.tasks import find_tasks
 
-    names = find_tasks(parse_names("task", text))
-    if wordings is None or wordings in POOLS or not means_all(text):
+    names = find_tasks(parse_names("task", given))
+    if wordings is None or wordings in POOLS or not means_all(given):
         return names
     return tuple(name for name in names if name in find_wordings(wordings).tasks)
 
 
-def known_settings(text: str) -> tuple[str, ...]:
-    """Return the settings that were typed."""
+def known_settings(given: object) -> tuple[str, ...]:
+    """Return settings as typed or in a plan."""
     from roboirg.evaluation.plan.option_parsing import parse_names
     from roboirg.language.settings import find_settings
 
-    return find_settings(parse_names("setting", text))
+    return find_settings(parse_names("setting", given))
 
 
 def known_name(kind: str, name: str, known: Sequence[Name]) -> Name:
@@ -43,10 +43,10 @@ def known_name(kind: str, name: str, known: Sequence[Name]) -> Name:
     raise UnknownNameError(kind, name, known)
 
 
-def known_names(kind: str, text: str, known: Sequence[Name]) -> tuple[Name, ...]:
+def known_names(kind: str, given: object, known: Sequence[Name]) -> tuple[Name, ...]:
     """Return the names that were typed, separated by commas; all are all that are known."""
     from roboirg.evaluation.plan.option_parsing import means_all, parse_names
 
-    if means_all(text):
+    if means_all(given):
         return tuple(known)
-    return tuple(known_name(kind, name, known) for name in parse_names(kind, text))
+    return tuple(known_name(kind, name, known) for name in parse_names(kind, given))

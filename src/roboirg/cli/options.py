@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import functools
-import inspect
 import sys
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, get_origin, get_type_hints
+from typing import TYPE_CHECKING, Annotated, Any, get_type_hints
 
 import typer
 
@@ -37,54 +35,6 @@ Workers = Annotated[
 ]
 
 
-_CONTEXT, _KEYWORD = "context", inspect.Parameter.KEYWORD_ONLY
-
-
-class OptionGroup:
-    """Options of a command that are one parameter of its function; see `spread`.
-
-    A subclass names its options as annotations. None of them has a default of its own.
-    """
-
-    def __init__(self, **given: Any) -> None:  # noqa: ANN401 - whatever its options take
-        self._given = given
-
-    @classmethod
-    def types(cls) -> dict[str, Any]:
-        """Return the annotation of each option."""
-        found = get_type_hints(cls, include_extras=True)
-        return {name: kind for name, kind in found.items() if get_origin(kind) is not ClassVar}
-
-    def typed(self) -> dict[str, Any]:
-        """Return those that were typed, by name."""
-        return {name: value for name, value in self._given.items() if value not in (None, [])}
-
-
-class WordOptions(OptionGroup):
-    """The options of one instruction, each an option of the command."""
-
-    @classmethod
-    def types(cls) -> dict[str, Any]:
-        """Return the annotation of each; the command chooses settings and forms itself."""
-        from roboirg.core.instruction_options import OPTION_HELP, InstructionOptions
-
-        usual = InstructionOptions()
-        return {
-            name: Annotated[
-                (int if isinstance(getattr(usual, name), int) else str) | None,
-                typer.Option(help=text),
-            ]
-            for name, text in OPTION_HELP.items()
-            if name not in ("setting", "form", "delivery")
-        }
-
-    def options(self) -> InstructionOptions:
-        """Return them checked one by one; `check_options` checks whether they go together."""
-        from roboirg.evaluation.plan.plan_maker import word_options
-
-        return word_options(**self.typed())
-
-
 PlanName = Annotated[
     str | None,
     typer.Option(
@@ -93,28 +43,35 @@ PlanName = Annotated[
         "--show-plan).",
     ),
 ]
-SELECTION = ("tasks", "split", "episodes", "settings")
-"""Options of commands with `PlanWords` that a plan gives, too."""
 
 
-class PlanWords(OptionGroup):
-    """The options of instructions, as a plan gives them.
+class PlanWords:
+    """What a command other than `run` takes from the file of its option `--plan`.
 
-    The class of a command may name a section of the plan's file, and what this may have: choices
-    of its own for which the command has no options.
+    Args:
+        context: of the command.
+        plan: name of the file, if there is one.
+        section: key in the file for choices of its own for which the command has no options.
+        own: names of these choices.
     """
 
-    plan: PlanName
-    section: ClassVar[str] = ""
-    own: ClassVar[Sequence[str]] = ()
-
-    @functools.cached_property
-    def fields(self) -> dict[str, Any]:
-        """The plan's fields as options of `make_plan`; empty without a plan."""
+    def __init__(
+        self,
+        context: typer.Context,
+        plan: str | None,
+        section: str = "",
+        own: Sequence[str] = (),
+    ) -> None:
         from roboirg.evaluation.plan.plan_file import read_plan_file
 
-        name = self._given.get("plan")
-        return {} if name is None else read_plan_file(name, self.section)
+        self._context, self._section, self._own = context, section, own
+        self.fields = {} if plan is None else read_plan_file(plan, section)
+
+    def given(self, name: str, value: str) -> Any:  # noqa: ANN401 - as in the file
+        """Return the value of an option of the command; if it was not typed, as in the plan."""
+        source = self._context.get_parameter_source(name)
+        is_typed = source is not None and source.name != "DEFAULT"
+        return value if is_typed else self.fields.get(name, value)
 
     def choices(self, kind: type) -> dict[str, Any]:
         """Return what the plan's section gives of the fields of this class.
@@ -125,40 +82,33 @@ class PlanWords(OptionGroup):
         """
         from roboirg.evaluation.plan.plan_maker import as_typed_field
 
-        given = self.fields.get(self.section) or {}
+        given = self.fields.get(self._section) or {}
         if not isinstance(given, Mapping):
             raise InvalidValueError(
-                f"{self.section} of the plan is {given!r}; it must be a mapping such as "
-                f"'{self.own[0]}: …'."
+                f"{self._section} of the plan is {given!r}; it must be a mapping such as "
+                f"'{self._own[0]}: …'."
             )
         for name in given:
-            if name not in self.own:
-                raise UnknownNameError(f"key of {self.section} in the plan", str(name), self.own)
+            if name not in self._own:
+                raise UnknownNameError(f"key of {self._section} in the plan", str(name), self._own)
         types = get_type_hints(kind, include_extras=True)
         return {
-            name: as_typed_field(f"{self.section}.{name}", types[name], value)
+            name: as_typed_field(f"{self._section}.{name}", types[name], value)
             for name, value in given.items()
             if name in types
         }
 
-    @property
-    def words(self) -> dict[str, Any]:
-        """Those of them that choose the words of each setting and form."""
-        from roboirg.evaluation.plan.plan import SINGLE_OPTIONS
-
-        names = ("stages", "wordings", "options", *SINGLE_OPTIONS)
-        return {name: self.fields[name] for name in names if name in self.fields}
-
-    @property
-    def wordings_file(self) -> str | None:
-        """The wording file or the name of a pool."""
-        return self.fields.get("wordings")
-
     def options(self) -> InstructionOptions:
-        """Return them checked one by one; `check_options` checks whether they go together."""
+        """Return the options of instructions, but setting and form, checked one by one.
+
+        `check_options` checks whether they go together.
+        """
+        from roboirg.evaluation.plan.plan import FLAT
         from roboirg.evaluation.plan.plan_maker import word_options
 
-        return word_options(**self.words)
+        own = (one for one, section in FLAT.items() if section == "instruction")
+        names = {"stages", "wordings", "instruction", *own}
+        return word_options(**{one: self.fields[one] for one in self.fields if one in names})
 
     def forms(self, usual: Sequence[str] = ("implicit",)) -> tuple[str, ...]:
         """Return the plan's forms, or the usual ones if it has none."""
@@ -174,58 +124,6 @@ class PlanWords(OptionGroup):
                 f"The plan's forms are {' and '.join(found)}; this command needs exactly one."
             )
         return found[0]
-
-
-NO_PLAN = PlanWords()
-NO_WORDS = WordOptions()
-
-
-def spread(command: Callable[..., None]) -> Callable[..., None]:
-    """Let each parameter that is a group of options be given as these options."""
-    types = get_type_hints(command, include_extras=True)
-    groups = {
-        name: kind
-        for name, kind in types.items()
-        if isinstance(kind, type) and issubclass(kind, OptionGroup)
-    }
-    members = {name: kind.types() for name, kind in groups.items()}
-    parameters = [inspect.Parameter(_CONTEXT, _KEYWORD, annotation=typer.Context)]
-    for one in inspect.signature(command).parameters.values():
-        if one.name not in groups:
-            parameters.append(one.replace(annotation=types[one.name], kind=_KEYWORD))
-            continue
-        parameters += [
-            one.replace(name=name, annotation=annotation, default=None, kind=_KEYWORD)
-            for name, annotation in members[one.name].items()
-        ]
-
-    @functools.wraps(command)
-    def spread_command(**given: Any) -> None:  # noqa: ANN401 - whatever the command takes
-        context = given.pop(_CONTEXT)
-        chosen = {
-            name: kind(**{member: given.pop(member) for member in members[name]})
-            for name, kind in groups.items()
-        }
-        for group in chosen.values():
-            if isinstance(group, PlanWords):
-                given |= _planned(given, group, context)
-        command(**given, **chosen)
-
-    # Typer reads both.
-    spread_command.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
-    spread_command.__annotations__ = {one.name: one.annotation for one in parameters}
-    return spread_command
-
-
-def _planned(given: Mapping[str, Any], group: PlanWords, context: typer.Context) -> dict[str, Any]:
-    """Return the options of a command that a plan gives and that were not typed."""
-    shared = [name for name in SELECTION if name in given and name in group.fields]
-    sources = {name: context.get_parameter_source(name) for name in shared}
-    return {
-        name: group.fields[name]
-        for name, source in sources.items()
-        if source is not None and source.name == "DEFAULT"
-    }
 
 
 def check_output_file(path: Path) -> None:

@@ -165,6 +165,7 @@ def tables(
 
     Example: roboirg tables runs/first --which main --published
     """
+    from roboirg.evaluation.analysis.stats.cells import gather
     from roboirg.evaluation.analysis.tables.diagnostic_tables import (
         DIAGNOSTIC_TABLES,
         RECORD_TABLES,
@@ -177,7 +178,7 @@ def tables(
             raise InvalidValueError(f"--which {which} excludes --published, --floors and --by.")
         found = [_diagnostic_table(which, runs or [])]
     elif by is None:
-        found = _tables(which, _cells(runs or []), published=published, floors=floors)
+        found = _tables(which, gather(*_runs(runs or [])), published=published, floors=floors)
     elif published or floors or which != _ALL:
         raise InvalidValueError(
             "--by prints tables of its own; it cannot be combined with --which, --published or "
@@ -266,11 +267,12 @@ def _tables(which: str, cells: Cells, *, published: bool, floors: str | None) ->
 
 
 def _breakdown_tables(runs: list[str], by: str) -> list[Table]:
+    from roboirg.evaluation.analysis.stats.cells import gather
     from roboirg.evaluation.analysis.tables.breakdown_table import make_breakdown_table
 
     if not runs:
         raise InvalidValueError("--by needs a run; give its folder.")
-    breakdowns, cells = _breakdowns(by), _cells(runs)
+    breakdowns, cells = _breakdowns(by), gather(*_runs(runs))
     labels = _labels(breakdowns, runs)
     found = [make_breakdown_table(one, cells, labels[one.name]) for one in breakdowns]
     if not any(table.rows for table in found):
@@ -336,12 +338,6 @@ def _write(found: list[Table], folder: Path, output: Format) -> None:
         path = folder / f"{table.key}{output.suffix}"
         write_atomically(path, output.draw(table))
         typer.echo(path)
-
-
-def _cells(runs: list[str]) -> Cells:
-    from roboirg.evaluation.analysis.stats.cells import gather
-
-    return gather(*_runs(runs))
 
 
 def _runs(runs: list[str]) -> tuple[list[tuple[str, Sequence[Summary]]], list[Job]]:

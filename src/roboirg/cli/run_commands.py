@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from roboirg.cli import run_options as options
-from roboirg.cli.options import Workers, add_working_directory, spread
+from roboirg.cli.declared_options import EPISODES
+from roboirg.cli.options import Workers, add_working_directory
 from roboirg.core.errors import InvalidValueError, UnknownNameError
 from roboirg.core.plain_text import counted, printable, verb_for
 
@@ -34,7 +34,7 @@ PlanName = Annotated[
         "--plan",
         help="YAML file or a run's plan.json; or challenge, demo, paper, paper-context, "
         "paper-planners, quick, robomme or standard.",
-        rich_help_panel=options.EPISODES,
+        rich_help_panel=EPISODES,
     ),
 ]
 Folder = Annotated[str, typer.Argument(help="Output folder of a run.")]
@@ -46,15 +46,14 @@ RetryErrors = Annotated[
 ]
 
 
-@spread
 def run(
+    context: typer.Context,
     out: Annotated[
         str | None,
         typer.Option(
             help="Output folder; give the same folder again to resume.", show_default="required"
         ),
     ] = None,
-    choices: options.PlanChoices = options.NO_CHOICES,
     plan: PlanName = None,
     workers: Workers = None,
     executor: Annotated[
@@ -77,9 +76,10 @@ def run(
     Example: roboirg run --policy oracle --tasks PickXtimes --out runs/first
     """
     from roboirg.evaluation.plan.plan_file import plan_text
+    from roboirg.evaluation.play.prompt_shares import prompt_shares, warning_lines
 
     add_working_directory(last=True)
-    made = _plan(plan, choices.typed(), usual=("oracle",) if show_plan else ())
+    made = _plan(plan, context.obj, usual=("oracle",) if show_plan else ())
     if show_plan:
         typer.echo(plan_text(made), nl=False)
         return
@@ -92,7 +92,8 @@ def run(
     if dry_run:
         _print_counts(made, folder)
         return
-    _warn_of_cut_prompts(made)
+    for line in warning_lines(prompt_shares(made.jobs())):
+        typer.echo(line, err=True)
     summary = play(made, folder, chosen, retry=retry_errors)
     print_tables_of(folder, planned_jobs(folder))
     report_problems(summary, folder)
@@ -192,8 +193,6 @@ def _plan(name: str | None, typed: dict[str, Any], usual: Sequence[str]) -> Plan
     from roboirg.tasks.splits.private_splits import drawn_split
 
     chosen = {**({} if name is None else read_plan_file(name)), **typed}
-    if "wordings" in typed and "wordings" in chosen.get("options", {}):
-        chosen["options"] = {**chosen["options"], "wordings": None}  # those of the file's wordings
     policies = chosen.pop("policies", None) or usual
     if not policies:
         raise InvalidValueError("No policy given; name one with --policy, such as oracle.")
@@ -211,13 +210,6 @@ def _check_run(plan: Plan, folder: Path) -> None:
     check_run(plan, folder)
 
 
-def _warn_of_cut_prompts(plan: Plan) -> None:
-    from roboirg.evaluation.play.prompt_shares import prompt_shares, warning_lines
-
-    for line in warning_lines(prompt_shares(plan.jobs())):
-        typer.echo(line, err=True)
-
-
 def _executor(plan: Plan, name: str, workers: int | None) -> Executor:
     if name not in EXECUTORS:
         raise UnknownNameError("executor", name, EXECUTORS)
@@ -225,37 +217,31 @@ def _executor(plan: Plan, name: str, workers: int | None) -> Executor:
         from roboirg.evaluation.run.ray_cluster import RayCluster
 
         address = os.environ.get("RAY_ADDRESS")
-        return RayCluster(workers, address, plan.episode_timeout_s, plan.cluster)
+        return RayCluster(workers, address, plan.attempts.episode_timeout_s, plan.cluster)
     from roboirg.evaluation.run.executor import choose_executor
 
-    return choose_executor(workers, plan.episode_timeout_s)
+    return choose_executor(workers, plan.attempts.episode_timeout_s)
 
 
 def _print_counts(plan: Plan, folder: Path) -> None:
     from rich.console import Console
-    from rich.table import Table
 
     from roboirg.evaluation.records.record_codec import identity_key
     from roboirg.evaluation.records.store import read_index
     from roboirg.evaluation.run.plan_counts import cell_sizes
     from roboirg.language.settings import EXPLICIT
-    from roboirg.util.console_width import widen
 
     jobs, console = plan.jobs(), Console()
-    table = Table(title=f"plan {plan.fingerprint}", title_justify="left")
     sizes = cell_sizes(jobs)
     settings = tuple(dict.fromkeys(setting for cells in sizes.values() for setting in cells))
-    table.add_column("policy")
-    table.add_column("task")
-    for setting in settings:
-        table.add_column(setting, justify="right")
-    for (policy, task), cells in sizes.items():
-        counts = (" + ".join(map(str, cells.get(one, {}).values())) or "–" for one in settings)
-        table.add_row(policy, task, *counts)
+    rows = [
+        (*names, *(" + ".join(map(str, cells.get(one, {}).values())) or "–" for one in settings))
+        for names, cells in sizes.items()
+    ]
     forms = dict.fromkeys(job.form for job in jobs if job.setting != EXPLICIT)  # it has one form
-    table.caption = f"episodes: {' + '.join(forms)}" if forms else "episodes"
-    widen(console, table)
-    console.print(table)
+    caption = f"episodes: {' + '.join(forms)}" if forms else "episodes"
+    heads = ("policy", "task", *settings)
+    _print_table(console, f"plan {plan.fingerprint}", heads, rows, caption)
     for arm, count in plan.left_out(jobs).items():
         console.print(f"{arm}: {counted(count, 'episode')} left out.", highlight=False)
     _print_prompt_shares(jobs, settings, console)
@@ -266,22 +252,36 @@ def _print_counts(plan: Plan, folder: Path) -> None:
     _print_model_calls(todo, console)
 
 
-def _print_model_calls(todo: Sequence[Job], console: Console) -> None:
-    """Print how often models will be asked at least, if policies ask any."""
+def _print_table(
+    console: Console,
+    title: str,
+    heads: Sequence[str],
+    rows: Sequence[Sequence[str]],
+    caption: str | None = None,
+) -> None:
+    """Print a table, if it has rows; all columns but those of names are numbers."""
     from rich.table import Table
 
-    from roboirg.evaluation.run.plan_counts import least_calls
     from roboirg.util.console_width import widen
 
-    table = Table(title="least calls of models", title_justify="left")
-    table.add_column("policy")
-    table.add_column("setting")
-    table.add_column("calls", justify="right")
-    for (policy, setting), calls in least_calls(todo).items():
-        table.add_row(policy, setting, f"{calls:,}")
-    if table.row_count:
+    table = Table(title=title, title_justify="left", caption=caption)
+    for head in heads:
+        is_name = head in ("policy", "task", "setting")
+        table.add_column(head, justify="left" if is_name else "right")
+    for row in rows:
+        table.add_row(*row)
+    if rows:
         widen(console, table)
         console.print(table)
+
+
+def _print_model_calls(todo: Sequence[Job], console: Console) -> None:
+    """Print how often models will be asked at least, if policies ask any."""
+    from roboirg.evaluation.run.plan_counts import least_calls
+
+    rows = [(*names, f"{calls:,}") for names, calls in least_calls(todo).items()]
+    _print_table(console, "least calls of models", ("policy", "setting", "calls"), rows)
+    if rows:
         console.print(
             "A listener is asked once an episode, a planner at least once a subgoal; planners that "
             "are asked before every chunk, second questions and retried episodes need more."
@@ -292,24 +292,18 @@ def _print_prompt_shares(
     jobs: tuple[Job, ...], settings: tuple[str, ...], console: Console
 ) -> None:
     """Print how many instructions the policies that declare a limit do not read whole."""
-    from rich.table import Table
-
     from roboirg.evaluation.play.prompt_shares import prompt_shares, share_text
     from roboirg.policies.builtin import BUILTIN
-    from roboirg.util.console_width import widen
 
     shares = prompt_shares(jobs)
-    table = Table(title="instructions cut off at a policy's limit", title_justify="left")
-    for name in ("policy", "reads", *settings):
-        table.add_column(name, justify="left" if name == "policy" else "right")
+    rows = []
     for one in shares:
         if one.limit is not None:
             counts = (one.settings.get(setting) for setting in settings)
             row = ("–" if count is None else share_text(count) for count in counts)
-            table.add_row(one.policy, f"{one.limit.tokens} tokens", *row)
-    if table.row_count:
-        widen(console, table)
-        console.print(table)
+            rows.append((one.policy, f"{one.limit.tokens} tokens", *row))
+    title = "instructions cut off at a policy's limit"
+    _print_table(console, title, ("policy", "reads", *settings), rows)
     undeclared = [one.policy for one in shares if one.limit is None and one.policy not in BUILTIN]
     if undeclared:
         console.print(

@@ -5,12 +5,14 @@ from __future__ import annotations
 from dataclasses import asdict, dataclass, field, fields
 from typing import Any, Literal, TypedDict
 
-from roboirg.core.errors import InvalidValueError
+from roboirg.core.actions import find_action_space
+from roboirg.core.errors import InvalidValueError, UnknownNameError
 from roboirg.core.field_types import Name, Whole, described
 
 MAX_STEPS = 1300
 """Control steps a policy has, as in RoboMME's published experiments."""
 DEFAULT_MESHES = "faithful"
+MESHES = (DEFAULT_MESHES, "light")
 
 DemonstrationFrames = Literal["all", "none"] | int
 """Which frames of the video are included: all, none, or every n-th, the first included."""
@@ -58,6 +60,25 @@ class EnvironmentOptions:
     def prescribed(self) -> dict[str, Any]:
         """The values by name, without those that are left to the policy."""
         return {name: value for name, value in asdict(self).items() if value is not None}
+
+    def check(self) -> None:
+        """Raise if a value is invalid.
+
+        Raises:
+            UnknownNameError: there is no such action space or kind of meshes.
+            InvalidValueError: a number is out of range.
+        """
+        if type(self.max_steps) is not int or self.max_steps < 1:
+            raise InvalidValueError(
+                f"max_steps is {self.max_steps!r}; it must be a whole number of at least 1."
+            )
+        if self.actions is not None:
+            find_action_space(self.actions)
+        if self.demonstration_frames is not None:
+            check_demonstration_frames(self.demonstration_frames)
+        check_observe_every(self.observe_every)
+        if self.meshes not in MESHES:
+            raise UnknownNameError("kind of meshes", self.meshes, MESHES)
 
 
 class EnvironmentKeywords(TypedDict, total=False):

@@ -93,8 +93,6 @@ class InstructionKeywords(WordKeywords, total=False):
 
 OPTION_NAMES = tuple(one.name for one in fields(InstructionOptions))
 """The names of all options."""
-OPTION_HELP = {one.name: str(one.metadata["help"]) for one in fields(InstructionOptions)}
-"""What each option means."""
 
 
 def as_fields(given: Mapping[str, Any]) -> dict[str, Any]:

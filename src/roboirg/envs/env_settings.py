@@ -15,7 +15,7 @@ from roboirg.core.environment_options import (
     check_demonstration_frames,
 )
 from roboirg.core.episode import Episode
-from roboirg.core.errors import InvalidValueError, UnknownNameError
+from roboirg.core.errors import UnknownNameError
 from roboirg.core.instruction_options import (
     OPTION_NAMES,
     InstructionKeywords,
@@ -85,9 +85,7 @@ class EnvSettings:
         return cls().with_options(options)
 
     def __post_init__(self) -> None:
-        limit = self.environment.max_steps
-        if not isinstance(limit, int) or limit < 1:
-            raise InvalidValueError(f"max_steps is {limit!r}; it must be an integer >= 1.")
+        self.environment.check()
         if self.render_mode is not None and self.render_mode not in RENDER_MODES:
             raise UnknownNameError("render mode", self.render_mode, RENDER_MODES)
         check_arm(self.arm)

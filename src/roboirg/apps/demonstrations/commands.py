@@ -9,13 +9,13 @@ import typer
 
 from roboirg.cli.export_commands import export_app
 from roboirg.cli.options import (
+    PlanName,
     PlanWords,
     Settings,
     Split,
     Tasks,
     Workers,
     check_output_file,
-    spread,
 )
 from roboirg.core.plain_text import counted
 
@@ -23,25 +23,19 @@ if TYPE_CHECKING:
     from roboirg.apps.demonstrations.export_plan import ExportPlan
 
 
-class ExportWords(PlanWords):
-    """A plan with words, and what is rare in an export."""
-
-    section = "demonstrations"
-    own = (
-        "cameras", "size", "video", "names", "extra_actions", "variations", "policy", "outcomes",
-        "language_columns", "actions", "disturbed",
-    )  # fmt: skip
-
-
-NO_WORDS = ExportWords()
+OWN_OPTIONS = (
+    "cameras", "size", "video", "names", "extra_actions", "variations", "policy", "outcomes",
+    "language_columns", "actions", "disturbed",
+)  # fmt: skip
+"""What is rare in an export: keys of a plan's section ``demonstrations``."""
 _TEST_WORDS = (
     "roboirg: These demonstrations speak the words held out for tests; a policy that is trained on "
     "them is tested in words that it knows."
 )
 
 
-@spread
 def export_demonstrations(
+    context: typer.Context,
     out: Annotated[Path, typer.Option(help="Folder of the dataset.")],
     format: Annotated[  # noqa: A002
         str, typer.Option(help="lerobot-v3, lerobot-v2.1 or robomme-hdf5.")
@@ -52,7 +46,7 @@ def export_demonstrations(
         str, typer.Option(help="all, 4 for the first four, or a list: 0,3,5-9.")
     ] = "all",
     settings: Settings = "all",
-    words: ExportWords = NO_WORDS,
+    plan: PlanName = None,
     pictures: Annotated[
         str, typer.Option(help="png, lossless-video, lossy-video or none.")
     ] = "png",
@@ -76,35 +70,36 @@ def export_demonstrations(
     from roboirg.apps.demonstrations.export_plan import ExportPlan, training_words
     from roboirg.apps.demonstrations.export_run import run_export
     from roboirg.apps.demonstrations.size_estimate import size_text
-    from roboirg.cli.names import known_settings
+    from roboirg.cli.names import known_settings, known_tasks
     from roboirg.cli.progress_bar import progress_bars
-    from roboirg.evaluation.plan.option_parsing import parse_episodes, parse_names
+    from roboirg.evaluation.plan.option_parsing import parse_episodes
     from roboirg.policies import find_policy
-    from roboirg.tasks import find_tasks
     from roboirg.util.processor import worker_count
 
+    words = PlanWords(context, plan, "demonstrations", OWN_OPTIONS)
     chosen = words.choices(ExportPlan)
     find_policy(chosen.get("policy", ExportPlan.policy))
     chosen.setdefault("video", "prefix" if format == "robomme-hdf5" else "none")
     # Pictures in the tables of this format are read by openpi alone.
     openpi = (format, pictures) == ("lerobot-v2.1", "png")
     chosen.setdefault("names", "openpi" if openpi else "lerobot")
+    split = words.given("split", split)
     # `validated` checks the names that are cast.
-    names_of_tasks = find_tasks(parse_names("task", tasks))
-    plan = ExportPlan(
+    names_of_tasks = known_tasks(words.given("tasks", tasks))
+    made = ExportPlan(
         tasks=names_of_tasks,
         split=split,
-        episodes=parse_episodes(episodes, split, names_of_tasks),
-        settings=known_settings(settings),
+        episodes=parse_episodes(words.given("episodes", episodes), split, names_of_tasks),
+        settings=known_settings(words.given("settings", settings)),
         forms=words.forms(),
         options=training_words(split, words.options()),
         format=cast("Any", format),
         pictures=cast("Any", pictures),
         **chosen,
     ).validated()
-    if plan.options.wordings == "test":
+    if made.options.wordings == "test":
         typer.echo(_TEST_WORDS, err=True)
-    _print_estimate(plan)
+    _print_estimate(made)
     if dry_run:
         return
     count = worker_count(workers)
@@ -113,7 +108,7 @@ def export_demonstrations(
         def report(work: str, done: int, total: int, size: int) -> None:
             show(work, done, total, size_text(size) if size else "")
 
-        summary = run_export(plan, out, count, report, trajectories)
+        summary = run_export(made, out, count, report, trajectories)
     ends = ", ".join(f"{number} {status}" for status, number in summary.statuses.items())
     typer.echo(
         f"{counted(summary.episodes, 'episode')}, {size_text(summary.size)}: {out} "

@@ -11,10 +11,10 @@ import typer
 from roboirg.cli.export_commands import export_app
 from roboirg.cli.options import (
     AnySplit,
+    PlanName,
     PlanWords,
     Settings,
     Tasks,
-    spread,
 )
 from roboirg.core.errors import InvalidValueError
 from roboirg.core.plain_text import counted
@@ -33,23 +33,13 @@ def _score() -> None:
     pass
 
 
-class GroundingWords(PlanWords):
-    """A plan with words, and what is rare in an export."""
-
-    section = "grounding"
-    own = ("every_variant", "frames", "frames_every")
-
-
-NO_WORDS = GroundingWords()
-
-
-@spread
 def export_grounding(
+    context: typer.Context,
     out: Annotated[Path, typer.Option(help="Folder for the dataset; continued if interrupted.")],
     split: AnySplit = "test",
     tasks: Tasks = "all",
     settings: Settings = "all",
-    words: GroundingWords = NO_WORDS,
+    plan: PlanName = None,
 ) -> None:
     """Export grounding questions with pictures: Parquet, JSON lines, VLMEvalKit's TSV.
 
@@ -70,19 +60,20 @@ def export_grounding(
     from roboirg.util.processor import worker_count
 
     check_parquet_support()
+    words = PlanWords(context, plan, "grounding", ("every_variant", "frames", "frames_every"))
     options = words.options()
     check_options(options)
     request = ExportRequest(
         episodes=tuple(
             EpisodeName(task, one, index)
-            for task in known_tasks(tasks, options.wordings)
-            for one in parse_splits(split)
+            for task in known_tasks(words.given("tasks", tasks), options.wordings)
+            for one in parse_splits(words.given("split", split))
             for index in parse_episodes(words.fields.get("episodes", "all"), one, [task])
         ),
-        settings=known_settings(settings),
+        settings=known_settings(words.given("settings", settings)),
         forms=words.forms(),
         options=options,
-        wordings_file=words.wordings_file,
+        wordings_file=words.fields.get("wordings"),
         **words.choices(ExportRequest),
     )
     count = worker_count()

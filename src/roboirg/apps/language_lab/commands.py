@@ -12,13 +12,12 @@ import typer
 from roboirg.cli.export_commands import export_app
 from roboirg.cli.names import known_name, known_settings, known_tasks
 from roboirg.cli.options import (
-    NO_PLAN,
     AnySplit,
+    PlanName,
     PlanWords,
     Settings,
     Tasks,
     check_output_file,
-    spread,
 )
 from roboirg.core.errors import InvalidValueError, RoboIRGError
 from roboirg.core.plain_text import counted
@@ -42,13 +41,13 @@ _LINE_EVERY = 200
 language_app = typer.Typer(no_args_is_help=True, help="Count, validate and score the instructions.")
 
 
-@spread
 def export_instructions(
+    context: typer.Context,
     out: Annotated[Path, typer.Option(help="File to write; its name ends in .jsonl or .parquet.")],
     split: AnySplit = "test",
     tasks: Tasks = "all",
     settings: Settings = "all",
-    words: PlanWords = NO_PLAN,
+    plan: PlanName = None,
 ) -> None:
     """Export a row per episode, setting and form (columns: see docs/instruction-data.md).
 
@@ -69,9 +68,11 @@ def export_instructions(
     check_output_file(out)
     kind = known_name("format", out.suffix.removeprefix("."), EXPORT_FORMATS)
     check_export_support(kind)
+    words = PlanWords(context, plan)
     options = words.options()
-    names, chosen = known_tasks(tasks, options.wordings), known_settings(settings)
-    episodes = list(split_episodes(names, parse_splits(split)))
+    names = known_tasks(words.given("tasks", tasks), options.wordings)
+    chosen = known_settings(words.given("settings", settings))
+    episodes = list(split_episodes(names, parse_splits(words.given("split", split))))
     said = instructions(episodes, chosen, words.forms(FORMS), options)
     rows = [row(episode, instruction) for episode, instruction in said]
     if not rows:
@@ -161,13 +162,13 @@ def validate_instructions(
 
 
 @language_app.command("shortcuts")
-@spread
 def score_shortcuts(
+    context: typer.Context,
     split: Annotated[str, typer.Option(help="train, val, test, all or none.")] = "test",
     seeds: Annotated[int, typer.Option(help="Random scenes for each task, beyond the split.")] = 0,
     tasks: Tasks = "all",
     settings: Settings = "all",
-    words: PlanWords = NO_PLAN,
+    plan: PlanName = None,
     by: Annotated[
         str | None, typer.Option(help="A row for each pattern, task or slot of a setting.")
     ] = None,
@@ -190,6 +191,8 @@ def score_shortcuts(
         shortcut_table,
     )
 
+    words = PlanWords(context, plan)
+    split = words.given("split", split)
     splits = () if split.strip().lower() == "none" else parse_splits(split)
     grouping = None if by is None else known_name("row", by, GROUPINGS)
     if learned:
@@ -200,7 +203,8 @@ def score_shortcuts(
                 f"{split} would test it on what it has seen; choose --split test."
             )
     options = replace(words.options(), form=words.form())
-    names, chosen = known_tasks(tasks, options.wordings), known_settings(settings)
+    names = known_tasks(words.given("tasks", tasks), options.wordings)
+    chosen = known_settings(words.given("settings", settings))
     scenes = LEARNING_SCENES if learned else None
     rows = shortcut_rows(names, splits, chosen, options, seeds=seeds, by=grouping, learning=scenes)
     if not rows:

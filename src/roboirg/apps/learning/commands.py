@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from pathlib import Path
 from shlex import quote
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from roboirg.cli.options import PlanWords, Tasks, Workers, check_output_file, spread
+from roboirg.cli.options import PlanName, PlanWords, Tasks, Workers, check_output_file
 from roboirg.core.errors import InvalidValueError
 from roboirg.core.plain_text import counted
 
@@ -22,14 +22,8 @@ if TYPE_CHECKING:
 learn_app = typer.Typer(no_args_is_help=True, help="Train a listener or a policy.")
 
 
-class TrainingWords(PlanWords):
-    """A plan with words, and what is rare in a training."""
-
-    section = "training"
-    own = ("scenes", "goals", "detector_epochs", "reader_epochs", "seed", "seeds", "encoders")
-
-
-NO_WORDS = TrainingWords()
+TRAINING = "training"
+"""Key in a plan of what is rare in a training."""
 
 _Without = Annotated[
     str, typer.Option(help="What it does not get: none, pictures, video or words.")
@@ -37,10 +31,10 @@ _Without = Annotated[
 
 
 @learn_app.command("listener")
-@spread
 def learn_listener(
+    context: typer.Context,
     out: Annotated[Path, typer.Option(help="File for what it has learned; with --study a folder.")],
-    words: TrainingWords = NO_WORDS,
+    plan: PlanName = None,
     without: _Without = "none",
     study: Annotated[
         bool,
@@ -64,17 +58,18 @@ def learn_listener(
     from roboirg.util.processor import worker_count
 
     check_learn_support()
-    plan = _plan(words, without)
+    own = ("scenes", "goals", "detector_epochs", "reader_epochs", "seed", "seeds", "encoders")
+    training = _plan(PlanWords(context, plan, TRAINING, own), without)
     count = worker_count()
     if study:
-        _run_study(plan, out, count)
+        _run_study(training, out, count)
         return
     from roboirg.apps.learning.listener.learned_model import save_model
     from roboirg.apps.learning.listener.listener_study import WORK
     from roboirg.apps.learning.listener.listener_training import train_listener
 
     check_output_file(out)
-    model = train_listener(plan, out.parent / WORK, out.stem, count, _print_tenths())
+    model = train_listener(training, out.parent / WORK, out.stem, count, _print_tenths())
     save_model(model, out)
     typer.echo(f"{out}, {out.stat().st_size / 2**20:.1f} MiB")
 
@@ -117,25 +112,14 @@ def learned_answers(
     typer.echo(f"{counted(len(items), 'answer')}: {out}")
 
 
-class PolicyWords(PlanWords):
-    """A plan with words, and what is rare in the training of a policy."""
-
-    section = "training"
-    own = (
-        "scenes", "drawn", "goals", "detector_epochs", "body_epochs", "reader_epochs", "seed",
-        "encoders", "memories", "seeds", "parts", "played",
-    )  # fmt: skip
-
-
-NO_POLICY_WORDS = PolicyWords()
 USUAL_MEMORY = "recurrent"
 PLAYED = ("episodes", "split")
 """Keys of a plan that change what the paper's experiment plays."""
 
 
 @learn_app.command("policy")
-@spread
 def learn_policy(
+    context: typer.Context,
     out: Annotated[
         Path, typer.Option(help="Folder for the policy and for what it is learned from.")
     ],
@@ -149,7 +133,7 @@ def learn_policy(
             help="What it remembers: none, recurrent, ttt, framesamp, subgoal or keyframes."
         ),
     ] = USUAL_MEMORY,
-    words: PolicyWords = NO_POLICY_WORDS,
+    plan: PlanName = None,
     paper: Annotated[
         bool,
         typer.Option(
@@ -172,13 +156,21 @@ def learn_policy(
     from roboirg.apps.learning.policy.policy_plan import MEMORY_NAMES, PolicyPlan
     from roboirg.cli.names import known_name, known_settings, known_tasks
     from roboirg.core.word_pools import POOLS
+    from roboirg.evaluation.plan.option_parsing import parse_names
     from roboirg.util.atomic_write import locked
     from roboirg.util.processor import worker_count
 
-    plan = PolicyPlan(
+    own = (
+        "scenes", "drawn", "goals", "detector_epochs", "body_epochs", "reader_epochs", "seed",
+        "encoders", "memories", "seeds", "parts", "played",
+    )  # fmt: skip
+    words = PlanWords(context, plan, TRAINING, own)
+    tasks = ",".join(parse_names("task", words.given("tasks", tasks)))
+    settings = ",".join(parse_names("setting", words.given("settings", settings)))
+    training = PolicyPlan(
         known_tasks(tasks),
         () if settings == "none" else known_settings(settings),
-        words=known_name("pool of words", words.wordings_file or "train", POOLS),
+        words=known_name("pool of words", words.fields.get("wordings", "train"), POOLS),
         memory=known_name("memory", memory, MEMORY_NAMES),
         **words.choices(PolicyPlan),
     )
@@ -189,9 +181,9 @@ def learn_policy(
     check_learn_support()
     with locked(out / ".lock", f"Another command learns in {str(out)!r}."):
         if paper:
-            _play_paper(plan, words, out, worker_count(workers))
+            _play_paper(training, words, out, worker_count(workers))
             return
-        path = _train_policy(plan, out, worker_count(workers))
+        path = _train_policy(training, out, worker_count(workers))
     typer.echo(f"{path}, {path.stat().st_size / 2**20:.1f} MiB")
     typer.echo(f"Play it with: {_command_to_play(path, tasks, settings)}")
 
@@ -215,7 +207,7 @@ def _train_policy(plan: PolicyPlan, folder: Path, workers: int) -> Path:
     return path
 
 
-def _play_paper(plan: PolicyPlan, words: PolicyWords, out: Path, workers: int) -> None:
+def _play_paper(plan: PolicyPlan, words: PlanWords, out: Path, workers: int) -> None:
     from roboirg.apps.learning.policy.paper_experiment import (
         ExperimentPlan,
         check_experiment,
@@ -230,7 +222,7 @@ def _play_paper(plan: PolicyPlan, words: PolicyWords, out: Path, workers: int) -
     experiment = ExperimentPlan(**words.choices(ExperimentPlan))
     check_experiment(experiment)
     files = train_rows(experiment, plan, out, workers, _print_tenths())
-    changes = {"tasks": ",".join(plan.tasks)}
+    changes: dict[str, Any] = {"tasks": plan.tasks}
     changes |= {name: words.fields[name] for name in PLAYED if name in words.fields}
     for part in experiment.parts:
         made = make_plan(**part_options(part, experiment, files, changes))
@@ -238,7 +230,7 @@ def _play_paper(plan: PolicyPlan, words: PolicyWords, out: Path, workers: int) -
     typer.echo(str(write_paper_page(out)))
 
 
-def _plan(words: TrainingWords, without: str) -> TrainingPlan:
+def _plan(words: PlanWords, without: str) -> TrainingPlan:
     from roboirg.apps.learning.listener.learned_model import WITHOUTS
     from roboirg.apps.learning.listener.listener_training import TrainingPlan
     from roboirg.cli.names import known_name, known_settings, known_tasks
@@ -247,7 +239,7 @@ def _plan(words: TrainingWords, without: str) -> TrainingPlan:
     return TrainingPlan(
         known_tasks(words.fields.get("tasks", "all")),
         known_settings(words.fields.get("settings", "all")),
-        words=known_name("pool of words", words.wordings_file or "train", POOLS),
+        words=known_name("pool of words", words.fields.get("wordings", "train"), POOLS),
         without=known_name("variant", without, WITHOUTS),
         **words.choices(TrainingPlan),
     )

@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from roboirg.cli.declared_options import WordsCommand
 from roboirg.cli.names import known_settings
-from roboirg.cli.options import NO_WORDS, Settings, Split, WordOptions, spread
+from roboirg.cli.options import Settings, Split
 from roboirg.core.errors import InvalidValueError
 from roboirg.core.plain_text import counted
 
@@ -19,8 +20,8 @@ if TYPE_CHECKING:
     from roboirg.core.instruction_options import InstructionOptions
 
 
-@spread
 def show(
+    context: typer.Context,
     task: Annotated[str, typer.Argument(help="Name of the task.")],
     episode: Annotated[int, typer.Argument(help="Position in the split, from 0.")],
     split: Split = "test",
@@ -28,7 +29,6 @@ def show(
         bool, typer.Option("--words", help="Print the instructions only, with their lengths.")
     ] = False,
     settings: Settings = "all",
-    choices: WordOptions = NO_WORDS,
     out: Annotated[
         str | None,
         typer.Option(
@@ -41,13 +41,14 @@ def show(
 
     Example: roboirg show PickXtimes 3 --words
     """
+    from roboirg.evaluation.plan.plan_maker import word_options
     from roboirg.language import settings_of
     from roboirg.language.generator import check_options
     from roboirg.tasks import get_task
     from roboirg.tasks.splits.splits import get_episode
 
     found = get_episode(task, split, episode)
-    options = choices.options()
+    options = word_options(**context.obj)
     check_options(options)
     possible, chosen = settings_of(get_task(task)), known_settings(settings)
     shown = [name for name in chosen if name in possible] or chosen
@@ -111,4 +112,4 @@ def _draw(
 
 
 def add_commands(app: typer.Typer) -> None:
-    app.command()(show)
+    app.command(cls=WordsCommand)(show)

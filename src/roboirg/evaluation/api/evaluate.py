@@ -61,7 +61,6 @@ def evaluate(
     from roboirg.evaluation.api.python_run import play_plan, python_plan
     from roboirg.evaluation.api.results import Results
 
-    seeds = str(policy_seeds) if isinstance(policy_seeds, int) else policy_seeds
     plan = python_plan(
         policy,
         tasks=tasks,
@@ -69,7 +68,7 @@ def evaluate(
         forms=forms,
         split=split,
         episodes=episodes,
-        policy_seeds=seeds,
+        policy_seeds=policy_seeds,
         video=video,
         **options,
     )

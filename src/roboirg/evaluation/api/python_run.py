@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import datetime as dt
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -27,12 +27,11 @@ RUNS = Path("runs")
 def python_plan(
     policies: AnyPolicy | Sequence[AnyPolicy] | Mapping[str, AnyPolicy], **options: object
 ) -> Plan:
-    """Return a checked plan; options may be Python values or text as on the command line."""
+    """Return a checked plan; the options are those of `make_plan`."""
     refs = _named(policies)
     if any(one.place == "python" for one in refs):
         options["policy_process"] = "shared"
-    typed = {name: _typed(name, value) for name, value in options.items() if value is not None}
-    return make_plan(refs, **typed)  # type: ignore[arg-type]
+    return make_plan(refs, **options)
 
 
 def play_plan(
@@ -59,7 +58,7 @@ def play_plan(
                 "into a module that can be imported, or leave workers out."
             )
         workers = 0
-    executor = choose_executor(workers, plan.episode_timeout_s)
+    executor = choose_executor(workers, plan.attempts.episode_timeout_s)
     shown = ConsoleReporter(progress_console(stderr=True)) if progress else None
     with shown or contextlib.nullcontext():
         run_plan(plan, folder, episode_runner(plan, folder), executor, reporter=shown)
@@ -80,18 +79,6 @@ def _named(
             "your own to policies."
         )
     return found
-
-
-def _typed(name: str, value: object) -> object:
-    """Return a value as on the command line: ``(0, 3)`` becomes ``"0,3,"``."""
-    if isinstance(value, str) or not isinstance(value, Iterable):
-        return str(value) if name == "episodes" else value
-    parts = list(value)
-    if name == "stages" and any(not isinstance(one, int) for one in parts):
-        return ";".join(str(_typed(name, one)) for one in parts)
-    text = ",".join(map(str, parts))
-    # A single number without a comma would mean the first n episodes.
-    return f"{text}," if name == "episodes" else text
 
 
 def _new_folder() -> Path:

@@ -1,9 +1,11 @@
-"""Parse names, numbers and ranges from a command line or a plan file."""
+"""Parse names, numbers and ranges: as typed on a command line, or lists of YAML and Python."""
 
 from __future__ import annotations
 
+import functools
 import re
 from collections.abc import Collection, Iterable, Iterator, Sequence
+from typing import cast
 
 from roboirg import language
 from roboirg.core.arms import parse_arm
@@ -23,34 +25,40 @@ _NUMBERS_HINT = "write numbers and ranges such as 0,3,5-9"
 _EPISODES_HINT = f"{_NUMBERS_HINT}, or all"
 
 
-def parse_names(kind: str, text: str) -> tuple[str, ...]:
-    """Parse names separated by commas; repeated names count once.
+def parse_names(kind: str, given: object) -> tuple[str, ...]:
+    """Parse names, in a text separated by commas; repeated names count once.
 
     Args:
         kind: what the names are, for the error.
-        text: as typed.
+        given: as typed, or several of these, or a number alone.
 
     Raises:
         InvalidValueError: there is none.
     """
-    names = tuple(dict.fromkeys(word.strip() for word in text.split(",") if word.strip()))
+    names = tuple(dict.fromkeys(word for word in _words(given) if word))
     if not names:
         raise InvalidValueError(f"No {kind} was given.")
     return names
 
 
-def parse_arms(text: str) -> tuple[str, ...]:
-    """Parse control arms separated by commas; repeated ones count once.
+def _words(given: object) -> list[str]:
+    is_one = isinstance(given, str) or not isinstance(given, Iterable)
+    parts: Iterable[object] = [given] if is_one else cast("Iterable[object]", given)
+    return [word.strip() for one in parts for word in str(one).split(",")]
+
+
+def parse_arms(given: object) -> tuple[str, ...]:
+    """Parse control arms; repeated ones count once.
 
     Raises:
         UnknownNameError: there is no such arm.
         InvalidValueError: there is none, or a number of paraphrases is out of range.
     """
-    found = (arm for name in parse_names("arm", text) for arm in parse_arm(name))
+    found = (arm for name in parse_names("arm", given) for arm in parse_arm(name))
     return tuple(dict.fromkeys(found))
 
 
-def parse_policies(specs: Iterable[str]) -> tuple[str, ...]:
+def parse_policies(given: str | Iterable[str]) -> tuple[str, ...]:
     """Parse policies; one text may hold several names separated by commas.
 
     Raises:
@@ -59,7 +67,7 @@ def parse_policies(specs: Iterable[str]) -> tuple[str, ...]:
     # Addresses and their options may contain commas.
     parts = (
         (spec.strip(),) if "://" in spec or "?" in spec else parse_names("policy", spec)
-        for spec in specs
+        for spec in ([given] if isinstance(given, str) else map(str, given))
     )
     policies = tuple(dict.fromkeys(name for names in parts for name in names))
     if not policies:
@@ -81,9 +89,9 @@ def name_and_spec(policy: str) -> tuple[str, str]:
     return (policy, policy) if found is None else (found[1].strip(), found[2].strip())
 
 
-def means_all(text: str) -> bool:
-    """Return whether a list of names contains ``all``."""
-    return ALL in (word.strip().lower() for word in text.split(","))
+def means_all(given: object) -> bool:
+    """Return whether names contain ``all``."""
+    return ALL in (word.lower() for word in _words(given))
 
 
 def parse_splits(text: str) -> tuple[Split, ...]:
@@ -91,8 +99,11 @@ def parse_splits(text: str) -> tuple[Split, ...]:
     return SPLITS if means_all(text) else (splits.check_fixed_split(text),)
 
 
-def parse_episodes(text: str, split: str, tasks: Collection[str]) -> tuple[int, ...]:
+def parse_episodes(given: object, split: str, tasks: Collection[str]) -> tuple[int, ...]:
     """Parse episodes: ``4`` is the first four; with a comma or a dash it is a list of positions.
+
+    So is a list. Its positions are not compared with the size of the split, which only those who
+    know the salt of private episodes can draw.
 
     In a split of fixed episodes ``all`` is every one, and ``easy``, ``medium``, ``hard`` or several
     of them are those that have such a difficulty in all of the tasks.
@@ -101,30 +112,32 @@ def parse_episodes(text: str, split: str, tasks: Collection[str]) -> tuple[int, 
         UnknownNameError: there is no such split.
         InvalidValueError: the text is neither a number nor a list, or the split has fewer episodes.
     """
-    size = splits.split_size(split)
-    levels = {word.strip() for word in text.split(",")}
-    if means_all(text) or levels <= {*DIFFICULTIES}:
+    words, size = parse_names("episode", given), functools.partial(splits.split_size, split)
+    if means_all(words) or {*words} <= {*DIFFICULTIES}:
         if split not in SPLITS:
             raise InvalidValueError(
-                f"The split {split!r} has {size:,} episodes; say how many with --episodes."
+                f"The split {split!r} has {size():,} episodes; say how many with --episodes."
             )
-        found = range(size)
-        return tuple(found if means_all(text) else _of_difficulty(found, split, levels, tasks))
-    single = re.fullmatch(r"\s*(-?)(\d+)\s*", text)
+        every = range(size())
+        return tuple(every if means_all(words) else _of_difficulty(every, split, words, tasks))
+    if isinstance(given, Iterable) and not isinstance(given, str):
+        return _union(_parse_ranges("episode", words, _EPISODES_HINT))
+    single = re.fullmatch(r"\s*(-?)(\d+)\s*", str(given))
     if single is None:
-        ranges = _parse_ranges("episode", text, _EPISODES_HINT)
+        ranges = _parse_ranges("episode", words, _EPISODES_HINT)
     else:
         count = _number("number of episodes", single[2])
         if single[1] or count == 0:
             alone = "" if count else "; for episode 0 alone write '0,'"
             raise InvalidValueError(
-                f"The number of episodes is {text.strip()}; it must be at least 1{alone}."
+                f"The number of episodes is {single[0].strip()}; it must be at least 1{alone}."
             )
         ranges = [range(count)]
     for numbers in ranges:
-        if numbers[-1] >= size:
+        if numbers[-1] >= size():
             raise InvalidValueError(
-                f"There is no episode {numbers[-1]}: split {split!r} has episodes 0 to {size - 1}."
+                f"There is no episode {numbers[-1]}: split {split!r} has episodes 0 to "
+                f"{size() - 1}."
             )
     return _union(ranges)
 
@@ -137,25 +150,30 @@ def _of_difficulty(
             yield index
 
 
-def parse_stages(text: str) -> tuple[int, ...]:
+def parse_stages(given: object) -> tuple[int, ...]:
     """Parse stages of the contextual setting, such as ``1,5``."""
     sets = "; ".join(",".join(map(str, stages)) for stages in language.STAGE_SETS)
-    return _union(_parse_ranges("list of stages", text, f"the possible lists are {sets}"))
+    return _union(_parse_ranges("list of stages", given, f"the possible lists are {sets}"))
 
 
-def parse_stage_sets(text: str) -> tuple[tuple[int, ...], ...]:
+def parse_stage_sets(given: object) -> tuple[tuple[int, ...], ...]:
     """Parse several lists of stages, such as ``1,5; 1-5``."""
-    return tuple(dict.fromkeys(map(parse_stages, text.split(";"))))
+    sets: Iterable[object] = [given]
+    if isinstance(given, str):
+        sets = given.split(";")
+    elif isinstance(given, Iterable) and not all(isinstance(one, int) for one in given):
+        sets = given
+    return tuple(dict.fromkeys(map(parse_stages, sets)))
 
 
-def parse_numbers(kind: str, text: str) -> tuple[int, ...]:
-    """Parse numbers and ranges separated by commas, such as ``0,3,5-9``."""
-    return _union(_parse_ranges(kind, text, _NUMBERS_HINT))
+def parse_numbers(kind: str, given: object) -> tuple[int, ...]:
+    """Parse numbers and ranges, in a text separated by commas, such as ``0,3,5-9``."""
+    return _union(_parse_ranges(kind, given, _NUMBERS_HINT))
 
 
-def _parse_ranges(kind: str, text: str, hint: str) -> list[range]:
+def _parse_ranges(kind: str, given: object, hint: str) -> list[range]:
     ranges = []
-    for part in parse_names(kind, text):
+    for part in parse_names(kind, given):
         found = re.fullmatch(r"(\d+)(?:\s*-\s*(\d+))?", part)
         first, last = -1, -2
         if found is not None:

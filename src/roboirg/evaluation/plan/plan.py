@@ -2,62 +2,65 @@
 
 from __future__ import annotations
 
+import contextlib
 import functools
 import itertools
 import math
 import os
 import re
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import asdict, replace
-from typing import Any, Literal, get_args
+from dataclasses import asdict, fields, is_dataclass, replace
+from functools import partial
+from pathlib import Path
+from typing import Annotated, Any, Literal, NamedTuple, get_args, get_type_hints
 
 import msgspec
 from pydantic import (
     BaseModel,
+    BeforeValidator,
     ConfigDict,
     Field,
+    ValidationInfo,
     field_serializer,
     field_validator,
     model_validator,
 )
 
 from roboirg import language, tasks
-from roboirg.core.actions import find_action_space
-from roboirg.core.arms import TOLD, check_arm
+from roboirg.core.arms import TOLD
 from roboirg.core.delivery import TURNS
-from roboirg.core.environment_options import (
-    DEFAULT_MESHES,
-    ENVIRONMENT_OPTIONS,
-    MAX_STEPS,
-    DemonstrationFrames,
-    EnvironmentOptions,
-    check_demonstration_frames,
-    check_observe_every,
-)
+from roboirg.core.environment_options import EnvironmentOptions, check_demonstration_frames
 from roboirg.core.errors import InvalidValueError
-from roboirg.core.field_types import CONTROLS, MOST_SECONDS, NAME
-from roboirg.core.instruction_options import (
-    ALL_STAGES,
-    DEFAULT_FRAME,
-    OPTION_NAMES,
-    InstructionOptions,
-)
+from roboirg.core.field_types import CONTROLS, NAME
+from roboirg.core.instruction_options import DEFAULT_FRAME, InstructionOptions
 from roboirg.core.plain_text import is_encodable
 from roboirg.core.policy_ref import PolicyRef
 from roboirg.core.word_pools import POOLS
-from roboirg.evaluation.hosting.host_pool import DEFAULT_BATCH, HostSettings
 from roboirg.evaluation.hosting.policy_opening import open_policy
-from roboirg.evaluation.plan.option_parsing import check_names, name_and_spec, parse_policies
-from roboirg.evaluation.plan.worker_needs import WorkerNeeds
+from roboirg.evaluation.plan.option_parsing import (
+    check_names,
+    name_and_spec,
+    parse_arms,
+    parse_episodes,
+    parse_names,
+    parse_numbers,
+    parse_policies,
+    parse_stage_sets,
+)
+from roboirg.evaluation.plan.plan_sections import Attempts, Hosting, ModelUse, WorkerNeeds, names_of
 from roboirg.evaluation.play.job_instruction import instruct_job
 from roboirg.evaluation.records.film import VideoMode
-from roboirg.evaluation.records.record import (
-    ErrorKind,
-    Job,
-)
+from roboirg.evaluation.records.record import Job
 from roboirg.evaluation.records.record_codec import RecordKey, identity_key
 from roboirg.language.generator import check_options, find_refusal
-from roboirg.language.settings import EXPLICIT, SETTING_GROUPS, all_settings, expand_settings
+from roboirg.language.settings import (
+    EXPLICIT,
+    SETTING_GROUPS,
+    all_settings,
+    expand_settings,
+    find_settings,
+    get_setting,
+)
 from roboirg.language.wordings.wording_store import open_wordings
 from roboirg.policies.by_name.finding import read_policy
 from roboirg.tasks.splits import splits
@@ -70,139 +73,186 @@ REQUIRED = "required"
 
 
 SettingsName = Literal["all", "every"]
-SETTINGS_NAMES: tuple[SettingsName, ...] = get_args(SettingsName)
-
-PolicyProcessMode = Literal["own", "shared"]
-
-LongPrompts = Literal["send", "refuse"]
-LONG_PROMPTS: tuple[LongPrompts, ...] = get_args(LongPrompts)
-
-MESHES = ("faithful", "light")
 
 AXES = ("setting", "form", "stages")
 """Options of instructions of which a plan plays several."""
 
-RETRYABLE: tuple[ErrorKind, ...] = ("connection", "environment", "infrastructure")
-"""Kinds of errors that may not occur again when the episode is retried."""
+
+def _policies(given: object) -> object:
+    """Return policies as references, which texts are read into; one may name several."""
+    texts = [given] if isinstance(given, str) else given
+    if not isinstance(texts, list | tuple) or not all(isinstance(one, str) for one in texts):
+        return given
+    found = (read_policy(*reversed(name_and_spec(one))) for one in parse_policies(texts))
+    return tuple(dict.fromkeys(found))
+
+
+def _tasks(given: object) -> tuple[str, ...]:
+    """Return names of tasks and suites as tasks; `Plan.checked` refuses unknown ones."""
+    names = parse_names("task", given)
+    with contextlib.suppress(InvalidValueError):
+        return tasks.find_tasks(names)
+    return names
+
+
+def _settings(given: object) -> tuple[str, ...] | SettingsName:
+    """Return names of settings, or the word that stands for the same ones."""
+    words = tuple(
+        word.lower() if word.lower() in SETTING_GROUPS else word
+        for word in parse_names("setting", given)
+    )
+    found = {*expand_settings(words)}
+    same: Iterator[SettingsName] = (
+        name
+        for name in get_args(SettingsName)
+        if name in words and {*expand_settings([name])} == found
+    )
+    return next(same, words)
+
+
+def _word(given: object) -> object:
+    return "off" if given is False else given  # YAML 1.1 reads the word as false
+
+
+class ChosenWordings(NamedTuple):
+    """The wordings of a plan.
+
+    Attributes:
+        file: path of the wording file, or the name of a pool of our words.
+        identity: of the file's content; the name of the pool.
+    """
+
+    file: str
+    identity: str
+
+
+def _open_wordings(given: object) -> object:
+    if given == REQUIRED:
+        raise InvalidValueError(
+            "This plan needs RoboMME's sentences: make a wording file with `roboirg language "
+            "import-robomme PATH --out robomme.toml`, where PATH is a clone of RoboMME's "
+            "repository, and give it with --wordings robomme.toml."
+        )
+    if not isinstance(given, str | Path):
+        return given
+    file = str(given) if given in POOLS else os.path.realpath(given)
+    return ChosenWordings(file, str(open_wordings(file)))
+
+
+Seeds = Annotated[tuple[int, ...], BeforeValidator(partial(parse_numbers, "policy seed"))]
+StageSets = Annotated[tuple[tuple[int, ...], ...], BeforeValidator(parse_stage_sets)]
+
+
+def _option(default: Any, text: str) -> Any:  # noqa: ANN401 - as it may be typed
+    return Field(default=default, description=text)
 
 
 class Plan(BaseModel):
-    """Which policies play which episodes, with which instructions."""
+    """Which policies play which episodes, with which instructions.
 
-    model_config = ConfigDict(frozen=True, extra="forbid", use_attribute_docstrings=True)
+    Values are as typed on a command line, as in YAML, or Python's: ``"0,3,5-9"`` or ``(0, 3)``.
+    The options of the sections also stand alone, under their own names: ``max_steps=600``. Those
+    from `video` on are not part of a record's identity.
+    """
 
-    policies: tuple[PolicyRef, ...]
-    """Built-in names, package.module:Class, or addresses; NAME=SPEC gives one a name of its own."""
-    tasks: tuple[str, ...]
-    """Tasks or suites; all for the whole benchmark."""
-    settings: tuple[str, ...] | SettingsName = "all"
-    """Settings; all for every setting that can express the episode, except the harder ones; every
-    adds these. Next to names, tasks may lack any of them: all,grounded."""
-    in_turns: tuple[str, ...] = ()
-    """Settings that are also played with the utterances one after another."""
-    forms: tuple[str, ...] = ("implicit",)
-    """implicit, resolved or both."""
-    split: str = "test"
-    """train, val, test, random, or the name of a private split."""
-    episodes: tuple[int, ...]
-    """Positions in the split, from 0; a number alone, such as 4, is the first four."""
-    policy_seeds: tuple[int, ...] = (0,)
-    """Every seed plays every episode."""
-    arms: tuple[str, ...] = (TOLD,)
-    """told, and control arms of the same scenes: other-goal, silent, silent-empty, scrambled,
-    paraphrase:N (N other texts), again (another policy seed). Scenes without such an arm
-    are left out."""
-    stages: tuple[tuple[int, ...], ...] = (ALL_STAGES,)
-    """Sets of stages of the contextual setting; every set is played."""
-    options: InstructionOptions = InstructionOptions()
-    """Further options of instructions, for settings that read them. Its `wordings` identify those
-    of `wordings`; the setting, form and stages are the fields above."""
-    wordings: str | None = None
-    """Wording file whose commands are used; or train or test: our words of that pool in every
-    split."""
-    max_steps: int = MAX_STEPS
-    """Limit of an episode in control steps, 20 per second."""
-    actions: str | None = None
-    """Required action space; without one, each policy's own."""
-    demonstration_frames: DemonstrationFrames | None = None
-    """Frames of the demonstration that policies get: all, none, or their number; without it, as
-    each policy asks."""
-    observe_every: int | None = None
-    """Control steps between two observations; without it, as each policy asks."""
-    meshes: str = DEFAULT_MESHES
-    """Meshes for rendering: faithful or light."""
-    video: VideoMode = "off"
-    """Episodes whose video is recorded: off, failures or all. This and all fields below are not
-    part of a record's identity."""
-    policy_process: PolicyProcessMode = "own"
-    """own: a policy that is neither built in nor remote has a process of its own; shared: it runs
-    in the simulator's process, for debuggers."""
-    batch: int = DEFAULT_BATCH
-    """Largest number of episodes that a policy is asked about at once."""
-    devices: tuple[str, ...] = ()
-    """GPUs, such as 0,1; each policy gets a process on each. If empty, one process on any GPU."""
-    long_prompts: LongPrompts = "send"
-    """What to do with prompts longer than the limit that a policy declares: send or refuse."""
-    policy_timeout_s: float = 600.0
-    """Time limit of one call of a policy, seconds."""
-    episode_timeout_s: float = 7200.0
-    """Time limit of an episode, seconds."""
-    max_cost: float | None = Field(default=None, gt=0)
-    """Most US dollars that models may cost; then the run stops and can be resumed with more."""
-    model_replies: Literal["stored", "anew"] = "stored"
-    """stored: replies in the folder are used again; anew: models are asked again."""
-    cluster: WorkerNeeds = WorkerNeeds()
-    """What a worker reserves on a machine of a Ray cluster, and what it gets from this one."""
-    tries: int = 2
-    """How often an episode is played if it ends in an error of a kind in `retry_on`."""
-    retry_on: tuple[ErrorKind, ...] = RETRYABLE
-    """Kinds of errors after which an episode is played again."""
+    model_config = ConfigDict(frozen=True, extra="forbid", validate_default=True)
+
+    policies: Annotated[tuple[PolicyRef, ...], BeforeValidator(_policies)] = Field(
+        description="Built-in names, package.module:Class, or addresses; NAME=SPEC gives one a "
+        "name of its own."
+    )
+    tasks: Annotated[tuple[str, ...], BeforeValidator(_tasks)] = _option(
+        "all", "Tasks or suites; all for the whole benchmark."
+    )
+    settings: Annotated[tuple[str, ...] | SettingsName, BeforeValidator(_settings)] = _option(
+        "all",
+        "Settings; all for every setting that can express the episode, except the harder ones; "
+        "every adds these. Next to names, tasks may lack any of them: all,grounded.",
+    )
+    in_turns: Annotated[tuple[str, ...], names_of("setting")] = _option(
+        (), "Settings that are also played with the utterances one after another."
+    )
+    forms: Annotated[tuple[str, ...], names_of("form")] = _option(
+        "implicit", "implicit, resolved or both."
+    )
+    split: str = _option("test", "train, val, test, random, or the name of a private split.")
+    episodes: tuple[int, ...] = _option(
+        "4",
+        "Positions in the split, from 0: a list such as 0,3,5-9; 4 for the first four; all; or "
+        "easy, medium, hard.",
+    )
+    policy_seeds: Seeds = _option("0", "Every seed plays every episode.")
+    arms: Annotated[tuple[str, ...], BeforeValidator(parse_arms)] = _option(
+        TOLD,
+        "told, and control arms of the same scenes: other-goal, silent, silent-empty, scrambled, "
+        "paraphrase:N (N other texts), again (another policy seed). Scenes without such an arm "
+        "are left out.",
+    )
+    stages: StageSets = _option(
+        "1-5",
+        "Sets of stages of the contextual setting, separated by semicolons: 1,5;1-5; every set is "
+        "played.",
+    )
+    wordings: Annotated[ChosenWordings | None, BeforeValidator(_open_wordings)] = _option(
+        None,
+        "Wording file whose commands are used; or train or test: our words of that pool in every "
+        "split.",
+    )
+    instruction: InstructionOptions = _option(
+        InstructionOptions(), "Further options of instructions, for settings that read them."
+    )
+    environment: EnvironmentOptions = _option(EnvironmentOptions(), "How episodes are played.")
+    video: Annotated[VideoMode, BeforeValidator(_word)] = _option(
+        "off", "Episodes whose video is recorded: off, failures or all."
+    )
+    long_prompts: Literal["send", "refuse"] = _option(
+        "send",
+        "What to do with prompts longer than the limit that a policy declares: send or refuse.",
+    )
+    hosting: Hosting = _option(Hosting(), "How policies are hosted.")
+    attempts: Attempts = _option(Attempts(), "How long and how often an episode is played.")
+    models: ModelUse = _option(ModelUse(), "What models may cost.")
+    cluster: WorkerNeeds = _option(
+        WorkerNeeds(),
+        "What a worker reserves on a machine of a Ray cluster, and what it gets from this one.",
+    )
 
     @model_validator(mode="before")
     @classmethod
-    def _identify_wordings(cls, fields: Any) -> Any:  # noqa: ANN401 - whatever is to be validated
-        if not isinstance(fields, dict) or fields.get("wordings") is None:
-            return fields
-        options: Any = fields.get("options", {})
-        if isinstance(options, InstructionOptions):
-            options = asdict(options)
-        if not isinstance(options, dict) or options.get("wordings") is not None:
-            return fields
-        path = str(fields["wordings"])
-        if path not in POOLS:
-            path = os.path.realpath(path)
-        options = {**options, "wordings": path if path in POOLS else open_wordings(path)}
-        return {**fields, "wordings": path, "options": options}
-
-    @field_validator("policies", mode="before")
-    @classmethod
-    def _read_policies(cls, given: Any) -> Any:  # noqa: ANN401 - whatever is to be validated
-        if not isinstance(given, list | tuple) or not any(isinstance(one, str) for one in given):
+    def _nest(cls, given: object) -> object:
+        """Put options that stand alone into their sections; None stands for the default."""
+        if not isinstance(given, Mapping):
             return given
-        names = [parse_policies([one]) if isinstance(one, str) else [one] for one in given]
-        found = [
-            read_policy(*reversed(name_and_spec(one))) if isinstance(one, str) else one
-            for several in names
-            for one in several
-        ]
-        return tuple(dict.fromkeys(found))
+        found = {name: value for name, value in given.items() if value is not None}
+        check_names("field of plans", found, PLAN_KEYS)
+        for name in FLAT.keys() & found.keys():
+            value, section = found.pop(name), found.get(FLAT[name], {})
+            if is_dataclass(section) and not isinstance(section, type):
+                section = asdict(section)
+            if isinstance(section, Mapping):
+                found[FLAT[name]] = {**section, name: value}
+        return found
 
-    @field_serializer("options")
-    def _write_options(self, options: InstructionOptions) -> dict[str, Any]:
-        return {name: value for name, value in asdict(options).items() if name not in AXES}
-
-    @field_validator("demonstration_frames", mode="before")
+    @field_validator("episodes", mode="before")
     @classmethod
-    def _check_frames(cls, value: object) -> object:
-        return None if value is None else check_demonstration_frames(value)
+    def _parse_episodes(cls, given: object, info: ValidationInfo) -> tuple[int, ...]:
+        return parse_episodes(given, info.data.get("split", "test"), info.data.get("tasks", ()))
+
+    @field_validator("environment", mode="before")
+    @classmethod
+    def _check_frames(cls, given: object) -> object:
+        frames = given.get("demonstration_frames") if isinstance(given, Mapping) else None
+        return given if frames is None or check_demonstration_frames(frames) else None
+
+    @field_serializer("instruction")
+    def _write_instruction(self, options: InstructionOptions) -> dict[str, Any]:
+        return {name: one for name, one in asdict(options).items() if name in FLAT}
 
     @model_validator(mode="after")
     def _check_text(self) -> Plan:
-        texts = self.model_dump()
-        texts |= texts.pop("options")
-        for name, value in texts.items():
-            for text in value if isinstance(value, tuple) else (value,):
-                if isinstance(text, str) and re.search(f"[{CONTROLS}]", text):
+        for name, value in self.model_dump().items():
+            for text in _texts(value):
+                if re.search(f"[{CONTROLS}]", text):
                     raise InvalidValueError(
                         f"The plan has {text[:80]!r} as {name}; it must have no control characters."
                     )
@@ -210,8 +260,6 @@ class Plan(BaseModel):
 
     @model_validator(mode="after")
     def _check_size(self) -> Plan:
-        if not self.policy_seeds:
-            raise InvalidValueError("The plan has no policy seeds; it needs at least one.")
         several = (self.policies, self.tasks, self.forms, self.episodes, self.policy_seeds)
         words = (self.setting_names, self.stages, self.arms)
         size = math.prod(map(len, (*several, *words)))
@@ -236,13 +284,6 @@ class Plan(BaseModel):
         return not SETTING_GROUPS.keys().isdisjoint(self._setting_words)
 
     @property
-    def hosting(self) -> HostSettings | None:
-        """How policies are hosted; None if they run in the world's process."""
-        if self.policy_process == "shared":
-            return None
-        return HostSettings(self.batch, self.devices, self.policy_timeout_s)
-
-    @property
     def fingerprint(self) -> str:
         """Hash of all fields."""
         return short_hash(self.model_dump_json())
@@ -255,6 +296,8 @@ class Plan(BaseModel):
                 nearest.
             InvalidValueError: a number is out of range, or a task lacks a setting.
         """
+        tasks.find_tasks(self.tasks)
+        find_settings(self._setting_words)
         specs: dict[str, str] = {}
         for one in self.policies:
             name, spec = one.name, one.spec
@@ -269,8 +312,12 @@ class Plan(BaseModel):
                 raise InvalidValueError(
                     f"Two policies are named {name!r}: {specs[name]} and {spec}."
                 )
-        self._check_options()
-        if is_private(self.split) and self.policy_process == "shared":
+        for form, stages in itertools.product(self.forms, self.stages):
+            check_options(replace(self.instruction, form=form, stages=stages))
+        self.environment.check()
+        turned = [name for name, one in all_settings().items() if "delivery" in one.reads]
+        check_names("setting in turns", self.in_turns, turned)
+        if is_private(self.split) and self.hosting.policy_process == "shared":
             raise InvalidValueError(
                 "policy_process is 'shared', so policies would know the salt of private episodes; "
                 "it must be 'own'."
@@ -278,7 +325,8 @@ class Plan(BaseModel):
         for task in self.tasks:
             for index in (min(self.episodes), max(self.episodes)):
                 splits.get_episode(task, self.split, index)
-            self._check_settings(task)
+            for setting in () if self._has_groups else self.setting_names:
+                get_setting(setting, tasks.get_task(task))
         jobs = list(self._instruction_jobs())
         for job in jobs:
             instruct_job(job)  # raises if the options cannot express the episode
@@ -287,8 +335,9 @@ class Plan(BaseModel):
                 f"There is nothing to play: {', '.join(self._setting_words)} cannot express any of "
                 "these episodes."
             )
-        device = next(iter(self.devices), None)
-        opened = [open_policy(one, self.policy_timeout_s, device) for one in self.policies]
+        device = next(iter(self.hosting.devices), None)
+        limit = self.hosting.policy_timeout_s
+        opened = [open_policy(one, limit, device) for one in self.policies]
         return self.model_copy(update={"policies": tuple(opened)})
 
     def jobs(self) -> tuple[Job, ...]:
@@ -356,7 +405,7 @@ class Plan(BaseModel):
         seeds: tuple[int, ...],
     ) -> Iterator[Job]:
         said = [options for setting in settings for options in self._options_of(setting)]
-        environment = EnvironmentOptions(**{one: getattr(self, one) for one in ENVIRONMENT_OPTIONS})
+        file, wordings = self.wordings or (None, None)
         for options in sorted(said, key=_names_the_goal):
             if self._is_left_out(task, episode, options):
                 continue
@@ -365,9 +414,9 @@ class Plan(BaseModel):
                 task=task,
                 split=self.split,
                 episode=episode,
-                options=replace(options, wordings=self.options.wordings),
-                wordings_file=self.wordings,
-                environment=environment,
+                options=replace(options, wordings=wordings),
+                wordings_file=file,
+                environment=self.environment,
                 ref=policy,
             )
             # Copying is faster, and there may be very many.
@@ -382,7 +431,7 @@ class Plan(BaseModel):
         An option that the setting does not read keeps its default, so that equal words are one job.
         """
         rule, usual = all_settings()[setting], InstructionOptions(setting)
-        chosen = {option: getattr(self.options, option) for option in rule.reads - {"stages"}}
+        chosen = {option: getattr(self.instruction, option) for option in rule.reads - {"stages"}}
         for form in self.forms if rule.implicit else (usual.form,):
             for stages in self.stages if "stages" in rule.reads else (usual.stages,):
                 options = replace(usual, form=form, stages=stages, **chosen)
@@ -406,45 +455,65 @@ class Plan(BaseModel):
     def _instruction_jobs(self) -> Iterator[Job]:
         """Yield one job for each instruction that the language may not be able to express."""
         # All settings with the default frame are only those that can express the episode.
-        usual = self._has_groups and self.options.frame == DEFAULT_FRAME and self.wordings is None
+        usual = (
+            self._has_groups and self.instruction.frame == DEFAULT_FRAME and self.wordings is None
+        )
         for task in self.tasks:
             for episode in self.episodes[:1] if usual else self.episodes:
                 settings = self.settings_of(task, episode)
                 yield from self._jobs_of(None, task, episode, settings, (TOLD,), (0,))
 
-    def _check_options(self) -> None:
-        for form, stages in itertools.product(self.forms, self.stages):
-            check_options(replace(self.options, form=form, stages=stages))
-        check_names("kind of meshes", (self.meshes,), MESHES)
-        for arm in self.arms:
-            check_arm(arm)
-        turned = [name for name, one in all_settings().items() if "delivery" in one.reads]
-        check_names("setting in turns", self.in_turns, turned)
-        for name in ("max_steps", "tries", "batch"):
-            if getattr(self, name) < 1:
-                raise InvalidValueError(f"{name} is {getattr(self, name)}; it must be at least 1.")
-        for name in ("policy_timeout_s", "episode_timeout_s"):
-            if not 0 < getattr(self, name) <= MOST_SECONDS:
-                raise InvalidValueError(
-                    f"{name} is {getattr(self, name)}; it must be more than 0 and at most "
-                    f"{MOST_SECONDS:,} seconds."
-                )
-        if self.actions is not None:
-            find_action_space(self.actions)
-        check_observe_every(self.observe_every)
 
-    def _check_settings(self, task: str) -> None:
-        has = language.settings_of(tasks.get_task(task))
-        for setting in () if self._has_groups else self.setting_names:
-            check_names("setting", (setting,), language.setting_names())
-            if setting not in has:
-                raise InvalidValueError(
-                    f"{task} has no {setting} setting; its settings are {', '.join(has)}."
-                )
+SECTIONS: Mapping[str, type[Any]] = {
+    name: field.annotation
+    for name, field in Plan.model_fields.items()
+    if is_dataclass(field.annotation) and isinstance(field.annotation, type)
+}
+"""The sections of a plan, each with its class."""
+FLAT = {
+    option.name: section
+    for section, kind in SECTIONS.items()
+    if kind is not WorkerNeeds
+    for option in fields(kind)
+    if option.name not in (*AXES, *Plan.model_fields)
+}
+"""The section of each option that stands alone, too."""
+PLAN_KEYS = (*Plan.model_fields, *FLAT)
 
 
-SINGLE_OPTIONS = tuple(name for name in OPTION_NAMES if name not in (*AXES, *Plan.model_fields))
-"""Options of instructions of which a plan has one value, in `options`."""
+class PlanOption(NamedTuple):
+    """What there is to say of an option of a plan.
+
+    Attributes:
+        name: as it stands alone.
+        section: None if it is in none.
+        type: its annotation.
+        default: as it may be typed; None if there is none.
+        help: what it means.
+    """
+
+    name: str
+    section: str | None
+    type: Any
+    default: object
+    help: str
+
+    def value_in(self, plan: Plan) -> object:
+        return getattr(plan if self.section is None else getattr(plan, self.section), self.name)
+
+
+def plan_options() -> Iterator[PlanOption]:
+    """Yield all options, those of sections that stand alone in the place of the section."""
+    for name, one in Plan.model_fields.items():
+        if name not in FLAT.values():
+            default = None if one.is_required() else one.default
+            yield PlanOption(name, None, one.annotation, default, str(one.description))
+            continue
+        types = get_type_hints(SECTIONS[name])
+        for option in fields(SECTIONS[name]):
+            if option.name in FLAT:
+                words, kind = option.metadata["help"], types[option.name]
+                yield PlanOption(option.name, name, kind, option.default, words)
 
 
 @functools.lru_cache(maxsize=65_536)
@@ -461,8 +530,10 @@ def _names_the_goal(options: InstructionOptions) -> bool:
     return options.setting == EXPLICIT or options.form == "resolved"
 
 
-def nest_options(fields: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the fields of a plan, with the options of instructions among them in `options`."""
-    options = {name: value for name, value in fields.items() if name in SINGLE_OPTIONS}
-    others = {name: value for name, value in fields.items() if name not in SINGLE_OPTIONS}
-    return {**others, "options": {**fields.get("options", {}), **options}}
+def _texts(value: object) -> list[str]:
+    """Return all texts in a value."""
+    if isinstance(value, Mapping):
+        value = (*value, *value.values())
+    if isinstance(value, tuple):
+        return [text for one in value for text in _texts(one)]
+    return [value] if isinstance(value, str) else []

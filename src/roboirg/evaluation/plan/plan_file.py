@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import importlib.resources
-import inspect
+import itertools
 import textwrap
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from importlib.resources.abc import Traversable
 from pathlib import Path
 from typing import Any
@@ -14,10 +14,8 @@ import msgspec
 import yaml
 
 from roboirg.core.errors import InvalidValueError, UnknownNameError
-from roboirg.core.instruction_options import OPTION_HELP
-from roboirg.evaluation.plan.plan import SINGLE_OPTIONS, Plan
-from roboirg.evaluation.plan.plan_maker import make_plan
-from roboirg.evaluation.plan.stored_plans import present_fields
+from roboirg.evaluation.plan.option_parsing import check_names
+from roboirg.evaluation.plan.plan import PLAN_KEYS, Plan, plan_options
 from roboirg.util.regular_file import read_regular
 
 _PACKAGE = "roboirg.evaluation.plan"
@@ -26,11 +24,7 @@ _MOST_BYTES = 4_000_000
 """Of a plan file; lists of 10,000 numbers, the longest that are played, have less than 0.2 MB."""
 _SUFFIXES = (".yaml", ".yml", ".json")
 """JSON is YAML, too: a run's plan.json can be played again."""
-_LISTS = frozenset(inspect.signature(make_plan).parameters) - {"options"}
-"""Keys whose values are lists on the command line."""
 _WIDTH = 100
-_END = "...\n"
-"""What YAML writes after a text that stands alone."""
 
 
 def named_plans() -> tuple[str, ...]:
@@ -40,10 +34,7 @@ def named_plans() -> tuple[str, ...]:
 
 
 def read_plan_file(name: str, section: str = "") -> dict[str, Any]:
-    """Read a plan file as options of `make_plan`.
-
-    Lists become text as typed on the command line: ``[1, 5]`` becomes ``"1,5"``, and
-    ``[[1, 5], [1, 2, 5]]`` becomes ``"1,5;1,2,5"``.
+    """Read a plan file as options of `make_plan`; what is empty is left out.
 
     Args:
         name: name of a plan that comes with the package, or path of a YAML file, or of the
@@ -60,11 +51,19 @@ def read_plan_file(name: str, section: str = "") -> dict[str, Any]:
             f"The plan {name!r} is of type {type(data).__name__}; it must be a mapping such as "
             "'tasks: all'."
         )
-    known = (*Plan.model_fields, *SINGLE_OPTIONS, *([section] if section else []))
-    for key in data:
-        if key not in known:
-            raise UnknownNameError(f"plan key (in {name!r})", key, known)
-    return {key: _as_typed(key, value) for key, value in data.items() if value is not None}
+    check_names(f"plan key (in {name!r})", data, (*PLAN_KEYS, *([section] if section else [])))
+    found = {key: value for key, value in data.items() if value is not None}
+    policies = found.get("policies")
+    if isinstance(policies, list):
+        found["policies"] = [_named(one) for one in policies]
+    return found
+
+
+def _named(policy: object) -> str:
+    """Return a policy as typed; what a run's plan.json knew of it may have changed."""
+    if isinstance(policy, Mapping):
+        return f"{policy.get('name')}={policy.get('spec')}"
+    return str(policy)
 
 
 class _PlanLoader(yaml.SafeLoader):
@@ -92,7 +91,7 @@ def _load(name: str) -> object:
     file = _find(name)
     try:
         # A safe loader, with two more checks.
-        data = yaml.load(_text(file), _PlanLoader)  # noqa: S506
+        return yaml.load(_text(file), _PlanLoader)  # noqa: S506
     except (OSError, UnicodeDecodeError, InvalidValueError) as error:
         words = str(error).rstrip(".")
         raise InvalidValueError(f"The plan {name!r} cannot be read: {words}.") from error
@@ -101,8 +100,6 @@ def _load(name: str) -> object:
     except (yaml.YAMLError, ValueError) as error:  # such as a number of too many digits
         words = " ".join(str(error).split())
         raise InvalidValueError(f"The plan {name!r} is not valid YAML: {words}.") from error
-    is_stored = name.endswith(".json") and isinstance(data, dict)
-    return present_fields(data) if is_stored else data
 
 
 def _text(file: Path | Traversable) -> str:
@@ -124,70 +121,32 @@ def _folder() -> Traversable:
     return importlib.resources.files(_PACKAGE) / _FOLDER
 
 
-def _as_typed(key: str, value: object) -> object:
-    if value is False:
-        return "off"  # YAML 1.1 reads the word as false
-    if key not in _LISTS:
-        return value
-    if not isinstance(value, list):
-        return [str(value)] if key == "policies" else str(value)
-    if key == "policies":
-        return [_named(one) for one in value]
-    if key == "stages" and any(isinstance(one, list) for one in value):
-        return ";".join(str(_as_typed(key, one)) for one in value)
-    typed = ",".join(map(str, value)) or ("none" if key == "retry_on" else "")
-    # A single number without a comma would mean the first n episodes.
-    return f"{typed}," if key == "episodes" and len(value) == 1 else typed
-
-
-def _named(policy: object) -> str:
-    """Return a policy as typed; what a run's plan.json knew of it may have changed."""
-    if isinstance(policy, Mapping):
-        return f"{policy.get('name')}={policy.get('spec')}"
-    return str(policy)
-
-
 def plan_text(plan: Plan) -> str:
-    """Return a plan as YAML that `read_plan_file` reads; the comments explain each field."""
+    """Return a plan as YAML that `read_plan_file` reads; the comments explain each option."""
     comments = textwrap.TextWrapper(_WIDTH, initial_indent="# ", subsequent_indent="# ")
+    shown = {
+        "policies": [one.text for one in plan.policies],
+        "episodes": _ranges(plan.episodes),
+        "wordings": plan.wordings and plan.wordings.file,
+    }
     return "\n".join(
-        f"{comments.fill(explanation)}\n{_line(name, value)}"
-        for name, value, explanation in _fields(plan)
+        f"{comments.fill(one.help)}\n{one.name}: {_yaml(shown.get(one.name, one.value_in(plan)))}"
+        for one in plan_options()
     )
 
 
-def _fields(plan: Plan) -> Iterator[tuple[str, object, str]]:
-    """Yield name, value and explanation of each key of a plan file."""
-    for name, field in Plan.model_fields.items():
-        if name == "options":
-            for option in SINGLE_OPTIONS:
-                yield option, getattr(plan.options, option), OPTION_HELP[option]
-        elif name == "policies":
-            yield name, [one.text for one in plan.policies], str(field.description)
-        elif name == "episodes":
-            yield name, _ranges(plan.episodes), str(field.description)
-        else:
-            yield name, getattr(plan, name), str(field.description)
-
-
-def _line(name: str, value: object) -> str:
-    """Return a key with its value; lists stand in brackets."""
-    if value is None:
-        return f"{name}:\n"
+def _yaml(value: object) -> str:
+    """Return a value; lists stand in brackets."""
     text = yaml.safe_dump(
         msgspec.to_builtins(value), default_flow_style=True, width=_WIDTH, allow_unicode=True
     )
-    return f"{name}: {text.removesuffix(_END)}"
+    return text.removesuffix("...\n")  # which YAML writes after a text that stands alone
 
 
 def _ranges(numbers: Sequence[int]) -> str:
     """Return numbers as typed: 0-3,7 for 0, 1, 2, 3 and 7."""
-    runs: list[list[int]] = []
-    for number in numbers:
-        if runs and number == runs[-1][-1] + 1:
-            runs[-1].append(number)
-        else:
-            runs.append([number])
-    texts = [str(run[0]) if len(run) == 1 else f"{run[0]}-{run[-1]}" for run in runs]
+    runs = itertools.groupby(enumerate(numbers), lambda one: one[1] - one[0])
+    ends = [(run[0][1], run[-1][1]) for run in (list(found) for _, found in runs)]
+    text = ",".join(str(one) if one == last else f"{one}-{last}" for one, last in ends)
     # One number without a comma would mean the first episodes.
-    return f"{texts[0]}," if len(numbers) == 1 else ",".join(texts)
+    return f"{text}," if len(numbers) == 1 else text

@@ -22,7 +22,7 @@ from typing import Any
 
 from roboirg.core.errors import InvalidValueError, RoboIRGError
 from roboirg.core.extras import extra_needed
-from roboirg.evaluation.plan.worker_needs import WorkerNeeds
+from roboirg.evaluation.plan.plan_sections import WorkerNeeds
 from roboirg.evaluation.play.rollout import PlayJob
 from roboirg.evaluation.records.record import Job
 from roboirg.evaluation.run.executor import NO_TIMEOUT_S, Records, Warn

@@ -20,7 +20,7 @@ from typing import Any, cast
 
 from roboirg.core.errors import RoboIRGError
 from roboirg.core.plain_text import counted
-from roboirg.evaluation.plan.worker_needs import WorkerNeeds
+from roboirg.evaluation.plan.plan_sections import WorkerNeeds
 from roboirg.evaluation.play.episode_record import lost_record
 from roboirg.evaluation.play.rollout import EpisodeRunner, PlayJob
 from roboirg.evaluation.records.record import Job, Record

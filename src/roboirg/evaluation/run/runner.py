@@ -125,11 +125,11 @@ def episode_runner(plan: Plan, folder: Path) -> EpisodeRunner:
     return EpisodeRunner(
         folder,
         plan.video,
-        policy_timeout_s=plan.policy_timeout_s,
+        policy_timeout_s=plan.hosting.policy_timeout_s,
         plan=plan.fingerprint,
-        hosting=plan.hosting,
+        hosting=plan.hosting.settings,
         refuse_long=plan.long_prompts == "refuse",
-        replies=ReplySettings(folder, plan.max_cost, plan.model_replies == "anew"),
+        replies=ReplySettings(folder, plan.models.max_cost, plan.models.model_replies == "anew"),
     )
 
 
@@ -204,8 +204,8 @@ class _RunLoop:
 
     def _should_retry(self, job: Job, record: Record) -> bool:
         return (
-            record.error in self._plan.retry_on
-            and self.tries[job] < self._plan.tries
+            record.error in self._plan.attempts.retry_on
+            and self.tries[job] < self._plan.attempts.tries
             and job.policy not in self.unreachable
         )
 

@@ -128,10 +128,10 @@ def part_options(
         changes: other options of `make_plan`; tasks do not change parts with tasks of their own.
     """
     given = read_plan_file(PARTS[part])
-    given["forms"] = f"implicit,{RESOLVED}" if part == RESOLVED else "implicit"
-    given["policy_seeds"] = "0"
+    given["forms"] = ["implicit", *([RESOLVED] if part == RESOLVED else [])]
+    given["policy_seeds"] = 0
     if experiment.played and part != CONTEXT:
-        given["settings"] = ",".join(experiment.played)
+        given["settings"] = experiment.played
     if part in OWN_TASKS:
         changes = {name: one for name, one in changes.items() if name != "tasks"}
     if changes.get("split", given["split"]) != given["split"]:

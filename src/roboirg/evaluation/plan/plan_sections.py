@@ -1,0 +1,143 @@
+"""Subjects of a plan: hosts of policies, attempts at an episode, costs of models, a cluster."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Annotated, Any, Literal
+
+from pydantic import BeforeValidator, Field
+
+from roboirg.core.field_types import MOST_SECONDS, described
+from roboirg.evaluation.hosting.host_pool import DEFAULT_BATCH, HostSettings
+from roboirg.evaluation.plan.option_parsing import check_names, parse_names
+from roboirg.evaluation.records.record import ERROR_KINDS, ErrorKind
+
+PolicyProcessMode = Literal["own", "shared"]
+RETRYABLE: tuple[ErrorKind, ...] = ("connection", "environment", "infrastructure")
+"""Kinds of errors that may not occur again when the episode is retried."""
+
+
+def names_of(kind: str) -> BeforeValidator:
+    """Return what reads names of a kind; there may be none."""
+    return BeforeValidator(lambda given: parse_names(kind, given) if given else ())
+
+
+def _error_kinds(given: object) -> tuple[str, ...]:
+    names = parse_names("kind of error", given or "none")
+    if [one.lower() for one in names] == ["none"]:
+        return ()
+    check_names("kind of error", names, ERROR_KINDS)
+    return tuple(kind for kind in ERROR_KINDS if kind in names)
+
+
+Count = Annotated[int, Field(ge=1)]
+Seconds = Annotated[float, Field(gt=0, le=MOST_SECONDS)]
+
+
+@dataclass(frozen=True, slots=True)
+class Hosting:
+    """How policies are hosted."""
+
+    policy_process: PolicyProcessMode = field(
+        default="own",
+        metadata=described(
+            "own: a policy that is neither built in nor remote has a process of its own; shared: "
+            "it runs in the simulator's process, for debuggers."
+        ),
+    )
+    batch: Count = field(
+        default=DEFAULT_BATCH,
+        metadata=described("Largest number of episodes that a policy is asked about at once."),
+    )
+    devices: Annotated[tuple[str, ...], names_of("device")] = field(
+        default=(),
+        metadata=described(
+            "GPUs, such as 0,1; each policy gets a process on each. If empty, one process on any "
+            "GPU."
+        ),
+    )
+    policy_timeout_s: Seconds = field(
+        default=600.0, metadata=described("Time limit of one call of a policy, seconds.")
+    )
+
+    @property
+    def settings(self) -> HostSettings | None:
+        """The same for the hosts; None if policies run in the world's process."""
+        if self.policy_process == "shared":
+            return None
+        return HostSettings(self.batch, self.devices, self.policy_timeout_s)
+
+
+@dataclass(frozen=True, slots=True)
+class Attempts:
+    """How long and how often an episode is played."""
+
+    episode_timeout_s: Seconds = field(
+        default=7200.0, metadata=described("Time limit of an episode, seconds.")
+    )
+    tries: Count = field(
+        default=2,
+        metadata=described(
+            "How often an episode is played if it ends in an error of a kind in `retry_on`."
+        ),
+    )
+    retry_on: Annotated[tuple[ErrorKind, ...], BeforeValidator(_error_kinds)] = field(
+        default=RETRYABLE,
+        metadata=described("Kinds of errors after which an episode is played again; or none."),
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class ModelUse:
+    """What models may cost."""
+
+    max_cost: Annotated[float, Field(gt=0)] | None = field(
+        default=None,
+        metadata=described(
+            "Most US dollars that models may cost; then the run stops and can be resumed with more."
+        ),
+    )
+    model_replies: Literal["stored", "anew"] = field(
+        default="stored",
+        metadata=described(
+            "stored: replies in the folder are used again; anew: models are asked again."
+        ),
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class WorkerNeeds:
+    """What a worker reserves on its machine.
+
+    Attributes:
+        cpus: number of CPUs.
+        gpus: number of GPUs; may be a part of one.
+        memory_gb: memory in GB; 0 reserves none.
+        labels: which a machine must have.
+        variables: environment variables of this process that workers get.
+        working_dir: folder that is copied to all machines, with the policies' files.
+    """
+
+    cpus: Annotated[float, Field(gt=0)] = 1.0
+    gpus: Annotated[float, Field(ge=0)] = 0.0
+    memory_gb: Annotated[float, Field(ge=0)] = 0.0
+    labels: Mapping[str, str] = field(default_factory=dict)
+    variables: tuple[str, ...] = ()
+    working_dir: str | None = None
+
+    def slots(self, node: Mapping[str, Any]) -> int:
+        """Return how many workers a machine of the cluster has room for."""
+        if not self.labels.items() <= node.get("Labels", {}).items():
+            return 0
+        amounts = {"CPU": self.cpus, "GPU": self.gpus, "memory": self.memory_gb * 1e9}
+        return min(
+            int(node["Resources"].get(name, 0.0) / amount)
+            for name, amount in amounts.items()
+            if amount
+        )
+
+    def options(self) -> dict[str, Any]:
+        """Return the same as options of a Ray actor."""
+        memory = {"memory": int(self.memory_gb * 1e9)} if self.memory_gb else {}
+        return {"num_cpus": self.cpus, "num_gpus": self.gpus, **memory}
