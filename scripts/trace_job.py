@@ -54,7 +54,7 @@ class PaperWorld:
     executed_actions = 0
 
     def __init__(self, prepared: PreparedJob, _needs: object) -> None:
-        self.instruction = prepared.instruction
+        self.instruction = prepared.words.instruction
         self.seen = {"front_rgb": np.zeros((256, 256, 3), np.uint8), "joint_positions": np.zeros(7)}
         self.info = {"status": "ongoing", "events": [], "heard": [], "elapsed_steps": 3}
 

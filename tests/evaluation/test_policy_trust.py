@@ -22,12 +22,13 @@ from msgspec.structs import replace
 
 from roboirg.cli.options import add_working_directory
 from roboirg.core.errors import InvalidValueError
-from roboirg.evaluation.episode_errors import EpisodeError, Terminated, attribute_errors
+from roboirg.evaluation.episode_errors import EpisodeError, Terminated
 from roboirg.evaluation.hosting.host_pool import HostPool, HostSettings
 from roboirg.evaluation.hosting.hosted_policy import HostedPolicy
 from roboirg.evaluation.hosting.policy_opening import open_policy
 from roboirg.evaluation.plan.plan import Plan
 from roboirg.evaluation.plan.plan_maker import make_plan
+from roboirg.evaluation.play.call_guard import attribute_errors
 from roboirg.evaluation.records.episode_log import MAX_LOG_BYTES, log_path, logged_slugs
 from roboirg.evaluation.records.record import Job, Record
 from roboirg.evaluation.records.record_codec import StoreError, encode, read_record

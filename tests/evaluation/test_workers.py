@@ -20,10 +20,10 @@ from msgspec.structs import replace
 
 from roboirg.core.errors import RoboIRGError
 from roboirg.core.waiting import Wait, waiting
-from roboirg.evaluation.episode_errors import EpisodeError, attribute_errors
+from roboirg.evaluation.episode_errors import EpisodeError
 from roboirg.evaluation.plan.plan import Plan
 from roboirg.evaluation.play import watchdog
-from roboirg.evaluation.play.call_guard import CallGuard
+from roboirg.evaluation.play.call_guard import CallGuard, attribute_errors
 from roboirg.evaluation.play.job_instruction import PreparedJob
 from roboirg.evaluation.play.rollout import EpisodeRunner, load_policy
 from roboirg.evaluation.records.record import Job, Record

@@ -3,17 +3,10 @@
 from __future__ import annotations
 
 import re
-import signal
 import traceback
-from collections.abc import Iterator
-from contextlib import contextmanager
 from typing import Literal
 
-from roboirg.core.errors import (
-    EndOfRunError,
-    InvalidActionError,
-    RoboIRGError,
-)
+from roboirg.core.errors import InvalidActionError, RoboIRGError
 from roboirg.core.plain_text import clip_text, printable
 from roboirg.evaluation.records.record import ErrorKind
 
@@ -61,29 +54,6 @@ class EpisodeLostError(Exception):
 def format_cause(kind: ErrorKind, message: str) -> str:
     """Return a record's cause: kind of error and message."""
     return f"{kind.replace('_', ' ')}: {message}"
-
-
-@contextmanager
-def attribute_errors(source: ErrorSource) -> Iterator[None]:
-    """Turn every exception raised inside into an `EpisodeError` of this source.
-
-    Raises:
-        EpisodeError: an exception was raised.
-        EpisodeLostError: unchanged, because the episode is played again.
-        EndOfRunError: unchanged, because every other episode would end the same way.
-        KeyboardInterrupt: unchanged, if it may be the user's.
-    """
-    try:
-        yield
-    except (EndOfRunError, EpisodeError, EpisodeLostError, Terminated):
-        raise
-    except (Exception, SystemExit, GeneratorExit, KeyboardInterrupt) as error:
-        # Policies may raise anything. Where Ctrl-C is ignored, as in workers, it is not the user's.
-        if isinstance(error, KeyboardInterrupt) and signal.getsignal(signal.SIGINT) is not (
-            signal.SIG_IGN
-        ):
-            raise
-        raise describe_error(source, error) from error
 
 
 def describe_error(source: ErrorSource, error: BaseException) -> EpisodeError:

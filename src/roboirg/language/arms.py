@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import re
 import zlib
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -23,7 +24,9 @@ from roboirg.core.errors import InvalidValueError
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.language.generator import instruct_with
 from roboirg.language.instruction import Instruction, Utterance
-from roboirg.tasks import with_goal
+from roboirg.language.settings import EXPLICIT
+from roboirg.language.worded_command import describe_goal
+from roboirg.tasks import get_task, with_goal
 from roboirg.tasks.other_goals import draw_other_goal
 
 FUNCTION_WORDS = (
@@ -52,6 +55,24 @@ class ArmWords(NamedTuple):
     episode: Episode
     instruction: Instruction
     original: Episode | None = None
+
+
+class TrialWords(NamedTuple):
+    """Everything that is said of a trial.
+
+    Attributes:
+        episode: the episode, with the goal by which its verdict falls.
+        instruction: what is said.
+        command: the explicit command of its goal.
+        stated: its goal in words.
+        goals: the episode with each goal that its scene allows, by the goal's words.
+    """
+
+    episode: Episode
+    instruction: Instruction
+    command: str
+    stated: str
+    goals: Mapping[str, Episode]
 
 
 def arm_episode(episode: Episode, arm: str) -> Episode:
@@ -88,6 +109,16 @@ def say_arm(episode: Episode, options: InstructionOptions, arm: str = TOLD) -> A
     elif arm == SCRAMBLED:
         told = _scramble(stated, told)
     return ArmWords(stated, told, None if stated is episode else episode)
+
+
+def word_trial(episode: Episode, options: InstructionOptions, arm: str = TOLD) -> TrialWords:
+    """Return everything that is said of an arm of an episode; raises like `say_arm`."""
+    stated, told, _ = say_arm(episode, options, arm)
+    is_explicit = (options.setting, arm) == (EXPLICIT, TOLD)
+    explicit = told if is_explicit else instruct_with(stated, replace(options, setting=EXPLICIT))
+    every = get_task(stated.task).goals(stated.scene)
+    goals = {describe_goal(goal): with_goal(stated, goal) for goal in every}
+    return TrialWords(stated, told, explicit.text, describe_goal(stated.goal), goals)
 
 
 def _paraphrase(

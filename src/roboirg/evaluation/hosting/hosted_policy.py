@@ -18,11 +18,11 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import JsonValue
 
-from roboirg.core.errors import InvalidValueError, MissingDependencyError
+from roboirg.core.errors import EndOfRunError, InvalidValueError, MissingDependencyError
 from roboirg.core.inference_facts import InferenceFacts
 from roboirg.core.observations import Demonstration, Observation
 from roboirg.core.policy_ref import PolicyRef
-from roboirg.evaluation.episode_errors import EpisodeError, EpisodeLostError, attribute_errors
+from roboirg.evaluation.episode_errors import EpisodeError, EpisodeLostError, describe_error
 from roboirg.evaluation.hosting.messages import (
     Call,
     Outcome,
@@ -144,10 +144,11 @@ class HostedPolicy:
             answer = Call("gone")
             wanted = [field for field in self._demonstration if field in reply.fields]
             try:
-                with attribute_errors("environment"):
-                    answer = Call("answer", value=self._drawn(wanted))
-            except Exception as error:  # noqa: BLE001 - raised once the policy has returned
+                answer = Call("answer", value=self._drawn(wanted))
+            except EndOfRunError as error:  # raised once the policy has returned
                 failure = error
+            except Exception as error:  # noqa: BLE001 - likewise, as the world's
+                failure = describe_error("environment", error)
             send(self._hosts, [answer])
         return reply, failure
 

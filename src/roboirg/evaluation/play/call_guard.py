@@ -3,11 +3,19 @@
 from __future__ import annotations
 
 import contextlib
+import signal
 import time
 from collections.abc import Iterator
 
+from roboirg.core.errors import EndOfRunError
 from roboirg.core.waiting import queued_seconds
-from roboirg.evaluation.episode_errors import attribute_errors
+from roboirg.evaluation.episode_errors import (
+    EpisodeError,
+    EpisodeLostError,
+    ErrorSource,
+    Terminated,
+    describe_error,
+)
 from roboirg.evaluation.play.watchdog import Phase, watched
 
 
@@ -58,3 +66,26 @@ class CallGuard:
 
     def _add(self, name: str, seconds: float) -> None:
         self._timings[name] = round(self._timings.get(name, 0.0) + seconds, 6)
+
+
+@contextlib.contextmanager
+def attribute_errors(source: ErrorSource) -> Iterator[None]:
+    """Turn every exception raised inside into an `EpisodeError` of this source.
+
+    Raises:
+        EpisodeError: an exception was raised.
+        EpisodeLostError: unchanged, because the episode is played again.
+        EndOfRunError: unchanged, because every other episode would end the same way.
+        KeyboardInterrupt: unchanged, if it may be the user's.
+    """
+    try:
+        yield
+    except (EndOfRunError, EpisodeError, EpisodeLostError, Terminated):
+        raise
+    except (Exception, SystemExit, GeneratorExit, KeyboardInterrupt) as error:
+        # Policies may raise anything. Where Ctrl-C is ignored, as in workers, it is not the user's.
+        if isinstance(error, KeyboardInterrupt) and signal.getsignal(signal.SIGINT) is not (
+            signal.SIG_IGN
+        ):
+            raise
+        raise describe_error(source, error) from error

@@ -15,7 +15,6 @@ from pathlib import Path
 import msgspec
 
 from roboirg import language
-from roboirg.core.arms import TOLD
 from roboirg.core.delivery import TURNS
 from roboirg.core.episode import ENVIRONMENT_VERSION
 from roboirg.core.policy_ref import unknown_policy
@@ -33,7 +32,6 @@ from roboirg.evaluation.records.record import (
 )
 from roboirg.judging import attribute_failure
 from roboirg.judging.episode_replay import decide
-from roboirg.language.settings import EXPLICIT
 from roboirg.policies.prompt_length.prompt_audit import PromptLimit
 from roboirg.util.processor import processor_family
 from roboirg.util.short_hash import DIGITS
@@ -45,22 +43,21 @@ def begin_record(prepared: PreparedJob) -> Record:
     It has the words that are to be said, and the policy without its needs, as those with which it
     is played are a field of their own.
     """
-    job, episode, instruction = prepared.job, prepared.episode, prepared.instruction
-    is_explicit = job.setting == EXPLICIT and job.arm == TOLD
+    job, words = prepared.job, prepared.words
     policy = job.ref or unknown_policy(job.policy)
     return Record(
         **{**msgspec.structs.asdict(job), "ref": replace(policy, needs=None, problem=None)},
-        seed=episode.seed,
-        difficulty=episode.difficulty,
+        seed=words.episode.seed,
+        difficulty=words.episode.difficulty,
         outcome="error",
         error="environment",
-        cause=format_cause("environment", "the episode did not begin"),
+        cause="environment: the episode did not begin",
         instruction=utterances_at(prepared, ()),
-        mentions=tuple(MentionSpan(**asdict(one)) for one in instruction.mentions),
-        command=(instruction if is_explicit else prepared.explicit).text,
-        goal=dict(episode.goal.as_mapping()),
+        mentions=tuple(MentionSpan(**asdict(one)) for one in words.instruction.mentions),
+        command=words.command,
+        goal=dict(words.episode.goal.as_mapping()),
         # Exactly what a reader of the file gets.
-        metadata=json.loads(json.dumps(dict(instruction.metadata))),
+        metadata=json.loads(json.dumps(dict(words.instruction.metadata))),
         language_version=str(language.LANGUAGE_VERSION),
         environment_version=ENVIRONMENT_VERSION,
         package_version=importlib.metadata.version("roboirgbench"),
@@ -80,7 +77,7 @@ def lost_record(job: Job, kind: ErrorKind, message: str) -> Record:
 
 def utterances_at(prepared: PreparedJob, heard: Sequence[int]) -> tuple[UtteranceRecord, ...]:
     """Return the utterances of a job, given the steps at which those so far were heard."""
-    utterances = prepared.instruction.utterances
+    utterances = prepared.words.instruction.utterances
     steps = heard if prepared.job.options.delivery == TURNS else [0] * len(utterances)
     return tuple(
         UtteranceRecord(**asdict(one), step=step) for one, step in zip_longest(utterances, steps)
@@ -93,7 +90,7 @@ def audit_record(record: Record, prepared: PreparedJob, limit: PromptLimit) -> N
     Raises:
         InvalidValueError: the policy's tokenizer does not read this text.
     """
-    steps, words = [one.step for one in record.instruction], prepared.instruction
+    steps, words = [one.step for one in record.instruction], prepared.words.instruction
     is_silent = steps == [None] * len(steps)
     record.prompt, record.prompt_verdict = (
         audit_job(record, limit, words) if is_silent else audit_prompt(words, steps, limit)
@@ -119,10 +116,10 @@ def conclude(
     """
     if not record.events:
         return
-    episode, elapsed = prepared.episode, start + record.steps
-    events, instruction = judged_events(record.events, start), prepared.instruction
+    episode, instruction, *_ = prepared.words
+    events, elapsed = judged_events(record.events, start), start + record.steps
     decision = decide(episode, events, elapsed)
-    goals = record.goals = find_goal_outcomes(episode, events, elapsed, decision, original)
+    goals = record.goals = find_goal_outcomes(prepared.words, events, elapsed, decision, original)
     if record.outcome != "failure":
         return
     found = attribute_failure(

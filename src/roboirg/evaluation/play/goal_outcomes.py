@@ -10,8 +10,8 @@ from roboirg.core.episode import Episode
 from roboirg.evaluation.records.record import EventRecord, GoalOutcomes, OriginalStatus
 from roboirg.judging import Event, FailureAttribution, Status
 from roboirg.judging.episode_replay import Decision, decide
+from roboirg.language.arms import TrialWords
 from roboirg.language.worded_command import describe_goal
-from roboirg.tasks import get_task, with_goal
 
 
 def judged_events(events: Iterable[EventRecord], start: int) -> list[Event]:
@@ -22,7 +22,7 @@ def judged_events(events: Iterable[EventRecord], start: int) -> list[Event]:
 
 
 def find_goal_outcomes(
-    episode: Episode,
+    words: TrialWords,
     events: Sequence[Event],
     elapsed_steps: int,
     decision: Decision,
@@ -31,23 +31,23 @@ def find_goal_outcomes(
     """Return which goals of the scene were reached, and with which the wrong act agrees.
 
     Args:
-        episode: with the goal by which the verdict fell.
+        words: of the trial, with the scene's goals.
         events: all facts that changed, in order; steps count since the world began.
         elapsed_steps: steps of the world in all.
         decision: the verdict, which may have fallen before the end.
         original: how it ended for the scene's own goal, if the episode has another one.
     """
     reached, agrees = [], []
-    for goal in get_task(episode.task).goals(episode.scene):
-        judge, step = decide(with_goal(episode, goal), events, elapsed_steps)
+    for goal, episode in words.goals.items():
+        judge, step = decide(episode, events, elapsed_steps)
         is_reached = judge.status is Status.SUCCESS
         if is_reached:
-            reached.append(describe_goal(goal))
+            reached.append(goal)
         lives_on = judge.status is Status.ONGOING or step > decision.step
         if decision.judge.violation and (lives_on or (is_reached and step == decision.step)):
-            agrees.append(describe_goal(goal))
+            agrees.append(goal)
     return GoalOutcomes(
-        stated=describe_goal(episode.goal),
+        stated=words.stated,
         reached=tuple(reached),
         agrees=tuple(agrees),
         original=cast("OriginalStatus", "undecided" if original == "ongoing" else original),

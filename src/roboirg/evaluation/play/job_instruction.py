@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 
-from roboirg import language
 from roboirg.core.episode import Episode
 from roboirg.evaluation.records.record import Job
-from roboirg.language.arms import arm_episode, say_arm
+from roboirg.language.arms import TrialWords, arm_episode, say_arm, word_trial
 from roboirg.language.instruction import Instruction
-from roboirg.language.settings import EXPLICIT
 from roboirg.language.wordings.wording_store import open_wordings
 from roboirg.tasks.splits import splits
 
@@ -32,21 +30,10 @@ class PreparedJob:
         return arm_episode(self.scene_episode, self.job.arm)
 
     @cached_property
-    def instruction(self) -> Instruction:
-        """The instruction; raises like `instruct_job`."""
-        self.open_wordings()
-        return say_arm(self.scene_episode, self.job.options, self.job.arm).instruction
-
-    @cached_property
-    def explicit(self) -> Instruction:
-        """The explicit instruction of the goal of `episode`; raises like `instruct_job`."""
-        self.open_wordings()
-        return language.instruct_with(self.episode, replace(self.job.options, setting=EXPLICIT))
-
-    def open_wordings(self) -> None:
-        """Open the job's wording file, if it has one; raises like `instruct_job`."""
-        if self.job.options.wordings is not None:
-            open_wordings(self.job.wordings_file, self.job.options.wordings)
+    def words(self) -> TrialWords:
+        """Everything that is said of it; raises like `instruct_job`."""
+        _open_wordings(self.job)
+        return word_trial(self.scene_episode, self.job.options, self.job.arm)
 
 
 def instruct_job(job: Job) -> Instruction:
@@ -56,4 +43,10 @@ def instruct_job(job: Job) -> Instruction:
         InvalidValueError: the setting and options cannot express the episode, or the job's
             wording file is missing or has changed.
     """
-    return PreparedJob(job).instruction
+    _open_wordings(job)
+    return say_arm(PreparedJob(job).scene_episode, job.options, job.arm).instruction
+
+
+def _open_wordings(job: Job) -> None:
+    if job.options.wordings is not None:
+        open_wordings(job.wordings_file, job.options.wordings)

@@ -168,7 +168,7 @@ class EpisodeRunner:
                 needs = job_needs(policy, job)
                 limit = prompt_limit(needs)
                 if self.refuse_long and limit is not None:
-                    audit = audit_job(job, limit, prepared.instruction)
+                    audit = audit_job(job, limit, prepared.words.instruction)
                     if message := too_long_text(*audit):
                         raise EpisodeError("prompt", message, "")
             log = play_with(policy, prepared, needs, record, guard, writer)
