@@ -80,7 +80,7 @@ def canned(monkeypatch: pytest.MonkeyPatch) -> type[CannedPlayer]:
         (("--settings", "spatail"), "Did you mean 'spatial'?"),
         (("--split", "dev"), "There is no split 'dev'"),
         (("--episodes", "300000000"), "split 'test' has episodes 0 to 49."),
-        (("--episodes", "9" * 5000), "has 5000 digits"),
+        (("--episodes", "9" * 5000), "…' is not a valid episode; write numbers and ranges"),
         (("--max-steps", "9" * 5000), "'--max-steps'"),
         (("--stages", "5-1"), "the possible lists are 1,5;"),
         (("--worker", "1"), "No such option: --worker"),

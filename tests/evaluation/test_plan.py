@@ -1,7 +1,5 @@
 from __future__ import annotations
 
-from pathlib import Path
-
 import pytest
 
 from roboirg.core.errors import InvalidValueError, UnknownNameError
@@ -13,7 +11,6 @@ from roboirg.evaluation.plan.option_parsing import (
 )
 from roboirg.evaluation.plan.plan import Plan
 from roboirg.evaluation.plan.plan_maker import make_plan
-from roboirg.evaluation.plan.stored_plans import read_plan, write_plan
 from roboirg.evaluation.records.record import Job
 from roboirg.evaluation.records.record_codec import identity_key
 from roboirg.language import expressible, plain_settings
@@ -74,7 +71,7 @@ def test_sentences_about_numbers_say_what_would_be_right() -> None:
 
 @pytest.mark.parametrize("text", ["all", "ALL", "all,explicit", "direct, All"])
 def test_all_means_all_wherever_it_stands(text: str) -> None:
-    assert make_plan(["random"], settings=text, episodes="1").settings == "all"
+    assert make_plan(["random"], settings=text, episodes="1").settings == ("all",)
     words = text.replace("explicit", "BinFill").replace("direct", "StopCube")
     assert make_plan(["random"], tasks=words, episodes="1").tasks == tuple(all_tasks())
 
@@ -134,7 +131,7 @@ def test_harder_settings_are_played_only_where_they_are_named() -> None:
 def test_every_setting_is_the_harder_ones_too() -> None:
     for text in ("every", "direct, Every", "all,every"):
         plan = make_plan(["random"], tasks="StopCube,BinFill", settings=text, episodes="0-3")
-        assert plan.settings == "every"
+        assert plan.settings == ("every",)
     for job in plan.jobs():
         assert job.setting in expressible(get_episode(job.task, "test", job.episode))
     told = {job.setting for job in plan.jobs()}
@@ -206,14 +203,6 @@ def test_an_unknown_policy_is_told_up_front(spec: str) -> None:
 def test_a_policy_close_to_a_known_one_is_suggested() -> None:
     with pytest.raises(UnknownNameError, match="Did you mean 'listener'"):
         make_plan(["listner"])
-
-
-def test_a_plan_is_kept_beside_its_records(tmp_path: Path) -> None:
-    plan = make_plan(["random"], stages="1,5")
-    write_plan(plan, tmp_path)
-    assert read_plan(tmp_path) == plan
-    (tmp_path / "plan.json").write_text('{"from": "the future"}')
-    assert read_plan(tmp_path) is None
 
 
 def test_a_record_has_the_slug_of_its_job() -> None:

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import inspect
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import fields
+from functools import partial
 from typing import Annotated, Any, get_args, get_origin
 
 import typer
@@ -32,18 +33,18 @@ class DeclaredCommand(TyperCommand):
     name.
     """
 
-    def declared(self) -> Iterator[inspect.Parameter]:
-        """Yield the options; see `option`."""
-        raise NotImplementedError
-
     _all: list[Any]
     _made: list[Any]
+
+    def declared(self) -> Iterator[tuple[str, Any, Any]]:
+        """Yield name, type and `typer.Option` of each."""
+        raise NotImplementedError
 
     @property  # A list that the base class sets, and changes.
     def params(self) -> list[Any]:
         """All options; the declared ones come first."""
         if not self._made:
-            self._made = _params_of(list(self.declared()))
+            self._made = _params_of(self.declared())
             self._all[:0] = self._made
         return self._all
 
@@ -59,69 +60,50 @@ class DeclaredCommand(TyperCommand):
         return super().invoke(ctx)
 
 
-def _params_of(declared: list[inspect.Parameter]) -> list[Any]:
-    """Return parameters of a function as typer's parameters of a command."""
+def _params_of(declared: Iterable[tuple[str, Any, Any]]) -> list[Any]:
+    """Return typer's parameters of a command."""
 
     def command() -> None: ...
 
+    keyword = inspect.Parameter.KEYWORD_ONLY
+    parameters = [
+        inspect.Parameter(name, keyword, default=None, annotation=Annotated[kind | None, option])
+        for name, kind, option in declared
+    ]
     # Typer reads both.
-    command.__signature__ = inspect.Signature(declared)  # type: ignore[attr-defined]
-    command.__annotations__ = {one.name: one.annotation for one in declared}
+    command.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
+    command.__annotations__ = {one.name: one.annotation for one in parameters}
     holder = typer.Typer(add_completion=False)
     holder.command()(command)
     return typer.main.get_command(holder).params
 
 
-def option(
-    name: str,
-    kind: Any,  # noqa: ANN401 - as typer takes it
-    text: str,
-    panel: str | None = None,
-    *words: str,
-) -> inspect.Parameter:
-    """Return an option of a command.
-
-    Args:
-        name: of the field.
-        kind: type of what is typed.
-        text: of the help.
-        panel: of the help.
-        words: its name on the command line, if it is not that of the field.
-    """
-    declared = typer.Option(*words, help=text, rich_help_panel=panel)
-    annotation = Annotated[kind | None, declared]
-    return inspect.Parameter(
-        name, inspect.Parameter.KEYWORD_ONLY, default=None, annotation=annotation
-    )
-
-
 class RunCommand(DeclaredCommand):
     """The command that plays a plan; plans are imported for its own help only."""
 
-    def declared(self) -> Iterator[inspect.Parameter]:
+    def declared(self) -> Iterator[tuple[str, Any, Any]]:
         """Yield the daily options of a plan; their texts end with the defaults."""
         from roboirg.evaluation.plan.plan import plan_options
 
         options = {one.name: one for one in plan_options()}
         for panel, names in _PANELS.items():
-            for name in names:
-                one = options[name]
-                kinds = (one.type, *get_args(one.type))
-                numbers = (int, float) if get_origin(one.type) is not tuple else ()
-                kind = next((kind for kind in numbers if kind in kinds), str)
+            for one in map(options.__getitem__, names):
                 text = one.help if one.default is None else f"{one.help}  ({one.default})"
-                if name == "policies":
-                    yield option(name, list[str], text, panel, "--policy")
-                else:
-                    yield option(name, kind, text, panel)
+                option = partial(typer.Option, help=text, rich_help_panel=panel)
+                if one.name == "policies":
+                    yield one.name, list[str], option("--policy")
+                    continue
+                numbers = (int, float) if get_origin(one.type) is not tuple else ()
+                kinds = (one.type, *get_args(one.type))
+                yield one.name, next((kind for kind in numbers if kind in kinds), str), option()
 
 
 class WordsCommand(DeclaredCommand):
     """A command with the options of one instruction; it chooses settings and forms itself."""
 
-    def declared(self) -> Iterator[inspect.Parameter]:
+    def declared(self) -> Iterator[tuple[str, Any, Any]]:
         """Yield the options of an instruction."""
         for one in fields(InstructionOptions):
             if one.name not in ("setting", "form", "delivery"):
                 kind = int if isinstance(one.default, int) else str
-                yield option(one.name, kind, one.metadata["help"])
+                yield one.name, kind, typer.Option(help=one.metadata["help"])

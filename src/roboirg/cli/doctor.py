@@ -11,7 +11,6 @@ import importlib
 import importlib.util
 import os
 import platform
-import re
 import signal
 import subprocess
 import sys
@@ -20,6 +19,9 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from importlib import metadata
 from pathlib import Path
+
+from packaging.requirements import Requirement
+from packaging.specifiers import SpecifierSet
 
 from roboirg.core.errors import MissingDependencyError, RenderDeviceError, RoboIRGError
 from roboirg.core.extras import DISTRIBUTION, install_command
@@ -113,50 +115,24 @@ def _check_packages() -> Iterator[Check]:
         yield Check(DISTRIBUTION, False, "not installed", remedy)
         return
     yield Check(DISTRIBUTION, True, metadata.version(DISTRIBUTION))
-    wanted: dict[str, str] = {}  # several extras may list the same package
-    for requirement in requirements:
-        name, specifier, extra = _read_requirement(requirement)
-        if extra in ("", *_EXTRAS) and name != DISTRIBUTION:
-            wanted[name] = specifier
+    wanted = {}  # several extras may list the same package
+    for one in map(Requirement, requirements):
+        needed = one.marker is None or any(one.marker.evaluate({"extra": it}) for it in _EXTRAS)
+        if needed and one.name != DISTRIBUTION:
+            wanted[one.name] = one.specifier
     for name, specifier in wanted.items():
         yield _check_package(name, specifier)
 
 
-def _check_package(name: str, specifier: str) -> Check:
+def _check_package(name: str, specifier: SpecifierSet) -> Check:
     remedy = f"pip install '{name}{specifier}'"
     try:
         version = metadata.version(name)
     except metadata.PackageNotFoundError:
         return Check(name, False, f"not installed; needs {specifier}", remedy)
-    if not _satisfies(version, specifier):
+    if not specifier.contains(version, prereleases=True):
         return Check(name, False, f"{version}; needs {specifier}", remedy)
     return Check(name, True, version)
-
-
-def _read_requirement(requirement: str) -> tuple[str, str, str]:
-    """Split ``"av>=12; extra == 'world'"`` into name, specifier and extra."""
-    wanted, _, marker = requirement.partition(";")
-    name = re.match(r"[\w.-]+", wanted)
-    specifier = re.search(r"[<>=!~].*", wanted)
-    extra = re.search(r"extra\s*==\s*['\"]([\w-]+)['\"]", marker)
-    return (
-        name.group() if name else wanted.strip(),
-        specifier.group().strip() if specifier else "",
-        extra.group(1) if extra else "",
-    )
-
-
-def _satisfies(version: str, specifier: str) -> bool:
-    """Check ``>=`` and ``==``, the only operators in this project's own requirements."""
-    operator, wanted = specifier[:2], specifier[2:]
-    if operator == "==":
-        return version == wanted
-    return operator != ">=" or _numbers(version) >= _numbers(wanted)
-
-
-def _numbers(version: str) -> tuple[int, ...]:
-    leading = re.match(r"[\d.]*\d", version)
-    return tuple(map(int, leading.group().split("."))) if leading else ()
 
 
 def _check_model_files() -> Check:

@@ -228,14 +228,13 @@ def compare(
         names = [f"{names[0]} ({first})", f"{names[1]} ({second})"]
     console = Console()
     widen(console)
-    headlines = (
+    first_data, second_data = (RunData.of(*each) for each in sides)
+    for sentence in (
+        *sentences(found, names[0], names[1]),
         *headline_notes(ours, {found.first: names[0]}),
         *headline_notes(theirs, {found.second: names[1]}),
-    )
-    for sentence in (*sentences(found, names[0], names[1]), *headlines):
-        console.print(Text(sentence), highlight=False)
-    data = [RunData.of(*each) for each in sides]
-    for sentence in language_use_sentences(data[0], data[1], (names[0], names[1])):
+        *language_use_sentences(first_data, second_data, (names[0], names[1])),
+    ):
         console.print(Text(sentence), highlight=False)
 
 

@@ -77,6 +77,8 @@ def run(
     """
     from roboirg.evaluation.plan.plan_file import plan_text
     from roboirg.evaluation.play.prompt_shares import prompt_shares, warning_lines
+    from roboirg.evaluation.play.video_writer import check_video_support
+    from roboirg.evaluation.run.runner import check_run
 
     add_working_directory(last=True)
     made = _plan(plan, context.obj, usual=("oracle",) if show_plan else ())
@@ -88,7 +90,9 @@ def run(
     # Absolute: a policy in this process may change the working directory.
     folder = folder_of(out).absolute()
     chosen = _executor(made, executor, workers)
-    _check_run(made, folder)
+    if made.video != "off":
+        check_video_support()
+    check_run(made, folder)
     if dry_run:
         _print_counts(made, folder)
         return
@@ -198,16 +202,6 @@ def _plan(name: str | None, typed: dict[str, Any], usual: Sequence[str]) -> Plan
         raise InvalidValueError("No policy given; name one with --policy, such as oracle.")
     chosen["split"] = drawn_split(str(chosen.get("split", "test")))
     return make_plan(policies, **chosen)
-
-
-def _check_run(plan: Plan, folder: Path) -> None:
-    """Check what a run checks before its first episode; nothing is written."""
-    from roboirg.evaluation.play.video_writer import check_video_support
-    from roboirg.evaluation.run.runner import check_run
-
-    if plan.video != "off":
-        check_video_support()
-    check_run(plan, folder)
 
 
 def _executor(plan: Plan, name: str, workers: int | None) -> Executor:

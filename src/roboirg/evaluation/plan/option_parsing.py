@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import functools
 import re
-from collections.abc import Collection, Iterable, Iterator, Sequence
+from collections.abc import Collection, Iterable, Sequence
 from typing import cast
 
 from roboirg import language
@@ -19,7 +19,7 @@ ALL = "all"
 _NAME = r"[\w.+ -]+"
 """Of a policy: it becomes part of names of files."""
 _MAX_NUMBERS = 10_000
-_MAX_DIGITS = 18
+_NUMBER = r"\d{1,18}"
 _MAX_QUOTED_LENGTH = 40
 _NUMBERS_HINT = "write numbers and ranges such as 0,3,5-9"
 _EPISODES_HINT = f"{_NUMBERS_HINT}, or all"
@@ -118,15 +118,19 @@ def parse_episodes(given: object, split: str, tasks: Collection[str]) -> tuple[i
             raise InvalidValueError(
                 f"The split {split!r} has {size():,} episodes; say how many with --episodes."
             )
-        every = range(size())
-        return tuple(every if means_all(words) else _of_difficulty(every, split, words, tasks))
+        levels = {*DIFFICULTIES} if means_all(words) else words
+        return tuple(
+            index
+            for index in range(size())
+            if all(splits.get_episode(task, split, index).difficulty in levels for task in tasks)
+        )
     if isinstance(given, Iterable) and not isinstance(given, str):
         return _union(_parse_ranges("episode", words, _EPISODES_HINT))
-    single = re.fullmatch(r"\s*(-?)(\d+)\s*", str(given))
+    single = re.fullmatch(rf"\s*(-?)({_NUMBER})\s*", str(given))
     if single is None:
         ranges = _parse_ranges("episode", words, _EPISODES_HINT)
     else:
-        count = _number("number of episodes", single[2])
+        count = int(single[2])
         if single[1] or count == 0:
             alone = "" if count else "; for episode 0 alone write '0,'"
             raise InvalidValueError(
@@ -140,14 +144,6 @@ def parse_episodes(given: object, split: str, tasks: Collection[str]) -> tuple[i
                 f"{size() - 1}."
             )
     return _union(ranges)
-
-
-def _of_difficulty(
-    positions: Iterable[int], split: str, levels: Collection[str], tasks: Collection[str]
-) -> Iterator[int]:
-    for index in positions:
-        if all(splits.get_episode(task, split, index).difficulty in levels for task in tasks):
-            yield index
 
 
 def parse_stages(given: object) -> tuple[int, ...]:
@@ -174,23 +170,14 @@ def parse_numbers(kind: str, given: object) -> tuple[int, ...]:
 def _parse_ranges(kind: str, given: object, hint: str) -> list[range]:
     ranges = []
     for part in parse_names(kind, given):
-        found = re.fullmatch(r"(\d+)(?:\s*-\s*(\d+))?", part)
+        found = re.fullmatch(rf"({_NUMBER})(?:\s*-\s*({_NUMBER}))?", part)
         first, last = -1, -2
         if found is not None:
-            first, last = _number(kind, found[1]), _number(kind, found[2] or found[1])
+            first, last = int(found[1]), int(found[2] or found[1])
         if last < first:
             raise InvalidValueError(f"{_shorten(part)!r} is not a valid {kind}; {hint}.")
         ranges.append(range(first, last + 1))
     return ranges
-
-
-def _number(kind: str, digits: str) -> int:
-    if len(digits) > _MAX_DIGITS:
-        raise InvalidValueError(
-            f"The {kind} {_shorten(digits)} has {len(digits)} digits; "
-            f"it must have at most {_MAX_DIGITS}."
-        )
-    return int(digits)
 
 
 def _union(ranges: Sequence[range]) -> tuple[int, ...]:

@@ -12,7 +12,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import asdict, fields, is_dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import Annotated, Any, Literal, NamedTuple, get_args, get_type_hints
+from typing import Annotated, Any, Literal, NamedTuple, get_type_hints
 
 import msgspec
 from pydantic import (
@@ -33,7 +33,6 @@ from roboirg.core.environment_options import EnvironmentOptions, check_demonstra
 from roboirg.core.errors import InvalidValueError
 from roboirg.core.field_types import CONTROLS, NAME
 from roboirg.core.instruction_options import DEFAULT_FRAME, InstructionOptions
-from roboirg.core.plain_text import is_encodable
 from roboirg.core.policy_ref import PolicyRef
 from roboirg.core.word_pools import POOLS
 from roboirg.evaluation.hosting.policy_opening import open_policy
@@ -72,8 +71,6 @@ REQUIRED = "required"
 """Instead of a wording file in a plan: one must be given when the plan is run."""
 
 
-SettingsName = Literal["all", "every"]
-
 AXES = ("setting", "form", "stages")
 """Options of instructions of which a plan plays several."""
 
@@ -95,19 +92,13 @@ def _tasks(given: object) -> tuple[str, ...]:
     return names
 
 
-def _settings(given: object) -> tuple[str, ...] | SettingsName:
-    """Return names of settings, or the word that stands for the same ones."""
-    words = tuple(
-        word.lower() if word.lower() in SETTING_GROUPS else word
-        for word in parse_names("setting", given)
-    )
+def _settings(given: object) -> tuple[str, ...]:
+    """Return names of settings, or the one word that stands for the same ones."""
+    names = parse_names("setting", given)
+    words = tuple(one.lower() if one.lower() in SETTING_GROUPS else one for one in names)
     found = {*expand_settings(words)}
-    same: Iterator[SettingsName] = (
-        name
-        for name in get_args(SettingsName)
-        if name in words and {*expand_settings([name])} == found
-    )
-    return next(same, words)
+    same = (one for one in words if one in SETTING_GROUPS and {*expand_settings([one])} == found)
+    return next(((one,) for one in same), words)
 
 
 def _word(given: object) -> object:
@@ -164,7 +155,7 @@ class Plan(BaseModel):
     tasks: Annotated[tuple[str, ...], BeforeValidator(_tasks)] = _option(
         "all", "Tasks or suites; all for the whole benchmark."
     )
-    settings: Annotated[tuple[str, ...] | SettingsName, BeforeValidator(_settings)] = _option(
+    settings: Annotated[tuple[str, ...], BeforeValidator(_settings)] = _option(
         "all",
         "Settings; all for every setting that can express the episode, except the harder ones; "
         "every adds these. Next to names, tasks may lack any of them: all,grounded.",
@@ -252,9 +243,10 @@ class Plan(BaseModel):
     def _check_text(self) -> Plan:
         for name, value in self.model_dump().items():
             for text in _texts(value):
-                if re.search(f"[{CONTROLS}]", text):
+                if re.search(rf"[{CONTROLS}\ud800-\udfff]", text):
                     raise InvalidValueError(
-                        f"The plan has {text[:80]!r} as {name}; it must have no control characters."
+                        f"The plan has {text[:80]!r} as {name}; it must be text without control "
+                        "characters."
                     )
         return self
 
@@ -272,16 +264,12 @@ class Plan(BaseModel):
     @property
     def setting_names(self) -> tuple[str, ...]:
         """The settings that may be played."""
-        return expand_settings(self._setting_words)
-
-    @property
-    def _setting_words(self) -> tuple[str, ...]:
-        return (self.settings,) if isinstance(self.settings, str) else self.settings
+        return expand_settings(self.settings)
 
     @property
     def _has_groups(self) -> bool:
         """Whether tasks and episodes may lack a setting, because a word stands for several."""
-        return not SETTING_GROUPS.keys().isdisjoint(self._setting_words)
+        return not SETTING_GROUPS.keys().isdisjoint(self.settings)
 
     @property
     def fingerprint(self) -> str:
@@ -297,20 +285,17 @@ class Plan(BaseModel):
             InvalidValueError: a number is out of range, or a task lacks a setting.
         """
         tasks.find_tasks(self.tasks)
-        find_settings(self._setting_words)
+        find_settings(self.settings)
         specs: dict[str, str] = {}
         for one in self.policies:
-            name, spec = one.name, one.spec
-            if not is_encodable(f"{name}={spec}"):
-                raise InvalidValueError(f"Policy {name!r} is not text: it has lone surrogates.")
-            if not re.fullmatch(NAME, name):
+            if not re.fullmatch(NAME, one.name):
                 raise InvalidValueError(
-                    f"Policy {name[:80]!r} has no valid name for records: at most 1,000 "
+                    f"Policy {one.name[:80]!r} has no valid name for records: at most 1,000 "
                     "characters, without control characters."
                 )
-            if specs.setdefault(name, spec) != spec:
+            if specs.setdefault(one.name, one.spec) != one.spec:
                 raise InvalidValueError(
-                    f"Two policies are named {name!r}: {specs[name]} and {spec}."
+                    f"Two policies are named {one.name!r}: {specs[one.name]} and {one.spec}."
                 )
         for form, stages in itertools.product(self.forms, self.stages):
             check_options(replace(self.instruction, form=form, stages=stages))
@@ -332,7 +317,7 @@ class Plan(BaseModel):
             instruct_job(job)  # raises if the options cannot express the episode
         if not jobs:
             raise InvalidValueError(
-                f"There is nothing to play: {', '.join(self._setting_words)} cannot express any of "
+                f"There is nothing to play: {', '.join(self.settings)} cannot express any of "
                 "these episodes."
             )
         device = next(iter(self.hosting.devices), None)
@@ -382,10 +367,8 @@ class Plan(BaseModel):
         except MissingSaltError:
             return ()
         known = tuple(name for name in self.tasks if name in tasks.every_task())
-        settings = self.settings
-        if not isinstance(settings, str):
-            known_words = {*all_settings(), *SETTING_GROUPS}
-            settings = tuple(name for name in settings if name in known_words)
+        words = {*all_settings(), *SETTING_GROUPS}
+        settings = tuple(name for name in self.settings if name in words)
         return self.model_copy(update={"tasks": known, "settings": settings}).jobs()
 
     def settings_of(self, task: str, episode: int) -> tuple[str, ...]:
