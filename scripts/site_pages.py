@@ -11,6 +11,7 @@ import typer.main
 from mkdocs.config.defaults import MkDocsConfig
 from mkdocs.structure.files import File, Files
 
+from roboirg.evaluation.plan.plan import plan_options
 from roboirg.main import app
 
 ROOT = Path(__file__).parents[1]
@@ -39,6 +40,11 @@ def command_lines() -> Iterator[str]:
     """Yield the lines of the reference of all commands, from their help."""
     yield "# Command line\n\nThe help of each command, as `roboirg COMMAND --help` prints it.\n"
     yield from _help_of(typer.main.get_command(app), "roboirg")
+    yield from (
+        "## Keys of a plan\n",
+        "| key | meaning | default |\n| --- | --- | --- |",
+        *(f"| `{one.name}` | {_cell(one.help)} | {_default(one)} |" for one in plan_options()),
+    )
 
 
 def _help_of(command: Any, name: str) -> Iterator[str]:  # noqa: ANN401

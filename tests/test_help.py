@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 import shlex
-from pathlib import Path
 from typing import get_type_hints
 
 import count_commands
@@ -21,7 +20,6 @@ from roboirg.evaluation.plan.plan_file import plan_text, read_plan_file
 from roboirg.evaluation.plan.plan_maker import make_plan
 from roboirg.main import app
 
-RUNNING = Path(__file__).parent.parent / "docs" / "running.md"
 LINES, LINES_OF_RUN, COLUMNS = 45, 60, 100
 
 
@@ -67,14 +65,6 @@ def test_a_plan_explains_all_of_its_fields_and_is_read_back(tmp_path):
         (tmp_path / "plan.yaml").write_text(plan_text(one))
         fields = read_plan_file(str(tmp_path / "plan.yaml"))
         assert make_plan(fields.pop("policies"), **fields) == one
-
-
-def test_the_page_lists_all_keys_of_a_plan():
-    page = RUNNING.read_text()
-    for one in plan_options():
-        row = f"| `{one.name}` | {one.help} |"
-        option = f"| `--{one.name.replace('_', '-')}".replace("policies", "policy")
-        assert (row in page) != (option in page) or one.name == "cluster", row
 
 
 def test_options_of_instructions_are_listed_once():

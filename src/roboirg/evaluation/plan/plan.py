@@ -489,14 +489,15 @@ def plan_options() -> Iterator[PlanOption]:
     """Yield all options, those of sections that stand alone in the place of the section."""
     for name, one in Plan.model_fields.items():
         if name not in FLAT.values():
-            default = None if one.is_required() else one.default
+            default = None if one.is_required() or name in SECTIONS else one.default
             yield PlanOption(name, None, one.annotation, default, str(one.description))
             continue
         types = get_type_hints(SECTIONS[name])
         for option in fields(SECTIONS[name]):
             if option.name in FLAT:
-                words, kind = option.metadata["help"], types[option.name]
-                yield PlanOption(option.name, name, kind, option.default, words)
+                words, default = option.metadata["help"], option.default
+                default = ",".join(default) if isinstance(default, tuple) else default
+                yield PlanOption(option.name, name, types[option.name], default, words)
 
 
 @functools.lru_cache(maxsize=65_536)
