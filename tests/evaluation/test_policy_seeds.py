@@ -3,9 +3,8 @@
 import pytest
 
 from roboirg.evaluation.plan.plan_maker import make_plan
-from roboirg.evaluation.play.job_instruction import PreparedJob
+from roboirg.evaluation.play.job_instruction import PreparedJob, episode_policy_seed
 from roboirg.evaluation.play.rollout import load_policy
-from roboirg.policies.contract.random_state import episode_policy_seed
 from roboirg.tasks.splits.splits import SIZES, get_episode
 
 

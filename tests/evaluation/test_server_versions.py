@@ -12,7 +12,6 @@ from wire_servers import ChallengeServer
 from roboirg.evaluation.analysis.stats.cells import Versions, gather, labels
 from roboirg.evaluation.plan.plan import Plan
 from roboirg.evaluation.plan.plan_maker import make_plan
-from roboirg.evaluation.policy_calls import server_version
 from roboirg.evaluation.records.merging import merge_runs
 from roboirg.evaluation.records.record import Job, Record
 from roboirg.evaluation.records.record_codec import StoreError
@@ -20,6 +19,7 @@ from roboirg.evaluation.records.store import RecordStore, read_records, read_res
 from roboirg.evaluation.run.executor import InProcess
 from roboirg.evaluation.run.runner import run_plan
 from roboirg.policies import make_policy
+from roboirg.policies.contract.policy_calls import server_version
 from roboirg.policies.planners.hierarchical_policy import HierarchicalPolicy
 
 

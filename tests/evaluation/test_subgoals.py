@@ -18,12 +18,12 @@ from roboirg.core.errors import InvalidValueError
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.core.subgoal_text import split_point
 from roboirg.evaluation.play.rollout import EpisodeRunner
-from roboirg.evaluation.policy_calls import policy_subgoal
 from roboirg.evaluation.records.record import Job, SubgoalRecord
 from roboirg.evaluation.records.record_codec import StoreError, encode, read_record
 from roboirg.evaluation.records.store import RecordStore
 from roboirg.main import app
 from roboirg.policies.by_name.finding import read_policy
+from roboirg.policies.contract.policy_calls import policy_subgoal
 
 JOB = Job(
     policy="random",

@@ -10,8 +10,8 @@ from wire_servers import VlaEvalServer
 
 import roboirg
 from roboirg.core.errors import InvalidValueError, PolicyReplyError, PolicyTimeoutError
-from roboirg.evaluation.policy_calls import server_version
 from roboirg.policies import make_policy, play
+from roboirg.policies.contract.policy_calls import server_version
 from roboirg.policies.remote.message_codec import TEXT_KEYS, CodecError, pack, unpack
 
 

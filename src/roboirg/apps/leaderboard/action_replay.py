@@ -71,7 +71,9 @@ def replay(record: Record, log: ActionLog) -> tuple[Record, ActionLog | None]:
     again, played = begin_record(prepared), None
     needs = PolicyNeeds(cameras=(), actions=log.space)
     try:
-        played = play_with(policy, prepared, needs, again, CallGuard(again.timings, None))
+        loop = play_with(policy, prepared, needs, again, CallGuard(again.timings, None))
+        loop.conclude()
+        played = loop.log
     except EpisodeError as error:
         again.record_error(error.kind, error.cause)
     if policy.is_used_up and record.outcome == "error":

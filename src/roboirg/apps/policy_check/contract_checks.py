@@ -28,9 +28,9 @@ from roboirg.core.errors import InvalidValueError, MissingDependencyError, RoboI
 from roboirg.core.plain_text import counted, verb_for
 from roboirg.core.policy_needs import PolicyNeeds
 from roboirg.core.policy_ref import UNKNOWN_VERSION
-from roboirg.evaluation.policy_calls import policy_metadata, policy_subgoal, policy_usage
 from roboirg.policies.by_name.finding import look_up, read_policy
 from roboirg.policies.contract.batch_policy import BatchedEpisode
+from roboirg.policies.contract.policy_calls import policy_metadata, policy_subgoal, policy_usage
 from roboirg.policies.contract.policy_version import read_version
 
 

@@ -35,9 +35,14 @@ from roboirg.evaluation.hosting.messages import (
     receive_calls,
     send,
 )
-from roboirg.evaluation.policy_calls import check_rows, dump_metadata, policy_subgoal, policy_usage
 from roboirg.policies.by_name.finding import look_up, make_policy
 from roboirg.policies.contract.base import close_policy, tell_policy
+from roboirg.policies.contract.policy_calls import (
+    check_rows,
+    dump_metadata,
+    policy_subgoal,
+    policy_usage,
+)
 from roboirg.policies.contract.policy_version import read_version
 from roboirg.policies.contract.random_state import RandomState
 from roboirg.policies.opening import opened

@@ -32,8 +32,8 @@ from roboirg.evaluation.hosting.messages import (
     receive,
     send,
 )
-from roboirg.evaluation.policy_calls import read_metadata
 from roboirg.policies.contract.base import SubgoalEnd
+from roboirg.policies.contract.policy_calls import read_metadata
 
 _DRAWN = ("_rgb", "_depth")
 """How the fields of a demonstration end that are drawn when they are read."""

@@ -21,8 +21,8 @@ from roboirg.core.policy_needs import PolicyNeeds
 from roboirg.core.policy_ref import PolicyRef
 from roboirg.core.subgoal_text import MOST_SUBGOAL_LETTERS
 from roboirg.evaluation.episode_errors import MAX_DETAILS_LENGTH
-from roboirg.evaluation.policy_calls import MAX_COSTS, MAX_METADATA_LENGTH
 from roboirg.evaluation.records.record import ErrorKind
+from roboirg.policies.contract.policy_calls import MAX_COSTS, MAX_METADATA_LENGTH
 
 MAX_MESSAGE = 16 * 2**20
 """Largest message that is read from a policy; 10,000 actions have 640,000 bytes."""

@@ -21,17 +21,17 @@ from roboirg.evaluation.play.call_guard import CallGuard
 from roboirg.evaluation.play.episode_record import conclude, utterances_at
 from roboirg.evaluation.play.job_instruction import PreparedJob
 from roboirg.evaluation.play.video_writer import VideoWriter
-from roboirg.evaluation.policy_calls import (
-    check_rows,
-    policy_metadata,
-    policy_subgoal,
-    server_version,
-)
 from roboirg.evaluation.records.action_log import ActionLog
 from roboirg.evaluation.records.record import EventRecord, Record, SubgoalRecord
 from roboirg.judging import judge_subgoal, plain_subgoal
 from roboirg.policies.contract.base import Policy
 from roboirg.policies.contract.play import EpisodeLoop
+from roboirg.policies.contract.policy_calls import (
+    check_rows,
+    policy_metadata,
+    policy_subgoal,
+    server_version,
+)
 from roboirg.policies.contract.policy_version import read_version
 
 if TYPE_CHECKING:
@@ -56,6 +56,7 @@ class GuardedLoop(EpisodeLoop):
     Attributes:
         has_begun: whether the policy's turn came.
         answers: what was executed of each answer of the policy, (n, size).
+        log: the executed actions; None if the policy's turn never came, or the world broke.
     """
 
     def __init__(
@@ -77,16 +78,24 @@ class GuardedLoop(EpisodeLoop):
         self._reports, self._ends = bool(getattr(policy, "reports", False)), 0
         self._start, self._heard = 0, list[Mapping[str, Any]]()
         self.has_begun, self.answers = False, list[NDArray[np.float64]]()
+        self._last: dict[str, Any] | None = None
+        self.log: ActionLog | None = None
 
     def play(self) -> dict[str, Any]:
-        """Play the episode, and record how it ended and why."""
-        info, record = super().play(), self._record
+        """Play the episode from beginning to end. Returns the last step's info."""
+        self._last = super().play()
+        return self._last
+
+    def conclude(self) -> None:
+        """Record how the episode ended and why, if it came to its end."""
+        if (info := self._last) is None:
+            return
+        record = self._record
         if not record.record_status(info["status"], info.get("cause")):
             record.cause = f"environment: the episode ended with status {info['status']!r}"
-            return info
+            return
         timed_out, original = info["status"] == "timeout", info.get("original")
         conclude(record, self._prepared, self._start, timed_out=timed_out, original=original)
-        return info
 
     def begin(self) -> tuple[dict[str, Any], dict[str, Any]]:
         """Start the episode and the policy."""
@@ -224,9 +233,9 @@ class GuardedLoop(EpisodeLoop):
             super().hear(utterances)
             self._read_metadata()
 
-    def action_log(self) -> ActionLog:
-        """Return the executed actions, and where they left the world; record its hash."""
+    def keep_actions(self) -> None:
+        """Keep the executed actions, and where they left the world; record its hash."""
         numbers, self._record.end_state = self.env.end_state()
         starts = np.cumsum([0, *map(len, self.answers)], dtype=np.int32)[:-1]
         rows = np.concatenate([np.empty((0, self._space.size)), *self.answers])
-        return ActionLog(self._space.name, rows, starts, numbers)
+        self.log = ActionLog(self._space.name, rows, starts, numbers)

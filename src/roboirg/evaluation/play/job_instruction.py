@@ -1,10 +1,12 @@
-"""The episode and the words of a job."""
+"""The episode and the words of a job, and its policy's seed."""
 
 from __future__ import annotations
 
+import hashlib
 from dataclasses import dataclass
 from functools import cached_property
 
+from roboirg.core.arms import AGAIN, TOLD
 from roboirg.core.episode import Episode
 from roboirg.evaluation.records.record import Job
 from roboirg.language.arms import TrialWords, arm_episode, say_arm, word_trial
@@ -50,3 +52,19 @@ def instruct_job(job: Job) -> Instruction:
 def _open_wordings(job: Job) -> None:
     if job.options.wordings is not None:
         open_wordings(job.wordings_file, job.options.wordings)
+
+
+def episode_policy_seed(policy_seed: int, episode_seed: int, arm: str = TOLD) -> int:
+    """Return a policy's seed in an episode: the same in every setting, another in every episode.
+
+    Args:
+        policy_seed: of the plan.
+        episode_seed: of the episode's scene.
+        arm: of the episode; `AGAIN` has another seed, and all others have the same.
+
+    Returns:
+        A number below 2**32.
+    """
+    first = f"|{AGAIN}" if arm == AGAIN else ""
+    text = f"{first}|{policy_seed}|{episode_seed}"
+    return int.from_bytes(hashlib.sha256(text.encode()).digest()[:4], "big")

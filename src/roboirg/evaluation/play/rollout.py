@@ -35,18 +35,17 @@ from roboirg.evaluation.play.episode_record import (
     utc_now,
 )
 from roboirg.evaluation.play.guarded_loop import GuardedLoop
-from roboirg.evaluation.play.job_instruction import PreparedJob
+from roboirg.evaluation.play.job_instruction import PreparedJob, episode_policy_seed
 from roboirg.evaluation.play.policy_environment import job_needs, make_env
 from roboirg.evaluation.play.prompt_shares import audit_job, too_long_text
 from roboirg.evaluation.play.video_writer import VideoWriter
-from roboirg.evaluation.policy_calls import policy_usage
 from roboirg.evaluation.records.action_log import ActionLog, write_actions
 from roboirg.evaluation.records.film import VIDEO_FOLDER, VideoMode
 from roboirg.evaluation.records.record import Job, Record
 from roboirg.policies.by_name.finding import make_policy
 from roboirg.policies.by_name.policy_kinds import make_follower
 from roboirg.policies.contract.base import Policy, close_policy
-from roboirg.policies.contract.random_state import episode_policy_seed
+from roboirg.policies.contract.policy_calls import policy_usage
 from roboirg.policies.planners.hierarchical_policy import HierarchicalPolicy, with_planner
 from roboirg.policies.prompt_length.prompt_audit import PromptLimit
 from roboirg.policies.prompt_length.tokenizer_file import prompt_limit
@@ -158,7 +157,7 @@ class EpisodeRunner:
         guard = CallGuard(record.timings, self.policy_timeout_s, is_hosted=hosts is not None)
         policy: Policy | None = None
         limit: PromptLimit | None = None
-        log = None
+        loop: GuardedLoop | None = None
         try:
             with guard.policy("policy's constructor", "policy_load"):
                 if hosts is None:
@@ -171,16 +170,18 @@ class EpisodeRunner:
                     audit = audit_job(job, limit, prepared.words.instruction)
                     if message := too_long_text(*audit):
                         raise EpisodeError("prompt", message, "")
-            log = play_with(policy, prepared, needs, record, guard, writer)
+            loop = play_with(policy, prepared, needs, record, guard, writer)
         except EpisodeError as error:
             record.record_error(error.kind, error.cause, error.details)
         finally:
             if policy is not None:
                 _close_policy(policy, record, guard)
+        if loop is not None:
+            loop.conclude()
         if limit is not None:
             with contextlib.suppress(InvalidValueError):
                 audit_record(record, prepared, limit)
-        return record, log
+        return record, None if loop is None else loop.log
 
     def _finish_video(self, writer: VideoWriter | None, record: Record) -> str | None:
         """Keep or discard the video; return its path relative to the folder, or None."""
@@ -200,7 +201,7 @@ def play_with(
     record: Record,
     guard: CallGuard,
     writer: VideoWriter | None = None,
-) -> ActionLog | None:
+) -> GuardedLoop:
     """Play one job with a loaded policy, which is not closed; its errors end up in the record.
 
     Args:
@@ -212,7 +213,7 @@ def play_with(
         writer: gets the frames of a video.
 
     Returns:
-        The executed actions; None if the policy's turn never came, or the world broke.
+        What was played; `GuardedLoop.conclude` records how it ended.
 
     Raises:
         EpisodeError: the environment cannot be made, or its last state cannot be read.
@@ -226,10 +227,12 @@ def play_with(
             loop.play()
         except EpisodeError as error:
             record.record_error(error.kind, error.cause, error.details)
-        if not loop.has_begun or record.error == "environment":
-            return None
-        with guard.environment("env_step"):
-            return loop.action_log()
+            if error.kind == "environment":
+                return loop
+        if loop.has_begun:
+            with guard.environment("env_step"):
+                loop.keep_actions()
+        return loop
 
 
 def load_policy(prepared: PreparedJob) -> Policy:

@@ -278,10 +278,6 @@ class PromptAudit(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
         return f"{low}" if low == high else f"{low} to {high}"
 
 
-REAL_TRIAL = "real_trial"
-"""Key of a study's trial in a record's ``policy_metadata``."""
-
-
 # Checkers see no use in a struct of which a part is frozen: what was played, not how it went.
 class Summary(Job, frozen=False, kw_only=True, gc=False):  # type: ignore[misc]
     """How a job went, without instruction and events: everything that rates are computed from.

@@ -1,32 +1,13 @@
-"""Seeds of policies, and global random generators for episodes that share a process."""
+"""Global random generators for episodes that share a process."""
 
 from __future__ import annotations
 
-import hashlib
 import random
 import sys
 from types import TracebackType
 from typing import Any, ClassVar
 
 import numpy as np
-
-from roboirg.core.arms import AGAIN, TOLD
-
-
-def episode_policy_seed(policy_seed: int, episode_seed: int, arm: str = TOLD) -> int:
-    """Return a policy's seed in an episode: the same in every setting, another in every episode.
-
-    Args:
-        policy_seed: of the plan.
-        episode_seed: of the episode's scene.
-        arm: of the episode; `AGAIN` has another seed, and all others have the same.
-
-    Returns:
-        A number below 2**32.
-    """
-    first = f"|{AGAIN}" if arm == AGAIN else ""
-    text = f"{first}|{policy_seed}|{episode_seed}"
-    return int.from_bytes(hashlib.sha256(text.encode()).digest()[:4], "big")
 
 
 class RandomState:

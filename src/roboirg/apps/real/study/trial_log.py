@@ -19,8 +19,9 @@ from roboirg.core.errors import InvalidValueError
 from roboirg.evaluation.episode_errors import format_cause
 from roboirg.evaluation.play.episode_record import begin_record
 from roboirg.evaluation.play.job_instruction import PreparedJob
-from roboirg.evaluation.records.record import REAL_TRIAL, Record
+from roboirg.evaluation.records.record import Record
 from roboirg.evaluation.records.store import RecordStore, iterate_records
+from roboirg.policies.contract.policy_calls import REAL_TRIAL
 
 WITHDRAWN = format_cause("infrastructure", "the operator undid the score")
 VOID = format_cause("infrastructure", "the operator declared the trial void")

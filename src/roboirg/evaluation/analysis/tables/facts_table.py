@@ -14,8 +14,8 @@ from roboirg.evaluation.analysis.stats.option_labels import (
 )
 from roboirg.evaluation.analysis.stats.run_data import RunData
 from roboirg.evaluation.analysis.tables.table import Column, Entry, Row, Table
-from roboirg.evaluation.policy_calls import SERVER
 from roboirg.evaluation.records.record import Record, Summary
+from roboirg.policies.contract.policy_calls import SERVER
 from roboirg.util.media import CONTROL_RATE
 
 RUN = "the run"

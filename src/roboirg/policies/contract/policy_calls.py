@@ -16,7 +16,6 @@ from roboirg.core.errors import InvalidActionError, InvalidValueError
 from roboirg.core.field_types import SUBGOAL, as_name
 from roboirg.core.plain_text import clip_text, is_encodable
 from roboirg.core.subgoal_text import MOST_SUBGOAL_LETTERS
-from roboirg.evaluation.records.record import REAL_TRIAL
 from roboirg.policies.contract.base import Policy
 from roboirg.policies.contract.json_values import as_json
 
@@ -28,6 +27,9 @@ MAX_METADATA_LENGTH = 65_536
 
 MAX_METADATA_DEPTH = 16
 """Most containers of a policy's metadata around a value."""
+
+REAL_TRIAL = "real_trial"
+"""Key of a study's trial in a record's metadata of the policy."""
 
 SERVER = "server"
 """Key under which clients of remote policies name the address of the server."""
