@@ -98,14 +98,18 @@ def test_the_same_folder_resumes_and_none_makes_a_new_one(
     assert first.folder != second.folder
 
 
-def test_classes_and_objects_play_in_this_process(unplayed: None, tmp_path: Path) -> None:
+def test_classes_and_objects_play_in_this_process(unplayed: None, tmp_path: Path, capsys) -> None:
     given = Still(reach=0.5)
     results = roboirg.evaluate({"mine": given, "class": Still}, out=tmp_path, **QUICK)
     plan = read_plan(tmp_path)
     assert plan is not None
     assert plan.hosting.policy_process == "shared"
     assert {one.policy for one in results.records} == {"mine", "class"}
-    assert roboirg.evaluate({"mine": given}, out=tmp_path, **QUICK).errors == 0
+    again = roboirg.evaluate({"mine": given}, out=tmp_path, **{**QUICK, "progress": True})
+    assert again.errors == 0
+    assert (
+        "No other process has mine: all episodes are played in this one" in capsys.readouterr().err
+    )
     with pytest.raises(InvalidValueError, match="exists in this process only"):
         roboirg.evaluate(given, out=tmp_path, **{**QUICK, "workers": 2})
     with pytest.raises(InvalidValueError, match="same name"):

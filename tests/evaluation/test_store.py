@@ -130,9 +130,9 @@ def test_a_killed_writer_leaves_no_lock(tmp_path: Path) -> None:
 
 def test_another_schema_version_is_refused_and_nothing_changes(tmp_path: Path) -> None:
     whole = fill(tmp_path, some_records())
-    newer = whole.replace(b'"schema_version":4', b'"schema_version":7', 1)
+    newer = whole.replace(b'"schema_version":1', b'"schema_version":7', 1)
     (tmp_path / RECORDS_FILE).write_bytes(newer)
-    with pytest.raises(StoreError, match=r"line 1 has schema version 7, .* reads only version 4;"):
+    with pytest.raises(StoreError, match=r"line 1 has schema version 7, .* reads only version 1;"):
         RecordStore(tmp_path)
     assert (tmp_path / RECORDS_FILE).read_bytes() == newer
     (tmp_path / RECORDS_FILE).write_bytes(whole)
@@ -142,8 +142,8 @@ def test_another_schema_version_is_refused_and_nothing_changes(tmp_path: Path) -
 @pytest.mark.parametrize(
     ("line", "sentence"),
     [
-        (b'{"schema_version":4,"policy":3}', r"line 1 is not a record: Expected `str`.*policy"),
-        (b'{"schema_version":3,"policy":3}', r"line 1 has schema version 3, .* only version 4;"),
+        (b'{"schema_version":1,"policy":3}', r"line 1 is not a record: Expected `str`.*policy"),
+        (b'{"schema_version":4,"policy":3}', r"line 1 has schema version 4, .* only version 1;"),
         (b"[]", "line 1 has schema version None"),
     ],
 )

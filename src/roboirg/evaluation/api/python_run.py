@@ -51,7 +51,8 @@ def play_plan(
         progress: whether to show it.
     """
     folder = (_new_folder() if out is None else Path(out)).absolute()
-    if any(one.place == "python" for one in plan.policies):
+    here = [one.name for one in plan.policies if one.place == "python"]
+    if here:
         if workers:
             raise InvalidValueError(
                 f"workers is {workers}, but the policy exists in this process only; put its class "
@@ -61,6 +62,11 @@ def play_plan(
     executor = choose_executor(workers, plan.attempts.episode_timeout_s)
     shown = ConsoleReporter(progress_console(stderr=True)) if progress else None
     with shown or contextlib.nullcontext():
+        if shown is not None and here:
+            shown.warn(
+                f"No other process has {', '.join(here)}: all episodes are played in this one, one "
+                "after the other."
+            )
         run_plan(plan, folder, episode_runner(plan, folder), executor, reporter=shown)
     return folder
 

@@ -28,7 +28,7 @@ from roboirg.core.policy_ref import PolicyRef
 from roboirg.evaluation.records.run_files import RELATIVE_PATH
 from roboirg.util.short_hash import short_hash
 
-SCHEMA_VERSION: Literal[4] = 4
+SCHEMA_VERSION: Literal[1] = 1
 
 RunPath = Annotated[str, msgspec.Meta(pattern=RELATIVE_PATH)]
 Outcome = Literal["success", "failure", "error"]
@@ -320,7 +320,7 @@ class Summary(Job, frozen=False, kw_only=True, gc=False):  # type: ignore[misc]
         duration_s: wall-clock seconds.
     """
 
-    schema_version: Literal[4] = SCHEMA_VERSION
+    schema_version: Literal[1] = SCHEMA_VERSION
     seed: Whole
     difficulty: Name
     outcome: Outcome
