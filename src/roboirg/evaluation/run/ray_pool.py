@@ -196,7 +196,7 @@ class RayPool:
         self._looked = now
         alive = {node["NodeID"]: node for node in self._ray.nodes() if node["Alive"]}
         for name in set(self._machines) - set(alive):
-            self._machines.pop(name).fault = "it has left the cluster"
+            self._machines[name].fault = self._machines[name].fault or "it has left the cluster"
         self._check_any_left()
         for name, node in alive.items():
             slots = self._needs.slots(node)
