@@ -238,7 +238,7 @@ def _print_counts(plan: Plan, folder: Path) -> None:
     _print_table(console, f"plan {plan.fingerprint}", heads, rows, caption)
     for arm, count in plan.left_out(jobs).items():
         console.print(f"{arm}: {counted(count, 'episode')} left out.", highlight=False)
-    _print_prompt_shares(jobs, settings, console)
+    _print_prompt_shares(plan, jobs, settings, console)
     played = read_index(folder)
     todo = [job for job in jobs if identity_key(job) not in played]
     stored = len(jobs) - len(todo)
@@ -283,11 +283,11 @@ def _print_model_calls(todo: Sequence[Job], console: Console) -> None:
 
 
 def _print_prompt_shares(
-    jobs: tuple[Job, ...], settings: tuple[str, ...], console: Console
+    plan: Plan, jobs: tuple[Job, ...], settings: tuple[str, ...], console: Console
 ) -> None:
     """Print how many instructions the policies that declare a limit do not read whole."""
+    from roboirg.core.policy_ref import BUILT_IN
     from roboirg.evaluation.play.prompt_shares import prompt_shares, share_text
-    from roboirg.policies.builtin import BUILTIN
 
     shares = prompt_shares(jobs)
     rows = []
@@ -298,7 +298,8 @@ def _print_prompt_shares(
             rows.append((one.policy, f"{one.limit.tokens} tokens", *row))
     title = "instructions cut off at a policy's limit"
     _print_table(console, title, ("policy", "reads", *settings), rows)
-    undeclared = [one.policy for one in shares if one.limit is None and one.policy not in BUILTIN]
+    ours = {one.name for one in plan.policies if one.kind == BUILT_IN}
+    undeclared = [one.policy for one in shares if one.limit is None and one.policy not in ours]
     if undeclared:
         console.print(
             f"No limit declared (prompt_tokens=N), so cuts are unknown: {', '.join(undeclared)}.",

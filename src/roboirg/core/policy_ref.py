@@ -8,6 +8,8 @@ from typing import Literal
 from roboirg.core.field_types import Name
 from roboirg.core.policy_needs import PolicyNeeds
 
+BUILT_IN = "built-in"
+"""Kind and version of policies that come with the package."""
 UNKNOWN_VERSION = "unknown"
 PRIVILEGED = "privileged:"
 """Before the spec of a policy of others: the user lets it read the simulator's state."""
@@ -30,7 +32,8 @@ class PolicyRef:
     Attributes:
         name: in records and tables.
         spec: as it was named, with options.
-        kind: what makes it: a kind of policies, a scheme of URLs, ``class`` or ``live``.
+        kind: what makes it: a kind of policies, a scheme of URLs, `BUILT_IN`, ``class`` or
+            ``live``.
         target: what the kind makes: a class, file, address or name.
         options: of the kind.
         place: where it runs.

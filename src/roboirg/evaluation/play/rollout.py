@@ -248,7 +248,7 @@ def load_hosted_policy(
     if ref.place != "split":
         return HostedPolicy(hosts, ref, seed, alone=alone)
     hosted = HostedPlanner(hosts, ref.hosted_part, seed, alone=alone)
-    return with_planner(hosted, make_follower(SCRIPTED, seed), ref.body.partition("?")[0])
+    return with_planner(hosted, make_follower(SCRIPTED, seed), f"{ref.kind}:{ref.target}")
 
 
 def _policy_and_seed(prepared: PreparedJob) -> tuple[PolicyRef, int]:

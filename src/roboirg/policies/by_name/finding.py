@@ -11,6 +11,7 @@ from typing import Any
 from roboirg.core.errors import InvalidValueError
 from roboirg.core.policy_needs import PolicyNeeds
 from roboirg.core.policy_ref import (
+    BUILT_IN,
     ELSEWHERE,
     PRIVILEGED,
     SCRIPTED,
@@ -19,7 +20,6 @@ from roboirg.core.policy_ref import (
     Place,
     PolicyRef,
 )
-from roboirg.policies.builtin import BUILTIN
 from roboirg.policies.by_name.policy_classes import find_class
 from roboirg.policies.by_name.policy_kinds import (
     CLASS,
@@ -149,13 +149,13 @@ def look_up(ref: PolicyRef) -> PolicyRef:
 
     Of code of others, the version is a fingerprint of the file that defines it.
     """
-    if ref.kind == CLASS:
+    if ref.kind in (CLASS, BUILT_IN):
         declaring: object = find_class(ref.body)
     else:
         declaring = live[ref.target] if ref.kind == LIVE else maker_of(ref)(0)
     _refuse_undeclared(ref, declaring)
-    if ref.body in BUILTIN:
-        version: str | None = "built-in"
+    if ref.kind == BUILT_IN:
+        version: str | None = BUILT_IN
     else:
         version = _fingerprint(declaring) if ref.is_foreign else read_version(declaring)
     return replace(

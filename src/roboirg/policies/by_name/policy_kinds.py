@@ -23,7 +23,8 @@ from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
 
 from roboirg.core.errors import InvalidValueError, UnknownNameError
-from roboirg.core.policy_ref import ELSEWHERE, HANDS, PRIVILEGED, SCRIPTED, PolicyRef
+from roboirg.core.policy_ref import BUILT_IN, ELSEWHERE, HANDS, PRIVILEGED, SCRIPTED, PolicyRef
+from roboirg.policies.builtin import BUILTIN
 from roboirg.policies.by_name.policy_classes import (
     CHECKPOINTS,
     KINDS_GROUP,
@@ -84,7 +85,7 @@ def split_spec(name: str, spec: str) -> PolicyRef:
     elif colon and kind in known_kinds():
         options = parse_query(body, query)
     else:
-        kind, target = CLASS, body
+        kind, target = BUILT_IN if body in BUILTIN else CLASS, body
     pairs = tuple(options.items())
     return PolicyRef(name=name, spec=spec, kind=kind, target=target, options=pairs)
 
