@@ -177,6 +177,6 @@ def test_an_object_plays_its_episodes_itself(tmp_path: Path) -> None:
         out=tmp_path, progress=False,
     )  # fmt: skip
     assert [one.outcome for one in results.records] == ["failure", "failure"]
-    assert given.instructions == [
-        " ".join(turn.text for turn in one.instruction) for one in results.records
-    ]
+    opened, *heard = given.instructions  # on an episode that is made up, before the run
+    assert opened == "Put the red cube on the target."
+    assert heard == [" ".join(turn.text for turn in one.instruction) for one in results.records]

@@ -27,10 +27,10 @@ from roboirg.evaluation.play.episode_record import audit_record, utterances_at
 from roboirg.evaluation.play.job_instruction import PreparedJob, instruct_job
 from roboirg.evaluation.play.prompt_shares import (
     audit_job,
+    check_prompt,
     prompt_shares,
     sent_messages,
     share_text,
-    too_long_text,
     warning_lines,
 )
 from roboirg.evaluation.play.rollout import EpisodeRunner
@@ -170,7 +170,7 @@ def test_a_long_prompt_is_refused_before_it_is_played(tmp_path: Path) -> None:
 
 def test_only_what_is_certainly_cut_is_refused() -> None:
     for verdict in ("heard", "unknown"):
-        assert too_long_text(audit_job(job(), EXACT)[0], verdict) is None
+        check_prompt(audit_job(job(), EXACT)[0], verdict)
     with pytest.raises(InvalidValueError, match="should be 'send' or 'refuse'"):
         make_plan(["random"], long_prompts="cut")
 

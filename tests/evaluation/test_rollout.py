@@ -323,7 +323,7 @@ def test_a_video_that_cannot_be_written_does_not_change_the_verdict(
     def add(writer: VideoWriter, frame: np.ndarray) -> None:
         nonlocal count
         if count == after:
-            writer._container = Broken()  # type: ignore[assignment]
+            writer._output = Broken(), writer._output[1]  # type: ignore[assignment,index]
         count += 1
         real(writer, frame)
 

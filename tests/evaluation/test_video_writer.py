@@ -59,10 +59,10 @@ class Broken:
 
 def test_throwing_away_never_raises(tmp_path: Path) -> None:
     video = VideoWriter(tmp_path / "x.mp4")
-    video._container = Broken()  # type: ignore[assignment]
+    video._output = Broken(), None  # type: ignore[assignment]
     video.partial.mkdir()  # cannot be unlinked
     video.discard()
-    assert video._container is None
+    assert video._output is None
     assert not video.finish()
 
 

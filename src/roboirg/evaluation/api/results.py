@@ -5,7 +5,7 @@ from __future__ import annotations
 import functools
 import io
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -42,18 +42,19 @@ class Results:
 
     Attributes:
         folder: of the run, with ``records.jsonl``; `roboirg` commands take it, too.
-        errors: number of episodes that ended in an error and are in no rate.
-        missing: number of planned episodes that were not played.
     """
 
     folder: Path
-    errors: int = field(init=False)
-    missing: int = field(init=False)
 
-    def __post_init__(self) -> None:
-        cells = self.cells.values()
-        object.__setattr__(self, "errors", sum(cell.errors for cell in cells))
-        object.__setattr__(self, "missing", sum(cell.missing for cell in cells))
+    @property
+    def errors(self) -> int:
+        """Number of episodes that ended in an error and are in no rate."""
+        return sum(cell.errors for cell in self.cells.values())
+
+    @property
+    def missing(self) -> int:
+        """Number of planned episodes that were not played."""
+        return sum(cell.missing for cell in self.cells.values())
 
     @functools.cached_property
     def summaries(self) -> tuple[Summary, ...]:

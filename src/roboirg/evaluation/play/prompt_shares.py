@@ -9,6 +9,7 @@ from operator import itemgetter
 from typing import NamedTuple
 
 from roboirg.core.delivery import PromptVerdict, utterance_steps
+from roboirg.evaluation.episode_errors import EpisodeError
 from roboirg.evaluation.play.job_instruction import instruct_job
 from roboirg.evaluation.records.record import Job, PromptAudit
 from roboirg.language.instruction import Instruction
@@ -34,16 +35,6 @@ class PromptShares(NamedTuple):
     policy: str
     limit: PromptLimit | None
     settings: Mapping[str, Verdicts]
-
-    @property
-    def cut(self) -> int:
-        """Number of episodes that are certainly cut."""
-        return sum(verdicts["cut"] for verdicts in self.settings.values())
-
-    @property
-    def unknown(self) -> int:
-        """Number of episodes that may be cut."""
-        return sum(verdicts["unknown"] for verdicts in self.settings.values())
 
 
 def sent_messages(turns: Sequence[str], steps: Sequence[int | None]) -> tuple[tuple[str, ...], ...]:
@@ -89,14 +80,18 @@ def audit_job(
     )
 
 
-def too_long_text(audit: PromptAudit, verdict: PromptVerdict) -> str | None:
-    """Return a sentence on an instruction that is certainly cut; None for others."""
-    if verdict != "cut":
-        return None
-    return (
-        f"the instruction needs {audit.needed_text} tokens, but the policy's model reads "
-        f"{audit.limit}; long_prompts: send in the plan plays the episode anyway"
-    )
+def check_prompt(audit: PromptAudit, verdict: PromptVerdict) -> None:
+    """Refuse an instruction that is certainly cut.
+
+    Raises:
+        EpisodeError: it is.
+    """
+    if verdict == "cut":
+        words = (
+            f"the instruction needs {audit.needed_text} tokens, but the policy's model reads "
+            f"{audit.limit}; long_prompts: send in the plan plays the episode anyway"
+        )
+        raise EpisodeError("prompt", words, "")
 
 
 def prompt_shares(jobs: Iterable[Job]) -> tuple[PromptShares, ...]:
@@ -131,13 +126,13 @@ def share_text(verdicts: Verdicts) -> str:
 def warning_lines(shares: Iterable[PromptShares]) -> Iterator[str]:
     """Yield a sentence for each policy that does not read every instruction whole."""
     for one in shares:
-        if one.limit is None or not one.cut + one.unknown:
-            continue
         settings = ", ".join(
             f"{setting} {share_text(verdicts)}"
             for setting, verdicts in one.settings.items()
             if verdicts["cut"] + verdicts["unknown"]
         )
+        if one.limit is None or not settings:
+            continue
         yield (
             f"{one.policy} reads {one.limit.tokens} tokens of a prompt: the end of these "
             f"instructions does not reach it: {settings}."

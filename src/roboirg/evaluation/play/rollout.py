@@ -37,7 +37,7 @@ from roboirg.evaluation.play.episode_record import (
 from roboirg.evaluation.play.guarded_loop import GuardedLoop
 from roboirg.evaluation.play.job_instruction import PreparedJob, episode_policy_seed
 from roboirg.evaluation.play.policy_environment import job_needs, make_env
-from roboirg.evaluation.play.prompt_shares import audit_job, too_long_text
+from roboirg.evaluation.play.prompt_shares import audit_job, check_prompt
 from roboirg.evaluation.play.video_writer import VideoWriter
 from roboirg.evaluation.records.action_log import ActionLog, write_actions
 from roboirg.evaluation.records.film import VIDEO_FOLDER, VideoMode
@@ -99,25 +99,24 @@ class EpisodeRunner:
             EndOfRunError: no Vulkan device can render, a package has to be installed first, ….
         """
         started_at, start = utc_now(), time.monotonic()
+        writer = None
+        if self.video != "off":
+            writer = VideoWriter(self.folder / VIDEO_FOLDER / f"{job.slug}.mp4")
         with use_replies(self.replies, job.slug):
-            record, log, writer = self._play(job)
-        record.video = self._finish_video(writer, record)
-        if writer is not None and writer.error is not None:
-            record.video_error = one_line(writer.error)
+            record, log = self._play(job, writer)
+        if writer is not None:
+            self._finish_video(writer, record)
         if log is not None:
             record.action_log = write_actions(log, self.folder)
         record.started_at, record.plan = started_at, self.plan
         record.duration_s = round(time.monotonic() - start, 3)
         return record
 
-    def _play(self, job: Job) -> tuple[Record, ActionLog | None, VideoWriter | None]:
+    def _play(self, job: Job, writer: VideoWriter | None) -> tuple[Record, ActionLog | None]:
         """Play a job, again from its beginning if the policy's process is lost meanwhile."""
         alone, attempt = False, 0
         while True:
             attempt += 1
-            writer = None
-            if self.video != "off":
-                writer = VideoWriter(self.folder / VIDEO_FOLDER / f"{job.slug}.mp4")
             try:
                 record, log = self.play_once(job, writer, alone=alone)
             except EpisodeLostError as error:
@@ -129,7 +128,7 @@ class EpisodeRunner:
                 message = f"{error}, {attempt} times in a row"
                 record, log = lost_record(job, error.kind, message), None
             record.attempt = attempt
-            return record, log, writer
+            return record, log
 
     def play_once(
         self, job: Job, writer: VideoWriter | None = None, *, alone: bool = False
@@ -167,9 +166,7 @@ class EpisodeRunner:
                 needs = job_needs(policy, job)
                 limit = prompt_limit(needs)
                 if self.refuse_long and limit is not None:
-                    audit = audit_job(job, limit, prepared.words.instruction)
-                    if message := too_long_text(*audit):
-                        raise EpisodeError("prompt", message, "")
+                    check_prompt(*audit_job(job, limit, prepared.words.instruction))
             loop = play_with(policy, prepared, needs, record, guard, writer)
         except EpisodeError as error:
             record.record_error(error.kind, error.cause, error.details)
@@ -183,15 +180,13 @@ class EpisodeRunner:
                 audit_record(record, prepared, limit)
         return record, None if loop is None else loop.log
 
-    def _finish_video(self, writer: VideoWriter | None, record: Record) -> str | None:
-        """Keep or discard the video; return its path relative to the folder, or None."""
-        if writer is None:
-            return None
-        wanted = self.video == "all" or record.outcome != "success"
-        if wanted and writer.finish():
-            return writer.path.relative_to(self.folder).as_posix()
-        writer.discard()
-        return None
+    def _finish_video(self, writer: VideoWriter, record: Record) -> None:
+        """Keep or discard the video; record its path relative to the folder, or what failed."""
+        if (self.video == "all" or record.outcome != "success") and writer.finish():
+            record.video = writer.path.relative_to(self.folder).as_posix()
+        else:
+            writer.discard()
+        record.video_error = None if writer.error is None else one_line(writer.error)
 
 
 def play_with(

@@ -8,7 +8,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,11 +18,13 @@ from roboirg.core.extras import extra_needed
 from roboirg.core.observations import CAMERAS, FRONT
 from roboirg.core.subgoal_text import Point
 from roboirg.evaluation.records.film import FRAME_RATE, FRAME_STEPS, LAST_FRAME_REPEATS, poster_name
-from roboirg.util.media import draw_text, wrap_text
+from roboirg.util.media import draw_text, encode_jpeg, wrap_text
 
 if TYPE_CHECKING:
     from av.container import OutputContainer
     from av.video.stream import VideoStream
+
+    from roboirg.envs.environment import RoboIRGEnv
 
 Frame = NDArray[np.uint8]
 
@@ -44,13 +46,6 @@ _PARTIAL_SUFFIX = ".part"
 _TEXT_SCALE, _TEXT_LINE, _TEXT_MARGIN = 0.4, 16, 6
 _MAX_LINES = 12
 _TEXT_COLOR, _BACKGROUND = (31, 35, 40), 255
-
-
-class PictureSource(Protocol):
-    """Source of camera pictures, such as the environment."""
-
-    def picture(self, camera: str) -> Frame:
-        """Return the camera's current picture, uint8 (256, 256, 3)."""
 
 
 def check_video_support() -> None:
@@ -137,8 +132,9 @@ class VideoWriter:
     longest_caption: str = field(default="", init=False)
     point: Point | None = field(default=None, init=False)
     error: Exception | None = field(default=None, init=False)
-    _container: OutputContainer | None = field(default=None, init=False, repr=False)
-    _stream: VideoStream | None = field(default=None, init=False, repr=False)
+    _output: tuple[OutputContainer, VideoStream] | None = field(
+        default=None, init=False, repr=False
+    )
     _last: Frame | None = field(default=None, init=False, repr=False)
 
     @property
@@ -146,7 +142,7 @@ class VideoWriter:
         """Path of the unfinished video; a later video of the same name overwrites it."""
         return self.path.with_name(f".{self.path.name}{_PARTIAL_SUFFIX}")
 
-    def add_frame(self, source: PictureSource, is_demonstration: bool = False) -> None:
+    def add_frame(self, source: RoboIRGEnv, is_demonstration: bool = False) -> None:
         """Add a frame with the current pictures.
 
         Raises:
@@ -174,30 +170,31 @@ class VideoWriter:
 
     def finish(self) -> bool:
         """Complete the video. Returns False if it has no frame or could not be written."""
-        if self._last is None:
+        if self._last is None or self._output is None:
             return False
         poster = Path(poster_name(str(self.path)))
         try:
             for _ in range(LAST_FRAME_REPEATS):
                 self._encode(self._last)
-            last = self._last
-            self._close()
-            write_poster(last, poster)
+            poster.write_bytes(encode_jpeg(self._last))
+            container, stream = self._output
+            container.mux(stream.encode(None))
+            container.close()
             self.partial.replace(self.path)
         except Exception as error:  # noqa: BLE001 - see the class
             self._abandon(error)
             with contextlib.suppress(OSError):
                 poster.unlink(missing_ok=True)
             return False
+        self._output = None
         return True
 
     def discard(self) -> None:
         """Delete an unfinished video; never raises."""
-        container = self._container
-        self._container = self._stream = self._last = None
-        if container is not None:
+        output, self._output, self._last = self._output, None, None
+        if output is not None:
             with contextlib.suppress(Exception):
-                container.close()
+                output[0].close()
         with contextlib.suppress(OSError):
             self.partial.unlink(missing_ok=True)
 
@@ -207,15 +204,13 @@ class VideoWriter:
 
     def _encode(self, frame: Frame) -> None:
         """Encode a frame, uint8 (height, width, 3), both even; all of one size."""
-        container, stream = self._open(frame)
         import av
 
+        container, stream = self._output = self._output or self._open(frame)
         self._last = frame
         container.mux(stream.encode(av.VideoFrame.from_ndarray(frame, format="rgb24")))
 
     def _open(self, frame: Frame) -> tuple[OutputContainer, VideoStream]:
-        if self._container is not None and self._stream is not None:
-            return self._container, self._stream
         import av
 
         self.path.parent.mkdir(parents=True, exist_ok=True)
@@ -230,15 +225,7 @@ class VideoWriter:
         # 128: equal pictures would give files that differ.
         stream.options = {"crf": str(QUALITY), "preset": "veryfast", "mbtree": "0"}
         stream.codec_context.thread_count = 1
-        self._container, self._stream = container, stream
         return container, stream
-
-    def _close(self) -> None:
-        container, stream = self._container, self._stream
-        if container is not None and stream is not None:
-            container.mux(stream.encode(None))
-            container.close()
-        self._container = self._stream = None
 
 
 @contextlib.contextmanager
@@ -259,17 +246,3 @@ def _delete_unfinished(folder: Path) -> None:
     for left in folder.glob(f".*{_PARTIAL_SUFFIX}"):
         with contextlib.suppress(OSError):
             left.unlink()
-
-
-def write_poster(frame: Frame, path: Path) -> None:
-    """Write one frame as a JPEG."""
-    import av
-
-    options: dict[str, Any] = {"update": "1"}
-    with av.open(str(path), "w", format="image2", options=options) as container:
-        stream = container.add_stream("mjpeg", rate=1)
-        stream.height, stream.width = frame.shape[:2]
-        stream.pix_fmt = "yuvj420p"
-        picture = av.VideoFrame.from_ndarray(frame, format="rgb24")
-        container.mux(stream.encode(picture))
-        container.mux(stream.encode(None))

@@ -116,7 +116,11 @@ def _check_versions(runs: Sequence[tuple[Path, Iterable[Summary]]]) -> None:
                 (("language version",), one.language_version),
                 (("environment version",), one.environment_version),
                 (("version", "of policy", one.policy), one.policy_version),
-                *_server_version(one),
+                *(
+                    [(("version", "of the server of", one.policy), one.server_version)]
+                    if one.outcome != "error"
+                    else []
+                ),
                 (("seed", "of", one.task, one.split, one.episode), one.seed),
             ):
                 there, expected = first.setdefault(what, (folder, value))
@@ -126,12 +130,6 @@ def _check_versions(runs: Sequence[tuple[Path, Iterable[Summary]]]) -> None:
                         f"{' '.join(map(str, what))} is {value!r} in the first and "
                         f"{expected!r} in the second."
                     )
-
-
-def _server_version(record: Summary) -> Iterator[tuple[tuple[object, ...], object]]:
-    """Yield the version of the policy's server, if the episode has a verdict."""
-    if record.outcome != "error":
-        yield ("version", "of the server of", record.policy), record.server_version
 
 
 def _lines(
@@ -144,36 +142,27 @@ def _lines(
     logs = logged_slugs(source)
     for one, line in zip(wanted, run.lines(wanted), strict=True):
         if logs and (slug := one.slug) in logs:
-            _copy_log(source, target, log_path(Path(), slug).as_posix())
+            _copy(log_path(Path(), slug).as_posix(), source, target)
         if one.action_log is not None:
-            _copy_present(action_path(Path(), one.action_log).as_posix(), source, target)
-        if one.video is None or _copy_video(one.video, source, target):
+            _copy(action_path(Path(), one.action_log).as_posix(), source, target)
+        if one.video is None or _copy(one.video, source, target):
+            if one.video is not None:
+                _copy(poster_name(one.video), source, target)
             yield line
         else:
             record = next(run.records([one]))
             yield encode(msgspec.structs.replace(record, video=None))
 
 
-def _copy_video(name: str, source: Path, target: Path) -> bool:
-    """Copy a video and its poster; return whether the video exists."""
-    if not run_file(source, name).is_file():
-        return False
-    if not run_file(target, name).exists():
-        _copy_present(name, source, target)
-        _copy_present(poster_name(name), source, target)
-    return True
-
-
-def _copy_present(name: str, source: Path, target: Path) -> None:
+def _copy(name: str, source: Path, target: Path) -> bool:
+    """Copy a file over that of an error which is replaced; return whether it exists."""
     file, copy = run_file(source, name), run_file(target, name)
-    if file.is_file() and not copy.exists():
-        copy.parent.mkdir(parents=True, exist_ok=True)
-        try:
-            os.link(file.resolve(), copy)  # takes no space on the same disk
-        except OSError:
-            shutil.copyfile(file, copy)
-
-
-def _copy_log(source: Path, target: Path, name: str) -> None:
-    run_file(target, name).unlink(missing_ok=True)  # of an error that this record replaces
-    _copy_present(name, source, target)
+    if not file.is_file():
+        return False
+    copy.parent.mkdir(parents=True, exist_ok=True)
+    copy.unlink(missing_ok=True)
+    try:
+        os.link(file.resolve(), copy)  # takes no space on the same disk
+    except OSError:
+        shutil.copyfile(file, copy)
+    return True

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import itertools
 import json
-import operator
 from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -12,6 +11,8 @@ from typing import TYPE_CHECKING, Any
 import msgspec
 from msgspec import inspect
 
+from roboirg.core.environment_options import EnvironmentOptions
+from roboirg.core.instruction_options import InstructionOptions
 from roboirg.evaluation.records.record import Record
 from roboirg.util.atomic_write import replacing
 from roboirg.util.parquet_support import check_parquet_support
@@ -20,6 +21,8 @@ if TYPE_CHECKING:
     from pyarrow import DataType
 
 _BATCH_ROWS = 5_000
+_OPTIONS = {"options": InstructionOptions, "environment": EnvironmentOptions}
+"""Fields whose own fields are columns."""
 _NESTED = (inspect.StructType, inspect.DataclassType)
 
 
@@ -37,9 +40,12 @@ def write_parquet(records: Iterable[Record], path: Path) -> int:
     import pyarrow as pa
     from pyarrow import parquet
 
-    columns = {name.rpartition(".")[2]: _arrow_type(kind) for name, kind in _COLUMNS.items()}
+    columns = {name: _arrow_type(kind) for name, kind in _COLUMNS.items()}
     schema, count = pa.schema(columns), 0
-    rows = map(_row, records)
+    rows = (
+        {name: _fit(value, columns[name]) for name, value in _flat(record).items()}
+        for record in records
+    )
     with (
         replacing(path) as partial,
         parquet.ParquetWriter(partial, schema, compression="zstd") as writer,
@@ -50,27 +56,24 @@ def write_parquet(records: Iterable[Record], path: Path) -> int:
     return count
 
 
-def _row(record: Record) -> dict[str, Any]:
-    return {
-        name.rpartition(".")[2]: _fit(operator.attrgetter(name)(record), kind)
-        for name, kind in _COLUMNS.items()
-    }
+def _flat(record: Record) -> dict[str, Any]:
+    """Return the values of a record's columns, as JSON."""
+    row: dict[str, Any] = msgspec.to_builtins(record)
+    for name in _OPTIONS:
+        row |= row.pop(name)
+    return row
 
 
-def _fit(value: Any, kind: inspect.Type) -> Any:  # noqa: ANN401 - a value of that type
-    """Return a value as its column takes it."""
-    kind = _without_none(kind)
-    if value is None:
-        return None
-    if isinstance(kind, inspect.DictType):
-        return json.dumps(msgspec.to_builtins(value), ensure_ascii=False)
-    if isinstance(kind, inspect.UnionType):
-        return str(value)
-    if isinstance(kind, _NESTED):
-        return {one.name: _fit(getattr(value, one.name), one.type) for one in kind.fields}
-    if isinstance(kind, inspect.VarTupleType):
-        return [_fit(one, kind.item_type) for one in value]
-    return value
+def _fit(value: Any, kind: DataType) -> Any:  # noqa: ANN401 - JSON, of that type
+    """Return a value as its column takes it; what varies in its type is JSON."""
+    from pyarrow import types
+
+    if value is not None and types.is_struct(kind):
+        return {one.name: _fit(value[one.name], one.type) for one in kind}
+    if value is not None and types.is_list(kind):
+        return [_fit(one, kind.value_type) for one in value]
+    is_text = value is None or isinstance(value, str) or not types.is_string(kind)
+    return value if is_text else json.dumps(value, ensure_ascii=False)
 
 
 def _arrow_type(kind: inspect.Type) -> DataType:
@@ -98,18 +101,14 @@ def _without_none(kind: inspect.Type) -> inspect.Type:
     return kinds[0] if len(kinds) == 1 else inspect.UnionType(kinds)
 
 
-def _columns() -> dict[str, inspect.Type]:
-    """Return the type of each field of a record; those of options have dotted names."""
-    record = inspect.type_info(Record)
-    if not isinstance(record, inspect.StructType):
-        raise TypeError(f"{Record} is no struct")
-    found: dict[str, inspect.Type] = {}
-    for one in record.fields:
-        if isinstance(one.type, inspect.DataclassType) and one.name != "ref":
-            found |= {f"{one.name}.{option.name}": option.type for option in one.type.fields}
-        else:
-            found[one.name] = one.type
-    return found
+def _fields(kind: type) -> dict[str, inspect.Type]:
+    info: Any = inspect.type_info(kind)
+    return {one.name: one.type for one in info.fields}
 
 
-_COLUMNS = _columns()
+_COLUMNS = {
+    name: kind
+    for holder in (Record, *_OPTIONS.values())
+    for name, kind in _fields(holder).items()
+    if name not in _OPTIONS
+}
