@@ -37,6 +37,7 @@ from roboirg.policies.contract.contract_check import check_policy
 from roboirg.policies.contract.policy_urls import is_url
 from roboirg.policies.contract.policy_version import read_version
 from roboirg.policies.planners import OF_MODELS
+from roboirg.policies.planners.planner_alone import PlannerAlone
 from roboirg.util.short_hash import short_hash
 
 
@@ -169,7 +170,8 @@ def look_up(ref: PolicyRef) -> PolicyRef:
 def _refuse_undeclared(ref: PolicyRef, made: object) -> None:
     """Raise if a policy of others has ``attach``, which its spec does not declare."""
     # With scripted hands the whole has attach; the planner, which is all that is foreign, must not.
-    part = getattr(made, "planner", None) if ref.place == "split" else made
+    is_planner = ref.place == "split" or isinstance(made, PlannerAlone)
+    part = getattr(made, "planner", None) if is_planner else made
     if ref.is_foreign and not ref.is_declared and hasattr(part, "attach"):
         raise InvalidValueError(
             f"Policy {ref.spec!r} has attach(), with which a policy reads the simulator's state; "

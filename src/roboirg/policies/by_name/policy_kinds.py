@@ -160,8 +160,10 @@ def _of_class(spec: str, _target: str, _options: Mapping[str, str]) -> PolicyMak
     return functools.partial(make_from_class, spec, find_class(spec))
 
 
-def _of_system(spec: str, _target: str, _options: Mapping[str, str]) -> PolicyMaker:
-    return functools.partial(_build, system_of(split_spec(spec, spec)))
+def _of_system(kind: str, spec: str, target: str, options: Mapping[str, str]) -> PolicyMaker:
+    pairs = tuple(options.items())
+    ref = PolicyRef(name=spec, spec=spec, kind=kind, target=target, options=pairs)
+    return functools.partial(_build, system_of(ref))
 
 
 def _of_listener(_spec: str, name: str, options: Mapping[str, str]) -> PolicyMaker:
@@ -192,8 +194,8 @@ def _of_process(spec: str, name: str, _options: Mapping[str, str]) -> PolicyMake
 OURS = {
     one.name: one
     for one in (
-        PolicyKind(SYSTEM, _of_system),
-        PolicyKind(PLANNER, _of_system),
+        PolicyKind(SYSTEM, functools.partial(_of_system, SYSTEM)),
+        PolicyKind(PLANNER, functools.partial(_of_system, PLANNER)),
         PolicyKind(LISTENER, _of_listener),
         PolicyKind(LIVE, _of_process),
     )

@@ -26,7 +26,7 @@ class PlannerAlone:
     """
 
     def __init__(self, planner: Planner) -> None:
-        self._planner: Any = planner
+        self.planner: Any = planner
         planner.reports = True  # type: ignore[attr-defined]
         PolicyNeeds.of_planner(planner).declare_on(self)
         self.subgoal: str | None = None
@@ -34,35 +34,35 @@ class PlannerAlone:
     @property
     def version(self) -> str:
         """The planner's, which it may set until its `reset` ends."""
-        return read_version(self._planner) or UNKNOWN_VERSION
+        return read_version(self.planner) or UNKNOWN_VERSION
 
     @property
     def metadata(self) -> Any:  # noqa: ANN401 - of any class
         """The planner's."""
-        return getattr(self._planner, "metadata", {})
+        return getattr(self.planner, "metadata", {})
 
     def reset(self, instruction: str, demonstration: Demonstration) -> None:
         """Begin an episode."""
         self.subgoal = None
-        self._planner.reset(instruction, demonstration)
+        self.planner.reset(instruction, demonstration)
 
     def hear(self, text: str, step: int) -> None:
         """Pass on what was said."""
-        tell_policy(self._planner, [{"text": text, "step": step}])
+        tell_policy(self.planner, [{"text": text, "step": step}])
 
     def act(self, observation: Observation) -> NDArray[np.float64]:
         """Let the planner name a subgoal; the action means nothing."""
         seen: dict[str, Any] = dict(observation)
         ends, step = seen.pop("ends"), seen.pop("step")
-        for end in ends if hasattr(self._planner, "learn") else ():
-            self._planner.learn(SubgoalEnd(*end))
-        self.subgoal = self._planner.plan(cast("Observation", seen), step)
+        for end in ends if hasattr(self.planner, "learn") else ():
+            self.planner.learn(SubgoalEnd(*end))
+        self.subgoal = self.planner.plan(cast("Observation", seen), step)
         return np.zeros((1, 8))
 
     def usage(self) -> dict[str, float]:
         """Return the planner's cost."""
-        return dict(self._planner.usage()) if hasattr(self._planner, "usage") else {}
+        return dict(self.planner.usage()) if hasattr(self.planner, "usage") else {}
 
     def close(self) -> None:
         """Close the planner."""
-        close_policy(self._planner)
+        close_policy(self.planner)
