@@ -5,7 +5,6 @@ from __future__ import annotations
 import datetime as dt
 import functools
 import hashlib
-import importlib.metadata
 import json
 from collections.abc import Sequence
 from dataclasses import asdict, replace
@@ -18,6 +17,7 @@ from roboirg import language
 from roboirg.core.delivery import TURNS
 from roboirg.core.episode import ENVIRONMENT_VERSION
 from roboirg.core.policy_ref import unknown_policy
+from roboirg.core.version import __version__
 from roboirg.evaluation.episode_errors import format_cause
 from roboirg.evaluation.play.goal_outcomes import find_goal_outcomes, judged_events, name_other_goal
 from roboirg.evaluation.play.job_instruction import PreparedJob
@@ -60,7 +60,7 @@ def begin_record(prepared: PreparedJob) -> Record:
         metadata=json.loads(json.dumps(dict(words.instruction.metadata))),
         language_version=str(language.LANGUAGE_VERSION),
         environment_version=ENVIRONMENT_VERSION,
-        package_version=importlib.metadata.version("roboirgbench"),
+        package_version=__version__,
         code=code_fingerprint(),
         processor=processor_family(),
         started_at=utc_now(),
