@@ -131,12 +131,11 @@ def warning_lines(shares: Iterable[PromptShares]) -> Iterator[str]:
             for setting, verdicts in one.settings.items()
             if verdicts["cut"] + verdicts["unknown"]
         )
-        if one.limit is None or not settings:
-            continue
-        yield (
-            f"{one.policy} reads {one.limit.tokens} tokens of a prompt: the end of these "
-            f"instructions does not reach it: {settings}."
-        )
+        if one.limit is not None and settings:
+            yield (
+                f"{one.policy} reads {one.limit.tokens} tokens of a prompt: the end of these "
+                f"instructions does not reach it: {settings}."
+            )
 
 
 def _percent(share: float) -> str:

@@ -57,10 +57,7 @@ def _is_below(path: Path, folder: Path) -> bool:
 def store_plan(content: bytes, folder: Path) -> None:
     """Write the newest plan of a run; another one that was there goes to ``plans/``."""
     newest = folder / PLAN_FILE
-    if newest.is_file():
-        before = newest.read_bytes()
-        if before == content:
-            return
+    if newest.is_file() and (before := newest.read_bytes()) != content:
         keep_earlier_plan(before, folder)
     write_atomically(newest, content)
 
