@@ -546,13 +546,6 @@ def test_unfinished_videos_of_a_run_that_died_are_deleted(
     assert {one.name for one in videos.iterdir()} == {"b.mp4", ".c.mp4.part.keep", ".d.mp4.part"}
 
 
-def test_a_key_twice_in_a_plan_is_refused(roboirg, tmp_path: Path) -> None:
-    (tmp_path / "my.yaml").write_text("policies: [random]\ntasks: PickXtimes\ntasks: BinFill\n")
-    said = roboirg("run", "--plan", tmp_path / "my.yaml", "--out", tmp_path / "out")
-    assert said.code == 2
-    assert "line 3 has the key 'tasks' again" in said.err
-
-
 def test_a_name_that_is_no_name_is_told(roboirg, tmp_path: Path) -> None:
     said = roboirg("run", "--policy", "../../x=random", "--out", tmp_path / "out")
     assert said.code == 2

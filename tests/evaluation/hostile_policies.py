@@ -405,12 +405,6 @@ class TerminalVersion(Hostile):
     version = "\x1b[2J\u202e\n" + "9" * 5000
 
 
-class ChangingVersion(Hostile):
-    @property
-    def version(self) -> str:  # type: ignore[override]
-        return str(time.time_ns())
-
-
 FORGED = {
     "ForgesReply": "policy: the process sent no valid reply (Invalid value 'reply' - ",
     "ForgesLost": "policy: the process sent no valid reply (Object contains unknown field ",

@@ -194,17 +194,6 @@ def test_what_cannot_be_played_is_told_up_front(options: dict[str, str], sentenc
         make_plan(["random"], **options)
 
 
-@pytest.mark.parametrize("spec", ["orakel", "nowhere.at.all:Policy", "roboirg.core.errors:Policy"])
-def test_an_unknown_policy_is_told_up_front(spec: str) -> None:
-    with pytest.raises(InvalidValueError, match=spec.partition(":")[0]):
-        make_plan([spec])
-
-
-def test_a_policy_close_to_a_known_one_is_suggested() -> None:
-    with pytest.raises(UnknownNameError, match="Did you mean 'listener'"):
-        make_plan(["listner"])
-
-
 def test_a_record_has_the_slug_of_its_job() -> None:
     from evaluation_fakes import FakePlay
 

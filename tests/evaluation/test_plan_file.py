@@ -114,6 +114,7 @@ def test_values_are_those_that_would_be_typed(
         ("- oracle", r"is of type list; it must be a mapping"),
         ("", r"is of type NoneType"),
         ("tasks: [", r"is not valid YAML"),
+        ("tasks: all\ntasks: real", r"line 2 has the key 'tasks' again"),
     ],
 )
 def test_what_is_no_plan_is_one_sentence(tmp_path: Path, text: str, sentence: str) -> None:
