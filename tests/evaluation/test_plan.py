@@ -179,7 +179,7 @@ def test_jobs_are_ordered_and_named_uniquely() -> None:
         ({"forms": "resolve"}, r"no form 'resolve'.*Did you mean 'resolved'\?"),
         ({"episodes": "0,50"}, r"no episode 50: split 'test' has episodes 0 to 49"),
         ({"episodes": "51"}, r"no episode 50"),
-        ({"video": "on"}, r"video is 'on': Input should be 'off', 'failures' or 'all'"),
+        ({"video": "on"}, r"video is 'on'; it must be 'off', 'failures' or 'all'"),
         ({"stages": "2,5"}, r"stages \(2, 5\)"),
         ({"distractor": "loud"}, r"no distractor 'loud'"),
         ({"frame": "world"}, r"no frame 'world'"),

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any, get_type_hints
 import typer
 
 from roboirg.cli.names import known_names
-from roboirg.core.errors import InvalidValueError, UnknownNameError
+from roboirg.core.errors import InvalidValueError
 
 if TYPE_CHECKING:
     from roboirg.core.instruction_options import InstructionOptions
@@ -33,7 +33,6 @@ Workers = Annotated[
         help="Worker processes; 0 works in this process.  (ROBOIRG_WORKERS, or one per core)"
     ),
 ]
-
 
 PlanName = Annotated[
     str | None,
@@ -80,6 +79,7 @@ class PlanWords:
             UnknownNameError: a key is none of its own.
             InvalidValueError: a value is not of the field's type.
         """
+        from roboirg.evaluation.plan.option_parsing import check_names
         from roboirg.evaluation.plan.plan_maker import as_typed_field
 
         given = self.fields.get(self._section) or {}
@@ -88,9 +88,7 @@ class PlanWords:
                 f"{self._section} of the plan is {given!r}; it must be a mapping such as "
                 f"'{self._own[0]}: …'."
             )
-        for name in given:
-            if name not in self._own:
-                raise UnknownNameError(f"key of {self._section} in the plan", str(name), self._own)
+        check_names(f"key of {self._section} in the plan", given, self._own)
         types = get_type_hints(kind, include_extras=True)
         return {
             name: as_typed_field(f"{self._section}.{name}", types[name], value)

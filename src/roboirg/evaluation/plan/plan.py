@@ -11,7 +11,6 @@ import re
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import asdict, fields, is_dataclass, replace
 from functools import partial
-from pathlib import Path
 from typing import Annotated, Any, Literal, NamedTuple, get_type_hints
 
 import msgspec
@@ -70,7 +69,6 @@ MOST_JOBS = 1_000_000
 REQUIRED = "required"
 """Instead of a wording file in a plan: one must be given when the plan is run."""
 
-
 AXES = ("setting", "form", "stages")
 """Options of instructions of which a plan plays several."""
 
@@ -124,9 +122,9 @@ def _open_wordings(given: object) -> object:
             "import-robomme PATH --out robomme.toml`, where PATH is a clone of RoboMME's "
             "repository, and give it with --wordings robomme.toml."
         )
-    if not isinstance(given, str | Path):
+    if given is None or isinstance(given, list | tuple | Mapping):
         return given
-    file = str(given) if given in POOLS else os.path.realpath(given)
+    file = str(given) if given in POOLS else os.path.realpath(str(given))
     return ChosenWordings(file, str(open_wordings(file)))
 
 
@@ -215,7 +213,10 @@ class Plan(BaseModel):
         if not isinstance(given, Mapping):
             return given
         found = {name: value for name, value in given.items() if value is not None}
-        check_names("field of plans", found, PLAN_KEYS)
+        check_names("plan key", found, PLAN_KEYS)
+        for name, keys in SECTION_KEYS.items():
+            section = found.get(name)
+            check_names(f"key of {name}", section if isinstance(section, Mapping) else (), keys)
         for name in FLAT.keys() & found.keys():
             value, section = found.pop(name), found.get(FLAT[name], {})
             if is_dataclass(section) and not isinstance(section, type):
@@ -453,12 +454,15 @@ SECTIONS: Mapping[str, type[Any]] = {
     if is_dataclass(field.annotation) and isinstance(field.annotation, type)
 }
 """The sections of a plan, each with its class."""
-FLAT = {
-    option.name: section
+SECTION_KEYS = {
+    section: [one.name for one in fields(kind) if one.name not in (*AXES, *Plan.model_fields)]
     for section, kind in SECTIONS.items()
-    if kind is not WorkerNeeds
-    for option in fields(kind)
-    if option.name not in (*AXES, *Plan.model_fields)
+}
+FLAT = {
+    name: section
+    for section, names in SECTION_KEYS.items()
+    if section != "cluster"
+    for name in names
 }
 """The section of each option that stands alone, too."""
 PLAN_KEYS = (*Plan.model_fields, *FLAT)

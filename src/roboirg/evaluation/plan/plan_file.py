@@ -93,13 +93,15 @@ def _load(name: str) -> object:
         # A safe loader, with two more checks.
         return yaml.load(_text(file), _PlanLoader)  # noqa: S506
     except (OSError, UnicodeDecodeError, InvalidValueError) as error:
-        words = str(error).rstrip(".")
-        raise InvalidValueError(f"The plan {name!r} cannot be read: {words}.") from error
+        raise InvalidValueError(
+            f"The plan {name!r} cannot be read: {str(error).rstrip('.')}."
+        ) from error
     except RecursionError as error:
         raise InvalidValueError(f"The plan {name!r} is nested too deeply.") from error
     except (yaml.YAMLError, ValueError) as error:  # such as a number of too many digits
-        words = " ".join(str(error).split())
-        raise InvalidValueError(f"The plan {name!r} is not valid YAML: {words}.") from error
+        raise InvalidValueError(
+            f"The plan {name!r} is not valid YAML: {' '.join(str(error).split())}."
+        ) from error
 
 
 def _text(file: Path | Traversable) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable
 from dataclasses import replace
 from typing import Any
@@ -11,7 +12,7 @@ from pydantic import TypeAdapter, ValidationError
 from roboirg.core.errors import InvalidValueError
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.core.policy_ref import PolicyRef
-from roboirg.evaluation.plan.plan import SECTIONS, Plan
+from roboirg.evaluation.plan.plan import FLAT, Plan
 
 
 def make_plan(policies: str | Iterable[str | PolicyRef], **options: object) -> Plan:
@@ -51,7 +52,7 @@ def as_typed_field(name: str, kind: Any, value: object) -> Any:  # noqa: ANN401 
     try:
         return TypeAdapter(kind).validate_python(value)
     except ValidationError as error:
-        raise InvalidValueError(f"{name} is {value!r}: {error.errors()[0]['msg']}.") from error
+        raise _refusal(name, value, error.errors()[0]["msg"]) from error
 
 
 def _unchecked(**options: object) -> Plan:
@@ -59,10 +60,22 @@ def _unchecked(**options: object) -> Plan:
         return Plan.model_validate(options)
     except ValidationError as error:
         first = error.errors()[0]
-        cause = first.get("ctx", {}).get("error")
-        if isinstance(cause, InvalidValueError):
+        if isinstance(cause := first.get("ctx", {}).get("error"), InvalidValueError):
             raise cause from error
-        section, *inner = map(str, first["loc"])
-        is_inside = section in SECTIONS and inner
-        name = ".".join(inner[:1] if is_inside and section != "cluster" else [section, *inner])
-        raise InvalidValueError(f"{name} is {first['input']!r}: {first['msg']}.") from error
+        path = [str(part) for part in first["loc"]]
+        name = ".".join([one for one in path[1:2] if one in FLAT] or path)
+        raise _refusal(name, first["input"], first["msg"]) from error
+
+
+def _refusal(name: str, value: object, message: str) -> InvalidValueError:
+    """Return pydantic's complaint about a value in one plain sentence."""
+    words = (
+        re.sub(", (unable|got) .*| or an instance of .*", "", message)
+        .replace("Input should", "it must")
+        .replace("greater than or equal to", "at least")
+        .replace("less than or equal to", "at most")
+        .replace("valid integer", "whole number")
+        .replace("valid tuple", "list")
+        .replace("valid ", "")
+    )
+    return InvalidValueError(f"{name} is {value!r}; {words}.")
