@@ -70,7 +70,7 @@ def check_requirements(player: PolicyPlayer) -> Iterator[CheckResult]:
 
 
 def check_version(player: PolicyPlayer) -> Iterator[CheckResult]:
-    """Check that records can tell the policy from an earlier one of the same name."""
+    """Check that records distinguish the policy from an earlier one of the same name."""
     source = player.source
     try:
         episode = copy.deepcopy(player.without_video)

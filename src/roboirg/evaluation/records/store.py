@@ -38,7 +38,7 @@ Stored = TypeVar("Stored", bound=Summary)
 
 
 class ToldVersions(NamedTuple):
-    """The version of a policy, and that of its server; None if there is none or it told none."""
+    """The version of a policy, and the one that its server reported, if any."""
 
     policy: str
     server: str | None

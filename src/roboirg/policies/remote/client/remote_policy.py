@@ -14,13 +14,12 @@ from numpy.typing import NDArray
 from roboirg.core.actions import JOINT_ANGLE, check_chunk, find_action_space
 from roboirg.core.errors import InvalidActionError, PolicyReplyError
 from roboirg.core.observations import CAMERAS, Demonstration, Observation
+from roboirg.core.policy_ref import UNKNOWN_VERSION
 from roboirg.policies.contract.json_values import as_json
 from roboirg.policies.contract.policy_urls import read_options, split_url
 from roboirg.policies.remote.client.server_session import ServerSession
 from roboirg.policies.remote.endpoints import RemoteOptions, read_endpoints
 from roboirg.policies.remote.transport import WEBSOCKET, Transport
-
-UNKNOWN_VERSION = "unknown"
 
 
 class RemotePolicy(ABC):
