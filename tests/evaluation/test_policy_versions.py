@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import linecache
+import os
 from pathlib import Path
+from typing import Any
 
 import pytest
 from evaluation_fakes import comparable
@@ -16,7 +19,8 @@ from roboirg.evaluation.records.record_codec import StoreError
 from roboirg.evaluation.records.store import read_records
 from roboirg.evaluation.run.executor import InProcess
 from roboirg.evaluation.run.runner import run_plan
-from roboirg.policies.by_name.finding import read_policy
+from roboirg.policies.by_name.finding import policy_of, read_policy
+from roboirg.policies.contract.policy_version import file_fingerprint
 
 BODY = """
 import os, pathlib
@@ -109,3 +113,79 @@ def test_a_command_opens_each_policy_once(write, tmp_path: Path) -> None:
     write(reset=f"open({str(note)!r}, 'a').write(instruction)")
     make_plan(["mine=checkpointed:It", "random"], tasks="PickXtimes", episodes="2")
     assert note.read_text() == "Put the red cube on the target."
+
+
+def test_a_version_that_cannot_be_read_is_not_taken_for_none(write) -> None:
+    for value in ("self.nett.name", 'os.environ["NOT_SET"]'):
+        ref = write(on_class=f"version = property(lambda self: {value})")
+        with pytest.raises(InvalidValueError, match="version of It cannot be read"):
+            open_policy(ref)
+
+
+def test_versions_that_differ_in_what_a_name_cannot_hold_are_two(write) -> None:
+    values = (r"'a\n'", r"'a\\n'", r"'a\udc80'", "'a?'")
+    assert len({open_policy(write(made=f"self.version = {one}")).version for one in values}) == 4
+
+
+def test_without_a_version_another_class_or_part_of_a_system_is_another(
+    write, tmp_path: Path
+) -> None:
+    write()
+    parts = """
+class Other(It): pass
+class Hands(It):
+    def follow(self, subgoal): pass
+class Planner:
+    {slots}
+    def reset(self, instruction, demonstration): {reset}
+    def plan(self, observation, step): return None
+"""
+    file = tmp_path / "checkpointed.py"
+    before, found = file.read_text(), list[str]()
+    planner = "planner:checkpointed:Planner"
+    for slots, reset in (
+        ("__slots__ = ('reports',)", "pass"),
+        ("version = property(lambda self: self.late)", "self.late = 'set late'"),
+    ):
+        file.write_text(before + parts.format(slots=slots, reset=reset))
+        for spec in (f"{planner}?hands=checkpointed:Hands", planner, "checkpointed:It",
+                     "checkpointed:Other"):  # fmt: skip
+            found.append(open_policy(read_policy(spec)).version)
+    assert len(set(found)) == 8
+    assert (found[4].partition(" + ")[0], found[5]) == ("set late", "set late + scripted hands")
+    assert "unknown" not in "".join(found)
+
+
+def test_two_versions_that_nobody_could_read_are_not_one(write, tmp_path: Path) -> None:
+    write(reset="assert 'red cube on the target' not in instruction")
+    plan = paper_plan("mine=checkpointed:It", 1, policy_process="shared")
+    plan = plan.model_copy(update={"policies": tuple(map(open_policy, plan.policies))})
+    run_plan(plan, tmp_path, paper_runner(plan, tmp_path), InProcess())
+    with pytest.raises(StoreError, match="cannot be opened to read its version"):
+        run_plan(plan, tmp_path, paper_runner(plan, tmp_path), InProcess())
+
+
+def test_a_class_of_this_process_is_made_anew_in_each_run(monkeypatch: pytest.MonkeyPatch) -> None:
+    class Batched:
+        def __init__(self) -> None:
+            self.version = os.environ["CKPT"]
+
+        def begin(self, instruction: str, demonstration: object) -> None: ...
+
+        def act_batch(self, states: object, observations: object) -> None: ...
+
+    for checkpoint in ("7", "8"):
+        monkeypatch.setenv("CKPT", checkpoint)
+        assert open_policy(policy_of(Batched)).version == checkpoint
+
+
+def test_a_class_of_a_notebook_that_changes_is_another() -> None:
+    found = []
+    for value in ("1", "2", "1"):
+        cell, place = f"class It:\n    def act(self): return {value}\n", f"<cell {len(found)}>"
+        linecache.cache[place] = len(cell), None, cell.splitlines(keepends=True), place
+        namespace: dict[str, Any] = {"__name__": "no_module"}
+        exec(compile(cell, place, "exec"), namespace)  # noqa: S102 - as a notebook does
+        found.append(file_fingerprint(namespace["It"]))
+    assert None not in found
+    assert found[0] == found[2] != found[1]

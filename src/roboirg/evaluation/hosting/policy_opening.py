@@ -11,6 +11,7 @@ from roboirg.evaluation.episode_errors import EpisodeLostError
 from roboirg.evaluation.hosting.messages import Call
 from roboirg.evaluation.hosting.policy_child import PolicyChild
 from roboirg.policies.by_name.policy_kinds import make_follower
+from roboirg.policies.contract.batch_policy import forget_batched
 from roboirg.policies.opening import opened
 from roboirg.policies.planners.hierarchical_policy import joint_version
 from roboirg.util.deadline_watch import DeadlineWatch
@@ -36,6 +37,7 @@ def open_policy(ref: PolicyRef, limit_s: float = LIMIT_S, device: str | None = N
     """
     if not ref.is_foreign:
         return ref
+    forget_batched(ref.body)
     if ref.place == "python":
         return opened(ref)
     variables = {} if device is None else {"CUDA_VISIBLE_DEVICES": device}

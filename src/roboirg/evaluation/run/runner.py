@@ -271,16 +271,19 @@ def _check_versions(plan: Plan, records: Collection[Summary], folder: Path) -> N
 def _check_policies(plan: Plan, records: Iterable[Summary], folder: Path) -> None:
     """Refuse records of another version of a policy of the same name."""
     known = {one.name: one for one in plan.policies}
-    for policy, version in {(one.policy, one.policy_version) for one in records}:
+    for policy, version, is_verdict in {
+        (one.policy, one.policy_version, one.outcome != "error") for one in records
+    }:
         now = known.get(policy)
-        if now is None or version == now.version:
+        # Two versions that could not be read may differ.
+        if now is None or (version == now.version and not (is_verdict and now.problem)):
             continue
         if now.problem is not None:
             raise StoreError(
                 f"{folder} holds episodes of {policy} version {version}, but the policy cannot be "
                 f"opened to read its version now ({now.problem}); choose another --out."
             )
-        if now.version != UNKNOWN_VERSION:
+        if now.is_foreign or now.version != UNKNOWN_VERSION:
             raise StoreError(
                 f"{folder} holds episodes of {policy} version {version}, but the policy is now "
                 f"version {now.version}; choose another --out."

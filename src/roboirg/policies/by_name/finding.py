@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import importlib
-import inspect
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import Any
 
 from roboirg.core.errors import InvalidValueError
@@ -35,10 +33,9 @@ from roboirg.policies.by_name.policy_kinds import (
 from roboirg.policies.contract.base import Policy
 from roboirg.policies.contract.contract_check import check_policy
 from roboirg.policies.contract.policy_urls import is_url
-from roboirg.policies.contract.policy_version import read_version
+from roboirg.policies.contract.policy_version import file_fingerprint, read_version
 from roboirg.policies.planners import OF_MODELS
 from roboirg.policies.planners.planner_alone import PlannerAlone
-from roboirg.util.short_hash import short_hash
 
 
 @dataclass(frozen=True)
@@ -158,7 +155,7 @@ def look_up(ref: PolicyRef) -> PolicyRef:
     if ref.kind == BUILT_IN:
         version: str | None = BUILT_IN
     else:
-        version = _fingerprint(declaring) if ref.is_foreign else read_version(declaring)
+        version = file_fingerprint(declaring) if ref.is_foreign else read_version(declaring)
     return replace(
         ref,
         needs=PolicyNeeds.of(declaring),
@@ -178,15 +175,6 @@ def _refuse_undeclared(ref: PolicyRef, made: object) -> None:
             f"declare that as {PRIVILEGED + ref.spec!r}, in Python with roboirg.Privileged(policy),"
             " or remove attach()."
         )
-
-
-def _fingerprint(declaring: object) -> str | None:
-    """Return a hash of the file that defines a class, or an object's; None if there is none."""
-    kind = declaring if isinstance(declaring, type) else type(declaring)
-    try:
-        return short_hash(Path(inspect.getfile(kind)).read_bytes())
-    except (OSError, TypeError):
-        return None
 
 
 def _can_be_imported(policy: type[Any]) -> bool:

@@ -20,7 +20,6 @@ from roboirg.policies.contract.policy_urls import is_url
 from roboirg.policies.planners.planner import Planner
 from roboirg.policies.remote.protocols import protocols_by_scheme
 from roboirg.util.discovery import entry_names
-from roboirg.util.short_hash import short_hash
 
 _MAX_SHOWN, _MAX_NAMED = 3, 20
 CHECKPOINTS: Mapping[str, str] = {"lerobot": "roboirg.policies.lerobot_policy:LeRobotPolicy"}
@@ -52,14 +51,8 @@ def find_class(spec: str) -> type[Any]:
 
 
 def make_planner_of_class(spec: str, seed: int) -> Planner:
-    """Make a planner of ``package.module:Class``; raises like `find_class`.
-
-    Without a ``version`` of its own it gets a fingerprint of the file that defines it.
-    """
-    found = _import_class(spec, ("reset", "plan"))
-    planner: Planner = _construct(spec, found, seed)
-    if not hasattr(planner, "version"):
-        planner.version = short_hash(Path(inspect.getfile(found)).read_bytes())  # type: ignore[attr-defined]
+    """Make a planner of ``package.module:Class``; raises like `find_class`."""
+    planner: Planner = _construct(spec, _import_class(spec, ("reset", "plan")), seed)
     return planner
 
 

@@ -76,14 +76,20 @@ class BatchedEpisode:
             hear(self._state, text, step)
 
 
-_made: dict[object, Any] = {}
+_made: dict[tuple[str, object], Any] = {}
 
 
-def make_batched(key: object, make: Callable[[], Any], seed: int) -> BatchedEpisode:
+def forget_batched(spec: str) -> None:
+    """Let the policies of a spec be made anew, as when a run begins."""
+    for key in [one for one in _made if one[0] == spec]:
+        del _made[key]
+
+
+def make_batched(key: tuple[str, object], make: Callable[[], Any], seed: int) -> BatchedEpisode:
     """Return a new episode of a policy, which is made when the first one begins.
 
     Args:
-        key: identifies the policy.
+        key: identifies the policy: its spec, and its class or object.
         make: makes it.
         seed: of the episode's random choices.
     """

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import inspect
 import os
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -20,22 +22,46 @@ def read_version(policy: object) -> str | None:
     Numbers, NumPy's among them, and paths become text. A policy may set it until its `reset` ends.
 
     Raises:
-        InvalidValueError: it is something else, which may differ in each process, or empty.
+        InvalidValueError: it is something else, which may differ in each process, or empty; or it
+            cannot be read.
     """
-    if not hasattr(policy, "version"):
-        return None
-    value: Any = policy.version
+    kind, subject = type(policy), f"version of {type(policy).__name__}"
+    try:
+        value: Any = policy.version  # type: ignore[attr-defined]
+    except Exception as error:
+        missing = isinstance(error, AttributeError) and error.name in ("version", None)
+        if missing and not hasattr(kind, "version"):
+            return None
+        words = f"{type(error).__name__}: {error}"
+        raise InvalidValueError(f"{subject} cannot be read ({words:.300}).") from error
     if isinstance(value, np.generic | np.ndarray) and value.ndim == 0:
         value = value.item()
     if isinstance(value, os.PathLike):
         value = os.fspath(value)
     if isinstance(value, bool) or not isinstance(value, str | int | float) or value == "":
         raise InvalidValueError(
-            f"version of {type(policy).__name__} is {value!r:.80}; it must be a text, number or "
+            f"{subject} is {value!r:.80}; it must be a text, number or "
             "path, such as the name of a checkpoint, or not be there."
         )
     text = str(value)
     shown = as_name(text)
-    # Long paths may differ in their last letters only.
+    # Long paths may differ in their last letters only, others in what a name cannot hold.
     cut = f"{shown[:MOST_LETTERS]}…{short_hash(ascii(text))}"
-    return shown if len(shown) <= MOST_LETTERS else cut
+    return shown if shown == text and len(shown) <= MOST_LETTERS else cut
+
+
+def file_fingerprint(declaring: object) -> str | None:
+    """Return a hash of a class, or an object's, and the file that defines it; None without one.
+
+    In a notebook, which is no file, its methods count.
+    """
+    kind = declaring if isinstance(declaring, type) else type(declaring)
+    try:
+        source = Path(inspect.getfile(kind)).read_bytes()
+    except (OSError, TypeError):
+        methods = filter(inspect.isfunction, vars(kind).values())
+        try:
+            source = "".join(map(inspect.getsource, methods)).encode()
+        except OSError:
+            return None
+    return short_hash(kind.__qualname__.encode() + source)

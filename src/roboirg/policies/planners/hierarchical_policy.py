@@ -21,7 +21,7 @@ from roboirg.policies.contract.base import (
     close_policy,
     tell_policy,
 )
-from roboirg.policies.contract.policy_version import read_version
+from roboirg.policies.contract.policy_version import file_fingerprint, read_version
 from roboirg.policies.planners.observation_merging import (
     DemonstrationSubset,
     select_history,
@@ -193,8 +193,9 @@ class PrivilegedHierarchicalPolicy(HierarchicalPolicy):
 
 
 def joint_version(*parts: object) -> str:
-    """Return the versions of a planner and its policy as one."""
-    return BETWEEN_VERSIONS.join(read_version(one) or UNKNOWN_VERSION for one in parts)
+    """Return the versions of a planner and its policy as one, of their files if they have none."""
+    found = (read_version(one) or file_fingerprint(one) or UNKNOWN_VERSION for one in parts)
+    return BETWEEN_VERSIONS.join(found)
 
 
 def with_planner(planner: Planner, policy: Policy, name: str | None = None) -> HierarchicalPolicy:

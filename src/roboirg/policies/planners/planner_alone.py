@@ -9,9 +9,8 @@ from numpy.typing import NDArray
 
 from roboirg.core.observations import Demonstration, Observation
 from roboirg.core.policy_needs import PolicyNeeds
-from roboirg.core.policy_ref import UNKNOWN_VERSION
 from roboirg.policies.contract.base import SubgoalEnd, close_policy, tell_policy
-from roboirg.policies.contract.policy_version import read_version
+from roboirg.policies.planners.hierarchical_policy import joint_version
 from roboirg.policies.planners.planner import Planner
 
 
@@ -34,7 +33,7 @@ class PlannerAlone:
     @property
     def version(self) -> str:
         """The planner's, which it may set until its `reset` ends."""
-        return read_version(self.planner) or UNKNOWN_VERSION
+        return joint_version(self.planner)
 
     @property
     def metadata(self) -> Any:  # noqa: ANN401 - of any class
