@@ -11,7 +11,8 @@ from roboirg.core.plain_text import clip_text
 from roboirg.core.policy_needs import PolicyNeeds
 from roboirg.core.policy_ref import UNKNOWN_VERSION, PolicyRef
 from roboirg.policies.by_name.finding import look_up, make_policy
-from roboirg.policies.contract.base import close_policy
+from roboirg.policies.contract.base import Policy, close_policy
+from roboirg.policies.contract.policy_calls import server_version
 from roboirg.policies.contract.policy_version import read_version
 from roboirg.policies.contract.synthetic_episodes import SyntheticEpisodes
 
@@ -38,15 +39,33 @@ def opened(ref: PolicyRef, seed: int = 0) -> PolicyRef:
     except (Exception, SystemExit) as error:  # the policy's own code runs here
         raise InvalidValueError(f"Policy {ref.spec!r} cannot be made: {_words(error)}.") from error
     try:
-        episode = SyntheticEpisodes(needs).episode(FIRST_WORDS, VIDEO_STEPS)
-        policy.reset(episode.instruction, episode.demonstration)
+        _begin(policy, needs)
     except (Exception, SystemExit) as error:  # noqa: BLE001 - likewise
         return replace(ref, version=UNKNOWN_VERSION, problem=f"reset(): {_words(error)}")
-    try:
+    else:
         return replace(ref, needs=needs, version=read_version(policy) or ref.version)
     finally:
         with contextlib.suppress(Exception):  # how it ends does not count
             close_policy(policy)
+
+
+def reported_version(ref: PolicyRef) -> str | None:
+    """Return the version that the server of a policy of ours reports now, in a synthetic episode.
+
+    Raises:
+        RoboIRGError: the server cannot be reached or does not answer.
+    """
+    policy = make_policy(ref, 0)
+    try:
+        _begin(policy, PolicyNeeds.of(policy))
+        return server_version(getattr(policy, "metadata", {}))
+    finally:
+        close_policy(policy)
+
+
+def _begin(policy: Policy, needs: PolicyNeeds) -> None:
+    episode = SyntheticEpisodes(needs).episode(FIRST_WORDS, VIDEO_STEPS)
+    policy.reset(episode.instruction, episode.demonstration)
 
 
 def _words(error: BaseException) -> str:

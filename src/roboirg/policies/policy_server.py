@@ -12,6 +12,7 @@ from typing import NamedTuple
 from roboirg.core.errors import InvalidValueError, UnknownNameError
 from roboirg.core.field_types import MOST_SECONDS
 from roboirg.core.inference_facts import inference_facts
+from roboirg.core.policy_ref import BUILT_IN
 from roboirg.policies.by_name.finding import make_policy, read_policy
 from roboirg.policies.by_name.policy_classes import find_class
 from roboirg.policies.by_name.policy_kinds import CLASS
@@ -98,7 +99,9 @@ def open_server(
 
     found = protocols[protocol]
     process = inference_facts(None)
-    declared = getattr(find_class(policy.body), "metadata", {}) if policy.kind == CLASS else {}
+    declared = (
+        getattr(find_class(policy.body), "metadata", {}) if policy.kind in (CLASS, BUILT_IN) else {}
+    )
     if not isinstance(declared, Mapping):
         declared = {}  # a property is of an object
     metadata = {
