@@ -5,12 +5,10 @@ from pathlib import Path
 
 import msgspec
 import pandas as pd
-import pytest
 from evaluation_fakes import FakePlay, small_plan
 from msgspec.structs import replace
 
 from roboirg.core.environment_options import ENVIRONMENT_OPTIONS, EnvironmentOptions
-from roboirg.core.errors import InvalidValueError
 from roboirg.core.instruction_options import OPTION_NAMES
 from roboirg.evaluation.records.parquet import write_parquet
 from roboirg.evaluation.records.record import Attribution, Record
@@ -50,9 +48,3 @@ def test_a_table_holds_every_field_of_every_record(tmp_path: Path) -> None:
     assert [one["step"] for one in table.instruction[1]] == [0] * (len(said) - 1) + [20]
     assert table.demonstration_frames[0] == "4"
     assert json.loads(table.usage[0]) == {"calls": 2.0}
-
-
-def test_a_file_that_cannot_be_written_is_one_sentence(tmp_path: Path) -> None:
-    (tmp_path / "file").touch()
-    with pytest.raises(InvalidValueError, match="Cannot write"):
-        write_parquet([], tmp_path / "file" / "x.parquet")

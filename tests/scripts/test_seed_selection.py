@@ -6,27 +6,19 @@ import pytest
 from seed_selection import (
     ACCEPTANCE_SETTINGS,
     EpisodeSlot,
-    Rejection,
-    SelectedSeed,
-    check_kept_splits,
     check_seed,
     check_words,
     episode_slots,
     find_seed,
-    find_seeds,
-    merge_splits,
 )
-from seed_selection_fakes import die, refuse, take_the_third
 
 from roboirg.core.episode import SPLITS
-from roboirg.core.errors import InvalidValueError, RoboIRGError, SceneRejectedError
 from roboirg.language import expressible, find_refusals
 from roboirg.language.settings import all_settings, plain_settings, settings_of
 from roboirg.tasks import every_task, get_task
-from roboirg.tasks.splits.splits import SIZES, TaskSplits, get_episode, shipped_splits, slot_seed
+from roboirg.tasks.splits.splits import SIZES, get_episode, shipped_splits, slot_seed
 
 TASKS = tuple(every_task())
-REJECTED = Rejection(0, "no room", "no place")
 each_task = pytest.mark.parametrize("task", TASKS)
 
 
@@ -82,26 +74,6 @@ def test_seeds_passed_over_for_the_oracle_s_sake_had_to_be(task):
         assert rejection.reason == "oracle failed"
 
 
-def test_the_first_seed_that_can_be_taken_is_found_with_what_was_amiss_before():
-    found = find_seed(EpisodeSlot("PickXtimes", "val", 4), take_the_third)
-    assert [one.seed for one in found.rejections] == [1_010_400, 1_010_401]
-    with pytest.raises(
-        SceneRejectedError, match=r"1010400 to 1010499 .* PickXtimes/val/4.*timeout"
-    ):
-        find_seed(EpisodeSlot("PickXtimes", "val", 4), refuse)
-
-
-def test_reasons_are_told_apart():
-    assert check_words(EpisodeSlot("BinFill", "val", 3), 1_040_649) == Rejection(
-        1_040_649,
-        "not expressible",
-        "spatial: no landmark singles out a target",
-    )
-    rejections = find_seed(EpisodeSlot("VideoPlaceOrder", "val", 34), check_words).rejections
-    assert {one.reason for one in rejections} == {"no room"}
-    assert all("no place for" in one.cause for one in rejections)
-
-
 def test_a_new_setting_does_not_change_which_seeds_are_accepted(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
@@ -124,60 +96,7 @@ def test_seeds_are_accepted_by_the_settings_of_the_first_release() -> None:
     assert [*ACCEPTANCE_SETTINGS] == ["explicit", "direct", "reasoning", "contextual", "spatial"]
 
 
-def test_processes_find_what_one_finds():
-    slots = [EpisodeSlot("VideoPlaceOrder", "val", index) for index in range(50)]
-    alone = list(find_seeds(slots, 0, check_words))
-    assert [one.slot for one in alone] == slots
-    assert any(one.rejections for one in alone)
-    assert {one.slot: one for one in find_seeds(slots, 2, check_words)} == dict(
-        zip(slots, alone, strict=True)
-    )
-
-
-def test_what_ends_a_search_is_named():
-    slots = [EpisodeSlot("PickXtimes", "val", index) for index in range(3)]
-    with pytest.raises(SceneRejectedError, match="PickXtimes/val/0"):
-        list(find_seeds(slots[:1], 1, refuse))
-    with pytest.raises(RoboIRGError, match="worker process died"):
-        list(find_seeds(slots, 1, die))
-
-
 def test_only_sampled_episodes_need_a_seed():
     assert episode_slots(["VideoUnmask"]) == ()
     assert episode_slots(["VideoPlaceButton"]) == (EpisodeSlot("VideoPlaceButton", "val", 15),)
     assert len(episode_slots(["PutInBox"])) == sum(SIZES[split] for split in SPLITS)
-
-
-def test_what_was_not_built_again_stays():
-    slots = episode_slots(["VideoPlaceOrder"], ["val"])
-    built = [SelectedSeed(slot, (REJECTED,) * passed_over(slot)) for slot in slots]
-    tasks = ["VideoPlaceOrder", "VideoUnmask"]
-    now = merge_splits(tasks, built, shipped_splits())
-    assert now == dict(shipped_splits())
-    assert list(now) == list(TASKS)
-    # Any seed that gives a scene will do.
-    other = next(
-        count
-        for count in range(passed_over(slots[0]) + 1, 100)
-        if check_words(slots[0], first_seed(slots[0]) + count) is None
-    )
-    changed = [SelectedSeed(slots[0], (REJECTED,) * other), *built[1:]]
-    now = merge_splits(tasks, changed, shipped_splits())
-    assert now["VideoPlaceOrder"].passed_over == {
-        **shipped_splits()["VideoPlaceOrder"].passed_over,
-        f"val/{slots[0].index}": other,
-    }
-    assert now["VideoPlaceOrder"].sha256 != shipped_splits()["VideoPlaceOrder"].sha256
-    assert now["VideoUnmask"] == shipped_splits()["VideoUnmask"]
-
-
-def test_only_what_is_valid_can_stay():
-    check_kept_splits(["VideoPlaceOrder"], ["test"], shipped_splits())
-    check_kept_splits(["VideoPlaceOrder"], SPLITS, {})
-    with pytest.raises(
-        InvalidValueError, match=r"VideoPlaceOrder/train/7 .* all splits of VideoPlaceOrder"
-    ):
-        check_kept_splits(["VideoPlaceOrder"], ["test"], {})
-    nothing = {"VideoPlaceOrder": TaskSplits("", {})}
-    with pytest.raises(InvalidValueError, match=r"VideoPlaceOrder/val/34"):
-        check_kept_splits(["VideoPlaceOrder"], ["train", "test"], nothing)
