@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import os
 import sys
 import time
@@ -206,4 +207,6 @@ if __name__ == "__main__":
     out, count = Path(sys.argv[1]), int(sys.argv[2])
     sys.path.insert(0, str(Path(__file__).parent))
     plan = paper_plan(sys.argv[3], count, seeds=int(sys.argv[4]), policy_timeout_s=60.0)
-    run_plan(plan, out, paper_runner(plan, out, 0.02), LocalProcesses(3))
+    # As if it had been opened, which would take most of the time between two kills.
+    opened = {"policies": (dataclasses.replace(plan.policies[0], version="1"),)}
+    run_plan(plan.model_copy(update=opened), out, paper_runner(plan, out, 0.02), LocalProcesses(3))

@@ -12,6 +12,7 @@ from pathlib import Path
 from types import SimpleNamespace
 
 import chaos_policy
+import msgspec
 import pytest
 from evaluation_fakes import FakePlay, WaitingPlay, changed, comparable, small_plan
 from hypothesis import given
@@ -31,11 +32,12 @@ from roboirg.evaluation.records.store import read_records
 from roboirg.evaluation.run.executor import LocalProcesses, take_job
 from roboirg.evaluation.run.runner import UNREACHABLE_AFTER, RunSummary, run_plan
 from roboirg.evaluation.run.workers import Worker
+from roboirg.policies.by_name.finding import read_policy
 
 TIMEOUT_S = 20.0
 
 
-def plan_of_chaos() -> Plan:
+def plan_of_chaos(policy_process: str) -> Plan:
     """Enough episodes for every misdeed to happen, and twice as many good ones."""
     plan = Plan(
         policies=(chaos_policy.SPEC,),
@@ -45,6 +47,7 @@ def plan_of_chaos() -> Plan:
         policy_seeds=tuple(range(4)),
         max_steps=15,
         policy_timeout_s=TIMEOUT_S,
+        policy_process=policy_process,
         tries=1,
     )
     jobs, chosen, met = plan.jobs(), [], Counter[str | None]()
@@ -73,7 +76,7 @@ def play(plan: Plan, folder: Path) -> tuple[RunSummary, dict[Job, Record]]:
 @pytest.fixture(params=["own", pytest.param("shared", marks=pytest.mark.slow)])
 def plan(monkeypatch: pytest.MonkeyPatch, request: pytest.FixtureRequest) -> Plan:
     monkeypatch.syspath_prepend(Path(chaos_policy.__file__).parent)
-    return changed(plan_of_chaos(), policy_process=request.param)
+    return plan_of_chaos(request.param)
 
 
 @pytest.mark.slow
@@ -114,11 +117,13 @@ def test_a_policy_of_chaos_costs_its_own_episodes_and_nothing_else(
 
 
 def _misdeeds(plan: Plan) -> dict[Job, str]:
-    found = {job: chaos_policy.misdeed(_seed(job)) for job in plan.jobs()}
+    jobs = (msgspec.structs.replace(job, ref=None) for job in plan.jobs())  # as records know them
+    found = {job: chaos_policy.misdeed(_seed(job)) for job in jobs}
     return {job: misdeed for job, misdeed in found.items() if misdeed is not None}
 
 
 def _seed(job: Job) -> int:
+    job = msgspec.structs.replace(job, ref=read_policy(job.policy))
     return load_policy(PreparedJob(job)).seed  # type: ignore[attr-defined]
 
 

@@ -47,7 +47,6 @@ def test_the_recipe_makes_policies_in_a_process_of_their_own():
     assert isinstance(make_policy("lab:walk?fast=yes", 3), RandomPolicy)
     assert read_policy("lab:walk").is_foreign
     assert read_policy("lab:walk").is_hosted
-    assert policy_kinds.known_kinds()["recorded"]
     with pytest.raises(UnknownNameError, match="lab:…"):
         make_policy("nothing", 0)
 
