@@ -171,7 +171,7 @@ def test_a_long_prompt_is_refused_before_it_is_played(tmp_path: Path) -> None:
 def test_only_what_is_certainly_cut_is_refused() -> None:
     for verdict in ("heard", "unknown"):
         check_prompt(audit_job(job(), EXACT)[0], verdict)
-    with pytest.raises(InvalidValueError, match="should be 'send' or 'refuse'"):
+    with pytest.raises(InvalidValueError, match="must be 'send' or 'refuse'"):
         make_plan(["random"], long_prompts="cut")
 
 
