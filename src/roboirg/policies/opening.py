@@ -10,7 +10,8 @@ from roboirg.core.field_types import as_name
 from roboirg.core.plain_text import clip_text
 from roboirg.core.policy_needs import PolicyNeeds
 from roboirg.core.policy_ref import UNKNOWN_VERSION, PolicyRef
-from roboirg.policies.by_name.finding import look_up, make_policy
+from roboirg.policies.by_name.finding import declared_by, look_up, make_policy
+from roboirg.policies.by_name.policy_kinds import CLASS, LIVE
 from roboirg.policies.contract.base import Policy, close_policy
 from roboirg.policies.contract.policy_calls import server_version
 from roboirg.policies.contract.policy_version import read_version
@@ -30,7 +31,8 @@ def opened(ref: PolicyRef, seed: int = 0) -> PolicyRef:
         InvalidValueError: it cannot be made, or its version is no version; and as `make_policy`.
         MissingDependencyError: a library that it needs is not installed.
     """
-    ref = look_up(ref)
+    has_class = ref.kind in (CLASS, LIVE)
+    ref = look_up(ref) if has_class else ref
     try:
         policy = make_policy(ref, seed)
         needs = PolicyNeeds.of(policy)
@@ -38,6 +40,8 @@ def opened(ref: PolicyRef, seed: int = 0) -> PolicyRef:
         raise
     except (Exception, SystemExit) as error:  # the policy's own code runs here
         raise InvalidValueError(f"Policy {ref.spec!r} cannot be made: {_words(error)}.") from error
+    # Of other kinds, what declares something is what was made, once.
+    ref = ref if has_class else declared_by(ref, policy)
     try:
         _begin(policy, needs)
     except (Exception, SystemExit) as error:  # noqa: BLE001 - likewise

@@ -102,10 +102,9 @@ def open_server(
     declared = (
         getattr(find_class(policy.body), "metadata", {}) if policy.kind in (CLASS, BUILT_IN) else {}
     )
-    if not isinstance(declared, Mapping):
-        declared = {}  # a property is of an object
+    has_metadata = isinstance(declared, Mapping)  # a property is of an object
     metadata = {
-        **as_json(declared, "the policy's metadata"),
+        **as_json(declared if has_metadata else {}, "the policy's metadata"),
         "policy": spec,
         "version": policy.version,
         "protocol": protocol,

@@ -8,10 +8,11 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field
 
-from roboirg.core.field_types import MOST_SECONDS, described
+from roboirg.core.field_types import described
 from roboirg.evaluation.hosting.host_pool import DEFAULT_BATCH, HostSettings
 from roboirg.evaluation.plan.option_parsing import check_names, parse_names
 from roboirg.evaluation.records.record import ERROR_KINDS, ErrorKind
+from roboirg.policies.contract.option_checking import Seconds
 
 PolicyProcessMode = Literal["own", "shared"]
 RETRYABLE: tuple[ErrorKind, ...] = ("connection", "environment", "infrastructure")
@@ -32,7 +33,7 @@ def _error_kinds(given: object) -> tuple[str, ...]:
 
 
 Count = Annotated[int, Field(ge=1)]
-Seconds = Annotated[float, Field(gt=0, le=MOST_SECONDS)]
+TimeLimit = Annotated[Seconds, Field(gt=0)]
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,7 +58,7 @@ class Hosting:
             "GPU."
         ),
     )
-    policy_timeout_s: Seconds = field(
+    policy_timeout_s: TimeLimit = field(
         default=600.0, metadata=described("Time limit of one call of a policy, seconds.")
     )
 
@@ -73,7 +74,7 @@ class Hosting:
 class Attempts:
     """How long and how often an episode is played."""
 
-    episode_timeout_s: Seconds = field(
+    episode_timeout_s: TimeLimit = field(
         default=7200.0, metadata=described("Time limit of an episode, seconds.")
     )
     tries: Count = field(

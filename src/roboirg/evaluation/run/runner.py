@@ -74,9 +74,9 @@ def run_plan(
 ) -> RunSummary:
     """Play the jobs of a plan that the folder lacks; store each record as soon as it arrives.
 
-    An episode that ends in an error of a kind in `Plan.retry_on` is retried after all others, or at
-    once if its machine or process was lost, at most `Plan.tries` times in all; the newest record
-    counts.
+    An episode that ends in an error of a kind in the plan's `retry_on` is retried after all others,
+    or at once if its machine or process was lost, and played `tries` times at most; the newest
+    record counts.
 
     Args:
         plan: what to play.

@@ -148,9 +148,12 @@ def look_up(ref: PolicyRef) -> PolicyRef:
     Of code of others, the version is a fingerprint of the file that defines it.
     """
     if ref.kind in (CLASS, BUILT_IN):
-        declaring: object = find_class(ref.body)
-    else:
-        declaring = live[ref.target] if ref.kind == LIVE else maker_of(ref)(0)
+        return declared_by(ref, find_class(ref.body))
+    return declared_by(ref, live[ref.target] if ref.kind == LIVE else maker_of(ref)(0))
+
+
+def declared_by(ref: PolicyRef, declaring: object) -> PolicyRef:
+    """Return a policy with what its class, or one that was made, declares."""
     _refuse_undeclared(ref, declaring)
     if ref.kind == BUILT_IN:
         version: str | None = BUILT_IN

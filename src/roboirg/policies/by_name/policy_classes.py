@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import importlib
-import importlib.util
 import inspect
 import pkgutil
 from collections.abc import Mapping
@@ -21,7 +20,7 @@ from roboirg.policies.planners.planner import Planner
 from roboirg.policies.remote.protocols import protocols_by_scheme
 from roboirg.util.discovery import entry_names
 
-_MAX_SHOWN, _MAX_NAMED = 3, 20
+_MAX_NAMED = 20
 CHECKPOINTS: Mapping[str, str] = {"lerobot": "roboirg.policies.lerobot_policy:LeRobotPolicy"}
 """Policies of this process that a URL names, by its scheme; called with ``(url, seed=)``."""
 

@@ -20,7 +20,7 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Callable, Mapping
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, cast
 
 from roboirg.core.errors import InvalidValueError, UnknownNameError
 from roboirg.core.policy_ref import BUILT_IN, ELSEWHERE, HANDS, PRIVILEGED, SCRIPTED, PolicyRef
@@ -140,9 +140,7 @@ def make_follower(spec: str, seed: int) -> Policy:
     return maker_of(split_spec(spec, SCRIPTED_HANDS if spec == SCRIPTED else spec))(seed)
 
 
-def _build(system: System | None, seed: int) -> Policy:
-    if system is None:
-        raise ValueError("not a system")
+def _build(system: System, seed: int) -> Policy:
     if system.planner is None:
         return make_follower(system.policy, seed)
     options = dict(system.planner)
@@ -163,7 +161,7 @@ def _of_class(spec: str, _target: str, _options: Mapping[str, str]) -> PolicyMak
 def _of_system(kind: str, spec: str, target: str, options: Mapping[str, str]) -> PolicyMaker:
     pairs = tuple(options.items())
     ref = PolicyRef(name=spec, spec=spec, kind=kind, target=target, options=pairs)
-    return functools.partial(_build, system_of(ref))
+    return functools.partial(_build, cast("System", system_of(ref)))
 
 
 def _of_listener(_spec: str, name: str, options: Mapping[str, str]) -> PolicyMaker:
