@@ -14,7 +14,6 @@ import numpy as np
 from numpy.typing import NDArray
 from written_parts import rate_text, with_part
 
-from roboirg.apps.leaderboard.packing import opened_run
 from roboirg.apps.learning.listener.study_report import TrainedRate, trained_rate
 from roboirg.apps.learning.policy.paper_experiment import row_of
 from roboirg.core.arms import TOLD
@@ -30,6 +29,7 @@ from roboirg.evaluation.analysis.stats.chance import silent_chance
 from roboirg.evaluation.analysis.stats.intervals import ALPHA
 from roboirg.evaluation.analysis.stats.paired_tests import holm, sign_flip_test
 from roboirg.evaluation.analysis.stats.run_data import RunData
+from roboirg.evaluation.records.packs import opened_run
 from roboirg.evaluation.records.record import Summary
 from roboirg.evaluation.records.store import read_results
 from roboirg.language.settings import EXPLICIT, plain_settings
@@ -58,7 +58,7 @@ Verdicts = NDArray[np.int64]
 @functools.cache
 def played() -> RunData:
     """Return the episodes of the pack."""
-    with opened_run(PACK) as run:
+    with opened_run(PACK, ()) as run:
         return RunData.of([("val", read_results(run))])
 
 

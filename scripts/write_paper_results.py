@@ -11,7 +11,6 @@ from pathlib import Path
 
 from written_parts import rate_text, with_part
 
-from roboirg.apps.leaderboard.packing import opened_run
 from roboirg.apps.learning.policy.paper_experiment import CONTEXT, MAIN, PLANNER, SYSTEMS, row_name
 from roboirg.apps.learning.policy.paper_page import answers_text, row_cells, tables_text
 from roboirg.apps.learning.policy.policy_plan import PLANNERS
@@ -19,6 +18,7 @@ from roboirg.evaluation.analysis.published import published_rows
 from roboirg.evaluation.analysis.stats.cells import Cells
 from roboirg.evaluation.analysis.stats.run_summary import ALL, SummaryRow, summarize
 from roboirg.evaluation.plan.plan_file import read_plan_file
+from roboirg.evaluation.records.packs import opened_run
 from roboirg.evaluation.records.record import Summary
 from roboirg.evaluation.records.store import read_results
 from roboirg.language.settings import plain_settings
@@ -38,7 +38,7 @@ def played() -> Mapping[str, Cells]:
     """Return the cells of each part of the experiment."""
     results: dict[str, list[Summary]] = {}
     for part, pack in PACKS.items():
-        with opened_run(pack) as run:
+        with opened_run(pack, ()) as run:
             results[part] = list(read_results(run))
     if PLANNER in results:
         results[PLANNER] += _planners_of_main(results[MAIN])

@@ -89,9 +89,6 @@ def test_an_added_option_reaches_words_commands_plans_records_and_tables(
     assert said == {"direct": "hello", "explicit": "none"}
     assert records[0]["instruction"][0]["text"].startswith("Hello, robot.")
     assert "direct (greeting hello)" in command("tables", run)
-    command("records", "export", run, "--out", "records.parquet")
-    code = "import pandas; print(*pandas.read_parquet('records.parquet').greeting)"
-    assert python("-c", code).split() == ["hello", "none"]
     rows = tmp_path / "rows.jsonl"
     command("export", "instructions", *few, "--plan", plan, "--out", rows)
     assert "Hello, robot." in rows.read_text()

@@ -44,7 +44,7 @@ sys.__stdout__.write(json.dumps(found))
 NEEDS = {
     "run": "sim", "show": "sim", "report": "report",
     "figures": "report", "compare": "report", "serve": "remote",
-    "records export": "export", "real score": "pages",
+    "real score": "pages",
     "export demonstrations": "sim", "export grounding": "sim",
     "language shortcuts": "report",
 }  # fmt: skip

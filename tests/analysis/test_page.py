@@ -20,6 +20,7 @@ from roboirg.evaluation.analysis.page.entries import Run
 from roboirg.evaluation.analysis.page.page_server import PageServer
 from roboirg.evaluation.analysis.page.report import make_view, render_runs, write_report
 from roboirg.evaluation.plan.plan import Plan
+from roboirg.evaluation.plan.sources import Source
 from roboirg.evaluation.play.video_writer import VideoWriter
 from roboirg.evaluation.records.episode_log import EpisodeLog, log_path
 from roboirg.evaluation.records.record import Attribution, EventRecord, Record
@@ -347,7 +348,7 @@ def test_choosing_an_event_seeks_in_the_film_inside(page: Any) -> None:
 
 
 def test_choosing_an_event_seeks_in_the_film_that_is_served(open_page: Any, run: Path) -> None:
-    with PageServer(run, lambda: make_view(run)) as server:
+    with PageServer(run, lambda: make_view(Source(run))) as server:
         thread = threading.Thread(target=server.serve_forever)
         thread.start()
         with open_page(server.address) as page:
@@ -374,10 +375,10 @@ def test_what_the_policy_printed_is_a_click_away(
         store.append(silent)
     with EpisodeLog(log_path(tmp_path, loud.slug)) as log:
         log.append(b"<b>some words</b>")
-    with PageServer(tmp_path, lambda: make_view(tmp_path)) as server:
+    with PageServer(tmp_path, lambda: make_view(Source(tmp_path))) as server:
         thread = threading.Thread(target=server.serve_forever, daemon=True)
         thread.start()
-        address = server.address if served else write_report(tmp_path).as_uri()
+        address = server.address if served else write_report(Source(tmp_path)).as_uri()
         with open_page(address) as page:
             for row in (0, 1):
                 page.locator("#rows h3 button").nth(row).click()

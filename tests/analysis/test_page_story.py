@@ -15,6 +15,7 @@ from roboirg.evaluation.analysis.stats.comparison import compare
 from roboirg.evaluation.analysis.stats.run_data import RunData
 from roboirg.evaluation.analysis.stats.run_summary import ALL
 from roboirg.evaluation.plan.plan_maker import make_plan
+from roboirg.evaluation.plan.sources import Source
 from roboirg.evaluation.play.rollout import EpisodeRunner
 from roboirg.evaluation.records.record import Record
 from roboirg.evaluation.records.store import read_records
@@ -94,4 +95,4 @@ def test_the_whole_report_follows(run: Path, tmp_path: Path) -> None:
     paths = write_figures(content, tmp_path)
     names = {path.stem.removesuffix("-dark") for path in paths}
     assert names == {"gaps", "forms", "expressions", "failures"}
-    assert "ended in an error (" not in write_report(run, planned=PLAN.jobs()).read_text()
+    assert "ended in an error (" not in write_report(Source(run)).read_text()

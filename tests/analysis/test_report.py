@@ -24,6 +24,7 @@ from roboirg.evaluation.analysis.page.columns import UNATTRIBUTED
 from roboirg.evaluation.analysis.page.entries import Run
 from roboirg.evaluation.analysis.page.report import make_view, render_runs, write_report
 from roboirg.evaluation.plan.plan import Plan
+from roboirg.evaluation.plan.sources import Source
 from roboirg.evaluation.plan.stored_plans import write_plan
 from roboirg.evaluation.records.episode_log import EpisodeLog, log_path
 from roboirg.evaluation.records.record import (
@@ -338,12 +339,12 @@ def test_what_was_printed_is_linked_to(tmp_path: Path) -> None:
     with EpisodeLog(log_path(folder, loud.slug)) as log:
         log.append(b"words")
     link = log_path(Path(), loud.slug).as_posix()
-    assert [one.get("log") for one in Page(write_report(folder).read_text()).details] == [
+    assert [one.get("log") for one in Page(write_report(Source(folder)).read_text()).details] == [
         link,
         None,
     ]
     other = store(tmp_path / "other", [loud])
-    page = Page(write_report(other, against=folder, videos=False).read_text())
+    page = Page(write_report(Source(other), against=Source(folder), videos=False).read_text())
     assert [one.get("log") for one in page.details] == [None, f"../a%20run/{link}", None]
 
 
@@ -351,7 +352,7 @@ def test_the_served_page_never_holds_films(tmp_path: Path) -> None:
     (tmp_path / "videos").mkdir()
     (tmp_path / "videos" / "x.mp4").write_bytes(b"film")
     store(tmp_path, [replace(records()[0], video="videos/x.mp4")])
-    (details,) = Page(make_view(tmp_path)).details
+    (details,) = Page(make_view(Source(tmp_path))).details
     assert details["film"] == "videos/x.mp4"
 
 
@@ -362,12 +363,9 @@ def test_two_runs_are_held_against_each_other(tmp_path: Path) -> None:
     found = records()
     store(ours, found)
     store(theirs, [replace(found[0], video="videos/x.mp4"), *found[1:-4]])
-    write_plan(PLAN, theirs)
-    page = Page(
-        write_report(
-            ours, videos=True, against=theirs, planned=PLAN.jobs(), planned_against=PLAN.jobs()
-        ).read_text()
-    )
+    for folder in (ours, theirs):
+        write_plan(PLAN, folder)
+    page = Page(write_report(Source(ours), against=Source(theirs)).read_text())
     policies = page.data["matrix"]["policies"]
     assert policies == [
         "listener, ours (privileged)", "forgetful, ours (privileged)",
@@ -394,7 +392,7 @@ def test_films_of_another_run_are_found_from_the_page(
     (tmp_path / "b" / "videos" / "x.mp4").write_bytes(b"film")
     store(tmp_path / "a", [records()[0]])
     store(tmp_path / "b", [replace(records()[0], video="videos/x.mp4")])
-    page = Page(write_report(tmp_path / "a", against=tmp_path / "b").read_text())
+    page = Page(write_report(Source(tmp_path / "a"), against=Source(tmp_path / "b")).read_text())
     assert page.details[1]["film"] == "../b/videos/x.mp4"
     assert (tmp_path / "a" / page.details[1]["film"]).is_file()
 
@@ -432,7 +430,7 @@ def test_the_head_says_which_run_it_was(tmp_path: Path) -> None:
         folder,
         [first, replace(second, started_at="2026-01-02T03:09:05+00:00")],
     )
-    text = write_report(folder).read_text()
+    text = write_report(Source(folder)).read_text()
     assert "<title>tuesday – RoboIRGBench</title>" in text
     assert "<dd>tuesday</dd>" in text
     assert "<dd>2026-01-02 03:04 to 03:09 UTC</dd>" in text
@@ -453,15 +451,15 @@ def test_an_unknown_task_is_shown_too() -> None:
 
 def test_the_page_is_written_whole_and_the_same_again(tmp_path: Path) -> None:
     store(tmp_path, records())
-    path = write_report(tmp_path)
+    path = write_report(Source(tmp_path))
     first = path.read_bytes()
-    assert write_report(tmp_path).read_bytes() == first
+    assert write_report(Source(tmp_path)).read_bytes() == first
     assert not list(tmp_path.glob(".*.part"))
 
 
 def test_no_records_is_one_sentence(tmp_path: Path) -> None:
     with pytest.raises(StoreError, match="There are no records"):
-        write_report(tmp_path)
+        write_report(Source(tmp_path))
 
 
 def test_the_first_pair_has_something_to_show() -> None:

@@ -1,28 +1,34 @@
-"""The commands `tables` and `compare` on real folders of records."""
+"""The commands `tables`, `compare`, `figures` and `report` on real folders and packs."""
 
 from __future__ import annotations
 
+import json
+import re
 from pathlib import Path
 
 import pytest
 import typer
 from made_records import make_record
+from msgspec.structs import replace
 from typer.testing import CliRunner
 
-from roboirg.cli.report_commands import compare, figures, tables
-from roboirg.core.errors import InvalidValueError, UnknownNameError
+from roboirg.apps.leaderboard.packing import pack_run
+from roboirg.cli.records_commands import merge
+from roboirg.cli.report_commands import compare, figures, report, tables
+from roboirg.core.errors import InvalidValueError, RoboIRGError, UnknownNameError
 from roboirg.evaluation.plan.plan_maker import make_plan
 from roboirg.evaluation.plan.stored_plans import write_plan
 from roboirg.evaluation.records.record_codec import StoreError
 from roboirg.evaluation.records.store import RecordStore
 
 app = typer.Typer()
-app.command()(tables)
-app.command()(compare)
-app.command()(figures)
+for command in (tables, compare, figures, report, merge):
+    app.command()(command)
 
 
-def write_run(folder: Path, policies: tuple[str, ...], leave_out: int = 0) -> None:
+def write_run(
+    folder: Path, policies: tuple[str, ...], leave_out: int = 0, device: str | None = None
+) -> Path:
     """The listener succeeds always, others in explicit only; the last episodes are not played."""
     plan = make_plan(
         policies, tasks="PickXtimes,StopCube", settings="explicit,direct", episodes="8"
@@ -31,15 +37,21 @@ def write_run(folder: Path, policies: tuple[str, ...], leave_out: int = 0) -> No
         jobs = plan.jobs()
         for job in jobs[: len(jobs) - leave_out]:
             won = job.policy == "listener" or job.setting == "explicit"
-            store.append(make_record(job, *(("success",) if won else ("failure", "wrong"))))
+            record = make_record(job, *(("success",) if won else ("failure", "wrong")))
+            store.append(replace(record, render_device=device))
     write_plan(plan, folder)
+    return folder
 
 
 @pytest.fixture(scope="module")
 def run(tmp_path_factory) -> Path:
-    folder = tmp_path_factory.mktemp("runs") / "both"
-    write_run(folder, ("listener", "forgetful"))
-    return folder
+    return write_run(tmp_path_factory.mktemp("runs") / "folder-run", ("listener", "forgetful"))
+
+
+@pytest.fixture(scope="module")
+def pack(run: Path) -> Path:
+    pack_run(run, path := run.parent / "shipped.roboirg.zip")
+    return path
 
 
 def call(*words: object) -> str:
@@ -58,23 +70,104 @@ def test_tables_are_printed(run: Path) -> None:
     assert "Reference Avg" not in output  # nothing of this suite was played
 
 
-@pytest.mark.parametrize(
-    ("name", "suffix"), [("terminal", "txt"), ("markdown", "md"), ("latex", "tex"), ("csv", "csv")]
-)
-def test_tables_are_written(run: Path, tmp_path: Path, name: str, suffix: str) -> None:
+def test_tables_are_written(run: Path, tmp_path: Path) -> None:
     out = tmp_path / "new" / "tables"
-    printed = call("tables", run, "--format", name, "--out", out, "--published")
-    files = sorted(path.name for path in out.iterdir())
-    assert files == [
-        f"{key}.{suffix}" for key in ("context", "coverage", "main", "planner", "real")
+    printed = call("tables", run, "--format", "latex", "--out", out, "--published")
+    names = ["context.tex", "coverage.tex", "main.tex", "planner.tex", "real.tex"]
+    assert sorted(path.name for path in out.iterdir()) == names
+    assert str(out / "main.tex") in printed
+    assert "29.11" in (out / "context.tex").read_text()
+
+
+def test_a_pack_is_read_like_the_folder_it_was_made_of(
+    run: Path, pack: Path, tmp_path: Path
+) -> None:
+    for words in (
+        ("tables", "--format", "csv"),
+        ("tables", "--by", "difficulty", "--format", "json"),
+        ("tables", "--which", "facts", "--format", "markdown"),
+        ("tables", "--which", "failures", "--format", "markdown"),
+    ):
+        assert call(*words, pack) == call(*words, run).replace(str(run), str(pack))
+    sides = call("compare", f"{pack}:listener", f"{run}:forgetful", "--by", "difficulty")
+    assert sides == call("compare", f"{run}:listener", f"{pack}:forgetful", "--by", "difficulty")
+    drawn = call("figures", pack, "--which", "gaps", "--out", tmp_path).splitlines()
+    assert [Path(path).name for path in drawn][:2] == ["gaps.png", "gaps.svg"]
+
+
+def test_a_page_is_written_next_to_a_pack_or_where_it_is_wanted(
+    run: Path, pack: Path, tmp_path: Path
+) -> None:
+    pages = [run / "report.html", pack.parent / "shipped.html", tmp_path / "page.html"]
+    for words in ((run,), (pack,), (f"{pack}:listener", "--against", run, "--out", pages[2])):
+        call("report", *words)
+    folder, packed, both = (page.read_text("utf-8") for page in pages)
+    assert packed == folder.replace("folder-run", "shipped")
+    assert "<title>shipped:listener against folder-run" in both
+    with pytest.raises(InvalidValueError, match="--serve shows one run"):
+        call("report", pack, "--serve", "--out", tmp_path / "x.html")
+
+
+def test_policies_are_chosen_where_a_run_is_named(run: Path, pack: Path, tmp_path: Path) -> None:
+    csv = ("--which", "main", "--format", "csv")
+    whole = call("tables", run, *csv)
+    (head, *rows), one = whole.splitlines(), call("tables", f"{run}:forgetful", *csv)
+    assert one.splitlines() == [head, *(row for row in rows if "forgetful" in row)]
+    assert call("tables", f"{run}:forgetful", f"{run}:listener", run, *csv) == whole
+    other = call("tables", f"{run}:forgetful", f"{pack}:listener", *csv)
+    assert sorted(other.splitlines()) == sorted(whole.splitlines())
+    named = write_run(tmp_path / "a:b", ("listener", "forgetful"))
+    (tmp_path / "a").mkdir()
+    assert call("tables", f"{named}:forgetful", *csv) == one
+    with pytest.raises(UnknownNameError, match="Did you mean 'listener'"):
+        call("tables", f"{pack}:listner")
+
+
+@pytest.mark.parametrize("name", ["nowhere", "nowhere:other"])
+def test_a_missing_run_is_named_without_its_policy(run: Path, name: str) -> None:
+    with pytest.raises(StoreError, match="There is no run at nowhere;"):
+        call("compare", run, name)
+
+
+def played_under(run: Path, folder: Path, **changes: object) -> Path:
+    """Write the episodes of the forgetful listener twice, the second time changed."""
+    with RecordStore(folder) as store:
+        for line in (run / "records.jsonl").read_bytes().splitlines():
+            record = json.loads(line)
+            if record["policy"] == "forgetful":
+                store.extend([line, json.dumps(record | changes).encode()])
+    write_plan(make_plan(("forgetful",), tasks="PickXtimes", episodes="8"), folder)
+    return folder
+
+
+def test_tables_failures_and_page_show_the_same_policy_runs(run: Path, tmp_path: Path) -> None:
+    folder = played_under(run, tmp_path / "steps", environment={"max_steps": 40})
+    output = call("report", folder)
+    labels = [f"forgetful, max steps {steps} (privileged)" for steps in (1300, 40)]
+    for label in labels:
+        assert f"{label} " in output
+        assert f"\n{label}: 16 episodes without success\n" in output
+        assert label in (folder / "report.html").read_text()
+    assert output.count("episodes without success") == 2
+
+
+def test_mixed_render_devices_are_named(run: Path, tmp_path: Path) -> None:
+    devices = ("llvmpipe", "NVIDIA H100")
+    runs = [
+        write_run(tmp_path / name, (name,), device=device)
+        for name, device in zip(("listener", "forgetful"), devices, strict=True)
     ]
-    assert str(out / f"main.{suffix}") in printed
-    assert "29.11" in (out / f"context.{suffix}").read_text()
-
-
-def test_a_missing_run_is_named_without_its_policy(run: Path) -> None:
-    with pytest.raises(StoreError, match="no records in nowhere;"):
-        call("compare", "nowhere:other", run)
+    merged = tmp_path / "merged"
+    for words in (
+        ("merge", *runs, "--out", merged),
+        ("tables", merged),
+        ("tables", *runs),
+        ("compare", *runs),
+        ("report", merged),
+    ):
+        assert "Mixed render devices: NVIDIA H100, llvmpipe. Their pictures" in call(*words)
+    for words in (("tables", runs[0], run), ("report", runs[0])):
+        assert "Mixed" not in call(*words)
 
 
 def test_floors_are_explained_below_the_table(run: Path) -> None:
@@ -82,59 +175,56 @@ def test_floors_are_explained_below_the_table(run: Path) -> None:
     assert "union: for each value the better" in " ".join(output.split())
 
 
-def test_published_tables_need_no_run() -> None:
+def test_published_values_need_no_run(tmp_path: Path) -> None:
     assert "51.34" in call("tables", "--which", "planner", "--published", "--format", "markdown")
     assert call("tables", "--which", "coverage", "--format", "csv").startswith("table,source")
-    for words in ((), ("--which", "main")):
-        with pytest.raises(InvalidValueError, match="Tables need a run"):
-            call("tables", *words)
-    with pytest.raises(UnknownNameError, match="Did you mean 'planner'"):
-        call("tables", "--which", "planer")
-    with pytest.raises(UnknownNameError, match="There is no format 'pdf'"):
-        call("tables", "--format", "pdf")
-
-
-def test_tables_of_runs_alone(run: Path, tmp_path: Path) -> None:
-    failures = call("tables", run, "--which", "failures", "--format", "csv")
-    assert 'failures,ours,"forgetful (privileged), direct",all tasks,failures,no,,16,' in failures
-    with pytest.raises(InvalidValueError, match="excludes --published"):
-        call("tables", run, "--which", "failures", "--published")
-    with pytest.raises(InvalidValueError, match="The table 'forms' needs a run"):
-        call("tables", "--which", "forms")
-    with pytest.raises(InvalidValueError, match="--forms implicit,resolved"):
-        call("tables", run, "--which", "forms")
     assert "gaps.png" in call("figures", "--published", "--out", tmp_path, "--which", "gaps")
-    with pytest.raises(InvalidValueError, match="Figures need a run"):
-        call("figures", "--out", tmp_path)
-    with pytest.raises(
-        InvalidValueError, match="The paper's tables have nothing to draw for forms"
-    ):
-        call("figures", "--published", "--out", tmp_path, "--which", "forms")
 
 
-def test_what_the_run_lacks_is_said(run: Path, tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("words", "says"),
+    [
+        ("tables", "Tables need a run"),
+        ("tables --which main", "Tables need a run"),
+        ("tables --which forms", "The table 'forms' needs a run"),
+        ("tables --by all", "--by needs a run"),
+        ("tables --which planer", "Did you mean 'planner'"),
+        ("tables --format pdf", "There is no format 'pdf'"),
+        ("tables RUN --which failures --published", "excludes --published"),
+        ("tables RUN --by pattern --which main", "--by prints tables of its own"),
+        ("tables RUN --which forms", "--forms implicit,resolved"),
+        ("tables RUN --which real", "no results for the table 'real'"),
+        ("tables EMPTY", "no records in"),
+        ("tables FILE", "is not a packed run"),
+        ("tables RUN --out FILE", "Cannot write"),
+        ("figures --out EMPTY", "Figures need a run"),
+        ("figures --published --out EMPTY --which forms", "The paper's tables have nothing to"),
+        ("compare RUN RUN:forgetful", "name one as RUN:listener"),
+        ("report EMPTY", "no records in"),
+    ],
+)
+def test_what_cannot_be_shown_is_one_sentence(
+    run: Path, tmp_path: Path, words: str, says: str
+) -> None:
+    (tmp_path / "file").write_text("")
+    places = {"RUN": str(run), "EMPTY": str(tmp_path), "FILE": str(tmp_path / "file")}
+    for name, place in places.items():
+        words = re.sub(rf"\b{name}\b", place, words)
+    with pytest.raises(RoboIRGError, match=says):
+        call(*words.split())
+
+
+def test_what_a_run_lacks_is_said(tmp_path: Path) -> None:
     write_run(tmp_path / "part", ("listener",), leave_out=3)
     output = call("tables", tmp_path / "part", "--which", "main", "--format", "markdown")
     assert "100.00 …" in output
     assert "3 trials of the plan are still to be played" in output
-    with pytest.raises(InvalidValueError, match="no results for the table 'real'"):
-        call("tables", run, "--which", "real")
-    with pytest.raises(StoreError, match="no records in"):
-        call("tables", tmp_path)
-    (tmp_path / "file").write_text("")
-    with pytest.raises(InvalidValueError, match="Cannot write"):
-        call("tables", run, "--out", tmp_path / "file")
 
 
 def test_two_policies_of_a_run_are_compared(run: Path) -> None:
     output = call("compare", f"{run}:listener", f"{run}:forgetful")
     assert "direct: listener (privileged) is better, +100.0 points" in output
     assert "explicit: no clear difference" in output
-    assert call("compare", f"{run}:listener", f"{run}:forgetful") == output
-    with pytest.raises(UnknownNameError, match="Did you mean 'listener'"):
-        call("compare", f"{run}:listner", f"{run}:forgetful")
-    with pytest.raises(InvalidValueError, match="name one as RUN:listener"):
-        call("compare", run, f"{run}:forgetful")
 
 
 def test_two_runs_of_a_policy_are_told_apart_by_their_folders(run: Path, tmp_path: Path) -> None:
@@ -142,5 +232,3 @@ def test_two_runs_of_a_policy_are_told_apart_by_their_folders(run: Path, tmp_pat
     output = call("compare", tmp_path / "again", f"{run}:listener")
     assert f"listener (privileged) ({tmp_path / 'again'}) against" in " ".join(output.split())
     assert "Incomplete: 3 trials" in output
-    with pytest.raises(StoreError, match="no records in"):
-        call("compare", tmp_path / "nowhere", run)

@@ -57,7 +57,7 @@ def printed(records: list[Record], planned: tuple[Job, ...] = ()) -> str:
 
 def failures_text(records: list[Record]) -> str:
     console = Console(file=io.StringIO(), width=40)
-    print_failures(records, console)
+    print_failures(records, make_run_tables(records), console)
     return console.file.getvalue()  # type: ignore[attr-defined,no-any-return]
 
 
@@ -173,7 +173,7 @@ def test_each_failure_is_listed_with_its_cause() -> None:
             record("failure", 3, cause="pressed the button", **direct | {"policy": "random"}),
         ]
     ).splitlines() == [
-        "oracle: 2 episodes without success",
+        "oracle (privileged): 2 episodes without success",
         f"  PickXtimes test/3 direct (resolved) (policy seed 2): {long}",
         "  PickXtimes test/7 direct: environment: worker died (signal 9) !",
         "random: 1 episode without success",

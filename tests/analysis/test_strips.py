@@ -13,6 +13,7 @@ from roboirg.evaluation.analysis.figures import write_figures
 from roboirg.evaluation.analysis.figures.strips import PICTURES, draw_strips, shown_steps
 from roboirg.evaluation.analysis.stats.run_data import RunData
 from roboirg.evaluation.plan.plan import Plan
+from roboirg.evaluation.plan.sources import Source
 from roboirg.evaluation.play.video_writer import VideoWriter
 from roboirg.evaluation.records.record import Attribution, Record, SubgoalRecord
 from roboirg.evaluation.records.store import RecordStore
@@ -98,7 +99,7 @@ def drawn(figure: Figure | None) -> list[list[tuple[str, float, bool]]]:
 
 def test_a_strip_shows_the_pictures_of_its_steps_and_marks_the_moment(tmp_path: Path) -> None:
     found = records()
-    explicit, failed = drawn(draw_strips([a_run(tmp_path, found)]))
+    explicit, failed = drawn(draw_strips([Source(a_run(tmp_path, found))]))
     for row, record in ((explicit, found[0]), (failed, found[1])):
         steps = shown_steps(record)
         assert len(row) == len(steps) == PICTURES
@@ -112,15 +113,16 @@ def test_a_strip_shows_the_pictures_of_its_steps_and_marks_the_moment(tmp_path: 
 
 def test_without_the_explicit_film_there_is_no_strip(tmp_path: Path) -> None:
     explicit, failed = records()
-    assert draw_strips([a_run(tmp_path / "a", [replace(explicit, video=None), failed])]) is None
-    assert draw_strips([a_run(tmp_path / "b", [explicit])]) is None
+    folder = a_run(tmp_path / "a", [replace(explicit, video=None), failed])
+    assert draw_strips([Source(folder)]) is None
+    assert draw_strips([Source(a_run(tmp_path / "b", [explicit]))]) is None
 
 
 def test_the_figure_is_written_from_a_folder(tmp_path: Path) -> None:
     found = records()
     folder = a_run(tmp_path / "run", found)
     content = RunData.of([("run", found)])
-    paths = write_figures(content, tmp_path / "figures", ["strips"], runs=[folder])
+    paths = write_figures(content, tmp_path / "figures", ["strips"], runs=[Source(folder)])
     endings = (".png", ".svg", ".pdf", "-dark.png", "-dark.svg")
     assert {path.name for path in paths} == {f"strips{ending}" for ending in endings}
     assert "Picked the wrong." in (tmp_path / "figures" / "strips.svg").read_text()

@@ -79,7 +79,6 @@ def test_every_kind_of_policy_and_every_application_is_there(everything):
     assert {
         "run",
         "tables",
-        "records export",
         "leaderboard verify",
         "show",
     } <= commands.keys()

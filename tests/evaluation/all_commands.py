@@ -33,7 +33,6 @@ WORDS = {
     "language shortcuts": "--tasks StopCube --settings direct --learned",
     "export instructions": "--tasks PickXtimes --split val --out {folder}/words.jsonl",
     "export episodes": "--tasks PickXtimes --split val --out {folder}/episodes.jsonl",
-    "records export": "{run} --out {folder}/records.parquet",
     "export demonstrations": "--tasks StopCube --episodes 1 --pictures none --settings explicit"
     " --workers 0 --out {folder}/moves",
     "export grounding": "--tasks StopCube --plan {one_episode} --settings explicit"

@@ -19,6 +19,7 @@ from roboirg.apps.leaderboard.run_verification import verify_run
 from roboirg.core.errors import InvalidValueError, SceneRejectedError
 from roboirg.evaluation.analysis.page.report import write_report
 from roboirg.evaluation.plan.plan_maker import make_plan
+from roboirg.evaluation.plan.sources import Source
 from roboirg.evaluation.play.rollout import EpisodeRunner
 from roboirg.evaluation.records.merging import merge_runs
 from roboirg.evaluation.records.store import read_records
@@ -167,10 +168,10 @@ def test_results_are_read_without_the_salt(tmp_path: Path) -> None:
     assert plan.drawable_jobs() == ()
     merge_runs([run], tmp_path / "merged")
     pack_run(run, tmp_path / "run.roboirg.zip")
-    page = write_report(run).read_text()
+    page = write_report(Source(run)).read_text()
     assert f"The episodes of {split} are private" in page
     os.environ[SALT_VARIABLE] = SALT
-    page = write_report(run, planned=plan.jobs()).read_text()
+    page = write_report(Source(run)).read_text()
     assert "are private" not in page
     assert SALT.encode() not in contents(tmp_path)
     cli = CliRunner()

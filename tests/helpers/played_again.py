@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from roboirg.apps.leaderboard.packing import opened_run
 from roboirg.apps.leaderboard.run_verification import verify_run
+from roboirg.evaluation.records.packs import opened_run
 
 
 def assert_holds_here(pack: Path, sample: float) -> None:

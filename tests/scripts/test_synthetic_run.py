@@ -10,6 +10,7 @@ from benchmarks.synthetic_run import write_synthetic_run
 from roboirg.evaluation.analysis.page.entries import Run
 from roboirg.evaluation.analysis.page.report import make_view, render_runs
 from roboirg.evaluation.analysis.stats.cells import gather
+from roboirg.evaluation.plan.sources import Source
 from roboirg.evaluation.plan.stored_plans import read_plan
 from roboirg.evaluation.records.merging import merge_runs
 from roboirg.evaluation.records.record_codec import identity_key
@@ -51,11 +52,9 @@ def test_parts_of_records_give_the_cells_of_whole_records(run: Path) -> None:
 
 def test_a_page_of_records_read_one_by_one_is_that_of_all_in_memory(run: Path) -> None:
     told: list[tuple[int, int]] = []
-    plan = read_plan(run)
-    assert plan is not None
-    planned = plan.jobs()[: 2 * COUNT]
-    page = make_view(run, planned, lambda done, total: told.append((done, total)))
-    whole = Run(run.name, read_records(run), run, planned)
+    source = Source(run)
+    page = make_view(source, lambda done, total: told.append((done, total)))
+    whole = Run(run.name, read_records(run), run, source.planned)
     assert page == render_runs([whole], embed=False)
     assert told == [(done, COUNT) for done in range(1, COUNT + 1)]
 

@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from roboirg.cli.options import check_output_file
-from roboirg.cli.run_commands import Folder, folder_of
+from roboirg.cli.run_commands import folder_of
 from roboirg.core.plain_text import counted
 
-records_app = typer.Typer(no_args_is_help=True, help="Merge and export records.")
+records_app = typer.Typer(no_args_is_help=True, help="Merge records.")
 
 
 @records_app.command()
@@ -29,6 +27,8 @@ def merge(
     typer.echo(
         f"Added {counted(merged.added, 'record')} to {out}; {merged.duplicates:,} already there."
     )
+    for sentence in merged.warnings:
+        typer.echo(sentence, err=True)
     if merged.conflicts:
         first = merged.conflicts[0]
         typer.echo(
@@ -37,24 +37,3 @@ def merge(
             f"{first.outcome}.",
             err=True,
         )
-
-
-@records_app.command()
-def export(
-    run: Folder,
-    out: Annotated[Path, typer.Option(help="Parquet file to write.")],
-) -> None:
-    """Export the records of a run as a Parquet table (columns: see docs/record.md).
-
-    Example: roboirg records export runs/first --out first.parquet
-    """
-    from roboirg.evaluation.records.parquet import write_parquet
-    from roboirg.evaluation.records.record_codec import read_summary
-    from roboirg.evaluation.records.store import StoredRun
-    from roboirg.util.parquet_support import check_parquet_support
-
-    check_parquet_support()
-    check_output_file(out)
-    stored = StoredRun(folder_of(run), read_summary)
-    count = write_parquet(stored.records(stored.newest), out)
-    typer.echo(f"{counted(count, 'record')}: {out}")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -19,7 +19,8 @@ if TYPE_CHECKING:
     from rich.console import Console
 
     from roboirg.evaluation.plan.plan import Plan
-    from roboirg.evaluation.records.record import Job
+    from roboirg.evaluation.plan.sources import Source
+    from roboirg.evaluation.records.record import Job, Summary
     from roboirg.evaluation.run.executor import Executor
     from roboirg.evaluation.run.runner import RunSummary
 
@@ -76,6 +77,7 @@ def run(
     Example: roboirg run --policy oracle --tasks PickXtimes --out runs/first
     """
     from roboirg.evaluation.plan.plan_file import plan_text
+    from roboirg.evaluation.plan.sources import Source
     from roboirg.evaluation.play.prompt_shares import prompt_shares, warning_lines
     from roboirg.evaluation.play.video_writer import check_video_support
     from roboirg.evaluation.run.runner import check_run
@@ -99,7 +101,7 @@ def run(
     for line in warning_lines(prompt_shares(made.jobs())):
         typer.echo(line, err=True)
     summary = play(made, folder, chosen, retry=retry_errors)
-    print_tables_of(folder, planned_jobs(folder))
+    print_tables_of(Source(folder))
     report_problems(summary, folder)
 
 
@@ -135,8 +137,8 @@ def play(plan: Plan, out: Path, executor: Executor, *, retry: bool) -> RunSummar
         sys.exit(TERMINATED if isinstance(interrupt, Terminated) else INTERRUPTED)
 
 
-def print_tables_of(folder: Path, planned: Sequence[Job]) -> None:
-    """Print the table of a run with its planned jobs, and its unsuccessful episodes."""
+def print_tables_of(source: Source) -> None:
+    """Print the tables of a run, what is mixed in it, and its unsuccessful episodes."""
     from rich.console import Console
 
     from roboirg.evaluation.analysis.tables.run_tables import (
@@ -144,19 +146,19 @@ def print_tables_of(folder: Path, planned: Sequence[Job]) -> None:
         print_failures,
         print_run_tables,
     )
-    from roboirg.evaluation.records.store import read_results
 
-    results, console = read_results(folder), Console()
-    print_run_tables(make_run_tables(results, planned), console)
-    print_failures(results, console)
+    tables, console = make_run_tables(source.results, source.planned), Console()
+    print_run_tables(tables, console)
+    warn_of_mixtures(source.results)
+    print_failures(source.results, tables, console)
 
 
-def planned_jobs(folder: Path) -> tuple[Job, ...]:
-    """Return the jobs of a run's newest plan; none if the plan or its episodes are not known."""
-    from roboirg.evaluation.plan.stored_plans import read_plan
+def warn_of_mixtures(results: Collection[Summary]) -> None:
+    """Print on stderr which versions and render devices are mixed in results."""
+    from roboirg.evaluation.records.mixing import mixture_warnings
 
-    plan = read_plan(folder)
-    return plan.drawable_jobs() if plan else ()
+    for sentence in mixture_warnings(results):
+        typer.echo(sentence, err=True)
 
 
 def report_problems(summary: RunSummary, folder: Path) -> None:

@@ -23,21 +23,21 @@ import numpy as np
 import pytest
 from evaluation_fakes import fake_record, small_plan
 
-from roboirg.apps.leaderboard.packing import MANIFEST, opened_run, pack_run
+from roboirg.apps.leaderboard.packing import pack_run
 from roboirg.apps.leaderboard.run_verification import verify_run
 from roboirg.core.errors import RoboIRGError
 from roboirg.evaluation.analysis.page.report import write_report
 from roboirg.evaluation.plan.plan_file import read_plan_file
+from roboirg.evaluation.plan.sources import Source
 from roboirg.evaluation.plan.stored_plans import read_plans, write_plan
 from roboirg.evaluation.records.action_log import ActionLog, read_actions, write_actions
 from roboirg.evaluation.records.episode_log import log_path
 from roboirg.evaluation.records.merging import merge_runs
-from roboirg.evaluation.records.parquet import write_parquet
+from roboirg.evaluation.records.packs import MANIFEST, opened_run
 from roboirg.evaluation.records.run_files import PLAN_FILE
 from roboirg.evaluation.records.store import (
     RECORDS_FILE,
     RecordStore,
-    iterate_records,
     read_records,
 )
 from roboirg.language.wordings.wording_file import read_wordings
@@ -91,14 +91,9 @@ def merge(run: Path) -> Path:
     return run.parent / "merged"
 
 
-def export(run: Path) -> object:
-    pytest.importorskip("pyarrow")
-    return write_parquet(iterate_records(run), run.parent / "table.parquet")
-
-
 def report(run: Path) -> Path:
     pytest.importorskip("jinja2")
-    return write_report(run)
+    return write_report(Source(run))
 
 
 def verify(run: Path) -> str:
@@ -215,7 +210,7 @@ def test_records_are_refused(name: str, reader: Reader, run: Path) -> None:
 
 def test_an_event_at_step_10_to_25_is_refused(run: Path) -> None:
     record(events=[{"step": 10**25, "kind": "home", "subject": "robot"}])(run)
-    for reader in (read_records, merge, export, verify):
+    for reader in (read_records, merge, verify):
         assert "$.events[0].step" in refusal(reader, run)
 
 
@@ -540,7 +535,6 @@ def test_the_honest_wording_file_is_read(tmp_path: Path) -> None:
 
 def test_the_honest_run_goes_through_every_reader(run: Path) -> None:
     assert len(read_records(run)) == 2
-    assert export(run) == 2
     assert len(read_records(merge(run))) == 2
     with opened_run(pack(run)) as folder:
         assert len(read_records(folder)) == 2

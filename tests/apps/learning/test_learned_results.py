@@ -7,8 +7,8 @@ import pytest
 import write_learned_table as tables
 from played_again import assert_holds_here
 
-from roboirg.apps.leaderboard.packing import opened_run
 from roboirg.apps.learning.listener.study_report import trained_rate
+from roboirg.evaluation.records.packs import opened_run
 from roboirg.evaluation.records.store import read_results
 from roboirg.language.settings import EXPLICIT, plain_settings, settings_of
 from roboirg.tasks import all_tasks, get_task

@@ -38,8 +38,8 @@ def verify(
 
     Example: roboirg leaderboard verify runs/first --sample 10%
     """
-    from roboirg.apps.leaderboard.packing import opened_run
     from roboirg.apps.leaderboard.run_verification import verify_run
+    from roboirg.evaluation.records.packs import opened_run
     from roboirg.util.processor import worker_count
 
     with opened_run(folder_of(run)) as folder, progress_bar("records") as show:

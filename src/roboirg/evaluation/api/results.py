@@ -20,9 +20,9 @@ from roboirg.evaluation.analysis.stats.run_data import RunData
 from roboirg.evaluation.analysis.stats.run_summary import ALL, summarize
 from roboirg.evaluation.analysis.tables.paper_tables import WHICH, is_informative, make_table
 from roboirg.evaluation.analysis.tables.rendering import get_format
-from roboirg.evaluation.plan.stored_plans import read_plan
-from roboirg.evaluation.records.record import Job, Record, Summary
-from roboirg.evaluation.records.store import read_records, read_results
+from roboirg.evaluation.plan.sources import Source
+from roboirg.evaluation.records.record import Record, Summary
+from roboirg.evaluation.records.store import read_records
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -59,7 +59,7 @@ class Results:
     @functools.cached_property
     def summaries(self) -> tuple[Summary, ...]:
         """The verdicts, one for each episode, without instructions and events."""
-        return read_results(self.folder)
+        return self._source.results
 
     @functools.cached_property
     def records(self) -> tuple[Record, ...]:
@@ -69,7 +69,7 @@ class Results:
     @functools.cached_property
     def cells(self) -> Cells:
         """The verdicts gathered by policy, task and instruction options."""
-        return gather([("", self.summaries)], self._planned)
+        return gather([("", self.summaries)], self._source.planned)
 
     @property
     def frame(self) -> pd.DataFrame:
@@ -142,7 +142,7 @@ class Results:
         names = tuple(name for name in FIGURES if name not in ("expressions", "strips"))
         if which not in names:
             raise UnknownNameError("figure", which, names)
-        content = RunData.of([("", self.summaries)], self._planned)
+        content = RunData.of([("", self.summaries)], self._source.planned)
         figure = draw_figure(which, content, published=published)
         if figure is None:
             raise InvalidValueError(f"The run has nothing to draw for {which!r}.")
@@ -168,7 +168,7 @@ class Results:
         """
         from roboirg.evaluation.analysis.page.report import write_report
 
-        return write_report(self.folder, planned=self._planned, videos=videos)
+        return write_report(self._source, videos=videos)
 
     def __repr__(self) -> str:
         counts = f"{counted(self.errors, 'error')}, {self.missing:,} missing"
@@ -184,9 +184,8 @@ class Results:
         return "\n".join(self.table(one, "markdown") for one in shown[:1]) or repr(self)
 
     @functools.cached_property
-    def _planned(self) -> Sequence[Job]:
-        plan = read_plan(self.folder)
-        return () if plan is None else plan.drawable_jobs()
+    def _source(self) -> Source:
+        return Source(self.folder)
 
     def _cells_of(self, policy: str) -> Cells:
         names = list(dict.fromkeys(key.policy_run.policy for key in self.cells))

@@ -1,1 +1,1 @@
-"""Records of episodes: one JSON object each, stored, merged and exported."""
+"""Records of episodes: one JSON object each, stored, merged and packed."""

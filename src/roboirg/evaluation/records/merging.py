@@ -14,6 +14,7 @@ from roboirg.core.errors import InvalidValueError
 from roboirg.evaluation.records.action_log import action_path
 from roboirg.evaluation.records.episode_log import log_path, logged_slugs
 from roboirg.evaluation.records.film import poster_name
+from roboirg.evaluation.records.mixing import mixture_warnings
 from roboirg.evaluation.records.record import Summary
 from roboirg.evaluation.records.record_codec import (
     StoreError,
@@ -39,11 +40,13 @@ class MergeSummary(NamedTuple):
         added: number of records added to the folder.
         duplicates: number of records whose episode was already there.
         conflicts: duplicates with another verdict than the one kept.
+        warnings: what is mixed in the folder, in sentences.
     """
 
     added: int
     duplicates: int
     conflicts: tuple[Summary, ...]
+    warnings: tuple[str, ...] = ()
 
 
 def merge_runs(folders: Sequence[Path], out: Path) -> MergeSummary:
@@ -87,7 +90,8 @@ def merge_runs(folders: Sequence[Path], out: Path) -> MergeSummary:
                 kept[identity_key(one)] = one
                 added += before is None
             store.extend(_lines(run, wanted, folder, out))
-    return MergeSummary(added, duplicates, tuple(conflicts))
+    mixed = mixture_warnings(tuple(kept.values()))
+    return MergeSummary(added, duplicates, tuple(conflicts), tuple(mixed))
 
 
 def _keep_plans(folders: Sequence[Path], out: Path) -> None:

@@ -4,7 +4,7 @@ A record is one JSON object with everything that reports and statistics need, so
 the simulator. It depends only on its job, not on the worker, the order, or what ran before, except
 for the fields in `NON_DETERMINISTIC_FIELDS`.
 
-These structs are the one list of fields: identity, Parquet columns and keys derive from them.
+These structs are the one list of fields: identity and keys derive from them.
 Types are checked when a line is read, and every line is read before it is stored.
 """
 

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, cast
 from roboirg.core.errors import InvalidValueError, UnknownNameError
 from roboirg.evaluation.analysis.figures.figure_style import STYLE, check_figure_support, save
 from roboirg.evaluation.analysis.stats.run_data import RunData
+from roboirg.evaluation.plan.sources import Source
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -22,7 +23,7 @@ def write_figures(
     which: Sequence[str] = FIGURES,
     *,
     published: bool = False,
-    runs: Sequence[Path] = (),
+    runs: Sequence[Source] = (),
 ) -> tuple[Path, ...]:
     """Draw figures as PNG, SVG and PDF, and as PNG and SVG for dark pages.
 
@@ -31,7 +32,7 @@ def write_figures(
         folder: created if missing.
         which: names out of `FIGURES`; figures without data are left out.
         published: whether to add the paper's values, in gray.
-        runs: folders of the runs, for strips of pictures.
+        runs: the runs themselves, for strips of pictures.
 
     Returns:
         The files.
@@ -54,7 +55,7 @@ def write_figures(
 
 
 def _written(
-    name: str, content: RunData, folder: Path, *, published: bool, runs: Sequence[Path]
+    name: str, content: RunData, folder: Path, *, published: bool, runs: Sequence[Source]
 ) -> tuple[Path, ...]:
     from roboirg.evaluation.analysis.figures.expressions import write_expressions
     from roboirg.evaluation.analysis.figures.strips import draw_strips

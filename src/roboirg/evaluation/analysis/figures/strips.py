@@ -17,10 +17,10 @@ from roboirg.evaluation.analysis.stats.option_labels import (
     options_label,
     options_sort_key,
 )
+from roboirg.evaluation.plan.sources import Source
 from roboirg.evaluation.records.film import FRAME_STEPS, LAST_FRAME_REPEATS
 from roboirg.evaluation.records.record import Job, Record, Summary
 from roboirg.evaluation.records.run_files import run_file
-from roboirg.evaluation.records.store import iterate_records, read_results
 from roboirg.util.media import CONTROL_RATE
 
 if TYPE_CHECKING:
@@ -40,13 +40,13 @@ class Strip(NamedTuple):
     record: Record
 
 
-def draw_strips(folders: Sequence[Path]) -> Figure | None:
+def draw_strips(sources: Sequence[Source]) -> Figure | None:
     """Draw for each policy the first failure that was filmed, below its explicit play.
 
     Returns:
         None without a failed implicit episode whose explicit twin was filmed as well.
     """
-    strips = [strip for folder in folders for strip in _strips(folder)]
+    strips = [strip for source in sources for strip in _strips(source)]
     if not strips:
         return None
     figure = new_figure(PAGE_INCHES, ROW_INCHES * len(strips))
@@ -72,9 +72,9 @@ def shown_steps(record: Record) -> list[int]:
     return steps
 
 
-def _strips(folder: Path) -> Iterable[Strip]:
+def _strips(source: Source) -> Iterable[Strip]:
     """Return the strips of a run, the explicit one before each failure."""
-    filmed = [one for one in read_results(folder) if one.video is not None]
+    filmed = [one for one in source.results if one.video is not None]
     results = [one for one in filmed if one.robot is None]  # other films have times of their own
     explicit = {_scene(one): one for one in results if one.column == REFERENCE}
     chosen: dict[str, Summary] = {}
@@ -83,9 +83,9 @@ def _strips(folder: Path) -> Iterable[Strip]:
             chosen.setdefault(one.policy, one)
     wanted = [job.identity for one in chosen.values() for job in (explicit[_scene(one)], one)]
     found: dict[Job, Record] = {
-        one.identity: one for one in iterate_records(folder) if one.identity in wanted
+        one.identity: one for one in source.records() if one.identity in wanted
     }
-    return [Strip(folder, found[job]) for job in wanted]
+    return [Strip(source.folder, found[job]) for job in wanted]
 
 
 def _scene(result: Summary) -> tuple[object, ...]:

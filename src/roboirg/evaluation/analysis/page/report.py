@@ -12,7 +12,7 @@ from typing import Any
 
 from roboirg.evaluation.analysis.page.columns import Columns, Progress, make_columns
 from roboirg.evaluation.analysis.page.entries import EpisodeEntries, Run, make_entries
-from roboirg.evaluation.analysis.page.episode_videos import EpisodeVideos
+from roboirg.evaluation.analysis.page.episode_videos import MAX_EMBEDDED_BYTES, EpisodeVideos
 from roboirg.evaluation.analysis.page.matrix import make_matrix
 from roboirg.evaluation.analysis.page.run_warnings import comparisons, facts_of, run_warnings
 from roboirg.evaluation.analysis.stats.arm_figures import arm_figures
@@ -22,9 +22,15 @@ from roboirg.evaluation.analysis.stats.run_data import RunData
 from roboirg.evaluation.analysis.tables.arm_table import make_arm_table
 from roboirg.evaluation.analysis.tables.breakdown_table import make_breakdown_table
 from roboirg.evaluation.analysis.tables.table import Table
+from roboirg.evaluation.plan.sources import Source
 from roboirg.evaluation.records.episode_log import logged_slugs
-from roboirg.evaluation.records.film import FRAME_RATE, FRAME_STEPS, LAST_FRAME_REPEATS
-from roboirg.evaluation.records.record import Job
+from roboirg.evaluation.records.film import (
+    FRAME_RATE,
+    FRAME_STEPS,
+    LAST_FRAME_REPEATS,
+    VIDEO_FOLDER,
+)
+from roboirg.evaluation.records.packs import PACK_SUFFIX
 from roboirg.evaluation.records.store import read_summaries
 from roboirg.language.settings import EXPLICIT, all_settings
 from roboirg.util.atomic_write import write_atomically
@@ -51,38 +57,39 @@ SCRIPTS = (
 
 
 def write_report(
-    folder: Path,
+    source: Source,
     *,
-    planned: Sequence[Job] = (),
+    against: Source | None = None,
+    out: Path | None = None,
     videos: bool = True,
-    against: Path | None = None,
-    planned_against: Sequence[Job] = (),
     progress: Progress | None = None,
 ) -> Path:
-    """Write ``report.html`` into a run's folder atomically.
+    """Write the page of a run atomically and return its path.
 
     Args:
-        folder: of the run.
-        planned: jobs that should have a record; the page marks cells that lack some.
+        source: the run.
+        against: another run, to compare with episode by episode.
+        out: file to write; without it, ``report.html`` in the run's folder, or a page next to its
+            pack, with the pack's name.
         videos: whether to embed the videos.
-        against: folder of another run, to compare with episode by episode.
-        planned_against: planned jobs of the other run.
         progress: called after each episode.
     """
     check_report_support()
-    path = folder / REPORT_FILE
-    runs = [_run(folder, planned, videos=videos)]
-    if against is not None:
-        link = f"{os.path.relpath(against, folder)}/"
-        runs.append(_run(against, planned_against, videos=videos, link=link))
-    write_atomically(path, render_runs(_distinct(runs, folder, against), progress=progress))
+    beside = source.path.with_name(f"{source.path.name.removesuffix(PACK_SUFFIX)}.html")
+    path = out or (beside if source.unpacked else source.folder / REPORT_FILE)
+    sources = [one for one in (source, against) if one is not None]
+    runs = [_run(one, path.parent, videos=videos) for one in sources]
+    if len({run.name for run in runs}) < len(runs):
+        paths = (str(one.path) for one in sources)
+        runs = [dataclasses.replace(run, name=one) for run, one in zip(runs, paths, strict=True)]
+    write_atomically(path, render_runs(runs, progress=progress))
     return path
 
 
-def make_view(folder: Path, planned: Sequence[Job] = (), progress: Progress | None = None) -> str:
+def make_view(source: Source, progress: Progress | None = None) -> str:
     """Return the page of a run as it is served, with links to its videos."""
     check_report_support()
-    return render_runs([_run(folder, planned, videos=True)], embed=False, progress=progress)
+    return render_runs([_run(source)], embed=False, progress=progress)
 
 
 def render_runs(
@@ -182,18 +189,24 @@ def _safe(text: str) -> str:
     return text.replace("<", "\\u003c")
 
 
-def _run(folder: Path, planned: Sequence[Job], *, videos: bool, link: str = "") -> Run:
+def _run(source: Source, place: Path | None = None, *, videos: bool = True) -> Run:
+    """Return a run whose page is written to the folder `place`; None if the page is served.
+
+    The files of a pack are gone when it is closed: a written page can embed them, not link to them.
+    """
+    folder = source.folder
     stored = read_summaries(folder)
-    media = folder if videos else None
-    logs = logged_slugs(folder)
-    return Run(folder.resolve().name, stored.newest, media, planned, link, stored, logs)
-
-
-def _distinct(runs: Sequence[Run], *folders: Path | None) -> list[Run]:
-    """Return the runs with distinct names."""
-    if len({run.name for run in runs}) == len(runs):
-        return list(runs)
-    return [
-        dataclasses.replace(run, name=str(folder))
-        for run, folder in zip(runs, [one for one in folders if one is not None], strict=True)
-    ]
+    is_closed = place is not None and source.unpacked is not None
+    if is_closed:
+        sizes = (path.stat().st_size for path in (folder / VIDEO_FOLDER).rglob("*"))
+        videos = videos and sum(sizes) <= MAX_EMBEDDED_BYTES
+    link = "." if place is None else os.path.relpath(folder, place)
+    return Run(
+        source.name,
+        tuple(source.wanted(stored.newest)),
+        folder if videos else None,
+        source.planned,
+        "" if link == "." else f"{link}/",
+        stored,
+        frozenset() if is_closed else logged_slugs(folder),
+    )

@@ -117,19 +117,23 @@ def print_run_tables(tables: Sequence[RunTable], console: Console) -> None:
     console.print("; ".join(_legend(tables)), style="dim", highlight=False)
 
 
-def print_failures(records: Iterable[Summary], console: Console) -> None:
-    """List the episodes of each policy without success and the cause; count the rest."""
-    by_policy: dict[str, list[Summary]] = {}
+def print_failures(
+    records: Iterable[Summary], tables: Sequence[RunTable], console: Console
+) -> None:
+    """List for each table the episodes without success and the cause; count the rest."""
+    failed: dict[PolicyRun, list[Summary]] = {}
     for record in records:
         if record.outcome != "success":
-            by_policy.setdefault(record.policy, []).append(record)
-    for policy, failures in by_policy.items():
-        title = f"{counted(len(failures), 'episode')} without success"
-        console.print(Text.assemble((policy, "bold"), f": {title}"))
+            failed.setdefault(PolicyRun.of(record), []).append(record)
+    for table in tables:
         # The same order for any number of worker processes.
-        failures.sort(
-            key=lambda one: (one.task, one.split, one.episode, options_sort_key(one.options))
+        failures = sorted(
+            failed.get(table.policy_run, ()),
+            key=lambda one: (one.task, one.split, one.episode, options_sort_key(one.options)),
         )
+        if failures:
+            title = f"{counted(len(failures), 'episode')} without success"
+            console.print(Text.assemble((table.label, "bold"), f": {title}"), soft_wrap=True)
         for record in failures[:MAX_FAILURES]:
             console.print(Text(f"  {failure_text(record)}"), highlight=False, soft_wrap=True)
         if len(failures) > MAX_FAILURES:

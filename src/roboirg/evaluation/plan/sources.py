@@ -1,0 +1,119 @@
+"""Stored runs, plans with records: folders, packs, or some policies of these."""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Collection, Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import TypeVar
+
+from roboirg.core.errors import InvalidValueError, UnknownNameError
+from roboirg.evaluation.plan.stored_plans import read_plan
+from roboirg.evaluation.records.packs import PACK_SUFFIX, opened_run
+from roboirg.evaluation.records.record import Job, Record, Summary
+from roboirg.evaluation.records.store import iterate_records, read_results
+
+AnyJob = TypeVar("AnyJob", bound=Job)
+
+
+@dataclass(frozen=True)
+class Source:
+    """An opened run, or some of its policies.
+
+    Attributes:
+        path: of the folder or the pack, as it was given.
+        unpacked: folder with the files of a pack; None if `path` is one.
+        policies: those that are wanted; None for all.
+    """
+
+    path: Path
+    unpacked: Path | None = None
+    policies: tuple[str, ...] | None = None
+
+    @property
+    def folder(self) -> Path:
+        """The folder with the files."""
+        return self.unpacked or self.path
+
+    @property
+    def name(self) -> str:
+        """The name of the folder or the pack, with those of the wanted policies."""
+        name = self.path.resolve().name.removesuffix(PACK_SUFFIX)
+        return ":".join((name, *(self.policies or ())))
+
+    @cached_property
+    def results(self) -> tuple[Summary, ...]:
+        """The newest result of each episode, in the order of the file.
+
+        Raises:
+            StoreError: there are none, or a line is not a record of this schema version.
+            UnknownNameError: a policy that is wanted is neither among them nor planned.
+        """
+        found = read_results(self.folder)
+        known = list(dict.fromkeys(one.policy for one in (*self.planned, *found)))
+        for policy in self.policies or ():
+            if policy not in known:
+                raise UnknownNameError(f"policy in {self.path}", policy, known)
+        return tuple(self.wanted(found))
+
+    @cached_property
+    def planned(self) -> tuple[Job, ...]:
+        """The jobs of the newest plan; none if the plan or its episodes are not known."""
+        plan = read_plan(self.folder)
+        return () if plan is None else tuple(self.wanted(plan.drawable_jobs()))
+
+    def records(self) -> Iterator[Record]:
+        """Yield the whole records; those that were written again come twice."""
+        return iter(self.wanted(iterate_records(self.folder)))
+
+    def wanted(self, jobs: Iterable[AnyJob]) -> Iterable[AnyJob]:
+        """Return the jobs of the policies that are wanted."""
+        if self.policies is None:
+            return jobs
+        return (one for one in jobs if one.policy in self.policies)
+
+
+Pooled = tuple[list[tuple[str, Sequence[Summary]]], list[Job]]
+"""The results of several runs, each with its path, and all their planned jobs."""
+
+
+def pooled(sources: Sequence[Source]) -> Pooled:
+    results: list[tuple[str, Sequence[Summary]]] = [(str(one.path), one.results) for one in sources]
+    return results, [job for one in sources for job in one.planned]
+
+
+@contextlib.contextmanager
+def opened_sources(
+    paths: Iterable[str | Path], folders: Collection[str] = ()
+) -> Iterator[list[Source]]:
+    """Open folders and packs, each once, even if several of its policies are named.
+
+    Args:
+        paths: of folders and packs; ``PATH:policy`` for one policy, whose name may contain colons.
+        folders: what is unpacked of packs besides records and plans, as in `opened_run`.
+
+    Raises:
+        StoreError: there is no such path, or the file is no pack.
+    """
+    named: dict[Path, list[str | None]] = {}
+    for path, policy in map(_split, map(str, paths)):
+        named.setdefault(path, []).append(policy)
+    with contextlib.ExitStack() as stack:
+        found = []
+        for path, policies in named.items():
+            folder = stack.enter_context(opened_run(path, folders))
+            wanted = None if None in policies else tuple(dict.fromkeys(filter(None, policies)))
+            found.append(Source(path, None if folder == path else folder, wanted))
+        yield found
+
+
+def _split(text: str) -> tuple[Path, str | None]:
+    """Return the path of a run, and the policy that follows it after a colon."""
+    if not text.strip():
+        raise InvalidValueError("The name of the run's folder is empty.")
+    ends = [len(text), *(place for place in reversed(range(len(text))) if text[place] == ":")]
+    end = next((end for end in ends if Path(text[:end]).exists()), None)
+    path, _, policy = text.partition(":") if end is None else (text[:end], "", text[end + 1 :])
+    return Path(path), policy or None
