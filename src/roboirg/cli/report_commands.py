@@ -135,7 +135,7 @@ def figures(
 
     check_figure_support()
     if not runs and not published:
-        raise InvalidValueError("Figures need a run; give its folder, or --published.")
+        raise InvalidValueError("Figures need a run; give its folder, a pack, or --published.")
     names = FIGURES if which == _ALL else tuple(word.strip() for word in which.split(","))
     with opened_sources(runs or [], MEDIA_FOLDERS) as sources:
         content = RunData.of(*pooled(sources))
@@ -183,15 +183,7 @@ def tables(
     output = get_format(format)
     with opened_sources(runs or []) as sources:
         warn_of_mixtures([one for source in sources for one in source.results])
-        if by is None:
-            found = _tables(which, sources, published=published, floors=floors)
-        elif published or floors or which != _ALL:
-            raise InvalidValueError(
-                "--by prints tables of its own; it cannot be combined with --which, --published or "
-                "--floors."
-            )
-        else:
-            found = _breakdown_tables(sources, by)
+        found = _tables(which, by, sources, published=published, floors=floors)
     if out is not None:
         for table in found:
             path = out / f"{table.key}{output.suffix}"
@@ -251,9 +243,9 @@ def compare(
 
 
 def _tables(
-    which: str, sources: Sequence[Source], *, published: bool, floors: str | None
+    which: str, by: str | None, sources: Sequence[Source], *, published: bool, floors: str | None
 ) -> list[Table]:
-    """Return a table, or all that apply; those of runs alone have no published rows or floors."""
+    """Return the tables that are wanted; those of runs alone have no published rows or floors."""
     from roboirg.evaluation.analysis.stats.run_data import RunData
     from roboirg.evaluation.analysis.tables.diagnostic_tables import (
         DIAGNOSTIC_TABLES,
@@ -261,12 +253,19 @@ def _tables(
     )
     from roboirg.evaluation.plan.sources import pooled
 
-    if which not in (*DIAGNOSTIC_TABLES, *RECORD_TABLES):
+    alone = (*DIAGNOSTIC_TABLES, *RECORD_TABLES)
+    asked = [which] * (which != _ALL) + ["--by"] * (by is not None)
+    if {*alone, "--by"} & {*asked} and (published or floors or len(asked) > 1):
+        raise InvalidValueError(
+            f"--by, and --which {', '.join(alone)}, show runs alone; each excludes the other, "
+            "--published and --floors."
+        )
+    if not sources and not published and which != "coverage":
+        raise InvalidValueError("Tables need a run; give its folder, a pack, or --published.")
+    if by is not None:
+        return _breakdown_tables(sources, by)
+    if which not in alone:
         return _paper_tables(which, sources, published=published, floors=floors)
-    if published or floors:
-        raise InvalidValueError(f"--which {which} excludes --published, --floors and --by.")
-    if not sources:
-        raise InvalidValueError(f"The table {which!r} needs a run; give its folder.")
     data = RunData.of(*pooled(sources))
     if which in DIAGNOSTIC_TABLES:
         return [DIAGNOSTIC_TABLES[which](data)]
@@ -289,8 +288,6 @@ def _paper_tables(
 
     if which not in (*WHICH, _ALL):
         raise UnknownNameError("table", which, (*WHICH, *DIAGNOSTIC_TABLES, *RECORD_TABLES, _ALL))
-    if which != "coverage" and not published and not sources:
-        raise InvalidValueError("Tables need a run; give its folder, or --published.")
     cells = gather(*pooled(sources))
     shown = (*RATE_TABLES, "coverage") if published else ()
     applying = [one for one in WHICH if one in shown or is_informative(one, cells)]
@@ -311,8 +308,6 @@ def _breakdown_tables(sources: Sequence[Source], by: str) -> list[Table]:
     from roboirg.evaluation.analysis.tables.breakdown_table import make_breakdown_table
     from roboirg.evaluation.plan.sources import pooled
 
-    if not sources:
-        raise InvalidValueError("--by needs a run; give its folder.")
     cells = gather(*pooled(sources))
     tables = (make_breakdown_table(one, cells, own) for one, own in _labels(by, sources).items())
     if not (found := [table for table in tables if table.rows]):

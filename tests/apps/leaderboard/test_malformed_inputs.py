@@ -465,6 +465,7 @@ PACKS: Mapping[str, tuple[Callable[[bytes], bytes], str]] = {
     "absolute path": (_with("/var/evil"), "not belong to a run"),
     "path that leaves": (_with("actions/../../evil"), "not belong to a run"),
     "Windows path": (_with("actions\\..\\..\\evil"), "not belong to a run"),
+    "file of another kind": (_with("x"), "not belong to a run"),
     "name in bidi marks": (_with("logs/\u202egol"), "not belong to a run"),
     "name of 60,000 letters": (_with("logs/" + "a" * 60_000), "not belong to a run"),
     "name with a line end": (_with("logs/a.txt\n"), "not belong to a run"),
