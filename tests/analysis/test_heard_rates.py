@@ -11,13 +11,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from made_records import make_record
+from page_text import store
 from rich.console import Console
 from typer.testing import CliRunner
 
 from roboirg import main
 from roboirg.core.instruction_options import InstructionOptions
-from roboirg.evaluation.analysis.page.details import Strings, details_of
-from roboirg.evaluation.analysis.page.entries import Run, make_entries
+from roboirg.evaluation.analysis.page.details import EpisodeDetails
+from roboirg.evaluation.analysis.page.episodes import PageEpisodes
 from roboirg.evaluation.analysis.page.run_warnings import run_warnings
 from roboirg.evaluation.analysis.stats.cells import PolicyRun
 from roboirg.evaluation.analysis.stats.heard_rates import add_up, count_heard, cut_text, heard_notes
@@ -144,21 +145,20 @@ def test_the_command_prints_it_on_request(run: Path) -> None:
     assert "--which heard excludes --published" in str(refused.exception)
 
 
-def test_the_page_says_what_was_cut() -> None:
+def test_the_page_says_what_was_cut(tmp_path: Path) -> None:
     cut, whole = long_record("cutting", 64), long_record("whole", 1000)
-    entries = make_entries([Run("run", [cut, whole])])
-    (warning,) = [one for one in run_warnings(entries) if "limited" in one.text]
-    assert warning.kind == "warning"
-    assert warning.text.startswith("cutting did not read every instruction to its end")
-    strings = Strings()
-    details = details_of(cut, strings, None, None, embeds=False)
-    assert details["reached"] == list(cut.prompt.reached)  # type: ignore[union-attr]
-    assert strings.texts[details["prompt"]].startswith("cut: needs ")
-    assert "the model reads 64 (counted with some.model)" in strings.texts[details["prompt"]]
-    assert "mentions lost" in strings.texts[details["prompt"]]
+    episodes = PageEpisodes.of({"run": store(tmp_path, [cut, whole])}, videos=False)
+    (warning,) = [text for kind, text in run_warnings(episodes) if "limited" in text]
+    assert warning.startswith("cutting did not read every instruction to its end")
+    page = EpisodeDetails(tmp_path, embeds=False)
+    details = page.details_of(cut)
+    assert details["reached"] == cut.prompt.reached  # type: ignore[union-attr]
+    prompt = list(page.strings)[details["prompt"]]
+    assert prompt.startswith("cut: needs ")
+    assert "the model reads 64 (counted with some.model)" in prompt
+    assert "mentions lost" in prompt
     for record in (whole, long_record("silent", None)):
-        shown = details_of(record, strings, None, None, embeds=False)
-        assert not {"reached", "prompt"} & set(shown)
+        assert not {"reached", "prompt"} & set(page.details_of(record))
 
 
 @pytest.mark.browser

@@ -6,6 +6,7 @@ import itertools
 import re
 import threading
 from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from time import monotonic
 from typing import Any
@@ -14,17 +15,16 @@ import numpy as np
 import pytest
 from made_records import make_record
 from msgspec.structs import replace
-from page_text import render
+from page_text import store
 
-from roboirg.evaluation.analysis.page.entries import Run
+from roboirg.evaluation.analysis.page import report
 from roboirg.evaluation.analysis.page.page_server import PageServer
-from roboirg.evaluation.analysis.page.report import make_view, render_runs, write_report
+from roboirg.evaluation.analysis.page.report import make_view, write_report
 from roboirg.evaluation.plan.plan import Plan
 from roboirg.evaluation.plan.sources import Source
 from roboirg.evaluation.play.video_writer import VideoWriter
 from roboirg.evaluation.records.episode_log import EpisodeLog, log_path
 from roboirg.evaluation.records.record import Attribution, EventRecord, Record
-from roboirg.evaluation.records.store import RecordStore
 
 pytest.importorskip("jinja2")
 pytestmark = pytest.mark.browser
@@ -39,6 +39,7 @@ PLAN = Plan(
     forms=("implicit", "resolved"),
 )
 FILMED = "PickXtimes"
+LOG = b"<b>some words</b>"
 TRACEBACK = "Traceback <script>alert(1)</script>"
 
 
@@ -86,8 +87,8 @@ class Blank:
 
 
 @pytest.fixture(scope="module")
-def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A folder with records and one real film: 100 steps, every 8th of them, and the end."""
+def run(tmp_path_factory: pytest.TempPathFactory) -> Source:
+    """A run with records and one real film: 100 steps, every 8th of them, and the end."""
     folder = tmp_path_factory.mktemp("run")
     film = VideoWriter(folder / "videos" / "x.mp4")
     film.caption = "Do it."
@@ -95,17 +96,25 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
     for step in range(0, 101, 8):
         film.add_frame(world, is_demonstration=step < 20)  # type: ignore[arg-type]
     assert film.finish()
-    with RecordStore(folder) as store:
-        for record in records():
-            store.append(record)
-    return folder
+    loud = records()[0]
+    with EpisodeLog(log_path(folder, loud.slug)) as log:
+        log.append(LOG)
+    return store(folder, records(), PLAN)
 
 
 @pytest.fixture(scope="module")
-def page_file(run: Path) -> Path:
-    path = run / "report.html"
-    path.write_text(render(records(), run, PLAN.jobs(), name="a run"))
-    return path
+def page_file(run: Source) -> Path:
+    return write_report(run)
+
+
+@contextmanager
+def serving(run: Source) -> Iterator[PageServer]:
+    with PageServer(run.folder, lambda: make_view(run)) as server:
+        thread = threading.Thread(target=server.serve_forever)
+        thread.start()
+        yield server
+        server.shutdown()
+        thread.join()
 
 
 @pytest.fixture
@@ -227,9 +236,6 @@ def test_a_cell_shows_its_numbers_to_mouse_and_keyboard_and_shows_its_episodes(p
     assert page.input_value("#filters [name=task]") == "PickXtimes"
     assert page.input_value("#filters [name=form]") == "implicit"
     assert focused(page, "id") == "episodes"
-
-
-def test_a_row_of_a_suite_shows_its_tasks(page: Any) -> None:
     page.locator("tr.suite .cell").first.click()
     assert page.input_value("#filters [name=task]") == "any counting"
     assert shown(page) == 6
@@ -330,67 +336,40 @@ def wait_until(element: Any, predicate: str) -> None:
         element.page.wait_for_timeout(20)
 
 
-def check_seeking(page: Any) -> None:
-    row = first_row(page, policy="listener (privileged)", task=FILMED, setting="explicit")
-    row.locator(".moments button", has_text="lowered").click()
-    film = row.locator("video")
-    wait_until(film, "one => one.currentTime > 0 && !one.seeking")
-    time, length = film.evaluate("one => [one.currentTime, one.duration]")
-    # The turn ends where the last picture begins to be repeated; step 60 is 20 steps before.
-    assert time == pytest.approx(length - 0.8 - 20 / 80, abs=0.06)
-    row.locator(".track button.done, .track button.event").first.click()
-    wait_until(film, f"one => one.currentTime < {time} - 0.1")
-    assert row.locator(".head").is_visible()
-
-
-def test_choosing_an_event_seeks_in_the_film_inside(page: Any) -> None:
-    check_seeking(page)
-
-
-def test_choosing_an_event_seeks_in_the_film_that_is_served(open_page: Any, run: Path) -> None:
-    with PageServer(run, lambda: make_view(Source(run))) as server:
-        thread = threading.Thread(target=server.serve_forever)
-        thread.start()
-        with open_page(server.address) as page:
-            check_seeking(page)
-            assert page.locator("video").first.get_attribute("src") == "videos/x.mp4"
-        server.shutdown()
-        thread.join()
-
-
-def test_a_film_beside_the_page_plays_from_a_file(open_page: Any, run: Path) -> None:
-    path = run / "linked.html"
-    path.write_text(render_runs([Run("a", records(), run)], embed=False))
-    with open_page(path.as_uri()) as page:
-        check_seeking(page)
-
-
-@pytest.mark.parametrize("served", [True, False])
-def test_what_the_policy_printed_is_a_click_away(
-    open_page: Any, tmp_path: Path, served: bool
+@pytest.mark.parametrize("place", ["inside", "next to it", "served"])
+def test_choosing_an_event_seeks_in_the_film(
+    open_page: Any, run: Source, page_file: Path, place: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    loud, silent = records()[:2]
-    with RecordStore(tmp_path) as store:
-        store.append(loud)
-        store.append(silent)
-    with EpisodeLog(log_path(tmp_path, loud.slug)) as log:
-        log.append(b"<b>some words</b>")
-    with PageServer(tmp_path, lambda: make_view(Source(tmp_path))) as server:
-        thread = threading.Thread(target=server.serve_forever, daemon=True)
-        thread.start()
-        address = server.address if served else write_report(Source(tmp_path)).as_uri()
-        with open_page(address) as page:
-            for row in (0, 1):
-                page.locator("#rows h3 button").nth(row).click()
-            (link,) = page.get_by_text("what was printed").all()
-            target = link.get_attribute("href")
-            assert (tmp_path / target).read_text() == "<b>some words</b>"
-            if served:
-                answer = page.request.get(server.address + target)
-                assert answer.text() == "<b>some words</b>"
-                assert answer.headers["content-type"] == "text/plain; charset=utf-8"
-        server.shutdown()
-        thread.join()
+    with ExitStack() as stack:
+        if place == "served":
+            address = stack.enter_context(serving(run)).address
+        elif place == "inside":
+            address = page_file.as_uri()
+        else:
+            monkeypatch.setattr(report, "MAX_EMBEDDED_BYTES", 0)
+            address = write_report(run, out=run.folder / "linked.html").as_uri()
+        page = stack.enter_context(open_page(address))
+        row = first_row(page, policy="listener (privileged)", task=FILMED, setting="explicit")
+        row.locator(".moments button", has_text="lowered").click()
+        film = row.locator("video")
+        wait_until(film, "one => one.currentTime > 0 && !one.seeking")
+        time, length = film.evaluate("one => [one.currentTime, one.duration]")
+        # The turn ends where the last picture begins to be repeated; step 60 is 20 steps before.
+        assert time == pytest.approx(length - 0.8 - 20 / 80, abs=0.06)
+        row.locator(".track button.done, .track button.event").first.click()
+        wait_until(film, f"one => one.currentTime < {time} - 0.1")
+        assert row.locator(".head").is_visible()
+        assert (film.get_attribute("src") == "videos/x.mp4") == (place != "inside")
+
+
+def test_what_the_policy_printed_is_a_click_away(open_page: Any, run: Source) -> None:
+    with serving(run) as server, open_page(server.address) as page:
+        for row in (0, 1):
+            page.locator("#rows h3 button").nth(row).click()
+        (link,) = page.get_by_text("what was printed").all()
+        answer = page.request.get(server.address + link.get_attribute("href"))
+        assert answer.body() == LOG
+        assert answer.headers["content-type"] == "text/plain; charset=utf-8"
 
 
 def test_two_policies_are_compared_episode_by_episode(page: Any) -> None:
@@ -415,24 +394,6 @@ def test_two_policies_are_compared_episode_by_episode(page: Any) -> None:
     page.goto(page.url.replace("view=pairs", "view="))
     page.reload()
     assert page.locator("#filters [name=outcome]").is_visible()
-
-
-def test_two_runs_are_compared(open_page: Any, tmp_path: Path) -> None:
-    before = [one for one in records() if one.policy == "forgetful"]
-    after = [
-        replace(one, outcome="success", cause=None, attribution=None)
-        if one.outcome == "failure" and one.task == "StopCube"
-        else one
-        for one in before[:-4]
-    ]
-    path = tmp_path / "page.html"
-    path.write_text(render_runs([Run("before", before), Run("after", after)]))
-    gained = sum(one.outcome == "failure" and one.task == "StopCube" for one in before[:-4])
-    with open_page(f"{path.as_uri()}#?view=pairs") as page:
-        assert shown(page) == gained > 0
-        assert f"of {len(after)} pairs" in page.locator("#shown").inner_text()
-        page.select_option("#filters [name=change]", "right")
-        assert shown(page) == gained
 
 
 @pytest.mark.parametrize("scheme", ["light", "dark"])
@@ -485,9 +446,7 @@ def test_ten_thousand_episodes_cost_no_more_than_a_page_of_them(
     many = [
         replace(one, policy_seed=seed) for seed in range(-(-10_000 // len(some))) for one in some
     ][:10_000]
-    path = tmp_path / "many.html"
-    path.write_text(render(many))
-    with open_page(path.as_uri()) as page:
+    with open_page(write_report(store(tmp_path, many)).as_uri()) as page:
         assert shown(page) == 10_000
         elements = "document.querySelectorAll('*').length"
         assert page.evaluate(elements) < MOST_ELEMENTS

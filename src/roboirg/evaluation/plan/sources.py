@@ -13,7 +13,7 @@ from roboirg.core.errors import InvalidValueError, UnknownNameError
 from roboirg.evaluation.plan.stored_plans import read_plan
 from roboirg.evaluation.records.packs import PACK_SUFFIX, opened_run
 from roboirg.evaluation.records.record import Job, Record, Summary
-from roboirg.evaluation.records.store import iterate_records, read_results
+from roboirg.evaluation.records.store import StoredRun, iterate_records, read_summaries
 
 AnyJob = TypeVar("AnyJob", bound=Job)
 
@@ -44,6 +44,15 @@ class Source:
         return ":".join((name, *(self.policies or ())))
 
     @cached_property
+    def stored(self) -> StoredRun[Summary]:
+        """The newest result of each episode, and where its whole record is.
+
+        Raises:
+            StoreError: there are none, or a line is not a record of this schema version.
+        """
+        return read_summaries(self.folder)
+
+    @cached_property
     def results(self) -> tuple[Summary, ...]:
         """The newest result of each episode, in the order of the file.
 
@@ -51,7 +60,7 @@ class Source:
             StoreError: there are none, or a line is not a record of this schema version.
             UnknownNameError: a policy that is wanted is neither among them nor planned.
         """
-        found = read_results(self.folder)
+        found = self.stored.newest
         known = list(dict.fromkeys(one.policy for one in (*self.planned, *found)))
         for policy in self.policies or ():
             if policy not in known:

@@ -1,94 +1,215 @@
-"""The details of an opened episode: instruction with mentions, timeline, cause, video."""
+"""The details of an opened episode: instruction with mentions, timeline, cause, video.
+
+Every text of the page is stored once. The details of an episode are a line of JSON with indices of
+texts, which the page parses when the episode is opened.
+
+A record leaves out what follows from it: the resolved form of its instruction, and when stages were
+completed. Both are derived by the installed package, so only for records of the same versions; the
+page omits them for others.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+import os
+from collections import Counter
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
+from urllib.parse import quote
 
+import msgspec
+
+from roboirg.core.conditions import Fact, facts_of
+from roboirg.core.episode import ENVIRONMENT_VERSION, Episode, Scene
+from roboirg.core.errors import RoboIRGError
 from roboirg.core.fact_traits import fact_traits
 from roboirg.core.plain_text import counted
-from roboirg.evaluation.analysis.page.episode_videos import EpisodeVideo
-from roboirg.evaluation.analysis.page.reconstruction import names_of, stages_of
+from roboirg.evaluation.analysis.page.episodes import PageEpisode
 from roboirg.evaluation.analysis.stats.option_labels import words_label
+from roboirg.evaluation.play.job_instruction import PreparedJob, instruct_job
 from roboirg.evaluation.records.record import EventRecord, Record, SubgoalRecord
+from roboirg.judging.episode_replay import Event, completed_stages
+from roboirg.judging.judge import describe_object, plain_subgoal
+from roboirg.language import LANGUAGE_VERSION
 from roboirg.language.settings import EXPLICIT
 
 EMBEDDED = "#"
 """Stands for a video that is part of the page."""
 
+_KINDS = {"shuttle": "the moving cube", "site": "the spot on the table"}
+"""Words for objects that causes do not name."""
+
 Details = dict[str, Any]
 
 
 @dataclass
-class Strings:
-    """A list of distinct texts."""
+class EpisodeDetails:
+    """Makes the details of one episode after the other.
 
-    texts: list[str] = field(default_factory=list)
-    _places: dict[str, int] = field(default_factory=dict)
-
-    def index(self, text: str) -> int:
-        """Return the index of a text, which is added if it is new."""
-        place = self._places.setdefault(text, len(self.texts))
-        if place == len(self.texts):
-            self.texts.append(text)
-        return place
-
-    def optional_index(self, text: str | None) -> int | None:
-        return None if text is None else self.index(text)
-
-
-def searched_texts(record: Record, strings: Strings) -> list[int]:
-    """Return the texts that a search looks through: utterances, cause, attribution."""
-    texts = [turn.text for turn in record.instruction]
-    sentence = None if record.attribution is None else record.attribution.sentence
-    texts += [text for text in (record.cause, sentence) if text]
-    return [strings.index(text) for text in texts]
-
-
-def details_of(
-    record: Record,
-    strings: Strings,
-    video: EpisodeVideo | None,
-    resolved: str | None,
-    *,
-    embeds: bool,
-) -> Details:
-    """Return the details of an episode, with texts as indices; empty ones are left out.
-
-    `resolved` is the resolved form of its instruction; None if it has that form or none. If
-    `embeds`, the video is part of the page.
+    Attributes:
+        folder: of the page; links lead from there.
+        embeds: whether videos are part of the page.
+        gone: folders that will not be there when the page is read, so that nothing links to them.
+        links_videos: whether some are next to the page.
+        strings: every text with its index, in order.
+        words: for each episode, the texts that a search looks through.
+        lines: for each episode, its details.
     """
-    index, optional_index = strings.index, strings.optional_index
-    names = names_of(record)
-    found: Details = {
-        "turns": [[index(turn.stage), index(turn.text)] for turn in record.instruction],
-        "reached": _reached(record),
-        "prompt": optional_index(_prompt(record)),
-        "mentions": _mentions(record, strings),
-        "command": None if record.setting == EXPLICIT else index(record.command),
-        "resolved": optional_index(resolved),
-        "goal": [[index(slot), index(_value(value))] for slot, value in record.goal.items()],
-        "cause": optional_index(record.cause),
-        "attribution": _attribution(record, strings),
-        "shown": record.demonstration_steps or None,
-        "events": [
-            [one.step, index(event_text(one, names)), int(one.holds)]
-            for one in _shown_events(record)
-        ],
-        "subgoals": [
-            [one.step, index(_subgoal_text(one)), int(one.verdict == "right")]
-            for one in record.subgoals
-        ],
-        "stages": [[index(mark.subgoal), mark.step] for mark in stages_of(record)],
-        "traceback": optional_index(record.details),
-        "lost": optional_index(record.video_error),
-        "conditions": index(_conditions(record)),
-    }
-    if video is not None:
-        found["film"] = EMBEDDED if embeds else video.source
-        found["poster"] = EMBEDDED if embeds else video.poster
-    return {name: value for name, value in found.items() if value is not None and value != []}
+
+    folder: Path
+    embeds: bool
+    gone: Sequence[Path] = ()
+    links_videos: bool = False
+    strings: dict[str, int] = field(default_factory=dict)
+    words: list[list[int]] = field(default_factory=list)
+    lines: list[str] = field(default_factory=list)
+    _scenes: dict[tuple[object, ...], _PlayedScene] = field(default_factory=dict)
+    _resolved: dict[tuple[object, ...], str | None] = field(default_factory=dict)
+
+    def add(self, episode: PageEpisode, record: Record) -> None:
+        """Add an episode, given its whole record."""
+        cause = record.attribution
+        searched = [turn.text for turn in record.instruction]
+        searched += [one for one in (record.cause, cause and cause.sentence) if one]
+        self.words.append(list(map(self._index, searched)))
+        details = self.details_of(record)
+        media = {"film": episode.film, "poster": episode.poster}
+        for name, path in {**media, "log": episode.log}.items():
+            if path is not None and self.embeds and name in media:
+                details[name] = EMBEDDED
+            elif path is not None and not any(map(path.is_relative_to, self.gone)):
+                details[name] = quote(Path(os.path.relpath(path, self.folder)).as_posix())
+                self.links_videos |= name in media
+        self.lines.append(msgspec.json.encode(details).decode())
+
+    def details_of(self, record: Record) -> Details:
+        """Return the details of an episode, with texts as indices; empty ones are left out."""
+        index = self._index
+        scene = self._scene(record)
+        cause, audit = record.attribution, record.prompt
+        found: Details = {
+            "turns": [[index(turn.stage), index(turn.text)] for turn in record.instruction],
+            "reached": audit.reached if audit and record.prompt_verdict == "cut" else None,
+            "prompt": self._optional(_prompt(record)),
+            "mentions": [
+                [one.utterance, one.start, one.end, int(one.role == "anaphor"),
+                 index(one.expression or ""), index(one.slot), index(str(one.value))]
+                for one in record.mentions
+            ],
+            "command": None if record.setting == EXPLICIT else index(record.command),
+            "resolved": self._optional(self._resolved_form(record)),
+            "goal": [[index(slot), index(_value(value))] for slot, value in record.goal.items()],
+            "cause": self._optional(record.cause),
+            "attribution": cause and [*map(index, (cause.kind, cause.failure)), cause.step,
+                                      index(cause.sentence)],
+            "shown": record.demonstration_steps or None,
+            "events": [
+                [one.step, index(act), int(one.holds)]
+                for one in record.events if (act := scene.act(one)) is not None
+            ],
+            "subgoals": [
+                [one.step, index(_subgoal_text(one)), int(one.verdict == "right")]
+                for one in record.subgoals
+            ],
+            "stages": [[index(words), step] for words, step in scene.stages(record)],
+            "traceback": self._optional(record.details),
+            "lost": self._optional(record.video_error),
+            "conditions": index(_conditions(record)),
+        }  # fmt: skip
+        return {name: value for name, value in found.items() if value is not None and value != []}
+
+    def _index(self, text: str) -> int:
+        """Return the index of a text, which is added if it is new."""
+        return self.strings.setdefault(text, len(self.strings))
+
+    def _optional(self, text: str | None) -> int | None:
+        return None if text is None else self._index(text)
+
+    def _scene(self, record: Record) -> _PlayedScene:
+        version = record.environment_version
+        key = (record.task, record.split, record.episode, record.arm, version)
+        if key not in self._scenes:
+            self._scenes[key] = _PlayedScene.of(record)
+        return self._scenes[key]
+
+    def _resolved_form(self, record: Record) -> str | None:
+        """Return the same instruction with every reference resolved.
+
+        None if the record has this form already, another language or environment version, or words
+        of a wording file that is gone.
+        """
+        versions = record.language_version, record.environment_version
+        is_resolved = record.setting == EXPLICIT or record.form == "resolved"
+        if is_resolved or versions != (LANGUAGE_VERSION, ENVIRONMENT_VERSION):
+            return None
+        words = record.options, record.arm, record.wordings_file
+        key = (record.task, record.split, record.episode, *words)
+        if key not in self._resolved:
+            job = msgspec.structs.replace(record.identity, wordings_file=record.wordings_file)
+            try:
+                self._resolved[key] = instruct_job(job.with_options(form="resolved")).text
+            except RoboIRGError:
+                self._resolved[key] = None  # a task or a wording file that is no longer there
+        return self._resolved[key]
+
+
+@dataclass
+class _PlayedScene:
+    """What is the same whenever a scene is played.
+
+    Attributes:
+        episode: None for another environment version, or a task that is no longer installed.
+        names: words for the objects.
+        facts: those that stages depend on.
+    """
+
+    episode: Episode | None
+    names: Mapping[str, str]
+    facts: Mapping[Fact, Fact]
+    _acts: dict[tuple[object, ...], str | None] = field(default_factory=dict)
+
+    @classmethod
+    def of(cls, record: Record) -> _PlayedScene:
+        if record.environment_version != ENVIRONMENT_VERSION:
+            return cls(None, {}, {})
+        try:
+            episode = PreparedJob(record.identity).episode
+        except RoboIRGError:
+            return cls(None, {}, {})
+        stages = (*episode.demonstration, *episode.stages)
+        conditions = (one for stage in stages for one in (stage.expects, *stage.forbids))
+        facts = {fact: fact for condition in conditions for fact in facts_of(condition)}
+        return cls(episode, _object_names(episode.scene), facts)
+
+    def act(self, event: EventRecord) -> str | None:
+        """Return an event in words; None if timelines do not show it."""
+        key = (event.kind, event.subject, event.place, event.holds)
+        if key not in self._acts:
+            shown = fact_traits(event.kind).timeline
+            is_shown = shown == "both" or (shown == "start" and event.holds)
+            self._acts[key] = event_text(event, self.names) if is_shown else None
+        return self._acts[key]
+
+    def stages(self, record: Record) -> list[tuple[str, int | None]]:
+        """Return the stages of the policy's turn: subgoals, and the steps that completed them."""
+        if not record.events or self.episode is None:
+            return []
+        turn = max(0, -min(event.step for event in record.events))
+        last = max(record.steps, *(event.step for event in record.events))
+        events = [
+            Event(one.step + turn, fact, one.holds)
+            for one in record.events
+            if (fact := self.facts.get(Fact(one.kind, one.subject, one.place))) is not None
+        ]
+        try:
+            done = completed_stages(self.episode, events, turn + last)
+        except KeyError:
+            return []  # incomplete events
+        return [
+            (plain_subgoal(stage), done[place] - turn if place in done else None)
+            for place, stage in enumerate(self.episode.stages)
+        ]
 
 
 def event_text(event: EventRecord, names: Mapping[str, str]) -> str:
@@ -106,6 +227,18 @@ def event_text(event: EventRecord, names: Mapping[str, str]) -> str:
     return words.format(subject=subject, place=place)
 
 
+def _object_names(scene: Scene) -> Mapping[str, str]:
+    """Return words for each object; where two have the same, the end of their names is added."""
+    words = {
+        one.name: _KINDS.get(one.kind) or describe_object(one.name, scene) for one in scene.objects
+    }
+    counts = Counter(words.values())
+    return {
+        name: text if counts[text] == 1 else f"{text} ({name.rpartition('_')[2]})"
+        for name, text in words.items()
+    }
+
+
 def _subgoal_text(one: SubgoalRecord) -> str:
     parts = []
     if one.verdict != "right":
@@ -113,23 +246,6 @@ def _subgoal_text(one: SubgoalRecord) -> str:
     if one.ended is not None and one.ended != "done":
         parts.append(f"{one.ended}: {one.why}" if one.why else one.ended)
     return f"{one.text} ({'; '.join(parts)})" if parts else one.text
-
-
-def _mentions(record: Record, strings: Strings) -> list[list[int]]:
-    index = strings.index
-    return [
-        [one.utterance, one.start, one.end, int(one.role == "anaphor"),
-         index(one.expression or ""), index(one.slot), index(str(one.value))]
-        for one in record.mentions
-    ]  # fmt: skip
-
-
-def _reached(record: Record) -> list[int] | None:
-    """Return the characters of each utterance that arrive, if some do not."""
-    audit = record.prompt
-    if audit is None or record.prompt_verdict != "cut":
-        return None
-    return list(audit.reached)
 
 
 def _prompt(record: Record) -> str | None:
@@ -147,21 +263,6 @@ def _prompt(record: Record) -> str | None:
         f"{verdict}: needs {audit.needed_text} tokens, the model reads {audit.limit} "
         f"({counted_by}){tail}"
     )
-
-
-def _shown_events(record: Record) -> Iterator[EventRecord]:
-    for event in record.events:
-        shown = fact_traits(event.kind).timeline
-        if shown == "both" or (shown == "start" and event.holds):
-            yield event
-
-
-def _attribution(record: Record, strings: Strings) -> list[Any] | None:
-    found = record.attribution
-    if found is None:
-        return None
-    return [strings.index(found.kind), strings.index(found.failure), found.step,
-            strings.index(found.sentence)]  # fmt: skip
 
 
 def _value(value: object) -> str:

@@ -2,21 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Any, NamedTuple
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 from roboirg.core.episode import DIFFICULTIES
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.core.plain_text import counted
 from roboirg.evaluation.analysis.page.columns import setting_label
-from roboirg.evaluation.analysis.page.entries import EpisodeEntries, gather_run
-from roboirg.evaluation.analysis.stats.cells import (
-    CellKey,
-    CellResults,
-    Cells,
-    sort_cells,
-    task_order,
-)
+from roboirg.evaluation.analysis.page.episodes import PageEpisodes
+from roboirg.evaluation.analysis.stats.cells import Cells, PolicyRun, task_order
 from roboirg.evaluation.analysis.stats.intervals import Interval
 from roboirg.evaluation.analysis.stats.option_labels import options_label, options_sort_key
 from roboirg.evaluation.analysis.stats.rates import p_text, points, whole_percent
@@ -30,84 +24,61 @@ from roboirg.evaluation.analysis.stats.run_summary import (
 from roboirg.tasks import all_tasks
 
 
-class MatrixRow(NamedTuple):
-    """A row of every heat map."""
-
-    name: str
-    kind: str
-    scope: Scope
-
-
-def make_matrix(entries: EpisodeEntries) -> dict[str, Any]:
+def make_matrix(episodes: PageEpisodes) -> dict[str, Any]:
     """Return the heat maps as JSON values: columns, rows, and cells by policy, row and column.
 
     There is one set of cells for all episodes and, if there are several difficulties, one for
     each. Missing episodes have no difficulty yet; they count among all episodes only.
     """
-    columns = sorted({key.options for key in entries.cells}, key=options_sort_key)
-    rows = _rows(entries.cells)
-    levels = {"": entries.cells}
-    found = {entry.record.difficulty for entry in entries.all}
+    columns = sorted({key.options for key in episodes.cells}, key=options_sort_key)
+    rows = _rows(episodes.cells)
+    found = {one.record.difficulty for one in episodes.all}
+    levels = {"": episodes.cells}
     if len(found) > 1:
-        levels |= {
-            level: _of_difficulty(entries, level)
-            for level in (*DIFFICULTIES, *found)
-            if level in found
-        }
+        ordered = dict.fromkeys((*DIFFICULTIES, *found))
+        levels |= {level: episodes.cells_of(level) for level in ordered if level in found}
     return {
-        "policies": list(entries.names.values()),
+        "policies": list(episodes.names.values()),
         "columns": [
             {"setting": setting_label(one), "form": one.form, "name": options_label(one)}
             for one in columns
         ],
-        "rows": [{"name": row.name, "kind": row.kind, **row.scope._asdict()} for row in rows],
+        "rows": [{"name": name, **scope._asdict()} for scope, name in rows.items()],
         "levels": [
-            {"difficulty": level, "cells": _matrix_cells(cells, entries, rows, columns)}
+            {"difficulty": level, "cells": _matrix_cells(cells, episodes.names, rows, columns)}
             for level, cells in levels.items()
         ],
     }
 
 
-def _rows(cells: Cells) -> list[MatrixRow]:
-    tasks = task_order({key.task for key in cells})
+def _rows(cells: Cells) -> dict[Scope, str]:
+    """Return the rows of every heat map, each with its name."""
     suites: dict[str, list[str]] = {}
-    for task in tasks:
+    for task in task_order({key.task for key in cells}):
         known = all_tasks().get(task)
         suites.setdefault(known.suite if known else "", []).append(task)
-    rows = [MatrixRow(ALL_TASKS, "all", ALL)] if len(tasks) > 1 else []
+    rows = {}
+    if sum(map(len, suites.values())) > 1:
+        rows[ALL] = ALL_TASKS
     for suite, members in suites.items():
         if suite and len(suites) > 1 and len(members) > 1:
-            rows.append(MatrixRow(suite, "suite", Scope(suite=suite)))
-        rows += [MatrixRow(task, "task", Scope(task=task)) for task in members]
+            rows[Scope(suite=suite)] = suite
+        rows |= {Scope(task=task): task for task in members}
     return rows
-
-
-def _of_difficulty(entries: EpisodeEntries, difficulty: str) -> Cells:
-    """Gather the episodes of one difficulty."""
-    found: dict[CellKey, CellResults] = {}
-    for run in dict.fromkeys(entry.policy_run.run for entry in entries.all):
-        records = [
-            entry.record
-            for entry in entries.all
-            if entry.policy_run.run == run and entry.record.difficulty == difficulty
-        ]
-        found |= gather_run(run, records)
-    return sort_cells(found, list(entries.names))
 
 
 def _matrix_cells(
     cells: Cells,
-    entries: EpisodeEntries,
-    rows: Sequence[MatrixRow],
+    names: Mapping[PolicyRun, str],
+    rows: Mapping[Scope, str],
     columns: Sequence[InstructionOptions],
 ) -> list[dict[str, Any]]:
-    names = entries.names
     places = {policy_run: place for place, policy_run in enumerate(names)}
-    lines = {row.scope: line for line, row in enumerate(rows)}
+    lines = {scope: line for line, scope in enumerate(rows)}
     return [
         {
             "at": [places[one.policy_run], lines[one.scope], columns.index(one.options)],
-            **_cell(one, f"{names[one.policy_run]}, {rows[lines[one.scope]].name}"),
+            **_cell(one, f"{names[one.policy_run]}, {rows[one.scope]}"),
         }
         for one in summarize(cells)
         if one.scope in lines

@@ -2,42 +2,39 @@
 
 from __future__ import annotations
 
-import dataclasses
+import base64
+import contextlib
 import itertools
 import json
-import os
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from roboirg.evaluation.analysis.page.columns import Columns, Progress, make_columns
-from roboirg.evaluation.analysis.page.entries import EpisodeEntries, Run, make_entries
-from roboirg.evaluation.analysis.page.episode_videos import MAX_EMBEDDED_BYTES, EpisodeVideos
+from roboirg.core.arms import TOLD
+from roboirg.core.errors import InvalidValueError
+from roboirg.evaluation.analysis.page.columns import make_filters, make_numbers
+from roboirg.evaluation.analysis.page.details import EpisodeDetails
+from roboirg.evaluation.analysis.page.episodes import PageEpisodes
 from roboirg.evaluation.analysis.page.matrix import make_matrix
 from roboirg.evaluation.analysis.page.run_warnings import comparisons, facts_of, run_warnings
-from roboirg.evaluation.analysis.stats.arm_figures import arm_figures
-from roboirg.evaluation.analysis.stats.breakdowns import BREAKDOWNS, label_instructions
-from roboirg.evaluation.analysis.stats.cells import Cells, PolicyRun
+from roboirg.evaluation.analysis.stats.breakdowns import BREAKDOWNS, Labels, label_instructions
+from roboirg.evaluation.analysis.stats.cells import PolicyRun
 from roboirg.evaluation.analysis.stats.run_data import RunData
 from roboirg.evaluation.analysis.tables.arm_table import make_arm_table
 from roboirg.evaluation.analysis.tables.breakdown_table import make_breakdown_table
 from roboirg.evaluation.analysis.tables.table import Table
 from roboirg.evaluation.plan.sources import Source
-from roboirg.evaluation.records.episode_log import logged_slugs
-from roboirg.evaluation.records.film import (
-    FRAME_RATE,
-    FRAME_STEPS,
-    LAST_FRAME_REPEATS,
-    VIDEO_FOLDER,
-)
+from roboirg.evaluation.records.film import FRAME_RATE, FRAME_STEPS, LAST_FRAME_REPEATS
 from roboirg.evaluation.records.packs import PACK_SUFFIX
-from roboirg.evaluation.records.store import read_summaries
+from roboirg.evaluation.records.record import Record
 from roboirg.language.settings import EXPLICIT, all_settings
 from roboirg.util.atomic_write import write_atomically
 from roboirg.util.web.page_templates import check_page_support, template_environment
 
 REPORT_FILE = "report.html"
-TEMPLATE = "report.html.j2"
+MAX_EMBEDDED_BYTES = 20_000_000
+"""Larger videos, taken together, stay next to the page."""
 STYLES = ("base", "overview", "filters", "episodes", "pairs")
 SCRIPTS = (
     "dom",
@@ -55,6 +52,9 @@ SCRIPTS = (
 )
 """Parts of the style sheet and of the script, in order."""
 
+Progress = Callable[[int, int], None]
+"""Called after each episode: how many are done, and how many there are."""
+
 
 def write_report(
     source: Source,
@@ -71,52 +71,29 @@ def write_report(
         against: another run, to compare with episode by episode.
         out: file to write; without it, ``report.html`` in the run's folder, or a page next to its
             pack, with the pack's name.
-        videos: whether to embed the videos.
+        videos: whether to show the videos: in the page, or of more than `MAX_EMBEDDED_BYTES` next
+            to it. Those of a pack cannot be next to it, as the files are gone when it is closed.
         progress: called after each episode.
     """
-    check_report_support()
     beside = source.path.with_name(f"{source.path.name.removesuffix(PACK_SUFFIX)}.html")
     path = out or (beside if source.unpacked else source.folder / REPORT_FILE)
-    sources = [one for one in (source, against) if one is not None]
-    runs = [_run(one, path.parent, videos=videos) for one in sources]
-    if len({run.name for run in runs}) < len(runs):
-        paths = (str(one.path) for one in sources)
-        runs = [dataclasses.replace(run, name=one) for run, one in zip(runs, paths, strict=True)]
-    write_atomically(path, render_runs(runs, progress=progress))
+    sources = [source] if against is None else [source, against]
+    runs = {one.name: one for one in sources}
+    if len(runs) < len(sources):
+        runs = {str(one.path): one for one in sources}
+    episodes = PageEpisodes.of(runs, videos=videos)
+    embeds = sum(path.stat().st_size for path in _media(episodes).values()) <= MAX_EMBEDDED_BYTES
+    gone = [one.unpacked for one in sources if one.unpacked is not None]
+    details = EpisodeDetails(path.parent, embeds, gone)
+    write_atomically(path, _render(episodes, details, progress))
     return path
 
 
 def make_view(source: Source, progress: Progress | None = None) -> str:
     """Return the page of a run as it is served, with links to its videos."""
-    check_report_support()
-    return render_runs([_run(source)], embed=False, progress=progress)
-
-
-def render_runs(
-    runs: Sequence[Run], *, embed: bool = True, progress: Progress | None = None
-) -> str:
-    """Return the page of one run, or of two to compare.
-
-    Videos of more than `MAX_EMBEDDED_BYTES` are linked to.
-    """
-    check_report_support()
-    template = template_environment("roboirg.evaluation.analysis.page").get_template(TEMPLATE)
-    entries = make_entries(runs)
-    videos = EpisodeVideos.of(entries.all, embed=embed)
-    columns = make_columns(entries, videos, progress)
-    return template.render(
-        styles=STYLES,
-        scripts=SCRIPTS,
-        name=" against ".join(run.name for run in runs),
-        count=len(entries.all),
-        facts=facts_of(runs),
-        warnings=run_warnings(entries),
-        breakdowns=_breakdown_tables(runs, entries),
-        videos_are_linked=videos.count > 0 and not videos.embeds,
-        videos=columns.videos,
-        data=_json(_data(entries, columns)),
-        details="\n".join(map(_safe, columns.details)),
-    )
+    now = replace(source)  # without what was read before
+    episodes = PageEpisodes.of({now.name: now}, videos=True)
+    return _render(episodes, EpisodeDetails(now.folder, embeds=False), progress)
 
 
 def check_report_support() -> None:
@@ -124,15 +101,61 @@ def check_report_support() -> None:
     check_page_support("The report")
 
 
-def _data(entries: EpisodeEntries, columns: Columns) -> dict[str, Any]:
-    sides, change = _sides(entries)
+def _render(episodes: PageEpisodes, details: EpisodeDetails, progress: Progress | None) -> str:
+    """Return the page; the details are made for it."""
+    check_report_support()
+    template = template_environment("roboirg.evaluation.analysis.page").get_template(
+        f"{REPORT_FILE}.j2"
+    )
+    labels = label_instructions(tuple(BREAKDOWNS.values()), _add_all(details, episodes, progress))
+    data = _data(episodes, details)
+    return template.render(
+        styles=STYLES,
+        scripts=SCRIPTS,
+        name=" against ".join(episodes.runs),
+        facts=facts_of(episodes),
+        warnings=run_warnings(episodes),
+        breakdowns=_breakdown_tables(episodes, labels),
+        links_videos=details.links_videos,
+        media=((name, _data_uri(path)) for name, path in _media(episodes).items())
+        if details.embeds
+        else (),
+        data=_safe(json.dumps(data, ensure_ascii=False, separators=(",", ":"), allow_nan=False)),
+        details=_safe("\n".join(details.lines)),
+    )
+
+
+def _media(episodes: PageEpisodes) -> dict[str, Path]:
+    """Return the files of all videos by the names that the page's script knows them by."""
+    kinds = {f"film-{one.key}": one.film for one in episodes.all}
+    kinds |= {f"poster-{one.key}": one.poster for one in episodes.all}
+    return {name: path for name, path in kinds.items() if path is not None}
+
+
+def _add_all(
+    details: EpisodeDetails, episodes: PageEpisodes, progress: Progress | None
+) -> Iterator[Record]:
+    """Add the details of all episodes, and yield their whole records, each read once."""
+    for done, (one, record) in enumerate(zip(episodes.all, episodes.whole(), strict=True), 1):
+        details.add(one, record)
+        yield record
+        if progress is not None:
+            progress(done, len(episodes.all))
+
+
+def _data(episodes: PageEpisodes, details: EpisodeDetails) -> dict[str, Any]:
+    filters, numbers = make_filters(episodes), make_numbers(episodes)
+    sides, change = _sides(episodes, numbers["pair"])
     return {
-        "choices": [choice._asdict() for choice in columns.choices],
-        "columns": columns.columns,
-        "strings": columns.strings.texts,
-        "words": columns.words,
-        "matrix": make_matrix(entries),
-        "comparisons": comparisons(entries),
+        "choices": [
+            {"name": name, "label": one.label, "values": one.values, "groups": one.groups}
+            for name, one in filters.items()
+        ],
+        "columns": {**numbers, **{name: one.column for name, one in filters.items()}},
+        "strings": list(details.strings),
+        "words": details.words,
+        "matrix": make_matrix(episodes),
+        "comparisons": comparisons(episodes),
         "sides": sides,
         "change": change,
         "reference": EXPLICIT,
@@ -141,72 +164,45 @@ def _data(entries: EpisodeEntries, columns: Columns) -> dict[str, Any]:
     }
 
 
-def _breakdown_tables(runs: Sequence[Run], entries: EpisodeEntries) -> list[Table]:
+def _breakdown_tables(episodes: PageEpisodes, labels: dict[str, Labels]) -> list[Table]:
     """Return the tables of control arms, and of gaps by kind of instruction, that have rows."""
-    breakdowns = tuple(BREAKDOWNS.values())
-    instructions = itertools.chain.from_iterable(run.whole(run.records) for run in runs)
-    labels = label_instructions(breakdowns, instructions)
     tables = [
-        make_breakdown_table(one, entries.cells, labels[one.name], entries.names)
-        for one in breakdowns
+        make_breakdown_table(one, episodes.cells, labels[name], episodes.names)
+        for name, one in BREAKDOWNS.items()
     ]
-    data = RunData.of([(run.name, run.records) for run in runs])
-    arms = [make_arm_table(data)] if arm_figures(data) else []
+    arms = []
+    if any(one.record.arm != TOLD for one in episodes.all):
+        data = RunData.of([(name, run.results) for name, run in episodes.runs.items()])
+        with contextlib.suppress(InvalidValueError):  # no scene has two arms
+            arms.append(make_arm_table(data))
     return [*arms, *(table for table in tables if table.rows)]
 
 
-def _sides(entries: EpisodeEntries) -> tuple[list[int], str]:
+def _sides(episodes: PageEpisodes, pairs: Sequence[object]) -> tuple[Sequence[int], str]:
     """Return the policies to compare first, and which of their episodes to show.
 
     That is a policy and itself in the other run, or else the first two whose verdicts differ.
+    `pairs` has for each episode a number, equal for those that can be compared.
     """
-    names = list(entries.names)
+    names = list(episodes.names)
+    verdicts: dict[PolicyRun, dict[object, str]] = {run: {} for run in names}
+    for one, pair in zip(episodes.all, pairs, strict=True):
+        if one.record.outcome != "error":
+            verdicts[one.policy_run][pair] = one.record.outcome
     twins = [place for place, one in enumerate(names) if place and one.policy == names[0].policy]
-    pairs = [(0, twins[0])] if twins else [*itertools.combinations(range(len(names)), 2)]
-    for one, other in pairs:
-        if _differ(entries.cells, names[one], names[other]):
-            return [one, other], "changed"
-    return [*pairs[0]] if pairs else [0, 0], "all"
+    sides = [(0, twins[0])] if twins else list(itertools.combinations(range(len(names)), 2))
+    for first, second in sides:
+        ours, theirs = verdicts[names[first]], verdicts[names[second]]
+        if any(theirs.get(pair, verdict) != verdict for pair, verdict in ours.items()):
+            return (first, second), "changed"
+    return sides[0] if sides else (0, 0), "all"
 
 
-def _differ(cells: Cells, first: PolicyRun, second: PolicyRun) -> bool:
-    """Return whether one of two policies succeeded in an episode in which the other failed."""
-    for key, cell in cells.items():
-        other = cells.get(key._replace(policy_run=second))
-        if key.policy_run == first and other is not None:
-            theirs = other.verdicts
-            if any(theirs.get(trial, won) != won for trial, won in cell.verdicts.items()):
-                return True
-    return False
-
-
-def _json(value: object) -> str:
-    return _safe(json.dumps(value, ensure_ascii=False, separators=(",", ":"), allow_nan=False))
+def _data_uri(path: Path) -> str:
+    kind = "video/mp4" if path.suffix == ".mp4" else "image/jpeg"
+    return f"data:{kind};base64,{base64.b64encode(path.read_bytes()).decode('ascii')}"
 
 
 def _safe(text: str) -> str:
     """Escape JSON for a script element: no text in it ends the element."""
     return text.replace("<", "\\u003c")
-
-
-def _run(source: Source, place: Path | None = None, *, videos: bool = True) -> Run:
-    """Return a run whose page is written to the folder `place`; None if the page is served.
-
-    The files of a pack are gone when it is closed: a written page can embed them, not link to them.
-    """
-    folder = source.folder
-    stored = read_summaries(folder)
-    is_closed = place is not None and source.unpacked is not None
-    if is_closed:
-        sizes = (path.stat().st_size for path in (folder / VIDEO_FOLDER).rglob("*"))
-        videos = videos and sum(sizes) <= MAX_EMBEDDED_BYTES
-    link = "." if place is None else os.path.relpath(folder, place)
-    return Run(
-        source.name,
-        tuple(source.wanted(stored.newest)),
-        folder if videos else None,
-        source.planned,
-        "" if link == "." else f"{link}/",
-        stored,
-        frozenset() if is_closed else logged_slugs(folder),
-    )

@@ -2,19 +2,22 @@
 
 from __future__ import annotations
 
+import operator
 from collections import Counter
-from collections.abc import Iterable, Sequence
-from itertools import combinations
-from typing import Any, NamedTuple
+from collections.abc import Iterable
+from itertools import chain, combinations
+from typing import Any
 
 from roboirg.core.errors import InvalidValueError
 from roboirg.core.plain_text import counted, verb_for
-from roboirg.evaluation.analysis.page.entries import EpisodeEntries, Run
-from roboirg.evaluation.analysis.stats.cells import FAIRNESS, EvalConditions, PolicyRun, Versions
+from roboirg.evaluation.analysis.page.episodes import PageEpisodes
+from roboirg.evaluation.analysis.stats.cells import FAIRNESS, PolicyRun
 from roboirg.evaluation.analysis.stats.comparison import compare
 from roboirg.evaluation.analysis.stats.comparison_text import sentences
 from roboirg.evaluation.analysis.stats.headline import headline_notes
 from roboirg.evaluation.analysis.stats.heard_rates import count_heard, heard_notes
+from roboirg.evaluation.analysis.stats.option_labels import words_label
+from roboirg.evaluation.records.mixing import mixture_warnings
 from roboirg.language.settings import EXPLICIT
 from roboirg.tasks.splits.private_splits import SALT_VARIABLE, MissingSaltError, check_salt
 
@@ -22,57 +25,51 @@ MAX_COMPARISONS = 6
 """Pairs of policies that are compared in words."""
 
 
-class RunWarning(NamedTuple):
-    """A sentence above the results; `kind` is ``warning`` or ``note``."""
+_FACTS = {
+    "split": "split",
+    "words": "options.wordings",
+    "step limit": "environment.max_steps",
+    "roboirg": "package_version",
+    "language": "language_version",
+    "environment": "environment_version",
+    "rendered on": "render_device",
+}
+"""Facts in the head of the page, and the fields of records that hold them."""
 
-    kind: str
-    text: str
 
+def run_warnings(episodes: PageEpisodes) -> list[tuple[str, str]]:
+    """Return what is incomplete, failed, mixed, or cannot be compared.
 
-def run_warnings(entries: EpisodeEntries) -> list[RunWarning]:
-    """Return what is incomplete, failed, mixed, or cannot be compared."""
+    These are sentences above the results, each after its kind, ``warning`` or ``note``.
+    """
+    heard = count_heard((one.policy_run, one.record) for one in episodes.all)
+    warnings = (_incomplete(episodes), _mixed(episodes), heard_notes(heard, episodes.names))
+    headline = headline_notes(episodes.cells, episodes.names)
+    notes = (_without_reference(episodes), _private(episodes), headline)
     return [
-        *(RunWarning("warning", text) for text in _incomplete(entries)),
-        *(RunWarning("warning", text) for text in _mixed(entries)),
-        *(RunWarning("warning", text) for text in _cut(entries)),
-        *(RunWarning("note", text) for text in _without_reference(entries)),
-        *(RunWarning("note", text) for text in _private(entries)),
-        *(RunWarning("note", text) for text in headline_notes(entries.cells, entries.names)),
+        *(("warning", text) for text in chain(*warnings)),
+        *(("note", text) for text in chain(*notes)),
     ]
 
 
-def facts_of(runs: Sequence[Run]) -> list[tuple[str, str]]:
+def facts_of(episodes: PageEpisodes) -> list[tuple[str, str]]:
     """Return the facts in the head of the page, each with its label."""
-    records = [record for run in runs for record in run.records]
-    times = sorted(record.started_at[:16].replace("T", " ") for record in records)
-    conditions = [EvalConditions.of(record) for record in records]
-    facts = [
-        ("run", " against ".join(run.name for run in runs)),
-        ("played", _period(times[0], times[-1]) if times else ""),
-        *(
-            (label, ", ".join(sorted({one.text(name) for one in conditions})))
-            for label, name in (
-                ("split", "split"),
-                ("words", "wordings"),
-                ("step limit", "max_steps"),
-            )
-        ),
-        *(
-            (label, ", ".join(sorted({_text(getattr(one, name)) for one in records})))
-            for label, name in (
-                ("roboirg", "package_version"),
-                ("language", "language_version"),
-                ("environment", "environment_version"),
-                ("rendered on", "render_device"),
-            )
-        ),
-    ]
-    return [(label, value.strip(", ")) for label, value in facts if value.strip(", ")]
+    records = [one.record for one in episodes.all]
+    times = [record.started_at[:16].replace("T", " ") for record in records]
+    facts = {
+        "run": " against ".join(episodes.runs),
+        "played": _period(min(times), max(times)),
+    }
+    for label, field in _FACTS.items():
+        values = set(map(operator.attrgetter(field), records))
+        words = map(words_label, values) if label == "words" else map(str, values - {None})
+        facts[label] = ", ".join(sorted(words))
+    return [(label, text) for label, text in facts.items() if text]
 
 
-def comparisons(entries: EpisodeEntries) -> list[dict[str, Any]]:
+def comparisons(episodes: PageEpisodes) -> list[dict[str, Any]]:
     """Return the comparison of the first pairs of policies in words."""
-    names = list(entries.names)
+    names = list(episodes.names)
     arms = [one.conditions.arm for one in names]
     alike = [pair for pair in combinations(range(len(names)), 2) if arms[pair[0]] == arms[pair[1]]]
     pairs = alike[:MAX_COMPARISONS]
@@ -80,27 +77,27 @@ def comparisons(entries: EpisodeEntries) -> list[dict[str, Any]]:
         {
             "left": first,
             "right": second,
-            "sentences": _compared(entries, names[first], names[second]),
+            "sentences": _compared(episodes, names[first], names[second]),
         }
         for first, second in pairs
     ]
 
 
-def _compared(entries: EpisodeEntries, first: PolicyRun, second: PolicyRun) -> list[str]:
+def _compared(episodes: PageEpisodes, first: PolicyRun, second: PolicyRun) -> list[str]:
     ours, theirs = (
-        {key: cell for key, cell in entries.cells.items() if key.policy_run == policy_run}
+        {key: cell for key, cell in episodes.cells.items() if key.policy_run == policy_run}
         for policy_run in (first, second)
     )
     try:
         comparison = compare(ours, theirs)
     except InvalidValueError as error:
         return [str(error)]
-    return list(sentences(comparison, entries.names[first], entries.names[second]))
+    return list(sentences(comparison, episodes.names[first], episodes.names[second]))
 
 
-def _incomplete(entries: EpisodeEntries) -> Iterable[str]:
-    missing = sum(cell.missing for cell in entries.cells.values())
-    total = len(entries.all)
+def _incomplete(episodes: PageEpisodes) -> Iterable[str]:
+    missing = sum(cell.missing for cell in episodes.cells.values())
+    total = len(episodes.all)
     if missing:
         have = verb_for(missing, "have")
         yield (
@@ -108,7 +105,7 @@ def _incomplete(entries: EpisodeEntries) -> Iterable[str]:
             "been played. Cells and averages that lack some are marked “…”."
         )
     errors = Counter(
-        entry.record.error or "unknown" for entry in entries.all if entry.record.outcome == "error"
+        one.record.error or "unknown" for one in episodes.all if one.record.outcome == "error"
     )
     if errors:
         kinds = ", ".join(f"{count} {kind}" for kind, count in errors.most_common())
@@ -118,62 +115,41 @@ def _incomplete(entries: EpisodeEntries) -> Iterable[str]:
         )
 
 
-def _mixed(entries: EpisodeEntries) -> Iterable[str]:
-    for name in ("language", "environment"):
-        found = {getattr(Versions.of(entry.record), name) for entry in entries.all}
-        if len(found) > 1:
-            yield (
-                f"Mixed versions of the {name}: {', '.join(sorted(map(str, found)))}. "
-                "They have separate heat maps and are never averaged."
-            )
-    conditions = {EvalConditions.of(entry.record) for entry in entries.all}
+def _mixed(episodes: PageEpisodes) -> Iterable[str]:
+    runs = [one for one in episodes.names if one.versions is not None]
+    apart = "separate heat maps and are never averaged."
+    yield from mixture_warnings([one.record for one in episodes.all])
     for name, plural in FAIRNESS.items():
-        values = {one.text(name) for one in conditions}
+        values = {one.conditions.text(name) for one in runs}
         if len(values) > 1:
-            yield (
-                f"Mixed {plural}: {', '.join(sorted(values))}. "
-                "They have separate heat maps and are never averaged."
-            )
-    for policy in dict.fromkeys(one.policy for one in entries.names):
-        yield from _mixed_policy(policy, [one for one in entries.names if one.policy == policy])
-    codes = {entry.record.code for entry in entries.all}
+            yield f"Mixed {plural}: {', '.join(sorted(values))}. They have {apart}"
+    for policy in dict.fromkeys(one.policy for one in runs):
+        own = [one for one in runs if one.policy == policy]
+        versions = {one.versions.policy for one in own if one.versions is not None}
+        if len(versions) > 1:
+            found = ", ".join(sorted(versions))
+            yield f"{policy} played in several versions: {found}. They have {apart}"
+        conditions = {one.conditions for one in own}
+        if len(conditions) > 1:
+            count = f"{len(conditions)} sets of conditions"
+            yield f"{policy} played under {count}, which have separate heat maps."
+    codes = {one.record.code for one in episodes.all}
     if len(codes) > 1:
         yield f"Played with {len(codes)} different states of the package’s code."
 
 
-def _cut(entries: EpisodeEntries) -> Iterable[str]:
-    counts = count_heard((entry.policy_run, entry.record) for entry in entries.all)
-    return heard_notes(counts, entries.names)
-
-
-def _mixed_policy(policy: str, policy_runs: Sequence[PolicyRun]) -> Iterable[str]:
-    versions = {one.versions.policy for one in policy_runs if one.versions is not None}
-    if len(versions) > 1:
-        yield (
-            f"{policy} played in several versions: {', '.join(sorted(versions))}. "
-            "They have separate heat maps and are never averaged."
-        )
-    for run in dict.fromkeys(one.run for one in policy_runs):
-        conditions = {one.conditions for one in policy_runs if one.run == run}
-        if len(conditions) > 1:
-            yield (
-                f"{policy} played under {len(conditions)} sets of conditions, which have "
-                "separate heat maps."
-            )
-
-
-def _without_reference(entries: EpisodeEntries) -> Iterable[str]:
-    if len(entries.names) == 1:
+def _without_reference(episodes: PageEpisodes) -> Iterable[str]:
+    if len(episodes.names) == 1:
         yield (
             "Only one policy: without the forgetful listener’s results next to it, a rate does not "
             "show how much of it is chance (roboirg tables RUN --floors chance adds the level)."
         )
-    if all(key.options.setting != EXPLICIT for key in entries.cells):
+    if all(key.options.setting != EXPLICIT for key in episodes.cells):
         yield "Explicit was not played, so there is no gap to it."
 
 
-def _private(entries: EpisodeEntries) -> Iterable[str]:
-    for split in sorted({entry.record.split for entry in entries.all}):
+def _private(episodes: PageEpisodes) -> Iterable[str]:
+    for split in sorted({one.record.split for one in episodes.all}):
         try:
             check_salt(split)
         except MissingSaltError:
@@ -181,10 +157,6 @@ def _private(entries: EpisodeEntries) -> Iterable[str]:
                 f"The episodes of {split} are private: without their salt ({SALT_VARIABLE}) this "
                 "page cannot say which are missing, and lacks stages and resolved words."
             )
-
-
-def _text(value: object) -> str:
-    return "" if value is None else str(value)
 
 
 def _period(first: str, last: str) -> str:

@@ -21,7 +21,8 @@ const heatMap = (policy, measure, cellAt) => {
     });
     if (!cells.some(Boolean)) return null;
     rows.push(cells);
-    return h("tr", { class: row.kind }, h("th", { scope: "row" }, breakable(row.name)),
+    const kind = row.task ? "task" : row.suite ? "suite" : "all";
+    return h("tr", { class: kind }, h("th", { scope: "row" }, breakable(row.name)),
       cells.map((cell) => h("td", {}, cell ?? h("span", { class: "none" }, "–"))));
   });
   roam(rows);
