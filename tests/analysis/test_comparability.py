@@ -152,17 +152,16 @@ def test_differences_are_listed_by_policy_if_they_are_not_the_same(result) -> No
     )
 
 
-def test_the_table_of_a_run_marks_its_explicit_column(result) -> None:
+def test_the_table_of_a_run_marks_its_explicit_rates(result) -> None:
     comparable = printed(play(result, tasks=TASKS, settings=("explicit", "direct")))
-    assert "┃ explicit = ┃ direct ┃" in comparable
+    assert comparable.count("│ 80 = │ 80 (±0) │") == len(TASKS)
     assert "in the words of robomme@1a2b3c4d, with at most 1300 steps. n = 50" in comparable
     assert "not comparable" not in comparable
     ours = printed(play(result, tasks=TASKS, wordings=None))
-    assert "┃ explicit ≠ ┃" in ours
+    assert ours.count("│ 80 ≠ │") == len(TASKS)
     assert "≠ not comparable with the published rate: our own words." in ours
     assert "Played on the test split, in our own words" in ours
     both = printed([*play(result), *play(result, range(4), TASKS[1:])])
-    assert "┃ explicit ┃" in both
     assert "│ 80 = │" in both
     assert "│ 75 ≠ │" in both
     assert "┃ direct ┃" in printed(play(result, settings=("direct",)))
@@ -197,5 +196,5 @@ def test_imported_words_have_the_columns_of_our_own(result) -> None:
         InstructionOptions("explicit"),
         InstructionOptions("direct"),
     }
-    (table,) = make_run_tables(play(result, settings=("explicit", "direct")))
+    (table,) = make_run_tables(play(result, settings=("explicit", "direct"))).values()
     assert len(table.columns) == 2

@@ -137,7 +137,7 @@ def test_tables_failures_and_page_show_the_same_policy_runs(run: Path, tmp_path:
     output = call("report", folder)
     labels = [f"forgetful, max steps {steps} (privileged)" for steps in (1300, 40)]
     for label in labels:
-        assert f"{label} " in output
+        assert f"{label}\n" in output
         assert f"\n{label}: 16 episodes without success\n" in output
         assert label in (folder / "report.html").read_text()
     assert output.count("episodes without success") == 2

@@ -31,7 +31,6 @@ COMMANDS: dict[str, tuple[str, ...]] = {
     "published-latex": ("tables", "--published", "--which", "main", "--format", "latex"),
     "main-terminal": ("tables", MAIN, "--which", "main", "--published"),
     "main-latex": ("tables", MAIN, "--which", "main", "--format", "latex"),
-    "main-latex-pieces": ("tables", MAIN, "--which", "main", "--format", "latex-pieces"),
     "main-floors": ("tables", MAIN, "--which", "main", "--floors", "all", *MARKDOWN),
     "main-forms": ("tables", MAIN, "--which", "forms", *CSV),
     "main-breakdowns": ("tables", MAIN, "--by", "all", *CSV),

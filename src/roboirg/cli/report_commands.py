@@ -154,7 +154,7 @@ def tables(
         ),
     ] = _ALL,
     format: Annotated[  # noqa: A002
-        str, typer.Option(help="terminal, markdown, latex, latex-pieces (narrow), csv or json.")
+        str, typer.Option(help="terminal, markdown, latex, csv or json.")
     ] = "terminal",
     published: Annotated[bool, typer.Option(help="Add the paper's rows.")] = False,
     floors: Annotated[

@@ -72,7 +72,6 @@ def _confusion_table(field: str, counts: Counter[tuple[str, str]]) -> Table:
             Row(
                 field,
                 value,
-                "ours",
                 tuple(
                     Entry(word=str(counts[value, other] or "–"), best=value == other)
                     for other in understood

@@ -16,7 +16,7 @@ from roboirg.evaluation.analysis.tables.breakdown_table import (
     corrected_p_text,
     make_breakdown_table,
 )
-from roboirg.evaluation.analysis.tables.table import NOT_APPLICABLE, Column, Entry, Row, Table
+from roboirg.evaluation.analysis.tables.table import NOT_APPLICABLE, Column, Row, Table
 from roboirg.evaluation.grounding_items.grounding_item import GroundingItem
 
 COLUMNS = tuple(
@@ -47,8 +47,7 @@ def score_table(scores: Iterable[GroundingScore]) -> Table:
             Row(
                 f"{score.name}, {QUESTIONS[score.kind]}",
                 options_label(row.summary.options),
-                "ours",
-                _entries(row),
+                _words(row),
             )
             for score in scores
             for row in score_rows(score)
@@ -65,10 +64,10 @@ def breakdown_tables(score: GroundingScore) -> Iterator[Table]:
             yield make_breakdown_table(breakdown, score.cells, labels)
 
 
-def _entries(row: ScoreRow) -> tuple[Entry, ...]:
+def _words(row: ScoreRow) -> tuple[str, ...]:
     summary = row.summary
     gap, p_holm = summary.gap, summary.p_holm
-    words = (
+    return (
         str(summary.trials),
         _percent(None if summary.rate is None else float(summary.rate)),
         _interval(summary.interval),
@@ -79,7 +78,6 @@ def _entries(row: ScoreRow) -> tuple[Entry, ...]:
         NOT_APPLICABLE if gap is None else points(gap.value, 1),
         corrected_p_text(p_holm),
     )
-    return tuple(Entry(word=word) for word in words)
 
 
 def _notes(scores: Sequence[GroundingScore]) -> Iterator[str]:

@@ -23,7 +23,7 @@ from roboirg.evaluation.analysis.figures.figure_style import (
 )
 from roboirg.evaluation.analysis.stats.intervals import ALPHA, Interval, without_spread
 from roboirg.evaluation.analysis.tables.rendering.markdown import markdown
-from roboirg.evaluation.analysis.tables.table import NOT_APPLICABLE, Column, Entry, Row, Table
+from roboirg.evaluation.analysis.tables.table import NOT_APPLICABLE, Column, Row, Table
 from roboirg.language.settings import all_settings
 from roboirg.util.atomic_write import write_atomically
 
@@ -163,7 +163,7 @@ def _rows(
             for one in own
         ]
         for name, words in zip(("right", "by seed"), zip(*cells, strict=True), strict=True):
-            yield Row(variant.title, name, "ours", tuple(Entry(word=word) for word in words))
+            yield Row(variant.title, name, words)
 
 
 def _percent(rates: Iterable[float], between: str = ", ") -> str:

@@ -23,7 +23,7 @@ from roboirg.evaluation.analysis.stats.paired_tests import Gap, Pairs, holm, mea
 from roboirg.evaluation.analysis.stats.rates import interval_note, p_text, points
 from roboirg.evaluation.analysis.stats.run_data import RunData
 from roboirg.evaluation.analysis.tables.breakdown_table import corrected_p_text, interval_text
-from roboirg.evaluation.analysis.tables.table import NOT_APPLICABLE, Column, Entry, Row, Table
+from roboirg.evaluation.analysis.tables.table import NOT_APPLICABLE, Column, Row, Table
 
 COLUMNS = tuple(
     map(Column, ("episodes", "first, %", "second, %", "chance", "difference", "95 % interval", "p"))
@@ -57,8 +57,7 @@ def make_arm_table(data: RunData) -> Table:
             Row(
                 f"{names[one.policy_run]}, {options_label(one.options)}",
                 f"{one.contrast.name}: {one.contrast.first} − {one.contrast.second}",
-                "ours",
-                tuple(Entry(word=word) for word in _words(one)),
+                _words(one),
             )
             for one in found
         ),

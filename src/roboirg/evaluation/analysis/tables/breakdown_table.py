@@ -47,8 +47,7 @@ def make_breakdown_table(
             Row(
                 f"{names[row.policy_run]}, {options_label(row.results.options)}",
                 row.label,
-                "ours",
-                _entries(row),
+                _cells(row),
             )
             for row in rows
         ),
@@ -71,15 +70,15 @@ def corrected_p_text(p_value: float | None) -> str:
     return p_text(p_value).removeprefix("p ").removeprefix("= ")
 
 
-def _entries(row: BreakdownRow) -> tuple[Entry, ...]:
+def _cells(row: BreakdownRow) -> tuple[Entry | str, ...]:
     results = row.results
     counts = Counts(results.successes, results.trials, results.episodes, interval=row.interval)
     return (
-        Entry(word=str(results.episodes)),
+        str(results.episodes),
         Entry(percent=None if results.rate is None else percent(results.rate), counts=counts),
-        Entry(word=NOT_APPLICABLE if row.gap is None else points(row.gap.value, 1)),
-        Entry(word=interval_text(row.gap)),
-        Entry(word=corrected_p_text(row.p_holm)),
+        NOT_APPLICABLE if row.gap is None else points(row.gap.value, 1),
+        interval_text(row.gap),
+        corrected_p_text(row.p_holm),
     )
 
 

@@ -21,7 +21,7 @@ from roboirg.evaluation.analysis.tables.breakdown_table import (
 from roboirg.evaluation.analysis.tables.facts_table import make_facts_table
 from roboirg.evaluation.analysis.tables.heard_table import make_heard_table
 from roboirg.evaluation.analysis.tables.subgoal_table import make_subgoal_table
-from roboirg.evaluation.analysis.tables.table import POLICY, Column, Entry, Row, Table
+from roboirg.evaluation.analysis.tables.table import POLICY, Column, Row, Table
 from roboirg.evaluation.records.record import Record
 from roboirg.judging.failure_attribution import EXECUTION, GROUNDING
 
@@ -51,7 +51,7 @@ def make_forms_table(data: RunData) -> Table:
         found = form_rows(data, policy_run)
         corrected = holm([row.gap.p_value for row in found])
         rows += [
-            Row(f"{name}, {row.scope}", row.setting, "ours", _form_entries(row.gap, p_value))
+            Row(f"{name}, {row.scope}", row.setting, _form_words(row.gap, p_value))
             for row, p_value in zip(found, corrected, strict=True)
         ]
     if not rows:
@@ -68,13 +68,11 @@ def make_forms_table(data: RunData) -> Table:
     )
 
 
-def _form_entries(gap: Gap, p_value: float) -> tuple[Entry, ...]:
+def _form_words(gap: Gap, p_value: float) -> tuple[str, ...]:
     overlap = gap.overlap
     counts = (overlap.trials, overlap.both, overlap.only_second, overlap.only_first)
     words = (*map(str, (*counts, overlap.neither)), points(gap.value, 1))
-    return tuple(
-        Entry(word=word) for word in (*words, interval_text(gap), corrected_p_text(p_value))
-    )
+    return (*words, interval_text(gap), corrected_p_text(p_value))
 
 
 def make_failure_table(data: RunData) -> Table:
@@ -100,8 +98,7 @@ def make_failure_table(data: RunData) -> Table:
                 Row(
                     f"{name}, {options_label(options)}",
                     task,
-                    "ours",
-                    tuple(_failure_entries(trials[task], counts, kinds)),
+                    tuple(_failure_words(trials[task], counts, kinds)),
                 )
                 for task, counts in cells.items()
             ]
@@ -121,12 +118,12 @@ def _failure_column(kind: str) -> Column:
     return Column(kind.replace("_", " "), group)
 
 
-def _failure_entries(trials: int, counts: Counter[str], kinds: Iterable[str]) -> Iterator[Entry]:
+def _failure_words(trials: int, counts: Counter[str], kinds: Iterable[str]) -> Iterator[str]:
     total = counts.total()
-    yield from (Entry(word=str(trials)), Entry(word=str(total)))
+    yield from (str(trials), str(total))
     for kind in kinds:
         share = f" ({100 * counts[kind] / total:.0f} %)" if counts[kind] else ""
-        yield Entry(word=f"{counts[kind]}{share}")
+        yield f"{counts[kind]}{share}"
 
 
 DIAGNOSTIC_TABLES: Mapping[str, Callable[[RunData], Table]] = {

@@ -13,7 +13,7 @@ from roboirg.evaluation.analysis.stats.option_labels import (
     words_label,
 )
 from roboirg.evaluation.analysis.stats.run_data import RunData
-from roboirg.evaluation.analysis.tables.table import Column, Entry, Row, Table
+from roboirg.evaluation.analysis.tables.table import Column, Row, Table
 from roboirg.evaluation.records.record import Record, Summary
 from roboirg.policies.contract.policy_calls import SERVER
 from roboirg.util.media import CONTROL_RATE
@@ -91,7 +91,7 @@ def make_facts_table(data: RunData, records: Iterable[tuple[str, Record]]) -> Ta
         heads=("of", "fact"),
         columns=(Column("value", is_text=True),),
         rows=tuple(
-            Row(of, name, "ours", (Entry(word="; ".join(values) or NOT_REPORTED),))
+            Row(of, name, ["; ".join(values) or NOT_REPORTED])
             for of in (RUN, *totals)
             for (owner, name), values in known.items()
             if owner == of

@@ -51,11 +51,11 @@ def make_heard_table(data: RunData) -> Table:
     keys = sorted_keys(cells, list(names))
     for place, key in enumerate(keys):
         group = f"{names[key.policy_run]}, {options_label(key.options)}"
-        rows.append(Row(group, key.task, "ours", _entries(cells[key])))
+        rows.append(Row(group, key.task, _cells(cells[key])))
         owner = key.policy_run, key.options
         is_last = place + 1 == len(keys) or keys[place + 1][::2] != owner
         if is_last and sum(one[::2] == owner for one in keys) > 1:
-            rows.append(Row(group, ALL_TASKS, "ours", _entries(totals[owner])))
+            rows.append(Row(group, ALL_TASKS, _cells(totals[owner])))
     return Table(
         key="heard",
         title="Instructions that the policies' models read to the end",
@@ -66,17 +66,17 @@ def make_heard_table(data: RunData) -> Table:
     )
 
 
-def _entries(one: HeardCounts) -> tuple[Entry, ...]:
+def _cells(one: HeardCounts) -> tuple[Entry | str, ...]:
     return (
-        Entry(word=str(one.episodes)),
-        Entry(word=cut_text(one)),
+        str(one.episodes),
+        cut_text(one),
         _rate(one.successes, one.trials),
-        Entry(word=str(one.heard)),
+        str(one.heard),
         _rate(one.heard_successes, one.heard),
     )
 
 
-def _rate(successes: int, trials: int) -> Entry:
+def _rate(successes: int, trials: int) -> Entry | str:
     if not trials:
-        return Entry(word=NOT_APPLICABLE)
+        return NOT_APPLICABLE
     return Entry(percent=percent(Fraction(successes, trials)), counts=Counts(successes, trials))

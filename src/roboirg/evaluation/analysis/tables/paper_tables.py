@@ -131,13 +131,13 @@ def _rate_table(which: RateTable, cells: Cells, *, published: bool, floors: Sequ
     for policy_run, position in _positions(which, cells):
         keys = [CellKey(policy_run, task, position.options) for task in tasks]
         entries = {key.task: _entry(key, cells, differences, rng) for key in keys}
-        rows.append(Row(position.group, position.name, "ours", with_averages(columns, entries)))
+        rows.append(Row(position.group, position.name, with_averages(columns, entries)))
     for floor in floors:
         rows += _floor_rows(floor, which, columns, cells)
     if shows_published:
         rows += [_published_row(which, columns, row) for row in published_rows(which)]
     reference_of = _reference_finder(which, rows)
-    rows = with_best(with_changes(columns, _grouped(which, rows), reference_of))
+    rows = [*with_best(with_changes(columns, _grouped(which, rows), reference_of))]
     return Table(
         key=which,
         title=TITLES[which],
@@ -257,7 +257,7 @@ def _floor_rows(floor: str, which: RateTable, columns: Sequence[Column], cells: 
                 None if level is None else percent(level), applies=_applies(task, options)
             )
         if any(entry.percent is not None for entry in entries.values()):
-            rows.append(Row(options.setting, floor, "chance", with_averages(columns, entries)))
+            rows.append(Row(options.setting, floor, with_averages(columns, entries), "chance"))
     return rows
 
 
@@ -289,7 +289,7 @@ def _published_row(which: RateTable, columns: Sequence[Column], row: PublishedRo
     position = _position(which, row.model, row.options)
     # The paper prints the overall average, but no averages of suites.
     entries = (*entries[:-1], Entry(percent=row.average))
-    return Row(position.group, position.name, "published", entries)
+    return Row(position.group, position.name, entries, "published")
 
 
 def _grouped(which: RateTable, rows: Iterable[Row]) -> list[Row]:
@@ -333,10 +333,10 @@ def _coverage() -> Table:
     has = {setting for task in all_tasks().values() for setting in settings_of(task)}
     table_rows = []
     for row in rows:
-        words = {kind: "yes" if kind in has else "no" for kind in kinds}
+        words = ["yes" if kind in has else "no" for kind in kinds]
         is_own = row.benchmark == OWN_NAME
-        entries = tuple(Entry(word=word) for word in (words if is_own else row.covers).values())
-        table_rows.append(Row(row.kind, row.benchmark, "ours" if is_own else "cited", entries))
+        cells = words if is_own else [*row.covers.values()]
+        table_rows.append(Row(row.kind, row.benchmark, cells, "ours" if is_own else "cited"))
     return Table(
         key="coverage",
         title=TITLES["coverage"],

@@ -11,7 +11,7 @@ from roboirg.evaluation.analysis.stats.cells import CellKey
 from roboirg.evaluation.analysis.stats.option_labels import options_label
 from roboirg.evaluation.analysis.stats.planner_failures import PLANNER_FAILURES, planner_failure
 from roboirg.evaluation.analysis.stats.run_data import RunData
-from roboirg.evaluation.analysis.tables.table import Column, Entry, Row, Table
+from roboirg.evaluation.analysis.tables.table import Column, Row, Table
 from roboirg.evaluation.records.record import Record
 from roboirg.judging import SUBGOAL_VERDICTS
 
@@ -51,15 +51,15 @@ class _PlannerCell:
         for name in _COSTS:
             self.costs[name] += record.usage.get(name, 0)
 
-    def entries(self, failures: Iterable[str], costs: Iterable[str]) -> Iterator[Entry]:
+    def words(self, failures: Iterable[str], costs: Iterable[str]) -> Iterator[str]:
         total = self.verdicts.total()
-        yield Entry(word=str(total))
+        yield str(total)
         for one in SUBGOAL_VERDICTS:
             share = 100 * self.verdicts[one] / max(total, 1)
-            yield Entry(word=f"{self.verdicts[one]} ({share:.0f} %)")
-        yield from (Entry(word=str(self.failures[one])) for one in failures)
+            yield f"{self.verdicts[one]} ({share:.0f} %)"
+        yield from (str(self.failures[one]) for one in failures)
         for name in costs:
-            yield Entry(word=f"{self.costs[name] / self.episodes:.3g}")
+            yield f"{self.costs[name] / self.episodes:.3g}"
 
 
 def make_subgoal_table(data: RunData, records: Iterable[tuple[str, Record]]) -> Table:
@@ -92,8 +92,7 @@ def make_subgoal_table(data: RunData, records: Iterable[tuple[str, Record]]) -> 
             Row(
                 f"{data.names[key.policy_run]}, {options_label(key.options)}",
                 key.task,
-                "ours",
-                tuple(cell.entries(failures, costs)),
+                tuple(cell.words(failures, costs)),
             )
             for key, cell in shown.items()
         ),

@@ -1,8 +1,9 @@
-"""Tables before rendering: rows of entries with everything that a rendering shows."""
+"""Tables before they are printed: rows of entries with everything that a format shows."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+import itertools
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from decimal import Decimal
 from typing import Literal, NamedTuple
@@ -58,6 +59,7 @@ class Entry:
         marks: of incomplete entries, as in the constants above.
         counts: behind the rate; None if they are unknown.
         differences: from the published rate's conditions; None without a published rate.
+        style: color of the text in a terminal, or empty.
     """
 
     percent: Decimal | None = None
@@ -68,6 +70,13 @@ class Entry:
     marks: str = ""
     counts: Counts | None = None
     differences: Differences | None = None
+    style: str = ""
+
+    @property
+    def text(self) -> str:
+        """The rate, a dash if the setting does not apply, or the word; empty without results."""
+        rate = "" if self.percent is None else str(self.percent)
+        return self.word or (rate if self.applies else NOT_APPLICABLE)
 
     @property
     def change_text(self) -> str:
@@ -79,14 +88,8 @@ class Entry:
         """The marks, and whether the rate can be compared with the published one."""
         return self.marks + comparison_sign(self.differences)
 
-    @property
-    def text(self) -> str:
-        """The rate, a dash if the setting does not apply, or the word; empty without results."""
-        if self.word:
-            return self.word
-        if not self.applies:
-            return NOT_APPLICABLE
-        return "" if self.percent is None else str(self.percent)
+    def __str__(self) -> str:
+        return " ".join(filter(None, (self.text, self.change_text, self.signs)))
 
 
 class Column(NamedTuple):
@@ -105,36 +108,41 @@ class Column(NamedTuple):
     is_text: bool = False
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Row:
     """A row of a table.
 
     Attributes:
         group: the setting or policy above it.
         name: of the row in its group.
+        cells: one for each column, as an entry or as its word.
         source: origin of its rates.
-        entries: one for each column.
     """
 
     group: str
     name: str
-    source: Source
-    entries: tuple[Entry, ...]
+    cells: Sequence[Entry | str]
+    source: Source = "ours"
+
+    @property
+    def entries(self) -> tuple[Entry, ...]:
+        """The cells as entries."""
+        return tuple(Entry(word=one) if isinstance(one, str) else one for one in self.cells)
 
 
 @dataclass(frozen=True, slots=True)
 class Table:
-    """A table, ready to be rendered.
+    """A table, ready to be printed.
 
     Attributes:
         key: a short name, usable as a file name.
         title: of the table.
         heads: headings of the groups, and of the names of the rows. With several of these a name
-            lists headings, and each has a check mark or none.
+            lists headings, and each has a check mark or none. With a single head in all, groups
+            are set apart and not named.
         columns: of the entries.
-        rows: in groups.
+        rows: printed by group, these in the order of their first rows.
         notes: sentences below the table.
-        published_mark: behind the names of policies in published rows.
     """
 
     key: str
@@ -143,58 +151,57 @@ class Table:
     columns: tuple[Column, ...]
     rows: tuple[Row, ...]
     notes: tuple[str, ...] = ()
-    published_mark: str = PUBLISHED_MARK
 
-    def groups(self) -> dict[str, list[Row]]:
-        """Return the rows by the label of their group, in order."""
-        groups: dict[str, list[Row]] = {}
+    def lines(self) -> Iterator[tuple[bool, tuple[str, ...], Row]]:
+        """Yield whether a row is the first of its group, its labels as printed, and the row."""
+        for group in self.groups():
+            for number, row in enumerate(group):
+                labels = self.labels(row)
+                names_group = not number or len(labels) == 1
+                yield not number, labels if names_group else ("", *labels[1:]), row
+
+    def groups(self) -> Iterable[list[Row]]:
+        """Return the rows of each group; published policies are apart from others of the name."""
+        is_by_policy = self.heads[0] == POLICY
+        groups: dict[object, list[Row]] = {}
         for row in self.rows:
-            label = row.group + self._mark(row, is_policy=self._is_by_policy)
-            groups.setdefault(label, []).append(row)
-        return groups
+            groups.setdefault((row.group, is_by_policy and row.source), []).append(row)
+        return groups.values()
 
-    def names(self, row: Row) -> tuple[str, ...]:
-        """Return the label of a row, or its check marks, one for each heading of names."""
-        heads = self.heads[1:]
-        if len(heads) > 1:
-            listed = row.name.split(",")
-            return tuple(CHECK_MARK if head in listed else "" for head in heads)
-        return (row.name + self._mark(row, is_policy=not self._is_by_policy),)
-
-    @property
-    def _is_by_policy(self) -> bool:
-        return self.heads[0] == POLICY
-
-    def _mark(self, row: Row, *, is_policy: bool) -> str:
-        return self.published_mark if is_policy and row.source == "published" else ""
+    def labels(self, row: Row) -> tuple[str, ...]:
+        """Return the label of a row below each head; names of published policies are marked."""
+        listed = row.name.split(",")
+        checks = [CHECK_MARK if head in listed else "" for head in self.heads[1:]]
+        labels = [row.group, *(checks if len(checks) > 1 else [row.name])][-len(self.heads) :]
+        if row.source == "published" and POLICY in self.heads:
+            labels[self.heads.index(POLICY)] += PUBLISHED_MARK
+        return tuple(labels)
 
 
-def with_averages(columns: Sequence[Column], entries: Mapping[str, Entry]) -> tuple[Entry, ...]:
-    """Return a row's entries: those of its tasks, and the averages over them.
+def average(entries: Sequence[Entry]) -> Entry:
+    """Return the average over the tasks that apply and have a rate.
 
-    An average is over the tasks that apply and have a rate. It is marked if one of them has no
-    rate or is incomplete.
+    It is marked if one of them has no rate or is incomplete.
     """
-    return tuple(
-        _average([entries[name] for name in column.averages])
-        if column.averages
-        else entries[column.name]
-        for column in columns
-    )
-
-
-def _average(entries: Sequence[Entry]) -> Entry:
     applying = [entry for entry in entries if entry.applies]
-    if not applying:
-        return Entry(applies=False)
     rates = [entry.percent for entry in applying if entry.percent is not None]
     if not rates:
-        return Entry()
+        return Entry(applies=bool(applying))
     is_partial = len(rates) < len(applying) or any(entry.marks for entry in applying)
     return Entry(
         percent=mean_percent(rates),
         marks=PARTIAL_MARK if is_partial else "",
         differences=merged(entry.differences for entry in applying),
+    )
+
+
+def with_averages(columns: Iterable[Column], entries: Mapping[str, Entry]) -> tuple[Entry, ...]:
+    """Return a row's entries: those of its tasks, and the averages over them."""
+    return tuple(
+        average([entries[name] for name in column.averages])
+        if column.averages
+        else entries[column.name]
+        for column in columns
     )
 
 
@@ -207,57 +214,38 @@ def with_changes(
     some settings.
     """
     return [
-        replace(
-            row,
-            entries=tuple(
-                replace(entry, change=_change(columns, index, row, reference))
-                for index, entry in enumerate(row.entries)
-            ),
-        )
-        if (reference := reference_of(row)) is not None
-        else row
+        row
+        if (reference := reference_of(row)) is None
+        else replace(row, cells=tuple(_changed(columns, row, reference)))
         for row in rows
     ]
 
 
-def _change(columns: Sequence[Column], index: int, row: Row, reference: Row) -> Decimal | None:
-    entry, other = row.entries[index], reference.entries[index]
-    if columns[index].averages:
-        by_name = dict(zip((column.name for column in columns), row.entries, strict=True))
-        others = dict(zip((column.name for column in columns), reference.entries, strict=True))
-        applying = [name for name in columns[index].averages if by_name[name].applies]
-        other = _average([others[name] for name in applying])
-    if entry.marks or other.marks or entry.percent is None or other.percent is None:
-        return None
-    return entry.percent - other.percent
+def _changed(columns: Sequence[Column], row: Row, reference: Row) -> Iterator[Entry]:
+    names = [column.name for column in columns]
+    ours, theirs = (dict(zip(names, one.entries, strict=True)) for one in (row, reference))
+    for column, entry in zip(columns, row.entries, strict=True):
+        tasks = column.averages or (column.name,)
+        other = average([theirs[name] for name in tasks if ours[name].applies])
+        if entry.marks or other.marks or entry.percent is None or other.percent is None:
+            yield entry
+        else:
+            yield replace(entry, change=entry.percent - other.percent)
 
 
-def with_best(rows: Sequence[Row]) -> list[Row]:
-    """Return the rows with the best entries of each column, group and source marked.
+def with_best(rows: Iterable[Row]) -> Iterator[Row]:
+    """Yield the rows with the best entries of each column, group and source marked.
 
     None is the best if all have the same rate, only one has a rate, or one is incomplete.
     """
-    return [
-        replace(
-            row,
-            entries=tuple(
-                replace(entry, best=_is_best(entry, _rivals(rows, row, index)))
-                for index, entry in enumerate(row.entries)
-            ),
-        )
-        for row in rows
-    ]
+    for _, rivals in itertools.groupby(rows, lambda row: (row.group, row.source)):
+        found = list(rivals)
+        columns = zip(*(row.entries for row in found), strict=True)
+        for row, cells in zip(found, zip(*map(_with_best, columns), strict=True), strict=True):
+            yield replace(row, cells=cells)
 
 
-def _rivals(rows: Sequence[Row], row: Row, index: int) -> list[Entry]:
-    return [
-        other.entries[index]
-        for other in rows
-        if (other.group, other.source) == (row.group, row.source)
-    ]
-
-
-def _is_best(entry: Entry, rivals: Sequence[Entry]) -> bool:
-    rates = [rival.percent for rival in rivals if rival.percent is not None]
-    fair = len(set(rates)) > 1 and not any(rival.marks for rival in rivals)
-    return fair and entry.percent is not None and entry.percent == max(rates)
+def _with_best(rivals: Sequence[Entry]) -> list[Entry]:
+    rates = {entry.percent for entry in rivals if entry.percent is not None}
+    is_fair = len(rates) > 1 and not any(entry.marks for entry in rivals)
+    return [replace(one, best=is_fair and one.percent == max(rates)) for one in rivals]

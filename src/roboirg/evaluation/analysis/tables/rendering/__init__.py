@@ -1,15 +1,13 @@
-"""Rendering of tables for the terminal, Markdown, LaTeX and other programs."""
+"""Printing of tables for the terminal, Markdown, LaTeX and other programs."""
 
 from __future__ import annotations
 
-import functools
 from collections.abc import Callable, Mapping
 from typing import NamedTuple
 
 from roboirg.core.errors import UnknownNameError
 from roboirg.evaluation.analysis.tables.rendering.csv_lines import csv_text, json_text
 from roboirg.evaluation.analysis.tables.rendering.latex import latex
-from roboirg.evaluation.analysis.tables.rendering.latex_layout import PIECES
 from roboirg.evaluation.analysis.tables.rendering.markdown import markdown
 from roboirg.evaluation.analysis.tables.rendering.terminal import plain
 from roboirg.evaluation.analysis.tables.table import Table
@@ -31,7 +29,6 @@ FORMATS: Mapping[str, Format] = {
     "terminal": Format(".txt", plain),
     "markdown": Format(".md", markdown),
     "latex": Format(".tex", latex),
-    "latex-pieces": Format(".tex", functools.partial(latex, layout=PIECES)),
     "csv": Format(".csv", csv_text),
     "json": Format(".json", json_text),
 }

@@ -1,36 +1,46 @@
-"""Tables in LaTeX; the document needs the packages booktabs, xcolor and amssymb.
+"""Tables in LaTeX; the document needs the packages booktabs, xcolor, amssymb, array and graphicx.
 
-A table is as wide as both columns of IEEEtran's conference class, or, in pieces, no wider than the
-text of a one-column article. What is wider or longer becomes several tables: by groups of columns,
-as on the terminal, and by groups of rows.
+A table is never wider than the text of the document: what is wider is scaled down. What is much
+wider or longer becomes several tables: by groups of columns, as on the terminal, and by groups of
+rows.
 """
 
 from __future__ import annotations
 
 import dataclasses
 import itertools
+import re
 from collections.abc import Iterator, Sequence
 
-from roboirg.evaluation.analysis.tables.rendering.latex_layout import (
-    HUMPS,
-    PAGE,
-    Layout,
-    Part,
-    parts_of,
-)
+from roboirg.evaluation.analysis.tables.rendering.terminal import split_columns
 from roboirg.evaluation.analysis.tables.table import (
     CHECK_MARK,
-    NOT_APPLICABLE,
     PUBLISHED_MARK,
     Column,
     Entry,
+    Row,
     Table,
 )
 
-_PREAMBLE = r"""% needs \usepackage{booktabs,xcolor,amssymb}
+_PREAMBLE = r"""% needs \usepackage{booktabs,xcolor,amssymb,array,graphicx}
 \providecommand{\roboirgup}[1]{{\tiny\textcolor[rgb]{0,.42,.25}{$\uparrow$#1}}}
 \providecommand{\roboirgdown}[1]{{\tiny\textcolor[rgb]{.75,.1,.1}{$\downarrow$#1}}}
-\providecommand{\roboirgsame}[1]{{\tiny\textcolor[gray]{.4}{$\rightarrow$#1}}}"""
+\providecommand{\roboirgsame}[1]{{\tiny\textcolor[gray]{.4}{$\rightarrow$#1}}}
+\providecommand{\roboirgfit}[1]{\resizebox{\ifdim\width>\textwidth\textwidth\else\width\fi}{!}{#1}}"""
+_FLOAT = r"""\begin{{table*}}
+\centering\scriptsize
+\setlength{{\tabcolsep}}{{2pt}}
+\caption{{{caption}.}}
+\label{{tab:{label}}}
+\roboirgfit{{\begin{{tabular}}{{{columns}}}
+\toprule
+{lines}
+\bottomrule
+\end{{tabular}}}}
+\par\smallskip{{\raggedright {notes}\par}}
+\end{{table*}}"""
+_FOLDED = r">{{\raggedright\arraybackslash}}p{{{:g}em}}"
+"""A column whose texts are folded, by its width."""
 DAGGER = "†"
 """Marks published rows."""
 _CHANGES = {"↑": r"\roboirgup", "↓": r"\roboirgdown", "→": r"\roboirgsame"}
@@ -54,81 +64,90 @@ _SPECIAL = {
     "≠": r"$\neq$",
     CHECK_MARK: r"$\checkmark$",
     DAGGER: r"\textsuperscript{\dag}",
+    "\u200b": r"\allowbreak{}",
 }
-_BREAKS = frozenset("./:_-,=?&")
-"""Signs behind which a long name may be broken."""
-_MOST_LETTERS = 14
-"""Letters of a name behind which it may be broken in any case."""
+_BREAKS = re.compile(r"[./:_,=?&-](?=[^\s\d])|[^\s./:_,=?&-]{14}(?=\S)")
+"""Behind what a long name may be broken: these signs, and 14 letters without one."""
+_BREAK = "\\g<0>\u200b"
+_HUMPS = re.compile(r"(?<=[a-z])(?=[A-Z])|(?<=_)|\s+")
+"""Where a heading may be broken: before a capital, behind an underscore, at blanks."""
+_ROOM = 220
+"""Characters of all columns as on a terminal; more are not legible in a page's width."""
+_LINES = 52
+"""Lines of rows in one table; with caption and notes they fill a page."""
+_NAME = 30
+"""Letters of a row's name in one line; longer ones are folded."""
 
 
-def latex(table: Table, layout: Layout = PAGE) -> str:
-    """Return table environments with rules between groups of columns and of rows."""
-    mark = PUBLISHED_MARK.strip()
-    notes = tuple(note.replace(mark, DAGGER) for note in table.notes)
-    table = dataclasses.replace(table, published_mark=DAGGER, notes=notes)
-    lines = [_PREAMBLE]
-    parts = parts_of(table, layout)
-    for number, part in enumerate(parts, start=1):
-        lines += _float(table, part, layout, number, len(parts))
-    return "\n".join(lines) + "\n"
+def latex(table: Table) -> str:
+    """Return table environments with rules between groups of columns and of rows.
+
+    The averages of suites, which the paper does not have, are left out.
+    """
+    columns = enumerate(table.columns)
+    shown = [index for index, one in columns if not (one.averages and one.group)]
+    parts = [
+        (indices, dataclasses.replace(table, rows=tuple(rows)))
+        for indices in split_columns(table, shown, _ROOM)
+        for rows in _blocks(table)
+    ]
+    floats = (_float(block, at, number, len(parts)) for number, (at, block) in enumerate(parts, 1))
+    return "\n".join([_PREAMBLE, *floats, ""])
 
 
-def _float(table: Table, part: Part, layout: Layout, number: int, count: int) -> Iterator[str]:
-    columns = [table.columns[index] for index in part.indices]
-    heads = table.heads[1:]
-    caption, label = escaped(table.title), f"tab:{table.key}"
-    if count > 1:
-        caption += f" ({number} of {count})"
-        label += f"-{number}" if number > 1 else ""
-    first = rf"p{{{part.names_pt:.0f}pt}}" if len(heads) == 1 else "c" * len(heads)
-    yield r"\begin{table*}"
-    yield rf"\centering\{layout.size}"
-    yield rf"\setlength{{\tabcolsep}}{{{layout.gap / 2:.0f}pt}}"
-    yield rf"\caption{{{caption}.}}"
-    yield rf"\label{{{label}}}"
-    yield rf"\begin{{tabular}}{{{first}{'r' * len(columns)}}}"
-    yield r"\toprule"
-    yield from _column_groups(columns, len(heads))
-    yield _line([*map(escaped, heads), *(_head(column.name) for column in columns)])
-    block = dataclasses.replace(table, rows=tuple(part.rows))
-    for group, rows in block.groups().items():
-        yield r"\midrule"
-        width = len(heads) + len(columns)
-        yield rf"\multicolumn{{{width}}}{{l}}{{\emph{{{escaped(group)}}}}} \\"
-        for row in rows:
-            cells = [_cell(row.entries[index]) for index in part.indices]
-            yield _line([*_names(table.names(row)), *cells])
-    yield r"\bottomrule"
-    yield r"\end{tabular}"
-    if number == count:
-        yield rf"\par\smallskip{{\raggedright {_foldable(' '.join(table.notes))}\par}}"
-    yield r"\end{table*}"
+def _blocks(table: Table) -> Iterator[list[Row]]:
+    """Yield the rows of each table; a group is divided only if it is longer than a table."""
+    most = _LINES // max([1 + len(row.name) // _NAME for row in table.rows], default=1)
+    block: list[Row] = []
+    for group in table.groups():
+        for piece in (group[at : at + most] for at in range(0, len(group), most)):
+            if block and len(block) + len(piece) > most:
+                yield block
+                block = []
+            block = [*block, *piece]
+    yield block
 
 
-def _names(labels: Sequence[str]) -> list[str]:
-    if len(labels) > 1:
-        return [escaped(label) for label in labels]
-    return [rf"\raggedright {_foldable(labels[0])}"]
+def _float(table: Table, indices: list[int], number: int, count: int) -> str:
+    columns = [table.columns[index] for index in indices]
+    heads = [*map(escaped, table.heads[1:])]
+    is_long = any(len(row.name) > _NAME for row in table.rows)
+    names = (
+        [_FOLDED.format(_NAME / 2)] if is_long else ["l"] if len(heads) == 1 else "c" * len(heads)
+    )
+    sides = [_FOLDED.format(30) if column.is_text else "r" for column in columns]
+    lines = _column_groups(columns, len(heads))
+    lines.append(_line([*heads, *(_head(column.name) for column in columns)]))
+    for begins, labels, row in table.lines():
+        if begins:
+            group = rf"{{l}}{{\emph{{{escaped(labels[0])}}}}}"
+            lines += [r"\midrule", rf"\multicolumn{{{len(heads + indices)}}}{group} \\"]
+        cells = [_cell(row.entries[index], table.columns[index]) for index in indices]
+        lines.append(_line([*map(_foldable if is_long else escaped, labels[1:]), *cells]))
+    return _FLOAT.format(
+        caption=escaped(table.title) + (f" ({number} of {count})" if count > 1 else ""),
+        label=table.key + (f"-{number}" if number > 1 else ""),
+        columns="".join([*names, *sides]),
+        lines="\n".join(lines),
+        notes=" ".join(map(_foldable, table.notes)) if number == count else "",
+    )
 
 
 def _column_groups(columns: Sequence[Column], names: int) -> list[str]:
     if not any(column.group for column in columns):
         return []
-    cells, rules, place = [""] * names, [], names + 1
+    cells, rules, place = [""] * names, "", names + 1
     for name, members in itertools.groupby(column.group for column in columns):
         width = len(list(members))
-        cells.append(
-            rf"\multicolumn{{{width}}}{{c}}{{{escaped(name)}}}" if name else " & " * (width - 1)
-        )
-        if name:
-            rules.append(rf"\cmidrule(lr){{{place}-{place + width - 1}}}")
+        cells.append(rf"\multicolumn{{{width}}}{{c}}{{{escaped(name)}}}")
+        rules += rf"\cmidrule(lr){{{place}-{place + width - 1}}}" if name else ""
         place += width
-    return [_line(cells), "".join(rules)]
+    return [_line(cells), rules]
 
 
 def _head(name: str) -> str:
     """Return a heading with a line for each of its words."""
-    words = [escaped(word) for word in HUMPS.split(name)]
+    words = [escaped(word) for word in _HUMPS.split(name)]
     stacked = r"\\".join(rf"{word}\vphantom{{Ag}}" for word in words)
     return words[0] if len(words) == 1 else rf"\shortstack[r]{{{stacked}}}"
 
@@ -137,8 +156,8 @@ def _line(cells: list[str]) -> str:
     return " & ".join(cells) + r" \\"
 
 
-def _cell(entry: Entry) -> str:
-    text = "--" if entry.text == NOT_APPLICABLE else escaped(entry.text)
+def _cell(entry: Entry, column: Column) -> str:
+    text = _foldable(entry.text) if column.is_text else escaped(entry.text)
     if entry.best:
         text = rf"\textbf{{{text}}}"
     if change := entry.change_text:
@@ -150,15 +169,10 @@ def _cell(entry: Entry) -> str:
 
 def _foldable(text: str) -> str:
     """Return text that may be broken within long names, too."""
-    found, run = [], 0
-    for sign in text:
-        run = 0 if sign in _BREAKS or sign == " " else run + 1
-        may_break = sign in _BREAKS or run == _MOST_LETTERS
-        found.append(escaped(sign) + (r"\allowbreak{}" if may_break else ""))
-        run = 0 if may_break else run
-    return "".join(found)
+    return escaped(_BREAKS.sub(_BREAK, text))
 
 
 def escaped(text: str) -> str:
-    """Return a text as the format prints it."""
-    return "".join(_SPECIAL.get(sign, sign) for sign in text)
+    """Return a text as the format prints it; a dagger marks published rows."""
+    marked = text.replace(PUBLISHED_MARK, DAGGER).replace(PUBLISHED_MARK.strip(), DAGGER)
+    return "".join(_SPECIAL.get(sign, sign) for sign in marked)

@@ -9,15 +9,12 @@ _SPECIAL = str.maketrans({sign: f"\\{sign}" for sign in "\\|*_`<[]"})
 
 def markdown(table: Table) -> str:
     """Return title, table and notes; only the first row of a group names the group."""
-    heads = [*table.heads, *(column.name for column in table.columns)]
-    lines = [f"### {escaped(table.title)}", "", _line([escaped(head) for head in heads])]
+    heads = [escaped(head) for head in (*table.heads, *(column.name for column in table.columns))]
     sides = ["---" if column.is_text else "---:" for column in table.columns]
+    lines = [f"### {escaped(table.title)}", "", _line(heads)]
     lines.append(_line(["---"] * len(table.heads) + sides))
-    for group, rows in table.groups().items():
-        for number, row in enumerate(rows):
-            name = "" if number else escaped(group)
-            names = map(escaped, table.names(row))
-            lines.append(_line([name, *names, *map(_cell, row.entries)]))
+    for _, labels, row in table.lines():
+        lines.append(_line([*map(escaped, labels), *map(_cell, row.entries)]))
     notes = [line for note in table.notes for line in ("", escaped(note))]
     return "\n".join([*lines, *notes]) + "\n"
 

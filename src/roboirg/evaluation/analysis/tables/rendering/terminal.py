@@ -10,10 +10,11 @@ from rich.table import Table as Grid
 from rich.text import Text
 
 from roboirg.evaluation.analysis.stats.run_summary import ALL_TASKS
-from roboirg.evaluation.analysis.tables.rendering.column_parts import BORDERS, split_columns
 from roboirg.evaluation.analysis.tables.table import Entry, Row, Table
 from roboirg.util.console_width import LINE_WIDTH, line_width, widen
 
+_BORDERS = 3
+"""Characters of a column's line and its two blanks."""
 _TEXT_WIDTH = 80
 """Characters of a column of texts, which are folded."""
 
@@ -21,17 +22,20 @@ _TEXT_WIDTH = 80
 def renderable(table: Table, console: Console) -> RenderableType:
     """Return the table with its notes, split to fit the console's width.
 
-    A console that is no terminal is widened if names need it; in a terminal they are folded.
+    Columns without a result in any row are left out. A console that is no terminal is widened if
+    names need it; in a terminal they are folded.
     """
-    parts = _parts(table, line_width(console))
+    columns = enumerate(zip(*(row.entries for row in table.rows), strict=True))
+    shown = [index for index, found in columns if any(one.applies and str(one) for one in found)]
+    labels = zip(table.heads, *map(table.labels, table.rows), strict=True)
+    names = 1 + sum(max(map(len, words)) + _BORDERS for words in labels)
+    parts = split_columns(table, shown, line_width(console) - names)
     grids = [_grid(table, indices) for indices in parts]
     widen(console, *grids)
-    titles = (
-        Text(table.title if len(parts) == 1 else _title(table, indices), "bold")
-        for indices in parts
+    titled = zip([Text(one, "bold") for one in _titles(table, parts)], grids, strict=True)
+    return Group(
+        *(line for part in titled for line in part), *(Text(note, "dim") for note in table.notes)
     )
-    titled = (part for pair in zip(titles, grids, strict=True) for part in pair)
-    return Group(*titled, *(Text(note, "dim") for note in table.notes))
 
 
 def plain(table: Table) -> str:
@@ -42,54 +46,62 @@ def plain(table: Table) -> str:
     return "\n".join(line.rstrip() for line in captured.get().splitlines()) + "\n"
 
 
-def _parts(table: Table, width: int) -> list[list[int]]:
-    """Return the columns of each part; those without a result in any row are left out."""
-    labels = [(group, *table.names(row)) for group, rows in table.groups().items() for row in rows]
-    heads = sum(max(map(len, words)) + BORDERS for words in zip(table.heads, *labels, strict=True))
-    widths = {
-        index: max(len(column.name), *(len(_cell(row, row.entries[index])) for row in table.rows))
-        + BORDERS
-        for index, column in enumerate(table.columns)
-        if any(entry.percent is not None or entry.word or entry.signs
-               for entry in (row.entries[index] for row in table.rows))
-    }  # fmt: skip
-    groups, shown = [table.columns[index].group for index in widths], list(widths)
-    parts = split_columns(groups, list(widths.values()), width - heads - 1)
-    return [[shown[place] for place in part] for part in parts]
+def split_columns(table: Table, shown: Sequence[int], room: int) -> list[list[int]]:
+    """Return the columns of each part: whole groups if they fit, at least one column.
+
+    Args:
+        table: what is split.
+        shown: the columns that are printed.
+        room: characters of a part without the labels of its rows.
+    """
+    names = [[column.name] for column in table.columns]
+    texts = zip(names, *(map(str, row.entries) for row in table.rows), strict=True)
+    widths = [max(map(len, (*name, *words))) + _BORDERS for name, *words in texts]
+    parts: list[list[int]] = []
+    left = 0
+    for index in shown:
+        group = [at for at in shown if table.columns[at].group == table.columns[index].group]
+        # A group stays together; one that is too wide for a part begins with one of its own.
+        needed = sum(widths[at] for at in group) if index == group[0] else widths[index]
+        if not parts or needed > left:
+            parts.append([])
+            left = room
+        parts[-1].append(index)
+        left -= widths[index]
+    return parts
 
 
-def _title(table: Table, indices: Sequence[int]) -> str:
-    groups = dict.fromkeys(table.columns[index].group or ALL_TASKS for index in indices)
-    return f"{table.title}: {', '.join(groups)}"
+def _titles(table: Table, parts: Sequence[Sequence[int]]) -> list[str]:
+    if len(parts) == 1:
+        return [table.title]
+    groups = [dict.fromkeys(table.columns[at].group or ALL_TASKS for at in part) for part in parts]
+    return [f"{table.title}: {', '.join(one)}" for one in groups]
 
 
 def _grid(table: Table, indices: Sequence[int]) -> Grid:
     grid = Grid()
     for head in table.heads:
         grid.add_column(head, overflow="fold")
-    for index in indices:
-        column = table.columns[index]
+    for column in (table.columns[index] for index in indices):
         if column.is_text:
             grid.add_column(column.name, overflow="fold", max_width=_TEXT_WIDTH)
         else:
             grid.add_column(column.name, justify="right", no_wrap=True)
-    for group, rows in table.groups().items():
-        grid.add_section()
-        for number, row in enumerate(rows):
-            cells = [_cell(row, row.entries[index]) for index in indices]
-            names = (Text(name, _style(row)) for name in table.names(row))
-            grid.add_row(Text("" if number else group), *names, *cells)
+    for begins, labels, row in table.lines():
+        if begins:
+            grid.add_section()
+        names = [Text(label, _style(row) if number else "") for number, label in enumerate(labels)]
+        grid.add_row(*names, *(_cell(row, row.entries[index]) for index in indices))
     return grid
 
 
 def _cell(row: Row, entry: Entry) -> Text:
-    text = Text(entry.text, "bold" if entry.best else "")
-    if entry.change is not None:
-        text.append(f" {entry.change_text}")
-    if entry.signs:
-        text.append(f" {entry.signs}" if entry.text else entry.signs, "bold yellow")
-    text.stylize(_style(row))
-    return text
+    texts = (entry.text, entry.change_text, entry.signs)
+    styles = ("bold" if entry.best else entry.style, "", "bold yellow")
+    parts = zip(texts, styles, strict=True)
+    cell = Text(" ").join(Text(text, style) for text, style in parts if text)
+    cell.stylize(_style(row))
+    return cell
 
 
 def _style(row: Row) -> str:
