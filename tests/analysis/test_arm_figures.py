@@ -120,8 +120,6 @@ def test_tables_figures_and_sentences_have_each_policy_once():
     assert uses["mine, explicit"][1].text.startswith("100.0 (")
     assert uses["knows, explicit"][1].text.startswith("0.0 (")
     assert uses["knows, explicit"][0].text == "24"
-    assert draw_figure("arms", data) is not None
-    assert draw_figure("arms", data_of(play("mine", {"told": "own"}))) is None
     assert draw_figure("gaps", data) is not None
     with pytest.raises(InvalidValueError, match="--arms told"):
         make_arm_table(data_of(play("mine", {"told": "own"})))

@@ -94,5 +94,5 @@ def test_the_whole_report_follows(run: Path, tmp_path: Path) -> None:
     assert gaps[InstructionOptions("direct")] > 0
     paths = write_figures(content, tmp_path)
     names = {path.stem.removesuffix("-dark") for path in paths}
-    assert names == {"gaps", "forms", "expressions", "failures"}
+    assert names == {"gaps", "forms", "failures"}
     assert "ended in an error (" not in write_report(Source(run)).read_text()

@@ -12,7 +12,7 @@ import write_language_card as card
 from rich.console import Console
 from seed_selection import EpisodeSlot, check_words
 
-from roboirg.apps.language_lab import statistics_tables
+from roboirg.apps.language_lab import expressions, statistics_tables
 from roboirg.apps.language_lab.validation import episode_checks
 from roboirg.apps.language_lab.validation.episode_checks import check_episode
 from roboirg.apps.language_lab.validation.validation_run import Batch, validate_batch
@@ -20,7 +20,6 @@ from roboirg.apps.language_lab.validation.validation_tables import validation_ta
 from roboirg.apps.show.episode_text import instructions_table
 from roboirg.core.errors import InvalidValueError
 from roboirg.core.instruction_options import InstructionOptions
-from roboirg.evaluation.analysis.figures import expressions
 from roboirg.evaluation.plan.plan_maker import make_plan
 from roboirg.language import (
     FORMS,

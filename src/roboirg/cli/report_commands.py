@@ -117,8 +117,8 @@ def figures(
     which: Annotated[
         str,
         typer.Option(
-            help="gaps, forms, expressions, context, failures, arms, strips (a "
-            "failure in pictures), several separated by commas, or all that apply."
+            help="gaps, forms, context, failures, strips (a failure in pictures), several "
+            "separated by commas, or all that apply."
         ),
     ] = _ALL,
     published: Annotated[bool, typer.Option(help="Add the paper's values.")] = False,

@@ -94,8 +94,8 @@ def stats(
 
     Example: roboirg language stats --split val
     """
+    from roboirg.apps.language_lab.expressions import write_figure
     from roboirg.apps.language_lab.statistics_tables import overview_tables
-    from roboirg.evaluation.analysis.figures.expressions import write_figure
     from roboirg.evaluation.analysis.figures.figure_style import check_figure_support
     from roboirg.evaluation.plan.option_parsing import parse_splits
     from roboirg.language import plain_settings

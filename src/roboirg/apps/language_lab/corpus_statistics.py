@@ -8,7 +8,7 @@ from collections import Counter
 from collections.abc import Iterable, Mapping
 from typing import NamedTuple
 
-from roboirg.evaluation.analysis.figures.expressions import ClassCounts
+from roboirg.apps.language_lab.expressions import ClassCounts
 from roboirg.language.instruction import Instruction
 from roboirg.language.token_counts import SHORT_LIMIT, USUAL_LIMIT, count_tokens
 

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from rich.table import Table
 
 from roboirg.apps.language_lab import corpus_statistics
-from roboirg.evaluation.analysis.figures.expressions import (
+from roboirg.apps.language_lab.expressions import (
     ClassCounts,
     expression_counts,
     expression_order,

@@ -132,14 +132,14 @@ class Results:
         )
 
     def plot(self, which: str = "gaps", *, published: bool = False) -> Plot:
-        """Return one of the figures: gaps, forms, context, failures, arms or real.
+        """Return one of the figures: gaps, forms, context or failures.
 
         Raises:
             UnknownNameError: there is no such figure.
             InvalidValueError: the run has nothing to draw for it.
             MissingDependencyError: matplotlib is not installed.
         """
-        names = tuple(name for name in FIGURES if name not in ("expressions", "strips"))
+        names = tuple(name for name in FIGURES if name != "strips")
         if which not in names:
             raise UnknownNameError("figure", which, names)
         content = RunData.of([("", self.summaries)], self._source.planned)

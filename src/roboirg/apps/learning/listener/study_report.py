@@ -15,12 +15,8 @@ from numpy.typing import NDArray
 
 from roboirg.apps.learning.listener.listener_study import HELD_OUT, RIVAL, VARIANTS, StudyAnswer
 from roboirg.core.plain_text import counted
-from roboirg.evaluation.analysis.figures.figure_style import (
-    draw_point,
-    legend_below,
-    rates_figure,
-    save,
-)
+from roboirg.evaluation.analysis.figures.figure_style import save
+from roboirg.evaluation.analysis.figures.rates import Rate, RateRow, draw_rates
 from roboirg.evaluation.analysis.stats.intervals import ALPHA, Interval, without_spread
 from roboirg.evaluation.analysis.tables.rendering.markdown import markdown
 from roboirg.evaluation.analysis.tables.table import NOT_APPLICABLE, Column, Row, Table
@@ -31,8 +27,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 FIGURE, BY_TASK = "study", "by-task.csv"
-HEIGHT_INCHES, SPREAD = 2.5, 0.62
-"""Of the figure without its legend; width of the points of a setting, of 1."""
 _SECTIONS = (
     ("Held-out words", HELD_OUT, False),
     ("Words of the training pool", "train", False),
@@ -173,15 +167,9 @@ def _percent(rates: Iterable[float], between: str = ", ") -> str:
 def _draw(found: Mapping[ListenerCell, TrainedRate]) -> Figure:
     """Draw the means over tasks by setting, in held-out words."""
     settings = _settings(found, HELD_OUT, has_rival=False)
-    figure, axes = rates_figure(HEIGHT_INCHES, [variant.title for variant in VARIANTS])
-    for number, variant in enumerate(VARIANTS):
-        shift = SPREAD * ((number + 0.5) / len(VARIANTS) - 0.5)
-        for place, setting in enumerate(settings):
-            one = found.get((variant.name, HELD_OUT, setting))
-            if one is not None:
-                draw_point(axes, place + shift, one.rate, one.interval, number, variant.title)
-    axes.set_xticks(range(len(settings)), settings)
-    axes.set_xlim(-0.5, len(settings) - 0.5)
-    axes.set_ylabel("right, %")
-    legend_below(figure, axes)
-    return figure
+    rows = []
+    for variant in VARIANTS:
+        own = {setting: found.get((variant.name, HELD_OUT, setting)) for setting in settings}
+        rates = {name: Rate(one.rate, None, one.interval) for name, one in own.items() if one}
+        rows.append(RateRow(variant.title, rates))
+    return draw_rates(dict.fromkeys(settings, "right, %"), rows, ("right", "", ""), [])

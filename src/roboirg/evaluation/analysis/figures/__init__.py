@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
@@ -14,7 +15,7 @@ from roboirg.evaluation.plan.sources import Source
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-FIGURES = ("gaps", "forms", "expressions", "context", "failures", "arms", "strips")
+FIGURES = ("gaps", "forms", "context", "failures", "strips")
 
 
 def write_figures(
@@ -40,11 +41,9 @@ def write_figures(
     for name in which:
         if name not in FIGURES:
             raise UnknownNameError("figure", name, FIGURES)
-    paths = [
-        path
-        for name in which
-        for path in _written(name, content, folder, published=published, runs=runs)
-    ]
+    paths: list[Path] = []
+    for name in which:
+        paths += save(partial(_drawn, name, content, published, runs), folder, name)
     if not paths:
         whose = "The runs have" if content.results else "The paper's tables have"
         raise InvalidValueError(
@@ -54,40 +53,31 @@ def write_figures(
     return tuple(paths)
 
 
-def _written(
-    name: str, content: RunData, folder: Path, *, published: bool, runs: Sequence[Source]
-) -> tuple[Path, ...]:
-    from roboirg.evaluation.analysis.figures.expressions import write_expressions
-    from roboirg.evaluation.analysis.figures.strips import draw_strips
-
-    if name == "expressions":
-        return write_expressions(content, folder, name)
-    if name == "strips":
-        return save(lambda: draw_strips(runs), folder, name)
-    return save(lambda: _drawn(name, content, published=published), folder, name)
-
-
 def draw_figure(name: str, content: RunData, *, published: bool = False) -> Figure | None:
-    """Draw one of `FIGURES` but expressions and strips; return None without data."""
+    """Draw one of `FIGURES` but strips; return None without data."""
     check_figure_support()
     import matplotlib as mpl
 
     # The keys of its own type are those of one version.
     with mpl.rc_context(cast("Any", STYLE)):
-        return _drawn(name, content, published=published)
+        return _drawn(name, content, published)
 
 
-def _drawn(name: str, content: RunData, *, published: bool) -> Figure | None:
-    from roboirg.evaluation.analysis.figures.arms import draw_arms
-    from roboirg.evaluation.analysis.figures.context import draw_context
+def _drawn(
+    name: str,
+    content: RunData,
+    published: bool,
+    runs: Sequence[Source] = (),
+) -> Figure | None:
     from roboirg.evaluation.analysis.figures.failures import draw_failures
     from roboirg.evaluation.analysis.figures.forms import draw_forms
-    from roboirg.evaluation.analysis.figures.gaps import draw_gaps
+    from roboirg.evaluation.analysis.figures.gaps import draw_context, draw_gaps
+    from roboirg.evaluation.analysis.figures.strips import draw_strips
 
-    if name == "arms":
-        return draw_arms(content)
+    if name == "strips":
+        return draw_strips(runs)
     content = content.told()
-    with_published = {"gaps": draw_gaps, "context": draw_context}
-    if name in with_published:
-        return with_published[name](content, published=published)
+    if name in ("gaps", "context"):
+        draw = draw_gaps if name == "gaps" else draw_context
+        return draw(content, published=published)
     return draw_forms(content) if name == "forms" else draw_failures(content)

@@ -3,25 +3,29 @@
 from __future__ import annotations
 
 import textwrap
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal, cast
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple, cast
 
 from roboirg.core.errors import InvalidValueError
 from roboirg.core.extras import extra_needed
-from roboirg.evaluation.analysis.stats.intervals import Interval
 
 if TYPE_CHECKING:
+    from matplotlib.artist import Artist
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 COLUMN_INCHES, PAGE_INCHES = 3.4, 7.0
 """Widths of a column and of a page; figures are drawn at final size."""
-LEGEND_LINE_INCHES = 0.16
-LEGEND_LETTERS, MOST_COLUMNS, SIGN_LETTERS = 50, 2, 3
-"""Letters of a legend's line in a figure of one column, its columns, and what a sign takes."""
-TITLE_LETTERS = 34
-"""Letters of a line above a panel."""
+ROW_LINE_INCHES, NOTE_LINE_INCHES, KEY_LINE_INCHES, TITLE_LINE_INCHES = 0.115, 0.11, 0.16, 0.14
+"""Heights of a line of a row, a note, the legend and a panel's title."""
+AXIS_INCHES = 0.4
+"""Height of what is below a panel."""
+MOST_ROW_LETTERS = 28
+"""Letters of a line of a row's label."""
+ROW_LETTERS, TITLE_LETTERS, NOTE_LETTERS, KEY_LETTERS = 14, 10, 21, 19
+"""Letters that fit into an inch of a row's label, a panel's title, a note and the legend."""
+KEY_SIGN_LETTERS, MOST_KEY_COLUMNS = 5, 4
 DOTS_PER_INCH = 300
 STYLE = {
     "font.size": 7.5,
@@ -50,8 +54,7 @@ DARK_STYLE = {
 }
 """For pages with a dark background."""
 COLORS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#E69F00")
-"""Okabe and Ito's colors, safe for color-blind readers; signs differ as well."""
-SIGNS = ("o", "s", "^", "D", "v", "P")
+"""Okabe and Ito's colors, safe for color-blind readers."""
 _METADATA: Mapping[str, Mapping[str, None] | None] = {
     "svg": {"Date": None},
     "pdf": {"CreationDate": None},
@@ -62,8 +65,8 @@ _SAME_FILES: Mapping[str, object] = {
     "pdf.fonttype": 42,  # letters, not outlines, which some venues refuse
     "svg.hashsalt": "roboirg",  # the ids in an SVG file are random without it
 }
-PUBLISHED_NOTE = "published: the same tasks, the paper's instructions and simulator"
-GHOST, GHOST_SIGNS = "#8a8a8a", ("d", "X", "p", "<", ">", "h", "8", "*")
+GHOST = "#8a8a8a"
+"""Of what is published and of what only explains."""
 
 
 def check_figure_support() -> None:
@@ -129,15 +132,16 @@ def _drawn_with(name: Literal["axes.facecolor", "lines.color"]) -> str:
     return str(mpl.rcParams[name])
 
 
-def new_figure(width: float, height: float) -> Figure:
-    """Return an empty figure of the given size in inches."""
+def new_figure(width: float, height: float, below: float = 0) -> Figure:
+    """Return an empty figure of the given size in inches, with a share of it left free below."""
     # Without pyplot, which keeps every figure and looks for a display.
     from matplotlib.figure import Figure
     from matplotlib.layout_engine import ConstrainedLayoutEngine
 
-    return Figure(
-        figsize=(width, height), layout=ConstrainedLayoutEngine(w_pad=0.03, h_pad=0.03, wspace=0.04)
+    engine = ConstrainedLayoutEngine(
+        w_pad=0.03, h_pad=0.03, wspace=0.04, rect=(0, below, 1, 1 - below)
     )
+    return Figure(figsize=(width, height), layout=engine)
 
 
 def clear_axes(axes: Axes, *, grid: str) -> None:
@@ -149,73 +153,69 @@ def clear_axes(axes: Axes, *, grid: str) -> None:
         axes.spines[side].set_visible(False)
 
 
-def folded(name: str, letters: int) -> str:
-    """Return a name in lines of at most `letters` letters."""
-    return textwrap.fill(name, letters, break_on_hyphens=False)
+def folded(text: str, letters: float) -> str:
+    """Return a text in lines of at most `letters` letters."""
+    return textwrap.fill(text, int(letters), break_on_hyphens=False)
 
 
-def rates_figure(height: float, labels: Sequence[str]) -> tuple[Figure, Axes]:
-    """Return an empty one-column figure for success in percent, with room for a legend below.
+class Panel(NamedTuple):
+    """Axes and the vertical position of each row."""
 
-    The height is in inches, without the legend.
+    axes: Axes
+    places: Sequence[float]
+
+
+def panels(
+    rows: Mapping[str, Sequence[str]],
+    across: int,
+    keys: Mapping[str, Artist],
+    notes: Sequence[str],
+    *,
+    headings: Collection[str] = (),
+) -> tuple[Figure, list[Panel]]:
+    """Return a new figure and its panels; below them are its keys and then its notes.
+
+    Args:
+        rows: title of each panel and the labels of its rows, from the top down.
+        across: most panels side by side; one alone has the width of a column, several of a page.
+        keys: what the legend explains, by label.
+        notes: sentences, each in lines of its own.
+        headings: labels in bold.
     """
-    lines = sum(folded(one, LEGEND_LETTERS).count("\n") + 1 for one in labels)
-    lines = -(-lines // _legend_columns(labels))
-    figure = new_figure(COLUMN_INCHES, height + LEGEND_LINE_INCHES * lines)
-    axes = figure.subplots()
-    clear_axes(axes, grid="y")
-    axes.set_ylim(-3, 103)
-    axes.set_yticks(range(0, 101, 25))
-    axes.set_ylabel("success, %")
-    return figure, axes
+    across = min(across, len(rows))
+    down, width = -(-len(rows) // across), PAGE_INCHES if across > 1 else COLUMN_INCHES
+    labels = [[folded(label, MOST_ROW_LETTERS) for label in own] for own in rows.values()]
+    longest = max(len(line) for own in labels for label in own for line in label.split("\n"))
+    room = (width - longest / ROW_LETTERS) / across
+    titles = [folded(title, TITLE_LETTERS * room) for title in rows]
+    sizes = [[label.count("\n") + 2 for label in own] for own in labels]
+    text = "\n".join(folded(note, NOTE_LETTERS * width) for note in notes)
+    key_columns = int(KEY_LETTERS * width) // (max(map(len, keys), default=0) + KEY_SIGN_LETTERS)
+    key_columns = max(1, min(MOST_KEY_COLUMNS, key_columns))
 
-
-def draw_point(
-    axes: Axes, place: float, rate: float, interval: Interval | None, number: int, label: str
-) -> None:
-    """Draw a rate with its interval, both from 0 to 1."""
-    color = COLORS[number % len(COLORS)]
-    if interval is not None:
-        axes.plot([place] * 2, [100 * end for end in interval], color=color, linewidth=1.1)
-    axes.plot(
-        [place],
-        [100 * rate],
-        linestyle="none",
-        marker=SIGNS[number % len(SIGNS)],
-        markersize=4.6,
-        color=color,
-        label=label,
-    )
-
-
-def draw_ghost(axes: Axes, place: float, percent: float, number: int, label: str) -> None:
-    """Draw a published value."""
-    axes.plot(
-        [place],
-        [percent],
-        linestyle="none",
-        marker=GHOST_SIGNS[number % len(GHOST_SIGNS)],
-        markersize=4.2,
-        markerfacecolor="none",
-        markeredgecolor=GHOST,
-        markeredgewidth=0.8,
-        label=label,
-        zorder=1,
-    )
-
-
-def legend_below(figure: Figure, axes: Axes) -> None:
-    """Add a legend below the axes with every label once."""
-    handles, names = axes.get_legend_handles_labels()
-    found = dict(zip(names, handles, strict=True))
-    labels = [folded(name, LEGEND_LETTERS) for name in found]
+    note_inches = NOTE_LINE_INCHES * (text.count("\n") + 2)
+    below = note_inches + KEY_LINE_INCHES * (-(-len(keys) // key_columns) + 0.5)
+    title_inches = TITLE_LINE_INCHES * max(title.count("\n") + 1 for title in titles)
+    above = down * (ROW_LINE_INCHES * max(map(sum, sizes)) + title_inches + AXIS_INCHES)
+    height = above + below
+    figure = new_figure(width, height, below=below / height)
+    is_shared = all(own == labels[0] for own in labels)
+    grid = figure.subplots(down, across, sharey=is_shared, squeeze=False).ravel()
+    found = []
+    for axes, title, own, size in zip(grid, titles, labels, sizes, strict=False):
+        places = [sum(size[:number]) + one / 2 for number, one in enumerate(size)]
+        axes.set_title(title, loc="left")
+        axes.set_ylim(sum(size), 0)
+        axes.set_yticks(places, own)
+        for label in axes.get_yticklabels():
+            label.set_fontweight("bold" if label.get_text() in headings else "normal")
+        clear_axes(axes, grid="x")
+        found.append(Panel(axes, places))
+    for axes in grid[len(rows) :]:
+        axes.set_visible(False)
     figure.legend(
-        found.values(), labels, loc="outside lower center", ncols=_legend_columns(labels),
-        columnspacing=1.2, handletextpad=0.3,
+        keys.values(), keys, loc="lower center", bbox_to_anchor=(0.5, note_inches / height),
+        ncols=key_columns, columnspacing=1.2, handletextpad=0.7, borderaxespad=0, borderpad=0,
     )  # fmt: skip
-
-
-def _legend_columns(labels: Sequence[str]) -> int:
-    """Return in how many columns the labels fit next to each other."""
-    longest = max(map(len, labels), default=0) + SIGN_LETTERS
-    return max(1, min(MOST_COLUMNS, LEGEND_LETTERS // longest))
+    figure.text(0.01, 0.5 * NOTE_LINE_INCHES / height, text, fontsize=6, va="bottom")
+    return figure, found

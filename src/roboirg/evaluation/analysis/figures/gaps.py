@@ -1,213 +1,200 @@
-"""Figure: success of each policy in each implicit setting, next to explicit instructions."""
+"""Figures: success in each implicit setting, and with each longer context, next to a reference.
+
+The reference is explicit instructions, or the shortest context. In a panel, all policies are
+compared on the tasks that all of them played; published ones stand apart, below a line.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
-from typing import TYPE_CHECKING, Any, NamedTuple
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
 
 from roboirg.core.instruction_options import InstructionOptions
-from roboirg.core.plain_text import counted
-from roboirg.evaluation.analysis.figures.figure_style import (
-    GHOST,
-    LEGEND_LINE_INCHES,
-    PAGE_INCHES,
-    clear_axes,
-    first_color,
-    folded,
-    new_figure,
-    paper,
+from roboirg.evaluation.analysis.comparability import (
+    COMPARABLE_SIGN,
+    DIFFERENT_SIGN,
+    AllDifferences,
+    comparison_notes,
+    comparison_sign,
+    differences_of,
 )
-from roboirg.evaluation.analysis.published import published_rows
-from roboirg.evaluation.analysis.stats.cells import Cells, PolicyRun
-from roboirg.evaluation.analysis.stats.intervals import Interval
+from roboirg.evaluation.analysis.figures.rates import Rate, RateRow, draw_rates
+from roboirg.evaluation.analysis.published import TRIALS, RateTable, published_rows
+from roboirg.evaluation.analysis.stats.cells import (
+    CellKey,
+    CellResults,
+    Cells,
+    PolicyRun,
+    clustered_interval,
+)
+from roboirg.evaluation.analysis.stats.intervals import SEED
 from roboirg.evaluation.analysis.stats.option_labels import (
     REFERENCE,
-    has_default_options,
     setting_sort_key,
+    staged_options,
 )
-from roboirg.evaluation.analysis.stats.rates import points
-from roboirg.evaluation.analysis.stats.run_data import RunData, summaries_by_key
-from roboirg.evaluation.analysis.stats.run_summary import ALL, ScopeKey
+from roboirg.evaluation.analysis.stats.paired_tests import Pairs, measure_gap
+from roboirg.evaluation.analysis.stats.run_data import RunData
+from roboirg.evaluation.analysis.tables.table_notes import is_shown, where_played
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-MOST_COLUMNS = 4
-ROW_INCHES, MARGIN_INCHES = 0.25, 0.6
-NAME_LETTERS = 26
-TASKS_STYLE: Mapping[str, Any] = {"fontsize": 6.5, "fontweight": "normal", "color": GHOST}
-TICK = 25
-"""The scale ends at a multiple of this, percent."""
+NO_BREAK = "\N{NO-BREAK SPACE}"
+SIZE_NOTE = "n: episodes per task and setting, × policy seeds if there are several."
+PUBLISHED_NOTE = "published: the same tasks, the paper's instructions and simulator."
+
+Tasks = Mapping[InstructionOptions, Sequence[str]]
+"""The tasks of each column."""
 
 
-class Drop(NamedTuple):
-    """The fall from explicit to an implicit setting, on the same tasks and episodes, in percent.
+class Comparison(NamedTuple):
+    """The rates of a published table and the options that they are compared with."""
 
-    Attributes:
-        explicit: mean success of the explicit setting; None if it was not played.
-        implicit: that of the implicit setting.
-        ends: of the 95 % interval of the difference, seen from `explicit`, or of `implicit` alone;
-            None if unknown.
-    """
+    table: RateTable
+    reference: InstructionOptions
 
-    explicit: float | None
-    implicit: float
-    ends: Interval | None = None
-
-
-class PolicyDrops(NamedTuple):
-    """A policy with its drops by setting."""
-
-    name: str
-    is_own: bool
-    drops: Mapping[str, Drop]
+    def title(self, options: InstructionOptions) -> str:
+        stages = ",".join(map(str, options.stages))
+        return options.setting if self.table == "main" else f"stages {stages}"
 
 
 def draw_gaps(content: RunData, *, published: bool = False) -> Figure | None:
-    """Draw a panel for each implicit setting and in it a line for each policy.
+    """Draw the implicit settings next to explicit; rates alone where either was not played."""
+    words = "success", "success with explicit instructions", "with implicit ones"
+    return _draw(content, Comparison("main", REFERENCE), words, published=published)
 
-    In each panel, all policies are compared on the tasks that all of them played in the setting;
-    the published ones alone on all of theirs. Without explicit, or with nothing else, the rates
-    stand alone. None without results.
-    """
-    tasks = _shared_tasks(content.cells) if content.cells else _published_tasks()
+
+def draw_context(content: RunData, *, published: bool = False) -> Figure | None:
+    """Draw success by the stages of the contextual discourse that are spoken."""
+    kind = Comparison("context", staged_options()[0])
+    words = "success", f"success with {kind.title(kind.reference)}", "with more stages"
+    return _draw(content, kind, words, published=published)
+
+
+def _draw(
+    content: RunData, kind: Comparison, words: tuple[str, str, str], *, published: bool
+) -> Figure | None:
+    tasks = _shared_tasks(content.cells, kind) if content.cells else _published_tasks(kind)
     if len(tasks) > 1:
-        tasks.pop(REFERENCE.setting, None)
-    lines = _own(content, tasks) + (_published(tasks) if published else [])
-    lines = [one for one in lines if one.drops]
-    settings = [name for name in tasks if any(name in one.drops for one in lines)]
-    if not settings:
-        return None
-    columns = min(MOST_COLUMNS, len(settings))
-    down = -(-len(settings) // columns)
-    height = down * (ROW_INCHES * len(lines) + MARGIN_INCHES) + LEGEND_LINE_INCHES
-    figure = new_figure(PAGE_INCHES, height)
-    panels = figure.subplots(down, columns, sharex=True, sharey=True, squeeze=False).ravel()
-    for panel, setting in zip(panels, settings, strict=False):
-        _draw_panel(panel, lines, setting)
-        panel.set_title(setting, loc="left")
-        panel.set_title(counted(len(tasks[setting]), "task"), loc="right", **TASKS_STYLE)
-    for panel in panels[len(settings) :]:
-        panel.set_visible(False)
-    drops = [drop for one in lines for drop in one.drops.values()]
-    most = max(max(drop.implicit, drop.explicit or 0) for drop in drops)
-    end = max(TICK, TICK * -(-int(most + 0.999) // TICK))
-    panels[0].set_xlim(-0.04 * end, 1.04 * end)
-    panels[0].set_xticks(range(0, end + 1, TICK))
-    panels[0].set_ylim(len(lines) - 0.5, -0.5)
-    names = [folded(one.name, NAME_LETTERS) for one in lines]
-    panels[0].set_yticks(range(len(lines)), names)
-    _add_legend(figure, drops)
-    return figure
+        tasks.pop(kind.reference, None)
+    elif kind.table == "context":
+        return None  # a run of the usual settings has one context
+    own = {one: _own_rates(content.cells, one, kind, tasks) for one in content.names}
+    own = {one: rates for one, rates in own.items() if rates}
+    paper = _published_rows(kind, tasks) if published else []
+    cells = _cells_of(content.cells, kind, tasks)
+    differences = {key: differences_of(key, cell) for key, cell in cells.items()} if paper else {}
+    rows = [
+        RateRow(content.name(one) + _size_and_sign(one, cells, differences), rates)
+        for one, rates in own.items()
+    ]
+    notes = [SIZE_NOTE, where_played([one.conditions for one in own])] if own else []
+    if paper:
+        episodes, seeds = TRIALS[kind.table]
+        rows += [RateRow(f"published, n = {episodes} × {seeds}", {}), *paper]
+        notes.append(PUBLISHED_NOTE)
+        for note in comparison_notes(differences, content.names):
+            has_sign = note.startswith((COMPARABLE_SIGN, DIFFERENT_SIGN))
+            notes.append(note if has_sign else f"{DIFFERENT_SIGN} {note}")
+    columns = {
+        kind.title(options): f"mean over {len(names)} tasks" if len(names) > 1 else names[0]
+        for options, names in tasks.items()
+        if any(kind.title(options) in row.rates for row in rows)
+    }
+    return draw_rates(columns, rows, words, notes) if columns else None
 
 
-def _cells_of(cells: Cells, tasks: Mapping[str, Collection[str]]) -> Cells:
-    """Return the cells of the given tasks of each setting, with default options."""
+def _cells_of(cells: Cells, kind: Comparison, tasks: Tasks) -> Cells:
+    """Return the cells with a verdict behind the columns and their references."""
+    known = {kind.reference: {task for names in tasks.values() for task in names}, **tasks}
     return {
         key: cell
         for key, cell in cells.items()
-        if key.task in tasks.get(key.options.setting, ()) and has_default_options(key.options)
+        if cell.trials and key.task in known.get(key.options, ())
     }
 
 
-def _shared_tasks(cells: Cells) -> dict[str, list[str]]:
-    """Return by setting the tasks that all policy runs with results in it played."""
-    played: dict[str, dict[PolicyRun, list[str]]] = {}
+def _size_and_sign(policy_run: PolicyRun, cells: Cells, differences: AllDifferences) -> str:
+    """Return how many episodes a policy has per cell, and whether its rates are comparable."""
+    own = [cell.by_episode() for key, cell in cells.items() if key.policy_run == policy_run]
+    sizes = sorted(map(len, own))
+    text = f"n = {sizes[0]}" + (f" to {sizes[-1]}" if sizes[0] < sizes[-1] else "")
+    seeds = max(len(verdicts) for episodes in own for verdicts in episodes.values())
+    text += f" × {seeds}" if seeds > 1 else ""
+    found = [one for key, one in differences.items() if key.policy_run == policy_run]
+    known = [comparison_sign(one) for one in found if one is not None]
+    if known:
+        # Implicit settings have no sign in a table, which says below it that none is comparable.
+        text += f" {max(known) or DIFFERENT_SIGN}"
+    return ", " + text.replace(" ", NO_BREAK)
+
+
+def _shared_tasks(cells: Cells, kind: Comparison) -> dict[InstructionOptions, list[str]]:
+    """Return by column the tasks that all policy runs with results in it played.
+
+    Those that played the reference as well must have played these tasks with it.
+    """
+    played: dict[InstructionOptions, dict[PolicyRun, list[str]]] = {}
     for key, cell in cells.items():
-        if has_default_options(key.options) and cell.trials:
-            runs = played.setdefault(key.options.setting, {})
-            runs.setdefault(key.policy_run, []).append(key.task)
+        if cell.trials and is_shown(kind.table, key.options):
+            played.setdefault(key.options, {}).setdefault(key.policy_run, []).append(key.task)
     shared = {}
-    for setting in sorted(played, key=setting_sort_key):
-        first, *others = played[setting].values()
-        tasks = [task for task in first if all(task in other for other in others)]
-        if tasks:
-            shared[setting] = tasks
+    for options in sorted(played, key=lambda one: (setting_sort_key(one.setting), len(one.stages))):
+        runs = played[options]
+        references = played.get(kind.reference, {})
+        needed = [*runs.values(), *(references[one] for one in runs if one in references)]
+        if tasks := [task for task in needed[0] if all(task in own for own in needed)]:
+            shared[options] = tasks
     return shared
 
 
-def _published_tasks() -> dict[str, list[str]]:
-    """Return by setting the tasks that have published rates."""
-    rows = {row.options.setting: row for row in published_rows("main")}
-    settings = sorted(rows, key=setting_sort_key)
+def _published_tasks(kind: Comparison) -> dict[InstructionOptions, list[str]]:
+    """Return by column the tasks that have published rates."""
     return {
-        one: [task for task, rate in rows[one].rates.items() if rate is not None]
-        for one in settings
+        row.options: [task for task, rate in row.rates.items() if rate is not None]
+        for row in published_rows(kind.table)
     }
 
 
-def _own(content: RunData, tasks: Mapping[str, Collection[str]]) -> list[PolicyDrops]:
-    """Return a line for each policy run."""
-    # Explicit cells stay whole: a drop is paired with those of its own tasks.
-    known = {REFERENCE.setting: {key.task for key in content.cells}, **tasks}
-    found = summaries_by_key(_cells_of(content.cells, known))
-    lines = []
-    for policy_run in content.names:
-        drops = {}
-        for setting in tasks:
-            one = found.get(ScopeKey(policy_run, ALL, InstructionOptions(setting)))
-            if one is None or one.rate is None:
-                continue
-            rate = 100 * float(one.rate)
-            explicit = None if one.gap is None else rate - 100 * one.gap.value
-            ends = one.interval if one.gap is None else one.gap.interval
-            if ends is not None:
-                ends = Interval(*(100 * end + (explicit or 0) for end in ends))
-            drops[setting] = Drop(explicit, rate, ends)
-        lines.append(PolicyDrops(content.name(policy_run), is_own=True, drops=drops))
-    return lines
-
-
-def _published(tasks: Mapping[str, Collection[str]]) -> list[PolicyDrops]:
-    """Return a line for each published policy, the best explicit one first."""
-    rows = {(row.model, row.options.setting): row for row in published_rows("main")}
-    references = [row for row in published_rows("main") if row.options == REFERENCE]
-    lines = []
-    for reference in sorted(references, key=lambda row: -row.average):
-        drops = {}
-        for setting, names in tasks.items():
-            row = rows.get((reference.model, setting))
-            explicit = reference.average_over(names)
-            implicit = None if row is None else row.average_over(names)
-            if explicit is not None and implicit is not None:
-                alone = setting == REFERENCE.setting
-                drops[setting] = Drop(None if alone else float(explicit), float(implicit))
-        lines.append(PolicyDrops(f"{reference.model} (published)", is_own=False, drops=drops))
-    return lines
-
-
-def _draw_panel(axes: Axes, lines: Sequence[PolicyDrops], setting: str) -> None:
-    has_own = any(one.is_own for one in lines)
-    for place, one in enumerate(lines):
-        drop = one.drops.get(setting)
-        if drop is None:
+def _own_rates(
+    cells: Cells, policy_run: PolicyRun, kind: Comparison, tasks: Tasks
+) -> dict[str, Rate]:
+    """Return the rates of a policy run by column."""
+    rates, rng = {}, np.random.default_rng(SEED)
+    for options, names in tasks.items():
+        own = [cells.get(CellKey(policy_run, task, options), CellResults()) for task in names]
+        if not all(cell.trials for cell in own):
             continue
-        color = first_color() if one.is_own or not has_own else GHOST
-        if drop.ends is not None:
-            axes.plot(drop.ends, [place, place], color=color, linewidth=4.5, alpha=0.3)
-        if drop.explicit is not None:
-            fall = [drop.explicit, drop.implicit]
-            axes.plot(fall, [place, place], color=color, linewidth=1.3)
-            axes.plot(fall[0], place, "o", color=color, markersize=4.8, markerfacecolor=paper())
-            axes.text(
-                1.02, place, points((fall[1] - fall[0]) / 100),
-                transform=axes.get_yaxis_transform(), va="center", fontsize=7,
-            )  # fmt: skip
-        axes.plot(drop.implicit, place, "o", color=color, markersize=4.8)
-    clear_axes(axes, grid="x")
+        references = [cells.get(CellKey(policy_run, task, kind.reference)) for task in names]
+        pairs = [Pairs.of(cell, one) for cell, one in zip(own, references, strict=True) if one]
+        gap = measure_gap(pairs, rng) if options != kind.reference else None
+        rate = float(sum(cell.rate or 0 for cell in own) / len(own))
+        rates[kind.title(options)] = (
+            Rate(rate, None, clustered_interval(own, rng))
+            if gap is None
+            else Rate(rate, rate - gap.value, gap.interval)
+        )
+    return rates
 
 
-def _add_legend(figure: Figure, drops: Sequence[Drop]) -> None:
-    from matplotlib.lines import Line2D
-
-    gray: dict[str, Any] = {"color": GHOST, "marker": "o", "linestyle": "none", "markersize": 4.8}
-    handles, labels = [Line2D([], [], **gray)], ["success, %"]
-    if any(drop.explicit is not None for drop in drops):
-        handles.insert(0, Line2D([], [], **gray, markerfacecolor=paper()))
-        labels = ["success with explicit instructions, %", "with implicit ones; number: difference"]
-    if any(drop.ends for drop in drops):
-        handles.append(Line2D([], [], color=GHOST, linewidth=4.5, alpha=0.3))
-        of_gaps = any(drop.ends and drop.explicit is not None for drop in drops)
-        labels.append("95 % interval of the difference" if of_gaps else "95 % interval")
-    figure.legend(handles, labels, loc="outside lower center", ncols=3, columnspacing=1.5)
+def _published_rows(kind: Comparison, tasks: Tasks) -> list[RateRow]:
+    """Return a row for each published policy, that with the best reference first."""
+    published = {(row.model, row.options): row for row in published_rows(kind.table)}
+    references = [row for row in published.values() if row.options == kind.reference]
+    rows = []
+    for reference in sorted(references, key=lambda row: -row.average):
+        rates = {}
+        for options, names in tasks.items():
+            row = published.get((reference.model, options))
+            before, rate = reference.average_over(names), row and row.average_over(names)
+            if before is not None and rate is not None:
+                is_alone = options == kind.reference
+                rates[kind.title(options)] = Rate(
+                    float(rate) / 100, None if is_alone else float(before) / 100
+                )
+        if rates:
+            rows.append(RateRow(reference.model, rates))
+    return rows

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import textwrap
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,11 +19,12 @@ from roboirg.evaluation.analysis.stats.option_labels import (
 )
 from roboirg.evaluation.plan.sources import Source
 from roboirg.evaluation.records.film import FRAME_STEPS, LAST_FRAME_REPEATS
-from roboirg.evaluation.records.record import Job, Record, Summary
+from roboirg.evaluation.records.record import Record, Summary
 from roboirg.evaluation.records.run_files import run_file
 from roboirg.util.media import CONTROL_RATE
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 PICTURES = 5
@@ -33,99 +34,79 @@ PICTURE_PIXELS = 256
 _SUBGOAL_LETTERS, _TITLE_LETTERS = 26, 118
 
 
-class Strip(NamedTuple):
-    """A played episode and the folder of its run."""
-
-    folder: Path
-    record: Record
-
-
 def draw_strips(sources: Sequence[Source]) -> Figure | None:
     """Draw for each policy the first failure that was filmed, below its explicit play.
 
     Returns:
         None without a failed implicit episode whose explicit twin was filmed as well.
     """
-    strips = [strip for source in sources for strip in _strips(source)]
+    strips = [(source, record) for source in sources for record in _shown_records(source)]
     if not strips:
         return None
     figure = new_figure(PAGE_INCHES, ROW_INCHES * len(strips))
     rows = figure.subfigures(len(strips), 1, squeeze=False).ravel()
-    for place, strip in zip(rows, strips, strict=True):
-        _draw_strip(place, strip)
+    for row, (source, record) in zip(rows, strips, strict=True):
+        words = " ".join(turn.text for turn in record.instruction)
+        title = f"{record.policy}, {options_label(record.column)}: “{words}”"
+        if record.cause:
+            title += f" {record.cause[0].upper()}{record.cause[1:]}."
+        row.suptitle(textwrap.fill(title, _TITLE_LETTERS), fontsize=7, x=0.01, ha="left")
+        steps = shown_steps(record)
+        pictures = _pictures(run_file(source.folder, record.video or ""), record, steps)
+        panels = row.subplots(1, PICTURES, squeeze=False).ravel()
+        for axes, step, picture in zip(panels, steps, pictures, strict=True):
+            axes.imshow(picture)
+            _label_picture(axes, record, step)
     return figure
-
-
-def failing_step(record: Record) -> int:
-    """Return the control step at which a failure showed: its attribution's, or the last."""
-    found = None if record.attribution is None else record.attribution.step
-    return record.steps if found is None else found
 
 
 def shown_steps(record: Record) -> list[int]:
     """Return the control steps that are shown, in order; of a failure its moment among them."""
     steps = [round(record.steps * place / (PICTURES - 1)) for place in range(PICTURES)]
-    if record.outcome == "failure":
-        moment = failing_step(record)
+    if (moment := _moment(record)) is not None:
         nearest = min(range(PICTURES), key=lambda place: abs(steps[place] - moment))
         steps[nearest] = moment
     return steps
 
 
-def _strips(source: Source) -> Iterable[Strip]:
-    """Return the strips of a run, the explicit one before each failure."""
+def _moment(record: Record) -> int | None:
+    """Return the control step at which a failure showed, or the last; None without a failure."""
+    if record.outcome != "failure":
+        return None
+    found = None if record.attribution is None else record.attribution.step
+    return record.steps if found is None else found
+
+
+def _shown_records(source: Source) -> list[Record]:
+    """Return the records of a run that are shown, the explicit one before each failure."""
     filmed = [one for one in source.results if one.video is not None]
     results = [one for one in filmed if one.robot is None]  # other films have times of their own
     explicit = {_scene(one): one for one in results if one.column == REFERENCE}
     chosen: dict[str, Summary] = {}
-    for one in sorted(results, key=_place):
+    for one in sorted(results, key=lambda one: (*_scene(one), options_sort_key(one.options))):
         if one.outcome == "failure" and one.column != REFERENCE and _scene(one) in explicit:
             chosen.setdefault(one.policy, one)
     wanted = [job.identity for one in chosen.values() for job in (explicit[_scene(one)], one)]
-    found: dict[Job, Record] = {
-        one.identity: one for one in source.records() if one.identity in wanted
-    }
-    return [Strip(source.folder, found[job]) for job in wanted]
+    found = {one.identity: one for one in source.records() if one.identity in wanted}
+    return [found[job] for job in wanted]
 
 
 def _scene(result: Summary) -> tuple[object, ...]:
     return result.policy, result.task, result.split, result.episode, result.policy_seed
 
 
-def _place(result: Summary) -> tuple[object, ...]:
-    return (*_scene(result), options_sort_key(result.options))
-
-
-def _draw_strip(place: Any, strip: Strip) -> None:  # noqa: ANN401 - a SubFigure
-    record = strip.record
-    words = " ".join(turn.text for turn in record.instruction)
-    title = f"{record.policy}, {options_label(record.column)}: “{words}”"
-    if record.cause:
-        title += f" {record.cause[0].upper()}{record.cause[1:]}."
-    place.suptitle(textwrap.fill(title, _TITLE_LETTERS), fontsize=7, x=0.01, ha="left")
-    steps = shown_steps(record)
-    pictures = _pictures(run_file(strip.folder, record.video or ""), record, steps)
-    moment = failing_step(record) if record.outcome == "failure" else None
-    for axes, step, picture in zip(
-        place.subplots(1, PICTURES, squeeze=False).ravel(), steps, pictures, strict=True
-    ):
-        axes.imshow(picture)
-        axes.set_xticks([])
-        axes.set_yticks([])
-        is_moment = step == moment
-        for spine in axes.spines.values():
-            spine.set(color=MOMENT_COLOR if is_moment else GHOST, linewidth=2.5 * is_moment + 0.5)
-        text = f"{step / CONTROL_RATE:.1f} s"
-        if subgoal := _subgoal(record, step):
-            text += "\n" + textwrap.fill(f"“{subgoal}”", _SUBGOAL_LETTERS)
-        label = axes.set_xlabel(text, fontsize=6)
-        if is_moment:
-            label.set_color(MOMENT_COLOR)
-
-
-def _subgoal(record: Record, step: int) -> str | None:
-    """Return the subgoal that held at a step."""
-    return next((one.text for one in reversed(record.subgoals) if one.step <= step), None)
+def _label_picture(axes: Axes, record: Record, step: int) -> None:
+    """Write below a picture its time and the subgoal that held; frame the moment of a failure."""
+    is_moment = step == _moment(record)
+    axes.set(xticks=[], yticks=[])
+    for spine in axes.spines.values():
+        spine.set(color=MOMENT_COLOR if is_moment else GHOST, linewidth=2.5 * is_moment + 0.5)
+    text = f"{step / CONTROL_RATE:.1f} s"
+    if subgoals := [one.text for one in record.subgoals if one.step <= step]:
+        text += "\n" + textwrap.fill(f"“{subgoals[-1]}”", _SUBGOAL_LETTERS)
+    label = axes.set_xlabel(text, fontsize=6)
+    if is_moment:
+        label.set_color(MOMENT_COLOR)
 
 
 def _pictures(path: Path, record: Record, steps: Sequence[int]) -> list[NDArray[np.uint8]]:
