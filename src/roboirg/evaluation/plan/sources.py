@@ -61,8 +61,10 @@ class Source:
             UnknownNameError: a policy that is wanted is neither among them nor planned.
         """
         found = self.stored.newest
+        if self.policies is None:
+            return found
         known = list(dict.fromkeys(one.policy for one in (*self.planned, *found)))
-        for policy in self.policies or ():
+        for policy in self.policies:
             if policy not in known:
                 raise UnknownNameError(f"policy in {self.path}", policy, known)
         return tuple(self.wanted(found))
