@@ -12,6 +12,7 @@ that lines are in the order of the plan (they are in the order in which episodes
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
+from functools import cached_property
 from pathlib import Path
 from typing import Generic, NamedTuple, Self, TypeVar
 
@@ -198,7 +199,13 @@ class StoredRun(Generic[Stored]):
                 f"There are no records in {folder}; give the --out folder of a `roboirg run`."
             )
         self.newest: tuple[Stored, ...] = adopt_told_versions(one for one, _ in kept.values())
-        self._places = {key: place for key, (_, place) in kept.items()}
+        self._in_order = [place for _, place in kept.values()]
+
+    @cached_property
+    def _places(self) -> dict[RecordKey, LinePlace]:
+        """Where each record is; most readers of results never ask."""
+        keys = map(identity_key, self.newest)
+        return dict(zip(keys, self._in_order, strict=True))
 
     def lines(self, wanted: Iterable[Stored]) -> Iterator[bytes]:
         """Yield the lines of some records, without newlines."""
