@@ -5,6 +5,7 @@ from __future__ import annotations
 import functools
 import json
 import re
+from collections import Counter
 from html import unescape
 from pathlib import Path
 from typing import Any
@@ -29,7 +30,6 @@ from roboirg.evaluation.records.record import (
     Record,
     UtteranceRecord,
 )
-from roboirg.policies.by_name.finding import read_policy
 from roboirg.tasks.splits.splits import get_episode
 
 pytest.importorskip("jinja2")
@@ -106,12 +106,12 @@ def film(folder: Path, name: str = "x") -> str:
 
 
 def test_every_episode_is_there_in_order_and_nothing_comes_from_outside() -> None:
-    text = usual()
-    page = Page(text)
+    page = Page(text := usual())
     assert len(page.details) == len(PLAN.jobs()) == len(set(page.data["columns"]["key"]))
-    for outcome in ("success", "failure", "error"):
-        expected = sum(record.outcome == outcome for record in records())
-        assert page.column("outcome").count(outcome) == expected
+    assert Counter(page.column("outcome")) == Counter(record.outcome for record in records())
+    assert {*page.column("failure")} == {None, "wrong_object", UNATTRIBUTED, "policy"}
+    (choice,) = [one for one in page.data["choices"] if one["name"] == "failure"]
+    assert choice["groups"] == ["grounding", UNATTRIBUTED, "error"]
     policies = [f"{one.name} (privileged)" for one in PLAN.policies]
     assert list(dict.fromkeys(page.column("policy"))) == policies == page.data["matrix"]["policies"]
     assert page.column("setting")[:2] == ["explicit", "direct"]
@@ -125,20 +125,6 @@ def test_every_episode_is_there_in_order_and_nothing_comes_from_outside() -> Non
     assert {"policy: ValueError: </script><b>&", "T <x>"} <= set(page.data["strings"])
     # Nor does the order of the file matter.
     assert render(records()[::-1], PLAN) == text
-
-
-def test_failures_are_told_apart_by_kind() -> None:
-    page = Page(usual())
-    assert set(zip(page.column("outcome"), page.column("failure"), strict=True)) == {
-        ("success", None),
-        ("failure", "wrong_object"),
-        ("failure", UNATTRIBUTED),
-        ("error", "policy"),
-    }
-    (choice,) = [one for one in page.data["choices"] if one["name"] == "failure"]
-    assert dict(zip(choice["values"], choice["groups"], strict=True)) == {
-        "wrong_object": "grounding", UNATTRIBUTED: UNATTRIBUTED, "policy": "error",
-    }  # fmt: skip
 
 
 def test_mentions_explicit_and_resolved_form_are_there() -> None:
@@ -258,11 +244,7 @@ def test_cells_say_how_sure_they_are_and_each_difficulty_has_its_own() -> None:
     assert re.search(r"\d+ % success: \d of \d trials, \d episodes", note)
     assert "95 % interval" in note
     assert "points to explicit on the same" in note
-    lost = [
-        make_record(job, "failure", "it fell")
-        for job in PLAN.jobs()
-        if job.setting in {"explicit", "direct"}
-    ]
+    lost = [make_record(job, "failure", "it fell") for job in PLAN.jobs()]
     note = Page(render(lost)).cell("listener (privileged), PickXtimes, direct")
     assert "no success either, so the gap says nothing" in note
 
@@ -343,24 +325,14 @@ def test_the_head_says_which_run_it_was(tmp_path: Path) -> None:
     first, second, *_ = records()
     later = replace(second, started_at="2026-01-02T03:09:05+00:00")
     text = write_report(store(tmp_path / "tuesday", [first, later])).read_text()
-    assert "<title>tuesday – RoboIRGBench</title>" in text
     facts = dict(re.findall("<dt>(.*?)</dt><dd>(.*?)</dd>", text))
-    assert facts["run"] == "tuesday"
-    assert facts["played"] == "2026-01-02 03:04 to 03:09 UTC"
-    assert facts["step limit"] == "1300"
-    assert facts["environment"] == str(ENVIRONMENT_VERSION)
-
-
-def test_the_first_pair_has_something_to_show() -> None:
-    plan = PLAN.model_copy(
-        update={"policies": tuple(map(read_policy, ("oracle", "listener", "forgetful")))}
+    assert "<title>tuesday – RoboIRGBench</title>" in text
+    assert (
+        facts.items()
+        >= {
+            "run": "tuesday",
+            "played": "2026-01-02 03:04 to 03:09 UTC",
+            "step limit": "1300",
+            "environment": str(ENVIRONMENT_VERSION),
+        }.items()
     )
-    won = [make_record(job, "success") for job in plan.jobs()]
-    some = [*won[:-1], replace(won[-1], outcome="failure", cause="fell")]
-    for played, sides, change in (
-        (won, [0, 1], "all"),
-        (some, [0, 2], "changed"),
-        (won[:3], [0, 0], "all"),
-    ):
-        page = Page(render(played))
-        assert (page.data["sides"], page.data["change"]) == (sides, change)

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import base64
 import contextlib
-import itertools
 import json
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -19,7 +18,6 @@ from roboirg.evaluation.analysis.page.episodes import PageEpisodes
 from roboirg.evaluation.analysis.page.matrix import make_matrix
 from roboirg.evaluation.analysis.page.run_warnings import comparisons, facts_of, run_warnings
 from roboirg.evaluation.analysis.stats.breakdowns import BREAKDOWNS, Labels, label_instructions
-from roboirg.evaluation.analysis.stats.cells import PolicyRun
 from roboirg.evaluation.analysis.stats.run_data import RunData
 from roboirg.evaluation.analysis.tables.arm_table import make_arm_table
 from roboirg.evaluation.analysis.tables.breakdown_table import make_breakdown_table
@@ -145,7 +143,8 @@ def _add_all(
 
 def _data(episodes: PageEpisodes, details: EpisodeDetails) -> dict[str, Any]:
     filters, numbers = make_filters(episodes), make_numbers(episodes)
-    sides, change = _sides(episodes, numbers["pair"])
+    policies = [one.policy for one in episodes.names]
+    twins = (place for place, one in enumerate(policies) if place and one == policies[0])
     return {
         "choices": [
             {"name": name, "label": one.label, "values": one.values, "groups": one.groups}
@@ -156,8 +155,8 @@ def _data(episodes: PageEpisodes, details: EpisodeDetails) -> dict[str, Any]:
         "words": details.words,
         "matrix": make_matrix(episodes),
         "comparisons": comparisons(episodes),
-        "sides": sides,
-        "change": change,
+        # At first a policy is compared with itself in the other run, or else with the next one.
+        "sides": [0, next(twins, min(1, len(policies) - 1))],
         "reference": EXPLICIT,
         "framed": [name for name, one in all_settings().items() if "frame" in one.reads],
         "film": {"every": FRAME_STEPS, "rate": FRAME_RATE, "repeats": LAST_FRAME_REPEATS},
@@ -176,26 +175,6 @@ def _breakdown_tables(episodes: PageEpisodes, labels: dict[str, Labels]) -> list
         with contextlib.suppress(InvalidValueError):  # no scene has two arms
             arms.append(make_arm_table(data))
     return [*arms, *(table for table in tables if table.rows)]
-
-
-def _sides(episodes: PageEpisodes, pairs: Sequence[object]) -> tuple[Sequence[int], str]:
-    """Return the policies to compare first, and which of their episodes to show.
-
-    That is a policy and itself in the other run, or else the first two whose verdicts differ.
-    `pairs` has for each episode a number, equal for those that can be compared.
-    """
-    names = list(episodes.names)
-    verdicts: dict[PolicyRun, dict[object, str]] = {run: {} for run in names}
-    for one, pair in zip(episodes.all, pairs, strict=True):
-        if one.record.outcome != "error":
-            verdicts[one.policy_run][pair] = one.record.outcome
-    twins = [place for place, one in enumerate(names) if place and one.policy == names[0].policy]
-    sides = [(0, twins[0])] if twins else list(itertools.combinations(range(len(names)), 2))
-    for first, second in sides:
-        ours, theirs = verdicts[names[first]], verdicts[names[second]]
-        if any(theirs.get(pair, verdict) != verdict for pair, verdict in ours.items()):
-            return (first, second), "changed"
-    return sides[0] if sides else (0, 0), "all"
 
 
 def _data_uri(path: Path) -> str:

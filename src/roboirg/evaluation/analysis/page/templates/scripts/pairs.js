@@ -13,8 +13,8 @@ const pairFields = () => {
     made.classList.add("paired");
     return made;
   };
-  const change = field("what", h("select", { name: "change", "data-usual": data.change },
-    Object.entries(CHANGES).map(([value, label]) => h("option", { value, selected: value === data.change }, label))));
+  const change = field("what", h("select", { name: "change", "data-usual": "changed" },
+    Object.entries(CHANGES).map(([value, label]) => h("option", { value }, label))));
   change.classList.add("paired");
   return [pick("left", "first", data.sides[0]), pick("right", "second", data.sides[1]), change];
 };
