@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-import csv
+import itertools
 import re
 import shutil
 import subprocess
 from decimal import Decimal
-from importlib import resources
 from pathlib import Path
 
 import pytest
 from msgspec.structs import replace
 
+from roboirg.evaluation.analysis.published import RATE_TABLES
 from roboirg.evaluation.analysis.stats.cells import gather
 from roboirg.evaluation.analysis.tables.paper_tables import WHICH, make_table
 from roboirg.evaluation.analysis.tables.rendering.latex import latex
@@ -26,7 +26,6 @@ DOCUMENT = r"""
 %s
 \end{document}
 """
-FILES = {"real": "real_world"}
 LONG = "my_package.policies:NetWithAVeryLongName, 600 steps, frames of the video none (privileged)"
 
 
@@ -86,74 +85,30 @@ def test_every_name_and_rate_is_there_once() -> None:
     assert text.rindex(r"\bottomrule") < text.index("folder")
 
 
-ARROWS = {"up": 1, "down": -1, "same": 0}
-REFERENCES = {"main": "explicit", "planner": "explicit", "real": "explicit", "context": "1,5"}
+CELL = re.compile(r"(?:\\textbf\{)?([\d.]+|--|yes|no|partial)\}?(?:\\roboirg(\w+)\{([\d.]+)\})?")
+ARROWS = {"up": "↑", "down": "↓", "same": "→", None: ""}
 
 
-def shown(cell: str) -> tuple[str, float | None]:
-    """The rate of a cell as printed, and its change with its sign."""
-    rate, arrow, size = re.fullmatch(
-        r"\s*(?:\\textbf\{)?([\d.]+|--)\}?(?:\\roboirg(\w+)\{([\d.]+)\})?\s*(?:\\\\)?", cell
-    ).groups()
-    return rate, None if arrow is None else ARROWS[arrow] * float(size)
-
-
-def printed(which: str) -> dict[tuple[str, str, str], str]:
-    """The published rates by model, setting or stages, and task, read without the package."""
-    file = FILES.get(which, which)
-    folder = resources.files("roboirg.evaluation.analysis") / "published_results"
-    lines = csv.DictReader((folder / f"{file}.csv").read_text().splitlines())
-    return {
-        (
-            line.get("model") or line["planner"],
-            line.get("stages") or line["setting"],
-            line["task"],
-        ): line["success_rate_percent"]
-        for line in lines
-    }
-
-
-@pytest.mark.parametrize("which", REFERENCES)
-def test_a_published_table_is_one_and_has_every_printed_figure(which: str) -> None:
-    text = latex(make_table(which, {}, published=True))
-    assert text.count(r"\begin{table*}") == 1
-    rates = printed(which)
-    tasks = list(dict.fromkeys(task for _, _, task in rates))
-    body = text.split(r"\midrule", 1)[1].split(r"\bottomrule")[0]
-    found, group = 0, ""
+@pytest.mark.parametrize("which", [*RATE_TABLES, "coverage"])
+def test_a_published_table_is_one_and_has_every_figure_in_its_place(which: str) -> None:
+    table = make_table(which, {}, published=True)
+    (body,) = re.findall(r"\\midrule(.*)\\bottomrule", latex(table), re.DOTALL)
+    printed = []
     for line in body.splitlines():
-        if heading := re.search(r"\\emph\{(.*?)\}+ ", line):
-            group = plain(heading[1])
-        elif "&" in line:
-            names, cells = line.split(" & ")[: -len(tasks)], line.split(" & ")[-len(tasks) :]
-            if which == "context":
-                name = ",".join(str(at) for at, one in enumerate(names, 1) if "check" in one)
-            else:
-                name = plain(names[0])
-            model, row = (name, group) if which in ("main", "real") else (group, name)
-            for task, cell in zip(tasks, cells, strict=True):
-                assert shown(cell) == expected(rates, model, row, task, REFERENCES[which])
-                found += 1
-    assert found == len(rates)
-
-
-def plain(text: str) -> str:
-    return re.sub(r"\\textsuperscript\{.*|\\allowbreak\{\}", "", text)
-
-
-def expected(rates, model: str, row: str, task: str, reference: str):
-    """A rate and its change; that of an average is on equal tasks."""
-    rate = rates[model, row, task]
-    if not rate:
-        return "--", None
-    if row == reference:
-        return f"{float(rate):.2f}", None
-    before = rates[model, reference, task]
-    if task == "Avg":
-        has = [name for one, own, name in rates if (one, own) == (model, row) and name != "Avg"]
-        same = [float(rates[model, reference, name]) for name in has if rates[model, row, name]]
-        before = round(sum(same) / len(same) + 1e-9, 2)
-    return f"{float(rate):.2f}", round(float(rate) - float(before), 2)
+        if "&" in line:
+            cells = map(
+                CELL.fullmatch, line.removesuffix(r" \\").split(" & ")[len(table.heads) - 1 :]
+            )
+            printed.append([(cell[1], ARROWS[cell[2]] + (cell[3] or "")) for cell in cells if cell])
+    kept = [not (column.averages and column.group) for column in table.columns]
+    assert printed == [
+        [
+            (entry.text.replace("–", "--"), entry.change_text)
+            for entry in itertools.compress(row.entries, kept)
+        ]
+        for group in table.groups()
+        for row in group
+    ]
 
 
 @pytest.mark.skipif(

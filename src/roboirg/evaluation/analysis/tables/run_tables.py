@@ -50,8 +50,6 @@ from roboirg.evaluation.analysis.tables.table import (
 from roboirg.evaluation.analysis.tables.table_notes import where_played
 from roboirg.evaluation.records.record import Job, Summary
 
-NO_GAP = "–"
-
 MAX_FAILURES = 10
 """Episodes of a policy that are listed below the tables."""
 
@@ -137,7 +135,7 @@ def gap_text(overlap: Overlap) -> str:
     if not overlap.trials:
         return ""
     if not overlap.both and not overlap.only_first and not overlap.only_second:
-        return NO_GAP
+        return NOT_APPLICABLE
     return points((overlap.only_first - overlap.only_second) / overlap.trials)
 
 
@@ -192,8 +190,8 @@ def _legend(cells: Sequence[ScopeResults]) -> Iterator[str]:
     gaps = {gap_text(cell.explicit_overlap()) for cell in cells} - {""}
     compared = ", in brackets the gap to explicit on the same episodes in points"
     yield f"success rate in %{compared if gaps else ''}"
-    if NO_GAP in gaps:
-        yield f"({NO_GAP}) explicit has no success either, so the gap says nothing"
+    if NOT_APPLICABLE in gaps:
+        yield f"({NOT_APPLICABLE}) explicit has no success either, so the gap says nothing"
     if any(cell.errors for cell in cells):
         yield f"{ERROR_MARK} episodes ended in an error and are left out of the rates"
     if any(cell.missing for cell in cells):

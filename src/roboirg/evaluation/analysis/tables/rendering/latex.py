@@ -68,7 +68,6 @@ _SPECIAL = {
 }
 _BREAKS = re.compile(r"[./:_,=?&-](?=[^\s\d])|[^\s./:_,=?&-]{14}(?=\S)")
 """Behind what a long name may be broken: these signs, and 14 letters without one."""
-_BREAK = "\\g<0>\u200b"
 _HUMPS = re.compile(r"(?<=[a-z])(?=[A-Z])|(?<=_)|\s+")
 """Where a heading may be broken: before a capital, behind an underscore, at blanks."""
 _ROOM = 220
@@ -169,7 +168,7 @@ def _cell(entry: Entry, column: Column) -> str:
 
 def _foldable(text: str) -> str:
     """Return text that may be broken within long names, too."""
-    return escaped(_BREAKS.sub(_BREAK, text))
+    return escaped(_BREAKS.sub("\\g<0>\u200b", text))
 
 
 def escaped(text: str) -> str:

@@ -10,7 +10,7 @@ from rich.table import Table as Grid
 from rich.text import Text
 
 from roboirg.evaluation.analysis.stats.run_summary import ALL_TASKS
-from roboirg.evaluation.analysis.tables.table import Entry, Row, Table
+from roboirg.evaluation.analysis.tables.table import Entry, Table
 from roboirg.util.console_width import LINE_WIDTH, line_width, widen
 
 _BORDERS = 3
@@ -83,26 +83,23 @@ def _grid(table: Table, indices: Sequence[int]) -> Grid:
     for head in table.heads:
         grid.add_column(head, overflow="fold")
     for column in (table.columns[index] for index in indices):
-        if column.is_text:
-            grid.add_column(column.name, overflow="fold", max_width=_TEXT_WIDTH)
-        else:
-            grid.add_column(column.name, justify="right", no_wrap=True)
+        grid.add_column(
+            column.name,
+            justify="left" if column.is_text else "right",
+            no_wrap=not column.is_text,
+            overflow="fold",
+            max_width=_TEXT_WIDTH,
+        )
     for begins, labels, row in table.lines():
         if begins:
             grid.add_section()
-        names = [Text(label, _style(row) if number else "") for number, label in enumerate(labels)]
-        grid.add_row(*names, *(_cell(row, row.entries[index]) for index in indices))
+        cells = (_cell(row.entries[index]) for index in indices)
+        grid.add_row(*map(Text, labels), *cells, style="" if row.source == "ours" else "dim")
     return grid
 
 
-def _cell(row: Row, entry: Entry) -> Text:
+def _cell(entry: Entry) -> Text:
     texts = (entry.text, entry.change_text, entry.signs)
     styles = ("bold" if entry.best else entry.style, "", "bold yellow")
     parts = zip(texts, styles, strict=True)
-    cell = Text(" ").join(Text(text, style) for text, style in parts if text)
-    cell.stylize(_style(row))
-    return cell
-
-
-def _style(row: Row) -> str:
-    return "" if row.source == "ours" else "dim"
+    return Text(" ").join(Text(text, style) for text, style in parts if text)
