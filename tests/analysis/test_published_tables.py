@@ -19,7 +19,7 @@ from roboirg.evaluation.analysis.published import (
 )
 from roboirg.evaluation.analysis.stats.cells import gather
 from roboirg.evaluation.analysis.stats.rates import mean_percent, percent
-from roboirg.evaluation.analysis.tables.paper_tables import WHICH, make_table
+from roboirg.evaluation.analysis.tables.paper_tables import make_table
 from roboirg.evaluation.analysis.tables.rendering import FORMATS
 from roboirg.evaluation.analysis.tables.table import Row, Table
 from roboirg.evaluation.analysis.tables.table_notes import TWIN_MARK
@@ -246,29 +246,6 @@ def test_the_coverage_of_this_benchmark_is_read_off_its_tasks() -> None:
             tuple(theirs.covers.values()),
         )
     assert [row.name for row in table.rows if row.source == "ours"] == ["RoboIRGBench"]
-
-
-def test_suites_stand_together() -> None:
-    table = make_table("main", {}, published=True)
-    groups = {column.name: column.group for column in table.columns}
-    assert [name for name, group in groups.items() if group == "Reference"] == [
-        "VideoRepick",
-        "VideoPlaceButton",
-        "VideoPlaceOrder",
-        "Reference Avg",
-    ]
-    averages = [column for column in table.columns if column.averages]
-    assert [len(column.averages) for column in averages] == [4, 4, 3, 11]
-    # 28.67, 44.67, 35.33 and 6.00 are 114.67, by 4 28.6675.
-    assert table.rows[0].entries[4].percent == Decimal("28.67")
-
-
-@pytest.mark.parametrize("which", WHICH)
-@pytest.mark.parametrize("name", FORMATS)
-def test_all_can_be_drawn_from_the_published_rows_alone(which: str, name: str) -> None:
-    text = FORMATS[name].draw(make_table(which, {}, published=True))
-    assert text.endswith("\n")
-    assert not text.endswith("\n\n")
 
 
 @pytest.mark.parametrize(
