@@ -99,7 +99,8 @@ def drawn(figure: Figure | None) -> list[list[tuple[str, float, bool]]]:
 
 def test_a_strip_shows_the_pictures_of_its_steps_and_marks_the_moment(tmp_path: Path) -> None:
     found = records()
-    explicit, failed = drawn(draw_strips([Source(a_run(tmp_path, found))]))
+    source = Source(a_run(tmp_path, found))
+    explicit, failed = drawn(draw_strips([source]))
     for row, record in ((explicit, found[0]), (failed, found[1])):
         steps = shown_steps(record)
         assert len(row) == len(steps) == PICTURES
@@ -109,6 +110,9 @@ def test_a_strip_shows_the_pictures_of_its_steps_and_marks_the_moment(tmp_path: 
     assert not any(marked for *_, marked in explicit)
     assert [label.partition("\n")[0] for label, _, marked in failed if marked] == ["3.6 s"]
     assert ["lift the red" in label for label, *_ in failed] == [False, False, True, True, True]
+    out = tmp_path / "figures"
+    assert write_figures(RunData.of([("run", found)]), out, ["strips"], runs=[source])
+    assert "Picked the wrong." in (out / "strips.svg").read_text()
 
 
 def test_without_the_explicit_film_there_is_no_strip(tmp_path: Path) -> None:
@@ -116,13 +120,3 @@ def test_without_the_explicit_film_there_is_no_strip(tmp_path: Path) -> None:
     folder = a_run(tmp_path / "a", [replace(explicit, video=None), failed])
     assert draw_strips([Source(folder)]) is None
     assert draw_strips([Source(a_run(tmp_path / "b", [explicit]))]) is None
-
-
-def test_the_figure_is_written_from_a_folder(tmp_path: Path) -> None:
-    found = records()
-    folder = a_run(tmp_path / "run", found)
-    content = RunData.of([("run", found)])
-    paths = write_figures(content, tmp_path / "figures", ["strips"], runs=[Source(folder)])
-    endings = (".png", ".svg", ".pdf", "-dark.png", "-dark.svg")
-    assert {path.name for path in paths} == {f"strips{ending}" for ending in endings}
-    assert "Picked the wrong." in (tmp_path / "figures" / "strips.svg").read_text()

@@ -45,10 +45,10 @@ def draw_bars(
     """Draw the bars of each policy; only parts that occur are in the legend."""
     from matplotlib.patches import Patch
 
-    occurring = {
+    seen = {
         name for bars in rows.values() for bar in bars for name, one in bar.counts.items() if one
     }
-    parts = [part for part in parts if part.label in occurring]
+    parts = [part for part in parts if part.label in seen]
     keys = {
         part.label: Patch(facecolor=part.color, hatch=part.pattern, edgecolor=paper())
         for part in parts

@@ -5,7 +5,7 @@ from __future__ import annotations
 import textwrap
 from collections.abc import Callable, Collection, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal, NamedTuple, cast
+from typing import TYPE_CHECKING, Any, cast
 
 from roboirg.core.errors import InvalidValueError
 from roboirg.core.extras import extra_needed
@@ -87,49 +87,38 @@ def save(
     has no extension, and the folder is created if it is missing. Without a figure no file is
     written.
     """
-    on_dark = [one for one in formats if one != "pdf"]
-    light = _save_in_style(draw, folder, name, formats, STYLE)
-    return light + _save_in_style(draw, folder, f"{name}-dark", on_dark, DARK_STYLE)
-
-
-def _save_in_style(
-    draw: Callable[[], Figure | None],
-    folder: Path,
-    name: str,
-    formats: Sequence[str],
-    style: Mapping[str, object],
-) -> tuple[Path, ...]:
     check_figure_support()
     import matplotlib as mpl
 
-    with mpl.rc_context(cast("Any", {**_SAME_FILES, **style})):
-        figure = draw()
-        if figure is None:
-            return ()
-        paths = tuple(folder / f"{name}.{one}" for one in formats)
-        try:
-            folder.mkdir(parents=True, exist_ok=True)
-            for path, one in zip(paths, formats, strict=True):
-                figure.savefig(path, dpi=DOTS_PER_INCH, metadata=_METADATA[one])
-        except OSError as error:
-            raise InvalidValueError(f"Cannot write to {folder}: {error.strerror}.") from error
-    return paths
+    paths: list[Path] = []
+    on_dark = [one for one in formats if one != "pdf"]
+    for stem, style, own in ((name, STYLE, formats), (f"{name}-dark", DARK_STYLE, on_dark)):
+        with mpl.rc_context(cast("Any", {**_SAME_FILES, **style})):
+            figure = draw()
+            if figure is None:
+                return ()
+            try:
+                folder.mkdir(parents=True, exist_ok=True)
+                for one in own:
+                    paths.append(folder / f"{stem}.{one}")
+                    figure.savefig(paths[-1], dpi=DOTS_PER_INCH, metadata=_METADATA[one])
+            except OSError as error:
+                raise InvalidValueError(f"Cannot write to {folder}: {error.strerror}.") from error
+    return tuple(paths)
 
 
 def paper() -> str:
     """Return the color of the page that is being drawn."""
-    return _drawn_with("axes.facecolor")
+    import matplotlib as mpl
+
+    return str(mpl.rcParams["axes.facecolor"])
 
 
 def first_color() -> str:
     """Return the first of the colors, which is a lighter blue on dark pages."""
-    return _drawn_with("lines.color")
-
-
-def _drawn_with(name: Literal["axes.facecolor", "lines.color"]) -> str:
     import matplotlib as mpl
 
-    return str(mpl.rcParams[name])
+    return str(mpl.rcParams["lines.color"])
 
 
 def new_figure(width: float, height: float, below: float = 0) -> Figure:
@@ -158,13 +147,6 @@ def folded(text: str, letters: float) -> str:
     return textwrap.fill(text, int(letters), break_on_hyphens=False)
 
 
-class Panel(NamedTuple):
-    """Axes and the vertical position of each row."""
-
-    axes: Axes
-    places: Sequence[float]
-
-
 def panels(
     rows: Mapping[str, Sequence[str]],
     across: int,
@@ -172,7 +154,7 @@ def panels(
     notes: Sequence[str],
     *,
     headings: Collection[str] = (),
-) -> tuple[Figure, list[Panel]]:
+) -> tuple[Figure, list[tuple[Axes, list[float]]]]:
     """Return a new figure and its panels; below them are its keys and then its notes.
 
     Args:
@@ -181,6 +163,10 @@ def panels(
         keys: what the legend explains, by label.
         notes: sentences, each in lines of its own.
         headings: labels in bold.
+
+    Returns:
+        The figure, and of each panel the axes and the vertical positions of its rows, each of
+        which is two units high, and one more for every further line of its label.
     """
     across = min(across, len(rows))
     down, width = -(-len(rows) // across), PAGE_INCHES if across > 1 else COLUMN_INCHES
@@ -190,27 +176,22 @@ def panels(
     titles = [folded(title, TITLE_LETTERS * room) for title in rows]
     sizes = [[label.count("\n") + 2 for label in own] for own in labels]
     text = "\n".join(folded(note, NOTE_LETTERS * width) for note in notes)
-    key_columns = int(KEY_LETTERS * width) // (max(map(len, keys), default=0) + KEY_SIGN_LETTERS)
-    key_columns = max(1, min(MOST_KEY_COLUMNS, key_columns))
+    key_letters = max(map(len, keys), default=0) + KEY_SIGN_LETTERS
+    key_columns = max(1, min(MOST_KEY_COLUMNS, int(KEY_LETTERS * width) // key_letters))
 
     note_inches = NOTE_LINE_INCHES * (text.count("\n") + 2)
     below = note_inches + KEY_LINE_INCHES * (-(-len(keys) // key_columns) + 0.5)
     title_inches = TITLE_LINE_INCHES * max(title.count("\n") + 1 for title in titles)
-    above = down * (ROW_LINE_INCHES * max(map(sum, sizes)) + title_inches + AXIS_INCHES)
-    height = above + below
+    panel_inches = ROW_LINE_INCHES * max(map(sum, sizes)) + title_inches + AXIS_INCHES
+    height = down * panel_inches + below
     figure = new_figure(width, height, below=below / height)
     is_shared = all(own == labels[0] for own in labels)
     grid = figure.subplots(down, across, sharey=is_shared, squeeze=False).ravel()
     found = []
     for axes, title, own, size in zip(grid, titles, labels, sizes, strict=False):
-        places = [sum(size[:number]) + one / 2 for number, one in enumerate(size)]
         axes.set_title(title, loc="left")
-        axes.set_ylim(sum(size), 0)
-        axes.set_yticks(places, own)
-        for label in axes.get_yticklabels():
-            label.set_fontweight("bold" if label.get_text() in headings else "normal")
         clear_axes(axes, grid="x")
-        found.append(Panel(axes, places))
+        found.append((axes, _label_rows(axes, own, size, headings)))
     for axes in grid[len(rows) :]:
         axes.set_visible(False)
     figure.legend(
@@ -219,3 +200,15 @@ def panels(
     )  # fmt: skip
     figure.text(0.01, 0.5 * NOTE_LINE_INCHES / height, text, fontsize=6, va="bottom")
     return figure, found
+
+
+def _label_rows(
+    axes: Axes, labels: Sequence[str], sizes: Sequence[int], headings: Collection[str]
+) -> list[float]:
+    """Label rows of some sizes from the top down; return their positions."""
+    places = [sum(sizes[:number]) + size / 2 for number, size in enumerate(sizes)]
+    axes.set_ylim(sum(sizes), 0)
+    axes.set_yticks(places, labels)
+    for label in axes.get_yticklabels():
+        label.set_fontweight("bold" if label.get_text() in headings else "normal")
+    return places

@@ -96,9 +96,12 @@ def _draw(
         episodes, seeds = TRIALS[kind.table]
         rows += [RateRow(f"published, n = {episodes} × {seeds}", {}), *paper]
         notes.append(PUBLISHED_NOTE)
-        for note in comparison_notes(differences, content.names):
-            has_sign = note.startswith((COMPARABLE_SIGN, DIFFERENT_SIGN))
-            notes.append(note if has_sign else f"{DIFFERENT_SIGN} {note}")
+        notes += [
+            note
+            if note.startswith((COMPARABLE_SIGN, DIFFERENT_SIGN))
+            else f"{DIFFERENT_SIGN} {note}"
+            for note in comparison_notes(differences, content.names)
+        ]
     columns = {
         kind.title(options): f"mean over {len(names)} tasks" if len(names) > 1 else names[0]
         for options, names in tasks.items()
@@ -124,11 +127,14 @@ def _size_and_sign(policy_run: PolicyRun, cells: Cells, differences: AllDifferen
     text = f"n = {sizes[0]}" + (f" to {sizes[-1]}" if sizes[0] < sizes[-1] else "")
     seeds = max(len(verdicts) for episodes in own for verdicts in episodes.values())
     text += f" × {seeds}" if seeds > 1 else ""
-    found = [one for key, one in differences.items() if key.policy_run == policy_run]
-    known = [comparison_sign(one) for one in found if one is not None]
-    if known:
+    signs = [
+        comparison_sign(one)
+        for key, one in differences.items()
+        if key.policy_run == policy_run and one is not None
+    ]
+    if signs:
         # Implicit settings have no sign in a table, which says below it that none is comparable.
-        text += f" {max(known) or DIFFERENT_SIGN}"
+        text += f" {max(signs) or DIFFERENT_SIGN}"
     return ", " + text.replace(" ", NO_BREAK)
 
 
@@ -191,9 +197,9 @@ def _published_rows(kind: Comparison, tasks: Tasks) -> list[RateRow]:
             row = published.get((reference.model, options))
             before, rate = reference.average_over(names), row and row.average_over(names)
             if before is not None and rate is not None:
-                is_alone = options == kind.reference
                 rates[kind.title(options)] = Rate(
-                    float(rate) / 100, None if is_alone else float(before) / 100
+                    float(rate) / 100,
+                    float(before) / 100 if options != kind.reference else None,
                 )
         if rates:
             rows.append(RateRow(reference.model, rates))

@@ -63,14 +63,12 @@ def draw_rates(
         words: what the legend calls a rate that stands alone, the reference, and a rate next to it.
         notes: sentences below the legend.
     """
-    labels = [row.label for row in rows]
+    labels = dict.fromkeys(columns, tuple(row.label for row in rows))
     headings = [row.label for row in rows if not row.rates]
     rates = [rate for row in rows for rate in row.rates.values()]
     most = 100 * max(max(one.value, one.reference or 0) for one in rates)
     end = max(TICK, TICK * -(-int(most + 0.999) // TICK))
-    figure, found = panels(
-        dict.fromkeys(columns, labels), MOST_COLUMNS, _keys(rates, words), notes, headings=headings
-    )
+    figure, found = panels(labels, MOST_COLUMNS, _keys(rates, words), notes, headings=headings)
     for (axes, places), (column, below) in zip(found, columns.items(), strict=True):
         color = first_color()
         for place, row in zip(places, rows, strict=True):

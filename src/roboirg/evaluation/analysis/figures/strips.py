@@ -53,8 +53,7 @@ def draw_strips(sources: Sequence[Source]) -> Figure | None:
         row.suptitle(textwrap.fill(title, _TITLE_LETTERS), fontsize=7, x=0.01, ha="left")
         steps = shown_steps(record)
         pictures = _pictures(run_file(source.folder, record.video or ""), record, steps)
-        panels = row.subplots(1, PICTURES, squeeze=False).ravel()
-        for axes, step, picture in zip(panels, steps, pictures, strict=True):
+        for axes, step, picture in zip(row.subplots(1, PICTURES), steps, pictures, strict=True):
             axes.imshow(picture)
             _label_picture(axes, record, step)
     return figure
