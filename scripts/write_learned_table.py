@@ -24,7 +24,7 @@ from roboirg.evaluation.analysis.stats.arm_figures import (
     ArmFigure,
     arm_figures,
 )
-from roboirg.evaluation.analysis.stats.cells import CellResults, only_told
+from roboirg.evaluation.analysis.stats.cells import Cell, cells_of
 from roboirg.evaluation.analysis.stats.chance import silent_chance
 from roboirg.evaluation.analysis.stats.intervals import ALPHA
 from roboirg.evaluation.analysis.stats.paired_tests import holm, sign_flip_test
@@ -49,7 +49,7 @@ WORDS = {MEMORY: "explicit", "small-recurrent-all-words": "all five settings"}
 WORDLESS = "small-recurrent-no-words"
 """Its reader was trained on no words, so that it does the same in each setting."""
 
-Cells = Mapping[tuple[str, str], Mapping[str, Mapping[int, CellResults]]]
+Cells = Mapping[tuple[str, str], Mapping[str, Mapping[int, Cell]]]
 """By row and setting, then by task, then by training seed."""
 Verdicts = NDArray[np.int64]
 """1 where an episode is solved, else 0; shape (training seeds, episodes)."""
@@ -64,15 +64,15 @@ def played() -> RunData:
 
 def told(data: RunData) -> Cells:
     """Return the episodes without control arms."""
-    found: dict[tuple[str, str], dict[str, dict[int, CellResults]]] = {}
-    for key, cell in only_told(data.cells).items():
+    found: dict[tuple[str, str], dict[str, dict[int, Cell]]] = {}
+    for key, cell in cells_of(data.frame.told()).items():
         row, seed = row_of(key.policy_run.policy)
         by_task = found.setdefault((row, key.options.setting), {})
         by_task.setdefault(key.task, {})[seed] = cell
     return found
 
 
-def verdicts(trained: Mapping[int, CellResults]) -> Verdicts:
+def verdicts(trained: Mapping[int, Cell]) -> Verdicts:
     """Return the verdicts of each training seed on the same episodes."""
     by_seed = [
         {trial.episode: won for trial, won in cell.verdicts.items()}
@@ -135,7 +135,7 @@ def failures(data: RunData) -> list[Summary]:
     """Return the failures of the policy with memory in explicit words, of all training seeds."""
     return [
         one
-        for _, one in data.results
+        for one in data.frame["result"]
         if row_of(one.policy)[0] == MEMORY
         and (one.arm, one.setting, one.outcome) == (TOLD, EXPLICIT, "failure")
     ]
@@ -179,7 +179,7 @@ def arms_table(data: RunData) -> str:
     """Return what control arms show: both rates of each figure, by kind of words and setting."""
     found = {
         (one.policy_run.policy, one.contrast.name, one.options.setting): one
-        for one in arm_figures(data)
+        for one in arm_figures(data.frame)
     }
     settings = plain_settings()
     lines = [
@@ -204,7 +204,7 @@ def _both_rates(one: ArmFigure) -> str:
     return f"{first:.0f} / {second:.0f}{star}"
 
 
-def _tasks_of(by_task: Mapping[str, Mapping[int, CellResults]]) -> Iterator[NDArray[np.float64]]:
+def _tasks_of(by_task: Mapping[str, Mapping[int, Cell]]) -> Iterator[NDArray[np.float64]]:
     """Yield the verdicts of each training seed, by task."""
     for trained in by_task.values():
         yield verdicts(trained).astype(float)

@@ -12,11 +12,12 @@ from pathlib import Path
 from written_parts import rate_text, with_part
 
 from roboirg.apps.learning.policy.paper_experiment import CONTEXT, MAIN, PLANNER, SYSTEMS, row_name
-from roboirg.apps.learning.policy.paper_page import answers_text, row_cells, tables_text
+from roboirg.apps.learning.policy.paper_page import answers_text, row_frame, tables_text
 from roboirg.apps.learning.policy.policy_plan import PLANNERS
+from roboirg.evaluation.analysis.frame import Frame
 from roboirg.evaluation.analysis.published import published_rows
-from roboirg.evaluation.analysis.stats.cells import Cells
-from roboirg.evaluation.analysis.stats.run_summary import ALL, SummaryRow, summarize
+from roboirg.evaluation.analysis.stats.cells import cells_of
+from roboirg.evaluation.analysis.stats.measure import ALL_TASKS, Measured, ScopeKey, summarize
 from roboirg.evaluation.plan.plan_file import read_plan_file
 from roboirg.evaluation.records.packs import opened_run
 from roboirg.evaluation.records.record import Summary
@@ -34,15 +35,15 @@ PACKS = {
 
 
 @functools.cache
-def played() -> Mapping[str, Cells]:
-    """Return the cells of each part of the experiment."""
+def played() -> Mapping[str, Frame]:
+    """Return the results of each part of the experiment."""
     results: dict[str, list[Summary]] = {}
     for part, pack in PACKS.items():
         with opened_run(pack, ()) as run:
             results[part] = list(read_results(run))
     if PLANNER in results:
         results[PLANNER] += _planners_of_main(results[MAIN])
-    return {part: row_cells(part, found) for part, found in results.items()}
+    return {part: row_frame(part, found) for part, found in results.items()}
 
 
 def _planners_of_main(results: Iterable[Summary]) -> list[Summary]:
@@ -56,14 +57,14 @@ def _planners_of_main(results: Iterable[Summary]) -> list[Summary]:
     ]
 
 
-def rates_table(main: Cells) -> str:
+def rates_table(main: Frame) -> str:
     """Return success in each setting as mean over tasks, next to the published rates."""
     settings = plain_settings()
     lines = [f"| row | {' | '.join(settings)} |", "| --- " + "| ---: " * len(settings) + "|"]
     found = {
-        (one.policy_run.policy, one.options.setting): one
-        for one in summarize(main)
-        if one.scope == ALL and one.options.form == "implicit"
+        (key.policy_run.policy, key.options.setting): one
+        for key, one in summarize(cells_of(main)).items()
+        if key.scope == ALL_TASKS and key.options.form == "implicit"
     }
     published = {(one.model, one.options.setting): one for one in published_rows("main")}
     for memory, system in SYSTEMS.items():
@@ -75,7 +76,7 @@ def rates_table(main: Cells) -> str:
     return "\n".join(lines)
 
 
-def _rate(row: SummaryRow | None) -> str:
+def _rate(row: Measured[ScopeKey] | None) -> str:
     if row is None or row.rate is None or row.interval is None:
         return "–"
     return rate_text(float(row.rate), row.interval)

@@ -16,12 +16,13 @@ import typer
 from made_records import make_record
 from msgspec.structs import replace
 from page_text import render
+from roboirg.evaluation.analysis.stats.breakdown_rows import break_down
+from roboirg.evaluation.analysis.tables.breakdown_table import make_breakdown_table
 from typer.testing import CliRunner
 
 from roboirg.cli.report_commands import compare as compare_command
 from roboirg.cli.report_commands import tables
 from roboirg.core.errors import InvalidValueError, UnknownNameError
-from roboirg.evaluation.analysis.stats.breakdown_rows import break_down
 from roboirg.evaluation.analysis.stats.breakdowns import (
     BREAKDOWNS,
     COMPETING,
@@ -37,7 +38,6 @@ from roboirg.evaluation.analysis.stats.cells import CellResults, gather
 from roboirg.evaluation.analysis.stats.comparison import compare
 from roboirg.evaluation.analysis.stats.comparison_text import sentences
 from roboirg.evaluation.analysis.stats.paired_tests import Pairs, measure_gap
-from roboirg.evaluation.analysis.tables.breakdown_table import make_breakdown_table
 from roboirg.evaluation.plan.plan import Plan
 from roboirg.evaluation.plan.stored_plans import write_plan
 from roboirg.evaluation.records.record import Job, Record

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pytest
+from roboirg.evaluation.analysis.stats.run_summary import ALL, summarize
 
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.evaluation.analysis.stats import headline
@@ -14,7 +15,6 @@ from roboirg.evaluation.analysis.stats.measured_floors import (
     measured_floors,
     settings_at_chance,
 )
-from roboirg.evaluation.analysis.stats.run_summary import ALL, summarize
 from roboirg.evaluation.analysis.tables.paper_tables import make_table
 from roboirg.evaluation.analysis.tables.run_tables import make_run_tables
 from roboirg.language.settings import all_settings, settings_of

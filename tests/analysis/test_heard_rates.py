@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 from made_records import make_record
 from page_text import store
 from rich.console import Console
+from roboirg.evaluation.analysis.tables.heard_table import make_heard_table
 from typer.testing import CliRunner
 
 from roboirg import main
@@ -23,7 +24,6 @@ from roboirg.evaluation.analysis.page.run_warnings import run_warnings
 from roboirg.evaluation.analysis.stats.cells import PolicyRun
 from roboirg.evaluation.analysis.stats.heard_rates import add_up, count_heard, cut_text, heard_notes
 from roboirg.evaluation.analysis.stats.run_data import RunData
-from roboirg.evaluation.analysis.tables.heard_table import make_heard_table
 from roboirg.evaluation.analysis.tables.rendering import get_format
 from roboirg.evaluation.analysis.tables.run_tables import make_run_tables, print_run_tables
 from roboirg.evaluation.play.episode_record import audit_record

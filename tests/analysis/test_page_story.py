@@ -6,6 +6,7 @@ import math
 from pathlib import Path
 
 import pytest
+from roboirg.evaluation.analysis.stats.run_summary import ALL
 
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.evaluation.analysis.figures import write_figures
@@ -13,7 +14,6 @@ from roboirg.evaluation.analysis.page.report import write_report
 from roboirg.evaluation.analysis.stats.chance import CHANCE, floor_level
 from roboirg.evaluation.analysis.stats.comparison import compare
 from roboirg.evaluation.analysis.stats.run_data import RunData
-from roboirg.evaluation.analysis.stats.run_summary import ALL
 from roboirg.evaluation.plan.plan_maker import make_plan
 from roboirg.evaluation.plan.sources import Source
 from roboirg.evaluation.play.rollout import EpisodeRunner

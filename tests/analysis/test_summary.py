@@ -6,12 +6,12 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
+from roboirg.evaluation.analysis.stats.run_summary import ALL, Scope, summarize
 
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.evaluation.analysis.stats.cells import CellResults, Trial, gather, labels
 from roboirg.evaluation.analysis.stats.intervals import wilson_interval
 from roboirg.evaluation.analysis.stats.option_labels import REFERENCE
-from roboirg.evaluation.analysis.stats.run_summary import ALL, Scope, summarize
 
 DIRECT = InstructionOptions("direct")
 

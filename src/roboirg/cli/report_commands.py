@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -13,7 +12,7 @@ from roboirg.cli.names import known_names
 from roboirg.core.errors import InvalidValueError, UnknownNameError
 
 if TYPE_CHECKING:
-    from roboirg.evaluation.analysis.stats.breakdowns import Breakdown, Labels
+    from roboirg.evaluation.analysis.stats.breakdowns import Breakdown
     from roboirg.evaluation.analysis.tables.table import Table
     from roboirg.evaluation.plan.sources import Source
 
@@ -129,8 +128,9 @@ def figures(
     """
     from roboirg.evaluation.analysis.figures import FIGURES, write_figures
     from roboirg.evaluation.analysis.figures.figure_style import check_figure_support
+    from roboirg.evaluation.analysis.frame_reading import read_frame
     from roboirg.evaluation.analysis.stats.run_data import RunData
-    from roboirg.evaluation.plan.sources import opened_sources, pooled
+    from roboirg.evaluation.plan.sources import opened_sources
     from roboirg.evaluation.records.packs import MEDIA_FOLDERS
 
     check_figure_support()
@@ -138,7 +138,7 @@ def figures(
         raise InvalidValueError("Figures need a run; give its folder, a pack, or --published.")
     names = FIGURES if which == _ALL else tuple(word.strip() for word in which.split(","))
     with opened_sources(runs or [], MEDIA_FOLDERS) as sources:
-        content = RunData.of(*pooled(sources))
+        content = RunData(read_frame(sources))
         for path in write_figures(content, out, names, published=published, runs=sources):
             typer.echo(path)
 
@@ -212,32 +212,30 @@ def compare(
     from rich.text import Text
 
     from roboirg.cli.run_commands import warn_of_mixtures
-    from roboirg.evaluation.analysis.stats.cells import gather
-    from roboirg.evaluation.analysis.stats.comparison import compare as compare_cells
+    from roboirg.evaluation.analysis.frame_reading import read_frame
+    from roboirg.evaluation.analysis.stats.cells import cells_of
+    from roboirg.evaluation.analysis.stats.comparison import compare as compare_frames
     from roboirg.evaluation.analysis.stats.comparison_text import sentences
     from roboirg.evaluation.analysis.stats.headline import headline_notes
-    from roboirg.evaluation.analysis.stats.run_data import RunData
     from roboirg.evaluation.analysis.tables.arm_table import language_use_sentences
-    from roboirg.evaluation.plan.sources import opened_sources, pooled
+    from roboirg.evaluation.plan.sources import opened_sources
     from roboirg.util.console_width import widen
 
+    wanted = _breakdowns(by)
     with opened_sources([first]) as ours, opened_sources([second]) as theirs:
-        sides = pooled(ours), pooled(theirs)
-        labels = _labels(by, [*ours, *theirs])
-    warn_of_mixtures([one for runs, _ in sides for _, results in runs for one in results])
-    cells, other_cells = (gather(*side) for side in sides)
-    found = compare_cells(cells, other_cells, {one.title: own for one, own in labels.items()})
+        frame, other = (read_frame(one, words=bool(wanted)) for one in (ours, theirs))
+        warn_of_mixtures([one for source in (*ours, *theirs) for one in source.results])
+    found = compare_frames(frame, other, wanted)
     names = (found.first.marked_policy, found.second.marked_policy)
     if names[0] == names[1]:
         names = (f"{names[0]} ({first})", f"{names[1]} ({second})")
-    data, other_data = (RunData.of(*side) for side in sides)
     console = Console()
     widen(console)
     for sentence in (
         *sentences(found, *names),
-        *headline_notes(cells, {found.first: names[0]}),
-        *headline_notes(other_cells, {found.second: names[1]}),
-        *language_use_sentences(data, other_data, names),
+        *headline_notes(cells_of(frame), {found.first: names[0]}),
+        *headline_notes(cells_of(other), {found.second: names[1]}),
+        *language_use_sentences(frame, other, names),
     ):
         console.print(Text(sentence), highlight=False)
 
@@ -246,12 +244,12 @@ def _tables(
     which: str, by: str | None, sources: Sequence[Source], *, published: bool, floors: str | None
 ) -> list[Table]:
     """Return the tables that are wanted; those of runs alone have no published rows or floors."""
+    from roboirg.evaluation.analysis.frame_reading import read_frame
     from roboirg.evaluation.analysis.stats.run_data import RunData
     from roboirg.evaluation.analysis.tables.diagnostic_tables import (
         DIAGNOSTIC_TABLES,
         RECORD_TABLES,
     )
-    from roboirg.evaluation.plan.sources import pooled
 
     alone = (*DIAGNOSTIC_TABLES, *RECORD_TABLES)
     asked = [which] * (which != _ALL) + ["--by"] * (by is not None)
@@ -266,34 +264,33 @@ def _tables(
         return _breakdown_tables(sources, by)
     if which not in alone:
         return _paper_tables(which, sources, published=published, floors=floors)
-    data = RunData.of(*pooled(sources))
+    data = RunData(read_frame(sources))
     if which in DIAGNOSTIC_TABLES:
         return [DIAGNOSTIC_TABLES[which](data)]
-    records = ((str(source.path), one) for source in sources for one in source.records())
-    return [RECORD_TABLES[which](data, records)]
+    return [RECORD_TABLES[which](data, (one for source in sources for one in source.records()))]
 
 
 def _paper_tables(
     which: str, sources: Sequence[Source], *, published: bool, floors: str | None
 ) -> list[Table]:
+    from roboirg.evaluation.analysis.frame_reading import read_frame
     from roboirg.evaluation.analysis.published import RATE_TABLES
-    from roboirg.evaluation.analysis.stats.cells import gather
     from roboirg.evaluation.analysis.stats.chance import FLOORS
+    from roboirg.evaluation.analysis.stats.run_data import RunData
     from roboirg.evaluation.analysis.tables.diagnostic_tables import (
         DIAGNOSTIC_TABLES,
         RECORD_TABLES,
     )
     from roboirg.evaluation.analysis.tables.paper_tables import WHICH, is_informative, make_table
-    from roboirg.evaluation.plan.sources import pooled
 
     if which not in (*WHICH, _ALL):
         raise UnknownNameError("table", which, (*WHICH, *DIAGNOSTIC_TABLES, *RECORD_TABLES, _ALL))
-    cells = gather(*pooled(sources))
+    data = RunData(read_frame(sources))
     shown = (*RATE_TABLES, "coverage") if published else ()
-    applying = [one for one in WHICH if one in shown or is_informative(one, cells)]
+    applying = [one for one in WHICH if one in shown or is_informative(one, data)]
     added = () if floors is None else known_names("floor", floors, FLOORS)
     found = [
-        make_table(one, cells, published=published, floors=added)
+        make_table(one, data, published=published, floors=added)
         for one in (applying if which == _ALL else [which])
     ]
     if which not in (_ALL, "coverage") and not found[0].rows:
@@ -304,12 +301,11 @@ def _paper_tables(
 
 
 def _breakdown_tables(sources: Sequence[Source], by: str) -> list[Table]:
-    from roboirg.evaluation.analysis.stats.cells import gather
-    from roboirg.evaluation.analysis.tables.breakdown_table import make_breakdown_table
-    from roboirg.evaluation.plan.sources import pooled
+    from roboirg.evaluation.analysis.frame_reading import read_frame
+    from roboirg.evaluation.analysis.tables.diagnostic_tables import make_breakdown_table
 
-    cells = gather(*pooled(sources))
-    tables = (make_breakdown_table(one, cells, own) for one, own in _labels(by, sources).items())
+    wanted, frame = _breakdowns(by), read_frame(sources, words=True)
+    tables = (make_breakdown_table(one, frame) for one in wanted)
     if not (found := [table for table in tables if table.rows]):
         raise InvalidValueError(
             f"The runs have no instruction to break down by {by}; they need an implicit setting."
@@ -317,20 +313,12 @@ def _breakdown_tables(sources: Sequence[Source], by: str) -> list[Table]:
     return found
 
 
-def _labels(by: str | None, sources: Sequence[Source]) -> dict[Breakdown, Labels]:
-    """Return the labels of the instructions of runs, whose records are read one by one."""
-    from roboirg.evaluation.analysis.stats.breakdowns import (
-        BREAKDOWNS,
-        find_breakdowns,
-        label_instructions,
-    )
+def _breakdowns(by: str | None) -> tuple[Breakdown, ...]:
+    from roboirg.evaluation.analysis.stats.breakdowns import BREAKDOWNS, find_breakdowns
 
     if by is None:
-        return {}
-    wanted = find_breakdowns(BREAKDOWNS if by == _ALL else map(str.strip, by.split(",")))
-    records = itertools.chain.from_iterable(source.records() for source in sources)
-    labels = label_instructions(wanted, records)
-    return {one: labels[one.name] for one in wanted}
+        return ()
+    return find_breakdowns(BREAKDOWNS if by == _ALL else map(str.strip, by.split(",")))
 
 
 def _print(found: list[Table]) -> None:

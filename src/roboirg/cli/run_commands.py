@@ -141,16 +141,17 @@ def print_tables_of(source: Source) -> None:
     """Print the tables of a run, what is mixed in it, and its unsuccessful episodes."""
     from rich.console import Console
 
+    from roboirg.evaluation.analysis.frame_reading import read_frame
     from roboirg.evaluation.analysis.tables.run_tables import (
         make_run_tables,
         print_failures,
         print_run_tables,
     )
 
-    tables, console = make_run_tables(source.results, source.planned), Console()
-    print_run_tables(tables, console)
+    frame, console = read_frame([source]), Console()
+    print_run_tables(make_run_tables(frame), console)
     warn_of_mixtures(source.results)
-    print_failures(source.results, tables, console)
+    print_failures(frame, console)
 
 
 def warn_of_mixtures(results: Collection[Summary]) -> None:

@@ -6,22 +6,17 @@ import json
 from collections import defaultdict
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
+from roboirg.core.arms import TOLD
 from roboirg.core.errors import InvalidValueError
-from roboirg.evaluation.analysis.stats.cells import (
-    CellKey,
-    CellResults,
-    Cells,
-    EvalConditions,
-    PolicyRun,
-    Trial,
-    Versions,
-    sort_cells,
-)
-from roboirg.evaluation.analysis.stats.run_summary import ALL, SummaryRow, summarize
+from roboirg.evaluation.analysis.frame import MISSING, Frame, as_column, task_order
+from roboirg.evaluation.analysis.policy_run import EvalConditions, PolicyRun, Versions
+from roboirg.evaluation.analysis.stats.cells import cells_of
+from roboirg.evaluation.analysis.stats.measure import ALL_TASKS, Measured, ScopeKey, summarize
+from roboirg.evaluation.analysis.stats.option_labels import options_sort_key
 from roboirg.evaluation.grounding_items.answer_file import Answer
 from roboirg.evaluation.grounding_items.grounding_item import (
     QUESTION_KINDS,
@@ -49,13 +44,14 @@ class GroundingScore:
         name: of the model.
         kind: of question.
         judged: answered items, in the order of the dataset.
-        cells: for the statistics, sorted; items without an answer are missing.
+        frame: a row for each item, sorted, with columns for the statistics and ``item``; items
+            without an answer are missing.
     """
 
     name: str
     kind: QuestionKind
     judged: tuple[JudgedItem, ...]
-    cells: Cells
+    frame: Frame
 
     @property
     def unparsed(self) -> int:
@@ -65,7 +61,7 @@ class GroundingScore:
     @property
     def missing(self) -> int:
         """Number of items without an answer."""
-        return sum(cell.missing for cell in self.cells.values())
+        return [*self.frame["outcome"]].count(MISSING)
 
 
 @dataclass(frozen=True)
@@ -80,7 +76,7 @@ class ScoreRow:
             hidden.
     """
 
-    summary: SummaryRow
+    summary: Measured[ScopeKey]
     chance: float
     command_chance: float
     hidden: float | None
@@ -126,8 +122,8 @@ def score_answers(
 
 def score_rows(score: GroundingScore) -> tuple[ScoreRow, ...]:
     """Return a row for each set of options, with intervals and corrected tests."""
-    found = summarize(score.cells)
-    return tuple(_row(score, one) for one in found if one.scope == ALL)
+    found = summarize(cells_of(score.frame))
+    return tuple(_row(score, one) for key, one in found.items() if key.scope == ALL_TASKS)
 
 
 def _policy_run(items: Sequence[GroundingItem], name: str) -> PolicyRun:
@@ -147,25 +143,34 @@ def _policy_run(items: Sequence[GroundingItem], name: str) -> PolicyRun:
 def _score(
     items: Sequence[GroundingItem], replies: Mapping[str, str], run: PolicyRun, kind: QuestionKind
 ) -> GroundingScore:
-    judged = tuple(
-        JudgedItem(item, judge_reply(item, kind, replies[item.id]))
-        for item in items
-        if item.id in replies
-    )
-    verdicts: dict[CellKey, dict[Trial, bool]] = defaultdict(dict)
-    for item, verdict in judged:
-        verdicts[CellKey(run, item.task, item.options)][Trial(item.episode, 0)] = verdict.right
-    missing: dict[CellKey, int] = defaultdict(int)
-    for item in items:
-        missing[CellKey(run, item.task, item.options)] += item.id not in replies
-    cells = {
-        key: CellResults(verdicts.get(key, {}), missing=number) for key, number in missing.items()
+    verdicts = {
+        item.id: judge_reply(item, kind, replies[item.id]) for item in items if item.id in replies
     }
-    return GroundingScore(run.policy, kind, judged, sort_cells(cells, [run]))
+    judged = tuple(JudgedItem(one, verdicts[one.id]) for one in items if one.id in verdicts)
+    tasks = task_order({one.task for one in items})
+    ordered = sorted(
+        items, key=lambda one: (tasks.index(one.task), options_sort_key(one.options), one.episode)
+    )
+    columns: dict[str, list[Any]] = {
+        "run": [run] * len(ordered),
+        "item": ordered,
+        "options": [one.options for one in ordered],
+        "task": [one.task for one in ordered],
+        "episode": [one.episode for one in ordered],
+        "policy_seed": [0] * len(ordered),
+        "arm": [TOLD] * len(ordered),
+        "outcome": [_outcome(verdicts.get(one.id)) for one in ordered],
+    }
+    frame = Frame({name: as_column(values) for name, values in columns.items()})
+    return GroundingScore(run.policy, kind, judged, frame)
 
 
-def _row(score: GroundingScore, summary: SummaryRow) -> ScoreRow:
-    own = [one for one in score.judged if one.item.options == summary.options]
+def _outcome(verdict: ReplyVerdict | None) -> str:
+    return MISSING if verdict is None else "success" if verdict.right else "failure"
+
+
+def _row(score: GroundingScore, summary: Measured[ScopeKey]) -> ScoreRow:
+    own = [one for one in score.judged if one.item.options == summary.key.options]
     return ScoreRow(
         summary,
         chance=_mean_over_tasks((item, guess_chance(item, score.kind)) for item, _ in own),

@@ -163,7 +163,7 @@ def _comparisons(scores: Sequence[GroundingScore]) -> list[str]:
         for second in scores[place + 1 :]:
             if first.kind == second.kind:
                 names = f"{first.name} ({first.kind})", f"{second.name} ({second.kind})"
-                result = compare(first.cells, second.cells)
+                result = compare(first.frame, second.frame)
                 found += ["", *sentences(result, *names)]
     return found
 

@@ -3,30 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import replace
 from itertools import pairwise
 
 from roboirg.apps.grounding.answer_scores import GroundingScore, ScoreRow, score_rows
 from roboirg.core.plain_text import counted
-from roboirg.evaluation.analysis.stats.breakdowns import Breakdown, InstructionKey, Labels
+from roboirg.evaluation.analysis.frame import as_column
+from roboirg.evaluation.analysis.stats.breakdowns import Breakdown
 from roboirg.evaluation.analysis.stats.intervals import Interval
 from roboirg.evaluation.analysis.stats.option_labels import options_label
-from roboirg.evaluation.analysis.stats.rates import points
-from roboirg.evaluation.analysis.tables.breakdown_table import (
-    corrected_p_text,
-    make_breakdown_table,
-)
-from roboirg.evaluation.analysis.tables.table import NOT_APPLICABLE, Column, Row, Table
+from roboirg.evaluation.analysis.stats.rates import NOT_APPLICABLE, gap_words
+from roboirg.evaluation.analysis.tables.diagnostic_tables import make_breakdown_table
+from roboirg.evaluation.analysis.tables.table import Row, Table, named_columns
 from roboirg.evaluation.grounding_items.grounding_item import GroundingItem
 
-COLUMNS = tuple(
-    map(
-        Column,
-        (
-            "items", "right", "95 % interval", "random", "above random", "command", "hidden slots",
-            "gap", "p",
-        ),
-    )
+COLUMNS = named_columns(
+    "items", "right", "95 % interval", "random", "above random", "command", "hidden slots", "gap",
+    "p",
 )  # fmt: skip
 WORDS_BACK_EDGES = (0, 5, 10, 15, 20, 30)
 METERS_EDGES = (0.0, 0.4, 0.45, 0.5, 0.55)
@@ -46,7 +38,7 @@ def score_table(scores: Iterable[GroundingScore]) -> Table:
         rows=tuple(
             Row(
                 f"{score.name}, {QUESTIONS[score.kind]}",
-                options_label(row.summary.options),
+                options_label(row.summary.key.options),
                 _words(row),
             )
             for score in scores
@@ -58,15 +50,17 @@ def score_table(scores: Iterable[GroundingScore]) -> Table:
 
 def breakdown_tables(score: GroundingScore) -> Iterator[Table]:
     """Yield the gaps to explicit by pattern, expression, and distance of what is meant."""
+    items = score.frame["item"]
     for breakdown, labels_of in _BREAKDOWNS:
-        labels = _labels(score, labels_of)
-        if any(labels.values()):
-            yield make_breakdown_table(breakdown, score.cells, labels)
+        labels = [tuple(labels_of(item)) for item in items]
+        frame = score.frame.extended({breakdown.name: as_column(labels)})
+        if any(labels):
+            yield make_breakdown_table(breakdown, frame)
 
 
 def _words(row: ScoreRow) -> tuple[str, ...]:
     summary = row.summary
-    gap, p_holm = summary.gap, summary.p_holm
+    value, _, p_value = gap_words(summary.gap, summary.p_holm)
     return (
         str(summary.trials),
         _percent(None if summary.rate is None else float(summary.rate)),
@@ -75,8 +69,8 @@ def _words(row: ScoreRow) -> tuple[str, ...]:
         _percent(row.corrected),
         _percent(row.command_chance),
         _percent(row.hidden),
-        NOT_APPLICABLE if gap is None else points(gap.value, 1),
-        corrected_p_text(p_holm),
+        value,
+        p_value,
     )
 
 
@@ -106,23 +100,6 @@ def _interval(interval: Interval | None) -> str:
     return NOT_APPLICABLE if interval is None else " to ".join(map(_percent, interval))
 
 
-def _labels(score: GroundingScore, labels_of: ItemLabels) -> Labels:
-    run = next(iter(score.cells)).policy_run
-    if run.versions is None:
-        return {}
-    return {
-        InstructionKey(
-            item.task,
-            item.split,
-            item.episode,
-            replace(item.options, wordings=run.conditions.wordings),
-            run.versions.language,
-            run.versions.environment,
-        ): tuple(labels_of(item))
-        for item, _ in score.judged
-    }
-
-
 def range_label(value: float, edges: Sequence[float], unit: str) -> str:
     """Return the range between two edges in which a value lies, with its unit."""
     for low, high in pairwise(edges):
@@ -138,8 +115,7 @@ def _distance_labels(item: GroundingItem) -> Sequence[str]:
 
 
 _BREAKDOWNS: tuple[tuple[Breakdown, ItemLabels], ...] = tuple(
-    # The labels are found from items, not from records.
-    (Breakdown(name, title, lambda _record: (), note), labels_of)
+    (Breakdown(name, title, note, in_explicit=name == "meters"), labels_of)
     for name, title, note, labels_of in (
         (
             "pattern",

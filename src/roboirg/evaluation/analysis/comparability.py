@@ -12,8 +12,9 @@ from roboirg.core.arms import TOLD
 from roboirg.core.environment_options import DEFAULT_MESHES
 from roboirg.core.episode import ENVIRONMENT_VERSION
 from roboirg.core.plain_text import counted
+from roboirg.evaluation.analysis.policy_run import PolicyRun
 from roboirg.evaluation.analysis.published import MAX_STEPS, TRIALS, published_tasks
-from roboirg.evaluation.analysis.stats.cells import CellKey, CellResults, PolicyRun
+from roboirg.evaluation.analysis.stats.cells import Cell, CellKey
 from roboirg.evaluation.analysis.stats.option_labels import words_label
 from roboirg.language.settings import EXPLICIT
 from roboirg.language.worded_command import ROBOMME_NAME
@@ -32,7 +33,7 @@ DIFFERENT_SIGN = "≠"
 _SPLIT = "test"
 
 
-def differences_of(key: CellKey, cell: CellResults) -> Differences | None:
+def differences_of(key: CellKey, cell: Cell) -> Differences | None:
     """Return what differs between a cell and the published rate of that cell.
 
     The number of policy seeds makes no difference, nor does it matter what the policy is.
@@ -110,7 +111,7 @@ def _text(tasks: Mapping[str, Differences]) -> str:
     return "; ".join(parts)
 
 
-def _explicit_differences(policy_run: PolicyRun, cell: CellResults) -> Iterator[str]:
+def _explicit_differences(policy_run: PolicyRun, cell: Cell) -> Iterator[str]:
     conditions, versions = policy_run.conditions, policy_run.versions
     environment = conditions.environment
     if not is_robomme(conditions.wordings):

@@ -12,15 +12,16 @@ from typing import TYPE_CHECKING, Any
 from roboirg.core.errors import InvalidValueError, MissingDependencyError, UnknownNameError
 from roboirg.core.plain_text import counted
 from roboirg.evaluation.analysis.figures import FIGURES, draw_figure
-from roboirg.evaluation.analysis.stats.cells import Cells, gather, only_told
+from roboirg.evaluation.analysis.frame import COLUMNS, MISSING
+from roboirg.evaluation.analysis.frame_reading import WORD_COLUMNS, read_frame
 from roboirg.evaluation.analysis.stats.comparison import compare
 from roboirg.evaluation.analysis.stats.comparison_text import sentences
+from roboirg.evaluation.analysis.stats.measure import ALL_TASKS
 from roboirg.evaluation.analysis.stats.option_labels import options_label
 from roboirg.evaluation.analysis.stats.run_data import RunData
-from roboirg.evaluation.analysis.stats.run_summary import ALL, summarize
 from roboirg.evaluation.analysis.tables.paper_tables import WHICH, is_informative, make_table
 from roboirg.evaluation.analysis.tables.rendering import get_format
-from roboirg.evaluation.plan.sources import Source
+from roboirg.evaluation.plan.sources import Source, opened_sources
 from roboirg.evaluation.records.record import Record, Summary
 from roboirg.evaluation.records.store import read_records
 
@@ -28,12 +29,42 @@ if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.figure import Figure
 
-COLUMNS = (
-    "policy", "task", "split", "episode", "difficulty", "setting", "form", "policy_seed", "arm",
-    "outcome", "cause", "error", "steps", "max_steps", "privileged", "policy_version",
-    "language_version", "environment_version", "duration_s", "video",
-)  # fmt: skip
-"""Columns of the data frame, besides ``success`` and ``failure``."""
+_TYPES = {
+    "text": "string",
+    "texts": "object",
+    "number": "Int64",
+    "decimal": "Float64",
+    "flag": "boolean",
+}
+"""Types of pandas, all of which know missing values, by the kind of a column."""
+
+
+def results(*paths: str | Path) -> pd.DataFrame:
+    """Return the results of runs as a data frame of pandas, a row for each episode.
+
+    The page "Your own table" lists its columns.
+
+    Args:
+        paths: folders of runs, packs (``*.roboirg.zip``), or one policy of them, ``PATH:NAME``.
+
+    Raises:
+        StoreError: there are no records at a path.
+        MissingDependencyError: pandas is not installed.
+    """
+    try:
+        import pandas as pd
+    except ImportError as error:
+        raise MissingDependencyError(
+            f"A data frame needs pandas, which is not installed ({error}); run: pip install pandas"
+        ) from error
+    with opened_sources(paths) as sources:
+        frame = read_frame(sources, words=True)
+    played = frame.take(frame["outcome"] != MISSING)
+    found = {
+        one.name: pd.Series(played[one.name]).astype(_TYPES[one.kind])
+        for one in (*COLUMNS.values(), *WORD_COLUMNS.values())
+    }
+    return pd.DataFrame(found)
 
 
 @dataclass(frozen=True)
@@ -49,12 +80,12 @@ class Results:
     @property
     def errors(self) -> int:
         """Number of episodes that ended in an error and are in no rate."""
-        return sum(cell.errors for cell in self.cells.values())
+        return [*self._data.frame["outcome"]].count("error")
 
     @property
     def missing(self) -> int:
         """Number of planned episodes that were not played."""
-        return sum(cell.missing for cell in self.cells.values())
+        return [*self._data.frame["outcome"]].count(MISSING)
 
     @functools.cached_property
     def summaries(self) -> tuple[Summary, ...]:
@@ -66,46 +97,17 @@ class Results:
         """The whole records, with instructions, events, times and metadata."""
         return read_records(self.folder)
 
-    @functools.cached_property
-    def cells(self) -> Cells:
-        """The verdicts gathered by policy, task and instruction options."""
-        return gather([("", self.summaries)], self._source.planned)
-
     @property
     def frame(self) -> pd.DataFrame:
-        """One row for each episode (`COLUMNS`), ``success`` as a boolean, missing for errors.
-
-        Raises:
-            MissingDependencyError: pandas is not installed.
-        """
-        try:
-            import pandas as pd
-        except ImportError as error:
-            raise MissingDependencyError(
-                f"A data frame needs pandas, which is not installed ({error}); run: "
-                "pip install pandas"
-            ) from error
-        frame = pd.DataFrame(
-            [
-                {
-                    **{name: getattr(one, name) for name in COLUMNS if name != "max_steps"},
-                    "max_steps": one.environment.max_steps,
-                    "failure": None if one.attribution is None else one.attribution.failure,
-                }
-                for one in self.summaries
-            ],
-            columns=[*COLUMNS, "failure"],
-        )
-        success = frame["outcome"].map({"success": True, "failure": False}).astype("boolean")
-        frame.insert(COLUMNS.index("outcome") + 1, "success", success)
-        return frame
+        """The results as `roboirg.results` returns them."""
+        return results(self.folder)
 
     def rates(self) -> dict[tuple[str, str], float]:
         """Return the mean success over tasks, 0 to 1, by policy and setting (with options)."""
         return {
-            (one.key.policy_run.policy, options_label(one.key.options)): float(one.rate)
-            for one in summarize(only_told(self.cells))
-            if one.key.scope == ALL and one.rate is not None
+            (key.policy_run.policy, options_label(key.options)): float(one.rate)
+            for key, one in self._data.told.summaries.items()
+            if key.scope == ALL_TASKS and one.rate is not None
         }
 
     def table(
@@ -128,7 +130,7 @@ class Results:
             UnknownNameError: there is no such table or format.
         """
         return get_format(format).draw(
-            make_table(which, self.cells, published=published, floors=floors)
+            make_table(which, self._data, published=published, floors=floors)
         )
 
     def plot(self, which: str = "gaps", *, published: bool = False) -> Plot:
@@ -142,8 +144,7 @@ class Results:
         names = tuple(name for name in FIGURES if name != "strips")
         if which not in names:
             raise UnknownNameError("figure", which, names)
-        content = RunData.of([("", self.summaries)], self._source.planned)
-        figure = draw_figure(which, content, published=published)
+        figure = draw_figure(which, self._data, published=published)
         if figure is None:
             raise InvalidValueError(f"The run has nothing to draw for {which!r}.")
         return Plot(figure)
@@ -155,10 +156,14 @@ class Results:
             UnknownNameError: the run has no such policy.
             InvalidValueError: the two cannot be compared.
         """
-        ours, theirs = self._cells_of(first), self._cells_of(second)
+        names = list(dict.fromkeys(self._data.frame["policy"]))
+        for policy in (first, second):
+            if policy not in names:
+                raise UnknownNameError(f"policy in {self.folder}", policy, names)
+        ours, theirs = (self._data.frame.where(policy=one) for one in (first, second))
         found = compare(ours, theirs)
-        names = found.first.marked_policy, found.second.marked_policy
-        return "\n".join(sentences(found, *names))
+        marked = found.first.marked_policy, found.second.marked_policy
+        return "\n".join(sentences(found, *marked))
 
     def report(self, *, videos: bool = True) -> Path:
         """Write the page of the run and return its path.
@@ -180,18 +185,16 @@ class Results:
         return "\n".join(lines)
 
     def _repr_markdown_(self) -> str:
-        shown = [one for one in WHICH if is_informative(one, self.cells)]
+        shown = [one for one in WHICH if is_informative(one, self._data)]
         return "\n".join(self.table(one, "markdown") for one in shown[:1]) or repr(self)
 
     @functools.cached_property
     def _source(self) -> Source:
         return Source(self.folder)
 
-    def _cells_of(self, policy: str) -> Cells:
-        names = list(dict.fromkeys(key.policy_run.policy for key in self.cells))
-        if policy not in names:
-            raise UnknownNameError(f"policy in {self.folder}", policy, names)
-        return {key: cell for key, cell in self.cells.items() if key.policy_run.policy == policy}
+    @functools.cached_property
+    def _data(self) -> RunData:
+        return RunData(read_frame([self._source]))
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ import itertools
 import math
 import os
 import re
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import asdict, fields, is_dataclass, replace
 from functools import partial
 from typing import Annotated, Any, Literal, NamedTuple, get_type_hints
@@ -25,7 +25,7 @@ from pydantic import (
     model_validator,
 )
 
-from roboirg import language, tasks
+from roboirg import tasks
 from roboirg.core.arms import TOLD
 from roboirg.core.delivery import TURNS
 from roboirg.core.environment_options import EnvironmentOptions, check_demonstration_frames
@@ -48,7 +48,7 @@ from roboirg.evaluation.plan.option_parsing import (
 from roboirg.evaluation.plan.plan_sections import Attempts, Hosting, ModelUse, WorkerNeeds, names_of
 from roboirg.evaluation.play.job_instruction import instruct_job
 from roboirg.evaluation.records.film import VideoMode
-from roboirg.evaluation.records.record import Job
+from roboirg.evaluation.records.record import Job, Summary
 from roboirg.evaluation.records.record_codec import RecordKey, identity_key
 from roboirg.language.generator import check_options, find_refusal
 from roboirg.language.settings import (
@@ -58,6 +58,7 @@ from roboirg.language.settings import (
     expand_settings,
     find_settings,
     get_setting,
+    settings_of,
 )
 from roboirg.language.wordings.wording_store import open_wordings
 from roboirg.policies.by_name.finding import read_policy
@@ -326,15 +327,19 @@ class Plan(BaseModel):
         opened = [open_policy(one, limit, device) for one in self.policies]
         return self.model_copy(update={"policies": tuple(opened)})
 
-    def jobs(self) -> tuple[Job, ...]:
+    def jobs(self, played: Iterable[Summary] = ()) -> tuple[Job, ...]:
         """Return every job, ordered by policy, task, episode, setting, form, stages and seed.
 
         Of a scene, what leaves the goal implicit comes first: a policy that keeps what it heard
         has not heard the explicit command of the scene yet.
+
+        Args:
+            played: results, to save time: what was said can be said.
         """
+        said = {(one.task, one.episode, one.setting) for one in played if one.split == self.split}
         # The settings of an episode are slow to find, so all policies share them.
         settings = {
-            (task, episode): self.settings_of(task, episode)
+            (task, episode): self.settings_of(task, episode, said)
             for task in self.tasks
             for episode in self.episodes
         }
@@ -357,11 +362,11 @@ class Plan(BaseModel):
         every = set[RecordKey]().union(*trials.values())
         return {name: len(every - found) for name, found in trials.items() if found != every}
 
-    def drawable_jobs(self) -> tuple[Job, ...]:
+    def drawable_jobs(self, played: Iterable[Summary] = ()) -> tuple[Job, ...]:
         """Return the jobs whose words can be made here, for counting what a stored run lacks.
 
-        None if the episodes are private and their salt is not known; none of tasks and settings
-        whose package is not installed.
+        `played` are its results, see `jobs`. None if the episodes are private and their salt is not
+        known; none of tasks and settings whose package is not installed.
         """
         try:
             splits.check_split(self.split)
@@ -370,14 +375,25 @@ class Plan(BaseModel):
         known = tuple(name for name in self.tasks if name in tasks.every_task())
         words = {*all_settings(), *SETTING_GROUPS}
         settings = tuple(name for name in self.settings if name in words)
-        return self.model_copy(update={"tasks": known, "settings": settings}).jobs()
+        return self.model_copy(update={"tasks": known, "settings": settings}).jobs(played)
 
-    def settings_of(self, task: str, episode: int) -> tuple[str, ...]:
-        """Return the settings in which an episode is played."""
+    def settings_of(
+        self, task: str, episode: int, said: Collection[tuple[str, int, str]] = ()
+    ) -> tuple[str, ...]:
+        """Return the settings in which an episode is played.
+
+        `said` has task, episode and setting of what is known to be expressible.
+        """
         if not self._has_groups:
             return self.setting_names
-        found = language.expressible(splits.get_episode(task, self.split, episode))
-        return tuple(name for name in found if name in self.setting_names)
+        found = splits.get_episode(task, self.split, episode)
+        return tuple(
+            name
+            for name in settings_of(tasks.get_task(task))
+            if name in self.setting_names
+            if (task, episode, name) in said
+            or find_refusal(found, InstructionOptions(name)) is None
+        )
 
     def _jobs_of(
         self,

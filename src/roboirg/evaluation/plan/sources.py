@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Collection, Iterable, Iterator, Sequence
+from collections.abc import Collection, Iterable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -73,7 +73,8 @@ class Source:
     def planned(self) -> tuple[Job, ...]:
         """The jobs of the newest plan; none if the plan or its episodes are not known."""
         plan = read_plan(self.folder)
-        return () if plan is None else tuple(self.wanted(plan.drawable_jobs()))
+        jobs = () if plan is None else plan.drawable_jobs(self.stored.newest)
+        return tuple(self.wanted(jobs))
 
     def records(self) -> Iterator[Record]:
         """Yield the whole records; those that were written again come twice."""
@@ -84,15 +85,6 @@ class Source:
         if self.policies is None:
             return jobs
         return (one for one in jobs if one.policy in self.policies)
-
-
-Pooled = tuple[list[tuple[str, Sequence[Summary]]], list[Job]]
-"""The results of several runs, each with its path, and all their planned jobs."""
-
-
-def pooled(sources: Sequence[Source]) -> Pooled:
-    results: list[tuple[str, Sequence[Summary]]] = [(str(one.path), one.results) for one in sources]
-    return results, [job for one in sources for job in one.planned]
 
 
 @contextlib.contextmanager

@@ -18,8 +18,9 @@ from roboirg.core.plain_text import counted
 from roboirg.evaluation.analysis.figures.figure_style import save
 from roboirg.evaluation.analysis.figures.rates import Rate, RateRow, draw_rates
 from roboirg.evaluation.analysis.stats.intervals import ALPHA, Interval, without_spread
+from roboirg.evaluation.analysis.stats.rates import NOT_APPLICABLE
 from roboirg.evaluation.analysis.tables.rendering.markdown import markdown
-from roboirg.evaluation.analysis.tables.table import NOT_APPLICABLE, Column, Row, Table
+from roboirg.evaluation.analysis.tables.table import Column, Row, Table
 from roboirg.language.settings import all_settings
 from roboirg.util.atomic_write import write_atomically
 

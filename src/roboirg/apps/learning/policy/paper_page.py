@@ -23,13 +23,15 @@ from roboirg.apps.learning.policy.paper_experiment import (
     run_of,
 )
 from roboirg.core.instruction_options import InstructionOptions
+from roboirg.evaluation.analysis.frame import Frame, make_frame
 from roboirg.evaluation.analysis.published import TRIALS, PublishedRow, published_rows
-from roboirg.evaluation.analysis.stats.cells import CellKey, CellResults, Cells, gather, only_told
+from roboirg.evaluation.analysis.stats.cells import Cell, CellKey, Cells, cells_of
 from roboirg.evaluation.analysis.stats.intervals import ALPHA, SEED, Z_95, Interval
+from roboirg.evaluation.analysis.stats.measure import ALL_TASKS, Measured, ScopeKey, summarize
 from roboirg.evaluation.analysis.stats.option_labels import staged_options
 from roboirg.evaluation.analysis.stats.paired_tests import Gap, Pairs, holm, measure_gap
-from roboirg.evaluation.analysis.stats.run_summary import ALL, SummaryRow, summarize
-from roboirg.evaluation.analysis.tables.paper_tables import Which, is_informative, make_table
+from roboirg.evaluation.analysis.stats.run_data import RunData
+from roboirg.evaluation.analysis.tables.paper_tables import is_informative, make_table
 from roboirg.evaluation.analysis.tables.rendering.markdown import markdown
 from roboirg.evaluation.records.record import Summary
 from roboirg.evaluation.records.store import read_results
@@ -39,7 +41,7 @@ from roboirg.tasks.splits.splits import get_episode
 from roboirg.util.atomic_write import write_atomically
 
 PAGE = "paper.md"
-TABLES: tuple[Which, ...] = ("main", "context", "planner")
+TABLES = ("main", "context", "planner")
 FIRST = "none"
 """The memory that the others are compared with."""
 _TITLE = "# The paper's experiment with small policies"
@@ -72,36 +74,36 @@ Column = Mapping[str, Difference]
 def write_paper_page(folder: Path) -> Path:
     """Write the page of the runs that were played, and return its path."""
     runs = {part: run_of(folder, part) for part in PARTS if part != RESOLVED}
-    found = {part: row_cells(part, read_results(run)) for part, run in runs.items() if run.exists()}
+    found = {part: row_frame(part, read_results(run)) for part, run in runs.items() if run.exists()}
     page = folder / PAGE
     write_atomically(page, f"{_TITLE}\n\n{_INTRODUCTION}\n\n{results_text(found)}\n")
     return page
 
 
-def row_cells(part: str, results: Iterable[Summary]) -> Cells:
-    """Return the cells of a part's results, without control arms; policies are rows."""
-    return only_told(gather([(part, [_of_row(one) for one in results])]))
+def row_frame(part: str, results: Iterable[Summary]) -> Frame:
+    """Return a part's results, without control arms; policies are rows."""
+    return make_frame([(part, [_of_row(one) for one in results])]).told()
 
 
-def results_text(found: Mapping[str, Cells]) -> str:
-    """Return tables and answers in Markdown; policies of each part's cells are rows."""
+def results_text(found: Mapping[str, Frame]) -> str:
+    """Return tables and answers in Markdown; policies of each part are rows."""
     return "\n\n".join(part for part in (tables_text(found), answers_text(found)) if part)
 
 
-def tables_text(found: Mapping[str, Cells]) -> str:
+def tables_text(found: Mapping[str, Frame]) -> str:
     """Return the paper's tables of the parts, with its rates."""
     shown = [
-        markdown(make_table(which, found[which], published=True)).rstrip()
+        markdown(make_table(which, RunData(found[which]), published=True)).rstrip()
         for which in TABLES
-        if which in found and (which == "planner" or is_informative(which, found[which]))
+        if which in found and (which == "planner" or is_informative(which, RunData(found[which])))
     ]
     return "\n\n".join(shown)
 
 
-def answers_text(found: Mapping[str, Cells]) -> str:
+def answers_text(found: Mapping[str, Frame]) -> str:
     """Return the paper's questions with the answers of the parts and of its rates."""
-    main = _questions(found[MAIN]) if MAIN in found else ()
-    context = _stage_question(found[CONTEXT]) if CONTEXT in found else ()
+    main = _questions(cells_of(found[MAIN])) if MAIN in found else ()
+    context = _stage_question(cells_of(found[CONTEXT])) if CONTEXT in found else ()
     return "\n\n".join([*main, *context])
 
 
@@ -135,7 +137,7 @@ def _questions(main: Cells) -> Iterator[str]:
     yield "## Do planners keep more?"
     yield "Success in each setting by explicit success, in percent."
     yield _retention(averages, settings)
-    if any(one.form_gap for one in averages):
+    if any(one.second_gap for one in averages):
         yield "## Do resolved forms recover it?"
         yield "Success with references replaced by names less success with references, in points."
         yield _table(settings, lambda one: _own_form_gaps(averages, one), lambda _: {})
@@ -200,28 +202,31 @@ def _percent(interval: Interval) -> tuple[float, float]:
     return 100 * interval.low, 100 * interval.high
 
 
-def _averages(cells: Cells) -> list[SummaryRow]:
+def _averages(cells: Cells) -> list[Measured[ScopeKey]]:
     """Return the averages over tasks of implicit forms."""
-    found = summarize(cells)
-    return [one for one in found if one.scope == ALL and one.options.form == "implicit"]
+    return [
+        one
+        for key, one in summarize(cells).items()
+        if key.scope == ALL_TASKS and key.options.form == "implicit"
+    ]
 
 
-def _own_gaps(averages: Sequence[SummaryRow], setting: str) -> dict[str, Difference]:
+def _own_gaps(averages: Sequence[Measured[ScopeKey]], setting: str) -> dict[str, Difference]:
     return {
-        one.policy_run.policy: _as_difference(one.gap)
+        one.key.policy_run.policy: _as_difference(one.gap)
         for one in averages
-        if one.gap and one.options.setting == setting
+        if one.gap and one.key.options.setting == setting
     }
 
 
-def _own_form_gaps(averages: Sequence[SummaryRow], setting: str) -> dict[str, Difference]:
+def _own_form_gaps(averages: Sequence[Measured[ScopeKey]], setting: str) -> dict[str, Difference]:
     found = {}
     for one in averages:
-        if one.form_gap is not None and one.options.setting == setting:
-            gap = _as_difference(one.form_gap)
+        if one.second_gap is not None and one.key.options.setting == setting:
+            gap = _as_difference(one.second_gap)
             ends = gap.interval
             turned = None if ends is None else Interval(-ends.high, -ends.low)
-            found[one.policy_run.policy] = Difference(-gap.value, turned, gap.p_value)
+            found[one.key.policy_run.policy] = Difference(-gap.value, turned, gap.p_value)
     return found
 
 
@@ -261,7 +266,7 @@ def _own_longer(
 
 
 def _paired(
-    found: Iterable[tuple[CellKey, CellResults, CellResults | None]],
+    found: Iterable[tuple[CellKey, Cell, Cell | None]],
 ) -> dict[str, Difference]:
     """Return the difference of the cells of each policy to others on the same episodes."""
     by_policy: dict[str, list[Pairs]] = {}
@@ -323,14 +328,14 @@ def _share(rate: Decimal | None) -> float:
     return 0.0 if rate is None else float(rate) / 100
 
 
-def _retention(averages: Sequence[SummaryRow], settings: Sequence[str]) -> str:
+def _retention(averages: Sequence[Measured[ScopeKey]], settings: Sequence[str]) -> str:
     kept: dict[str, dict[str, str]] = {}
     for one in averages:
         if one.gap is not None and one.gap.retention is not None:
             ends = one.gap.retention_interval
             shown = "" if ends is None else " ({:.0f} to {:.0f})".format(*_percent(ends))
             text = f"{100 * one.gap.retention:.0f}{shown}"
-            kept.setdefault(one.policy_run.policy, {})[one.options.setting] = text
+            kept.setdefault(one.key.policy_run.policy, {})[one.key.options.setting] = text
     rows = {(one.model, one.options.setting): one for one in published_rows("main")}
     for system in SYSTEMS.values():
         for setting in settings:

@@ -45,7 +45,7 @@ def write_figures(
     for name in which:
         paths += save(partial(_drawn, name, content, published, runs), folder, name)
     if not paths:
-        whose = "The runs have" if content.results else "The paper's tables have"
+        whose = "The runs have" if content.cells else "The paper's tables have"
         raise InvalidValueError(
             f"{whose} nothing to draw for {', '.join(which)}; `roboirg tables` shows "
             "what they have."
@@ -76,7 +76,7 @@ def _drawn(
 
     if name == "strips":
         return draw_strips(runs)
-    content = content.told()
+    content = content.told
     if name in ("gaps", "context"):
         draw = draw_gaps if name == "gaps" else draw_context
         return draw(content, published=published)

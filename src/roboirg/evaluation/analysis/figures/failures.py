@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from collections import Counter, defaultdict
+from collections import Counter
 from typing import TYPE_CHECKING
 
-from roboirg.core.instruction_options import InstructionOptions
 from roboirg.evaluation.analysis.figures.bars import Bar, Part, draw_bars
-from roboirg.evaluation.analysis.stats.cells import PolicyRun
-from roboirg.evaluation.analysis.stats.failure_counts import FAILURES, count_failures
 from roboirg.evaluation.analysis.stats.option_labels import options_label, options_sort_key
 from roboirg.evaluation.analysis.stats.run_data import RunData
+from roboirg.evaluation.analysis.tables.diagnostic_tables import FAILURES, count_failures
 from roboirg.evaluation.analysis.tables.table_notes import where_played
 from roboirg.judging.failure_attribution import EXECUTION, GROUNDING
 
@@ -38,27 +36,18 @@ PARTS = {
 
 def draw_failures(content: RunData) -> Figure | None:
     """Draw the shares of episodes by cause of failure; return None without failures."""
-    counts: dict[tuple[PolicyRun, InstructionOptions], Counter[str]] = defaultdict(Counter)
-    played: Counter[tuple[PolicyRun, InstructionOptions]] = Counter()
-    for key, own in count_failures(content).items():
-        counts[key.policy_run, key.options] += own
-        played[key.policy_run, key.options] += content.cells[key].trials
-    if not any(counts.values()):
+    counts = count_failures(content.frame, ("run", "options"))
+    if not any(own[name] for own in counts.values() for name in PARTS):
         return None
-    columns = sorted({options for _, options in played}, key=options_sort_key)
-    names = [one for one in content.names if any(own == one for own, _ in played)]
-    rows = {
-        content.name(one): [
-            Bar(
-                options_label(options),
-                {part.label: counts[one, options][name] for name, part in PARTS.items()},
-                n,
-                f"n = {n}" if n else "–",
-            )
-            for options in columns
-            for n in [played[one, options]]
-        ]
-        for one in names
-    }
+    columns = sorted({options for _, options in counts}, key=options_sort_key)
+    names = [one for one in content.names if any(run == one for run, _ in counts)]
+    rows: dict[str, list[Bar]] = {}
+    for one in names:
+        bars = rows[content.name(one)] = []
+        for options in columns:
+            own = counts.get((one, options), Counter())
+            parts = {part.label: own[name] for name, part in PARTS.items()}
+            n = own["trials"]
+            bars.append(Bar(options_label(options), parts, n, f"n = {n}" if n else "–"))
     notes = [NOTE, where_played([one.conditions for one in names])]
     return draw_bars(rows, list(PARTS.values()), notes)

@@ -6,9 +6,11 @@ from itertools import groupby
 from typing import TYPE_CHECKING
 
 from roboirg.evaluation.analysis.figures.bars import Bar, Part, draw_bars
-from roboirg.evaluation.analysis.stats.form_gaps import FormRow, form_rows
+from roboirg.evaluation.analysis.stats.measure import ScopeKey
+from roboirg.evaluation.analysis.stats.paired_tests import Gap
 from roboirg.evaluation.analysis.stats.rates import points
 from roboirg.evaluation.analysis.stats.run_data import RunData
+from roboirg.evaluation.analysis.tables.diagnostic_tables import form_rows
 from roboirg.evaluation.analysis.tables.table_notes import where_played
 
 if TYPE_CHECKING:
@@ -30,25 +32,28 @@ NOTE = (
 
 def draw_forms(content: RunData) -> Figure | None:
     """Draw overlap and difference of the two forms; return None unless both were played."""
-    rows = {one: bars for one in content.names if (bars := list(_bars(form_rows(content, one))))}
+    rows = {
+        run: list(_bars(own))
+        for run, own in groupby(form_rows(content), lambda row: row[0].policy_run)
+    }
     if not rows:
         return None
     notes = [NOTE, where_played([one.conditions for one in rows])]
     return draw_bars({content.name(one): bars for one, bars in rows.items()}, PARTS, notes)
 
 
-def _bars(rows: Iterable[FormRow]) -> Iterator[Bar]:
+def _bars(rows: Iterable[tuple[ScopeKey, Gap]]) -> Iterator[Bar]:
     """Yield the bars of a policy below the headings of their suites."""
-    for scope, own in groupby(rows, lambda row: row.scope):
+    for scope, own in groupby(rows, lambda row: row[0].scope):
         yield Bar(scope, {}, 0, "")
-        for _, setting, gap in own:
+        for key, gap in own:
             overlap = gap.overlap
             counts = (overlap.both, overlap.only_second, overlap.only_first, overlap.neither)
             text = points(gap.value)
             if gap.interval is not None:
                 text += f" [{points(gap.interval.low)}, {points(gap.interval.high)}]"
             yield Bar(
-                f"{setting}, n = {overlap.trials}",
+                f"{key.options.setting}, n = {overlap.trials}",
                 dict(zip((part.label for part in PARTS), counts, strict=True)),
                 overlap.trials,
                 text,

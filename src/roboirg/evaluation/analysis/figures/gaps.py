@@ -9,8 +9,6 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
-import numpy as np
-
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.evaluation.analysis.comparability import (
     COMPARABLE_SIGN,
@@ -21,23 +19,18 @@ from roboirg.evaluation.analysis.comparability import (
     differences_of,
 )
 from roboirg.evaluation.analysis.figures.rates import Rate, RateRow, draw_rates
+from roboirg.evaluation.analysis.policy_run import PolicyRun
 from roboirg.evaluation.analysis.published import TRIALS, RateTable, published_rows
-from roboirg.evaluation.analysis.stats.cells import (
-    CellKey,
-    CellResults,
-    Cells,
-    PolicyRun,
-    clustered_interval,
-)
-from roboirg.evaluation.analysis.stats.intervals import SEED
+from roboirg.evaluation.analysis.stats.cells import ByTask, CellKey, Cells
+from roboirg.evaluation.analysis.stats.measure import measure_groups
 from roboirg.evaluation.analysis.stats.option_labels import (
     REFERENCE,
     setting_sort_key,
     staged_options,
 )
-from roboirg.evaluation.analysis.stats.paired_tests import Pairs, measure_gap
 from roboirg.evaluation.analysis.stats.run_data import RunData
-from roboirg.evaluation.analysis.tables.table_notes import is_shown, where_played
+from roboirg.evaluation.analysis.tables.paper_tables import PAPER_TABLES
+from roboirg.evaluation.analysis.tables.table_notes import where_played
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -145,7 +138,7 @@ def _shared_tasks(cells: Cells, kind: Comparison) -> dict[InstructionOptions, li
     """
     played: dict[InstructionOptions, dict[PolicyRun, list[str]]] = {}
     for key, cell in cells.items():
-        if cell.trials and is_shown(kind.table, key.options):
+        if cell.trials and PAPER_TABLES[kind.table].shows(key.options):
             played.setdefault(key.options, {}).setdefault(key.policy_run, []).append(key.task)
     shared = {}
     for options in sorted(played, key=lambda one: (setting_sort_key(one.setting), len(one.stages))):
@@ -169,17 +162,22 @@ def _own_rates(
     cells: Cells, policy_run: PolicyRun, kind: Comparison, tasks: Tasks
 ) -> dict[str, Rate]:
     """Return the rates of a policy run by column."""
-    rates, rng = {}, np.random.default_rng(SEED)
-    for options, names in tasks.items():
-        own = [cells.get(CellKey(policy_run, task, options), CellResults()) for task in names]
-        if not all(cell.trials for cell in own):
-            continue
-        references = [cells.get(CellKey(policy_run, task, kind.reference)) for task in names]
-        pairs = [Pairs.of(cell, one) for cell, one in zip(own, references, strict=True) if one]
-        gap = measure_gap(pairs, rng) if options != kind.reference else None
-        rate = float(sum(cell.rate or 0 for cell in own) / len(own))
-        rates[kind.title(options)] = (
-            Rate(rate, None, clustered_interval(own, rng))
+
+    def played(options: InstructionOptions, names: Sequence[str]) -> ByTask:
+        keys = [CellKey(policy_run, task, options) for task in names]
+        return {key.task: cells[key] for key in keys if key in cells and cells[key].trials}
+
+    groups = {(options,): played(options, names) for options, names in tasks.items()}
+    found = measure_groups(
+        {key: own for key, own in groups.items() if len(own) == len(tasks[key[0]])},
+        [lambda key: {} if key[0] == kind.reference else played(kind.reference, tasks[key[0]])],
+        is_mean=lambda _key: True,
+    )
+    rates = {}
+    for one in found:
+        rate, gap = float(one.rate or 0), one.gap
+        rates[kind.title(one.key[0])] = (
+            Rate(rate, None, one.interval)
             if gap is None
             else Rate(rate, rate - gap.value, gap.interval)
         )

@@ -11,17 +11,16 @@ from typing import NamedTuple, get_args
 
 from roboirg.core.episode import DIFFICULTIES
 from roboirg.core.instruction_options import InstructionOptions
+from roboirg.evaluation.analysis.frame import task_order
 from roboirg.evaluation.analysis.page.episodes import PageEpisodes
-from roboirg.evaluation.analysis.stats.cells import FAIRNESS, task_order
-from roboirg.evaluation.analysis.stats.failure_counts import UNATTRIBUTED
+from roboirg.evaluation.analysis.policy_run import FAIRNESS
 from roboirg.evaluation.analysis.stats.option_labels import options_label, options_sort_key
+from roboirg.evaluation.analysis.tables.diagnostic_tables import FAILURES, UNATTRIBUTED
 from roboirg.evaluation.records.record import ERROR_KINDS, Outcome, Summary
-from roboirg.judging.failure_attribution import EXECUTION, GROUNDING
 from roboirg.tasks import all_tasks
 
 _KINDS: dict[str, str] = {
-    **dict.fromkeys(GROUNDING, "grounding"),
-    **dict.fromkeys(EXECUTION, "execution"),
+    **FAILURES,
     UNATTRIBUTED: UNATTRIBUTED,
     **dict.fromkeys(ERROR_KINDS, "error"),
 }

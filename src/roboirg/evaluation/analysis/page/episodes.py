@@ -2,24 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+import operator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import NamedTuple
 
 from roboirg.core.instruction_options import InstructionOptions
-from roboirg.evaluation.analysis.stats.cells import (
-    CellKey,
-    CellResults,
-    Cells,
-    PolicyRun,
-    gather,
-    labels,
-    policy_order,
-    sort_cells,
-    task_order,
-)
-from roboirg.evaluation.analysis.stats.option_labels import options_sort_key
+from roboirg.evaluation.analysis.frame import Frame, join, make_frame
+from roboirg.evaluation.analysis.policy_run import PolicyRun
+from roboirg.evaluation.analysis.stats.cells import Cells, cells_of
 from roboirg.evaluation.plan.sources import Source
 from roboirg.evaluation.records.episode_log import log_path, logged_slugs
 from roboirg.evaluation.records.film import poster_name
@@ -52,36 +45,36 @@ class PageEpisode(NamedTuple):
     log: Path | None
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class PageEpisodes:
-    """All episodes of a page and their cells.
+    """All episodes of a page and their results.
 
     Attributes:
         runs: that the page shows.
+        frame: the results of all runs, with those that are missing.
         all: by policy run, task, episode, options and policy seed.
-        cells: the same results gathered, with those that are missing.
-        names: labels of the policy runs, in the order of the page.
     """
 
     runs: Runs
+    frame: Frame
     all: tuple[PageEpisode, ...]
-    cells: Cells
-    names: Mapping[PolicyRun, str]
 
     @classmethod
     def of(cls, runs: Runs, *, videos: bool) -> PageEpisodes:
         """Gather and sort the episodes, with or without their videos."""
-        found = _gather(runs)
-        jobs = (job for run in runs.values() for job in (*run.planned, *run.results))
-        policies = list(dict.fromkeys(job.policy for job in jobs))
-        cells = sort_cells(found, policy_order(found, policies, list(runs)))
-        names = labels(cells)
-        episodes = _sorted(_episodes(runs, videos=videos), list(names))
-        return cls(runs, episodes, cells, names)
+        frame = join(
+            make_frame([(name, run.results)], run.planned, named=name) for name, run in _named(runs)
+        )
+        return cls(runs, frame, tuple(_episodes(runs, frame, videos=videos)))
 
-    def cells_of(self, difficulty: str) -> Cells:
-        """Gather the episodes of one difficulty; missing ones have none yet."""
-        return sort_cells(_gather(self.runs, difficulty), list(self.names))
+    @property
+    def names(self) -> Mapping[PolicyRun, str]:
+        """Labels of the policy runs, in the order of the page."""
+        return self.frame.names
+
+    @cached_property
+    def cells(self) -> Cells:
+        return cells_of(self.frame)
 
     def whole(self) -> Iterator[Record]:
         """Yield the whole records of all episodes in order, each read when it is asked for."""
@@ -96,59 +89,33 @@ def _named(runs: Runs) -> Iterator[tuple[str, Source]]:
         yield name if len(runs) > 1 else "", run
 
 
-def _gather(runs: Runs, difficulty: str | None = None) -> Cells:
-    """Gather all results with missing ones, or those of one difficulty; two runs stay apart."""
-    found: dict[CellKey, CellResults] = {}
-    for name, run in _named(runs):
-        results = [one for one in run.results if difficulty in (None, one.difficulty)]
-        own = gather([(name, results)], run.planned if difficulty is None else ())
-        found |= {
-            key._replace(policy_run=key.policy_run._replace(run=name)): cell
-            for key, cell in own.items()
-        }
-    return found
-
-
-def _episodes(runs: Runs, *, videos: bool) -> Iterator[PageEpisode]:
-    for number, (name, run) in enumerate(_named(runs)):
-        logs = logged_slugs(run.folder)
-        for record in run.results:
-            slug, film, poster = record.slug, None, None
-            if videos and record.video is not None:
-                film = _existing(run.folder, record.video)
-                poster = film and _existing(run.folder, poster_name(record.video))
-            yield PageEpisode(
-                key=slug.rpartition("-")[2] + ("" if number == 0 else f"-{number + 1}"),
-                record=record,
-                options=record.column,
-                policy_run=PolicyRun.of(record, name),
-                film=film,
-                poster=poster,
-                log=log_path(run.folder, slug) if slug in logs else None,
-            )
+def _episodes(runs: Runs, frame: Frame, *, videos: bool) -> Iterator[PageEpisode]:
+    """Yield the episodes of a frame that were played, those of a scene one after the other."""
+    named = dict(_named(runs))
+    logs = {name: logged_slugs(run.folder) for name, run in named.items()}
+    places: dict[object, int] = {}
+    rows = [
+        (places.setdefault((owner, one.task), len(places)), one.episode, owner, one, options)
+        for owner, one, options in zip(frame["run"], frame["result"], frame["options"], strict=True)
+        if isinstance(one, Summary)
+    ]
+    for _, _, owner, record, options in sorted(rows, key=operator.itemgetter(0, 1)):
+        folder, number = named[owner.run].folder, [*named].index(owner.run)
+        slug, film, poster = record.slug, None, None
+        if videos and record.video is not None:
+            film = _existing(folder, record.video)
+            poster = film and _existing(folder, poster_name(record.video))
+        yield PageEpisode(
+            key=slug.rpartition("-")[2] + (f"-{number + 1}" if number else ""),
+            record=record,
+            options=options,
+            policy_run=owner,
+            film=film,
+            poster=poster,
+            log=log_path(folder, slug) if slug in logs[owner.run] else None,
+        )
 
 
 def _existing(folder: Path, name: str) -> Path | None:
     path = run_file(folder, name)
     return path if path.is_file() else None
-
-
-def _sorted(
-    episodes: Iterator[PageEpisode], policy_runs: Sequence[PolicyRun]
-) -> tuple[PageEpisode, ...]:
-    found = list(episodes)
-    runs = {policy_run: rank for rank, policy_run in enumerate(policy_runs)}
-    tasks = {task: rank for rank, task in enumerate(task_order({e.record.task for e in found}))}
-    options = {one: options_sort_key(one) for one in {episode.options for episode in found}}
-    return tuple(
-        sorted(
-            found,
-            key=lambda one: (
-                runs[one.policy_run],
-                tasks[one.record.task],
-                one.record.episode,
-                options[one.options],
-                one.record.policy_seed,
-            ),
-        )
-    )

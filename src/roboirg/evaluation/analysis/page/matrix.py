@@ -2,26 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from typing import Any
 
 from roboirg.core.episode import DIFFICULTIES
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.core.plain_text import counted
+from roboirg.evaluation.analysis.frame import suite, task_order
 from roboirg.evaluation.analysis.page.columns import setting_label
 from roboirg.evaluation.analysis.page.episodes import PageEpisodes
-from roboirg.evaluation.analysis.stats.cells import Cells, PolicyRun, task_order
+from roboirg.evaluation.analysis.policy_run import PolicyRun
+from roboirg.evaluation.analysis.stats.cells import Cells, cells_of
 from roboirg.evaluation.analysis.stats.intervals import Interval
+from roboirg.evaluation.analysis.stats.measure import ALL_TASKS, Measured, ScopeKey, summarize
 from roboirg.evaluation.analysis.stats.option_labels import options_label, options_sort_key
 from roboirg.evaluation.analysis.stats.rates import p_text, points, whole_percent
-from roboirg.evaluation.analysis.stats.run_summary import (
-    ALL,
-    ALL_TASKS,
-    Scope,
-    SummaryRow,
-    summarize,
-)
-from roboirg.tasks import all_tasks
 
 
 def make_matrix(episodes: PageEpisodes) -> dict[str, Any]:
@@ -36,14 +31,18 @@ def make_matrix(episodes: PageEpisodes) -> dict[str, Any]:
     levels = {"": episodes.cells}
     if len(found) > 1:
         ordered = dict.fromkeys((*DIFFICULTIES, *found))
-        levels |= {level: episodes.cells_of(level) for level in ordered if level in found}
+        levels |= {
+            level: cells_of(episodes.frame.where(difficulty=level))
+            for level in ordered
+            if level in found
+        }
     return {
         "policies": list(episodes.names.values()),
         "columns": [
             {"setting": setting_label(one), "form": one.form, "name": options_label(one)}
             for one in columns
         ],
-        "rows": [{"name": name, **scope._asdict()} for scope, name in rows.items()],
+        "rows": [{"name": name, **scope} for name, scope in rows.items()],
         "levels": [
             {"difficulty": level, "cells": _matrix_cells(cells, episodes.names, rows, columns)}
             for level, cells in levels.items()
@@ -51,41 +50,40 @@ def make_matrix(episodes: PageEpisodes) -> dict[str, Any]:
     }
 
 
-def _rows(cells: Cells) -> dict[Scope, str]:
-    """Return the rows of every heat map, each with its name."""
-    suites: dict[str, list[str]] = {}
+def _rows(cells: Cells) -> dict[str, dict[str, str | None]]:
+    """Return the rows of every heat map by scope, each with its task or suite."""
+    suites: dict[str | None, list[str]] = {}
     for task in task_order({key.task for key in cells}):
-        known = all_tasks().get(task)
-        suites.setdefault(known.suite if known else "", []).append(task)
-    rows = {}
+        suites.setdefault(suite(task), []).append(task)
+    rows: dict[str, dict[str, str | None]] = {}
     if sum(map(len, suites.values())) > 1:
-        rows[ALL] = ALL_TASKS
-    for suite, members in suites.items():
-        if suite and len(suites) > 1 and len(members) > 1:
-            rows[Scope(suite=suite)] = suite
-        rows |= {Scope(task=task): task for task in members}
+        rows[ALL_TASKS] = {"task": None, "suite": None}
+    for name, members in suites.items():
+        if name is not None and len(suites) > 1 and len(members) > 1:
+            rows[name] = {"task": None, "suite": name}
+        rows |= {task: {"task": task, "suite": None} for task in members}
     return rows
 
 
 def _matrix_cells(
     cells: Cells,
     names: Mapping[PolicyRun, str],
-    rows: Mapping[Scope, str],
+    rows: Collection[str],
     columns: Sequence[InstructionOptions],
 ) -> list[dict[str, Any]]:
     places = {policy_run: place for place, policy_run in enumerate(names)}
     lines = {scope: line for line, scope in enumerate(rows)}
     return [
         {
-            "at": [places[one.policy_run], lines[one.scope], columns.index(one.options)],
-            **_cell(one, f"{names[one.policy_run]}, {rows[one.scope]}"),
+            "at": [places[key.policy_run], lines[key.scope], columns.index(key.options)],
+            **_cell(one, f"{names[key.policy_run]}, {key.scope}"),
         }
-        for one in summarize(cells)
-        if one.scope in lines
+        for key, one in summarize(cells).items()
+        if key.scope in lines
     ]
 
 
-def _cell(one: SummaryRow, subject: str) -> dict[str, Any]:
+def _cell(one: Measured[ScopeKey], subject: str) -> dict[str, Any]:
     cell: dict[str, Any] = {"note": notes(one, subject)}
     if one.rate is not None:
         cell |= {"rate": round(float(one.rate), 4), "text": whole_percent(one.rate)}
@@ -99,9 +97,9 @@ def _cell(one: SummaryRow, subject: str) -> dict[str, Any]:
     return cell
 
 
-def notes(one: SummaryRow, subject: str) -> list[str]:
+def notes(one: Measured[ScopeKey], subject: str) -> list[str]:
     """Return a cell in words: first its subject, then its results."""
-    lines = [f"{subject}, {options_label(one.options)}"]
+    lines = [f"{subject}, {options_label(one.key.options)}"]
     if one.rate is None:
         lines.append("no verdict yet")
     else:
@@ -121,7 +119,7 @@ def notes(one: SummaryRow, subject: str) -> list[str]:
     return lines
 
 
-def _gap_notes(one: SummaryRow) -> list[str]:
+def _gap_notes(one: Measured[ScopeKey]) -> list[str]:
     lines: list[str] = []
     if one.gap is not None:
         gap = f"{points(one.gap.value)} points to explicit"
@@ -135,10 +133,10 @@ def _gap_notes(one: SummaryRow) -> list[str]:
             lines.append(f"{gap}, which has no success")
         else:
             lines.append(f"{gap}, which has no success either, so the gap says nothing")
-    if one.form_gap is not None:
+    if one.second_gap is not None:
         lines.append(
-            f"{points(one.form_gap.value)} points to the resolved form"
-            f"{_ends(one.form_gap.interval)}"
+            f"{points(one.second_gap.value)} points to the resolved form"
+            f"{_ends(one.second_gap.interval)}"
         )
     return lines
 

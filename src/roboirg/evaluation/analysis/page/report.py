@@ -10,17 +10,18 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from roboirg.core.arms import TOLD
 from roboirg.core.errors import InvalidValueError
+from roboirg.evaluation.analysis.frame import Frame
+from roboirg.evaluation.analysis.frame_reading import with_words
 from roboirg.evaluation.analysis.page.columns import make_filters, make_numbers
 from roboirg.evaluation.analysis.page.details import EpisodeDetails
 from roboirg.evaluation.analysis.page.episodes import PageEpisodes
 from roboirg.evaluation.analysis.page.matrix import make_matrix
 from roboirg.evaluation.analysis.page.run_warnings import comparisons, facts_of, run_warnings
-from roboirg.evaluation.analysis.stats.breakdowns import BREAKDOWNS, Labels, label_instructions
+from roboirg.evaluation.analysis.stats.breakdowns import BREAKDOWNS
 from roboirg.evaluation.analysis.stats.run_data import RunData
 from roboirg.evaluation.analysis.tables.arm_table import make_arm_table
-from roboirg.evaluation.analysis.tables.breakdown_table import make_breakdown_table
+from roboirg.evaluation.analysis.tables.diagnostic_tables import make_breakdown_table
 from roboirg.evaluation.analysis.tables.table import Table
 from roboirg.evaluation.plan.sources import Source
 from roboirg.evaluation.records.film import FRAME_RATE, FRAME_STEPS, LAST_FRAME_REPEATS
@@ -105,7 +106,7 @@ def _render(episodes: PageEpisodes, details: EpisodeDetails, progress: Progress 
     template = template_environment("roboirg.evaluation.analysis.page").get_template(
         f"{REPORT_FILE}.j2"
     )
-    labels = label_instructions(tuple(BREAKDOWNS.values()), _add_all(details, episodes, progress))
+    frame = with_words(episodes.frame, _add_all(details, episodes, progress))
     data = _data(episodes, details)
     return template.render(
         styles=STYLES,
@@ -113,7 +114,7 @@ def _render(episodes: PageEpisodes, details: EpisodeDetails, progress: Progress 
         name=" against ".join(episodes.runs),
         facts=facts_of(episodes),
         warnings=run_warnings(episodes),
-        breakdowns=_breakdown_tables(episodes, labels),
+        breakdowns=_breakdown_tables(frame),
         links_videos=details.links_videos,
         media=((name, _data_uri(path)) for name, path in _media(episodes).items())
         if details.embeds
@@ -163,17 +164,12 @@ def _data(episodes: PageEpisodes, details: EpisodeDetails) -> dict[str, Any]:
     }
 
 
-def _breakdown_tables(episodes: PageEpisodes, labels: dict[str, Labels]) -> list[Table]:
+def _breakdown_tables(frame: Frame) -> list[Table]:
     """Return the tables of control arms, and of gaps by kind of instruction, that have rows."""
-    tables = [
-        make_breakdown_table(one, episodes.cells, labels[name], episodes.names)
-        for name, one in BREAKDOWNS.items()
-    ]
+    tables = [make_breakdown_table(one, frame) for one in BREAKDOWNS.values()]
     arms = []
-    if any(one.record.arm != TOLD for one in episodes.all):
-        data = RunData.of([(name, run.results) for name, run in episodes.runs.items()])
-        with contextlib.suppress(InvalidValueError):  # no scene has two arms
-            arms.append(make_arm_table(data))
+    with contextlib.suppress(InvalidValueError):  # no scene has two arms
+        arms.append(make_arm_table(RunData(frame)))
     return [*arms, *(table for table in tables if table.rows)]
 
 

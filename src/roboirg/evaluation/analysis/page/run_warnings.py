@@ -10,12 +10,13 @@ from typing import Any
 
 from roboirg.core.errors import InvalidValueError
 from roboirg.core.plain_text import counted, verb_for
+from roboirg.evaluation.analysis.frame import MISSING
 from roboirg.evaluation.analysis.page.episodes import PageEpisodes
-from roboirg.evaluation.analysis.stats.cells import FAIRNESS, PolicyRun
+from roboirg.evaluation.analysis.policy_run import FAIRNESS, PolicyRun
 from roboirg.evaluation.analysis.stats.comparison import compare
 from roboirg.evaluation.analysis.stats.comparison_text import sentences
 from roboirg.evaluation.analysis.stats.headline import headline_notes
-from roboirg.evaluation.analysis.stats.heard_rates import count_heard, heard_notes
+from roboirg.evaluation.analysis.stats.heard_rates import heard_notes
 from roboirg.evaluation.analysis.stats.option_labels import words_label
 from roboirg.evaluation.records.mixing import mixture_warnings
 from roboirg.language.settings import EXPLICIT
@@ -42,8 +43,8 @@ def run_warnings(episodes: PageEpisodes) -> list[tuple[str, str]]:
 
     These are sentences above the results, each after its kind, ``warning`` or ``note``.
     """
-    heard = count_heard((one.policy_run, one.record) for one in episodes.all)
-    warnings = (_incomplete(episodes), _mixed(episodes), heard_notes(heard, episodes.names))
+    heard = heard_notes(episodes.frame, episodes.names)
+    warnings = (_incomplete(episodes), _mixed(episodes), heard)
     headline = headline_notes(episodes.cells, episodes.names)
     notes = (_without_reference(episodes), _private(episodes), headline)
     return [
@@ -84,10 +85,7 @@ def comparisons(episodes: PageEpisodes) -> list[dict[str, Any]]:
 
 
 def _compared(episodes: PageEpisodes, first: PolicyRun, second: PolicyRun) -> list[str]:
-    ours, theirs = (
-        {key: cell for key, cell in episodes.cells.items() if key.policy_run == policy_run}
-        for policy_run in (first, second)
-    )
+    ours, theirs = (episodes.frame.where(run=policy_run) for policy_run in (first, second))
     try:
         comparison = compare(ours, theirs)
     except InvalidValueError as error:
@@ -96,7 +94,7 @@ def _compared(episodes: PageEpisodes, first: PolicyRun, second: PolicyRun) -> li
 
 
 def _incomplete(episodes: PageEpisodes) -> Iterable[str]:
-    missing = sum(cell.missing for cell in episodes.cells.values())
+    missing = [*episodes.frame["outcome"]].count(MISSING)
     total = len(episodes.all)
     if missing:
         have = verb_for(missing, "have")

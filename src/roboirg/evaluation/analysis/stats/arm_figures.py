@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import defaultdict
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -21,17 +20,13 @@ from roboirg.core.arms import (
     paraphrase_number,
 )
 from roboirg.core.instruction_options import InstructionOptions
-from roboirg.evaluation.analysis.stats.cells import (
-    CellResults,
-    PolicyRun,
-    Trial,
-    clustered_interval,
-    task_order,
-)
+from roboirg.evaluation.analysis.frame import Frame
+from roboirg.evaluation.analysis.policy_run import PolicyRun
+from roboirg.evaluation.analysis.stats.cells import ByTask, Cell, Key, Trial, clustered_interval
 from roboirg.evaluation.analysis.stats.intervals import SEED, Interval
+from roboirg.evaluation.analysis.stats.measure import pair
 from roboirg.evaluation.analysis.stats.option_labels import options_sort_key
-from roboirg.evaluation.analysis.stats.paired_tests import Gap, Pairs, measure_gap, with_holm
-from roboirg.evaluation.analysis.stats.run_data import RunData
+from roboirg.evaluation.analysis.stats.paired_tests import Gap, measure_gap, with_holm
 from roboirg.evaluation.records.record import Summary
 
 LANGUAGE_USE, WORDS_WORTH, ORDERS_WORTH = "language use", "words' worth", "order's worth"
@@ -75,7 +70,7 @@ class ArmFigure:
     policy_run: PolicyRun
     options: InstructionOptions
     contrast: ArmContrast
-    cells: tuple[Mapping[str, CellResults], Mapping[str, CellResults]]
+    cells: tuple[ByTask, ByTask]
     intervals: tuple[Interval | None, Interval | None]
     gap: Gap
     p_holm: float
@@ -89,22 +84,24 @@ class ArmFigure:
         return first, second
 
 
-def arm_figures(data: RunData) -> tuple[ArmFigure, ...]:
+def arm_figures(frame: Frame) -> tuple[ArmFigure, ...]:
     """Return the figures for which the arms were played, by policy run and setting."""
     rng = np.random.default_rng(SEED)
-    columns: dict[tuple[PolicyRun, InstructionOptions], dict[tuple[str, Trial], dict[str, Summary]]]
-    columns = defaultdict(lambda: defaultdict(dict))
-    for run, one in data.results:
-        if one.outcome != "error":
+    found: dict[tuple[PolicyRun, InstructionOptions], dict[Key, dict[str, Summary]]] = {}
+    for run, options, one in zip(frame["run"], frame["options"], frame["result"], strict=True):
+        if isinstance(one, Summary) and one.outcome != "error":
             told = run._replace(conditions=run.conditions._replace(arm=TOLD))
-            trial = Trial(one.episode, one.policy_seed)
-            columns[told, one.column][one.task, trial][one.arm] = one
-    found: dict[PolicyRun, list[ArmFigure]] = {run: [] for run, _ in columns}
-    for run, options in sorted(columns, key=lambda key: options_sort_key(key[1])):
-        trials = columns[run, options].values()
-        made = (_figure(run, options, each, trials, rng) for each in CONTRASTS)
-        found[run] += filter(None, made)
-    return tuple(one for figures in found.values() for one in with_holm(figures))
+            trials = found.setdefault((told, options), {})
+            trials.setdefault((one.task, one.episode, one.policy_seed), {})[one.arm] = one
+    runs = list(dict.fromkeys(run for run, _ in found))
+    figures = [
+        figure
+        for run, options in sorted(found, key=lambda key: options_sort_key(key[1]))
+        for contrast in CONTRASTS
+        if (figure := _figure(run, options, contrast, found[run, options].values(), rng))
+    ]
+    figures.sort(key=lambda one: runs.index(one.policy_run))
+    return with_holm(figures, lambda one: one.policy_run)
 
 
 def _figure(
@@ -114,31 +111,22 @@ def _figure(
     trials: Iterable[Arms],
     rng: np.random.Generator,
 ) -> ArmFigure | None:
-    sides: tuple[list[Summary], list[Summary]] = [], []
+    cells: tuple[dict[str, Cell], dict[str, Cell]] = {}, {}
     for arms in trials:
-        for side, more in zip(sides, contrast.sides(arms) or (), strict=False):
-            side.extend(more)
-    tasks = task_order({one.task for one in sides[0]})
-    first, second = ({task: _cell(task, side) for task in tasks} for side in sides)
-    gap = measure_gap([Pairs.of(first[task], second[task]) for task in tasks], rng)
+        for side, results in zip(cells, contrast.sides(arms) or (), strict=False):
+            for one in results:
+                # Paraphrases stand as policy seeds of their own.
+                seed = one.policy_seed * (MOST_PARAPHRASES + 1) + (paraphrase_number(one.arm) or 0)
+                side.setdefault(one.task, Cell()).add(Trial(one.episode, seed), one.outcome)
+    first, second = cells
+    gap = measure_gap(pair(first, second), rng)
     if gap is None:
         return None
     intervals = (
         clustered_interval([*first.values()], rng),
         clustered_interval([*second.values()], rng),
     )
-    cells = first, second
     return ArmFigure(policy_run, options, contrast, cells, intervals, gap, gap.p_value)
-
-
-def _cell(task: str, results: Sequence[Summary]) -> CellResults:
-    """Return the verdicts in a task; paraphrases stand as policy seeds of their own."""
-    verdicts = {}
-    for one in results:
-        if one.task == task:
-            seed = one.policy_seed * (MOST_PARAPHRASES + 1) + (paraphrase_number(one.arm) or 0)
-            verdicts[Trial(one.episode, seed)] = _won(one)
-    return CellResults(verdicts)
 
 
 def _won(one: Summary) -> bool:

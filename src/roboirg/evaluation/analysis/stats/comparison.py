@@ -2,90 +2,41 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from typing import Literal, NamedTuple
-
-import numpy as np
+from collections.abc import Iterator, Mapping, Sequence
+from typing import NamedTuple
 
 from roboirg.core.errors import InvalidValueError
 from roboirg.core.instruction_options import InstructionOptions
-from roboirg.evaluation.analysis.stats.breakdowns import Labels, cells_by_label
-from roboirg.evaluation.analysis.stats.cells import (
-    FAIRNESS,
-    CellResults,
-    Cells,
-    PolicyRun,
-    only_told,
-)
-from roboirg.evaluation.analysis.stats.intervals import ALPHA, SEED
+from roboirg.evaluation.analysis.frame import Frame
+from roboirg.evaluation.analysis.policy_run import FAIRNESS, PolicyRun
+from roboirg.evaluation.analysis.stats.breakdowns import Breakdown, labeled, natural
+from roboirg.evaluation.analysis.stats.cells import ByTask, gather
+from roboirg.evaluation.analysis.stats.measure import Measured, measure_groups
 from roboirg.evaluation.analysis.stats.option_labels import REFERENCE, options_sort_key
-from roboirg.evaluation.analysis.stats.paired_tests import Gap, Pairs, measure_gap, with_holm
-from roboirg.evaluation.analysis.stats.power import episodes_needed, smallest_gap
-
-Verdict = Literal["first", "second", "open"]
 
 
 class ComparisonKey(NamedTuple):
     """What is compared.
 
     Attributes:
-        task: one task or, as None, all tasks that both policies played.
         options: instruction options.
-        label: of the instructions, in a breakdown; None for all instructions.
+        task: one task or, as None, all tasks that both policies played.
+        part: title of a breakdown; None for all instructions.
+        label: of the instructions, in a breakdown.
     """
 
-    task: str | None
     options: InstructionOptions
-    label: str | None = None
+    task: str | None = None
+    part: str | None = None
+    label: str = ""
 
 
-@dataclass(frozen=True, slots=True)
-class ComparisonResult:
-    """The comparison for one task or all tasks with one set of options.
-
-    Attributes:
-        key: task and options.
-        tasks: that were paired.
-        gap: first less second.
-        p_holm: its p-value after Holm's correction over all averages, over all single cells, or
-            over all parts of a breakdown.
-        unpaired: trials with a verdict of one policy that the other did not play.
-        unjudged: trials of either policy that ended in an error or are still to be played.
-    """
-
-    key: ComparisonKey
-    tasks: tuple[str, ...]
-    gap: Gap
-    p_holm: float
-    unpaired: int
-    unjudged: int
-
-    @property
-    def verdict(self) -> Verdict:
-        """The better policy; open if the corrected test does not decide."""
-        if self.p_holm > ALPHA or self.gap.value == 0:
-            return "open"
-        return "first" if self.gap.value > 0 else "second"
-
-    @property
-    def discordance(self) -> float:
-        """Share of the episodes on which the two differ, at least the gap."""
-        return max(abs(self.gap.value), self.gap.overlap.discordance or 0.0)
-
-    @property
-    def detectable(self) -> float | None:
-        """The smallest gap that these episodes show with a power of 80 %; None if there is none."""
-        return smallest_gap(self.gap.episodes, self.discordance)
-
-    @property
-    def needed(self) -> int | None:
-        """Episodes that show a gap of this size with a power of 80 %; None if there are none."""
-        return episodes_needed(self.gap.value, self.discordance)
+Compared = Measured[ComparisonKey]
+"""The first policy, its gap to the second, and p-values that are corrected over all averages, over
+all single cells, or over all parts of a breakdown."""
 
 
-@dataclass(frozen=True, slots=True)
-class Comparison:
+class Comparison(NamedTuple):
     """The comparison of two policies.
 
     Attributes:
@@ -98,98 +49,77 @@ class Comparison:
 
     first: PolicyRun
     second: PolicyRun
-    averages: tuple[ComparisonResult, ...]
-    cells: tuple[ComparisonResult, ...]
-    parts: Mapping[str, tuple[ComparisonResult, ...]]
+    averages: Sequence[Compared]
+    cells: Sequence[Compared]
+    parts: Mapping[str, Sequence[Compared]]
 
 
-def compare(first: Cells, second: Cells, labels: Mapping[str, Labels] | None = None) -> Comparison:
+def compare(first: Frame, second: Frame, breakdowns: Sequence[Breakdown] = ()) -> Comparison:
     """Compare two policies on the episodes that both played, in the arm ``told`` if both have it.
 
     Args:
-        first: the cells of one policy run.
-        second: the cells of the other.
-        labels: of the instructions, by the title of each wanted breakdown.
+        first: the results of one policy.
+        second: those of the other.
+        breakdowns: by what the averages are broken down, too; their columns are in both frames.
 
     Raises:
         InvalidValueError: one side has several policies or versions, the two have different
-            language or environment versions, or they share no episode.
+            conditions, or they have no episode in common.
     """
-    rng = np.random.default_rng(SEED)
-    first, second = only_told(first), only_told(second)
+    first, second = first.told(), second.told()
     ours, theirs = _only_policy_run(first), _only_policy_run(second)
     _check_fair(ours, theirs)
-    here = {ComparisonKey(task, options): cell for (_, task, options), cell in first.items()}
-    there = {ComparisonKey(task, options): cell for (_, task, options), cell in second.items()}
-    shared = [key for key in here if key in there]
-    cells: list[ComparisonResult] = []
-    averages: list[ComparisonResult] = []
-    for options in sorted({key.options for key in shared}, key=options_sort_key):
-        keys = [key for key in shared if key.options == options]
-        cells += filter(None, [_compared(key, [key], here, there, rng) for key in keys])
-        average = _compared(ComparisonKey(None, options), keys, here, there, rng)
-        averages += filter(None, [average])
+    here, there = (dict(_groups(one, breakdowns)) for one in (first, second))
+    others = {key: _shared(there[key], here[key]) for key in here if key in there}
+    found = measure_groups(
+        {key: _shared(here[key], there[key]) for key in others},
+        [others.__getitem__],
+        lambda key: (key.part, key.task is None),
+        with_intervals=False,
+    )
+    results = [one for one in found if one.gap is not None]
+    averages = [one for one in results if one.key[1:3] == (None, None)]
     if not averages:
         raise InvalidValueError(
             f"{ours.policy} and {theirs.policy} have no episode in common with the same "
             "instruction; play both on the same tasks, settings and episodes."
         )
     parts = {
-        title: with_holm(_compared_parts(first, second, own, rng))
-        for title, own in (labels or {}).items()
-    }
-    return Comparison(ours, theirs, with_holm(averages), with_holm(cells), parts)
-
-
-def _compared_parts(
-    first: Cells, second: Cells, labels: Labels, rng: np.random.Generator
-) -> list[ComparisonResult]:
-    """Compare the averages over the instructions of each label; explicit ones have none."""
-    found: list[ComparisonResult] = []
-    ours, theirs = (
-        cells_by_label({key: one for key, one in cells.items() if key.options != REFERENCE}, labels)
-        for cells in (first, second)
-    )
-    for label in (label for label in ours if label in theirs):
-        here, there = (
-            {ComparisonKey(key.task, key.options): cell for key, cell in side[label].items()}
-            for side in (ours, theirs)
+        breakdown.title: sorted(
+            (one for one in results if one.key.part == breakdown.title),
+            key=lambda one: options_sort_key(one.key.options),
         )
-        shared = [key for key in here if key in there]
-        for options in sorted({key.options for key in shared}, key=options_sort_key):
-            keys = [key for key in shared if key.options == options]
-            part = _compared(ComparisonKey(None, options, label), keys, here, there, rng)
-            found += filter(None, [part])
-    return sorted(found, key=lambda one: options_sort_key(one.key.options))
+        for breakdown in breakdowns
+    }
+    cells = [one for one in results if one.key.task is not None]
+    return Comparison(ours, theirs, averages, cells, parts)
 
 
-def _compared(
-    key: ComparisonKey,
-    cells: Sequence[ComparisonKey],
-    here: Mapping[ComparisonKey, CellResults],
-    there: Mapping[ComparisonKey, CellResults],
-    rng: np.random.Generator,
-) -> ComparisonResult | None:
-    both = [(here[cell], there[cell]) for cell in cells]
-    pairs = [Pairs.of(ours, theirs) for ours, theirs in both]
-    gap = measure_gap(pairs, rng)
-    if gap is None:
-        return None
-    paired = sum(int(each.rows[:, 1::2].sum()) for each in pairs)
-    return ComparisonResult(
-        key=key,
-        tasks=tuple(
-            str(cell.task) for cell, each in zip(cells, pairs, strict=True) if len(each.rows)
-        ),
-        gap=gap,
-        p_holm=gap.p_value,
-        unpaired=sum(ours.trials + theirs.trials for ours, theirs in both) - paired,
-        unjudged=sum(one.errors + one.missing for pair in both for one in pair),
-    )
+def _groups(
+    frame: Frame, breakdowns: Sequence[Breakdown]
+) -> Iterator[tuple[ComparisonKey, ByTask]]:
+    """Yield what is compared of one policy; explicit instructions are not broken down."""
+    groups = gather(frame, ("options",))
+    for (options,) in sorted(groups, key=lambda key: options_sort_key(key[0])):
+        for task, cell in groups[options,].items():
+            yield ComparisonKey(options, task), {task: cell}
+        yield ComparisonKey(options), groups[options,]
+    for breakdown in breakdowns:
+        groups = gather(labeled(frame, breakdown), ("label", "options"))
+        for label, options in sorted(
+            groups, key=lambda key: (natural(key[0]), options_sort_key(key[1]))
+        ):
+            if options != REFERENCE:
+                key = ComparisonKey(options, None, breakdown.title, label)
+                yield key, groups[label, options]
 
 
-def _only_policy_run(cells: Cells) -> PolicyRun:
-    policy_runs = list(dict.fromkeys(key.policy_run for key in cells))
+def _shared(cells: ByTask, others: ByTask) -> ByTask:
+    return {task: cell for task, cell in cells.items() if task in others}
+
+
+def _only_policy_run(frame: Frame) -> PolicyRun:
+    policy_runs = list(frame.names)
     names = list(dict.fromkeys(one.policy for one in policy_runs))
     if not names:
         raise InvalidValueError("There are no results to compare; play something first.")

@@ -3,12 +3,20 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
 
 from roboirg.core.plain_text import counted, verb_for
-from roboirg.evaluation.analysis.stats.comparison import Comparison, ComparisonResult
+from roboirg.evaluation.analysis.stats.comparison import Compared, Comparison
+from roboirg.evaluation.analysis.stats.intervals import ALPHA
 from roboirg.evaluation.analysis.stats.option_labels import options_label
-from roboirg.evaluation.analysis.stats.power import MAX_EPISODES, POWER
+from roboirg.evaluation.analysis.stats.paired_tests import Gap
+from roboirg.evaluation.analysis.stats.power import (
+    MAX_EPISODES,
+    POWER,
+    episodes_needed,
+    smallest_gap,
+)
 from roboirg.evaluation.analysis.stats.rates import interval_note, p_text, points
 
 
@@ -20,10 +28,11 @@ def sentences(comparison: Comparison, first: str, second: str) -> Iterator[str]:
     names = (first, second)
     yield f"{first} against {second}, on the same episodes."
     yield ""
-    for result in comparison.averages:
-        yield _sentence(result, names)
-    decided = [result for result in comparison.cells if result.verdict != "open"]
-    if any(len(result.tasks) > 1 for result in comparison.averages):
+    averages = [_Result(one, names) for one in comparison.averages]
+    yield from (one.sentence for one in averages)
+    decided = [one for one in (_Result(one, names) for one in comparison.cells) if one.is_decided]
+    several = any(one.gap.tasks > 1 for one in averages)
+    if several:
         yield ""
         cells = f"{counted(len(comparison.cells), 'single cell')} (one task in one setting)"
         yield (
@@ -31,83 +40,100 @@ def sentences(comparison: Comparison, first: str, second: str) -> Iterator[str]:
             if decided
             else f"None of {cells} shows a difference by itself."
         )
-        for result in sorted(decided, key=lambda result: -abs(result.gap.value)):
-            yield f"  {_subject(result)}: {_better(result, names)}, {_figures(result)}."
-    for title, results in comparison.parts.items():
+        for one in sorted(decided, key=lambda one: -abs(one.gap.value)):
+            yield f"  {one.sentence}"
+    parts = {title: [_Result(one, names) for one in own] for title, own in comparison.parts.items()}
+    for title, own in parts.items():
         yield ""
-        yield f"By {title}:" if results else f"By {title}: no instruction has one."
-        for result in results:
-            yield f"  {_sentence(result, names)}"
+        yield f"By {title}:" if own else f"By {title}: no instruction has one."
+        yield from (f"  {one.sentence}" for one in own)
     yield ""
-    yield from _caveats(comparison)
-
-
-def _sentence(result: ComparisonResult, names: tuple[str, str]) -> str:
-    if result.verdict == "open":
-        return f"{_subject(result)}: no clear difference, {_figures(result)}.{_outlook(result)}"
-    return f"{_subject(result)}: {_better(result, names)}, {_figures(result)}."
-
-
-def _subject(result: ComparisonResult) -> str:
-    task, options, part = result.key
-    label = ", ".join((options_label(options), *([] if part is None else [part])))
-    return label if task is None else f"{task}, {label}"
-
-
-def _better(result: ComparisonResult, names: tuple[str, str]) -> str:
-    return f"{names[result.verdict == 'second']} is better"
-
-
-def _figures(result: ComparisonResult) -> str:
-    gap = result.gap
-    words = f"{points(gap.value, 1)} points{interval_note(gap.interval)}"
-    tasks = "" if len(result.tasks) == 1 else f" of {len(result.tasks)} tasks"
-    p_value = p_text(result.p_holm)
-    if _is_surprising(result):
-        p_value += f" (uncorrected {p_text(gap.p_value).removeprefix('p ').removeprefix('= ')})"
-    return f"{words}, {p_value}, {counted(gap.episodes, 'episode')}{tasks}"
-
-
-def _is_surprising(result: ComparisonResult) -> bool:
-    """Return whether the interval excludes no difference, and the corrected test does not."""
-    interval = result.gap.interval
-    return (
-        result.verdict == "open" and interval is not None and not interval.low <= 0 <= interval.high
-    )
-
-
-def _outlook(result: ComparisonResult) -> str:
-    """Say which gaps these episodes show, and how many episodes would show this gap."""
-    least = result.detectable
-    words = " With so few episodes, no gap can be detected"
-    if least is not None:
-        words = f" These episodes can show gaps of {100 * least:.1f} points or more"
-    words += f" with {POWER:.0%} power".replace("%", " %")
-    if result.gap.value == 0:
-        return f"{words}; the two did equally well."
-    needed = result.needed
-    number = f"more than {MAX_EPISODES:,}" if needed is None else f"about {needed:,}"
-    return f"{words}; showing a gap of this size needs {number}."
-
-
-def _caveats(comparison: Comparison) -> Iterator[str]:
-    unpaired = sum(result.unpaired for result in comparison.averages)
-    unjudged = sum(result.unjudged for result in comparison.averages)
-    several = any(len(result.tasks) > 1 for result in comparison.averages)
     yield "p-values are from the exact paired test, after Holm's correction" + (
         ": over the averages, and over the single cells. An average is the unweighted mean over "
         "tasks."
         if several
         else " over the settings."
     )
-    shown = (*comparison.averages, *itertools.chain.from_iterable(comparison.parts.values()))
-    if any(map(_is_surprising, shown)):
+    if any(one.is_surprising for one in itertools.chain(averages, *parts.values())):
         yield (
             "An interval belongs to one gap alone, so it may exclude 0 although p is above 0.05; "
             "p is corrected for all gaps that are tested together, and p decides."
         )
-    if comparison.parts:
+    if parts:
         yield "Each breakdown is corrected separately, over all its rows."
+    yield from _left_out(comparison.averages)
+
+
+@dataclass(frozen=True)
+class _Result:
+    """One result in words, and the names of the two policies."""
+
+    result: Compared
+    names: tuple[str, str]
+
+    @property
+    def gap(self) -> Gap:
+        assert self.result.gap is not None  # noqa: S101 - results without one are left out
+        return self.result.gap
+
+    @property
+    def p_holm(self) -> float:
+        return self.gap.p_value if self.result.p_holm is None else self.result.p_holm
+
+    @property
+    def is_decided(self) -> bool:
+        """Whether the corrected test finds one better."""
+        return self.p_holm <= ALPHA and self.gap.value != 0
+
+    @property
+    def is_surprising(self) -> bool:
+        """Whether the interval excludes no difference, and the corrected test does not."""
+        ends = self.gap.interval
+        return not self.is_decided and ends is not None and not ends.low <= 0 <= ends.high
+
+    @property
+    def sentence(self) -> str:
+        options, task, _, label = self.result.key
+        subject = ", ".join(filter(None, (task, options_label(options), label)))
+        if self.is_decided:
+            return f"{subject}: {self.names[self.gap.value < 0]} is better, {self._figures}."
+        return f"{subject}: no clear difference, {self._figures}.{self._outlook}"
+
+    @property
+    def _figures(self) -> str:
+        gap = self.gap
+        words = f"{points(gap.value, 1)} points{interval_note(gap.interval)}"
+        tasks = "" if gap.tasks == 1 else f" of {gap.tasks} tasks"
+        p_value = p_text(self.p_holm)
+        if self.is_surprising:
+            p_value += f" (uncorrected {p_text(gap.p_value).removeprefix('p ').removeprefix('= ')})"
+        return f"{words}, {p_value}, {counted(gap.episodes, 'episode')}{tasks}"
+
+    @property
+    def _outlook(self) -> str:
+        """Which gaps these episodes show, and how many episodes would show this gap."""
+        gap = self.gap
+        # Share of the episodes on which the two differ, at least the gap.
+        discordance = max(abs(gap.value), gap.overlap.discordance or 0.0)
+        least = smallest_gap(gap.episodes, discordance)
+        words = " With so few episodes, no gap can be detected"
+        if least is not None:
+            words = f" These episodes can show gaps of {100 * least:.1f} points or more"
+        words += f" with {POWER:.0%} power".replace("%", " %")
+        if gap.value == 0:
+            return f"{words}; the two did equally well."
+        needed = episodes_needed(gap.value, discordance)
+        number = f"more than {MAX_EPISODES:,}" if needed is None else f"about {needed:,}"
+        return f"{words}; showing a gap of this size needs {number}."
+
+
+def _left_out(averages: Iterable[Compared]) -> Iterator[str]:
+    """Yield how many trials are in no result."""
+    unpaired = unjudged = 0
+    for one in averages:
+        cells = [*one.cells.values(), *one.others.values()]
+        unpaired += sum(cell.trials for cell in cells) - (one.gap.trials if one.gap else 0)
+        unjudged += sum(cell.errors + cell.missing for cell in cells)
     if unpaired:
         verb = verb_for(unpaired, "are")
         yield f"{counted(unpaired, 'trial')} without a counterpart {verb} left out."

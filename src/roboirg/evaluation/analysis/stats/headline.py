@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.core.plain_text import counted
-from roboirg.evaluation.analysis.stats.cells import CellKey, CellResults, Cells, PolicyRun
+from roboirg.evaluation.analysis.policy_run import PolicyRun
+from roboirg.evaluation.analysis.stats.cells import Cell, CellKey, Cells
 from roboirg.evaluation.analysis.stats.intervals import (
     SEED,
     Interval,
@@ -95,7 +96,7 @@ def measure_headline(
         if key.policy_run == policy_run and key.options == REFERENCE
     }
     own = {
-        task: [cells.get(CellKey(policy_run, task, one), CellResults()) for one in options]
+        task: [cells.get(CellKey(policy_run, task, one), Cell()) for one in options]
         for task in explicit
     }
     rows = [_paired_rows(own[task], explicit[task]) for task in explicit]
@@ -113,7 +114,7 @@ def measure_headline(
     return Headline(tuple(settings), float(value[0]), interval, sum(sizes), is_complete)
 
 
-def _paired_rows(settings: Sequence[CellResults], explicit: CellResults) -> Rows:
+def _paired_rows(settings: Sequence[Cell], explicit: Cell) -> Rows:
     """Return a row for each episode of a task: the columns of `Pairs.rows` for each setting.
 
     They are 0 where the setting has no verdict.

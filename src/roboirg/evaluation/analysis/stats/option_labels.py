@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from dataclasses import asdict
 from typing import Any
 
@@ -56,17 +56,15 @@ def setting_sort_key(setting: str) -> tuple[int, str]:
     return (known.index(setting) if setting in known else len(known), setting)
 
 
+def is_usual(options: InstructionOptions) -> bool:
+    """Whether all options but the setting are the defaults."""
+    return options == InstructionOptions(options.setting)
+
+
 def has_default_options(options: InstructionOptions) -> bool:
     """Whether the setting is none of the harder ones, and all other options are the defaults."""
     setting = all_settings().get(options.setting)
-    is_plain = setting is None or setting.plain is None
-    return is_plain and options == InstructionOptions(options.setting)
-
-
-def default_settings(found: Iterable[InstructionOptions]) -> list[str]:
-    """Return, in order, the settings that occur with default options."""
-    settings = {options.setting for options in found if has_default_options(options)}
-    return sorted(settings, key=setting_sort_key)
+    return (setting is None or setting.plain is None) and is_usual(options)
 
 
 def staged_options() -> tuple[InstructionOptions, ...]:

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple, Protocol, TypeVar, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from roboirg.evaluation.analysis.stats.cells import CellResults
+from roboirg.evaluation.analysis.stats.cells import Cell
 from roboirg.evaluation.analysis.stats.intervals import (
     DRAWS,
     Interval,
@@ -63,7 +63,7 @@ class Pairs:
     overlap: Overlap
 
     @classmethod
-    def of(cls, first: CellResults, second: CellResults) -> Pairs:
+    def of(cls, first: Cell, second: Cell) -> Pairs:
         """Pair two cells of the same task."""
         ours, theirs = first.by_episode(), second.by_episode()
         rows = []
@@ -111,7 +111,9 @@ class Gap:
         p_value: of the null hypothesis of no difference; not corrected.
         retention: success rate of the first by that of the second; None if the latter is 0.
         retention_interval: of the retention; ends that the data do not bound are infinite.
+        tasks: number of tasks with pairs.
         episodes: number of paired episodes.
+        trials: number of paired trials, of both.
         overlap: of their trials.
     """
 
@@ -120,7 +122,9 @@ class Gap:
     p_value: float
     retention: float | None
     retention_interval: Interval | None
+    tasks: int
     episodes: int
+    trials: int
     overlap: Overlap
 
 
@@ -140,7 +144,9 @@ def measure_gap(tasks: Sequence[Pairs], rng: np.random.Generator, draws: int = D
         p_value=sign_flip_test(np.concatenate([pairs.differences for pairs in paired])),
         retention=float(first / second) if second else None,
         retention_interval=_retention_interval(drawn, sizes) if second else None,
+        tasks=len(paired),
         episodes=sum(sizes),
+        trials=int(sums[:, 1::2].sum()),
         overlap=pooled_overlap(paired),
     )
 

@@ -12,7 +12,9 @@ from decimal import ROUND_HALF_UP, Decimal
 from fractions import Fraction
 
 from roboirg.evaluation.analysis.stats.intervals import Interval
+from roboirg.evaluation.analysis.stats.paired_tests import Gap
 
+NOT_APPLICABLE = "–"
 DIGITS = Decimal("0.01")
 
 _SMALLEST_P = 0.001
@@ -56,6 +58,18 @@ def interval_note(interval: Interval | None) -> str:
 def p_text(p_value: float) -> str:
     """Return a p-value with its sign: ``p = 0.012``, ``p < 0.001``."""
     return f"p < {_SMALLEST_P}" if p_value < _SMALLEST_P else f"p = {p_value:.3f}"
+
+
+def gap_words(gap: Gap | None, p_value: float | None) -> tuple[str, str, str]:
+    """Return a gap in points, its interval, and its corrected p-value; dashes without one."""
+    ends = None if gap is None else gap.interval
+    return (
+        NOT_APPLICABLE if gap is None else points(gap.value, 1),
+        NOT_APPLICABLE if ends is None else " to ".join(points(end, 1) for end in ends),
+        NOT_APPLICABLE
+        if p_value is None
+        else p_text(p_value).removeprefix("p ").removeprefix("= "),
+    )
 
 
 def _rounded(value: Fraction) -> Decimal:

@@ -1,82 +1,51 @@
-"""The results of some runs with their summary: what figures and tables of runs are made from."""
+"""The results of some runs with what is measured of them: what figures and tables are made from."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
-from roboirg.evaluation.analysis.stats.cells import (
-    Cells,
-    PolicyRun,
-    gather,
-    labels,
-    only_told,
-    policy_order,
-    sort_cells,
-)
-from roboirg.evaluation.analysis.stats.run_summary import ScopeKey, SummaryRow, summarize
-from roboirg.evaluation.records.record import Job, Summary
+from roboirg.evaluation.analysis.frame import Frame, Runs, make_frame
+from roboirg.evaluation.analysis.policy_run import PolicyRun
+from roboirg.evaluation.analysis.stats.cells import Cells, cells_of
+from roboirg.evaluation.analysis.stats.measure import Measured, ScopeKey, summarize
+from roboirg.evaluation.records.record import Job
 
 
 @dataclass(frozen=True)
 class RunData:
-    """The results of some runs and their summary.
+    """The results of some runs; what is measured of them is measured when it is asked for."""
 
-    Attributes:
-        results: of all runs, each with its policy run.
-        cells: the results gathered into cells, in order.
-        summaries: by policy run, scope and options.
-        names: labels of the policy runs, in order.
-    """
-
-    results: tuple[tuple[PolicyRun, Summary], ...]
-    cells: Cells
-    summaries: Mapping[ScopeKey, SummaryRow]
-    names: Mapping[PolicyRun, str]
+    frame: Frame
 
     @classmethod
-    def of(
-        cls, runs: Sequence[tuple[str, Sequence[Summary]]], planned: Sequence[Job] = ()
-    ) -> RunData:
-        """Gather, sort and summarize runs, each with its name.
+    def of(cls, runs: Runs, planned: Sequence[Job] = ()) -> RunData:
+        """Gather runs, each with its name; see `make_frame`."""
+        return cls(make_frame(runs, planned))
 
-        Policies have the order of the plan, or are sorted by name without one.
-        """
-        found = gather(runs, planned)
-        policies = list(dict.fromkeys(job.policy for job in planned))
-        cells = sort_cells(found, policy_order(found, policies))
-        names = labels(cells)
-        results = [(_owner(name, one, names), one) for name, results in runs for one in results]
-        return cls(tuple(results), cells, summaries_by_key(cells), names)
+    @cached_property
+    def cells(self) -> Cells:
+        return cells_of(self.frame)
 
+    @cached_property
+    def summaries(self) -> Mapping[ScopeKey, Measured[ScopeKey]]:
+        """What `summarize` measures, by policy run, scope and options."""
+        return summarize(self.cells)
+
+    @property
+    def names(self) -> Mapping[PolicyRun, str]:
+        """Labels of the policy runs, in order."""
+        return self.frame.names
+
+    @cached_property
     def told(self) -> RunData:
-        """Return the data without control arms, if there is any."""
-        cells = only_told(self.cells)
-        names = labels(cells)
-        results = tuple(one for one in self.results if one[0] in names)
-        summaries = {key: one for key, one in self.summaries.items() if key.policy_run in names}
-        return RunData(results, cells, summaries, names)
-
-    def owner(self, run: str, result: Summary) -> PolicyRun:
-        return _owner(run, result, self.names)
-
-    def is_complete(self, policy_run: PolicyRun) -> bool:
-        """Return whether every planned trial of a policy run has a verdict."""
-        return all(
-            one.is_complete for key, one in self.summaries.items() if key.policy_run == policy_run
-        )
+        """The data without control arms, if there is any."""
+        frame = self.frame.told()
+        return self if frame is self.frame else RunData(frame)
 
     def name(self, policy_run: PolicyRun) -> str:
-        """Return the label of a policy run, marked if it is incomplete."""
-        return self.names[policy_run] + ("" if self.is_complete(policy_run) else " (incomplete)")
-
-
-def summaries_by_key(cells: Cells) -> Mapping[ScopeKey, SummaryRow]:
-    """Summarize cells for look-up by key."""
-    return {one.key: one for one in summarize(cells)}
-
-
-def _owner(run: str, result: Summary, known: Mapping[PolicyRun, str]) -> PolicyRun:
-    """Return the policy run of a result; it names the run if several runs played the policy."""
-    policy_run = PolicyRun.of(result)
-    return policy_run if policy_run in known else policy_run._replace(run=run)
+        """Return the label of a policy run, marked if some planned trial has no verdict."""
+        own = (one for key, one in self.cells.items() if key.policy_run == policy_run)
+        is_complete = all(one.is_complete for one in own)
+        return self.names[policy_run] + ("" if is_complete else " (incomplete)")

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from typing import cast
 
 import numpy as np
 
 from roboirg.core.errors import InvalidValueError
 from roboirg.core.instruction_options import InstructionOptions
+from roboirg.evaluation.analysis.frame import Frame
 from roboirg.evaluation.analysis.stats.arm_figures import (
     LANGUAGE_USE,
     MEANING,
@@ -18,16 +18,19 @@ from roboirg.evaluation.analysis.stats.arm_figures import (
 )
 from roboirg.evaluation.analysis.stats.chance import silent_chance
 from roboirg.evaluation.analysis.stats.intervals import SEED, Interval
+from roboirg.evaluation.analysis.stats.measure import pair
 from roboirg.evaluation.analysis.stats.option_labels import options_label
-from roboirg.evaluation.analysis.stats.paired_tests import Gap, Pairs, holm, measure_gap
-from roboirg.evaluation.analysis.stats.rates import interval_note, p_text, points
-from roboirg.evaluation.analysis.stats.run_data import RunData
-from roboirg.evaluation.analysis.tables.breakdown_table import corrected_p_text, interval_text
-from roboirg.evaluation.analysis.tables.table import NOT_APPLICABLE, Column, Row, Table
-
-COLUMNS = tuple(
-    map(Column, ("episodes", "first, %", "second, %", "chance", "difference", "95 % interval", "p"))
+from roboirg.evaluation.analysis.stats.paired_tests import Gap, holm, measure_gap
+from roboirg.evaluation.analysis.stats.rates import (
+    NOT_APPLICABLE,
+    gap_words,
+    interval_note,
+    p_text,
+    points,
 )
+from roboirg.evaluation.analysis.stats.run_data import RunData
+from roboirg.evaluation.analysis.tables.table import Row, Table, named_columns
+
 _NOTE = (
     "Each figure compares two rates on the same scenes, as means over tasks, in percent with 95 "
     f"% intervals. {MEANING} Chance is the success of pursuing a random goal of the scene without "
@@ -42,17 +45,19 @@ def make_arm_table(data: RunData) -> Table:
     Raises:
         InvalidValueError: the runs have no control arms.
     """
-    found = arm_figures(data)
+    found = arm_figures(data.frame)
     if not found:
         raise InvalidValueError(
             "The runs have no control arms; play them with --arms told,other-goal,silent,scrambled."
         )
-    names = data.told().names
+    names = data.told.names
     return Table(
         key="arms",
         title="Control arms",
         heads=("policy and setting", "figure"),
-        columns=COLUMNS,
+        columns=named_columns(
+            "episodes", "first, %", "second, %", "chance", "difference", "95 % interval", "p"
+        ),
         rows=tuple(
             Row(
                 f"{names[one.policy_run]}, {options_label(one.options)}",
@@ -65,23 +70,19 @@ def make_arm_table(data: RunData) -> Table:
     )
 
 
-def language_use_sentences(
-    first: RunData, second: RunData, names: tuple[str, str]
-) -> Iterator[str]:
+def language_use_sentences(first: Frame, second: Frame, names: tuple[str, str]) -> Iterator[str]:
     """Yield how the language use of two policies differs, a sentence for each setting.
 
     P-values are corrected over the settings.
     """
     rng = np.random.default_rng(SEED)
     ours, theirs = (
-        {of.options: of.cells[0] for of in arm_figures(data) if of.contrast.name == LANGUAGE_USE}
-        for data in (first, second)
+        {of.options: of.cells[0] for of in arm_figures(one) if of.contrast.name == LANGUAGE_USE}
+        for one in (first, second)
     )
     gaps: dict[InstructionOptions, Gap] = {}
     for options, here in ours.items():
-        there = theirs.get(options, {})
-        pairs = [Pairs.of(here[task], there[task]) for task in here if task in there]
-        if (gap := measure_gap(pairs, rng)) is not None:
+        if (gap := measure_gap(pair(here, theirs.get(options, {})), rng)) is not None:
             gaps[options] = gap
     corrected = holm([gap.p_value for gap in gaps.values()])
     for (options, gap), p_value in zip(gaps.items(), corrected, strict=True):
@@ -101,9 +102,8 @@ def _words(one: ArmFigure) -> Sequence[str]:
             np.mean([silent_chance(task, split, trial.episode) for trial in silent.verdicts])
             for task, silent in one.cells[1].items()
         ]
-        chance = f"{100 * float(cast('float', np.mean(chances))):.1f}"
-    figures = (points(one.gap.value, 1), interval_text(one.gap), corrected_p_text(one.p_holm))
-    return (str(one.gap.episodes), *rates, chance, *figures)
+        chance = f"{100 * float(np.mean(chances)):.1f}"
+    return (str(one.gap.episodes), *rates, chance, *gap_words(one.gap, one.p_holm))
 
 
 def _rate_text(rate: float, interval: Interval | None) -> str:

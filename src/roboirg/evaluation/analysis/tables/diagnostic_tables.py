@@ -1,33 +1,59 @@
-"""Tables that the paper has no numbers for: forms, failures, and others of runs alone."""
+"""Tables that the paper has no numbers for: forms, failures, cut prompts, kinds of words."""
 
 from __future__ import annotations
 
+import itertools
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 
 from roboirg.core.errors import InvalidValueError
-from roboirg.evaluation.analysis.stats.failure_counts import FAILURES, count_failures
-from roboirg.evaluation.analysis.stats.form_gaps import form_rows
-from roboirg.evaluation.analysis.stats.option_labels import options_label, options_sort_key
-from roboirg.evaluation.analysis.stats.paired_tests import Gap, holm
-from roboirg.evaluation.analysis.stats.rates import points
-from roboirg.evaluation.analysis.stats.run_data import RunData
-from roboirg.evaluation.analysis.stats.run_summary import ALL_TASKS
-from roboirg.evaluation.analysis.tables.arm_table import make_arm_table
-from roboirg.evaluation.analysis.tables.breakdown_table import (
-    corrected_p_text,
-    interval_text,
+from roboirg.evaluation.analysis.frame import Frame, suite
+from roboirg.evaluation.analysis.policy_run import PolicyRun
+from roboirg.evaluation.analysis.stats.breakdowns import Breakdown, LabelKey, break_down
+from roboirg.evaluation.analysis.stats.cells import Key
+from roboirg.evaluation.analysis.stats.comparison_text import incomplete_note
+from roboirg.evaluation.analysis.stats.heard_rates import (
+    HeardCounts,
+    count_heard,
+    cut_text,
+    rate_of,
 )
+from roboirg.evaluation.analysis.stats.measure import ALL_TASKS, Measured, ScopeKey
+from roboirg.evaluation.analysis.stats.option_labels import (
+    REFERENCE,
+    has_default_options,
+    options_label,
+    options_sort_key,
+    setting_sort_key,
+)
+from roboirg.evaluation.analysis.stats.paired_tests import Gap, holm
+from roboirg.evaluation.analysis.stats.rates import NOT_APPLICABLE, gap_words, percent
+from roboirg.evaluation.analysis.stats.run_data import RunData
+from roboirg.evaluation.analysis.tables.arm_table import make_arm_table
 from roboirg.evaluation.analysis.tables.facts_table import make_facts_table
-from roboirg.evaluation.analysis.tables.heard_table import make_heard_table
 from roboirg.evaluation.analysis.tables.subgoal_table import make_subgoal_table
-from roboirg.evaluation.analysis.tables.table import POLICY, Column, Row, Table
+from roboirg.evaluation.analysis.tables.table import (
+    POLICY,
+    Column,
+    Counts,
+    Entry,
+    Row,
+    Table,
+    named_columns,
+)
 from roboirg.evaluation.records.record import Record
 from roboirg.judging.failure_attribution import EXECUTION, GROUNDING
 
-FORM_COLUMNS = tuple(
-    map(Column, ("trials", "both", "only resolved", "only implicit", "neither"))
-) + tuple(map(Column, ("implicit − resolved", "95 % interval", "p")))
+UNATTRIBUTED = "not attributed"
+FAILURES: Mapping[str, str] = {
+    **dict.fromkeys(GROUNDING, "grounding"),
+    **dict.fromkeys(EXECUTION, "execution"),
+    UNATTRIBUTED: "",
+}
+"""The names of failures with their kinds, those of grounding first."""
+OF_CELLS = ("policy and setting", "task")
+CELL = ("run", "options", "scope")
+
 _FORMS_NOTE = (
     "The same episodes in the implicit form and in the resolved one, which names the goal: trials "
     "solved in both, in one alone, in neither. The difference, the mean over tasks, and its "
@@ -38,6 +64,43 @@ _FAILURES_NOTE = (
     "Grounding: the policy did something else than the instruction means; execution: it did not "
     "complete what the instruction means."
 )
+_BREAKDOWN_NOTE = (
+    "Success in percent, the gap to explicit on the same episodes in points, its interval, and "
+    "its p-value corrected over all rows of the policy. Rates are means over the tasks that "
+    "have such instructions, so two rows may differ in their tasks, too."
+)
+_HEARD_NOTE = (
+    "Cut: the policy's model reads fewer tokens than the prompt needs, so the end of the prompt, "
+    "where the command stands, does not arrive; between two bounds if the tokenizer is not "
+    "known. Success in percent over all episodes with a verdict, and over those that were heard "
+    "whole. Policies that declare no limit (prompt_tokens) are not in this table."
+)
+
+
+def form_rows(data: RunData) -> Iterator[tuple[ScopeKey, Gap]]:
+    """Yield the gaps between the two forms by policy run, suite and setting.
+
+    Of a policy run, those over all tasks come last, if there are several suites.
+    """
+    found = {
+        key: one.second_gap
+        for key, one in data.summaries.items()
+        if one.second_gap is not None
+        and has_default_options(key.options)
+        and key.scope not in one.cells
+    }
+    suites = {suite(key.task) for key in data.cells} - {None}
+    runs = list(data.names)
+    scopes = list(dict.fromkeys(key.scope for key in found))
+    for key in sorted(
+        found,
+        key=lambda key: (
+            runs.index(key.policy_run), scopes.index(key.scope),
+            setting_sort_key(key.options.setting),
+        ),
+    ):  # fmt: skip
+        if key.scope != ALL_TASKS or len(suites) > 1:
+            yield key, found[key]
 
 
 def make_forms_table(data: RunData) -> Table:
@@ -46,33 +109,44 @@ def make_forms_table(data: RunData) -> Table:
     Raises:
         InvalidValueError: no episode was played in both forms.
     """
-    rows: list[Row] = []
-    for policy_run, name in data.names.items():
-        found = form_rows(data, policy_run)
-        corrected = holm([row.gap.p_value for row in found])
-        rows += [
-            Row(f"{name}, {row.scope}", row.setting, _form_words(row.gap, p_value))
-            for row, p_value in zip(found, corrected, strict=True)
-        ]
-    if not rows:
+    found = list(form_rows(data))
+    if not found:
         raise InvalidValueError(
             "The runs have no episode in both forms; play them with --forms implicit,resolved."
         )
+    rows = []
+    for run, name in data.names.items():
+        own = [(key, gap) for key, gap in found if key.policy_run == run]
+        corrected = holm([gap.p_value for _, gap in own])
+        for (key, gap), p_value in zip(own, corrected, strict=True):
+            of = gap.overlap
+            counts = (of.trials, of.both, of.only_second, of.only_first, of.neither)
+            words = (*map(str, counts), *gap_words(gap, p_value))
+            rows.append(Row(f"{name}, {key.scope}", key.options.setting, words))
     return Table(
         key="forms",
         title="Implicit and resolved form",
         heads=(POLICY, "setting"),
-        columns=FORM_COLUMNS,
+        columns=named_columns(
+            "trials", "both", "only resolved", "only implicit", "neither", "implicit − resolved",
+            "95 % interval", "p",
+        ),
         rows=tuple(rows),
         notes=(_FORMS_NOTE,),
-    )
+    )  # fmt: skip
 
 
-def _form_words(gap: Gap, p_value: float) -> tuple[str, ...]:
-    overlap = gap.overlap
-    counts = (overlap.trials, overlap.both, overlap.only_second, overlap.only_first)
-    words = (*map(str, (*counts, overlap.neither)), points(gap.value, 1))
-    return (*words, interval_text(gap), corrected_p_text(p_value))
+def count_failures(frame: Frame, by: Sequence[str]) -> Mapping[Key, Counter[str]]:
+    """Return, by some columns, the number of ``trials`` with a verdict and of failures by name."""
+    found: dict[Key, Counter[str]] = {}
+    names = ("outcome", "failure", *by)
+    for outcome, failure, *key in zip(*(frame[name] for name in names), strict=True):
+        if outcome in ("success", "failure"):
+            counts = found.setdefault(tuple(key), Counter())
+            counts["trials"] += 1
+            if outcome == "failure":
+                counts[failure or UNATTRIBUTED] += 1
+    return found
 
 
 def make_failure_table(data: RunData) -> Table:
@@ -81,49 +155,118 @@ def make_failure_table(data: RunData) -> Table:
     Raises:
         InvalidValueError: no episode failed.
     """
-    found = count_failures(data)
+    found = count_failures(_with_scope(data.frame), CELL)
     kinds = [kind for kind in FAILURES if any(counts[kind] for counts in found.values())]
     if not kinds:
         raise InvalidValueError("No episode of the runs failed.")
-    rows: list[Row] = []
-    for policy_run, name in data.names.items():
-        own = {key: counts for key, counts in found.items() if key.policy_run == policy_run}
-        for options in sorted({key.options for key in own}, key=options_sort_key):
-            cells = {key.task: counts for key, counts in own.items() if key.options == options}
-            if len(cells) > 1:
-                cells[ALL_TASKS] = sum(cells.values(), Counter())
-            trials = {key.task: data.cells[key].trials for key in own if key.options == options}
-            trials[ALL_TASKS] = sum(trials.values())
-            rows += [
-                Row(
-                    f"{name}, {options_label(options)}",
-                    task,
-                    tuple(_failure_words(trials[task], counts, kinds)),
-                )
-                for task, counts in cells.items()
-            ]
+    rows = []
+    for key, group, scope in _in_order(found, data):
+        failures = sum(found[key][kind] for kind in kinds)
+        words = [f"{found[key]['trials']}", f"{failures}"]
+        for kind in kinds:
+            count = found[key][kind]
+            words.append(f"{count} ({100 * count / failures:.0f} %)" if count else "0")
+        rows.append(Row(group, scope, words))
     return Table(
         key="failures",
         title="Failures",
-        heads=("policy and setting", "task"),
-        columns=(Column("trials"), Column("failures"), *map(_failure_column, kinds)),
+        heads=OF_CELLS,
+        columns=(
+            *named_columns("trials", "failures"),
+            *(Column(kind.replace("_", " "), FAILURES[kind]) for kind in kinds),
+        ),
         rows=tuple(rows),
         notes=(_FAILURES_NOTE,),
     )
 
 
-def _failure_column(kind: str) -> Column:
-    groups = {"grounding": GROUNDING, "execution": EXECUTION}
-    group = next((group for group, kinds in groups.items() if kind in kinds), "")
-    return Column(kind.replace("_", " "), group)
+def make_heard_table(data: RunData) -> Table:
+    """Make the table of cut prompts and of success over the episodes that were heard whole.
+
+    Raises:
+        InvalidValueError: no policy declares how many tokens it reads.
+    """
+    found = count_heard(_with_scope(data.frame), CELL[1:])
+    if not found:
+        raise InvalidValueError(
+            "No policy of the runs declares how many tokens it reads; prompt_tokens=N does."
+        )
+    rows = []
+    for key, group, scope in _in_order(found, data):
+        one = found[key]
+        episodes, heard = str(one["episodes"]), str(one["heard trials"])
+        rates = (_heard_rate(one, ""), heard, _heard_rate(one, "heard "))
+        rows.append(Row(group, scope, (episodes, cut_text(one), *rates)))
+    return Table(
+        key="heard",
+        title="Instructions that the policies' models read to the end",
+        heads=OF_CELLS,
+        columns=named_columns("episodes", "cut, %", "success, all", "heard", "success, heard"),
+        rows=tuple(rows),
+        notes=(_HEARD_NOTE,),
+    )
 
 
-def _failure_words(trials: int, counts: Counter[str], kinds: Iterable[str]) -> Iterator[str]:
-    total = counts.total()
-    yield from (str(trials), str(total))
-    for kind in kinds:
-        share = f" ({100 * counts[kind] / total:.0f} %)" if counts[kind] else ""
-        yield f"{counts[kind]}{share}"
+def _heard_rate(one: HeardCounts, heard: str) -> Entry:
+    rate = rate_of(one, heard)
+    if rate is None:
+        return Entry(word=NOT_APPLICABLE)
+    counts = Counts(one[f"{heard}successes"], one[f"{heard}trials"])
+    return Entry(percent=percent(rate), counts=counts)
+
+
+def _with_scope(frame: Frame) -> Frame:
+    """Return each row twice: for its task and for all tasks, in a column ``scope``."""
+    return frame.spread("scope", [(task, ALL_TASKS) for task in frame["task"]])
+
+
+def _in_order(found: Iterable[Key], data: RunData) -> Iterator[tuple[Key, str, str]]:
+    """Yield each key of `CELL` with its group's label and its scope; all tasks come last.
+
+    They are left out if there is only one task.
+    """
+    runs = list(data.names)
+    keys = sorted(
+        found,
+        key=lambda key: (runs.index(key[0]), options_sort_key(key[1]), key[2] == ALL_TASKS),
+    )
+    for group, own in itertools.groupby(keys, lambda key: key[:2]):
+        scopes = list(own)
+        for key in scopes if len(scopes) > 2 else scopes[:1]:  # noqa: PLR2004 - a task and all
+            yield key, f"{data.names[group[0]]}, {options_label(group[1])}", key[2]
+
+
+def make_breakdown_table(
+    breakdown: Breakdown, frame: Frame, names: Mapping[PolicyRun, str] | None = None
+) -> Table:
+    """Make the table of gaps to explicit, broken down by a column that the frame has."""
+    names, found = names or frame.names, break_down(frame, breakdown)
+    left_out = sum(one not in ("success", "failure") for one in frame["outcome"])
+    notes = [f"{_BREAKDOWN_NOTE} {breakdown.note}"]
+    if any(one.gap is None and one.key.options != REFERENCE for one in found):
+        notes.append(f"{NOT_APPLICABLE} without explicit on the same episodes.")
+    if left_out:
+        notes.append(incomplete_note(left_out))
+    return Table(
+        key=f"by_{breakdown.name}",
+        title=f"Gap to explicit by {breakdown.title}",
+        heads=(OF_CELLS[0], breakdown.title),
+        columns=named_columns("episodes", "success", "gap", "95 % interval", "p"),
+        rows=tuple(
+            Row(
+                f"{names[one.key.run]}, {options_label(one.key.options)}",
+                one.key.label,
+                (str(one.episodes), _rate(one), *gap_words(one.gap, one.p_holm)),
+            )
+            for one in found
+        ),
+        notes=tuple(notes),
+    )
+
+
+def _rate(one: Measured[LabelKey]) -> Entry:
+    counts = Counts(one.successes, one.trials, one.episodes, interval=one.interval)
+    return Entry(percent=None if one.rate is None else percent(one.rate), counts=counts)
 
 
 DIAGNOSTIC_TABLES: Mapping[str, Callable[[RunData], Table]] = {
@@ -133,8 +276,8 @@ DIAGNOSTIC_TABLES: Mapping[str, Callable[[RunData], Table]] = {
     "arms": make_arm_table,
 }
 """By name, as in the command line."""
-RECORD_TABLES: Mapping[str, Callable[[RunData, Iterable[tuple[str, Record]]], Table]] = {
+RECORD_TABLES: Mapping[str, Callable[[RunData, Iterable[Record]], Table]] = {
     "subgoals": make_subgoal_table,
     "facts": make_facts_table,
 }
-"""Those that need whole records too, each with the name of its run."""
+"""Those that need whole records, too."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import operator
 from collections import Counter, defaultdict
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
 from roboirg.evaluation.analysis.stats.option_labels import (
@@ -66,19 +66,20 @@ _DECLARED = (
 """Keys of a policy's ``metadata``; the last four are also reported by its own process."""
 
 
-def make_facts_table(data: RunData, records: Iterable[tuple[str, Record]]) -> Table:
-    """Make the table from the records of the runs of `data`, each with the name of its run."""
-    kept = {(one.slug, one.started_at) for _, one in data.results}
+def make_facts_table(data: RunData, records: Iterable[Record]) -> Table:
+    """Make the table from the whole records of the runs of `data`."""
+    results = [one for one in data.frame["result"] if isinstance(one, Summary)]
+    kept = {(one.slug, one.started_at) for one in results}
     known: defaultdict[tuple[str, str], dict[str, None]] = defaultdict(dict)
     totals: defaultdict[str, Counter[str]] = defaultdict(Counter)
-    for _, record in records:
+    for record in records:
         if (record.slug, record.started_at) in kept:  # without what was played again
             for name, value in _of_policy(record):
                 known[record.policy, name] |= dict.fromkeys(_words(value))
             total = totals[record.policy]
             total.update(steps=record.steps, calls=record.calls)
             total["executed"] = max(total["executed"], record.executed)
-    for name, values in _of_run(data):
+    for name, values in _of_run(results, data):
         known[RUN, name] |= dict.fromkeys(word for value in values for word in _words(value))
     for policy, total in totals.items():
         mean = f"{total['steps'] / total['calls']:.1f}" if total["calls"] else ""
@@ -99,8 +100,7 @@ def make_facts_table(data: RunData, records: Iterable[tuple[str, Record]]) -> Ta
     )
 
 
-def _of_run(data: RunData) -> Facts:
-    results: list[Summary] = [one for _, one in data.results]
+def _of_run(results: Sequence[Summary], data: RunData) -> Facts:
     for name, field in _OF_RUN.items():
         yield name, map(operator.attrgetter(field), results)
     yield (

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence, Set
+from dataclasses import replace
 
 from rich.console import Console
 from rich.text import Text
@@ -14,41 +15,35 @@ from roboirg.evaluation.analysis.comparability import (
     comparison_notes,
     differences_of,
 )
-from roboirg.evaluation.analysis.stats.cells import (
-    CellKey,
-    PolicyRun,
-    gather,
-    labels,
-    policy_order,
-    sort_cells,
-)
+from roboirg.evaluation.analysis.frame import Frame
+from roboirg.evaluation.analysis.stats.cells import NOTHING, ByTask, CellKey, cells_of
 from roboirg.evaluation.analysis.stats.headline import headline_notes
-from roboirg.evaluation.analysis.stats.heard_rates import count_heard, heard_notes
+from roboirg.evaluation.analysis.stats.heard_rates import heard_notes
+from roboirg.evaluation.analysis.stats.measure import (
+    ALL_TASKS,
+    Measured,
+    ScopeKey,
+    by_scope,
+    pair,
+)
 from roboirg.evaluation.analysis.stats.option_labels import (
     REFERENCE,
     options_label,
     options_sort_key,
 )
-from roboirg.evaluation.analysis.stats.paired_tests import Overlap
-from roboirg.evaluation.analysis.stats.rates import points, whole_percent
-from roboirg.evaluation.analysis.stats.run_summary import (
-    ALL,
-    ALL_TASKS,
-    ScopeResults,
-    group_by_scope,
-)
+from roboirg.evaluation.analysis.stats.paired_tests import pooled_overlap
+from roboirg.evaluation.analysis.stats.rates import NOT_APPLICABLE, points, whole_percent
 from roboirg.evaluation.analysis.tables.rendering.terminal import renderable
 from roboirg.evaluation.analysis.tables.table import (
     ERROR_MARK,
     MISSING_MARK,
-    NOT_APPLICABLE,
     Column,
     Entry,
     Row,
     Table,
 )
 from roboirg.evaluation.analysis.tables.table_notes import where_played
-from roboirg.evaluation.records.record import Job, Summary
+from roboirg.evaluation.records.record import Summary
 
 MAX_FAILURES = 10
 """Episodes of a policy that are listed below the tables."""
@@ -56,62 +51,62 @@ MAX_FAILURES = 10
 _GOOD, _FAIR = 0.75, 0.4
 
 
-RunTables = Mapping[PolicyRun, Table]
-"""A table for each policy run, whose label is its title."""
+def make_run_tables(frame: Frame) -> list[Table]:
+    """Make a table for each policy run, in their order.
 
-
-def make_run_tables(records: Sequence[Summary], planned: Sequence[Job] = ()) -> RunTables:
-    """Make a table for each policy run, in the order of the plan.
-
-    Planned jobs without a record are counted as missing. What the signs mean is the last note of
-    the last table.
+    What the signs mean is the last note of the last table.
     """
-    found = gather([("", records)], planned)
-    policies = list(dict.fromkeys(job.policy for job in (*planned, *records)))
-    cells = sort_cells(found, policy_order(found, policies))
-    results = [one for one in group_by_scope(cells) if one.scope.suite is None]
-    heard = count_heard((PolicyRun.of(one), one) for one in records)
-    names = labels(cells)
-    tables = {}
-    for policy_run, label in names.items():
-        own = [one for one in results if one.policy_run == policy_run]
+    cells = cells_of(frame)
+    scopes = by_scope(cells)
+    found = {
+        key: Measured(key, own)
+        for key, own in scopes.items()
+        if key.scope == ALL_TASKS or key.scope in own
+    }
+    gaps = {key: gap_text(key, scopes) for key in found}
+    tables = []
+    for policy_run, label in frame.names.items():
+        names = {policy_run: label}
         # No other settings can be compared.
         differences = {
             key: differences_of(key, cell)
             for key, cell in cells.items()
             if key.policy_run == policy_run and key.options == REFERENCE
         }
+        own = {key: one for key, one in found.items() if key.policy_run == policy_run}
         notes = (
             f"{where_played([policy_run.conditions])} {_sizes(own)}",
-            *comparison_notes(differences, {policy_run: label}),
-            *heard_notes(heard, {policy_run: label}),
-            *headline_notes(cells, {policy_run: label}),
-            *(["; ".join(_legend(results))] if policy_run == [*names][-1] else ()),
+            *comparison_notes(differences, names),
+            *heard_notes(frame, names),
+            *headline_notes(cells, names),
         )
-        tables[policy_run] = _make_run_table(label, own, differences, notes)
-    return tables
+        tables.append(_make_run_table(label, own, gaps, differences, notes))
+    legend = "; ".join(_legend(found, set(gaps.values())))
+    last = (replace(table, notes=(*table.notes, legend)) for table in tables[-1:])
+    return [*tables[:-1], *last]
 
 
-def print_run_tables(tables: RunTables, console: Console) -> None:
-    for table in tables.values():
+def print_run_tables(tables: Iterable[Table], console: Console) -> None:
+    for table in tables:
         console.print(renderable(table, console), highlight=False)
 
 
-def print_failures(records: Iterable[Summary], tables: RunTables, console: Console) -> None:
-    """List for each table the episodes without success and the cause; count the rest."""
-    failed: dict[PolicyRun, list[Summary]] = {}
-    for record in records:
-        if record.outcome != "success":
-            failed.setdefault(PolicyRun.of(record), []).append(record)
-    for policy_run, table in tables.items():
+def print_failures(frame: Frame, console: Console) -> None:
+    """List the episodes of each policy run without success and the cause; count the rest."""
+    for run, label in frame.names.items():
+        own = frame.where(run=run)
         # The same order for any number of worker processes.
         failures = sorted(
-            failed.get(policy_run, ()),
+            (
+                one
+                for one, outcome in zip(own["result"], own["outcome"], strict=True)
+                if outcome in ("failure", "error")
+            ),
             key=lambda one: (one.task, one.split, one.episode, options_sort_key(one.options)),
         )
         if failures:
             title = f"{counted(len(failures), 'episode')} without success"
-            console.print(Text.assemble((table.title, "bold"), f": {title}"), soft_wrap=True)
+            console.print(Text.assemble((label, "bold"), f": {title}"), soft_wrap=True)
         for record in failures[:MAX_FAILURES]:
             console.print(Text(f"  {failure_text(record)}"), highlight=False, soft_wrap=True)
         if len(failures) > MAX_FAILURES:
@@ -127,84 +122,84 @@ def failure_text(record: Summary) -> str:
     return f"{where}{seed}{arm}: {printable(record.cause or record.outcome)}{mark}"
 
 
-def gap_text(overlap: Overlap) -> str:
-    """Return the gap over paired trials.
+def gap_text(key: ScopeKey, scopes: Mapping[ScopeKey, ByTask]) -> str:
+    """Return the gap to explicit over paired trials.
 
     A dash if neither has a success, which says nothing; empty without pairs.
     """
-    if not overlap.trials:
+    if key.options == REFERENCE:
         return ""
-    if not overlap.both and not overlap.only_first and not overlap.only_second:
+    found = pooled_overlap(pair(scopes[key], scopes.get(key._replace(options=REFERENCE), NOTHING)))
+    if not found.trials:
+        return ""
+    if found.neither == found.trials:
         return NOT_APPLICABLE
-    return points((overlap.only_first - overlap.only_second) / overlap.trials)
+    return points((found.only_first - found.only_second) / found.trials)
 
 
 def _make_run_table(
     label: str,
-    results: Sequence[ScopeResults],
+    found: Mapping[ScopeKey, Measured[ScopeKey]],
+    gaps: Mapping[ScopeKey, str],
     differences: AllDifferences,
     notes: tuple[str, ...],
 ) -> Table:
     """Return tasks × settings: the success rate and, in brackets, the gap to explicit."""
-    scopes = dict.fromkeys(one.scope for one in results if one.scope != ALL)
-    options = sorted({one.options for one in results}, key=options_sort_key)
-    cells = {(one.scope, one.options): one for one in results}
+    policy_run = next(iter(found)).policy_run
+    scopes = dict.fromkeys(key.scope for key in found)
+    options = sorted({key.options for key in found}, key=options_sort_key)
+    rows = []
+    for scope in scopes if len(scopes) > 2 else list(scopes)[:1]:  # noqa: PLR2004 - a task and all
+        keys = [ScopeKey(policy_run, scope, one) for one in options]
+        entries = [_entry(found.get(key), gaps.get(key, ""), differences) for key in keys]
+        rows.append(Row(ALL_TASKS if scope == ALL_TASKS else "", scope, entries))
     return Table(
         key="run",
         title=label,
         heads=("task",),
         columns=tuple(Column(options_label(one), one.setting) for one in options),
-        rows=tuple(
-            Row(
-                "" if scope.task else ALL_TASKS,
-                scope.task or ALL_TASKS,
-                [_entry(cells.get((scope, one)), differences) for one in options],
-            )
-            for scope in (*scopes, ALL)
-            if scope != ALL or len(scopes) > 1
-        ),
+        rows=tuple(rows),
         notes=notes,
     )
 
 
-def _entry(cell: ScopeResults | None, differences: AllDifferences) -> Entry:
-    if cell is None:
+def _entry(one: Measured[ScopeKey] | None, gap: str, differences: AllDifferences) -> Entry:
+    if one is None:
         return Entry(applies=False)
-    counts = ((cell.errors, ERROR_MARK), (cell.missing, MISSING_MARK))
+    counts = ((one.errors, ERROR_MARK), (one.missing, MISSING_MARK))
     marks = " ".join(f"{count}{mark}" for count, mark in counts if count)
     # Pooled over trials: the gaps are over trials too.
-    rate = cell.pooled_rate
+    rate = one.pooled_rate
     if rate is None:
         return Entry(word=NOT_APPLICABLE, marks=marks)
-    gap = gap_text(cell.explicit_overlap())
     return Entry(
         word=whole_percent(rate) + (f" ({gap})" if gap else ""),
         marks=marks,
-        differences=differences.get(CellKey(cell.policy_run, cell.scope.task or "", cell.options)),
+        differences=differences.get(CellKey(*one.key)),
         style="green" if rate >= _GOOD else "yellow" if rate >= _FAIR else "red",
     )
 
 
-def _legend(cells: Sequence[ScopeResults]) -> Iterator[str]:
+def _legend(found: Mapping[ScopeKey, Measured[ScopeKey]], gaps: Set[str]) -> Iterator[str]:
     """Yield what the signs mean that occur."""
-    gaps = {gap_text(cell.explicit_overlap()) for cell in cells} - {""}
     compared = ", in brackets the gap to explicit on the same episodes in points"
-    yield f"success rate in %{compared if gaps else ''}"
+    yield f"success rate in %{compared if any(gaps) else ''}"
     if NOT_APPLICABLE in gaps:
         yield f"({NOT_APPLICABLE}) explicit has no success either, so the gap says nothing"
-    if any(cell.errors for cell in cells):
+    if any(one.errors for one in found.values()):
         yield f"{ERROR_MARK} episodes ended in an error and are left out of the rates"
-    if any(cell.missing for cell in cells):
+    if any(one.missing for one in found.values()):
         yield f"{MISSING_MARK} episodes are still to be played"
-    if any(cell.policy_run.is_privileged for cell in cells):
+    if any(key.policy_run.is_privileged for key in found):
         yield "privileged policies and scripted hands use the simulator's state"
 
 
-def _sizes(results: Sequence[ScopeResults]) -> str:
-    single = [one.trials for one in results if one.scope != ALL]
+def _sizes(found: Mapping[ScopeKey, Measured[ScopeKey]]) -> str:
+    single = [one.trials for key, one in found.items() if key.scope != ALL_TASKS]
     text = f"n = {_range(single)} {'episode' if max(single) == 1 else 'episodes'} per cell"
-    if len({one.scope for one in results}) > 2:  # noqa: PLR2004 - a task and all of them
-        text += f", {_range([one.trials for one in results if one.scope == ALL])} for {ALL_TASKS}"
+    if len({key.scope for key in found}) > 2:  # noqa: PLR2004 - a task and all of them
+        every = [one.trials for key, one in found.items() if key.scope == ALL_TASKS]
+        text += f", {_range(every)} for {ALL_TASKS}"
     return text
 
 

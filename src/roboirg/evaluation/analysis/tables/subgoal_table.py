@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections import Counter, defaultdict
-from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterable, Iterator, Mapping
 
 from roboirg.core.errors import InvalidValueError
+from roboirg.evaluation.analysis.frame_reading import with_columns
 from roboirg.evaluation.analysis.stats.cells import CellKey
 from roboirg.evaluation.analysis.stats.option_labels import options_label
 from roboirg.evaluation.analysis.stats.planner_failures import PLANNER_FAILURES, planner_failure
@@ -34,48 +34,37 @@ _COSTS: Mapping[str, str] = {
 """What a planner costs: keys of a record's usage, and their headings."""
 
 
-@dataclass
-class _PlannerCell:
-    """What the records of one cell add up to."""
-
-    episodes: int = 0
-    verdicts: Counter[str] = field(default_factory=Counter)
-    failures: Counter[str] = field(default_factory=Counter)
-    costs: defaultdict[str, float] = field(default_factory=lambda: defaultdict(float))
-
-    def add(self, record: Record) -> None:
-        self.episodes += 1
-        self.verdicts.update(one.verdict for one in record.subgoals)
-        if (failure := planner_failure(record)) is not None:
-            self.failures[failure] += 1
-        for name in _COSTS:
-            self.costs[name] += record.usage.get(name, 0)
-
-    def words(self, failures: Iterable[str], costs: Iterable[str]) -> Iterator[str]:
-        total = self.verdicts.total()
-        yield str(total)
-        for one in SUBGOAL_VERDICTS:
-            share = 100 * self.verdicts[one] / max(total, 1)
-            yield f"{self.verdicts[one]} ({share:.0f} %)"
-        yield from (str(self.failures[one]) for one in failures)
-        for name in costs:
-            yield f"{self.costs[name] / self.episodes:.3g}"
+_READ: Mapping[str, Callable[[Record], object]] = {
+    "verdicts": lambda record: tuple(one.verdict for one in record.subgoals),
+    "planner_failure": planner_failure,
+    "usage": lambda record: record.usage,
+}
 
 
-def make_subgoal_table(data: RunData, records: Iterable[tuple[str, Record]]) -> Table:
-    """Make the table from the records of the runs of `data`, each with the name of its run.
+def make_subgoal_table(data: RunData, records: Iterable[Record]) -> Table:
+    """Make the table from the whole records of the runs of `data`.
 
     Raises:
         InvalidValueError: no record holds a subgoal, or the failure of a planner.
     """
-    found: defaultdict[CellKey, _PlannerCell] = defaultdict(_PlannerCell)
-    for run, record in records:
-        found[CellKey(data.owner(run, record), record.task, record.column)].add(record)
-    shown = {key: found[key] for key in data.cells if found[key].verdicts or found[key].failures}
+    frame = with_columns(data.frame, records, _READ)
+    found: defaultdict[CellKey, Counter[str]] = defaultdict(Counter)
+    names = ("run", "task", "options", *_READ)
+    for run, task, options, verdicts, failure, usage in zip(
+        *(frame[name] for name in names), strict=True
+    ):
+        if usage is not None:  # else the episode was not played
+            counts = found[CellKey(run, task, options)]
+            counts.update(("episodes", *verdicts, *([failure] if failure else ())))
+            counts.update({name: usage.get(name, 0) for name in _COSTS})
+    known = (*SUBGOAL_VERDICTS, *PLANNER_FAILURES)
+    shown = {key: one for key, one in found.items() if any(one[name] for name in known)}
     if not shown:
         raise InvalidValueError("No planner of the runs named a subgoal; their records hold none.")
-    failures = [one for one in PLANNER_FAILURES if any(it.failures[one] for it in shown.values())]
-    costs = [one for one in _COSTS if any(it.costs[one] for it in shown.values())]
+    failures, costs = (
+        [name for name in names if any(one[name] for one in shown.values())]
+        for names in (PLANNER_FAILURES, _COSTS)
+    )
     meanings = "; ".join(f"{one}: {PLANNER_FAILURES[one]}" for one in failures)
     notes = (_NOTE, *([f"Failed episodes, by what the planner did: {meanings}."] * bool(failures)))
     return Table(
@@ -92,9 +81,18 @@ def make_subgoal_table(data: RunData, records: Iterable[tuple[str, Record]]) -> 
             Row(
                 f"{data.names[key.policy_run]}, {options_label(key.options)}",
                 key.task,
-                tuple(cell.words(failures, costs)),
+                tuple(_words(counts, failures, costs)),
             )
-            for key, cell in shown.items()
+            for key, counts in shown.items()
         ),
         notes=notes,
     )
+
+
+def _words(counts: Counter[str], failures: Iterable[str], costs: Iterable[str]) -> Iterator[str]:
+    total = sum(counts[one] for one in SUBGOAL_VERDICTS)
+    yield str(total)
+    for one in SUBGOAL_VERDICTS:
+        yield f"{counts[one]} ({100 * counts[one] / max(total, 1):.0f} %)"
+    yield from (str(counts[one]) for one in failures)
+    yield from (f"{counts[one] / counts['episodes']:.3g}" for one in costs)

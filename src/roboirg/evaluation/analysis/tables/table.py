@@ -10,12 +10,11 @@ from typing import Literal, NamedTuple
 
 from roboirg.evaluation.analysis.comparability import Differences, comparison_sign, merged
 from roboirg.evaluation.analysis.stats.intervals import Interval
-from roboirg.evaluation.analysis.stats.rates import change_text, mean_percent
+from roboirg.evaluation.analysis.stats.rates import NOT_APPLICABLE, change_text, mean_percent
 
 Source = Literal["ours", "published", "cited", "chance"]
 """Origin of a row: the run, the paper's results, a citation of the paper, or computed."""
 
-NOT_APPLICABLE = "–"
 ERROR_MARK = "!"
 MISSING_MARK = "…"
 PARTIAL_MARK = "*"
@@ -106,6 +105,10 @@ class Column(NamedTuple):
     group: str = ""
     averages: tuple[str, ...] = ()
     is_text: bool = False
+
+
+def named_columns(*names: str) -> tuple[Column, ...]:
+    return tuple(map(Column, names))
 
 
 @dataclass(frozen=True)

@@ -2,36 +2,32 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from decimal import Decimal
+from typing import TYPE_CHECKING
 
-from roboirg.core.instruction_options import InstructionOptions
 from roboirg.core.plain_text import counted, verb_for
 from roboirg.evaluation.analysis.comparability import AllDifferences, comparison_notes
-from roboirg.evaluation.analysis.published import TRIALS, RateTable, published_rows
-from roboirg.evaluation.analysis.stats.cells import (
+from roboirg.evaluation.analysis.policy_run import (
     CONDITIONS,
     FAIRNESS,
-    CellResults,
-    Cells,
     EvalConditions,
     PolicyRun,
-    labels,
 )
+from roboirg.evaluation.analysis.published import TRIALS, RateTable, published_rows
+from roboirg.evaluation.analysis.stats.cells import Cell, Cells
 from roboirg.evaluation.analysis.stats.headline import headline_notes
 from roboirg.evaluation.analysis.stats.intervals import wilson_interval
 from roboirg.evaluation.analysis.stats.option_labels import (
-    REFERENCE,
-    has_default_options,
+    is_usual,
     options_label,
     options_sort_key,
     staged_options,
 )
-from roboirg.evaluation.analysis.stats.rates import change_text
+from roboirg.evaluation.analysis.stats.rates import NOT_APPLICABLE, change_text
 from roboirg.evaluation.analysis.tables.table import (
     ERROR_MARK,
     MISSING_MARK,
-    NOT_APPLICABLE,
     PARTIAL_MARK,
     PUBLISHED_MARK,
     Column,
@@ -40,6 +36,9 @@ from roboirg.evaluation.analysis.tables.table import (
 )
 from roboirg.language.settings import EXPLICIT
 from roboirg.tasks import every_task
+
+if TYPE_CHECKING:
+    from roboirg.evaluation.analysis.tables.paper_tables import PaperTable
 
 RATES_NOTE = (
     "Success rate in percent, the mean over policy seeds; averages are unweighted means over tasks."
@@ -54,57 +53,47 @@ TWIN_MARK = " (twin)"
 
 
 def notes_of(
-    which: RateTable,
+    table: PaperTable,
     rows: Sequence[Row],
     cells: Cells,
+    names: Mapping[PolicyRun, str],
     tasks: Sequence[str],
     differences: AllDifferences,
 ) -> tuple[str, ...]:
     """Return the notes of a table of rates."""
     shown = {
-        key: cell
-        for key, cell in cells.items()
-        if key.task in tasks and is_shown(which, key.options)
+        key: cell for key, cell in cells.items() if key.task in tasks and table.shows(key.options)
     }
     entries = [entry for row in rows for entry in row.entries]
     policy_runs = list(dict.fromkeys(key.policy_run for key in shown))
+    compared = {key: one for key, one in differences.items() if key in shown}
     return (
         RATES_NOTE,
-        *_sign_notes(which, entries),
+        *_sign_notes(table, entries),
         *_condition_notes([one.conditions for one in policy_runs]),
         *_size_notes(shown.values()),
         *_incomplete_notes(shown.values(), entries),
         *_version_notes(policy_runs),
-        *_omission_notes(which, cells, tasks),
-        *(headline_notes(cells, labels(cells)) if which == "main" else ()),
+        *(_omission_notes(table, cells, tasks) if table.name == "main" else ()),
+        *(headline_notes(cells, names) if table.name == "main" else ()),
         *_absent_notes({key.task for key in shown}),
         *_twin_notes(rows),
         *[_FLOORS_NOTE][: any(row.source == "chance" for row in rows)],
-        *_published_notes(which, rows),
-        *comparison_notes(
-            {key: one for key, one in differences.items() if key in shown}, labels(cells)
-        ),
+        *_published_notes(table, rows),
+        *comparison_notes(compared, names),
     )
 
 
-def is_shown(which: RateTable, options: InstructionOptions) -> bool:
-    """Return whether a table has rows for these instruction options."""
-    if which == "harder":
-        usual = InstructionOptions(options.setting)
-        return options == usual and (options == REFERENCE or not has_default_options(usual))
-    return options in staged_options() if which == "context" else has_default_options(options)
-
-
-def _sign_notes(which: RateTable, entries: Sequence[Entry]) -> list[str]:
+def _sign_notes(table: PaperTable, entries: Sequence[Entry]) -> list[str]:
     notes = []
     if any(entry.change is not None for entry in entries):
-        reference = "the shortest context" if which == "context" else "explicit"
+        reference = "the shortest context" if table.is_by_stages else "explicit"
         notes.append(
             f"↑ above, ↓ below, → equal to {reference} of the same policy, by how many points, as "
             "printed, on the same tasks; an arrow does not imply a significant difference."
         )
     if any(entry.best for entry in entries):
-        whose = "policy in a setting" if which == "planner" else "of its group"
+        whose = "policy in a setting" if table.name == "planner" else "of its group"
         notes.append(f"Bold: the best {whose}.")
     if any(not entry.applies for entry in entries):
         notes.append(f"{NOT_APPLICABLE} the setting is not defined for the task.")
@@ -184,18 +173,18 @@ def _distinct(conditions: Iterable[EvalConditions], name: str) -> list[str]:
     return sorted({one.text(name) for one in conditions})
 
 
-def _size_notes(cells: Iterable[CellResults]) -> list[str]:
+def _size_notes(cells: Iterable[Cell]) -> list[str]:
     judged = [cell for cell in cells if cell.trials]
     if not judged:
         return []
-    episodes = _range([len(cell.by_episode()) for cell in judged], "episode")
+    episodes = _range([cell.episodes for cell in judged], "episode")
     trials = _range([cell.trials for cell in judged], "trial")
-    if all(len(cell.by_episode()) == cell.trials for cell in judged):
+    if all(cell.episodes == cell.trials for cell in judged):
         return [f"{episodes} per cell, each played once."]
     return [f"{episodes} and {trials} per cell: several policy seeds."]
 
 
-def _incomplete_notes(cells: Iterable[CellResults], entries: Iterable[Entry]) -> list[str]:
+def _incomplete_notes(cells: Iterable[Cell], entries: Iterable[Entry]) -> list[str]:
     found = list(cells)
     notes = []
     errors, missing = sum(one.errors for one in found), sum(one.missing for one in found)
@@ -249,19 +238,17 @@ def _versions(policy_runs: Iterable[PolicyRun], name: str) -> list[str]:
     return sorted({str(getattr(one.versions, name)) for one in policy_runs if one.versions})
 
 
-def _omission_notes(which: RateTable, cells: Cells, tasks: Sequence[str]) -> list[str]:
-    if which != "main":
-        return []
+def _omission_notes(table: PaperTable, cells: Cells, tasks: Sequence[str]) -> list[str]:
     other_tasks = sorted({key.task for key in cells if key.task not in tasks})
     other_options = sorted(
-        {key.options for key in cells if key.task in tasks and not is_shown(which, key.options)},
+        {key.options for key in cells if key.task in tasks and not table.shows(key.options)},
         key=options_sort_key,
     )
     notes = []
     if other_tasks:
         notes.append(f"Not in this table: the results of {', '.join(other_tasks)}.")
     for is_harder, where in ((True, "In the table harder"), (False, "Not in this table")):
-        found = [one for one in other_options if is_shown("harder", one) == is_harder]
+        found = [one for one in other_options if is_usual(one) == is_harder]
         if found:
             notes.append(f"{where}: {'; '.join(map(options_label, found))}.")
     return notes
@@ -273,8 +260,9 @@ def _twin_notes(rows: Iterable[Row]) -> list[str]:
     return []
 
 
-def _published_notes(which: RateTable, rows: Iterable[Row]) -> list[str]:
-    if not any(row.source == "published" for row in rows):
+def _published_notes(table: PaperTable, rows: Iterable[Row]) -> list[str]:
+    which = table.of_paper
+    if which is None or not any(row.source == "published" for row in rows):
         return []
     episodes, seeds = TRIALS[which]
     trials = f"{episodes} trials" if seeds == 1 else f"{episodes} episodes × {seeds} seeds"

@@ -9,7 +9,7 @@ from rich.console import Console, Group, RenderableType
 from rich.table import Table as Grid
 from rich.text import Text
 
-from roboirg.evaluation.analysis.stats.run_summary import ALL_TASKS
+from roboirg.evaluation.analysis.stats.measure import ALL_TASKS
 from roboirg.evaluation.analysis.tables.table import Entry, Table
 from roboirg.util.console_width import LINE_WIDTH, line_width, widen
 

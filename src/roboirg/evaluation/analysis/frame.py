@@ -1,0 +1,289 @@
+"""Results as one long table: a row for each episode, its columns declared once.
+
+Planned episodes that were not played are rows, too: their outcome is ``missing``.
+"""
+
+from __future__ import annotations
+
+import operator
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from functools import cached_property
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from roboirg.core.arms import TOLD
+from roboirg.evaluation.analysis.policy_run import EvalConditions, PolicyRun, labels
+from roboirg.evaluation.analysis.stats.option_labels import options_label, options_sort_key
+from roboirg.evaluation.records.record import Job, Summary
+from roboirg.evaluation.records.record_codec import RecordKey, identity_key
+from roboirg.tasks import all_tasks
+
+MISSING = "missing"
+"""Outcome of planned episodes that were not played."""
+
+Values = NDArray[np.object_]
+Runs = Sequence[tuple[str, Sequence[Summary]]]
+"""Results of runs, each with its name."""
+
+
+class Column(NamedTuple):
+    """A column of the table.
+
+    Attributes:
+        name: of the column.
+        kind: text, texts (several), number (whole), decimal, or flag (true or false).
+        meaning: of its values, with their unit.
+        missing: what a missing value means; empty if there is none.
+        read: returns the value of a result.
+    """
+
+    name: str
+    kind: str
+    meaning: str
+    missing: str
+    read: Callable[[Any], object]
+
+
+def _field(name: str, kind: str, meaning: str, missing: str = "", path: str = "") -> Column:
+    return Column(name, kind, meaning, missing, operator.attrgetter(path or name))
+
+
+def _of_failure(name: str) -> Callable[[Summary], str | None]:
+    return lambda one: None if one.attribution is None else str(getattr(one.attribution, name))
+
+
+COLUMNS: Mapping[str, Column] = {
+    one.name: one
+    for one in (
+        _field("policy", "text", "name of the policy"),
+        _field("policy_version", "text", "version of the policy"),
+        Column(
+            "privileged",
+            "flag",
+            "whether the policy reads the simulator's state",
+            "",
+            lambda one: one.ref is not None and one.ref.is_privileged,
+        ),
+        _field("task", "text", "task"),
+        Column("suite", "text", "suite of the task", "not installed", lambda one: suite(one.task)),
+        _field("split", "text", "split of the episode"),
+        _field("setting", "text", "setting of the instruction"),
+        _field("form", "text", "implicit, or resolved: references replaced by names"),
+        Column(
+            "instruction_options",
+            "text",
+            "the setting and the options that differ from its defaults",
+            "",
+            lambda one: options_label(one.column),
+        ),
+        _field("delivery", "text", "how the utterances reach the policy", path="options.delivery"),
+        _field("arm", "text", "control arm; told for the episode's own words"),
+        _field("episode", "number", "position of the episode in its split, from 0"),
+        _field("policy_seed", "number", "seed of the policy"),
+        _field("difficulty", "text", "easy, medium or hard"),
+        _field("outcome", "text", "success, failure, or error (in no rate)"),
+        Column(
+            "success",
+            "flag",
+            "whether the episode succeeded",
+            "error",
+            lambda one: {"success": True, "failure": False}.get(one.outcome),
+        ),
+        Column("failure", "text", "how it failed", "no failure", _of_failure("failure")),
+        Column("failure_kind", "text", "grounding or execution", "no failure", _of_failure("kind")),
+        _field("error", "text", "kind of error", "no error"),
+        _field("cause", "text", "why it failed, in words", "success"),
+        _field(
+            "prompt", "text", "whether the prompt was heard whole, or cut", path="prompt_verdict"
+        ),
+        _field("steps", "number", "control steps that the policy played"),
+        _field("demonstration_steps", "number", "frames of the video before its turn"),
+        _field("max_steps", "number", "limit of control steps", path="environment.max_steps"),
+        _field("duration_s", "decimal", "wall-clock time, seconds"),
+        _field("started_at", "text", "ISO 8601, UTC"),
+        _field("language_version", "text", "version of the words"),
+        _field("environment_version", "number", "version of scenes, rules and physics"),
+        _field("package_version", "text", "version of roboirg"),
+        _field("render_device", "text", "what drew the pictures", "nothing was drawn"),
+        _field("robot", "text", "the real robot", "in simulation"),
+        _field("video", "text", "path of the video below the run", "no video"),
+    )
+}
+"""Columns of results, in the order of the documentation."""
+
+
+def suite(task: str) -> str | None:
+    known = all_tasks().get(task)
+    return None if known is None else known.suite
+
+
+class Frame(Mapping[str, Any]):
+    """Columns of equal length, a row for each episode; read when they are asked for.
+
+    Besides `COLUMNS` it has ``run`` (a `PolicyRun`), ``options`` (of the instruction, without
+    wordings), ``result`` (a `Summary`, or the `Job` of an episode that was not played) and
+    ``place`` (of the result among all that were given).
+    """
+
+    def __init__(self, columns: Mapping[str, Values]) -> None:
+        self.columns = dict(columns)  # those that were read so far
+
+    def __getitem__(self, name: str) -> Values:
+        if name not in self.columns:
+            read, rows = COLUMNS[name].read, zip(self["result"], self["outcome"], strict=True)
+            found = [None if outcome == MISSING else read(one) for one, outcome in rows]
+            self.columns[name] = as_column(found)
+        return self.columns[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter({**self.columns, **COLUMNS})
+
+    def __len__(self) -> int:
+        """Return the number of columns."""
+        return len(list(iter(self)))
+
+    def take(self, rows: Sequence[int] | NDArray[Any]) -> Frame:
+        """Return some rows: by their numbers, or those for which an array holds true."""
+        return Frame({name: column[rows] for name, column in self.columns.items()})
+
+    def where(self, **values: object) -> Frame:
+        """Return the rows that have certain values in some columns."""
+        chosen = np.ones(len(self["result"]), dtype=bool)
+        for name, value in values.items():
+            chosen &= [one == value for one in self[name]]
+        return self.take(chosen)
+
+    def spread(self, name: str, values: Iterable[Sequence[object]]) -> Frame:
+        """Return the frame with a new column and each row once for each of its values."""
+        pairs = [(row, one) for row, own in enumerate(values) for one in own]
+        found = self.take([row for row, _ in pairs])
+        return found.extended({name: as_column([one for _, one in pairs])})
+
+    def extended(self, columns: Mapping[str, Values]) -> Frame:
+        """Return the frame with further columns."""
+        return Frame({**self.columns, **columns})
+
+    def told(self) -> Frame:
+        """Return the frame without control arms, if there is anything else."""
+        is_told = self["arm"] == TOLD
+        return self.take(is_told) if is_told.any() and not is_told.all() else self
+
+    @cached_property
+    def names(self) -> Mapping[PolicyRun, str]:
+        """Labels of the policy runs, in order."""
+        return labels(self["run"])
+
+    @property
+    def names_as_played(self) -> Mapping[PolicyRun, str]:
+        """Labels of the policy runs, in the order of their first records."""
+        return {run: self.names[run] for run in self["run"][np.argsort(self["place"])]}
+
+
+def as_column(values: Sequence[object]) -> Values:
+    """Return values as a column; tuples stay tuples."""
+    column = np.empty(len(values), dtype=object)
+    column[:] = values
+    return column
+
+
+def join(frames: Iterable[Frame]) -> Frame:
+    """Return the rows of one frame after the other."""
+    found = list(frames)
+    return Frame({name: np.concatenate([one[name] for one in found]) for name in found[0].columns})
+
+
+def make_frame(runs: Runs, planned: Sequence[Job] = (), *, named: str = "") -> Frame:
+    """Return the results of one or several runs, sorted by policy run, task, options and episode.
+
+    Args:
+        runs: the results of a run have different identities. Runs that hold the same episodes of a
+            policy stay apart; others complete each other.
+        planned: jobs that should have a result; those without one are missing. Policies have the
+            order of these jobs; others follow by name.
+        named: name of a run that its policy runs bear in any case.
+    """
+    jobs = {identity_key(job): job for job in planned}
+    apart = _played_twice(runs) if len(runs) > 1 else set()
+    known: dict[PolicyRun, PolicyRun] = {}
+    owners: dict[tuple[str, EvalConditions], PolicyRun] = {}
+    rows: list[tuple[PolicyRun, Job, str]] = []
+    for name, results in runs:
+        for one in results:
+            found = PolicyRun.of(one, named or name * (one.policy in apart))
+            owner = known.setdefault(found, found)
+            owners.setdefault((one.policy, owner.conditions), owner)
+            rows.append((owner, one, one.outcome))
+            if jobs:
+                jobs.pop(identity_key(one), None)
+    policies = list(dict.fromkeys(job.policy for job in planned))
+    for job in jobs.values():
+        conditions = EvalConditions.of(job)
+        unplayed = PolicyRun(job.policy, conditions, None, named)
+        rows.append((owners.get((job.policy, conditions), unplayed), job, MISSING))
+    return _sorted(rows, policies)
+
+
+def _sorted(rows: Sequence[tuple[PolicyRun, Job, str]], policies: Sequence[str]) -> Frame:
+    """Return rows of policy run, result and outcome as a frame.
+
+    Episodes end in any order, but the bootstrap draws for one group after the other.
+    """
+
+    def place(one: PolicyRun) -> tuple[object, ...]:
+        rank = policies.index(one.policy) if one.policy in policies else len(policies)
+        versions = repr(one.versions)
+        return (rank, one.policy, one.run, repr(one.conditions), versions, one.robot or "")
+
+    options = [job.column for _, job, _ in rows]
+    owners = _ranks(sorted({owner for owner, _, _ in rows}, key=place))
+    tasks = _ranks(task_order({job.task for _, job, _ in rows}))
+    columns = _ranks(sorted(set(options), key=options_sort_key))
+    order = sorted(
+        range(len(rows)),
+        key=lambda at: (
+            owners[rows[at][0]],
+            tasks[rows[at][1].task],
+            columns[options[at]],
+            rows[at][1].episode,
+            rows[at][1].policy_seed,
+        ),
+    )
+    frame = Frame(
+        {
+            "place": np.array(order),
+            "run": as_column([rows[at][0] for at in order]),
+            "result": as_column([rows[at][1] for at in order]),
+            "outcome": as_column([rows[at][2] for at in order]),
+            "options": as_column([options[at] for at in order]),
+        }
+    )
+    # What a job knows stands in the rows of missing episodes, too.
+    known = ("policy", "task", "split", "arm", "setting", "form", "episode", "policy_seed")
+    return frame.extended(
+        {name: as_column([getattr(one, name) for one in frame["result"]]) for name in known}
+    )
+
+
+def _ranks(values: Iterable[Any]) -> dict[Any, int]:
+    return {value: rank for rank, value in enumerate(values)}
+
+
+def task_order(names: Iterable[str]) -> list[str]:
+    """Sort tasks in the order of the benchmark; unknown tasks come last."""
+    known = list(all_tasks())
+    return sorted(
+        names, key=lambda name: (known.index(name) if name in known else len(known), name)
+    )
+
+
+def _played_twice(runs: Runs) -> set[str]:
+    """Return the policies of which several runs hold the same episode."""
+    seen: set[RecordKey] = set()
+    twice: set[str] = set()
+    for _, results in runs:
+        own = {identity_key(result): result.policy for result in results}
+        twice |= {policy for key, policy in own.items() if key in seen}
+        seen |= own.keys()
+    return twice

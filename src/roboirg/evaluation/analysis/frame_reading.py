@@ -1,0 +1,122 @@
+"""The frame of stored runs, and its columns about words, which only whole records know."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable, Iterable, Mapping, Sequence
+
+from roboirg.evaluation.analysis.frame import Column, Frame, as_column, make_frame
+from roboirg.evaluation.plan.sources import Source
+from roboirg.evaluation.records.record import Job, Record
+from roboirg.evaluation.records.record_codec import identity_key
+
+RIVAL, NO_RIVAL = "recency rival", "no recency rival"
+COMPETING = "competing distractor"
+SINGLED = "one of two"
+"""Before the kind of words that single out one of two values."""
+
+Texts = tuple[str, ...]
+
+
+def _expressions(record: Record) -> Texts:
+    """Return the classes of the command's anaphors; those of the context add no referent."""
+    last = len(record.instruction) - 1
+    found = (one.expression for one in record.mentions if one.utterance == last)
+    return tuple(dict.fromkeys(one for one in found if one is not None))
+
+
+def _rival(record: Record) -> str | None:
+    metadata = record.metadata
+    if (reference := metadata.get("rival_reference")) is not None:
+        return f"{SINGLED}: {reference}"
+    if metadata.get("distractor") is None or "it" not in _expressions(record):
+        return None
+    if metadata["distractor"] == "competing":
+        return COMPETING
+    return NO_RIVAL if metadata.get("recency_rival") is None else RIVAL
+
+
+WORD_COLUMNS: Mapping[str, Column] = {
+    one.name: one
+    for one in (
+        Column(
+            "pattern",
+            "text",
+            "main reasoning pattern",
+            "no reasoning",
+            lambda one: one.metadata.get("pattern"),
+        ),
+        Column(
+            "expression",
+            "texts",
+            "classes of the command's referring expressions",
+            "",
+            _expressions,
+        ),
+        Column(
+            "slots",
+            "number",
+            "values of the goal that the command leaves to its context",
+            "none",
+            lambda one: one.metadata.get("hidden_slots") or None,
+        ),
+        Column(
+            "rival",
+            "text",
+            "what else “it” could mean, or how the words exclude it",
+            "no “it”",
+            _rival,
+        ),
+        Column(
+            "landmark",
+            "texts",
+            "landmarks in the words",
+            "",
+            lambda one: tuple(one.metadata.get("landmarks", ())),
+        ),
+        Column(
+            "words",
+            "number",
+            "words of all utterances",
+            "",
+            lambda one: sum(len(turn.text.split()) for turn in one.instruction),
+        ),
+        Column("command", "text", "the same task in explicit words", "", lambda one: one.command),
+    )
+}
+
+
+def read_frame(sources: Sequence[Source], *, words: bool = False) -> Frame:
+    """Return the results of runs and what is missing in them, with `WORD_COLUMNS` if wanted."""
+    runs = [(str(one.path), one.results) for one in sources]
+    frame = make_frame(runs, [job for one in sources for job in one.planned])
+    if not words:
+        return frame
+    return with_words(frame, itertools.chain.from_iterable(one.records() for one in sources))
+
+
+def with_words(frame: Frame, records: Iterable[Record]) -> Frame:
+    """Return a frame with `WORD_COLUMNS`; see `with_columns`."""
+    return with_columns(frame, records, {one.name: one.read for one in WORD_COLUMNS.values()})
+
+
+def with_columns(
+    frame: Frame, records: Iterable[Record], reads: Mapping[str, Callable[[Record], object]]
+) -> Frame:
+    """Return a frame of results with further columns, which are read from whole records.
+
+    Args:
+        frame: of results.
+        records: of its runs, in any order; they are read one by one, and none is kept.
+        reads: returns the value of a record, by the name of the column.
+    """
+    found = {_row_key(record): [read(record) for read in reads.values()] for record in records}
+    unknown = [None] * len(reads)
+    rows = [found.get(_row_key(one), unknown) for one in frame["result"]]
+    columns = zip(reads, zip(*rows, strict=True), strict=True)
+    return frame.extended({name: as_column(values) for name, values in columns})
+
+
+def _row_key(job: Job) -> tuple[object, ...]:
+    """Tell apart the same episode in two runs, or played again in one."""
+    return identity_key(job), getattr(job, "started_at", None)

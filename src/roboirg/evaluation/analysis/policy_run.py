@@ -1,0 +1,163 @@
+"""Results that may be averaged: one policy under one set of conditions and versions.
+
+Results under other conditions, or of other versions of the policy, the language or the
+environment, are another policy run and never averaged with the rest.
+"""
+
+from __future__ import annotations
+
+import operator
+from collections.abc import Iterable, Sequence
+from typing import NamedTuple
+
+from roboirg.core.arms import TOLD
+from roboirg.core.environment_options import ENVIRONMENT_OPTIONS, EnvironmentOptions
+from roboirg.core.subgoal_text import BETWEEN_VERSIONS, SCRIPTED_HANDS
+from roboirg.evaluation.analysis.stats.option_labels import words_label
+from roboirg.evaluation.records.record import Job, Summary
+
+CONDITIONS = ("split", *ENVIRONMENT_OPTIONS, "wordings", "arm")
+"""The names of all conditions."""
+
+FAIRNESS = {
+    "split": "splits",
+    "wordings": "words",
+    "max_steps": "step limits",
+    "meshes": "kinds of meshes",
+    "arm": "arms",
+}
+"""Conditions that must be equal in a comparison, with their names in the plural."""
+
+PRIVILEGED = " (privileged)"
+"""Mark of policies that read the simulator's state."""
+HANDS = f" ({SCRIPTED_HANDS})"
+"""Mark of planners whose hands read it, while they see pictures and words."""
+
+_read_conditions = operator.attrgetter("split", "environment", "options.wordings", "arm")
+
+
+class EvalConditions(NamedTuple):
+    """The conditions under which a policy plays."""
+
+    split: str
+    environment: EnvironmentOptions = EnvironmentOptions()
+    wordings: str | None = None
+    arm: str = TOLD
+
+    @classmethod
+    def of(cls, job: Job) -> EvalConditions:
+        return cls._make(_read_conditions(job))
+
+    def value(self, name: str) -> object:
+        """Return one of `CONDITIONS`."""
+        return getattr(self.environment if name in ENVIRONMENT_OPTIONS else self, name)
+
+    def text(self, name: str) -> str:
+        """Return the value of a condition in words."""
+        return words_label(self.wordings) if name == "wordings" else str(self.value(name))
+
+    def label(self, name: str) -> str:
+        """Return a condition with its value."""
+        before = "" if name == "wordings" else f"{name.replace('_', ' ')} "
+        return before + self.text(name)
+
+
+class Versions(NamedTuple):
+    """The versions that a result depends on."""
+
+    policy: str
+    language: str
+    environment: int
+
+    @classmethod
+    def of(cls, result: Summary) -> Versions:
+        policy, server = result.policy_version, result.server_version
+        return cls(
+            policy if server is None else f"{policy} (server {server})",
+            result.language_version,
+            result.environment_version,
+        )
+
+
+class PolicyRun(NamedTuple):
+    """One policy under one set of conditions and versions.
+
+    Attributes:
+        policy: its name.
+        conditions: under which it played.
+        versions: None before it has played.
+        run: name of the run if several runs hold the same episodes, else empty.
+        is_privileged: whether the policy read the simulator's state.
+        robot: the real robot of a study; None in simulation.
+    """
+
+    policy: str
+    conditions: EvalConditions
+    versions: Versions | None
+    run: str = ""
+    is_privileged: bool = False
+    robot: str | None = None
+
+    @classmethod
+    def of(cls, result: Summary, run: str = "") -> PolicyRun:
+        return cls(
+            result.policy,
+            EvalConditions.of(result),
+            Versions.of(result),
+            run,
+            result.privileged,
+            result.robot,
+        )
+
+    @property
+    def marked_policy(self) -> str:
+        """The policy's name, marked if it is privileged."""
+        return self.policy + self.mark
+
+    @property
+    def has_planner(self) -> bool:
+        """Whether it has played as a planner with a policy."""
+        return self.versions is not None and BETWEEN_VERSIONS in self.versions.policy
+
+    @property
+    def mark(self) -> str:
+        """The mark of a privileged policy; empty for the others."""
+        has_hands = self.versions is not None and SCRIPTED_HANDS in self.versions.policy
+        return (HANDS if has_hands else PRIVILEGED) * self.is_privileged
+
+
+def labels(policy_runs: Iterable[PolicyRun]) -> dict[PolicyRun, str]:
+    """Return a label for each policy run, with what distinguishes runs of the same policy.
+
+    Privileged policies are marked, because their rates are no rates of policies.
+    """
+    found = list(dict.fromkeys(policy_runs))
+    return {one: _label(one, found) + one.mark for one in found}
+
+
+def _label(policy_run: PolicyRun, policy_runs: Sequence[PolicyRun]) -> str:
+    parts = [policy_run.policy]
+    parts += [
+        policy_run.conditions.label(name)
+        for name in CONDITIONS
+        if len({other.conditions.value(name) for other in policy_runs}) > 1
+    ]
+    parts += _version_labels(policy_run, policy_runs)
+    if policy_run.robot is not None:
+        parts.append(f"on {policy_run.robot}")
+    if policy_run.run:
+        parts.append(policy_run.run)
+    return ", ".join(parts)
+
+
+def _version_labels(policy_run: PolicyRun, policy_runs: Sequence[PolicyRun]) -> list[str]:
+    """Return the versions in which a policy run differs from others."""
+    if policy_run.versions is None:
+        return []
+    found = []
+    for name in Versions._fields:
+        # The version of a policy matters only among runs of the same policy.
+        others = [one for one in policy_runs if name != "policy" or one.policy == policy_run.policy]
+        if len({getattr(one.versions, name) for one in others if one.versions}) > 1:
+            found.append(f"{name} {getattr(policy_run.versions, name)}")
+    return found

@@ -1,0 +1,216 @@
+"""Rates of groups of trials, and their gaps to others on the same episodes: all that is printed."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from fractions import Fraction
+from typing import Any, Generic, NamedTuple, TypeVar
+
+import numpy as np
+
+from roboirg.core.instruction_options import InstructionOptions
+from roboirg.evaluation.analysis.frame import suite
+from roboirg.evaluation.analysis.policy_run import PolicyRun
+from roboirg.evaluation.analysis.stats.cells import (
+    NOTHING,
+    ByTask,
+    Cell,
+    Cells,
+    Columns,
+    cell_interval,
+    clustered_interval,
+    gather,
+)
+from roboirg.evaluation.analysis.stats.intervals import SEED, Interval
+from roboirg.evaluation.analysis.stats.option_labels import REFERENCE
+from roboirg.evaluation.analysis.stats.paired_tests import Gap, Pairs, measure_gap, with_holm
+
+ALL_TASKS = "all tasks"
+
+K = TypeVar("K", bound=tuple[Any, ...])
+
+
+@dataclass(frozen=True, slots=True)
+class Measured(Generic[K]):
+    """What was measured of a group.
+
+    Attributes:
+        key: values of the columns that it is grouped by.
+        cells: its trials by task.
+        others: those of the first reference.
+        interval: 95 %, of the rate; None if it was not measured, or with too few episodes.
+        gap: to the first reference on the same episodes; None without pairs.
+        second_gap: to the second reference, if there is one.
+        p_holm: p-value of the gap after Holm's correction over its family.
+    """
+
+    key: K
+    cells: ByTask
+    others: ByTask = field(default_factory=dict)
+    interval: Interval | None = None
+    gap: Gap | None = None
+    second_gap: Gap | None = None
+    p_holm: float | None = None
+
+    @property
+    def tasks(self) -> tuple[str, ...]:
+        """Tasks with a verdict."""
+        return tuple(task for task, cell in self.cells.items() if cell.trials)
+
+    @property
+    def successes(self) -> int:
+        """Number of trials that succeeded."""
+        return sum(one.successes for one in self.cells.values())
+
+    @property
+    def trials(self) -> int:
+        """Number of trials with a verdict."""
+        return sum(one.trials for one in self.cells.values())
+
+    @property
+    def episodes(self) -> int:
+        """Number of episodes with a verdict."""
+        return sum(one.episodes for one in self.cells.values())
+
+    @property
+    def errors(self) -> int:
+        """Number of trials that ended in an error."""
+        return sum(one.errors for one in self.cells.values())
+
+    @property
+    def missing(self) -> int:
+        """Number of planned trials without a result."""
+        return sum(one.missing for one in self.cells.values())
+
+    @property
+    def is_complete(self) -> bool:
+        """Whether every planned trial has a verdict."""
+        return self.trials > 0 and not self.errors and not self.missing
+
+    @property
+    def rate(self) -> Fraction | None:
+        """Unweighted mean of the tasks' success rates; None without a verdict."""
+        rates = [cell.rate for cell in self.cells.values() if cell.rate is not None]
+        return sum(rates, Fraction(0)) / len(rates) if rates else None
+
+    @property
+    def pooled_rate(self) -> Fraction | None:
+        """Successes by trials, whatever their task; None without a verdict."""
+        return Fraction(self.successes, self.trials) if self.trials else None
+
+
+def measure(
+    frame: Columns,
+    by: Sequence[str],
+    against: Mapping[str, object] | None = None,
+    family: Sequence[str] = (),
+) -> tuple[Measured[tuple[Any, ...]], ...]:
+    """Measure success in each group of episodes, as the mean over tasks.
+
+    Args:
+        frame: as `roboirg.results` returns it, with columns of your own if you like.
+        by: columns whose values make a group.
+        against: values of some of these columns that make the group to compare with, such as
+            ``{"setting": "explicit"}``; the gap is on the same episodes and policy seeds.
+        family: columns of `by` within whose values p-values are corrected together.
+
+    Returns:
+        A row for each group, in the order in which they occur.
+    """
+    groups, changed = gather(frame, by), against or {}
+
+    def reference(key: tuple[Any, ...]) -> ByTask:
+        other = tuple(changed.get(name, one) for name, one in zip(by, key, strict=True))
+        return NOTHING if other == key else groups.get(other, NOTHING)
+
+    places = [list(by).index(name) for name in family]
+    return measure_groups(groups, [reference], lambda key: tuple(key[place] for place in places))
+
+
+def measure_groups(
+    groups: Mapping[K, ByTask],
+    references: Sequence[Callable[[K], ByTask]] = (),
+    family: Callable[[K], object] = lambda _key: None,
+    *,
+    is_mean: Callable[[K], bool] = lambda _key: False,
+    with_intervals: bool = True,
+) -> tuple[Measured[K], ...]:
+    """Measure groups against up to two references.
+
+    Args:
+        groups: to measure.
+        references: each returns the trials with which those of a group are compared.
+        family: what is read together: p-values of gaps are corrected over all of the same family.
+        is_mean: whether a group is a mean over tasks even if it has only one.
+        with_intervals: whether rates have intervals.
+    """
+    rng = np.random.default_rng(SEED)
+    found = []
+    for key, cells in groups.items():
+        # The order of these is part of the results: they draw from one generator.
+        interval = _interval(cells, rng, is_mean=is_mean(key)) if with_intervals else None
+        against = [one(key) for one in references]
+        gaps = [measure_gap(pair(cells, one), rng) for one in against]
+        others, *_ = (*against, NOTHING)
+        first, second, *_ = (*gaps, None, None)
+        found.append(Measured(key, cells, others, interval, first, second))
+    return with_holm(found, lambda one: family(one.key))
+
+
+def _interval(cells: ByTask, rng: np.random.Generator, *, is_mean: bool) -> Interval | None:
+    judged = [cell for cell in cells.values() if cell.trials]
+    if len(judged) == 1 and not is_mean:
+        return cell_interval(judged[0], rng)
+    return clustered_interval(judged, rng)
+
+
+def pair(cells: ByTask, others: ByTask) -> list[Pairs]:
+    """Pair the trials of each task."""
+    return [
+        Pairs.of(cell, others[task])
+        for task, cell in cells.items()
+        if cell.trials and task in others
+    ]
+
+
+class ScopeKey(NamedTuple):
+    """Policy run, scope (a task, a suite, or `ALL_TASKS`) and instruction options."""
+
+    policy_run: PolicyRun
+    scope: str
+    options: InstructionOptions
+
+
+def by_scope(cells: Cells) -> Mapping[ScopeKey, ByTask]:
+    """Group cells by scope, in their order: tasks, then suites, then all tasks."""
+    levels: tuple[dict[ScopeKey, dict[str, Cell]], ...] = ({}, {}, {})
+    for (policy_run, task, options), cell in cells.items():
+        for level, scope in zip(levels, (task, suite(task), ALL_TASKS), strict=True):
+            if scope is not None:
+                level.setdefault(ScopeKey(policy_run, scope, options), {})[task] = cell
+    return {key: own for level in levels for key, own in level.items()}
+
+
+def summarize(cells: Cells) -> Mapping[ScopeKey, Measured[ScopeKey]]:
+    """Measure each policy run and set of options in each scope.
+
+    The gap is to explicit, the second gap is the implicit form less the resolved one. P-values are
+    corrected over a policy run's tasks, its suites, or its averages.
+    """
+    scopes = by_scope(cells)
+
+    def other(key: ScopeKey, options: InstructionOptions) -> ByTask:
+        return NOTHING if options == key.options else scopes.get(key._replace(options=options), {})
+
+    found = measure_groups(
+        scopes,
+        (
+            lambda key: other(key, REFERENCE),
+            lambda key: other(key, replace(key.options, form="resolved")),
+        ),
+        # What is read together: a policy run's tasks, suites, averages.
+        lambda key: (key.policy_run, key.scope in scopes[key], key.scope == ALL_TASKS),
+        is_mean=lambda key: key.scope not in scopes[key],
+    )
+    return {one.key: one for one in found}
