@@ -13,7 +13,7 @@ import pytest
 from msgspec.structs import replace
 
 from roboirg.evaluation.analysis.published import RATE_TABLES
-from roboirg.evaluation.analysis.stats.cells import gather
+from roboirg.evaluation.analysis.stats.run_data import RunData
 from roboirg.evaluation.analysis.tables.paper_tables import WHICH, make_table
 from roboirg.evaluation.analysis.tables.rendering.latex import latex
 from roboirg.evaluation.analysis.tables.table import Column, Entry, Row, Table
@@ -59,11 +59,11 @@ FACTS = Table(
 
 
 def all_tables(like) -> list[Table]:
-    cells = gather([("run", [*like("main"), *like("real"), *like("context")])])
+    data = RunData.of([("run", [*like("main"), *like("real"), *like("context")])])
     perfect = [replace(one, outcome="success") for one in like("main", "MemER")]
     return [
-        make_table("main", gather([("run", perfect)]), published=True),
-        *(make_table(one, cells, published=True) for one in WHICH if one != "other"),
+        make_table("main", RunData.of([("run", perfect)]), published=True),
+        *(make_table(one, data, published=True) for one in WHICH if one != "other"),
         crowded(policies=2, tasks=7),
         crowded(policies=40, tasks=2),
         FACTS,
@@ -91,7 +91,7 @@ ARROWS = {"up": "↑", "down": "↓", "same": "→", None: ""}
 
 @pytest.mark.parametrize("which", [*RATE_TABLES, "coverage"])
 def test_a_published_table_is_one_and_has_every_figure_in_its_place(which: str) -> None:
-    table = make_table(which, {}, published=True)
+    table = make_table(which, None, published=True)
     (body,) = re.findall(r"\\midrule(.*)\\bottomrule", latex(table), re.DOTALL)
     printed = []
     for line in body.splitlines():

@@ -17,8 +17,8 @@ from roboirg.evaluation.analysis.published import (
     published_rows,
     published_tasks,
 )
-from roboirg.evaluation.analysis.stats.cells import gather
 from roboirg.evaluation.analysis.stats.rates import mean_percent, percent
+from roboirg.evaluation.analysis.stats.run_data import RunData
 from roboirg.evaluation.analysis.tables.paper_tables import make_table
 from roboirg.evaluation.analysis.tables.rendering import FORMATS
 from roboirg.evaluation.analysis.tables.table import Row, Table
@@ -48,7 +48,7 @@ def place(line: dict[str, str]) -> tuple[str, str]:
 @pytest.fixture(scope="module", params=RATE_TABLES)
 def made(request, published_like) -> Table:
     results = published_like(request.param)
-    return make_table(request.param, gather([("run", results)]), published=True)
+    return make_table(request.param, RunData.of([("run", results)]), published=True)
 
 
 def position(table: Table, row: Row) -> tuple[str, str]:
@@ -144,13 +144,13 @@ def test_our_rows_and_the_published_ones_are_drawn_alike(made: Table) -> None:
     ],
 )
 def test_some_rows_by_hand(published_like, table, model, names, texts) -> None:
-    made = make_table(table, gather([("run", published_like(table, model))]))
+    made = make_table(table, RunData.of([("run", published_like(table, model))]))
     markdown = FORMATS["markdown"].draw(made).replace("*", "")
     assert f"| {names} | {' | '.join(texts)} |" in markdown
 
 
 def test_spatial_averages_are_compared_on_equal_tasks_and_the_papers_changes_noted() -> None:
-    table = make_table("main", {}, published=True)
+    table = make_table("main", None, published=True)
     notes = " ".join(table.notes)
     assert "Averages of spatial are over the 7 of 11 tasks" in notes
     assert (
@@ -158,7 +158,7 @@ def test_spatial_averages_are_compared_on_equal_tasks_and_the_papers_changes_not
     ) in notes
     changes = [row.entries[-1].change for row in table.rows if row.group == "spatial"]
     assert list(map(str, changes)) == ["-14.48", "-10.86", "-26.48", "-17.91", "-29.04"]
-    assert "over the" not in " ".join(make_table("planner", {}, published=True).notes)
+    assert "over the" not in " ".join(make_table("planner", None, published=True).notes)
 
 
 def test_against_which_average_spatial_is_compared_turns_no_arrow_of_the_paper() -> None:
@@ -235,7 +235,7 @@ def test_published_tables_fit_this_benchmark() -> None:
 
 
 def test_the_coverage_of_this_benchmark_is_read_off_its_tasks() -> None:
-    table = make_table("coverage", {})
+    table = make_table("coverage", None)
     published = published_coverage()
     assert len(table.rows) == len(published) == 14
     for row, theirs in zip(table.rows, published, strict=True):
@@ -257,7 +257,7 @@ def test_the_coverage_of_this_benchmark_is_read_off_its_tasks() -> None:
     ],
 )
 def test_notes_name_what_would_mislead(which, said):
-    notes = " ".join(make_table(which, {}, published=True).notes)
+    notes = " ".join(make_table(which, None, published=True).notes)
     for words in said:
         assert words in notes
     assert ("over fewer tasks" in notes) == (which == "main")

@@ -3,17 +3,20 @@
 from __future__ import annotations
 
 import io
+from collections.abc import Sequence
 
 from flat_jobs import job_of
 from made_records import make_record
 from rich.console import Console
 
+from roboirg.evaluation.analysis.frame import make_frame
 from roboirg.evaluation.analysis.stats.rates import points
 from roboirg.evaluation.analysis.tables.run_tables import (
     make_run_tables,
     print_failures,
     print_run_tables,
 )
+from roboirg.evaluation.analysis.tables.table import Table
 from roboirg.evaluation.records.record import Job, Record
 
 
@@ -38,22 +41,26 @@ def record(
     return make_record(job, outcome, cause=cause)  # type: ignore[arg-type]
 
 
+def tables_of(records: list[Record], planned: Sequence[Job] = ()) -> list[Table]:
+    return make_run_tables(make_frame([("", records)], planned))
+
+
 def printed(records: list[Record], planned: tuple[Job, ...] = (), width: int = 120) -> str:
     console = Console(file=io.StringIO(), width=width)
-    print_run_tables(make_run_tables(records, planned), console)
+    print_run_tables(tables_of(records, planned), console)
     lines = console.file.getvalue().splitlines()  # type: ignore[attr-defined]
     return "".join(f"{line.rstrip()}\n" for line in lines)
 
 
 def texts(records: list[Record]) -> dict[str, list[str]]:
     """The cells of the only table as they are printed, by task."""
-    (table,) = make_run_tables(records).values()
+    (table,) = tables_of(records)
     return {row.name: list(map(str, row.entries)) for row in table.rows}
 
 
 def failures_text(records: list[Record]) -> str:
     console = Console(file=io.StringIO(), width=40)
-    print_failures(records, make_run_tables(records), console)
+    print_failures(make_frame([("", records)]), console)
     return console.file.getvalue()  # type: ignore[attr-defined,no-any-return]
 
 
@@ -128,7 +135,7 @@ def test_other_options_have_columns_of_their_own() -> None:
         record("success", setting="spatial", frame="camera"),
         record("success"),
     ]
-    (table,) = make_run_tables(records).values()
+    (table,) = tables_of(records)
     assert [column.name for column in table.columns] == [
         "explicit",
         "contextual",
@@ -147,10 +154,10 @@ def test_policies_and_conditions_have_tables_of_their_own_in_the_order_of_the_pl
         "listener, split val, max steps 1300 (privileged)",
         "random, split test, max steps 1300",
     ]
-    assert [table.title for table in make_run_tables(records).values()] == labels
+    assert [table.title for table in tables_of(records)] == labels
     planned = [record("success", policy=name).identity for name in ("random", "listener")]
-    tables = make_run_tables(records, planned)
-    assert [table.title for table in tables.values()] == [labels[3], *labels[:3]]
+    tables = tables_of(records, planned)
+    assert [table.title for table in tables] == [labels[3], *labels[:3]]
 
 
 def test_a_plan_without_results_has_a_table() -> None:

@@ -155,6 +155,11 @@ class Table:
     rows: tuple[Row, ...]
     notes: tuple[str, ...] = ()
 
+    @property
+    def headings(self) -> tuple[str, ...]:
+        """The headings of all columns, those of the labels first."""
+        return (*self.heads, *(column.name for column in self.columns))
+
     def lines(self) -> Iterator[tuple[bool, tuple[str, ...], Row]]:
         """Yield whether a row is the first of its group, its labels as printed, and the row."""
         for group in self.groups():

@@ -57,9 +57,8 @@ def csv_text(table: Table) -> str:
 
 def json_text(table: Table) -> str:
     """Return a list with an object for each row: what is printed, by heading."""
-    heads = (*table.heads, *(column.name for column in table.columns))
     rows = [(*table.labels(row), *(entry.text for entry in row.entries)) for row in table.rows]
-    found = [dict(zip(heads, row, strict=True)) for row in rows]
+    found = [dict(zip(table.headings, row, strict=True)) for row in rows]
     return json.dumps(found, ensure_ascii=False, indent=1) + "\n"
 
 

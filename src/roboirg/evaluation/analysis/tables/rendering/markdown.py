@@ -9,9 +9,8 @@ _SPECIAL = str.maketrans({sign: f"\\{sign}" for sign in "\\|*_`<[]"})
 
 def markdown(table: Table) -> str:
     """Return title, table and notes; only the first row of a group names the group."""
-    heads = [escaped(head) for head in (*table.heads, *(column.name for column in table.columns))]
     sides = ["---" if column.is_text else "---:" for column in table.columns]
-    lines = [f"### {escaped(table.title)}", "", _line(heads)]
+    lines = [f"### {escaped(table.title)}", "", _line([*map(escaped, table.headings)])]
     lines.append(_line(["---"] * len(table.heads) + sides))
     for _, labels, row in table.lines():
         lines.append(_line([*map(escaped, labels), *map(_cell, row.entries)]))
