@@ -148,7 +148,7 @@ def by_task(data: RunData) -> str:
         for task, trained in sorted(tasks.items()):
             for seed, cell in sorted(trained.items()):
                 solved = sum(cell.verdicts.values())
-                lines.append(f"{row},{setting},{task},{seed},{solved},{cell.trials}")
+                lines.append(f"{row},{setting},{task},{seed},{solved},{len(cell.verdicts)}")
     return "\n".join(lines) + "\n"
 
 

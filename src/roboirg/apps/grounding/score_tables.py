@@ -62,7 +62,7 @@ def _words(row: ScoreRow) -> tuple[str, ...]:
     summary = row.summary
     value, _, p_value = gap_words(summary.gap, summary.p_holm)
     return (
-        str(summary.trials),
+        str(summary.counts.trials),
         _percent(None if summary.rate is None else float(summary.rate)),
         _interval(summary.interval),
         _percent(row.chance),

@@ -41,7 +41,7 @@ def differences_of(key: CellKey, cell: Cell) -> Differences | None:
     Returns:
         None if nothing is published for the task, or if the cell has no rate.
     """
-    if not cell.trials:
+    if not cell.verdicts:
         return None
     if key.task in published_tasks("real"):
         return REAL

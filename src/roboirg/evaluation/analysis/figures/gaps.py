@@ -109,7 +109,7 @@ def _cells_of(cells: Cells, kind: Comparison, tasks: Tasks) -> Cells:
     return {
         key: cell
         for key, cell in cells.items()
-        if cell.trials and key.task in known.get(key.options, ())
+        if cell.verdicts and key.task in known.get(key.options, ())
     }
 
 
@@ -138,7 +138,7 @@ def _shared_tasks(cells: Cells, kind: Comparison) -> dict[InstructionOptions, li
     """
     played: dict[InstructionOptions, dict[PolicyRun, list[str]]] = {}
     for key, cell in cells.items():
-        if cell.trials and PAPER_TABLES[kind.table].shows(key.options):
+        if cell.verdicts and PAPER_TABLES[kind.table].shows(key.options):
             played.setdefault(key.options, {}).setdefault(key.policy_run, []).append(key.task)
     shared = {}
     for options in sorted(played, key=lambda one: (setting_sort_key(one.setting), len(one.stages))):
@@ -165,7 +165,7 @@ def _own_rates(
 
     def played(options: InstructionOptions, names: Sequence[str]) -> ByTask:
         keys = [CellKey(policy_run, task, options) for task in names]
-        return {key.task: cells[key] for key in keys if key in cells and cells[key].trials}
+        return {key.task: cells[key] for key in keys if key in cells and cells[key].verdicts}
 
     groups = {(options,): played(options, names) for options, names in tasks.items()}
     found = measure_groups(

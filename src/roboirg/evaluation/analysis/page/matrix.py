@@ -93,29 +93,29 @@ def _cell(one: Measured[ScopeKey], subject: str) -> dict[str, Any]:
         cell |= {"gap": round(one.gap.value, 4), "gap_text": points(one.gap.value)}
         if one.gap.retention is None and not one.gap.value:
             cell["floor"] = True
-    cell |= {name: count for name in ("errors", "missing") if (count := getattr(one, name))}
+    cell |= {name: count for name in ("errors", "missing") if (count := getattr(one.counts, name))}
     return cell
 
 
 def notes(one: Measured[ScopeKey], subject: str) -> list[str]:
     """Return a cell in words: first its subject, then its results."""
-    lines = [f"{subject}, {options_label(one.key.options)}"]
+    lines, counts = [f"{subject}, {options_label(one.key.options)}"], one.counts
     if one.rate is None:
         lines.append("no verdict yet")
     else:
         mean = f", mean of {len(one.tasks)} tasks" if len(one.tasks) > 1 else ""
         lines.append(
-            f"{whole_percent(one.rate)} % success{mean}: {one.successes} of "
-            f"{counted(one.trials, 'trial')}, {counted(one.episodes, 'episode')}"
+            f"{whole_percent(one.rate)} % success{mean}: {counts.successes} of "
+            f"{counted(counts.trials, 'trial')}, {counted(counts.episodes, 'episode')}"
         )
         if one.interval is not None:
             low, high = map(whole_percent, one.interval)
             lines.append(f"95 % interval {low} to {high} %")
     lines += _gap_notes(one)
-    if one.errors:
-        lines.append(f"{counted(one.errors, 'error')} left out of the rates")
-    if one.missing:
-        lines.append(f"{one.missing} still to be played")
+    if counts.errors:
+        lines.append(f"{counted(counts.errors, 'error')} left out of the rates")
+    if counts.missing:
+        lines.append(f"{counts.missing} still to be played")
     return lines
 
 

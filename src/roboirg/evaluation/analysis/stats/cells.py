@@ -29,14 +29,42 @@ class Trial(NamedTuple):
     policy_seed: int
 
 
+class Counts(NamedTuple):
+    """Numbers of trials.
+
+    Attributes:
+        successes: trials that succeeded.
+        trials: trials with a verdict.
+        episodes: episodes with a verdict.
+        errors: trials that ended in an error and are in no rate.
+        missing: planned trials without a result.
+    """
+
+    successes: int = 0
+    trials: int = 0
+    episodes: int = 0
+    errors: int = 0
+    missing: int = 0
+
+    @property
+    def rate(self) -> Fraction | None:
+        """Successes by trials; None without a verdict."""
+        return Fraction(self.successes, self.trials) if self.trials else None
+
+    @property
+    def is_complete(self) -> bool:
+        """Whether every planned trial has a verdict."""
+        return self.trials > 0 and not self.errors and not self.missing
+
+
 @dataclass(slots=True)
 class Cell:
     """Trials of one task.
 
     Attributes:
         verdicts: for each trial with a verdict, whether it succeeded.
-        errors: trials that ended in an error and are in no rate.
-        missing: planned trials without a result.
+        errors: number of trials that ended in an error.
+        missing: number of planned trials without a result.
     """
 
     verdicts: dict[Trial, bool] = field(default_factory=dict)
@@ -53,29 +81,15 @@ class Cell:
             self.verdicts[trial] = outcome == "success"
 
     @property
-    def trials(self) -> int:
-        """Number of trials with a verdict."""
-        return len(self.verdicts)
-
-    @property
-    def successes(self) -> int:
-        """Number of trials that succeeded."""
-        return sum(self.verdicts.values())
-
-    @property
-    def episodes(self) -> int:
-        """Number of episodes with a verdict."""
-        return len({one.episode for one in self.verdicts})
+    def counts(self) -> Counts:
+        episodes = {one.episode for one in self.verdicts}
+        successes, trials = sum(self.verdicts.values()), len(self.verdicts)
+        return Counts(successes, trials, len(episodes), self.errors, self.missing)
 
     @property
     def rate(self) -> Fraction | None:
         """Success rate, the mean over policy seeds; None without a verdict."""
-        return Fraction(self.successes, self.trials) if self.trials else None
-
-    @property
-    def is_complete(self) -> bool:
-        """Whether every planned trial has a verdict."""
-        return self.trials > 0 and not self.errors and not self.missing
+        return self.counts.rate
 
     def by_episode(self) -> dict[int, dict[int, bool]]:
         """Return the verdicts of each episode by policy seed."""
@@ -147,6 +161,7 @@ def clustered_interval(
 
 def cell_interval(cell: Cell, rng: np.random.Generator) -> Interval | None:
     """Return the interval of a cell's rate: Wilson's, or clustered with several policy seeds."""
-    if cell.episodes < cell.trials:
+    successes, trials, episodes, *_ = cell.counts
+    if episodes < trials:
         return clustered_interval([cell], rng)
-    return wilson_interval(cell.successes, cell.trials) if cell.trials else None
+    return wilson_interval(successes, trials) if trials else None

@@ -132,7 +132,7 @@ def _left_out(averages: Iterable[Compared]) -> Iterator[str]:
     unpaired = unjudged = 0
     for one in averages:
         cells = [*one.cells.values(), *one.others.values()]
-        unpaired += sum(cell.trials for cell in cells) - (one.gap.trials if one.gap else 0)
+        unpaired += sum(len(cell.verdicts) for cell in cells) - (one.gap.trials if one.gap else 0)
         unjudged += sum(cell.errors + cell.missing for cell in cells)
     if unpaired:
         verb = verb_for(unpaired, "are")

@@ -18,6 +18,7 @@ from roboirg.evaluation.analysis.stats.cells import (
     Cell,
     Cells,
     Columns,
+    Counts,
     cell_interval,
     clustered_interval,
     gather,
@@ -56,48 +57,18 @@ class Measured(Generic[K]):
     @property
     def tasks(self) -> tuple[str, ...]:
         """Tasks with a verdict."""
-        return tuple(task for task, cell in self.cells.items() if cell.trials)
+        return tuple(task for task, cell in self.cells.items() if cell.verdicts)
 
     @property
-    def successes(self) -> int:
-        """Number of trials that succeeded."""
-        return sum(one.successes for one in self.cells.values())
-
-    @property
-    def trials(self) -> int:
-        """Number of trials with a verdict."""
-        return sum(one.trials for one in self.cells.values())
-
-    @property
-    def episodes(self) -> int:
-        """Number of episodes with a verdict."""
-        return sum(one.episodes for one in self.cells.values())
-
-    @property
-    def errors(self) -> int:
-        """Number of trials that ended in an error."""
-        return sum(one.errors for one in self.cells.values())
-
-    @property
-    def missing(self) -> int:
-        """Number of planned trials without a result."""
-        return sum(one.missing for one in self.cells.values())
-
-    @property
-    def is_complete(self) -> bool:
-        """Whether every planned trial has a verdict."""
-        return self.trials > 0 and not self.errors and not self.missing
+    def counts(self) -> Counts:
+        """The sums over tasks."""
+        return Counts(*map(sum, zip(*(one.counts for one in self.cells.values()), strict=True)))
 
     @property
     def rate(self) -> Fraction | None:
         """Unweighted mean of the tasks' success rates; None without a verdict."""
         rates = [cell.rate for cell in self.cells.values() if cell.rate is not None]
         return sum(rates, Fraction(0)) / len(rates) if rates else None
-
-    @property
-    def pooled_rate(self) -> Fraction | None:
-        """Successes by trials, whatever their task; None without a verdict."""
-        return Fraction(self.successes, self.trials) if self.trials else None
 
 
 def measure(
@@ -159,7 +130,7 @@ def measure_groups(
 
 
 def _interval(cells: ByTask, rng: np.random.Generator, *, is_mean: bool) -> Interval | None:
-    judged = [cell for cell in cells.values() if cell.trials]
+    judged = [cell for cell in cells.values() if cell.verdicts]
     if len(judged) == 1 and not is_mean:
         return cell_interval(judged[0], rng)
     return clustered_interval(judged, rng)
@@ -170,7 +141,7 @@ def pair(cells: ByTask, others: ByTask) -> list[Pairs]:
     return [
         Pairs.of(cell, others[task])
         for task, cell in cells.items()
-        if cell.trials and task in others
+        if cell.verdicts and task in others
     ]
 
 

@@ -47,5 +47,5 @@ class RunData:
     def name(self, policy_run: PolicyRun) -> str:
         """Return the label of a policy run, marked if some planned trial has no verdict."""
         own = (one for key, one in self.cells.items() if key.policy_run == policy_run)
-        is_complete = all(one.is_complete for one in own)
+        is_complete = all(one.counts.is_complete for one in own)
         return self.names[policy_run] + ("" if is_complete else " (incomplete)")

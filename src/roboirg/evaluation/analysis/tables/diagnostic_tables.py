@@ -10,7 +10,7 @@ from roboirg.core.errors import InvalidValueError
 from roboirg.evaluation.analysis.frame import Frame, suite
 from roboirg.evaluation.analysis.policy_run import PolicyRun
 from roboirg.evaluation.analysis.stats.breakdowns import Breakdown, LabelKey, break_down
-from roboirg.evaluation.analysis.stats.cells import Key
+from roboirg.evaluation.analysis.stats.cells import Counts, Key
 from roboirg.evaluation.analysis.stats.comparison_text import incomplete_note
 from roboirg.evaluation.analysis.stats.heard_rates import (
     HeardCounts,
@@ -35,7 +35,6 @@ from roboirg.evaluation.analysis.tables.subgoal_table import make_subgoal_table
 from roboirg.evaluation.analysis.tables.table import (
     POLICY,
     Column,
-    Counts,
     Entry,
     Row,
     Table,
@@ -256,7 +255,7 @@ def make_breakdown_table(
             Row(
                 f"{names[one.key.run]}, {options_label(one.key.options)}",
                 one.key.label,
-                (str(one.episodes), _rate(one), *gap_words(one.gap, one.p_holm)),
+                (str(one.counts.episodes), _rate(one), *gap_words(one.gap, one.p_holm)),
             )
             for one in found
         ),
@@ -265,8 +264,8 @@ def make_breakdown_table(
 
 
 def _rate(one: Measured[LabelKey]) -> Entry:
-    counts = Counts(one.successes, one.trials, one.episodes, interval=one.interval)
-    return Entry(percent=None if one.rate is None else percent(one.rate), counts=counts)
+    rate = None if one.rate is None else percent(one.rate)
+    return Entry(percent=rate, counts=one.counts, interval=one.interval)
 
 
 DIAGNOSTIC_TABLES: Mapping[str, Callable[[RunData], Table]] = {

@@ -36,7 +36,6 @@ from roboirg.evaluation.analysis.tables.table import (
     MISSING_MARK,
     POLICY,
     Column,
-    Counts,
     Entry,
     Row,
     Table,
@@ -233,14 +232,8 @@ def _entry(
     return Entry(
         percent=None if cell.rate is None else percent(cell.rate),
         marks=ERROR_MARK * bool(cell.errors) + MISSING_MARK * bool(cell.missing),
-        counts=Counts(
-            cell.successes,
-            cell.trials,
-            cell.episodes,
-            cell.errors,
-            cell.missing,
-            cell_interval(cell, rng),
-        ),
+        counts=cell.counts,
+        interval=cell_interval(cell, rng),
         differences=differences.get(key),
     )
 

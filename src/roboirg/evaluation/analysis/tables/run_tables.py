@@ -166,10 +166,11 @@ def _make_run_table(
 def _entry(one: Measured[ScopeKey] | None, gap: str, differences: AllDifferences) -> Entry:
     if one is None:
         return Entry(applies=False)
-    counts = ((one.errors, ERROR_MARK), (one.missing, MISSING_MARK))
-    marks = " ".join(f"{count}{mark}" for count, mark in counts if count)
+    counts = one.counts
+    shown = ((counts.errors, ERROR_MARK), (counts.missing, MISSING_MARK))
+    marks = " ".join(f"{count}{mark}" for count, mark in shown if count)
     # Pooled over trials: the gaps are over trials too.
-    rate = one.pooled_rate
+    rate = counts.rate
     if rate is None:
         return Entry(word=NOT_APPLICABLE, marks=marks)
     return Entry(
@@ -186,19 +187,19 @@ def _legend(found: Mapping[ScopeKey, Measured[ScopeKey]], gaps: Set[str]) -> Ite
     yield f"success rate in %{compared if any(gaps) else ''}"
     if NOT_APPLICABLE in gaps:
         yield f"({NOT_APPLICABLE}) explicit has no success either, so the gap says nothing"
-    if any(one.errors for one in found.values()):
+    if any(one.counts.errors for one in found.values()):
         yield f"{ERROR_MARK} episodes ended in an error and are left out of the rates"
-    if any(one.missing for one in found.values()):
+    if any(one.counts.missing for one in found.values()):
         yield f"{MISSING_MARK} episodes are still to be played"
     if any(key.policy_run.is_privileged for key in found):
         yield "privileged policies and scripted hands use the simulator's state"
 
 
 def _sizes(found: Mapping[ScopeKey, Measured[ScopeKey]]) -> str:
-    single = [one.trials for key, one in found.items() if key.scope != ALL_TASKS]
+    single = [one.counts.trials for key, one in found.items() if key.scope != ALL_TASKS]
     text = f"n = {_range(single)} {'episode' if max(single) == 1 else 'episodes'} per cell"
     if len({key.scope for key in found}) > 2:  # noqa: PLR2004 - a task and all of them
-        every = [one.trials for key, one in found.items() if key.scope == ALL_TASKS]
+        every = [one.counts.trials for key, one in found.items() if key.scope == ALL_TASKS]
         text += f", {_range(every)} for {ALL_TASKS}"
     return text
 

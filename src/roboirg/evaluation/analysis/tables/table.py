@@ -9,6 +9,7 @@ from decimal import Decimal
 from typing import Literal, NamedTuple
 
 from roboirg.evaluation.analysis.comparability import Differences, comparison_sign, merged
+from roboirg.evaluation.analysis.stats.cells import Counts
 from roboirg.evaluation.analysis.stats.intervals import Interval
 from roboirg.evaluation.analysis.stats.rates import NOT_APPLICABLE, change_text, mean_percent
 
@@ -24,26 +25,6 @@ POLICY = "policy"
 """Heading of policies, whose names are marked if their rows are published."""
 
 
-class Counts(NamedTuple):
-    """The counts behind an entry.
-
-    Attributes:
-        successes: trials that succeeded.
-        trials: trials with a verdict.
-        episodes: episodes with a verdict.
-        errors: trials that ended in an error.
-        missing: planned trials without a result.
-        interval: 95 % interval of the rate, or None.
-    """
-
-    successes: int = 0
-    trials: int = 0
-    episodes: int = 0
-    errors: int = 0
-    missing: int = 0
-    interval: Interval | None = None
-
-
 @dataclass(frozen=True, slots=True)
 class Entry:
     """One cell of a table.
@@ -57,6 +38,7 @@ class Entry:
         best: whether it is the best, or among the best, of its group.
         marks: of incomplete entries, as in the constants above.
         counts: behind the rate; None if they are unknown.
+        interval: 95 %, of the rate; None if it is unknown.
         differences: from the published rate's conditions; None without a published rate.
         style: color of the text in a terminal, or empty.
     """
@@ -68,6 +50,7 @@ class Entry:
     best: bool = False
     marks: str = ""
     counts: Counts | None = None
+    interval: Interval | None = None
     differences: Differences | None = None
     style: str = ""
 

@@ -174,7 +174,7 @@ def _distinct(conditions: Iterable[EvalConditions], name: str) -> list[str]:
 
 
 def _size_notes(cells: Iterable[Cell]) -> list[str]:
-    judged = [cell for cell in cells if cell.trials]
+    judged = [cell.counts for cell in cells if cell.verdicts]
     if not judged:
         return []
     episodes = _range([cell.episodes for cell in judged], "episode")

@@ -63,9 +63,7 @@ def json_text(table: Table) -> str:
 
 
 def _line(table: Table, row: Row, column: Column, entry: Entry) -> list[object]:
-    counts = entry.counts
-    interval = counts.interval if counts else None
-    ends = ["", ""] if interval is None else [f"{100 * end:.2f}" for end in interval]
+    ends = ["", ""] if entry.interval is None else [f"{100 * end:.2f}" for end in entry.interval]
     return [
         table.key,
         row.source,
@@ -79,7 +77,7 @@ def _line(table: Table, row: Row, column: Column, entry: Entry) -> list[object]:
         "" if entry.change is None else entry.change,
         _flag(entry.best),
         " ".join(_MARK_NAMES[mark] for mark in entry.marks),
-        *(["", "", "", "", ""] if counts is None else counts[:5]),
+        *(entry.counts or ("",) * 5),
         *ends,
         "" if entry.differences is None else _flag(not entry.differences),
         "; ".join(entry.differences or ()),
