@@ -285,9 +285,6 @@ def test_an_episode_shows_its_forms_failure_and_scene_mates(page: Any) -> None:
     # It is hidden by the filters, so they are cleared.
     assert shown(page) == len(records())
     assert "explicit" in focused(page)
-
-
-def test_an_error_shows_its_traceback_as_text(page: Any) -> None:
     row = first_row(page, outcome="error")
     row.locator("summary").click()
     assert row.locator("pre").inner_text() == TRACEBACK

@@ -15,11 +15,11 @@ from flat_jobs import with_version
 from made_records import make_record
 from msgspec.structs import replace
 from page_text import render, store
-from roboirg.evaluation.analysis.stats.failure_counts import UNATTRIBUTED
 
 from roboirg.core.episode import ENVIRONMENT_VERSION
 from roboirg.evaluation.analysis.page import report
 from roboirg.evaluation.analysis.page.report import make_view, write_report
+from roboirg.evaluation.analysis.tables.diagnostic_tables import UNATTRIBUTED
 from roboirg.evaluation.plan.plan import Plan
 from roboirg.evaluation.plan.sources import Source
 from roboirg.evaluation.records.episode_log import EpisodeLog, log_path

@@ -28,7 +28,7 @@ from roboirg.evaluation.records.film import FRAME_RATE, FRAME_STEPS, LAST_FRAME_
 from roboirg.evaluation.records.packs import PACK_SUFFIX
 from roboirg.evaluation.records.record import Record
 from roboirg.language.settings import EXPLICIT, all_settings
-from roboirg.util.atomic_write import write_atomically
+from roboirg.util.atomic_write import replacing
 from roboirg.util.web.page_templates import check_page_support, template_environment
 
 REPORT_FILE = "report.html"
@@ -84,7 +84,9 @@ def write_report(
     embeds = sum(path.stat().st_size for path in _media(episodes).values()) <= MAX_EMBEDDED_BYTES
     gone = [one.unpacked for one in sources if one.unpacked is not None]
     details = EpisodeDetails(path.parent, embeds, gone)
-    write_atomically(path, _render(episodes, details, progress))
+    pieces = _render(episodes, details, progress)
+    with replacing(path) as part, part.open("w", encoding="utf-8") as file:
+        file.writelines(pieces)
     return path
 
 
@@ -92,7 +94,7 @@ def make_view(source: Source, progress: Progress | None = None) -> str:
     """Return the page of a run as it is served, with links to its videos."""
     now = replace(source)  # without what was read before
     episodes = PageEpisodes.of({now.name: now}, videos=True)
-    return _render(episodes, EpisodeDetails(now.folder, embeds=False), progress)
+    return "".join(_render(episodes, EpisodeDetails(now.folder, embeds=False), progress))
 
 
 def check_report_support() -> None:
@@ -100,15 +102,21 @@ def check_report_support() -> None:
     check_page_support("The report")
 
 
-def _render(episodes: PageEpisodes, details: EpisodeDetails, progress: Progress | None) -> str:
-    """Return the page; the details are made for it."""
+def _render(
+    episodes: PageEpisodes, details: EpisodeDetails, progress: Progress | None
+) -> Iterator[str]:
+    """Return the page in pieces, as a large one takes memory; the details are made for it."""
     check_report_support()
     template = template_environment("roboirg.evaluation.analysis.page").get_template(
         f"{REPORT_FILE}.j2"
     )
     frame = with_words(episodes.frame, _add_all(details, episodes, progress))
-    data = _data(episodes, details)
-    return template.render(
+    data = json.dumps(
+        _data(episodes, details), ensure_ascii=False, separators=(",", ":"), allow_nan=False
+    )
+    lines = "\n".join(details.lines)
+    details.lines.clear()
+    return template.generate(
         styles=STYLES,
         scripts=SCRIPTS,
         name=" against ".join(episodes.runs),
@@ -119,16 +127,19 @@ def _render(episodes: PageEpisodes, details: EpisodeDetails, progress: Progress 
         media=((name, _data_uri(path)) for name, path in _media(episodes).items())
         if details.embeds
         else (),
-        data=_safe(json.dumps(data, ensure_ascii=False, separators=(",", ":"), allow_nan=False)),
-        details=_safe("\n".join(details.lines)),
+        data=_safe(data),
+        details=_safe(lines),
     )
 
 
 def _media(episodes: PageEpisodes) -> dict[str, Path]:
     """Return the files of all videos by the names that the page's script knows them by."""
-    kinds = {f"film-{one.key}": one.film for one in episodes.all}
-    kinds |= {f"poster-{one.key}": one.poster for one in episodes.all}
-    return {name: path for name, path in kinds.items() if path is not None}
+    return {
+        f"{kind}-{one.key}": path
+        for one in episodes.all
+        for kind, path in (("film", one.film), ("poster", one.poster))
+        if path is not None
+    }
 
 
 def _add_all(
