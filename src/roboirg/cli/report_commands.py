@@ -13,6 +13,7 @@ from roboirg.core.errors import InvalidValueError, UnknownNameError
 
 if TYPE_CHECKING:
     from roboirg.evaluation.analysis.stats.breakdowns import Breakdown
+    from roboirg.evaluation.analysis.stats.run_data import RunData
     from roboirg.evaluation.analysis.tables.table import Table
     from roboirg.evaluation.plan.sources import Source
 
@@ -176,14 +177,21 @@ def tables(
     Example: roboirg tables runs/first --which main --published
     """
     from roboirg.cli.run_commands import warn_of_mixtures
+    from roboirg.evaluation.analysis.frame_reading import read_frame
+    from roboirg.evaluation.analysis.stats.run_data import RunData
     from roboirg.evaluation.analysis.tables.rendering import get_format
+    from roboirg.evaluation.analysis.tables.table_notes import with_mixtures
     from roboirg.evaluation.plan.sources import opened_sources
     from roboirg.util.atomic_write import write_atomically
 
     output = get_format(format)
+    _check_choice(which, by, runs or [], published=published, floors=floors)
     with opened_sources(runs or []) as sources:
-        warn_of_mixtures([one for source in sources for one in source.results])
-        found = _tables(which, by, sources, published=published, floors=floors)
+        data = RunData(read_frame(sources, words=by is not None))
+        made = _tables(which, by, sources, data, published=published, floors=floors)
+    found = [with_mixtures(table, data.frame) for table in made]
+    if format in ("csv", "json"):  # without notes
+        warn_of_mixtures(data.frame)
     if out is not None:
         for table in found:
             path = out / f"{table.key}{output.suffix}"
@@ -224,8 +232,8 @@ def compare(
     wanted = _breakdowns(by)
     with opened_sources([first]) as ours, opened_sources([second]) as theirs:
         frame, other = (read_frame(one, words=bool(wanted)) for one in (ours, theirs))
-        warn_of_mixtures([one for source in (*ours, *theirs) for one in source.results])
     found = compare_frames(frame, other, wanted)
+    warn_of_mixtures(frame, other)
     names = (found.first.marked_policy, found.second.marked_policy)
     if names[0] == names[1]:
         names = (f"{names[0]} ({first})", f"{names[1]} ({second})")
@@ -240,52 +248,58 @@ def compare(
         console.print(Text(sentence), highlight=False)
 
 
-def _tables(
-    which: str, by: str | None, sources: Sequence[Source], *, published: bool, floors: str | None
-) -> list[Table]:
-    """Return the tables that are wanted; those of runs alone have no published rows or floors."""
-    from roboirg.evaluation.analysis.frame_reading import read_frame
-    from roboirg.evaluation.analysis.stats.run_data import RunData
+def _check_choice(
+    which: str, by: str | None, runs: Sequence[str], *, published: bool, floors: str | None
+) -> None:
+    """Refuse tables that do not exist or that have no such rows, before anything is read."""
     from roboirg.evaluation.analysis.tables.diagnostic_tables import (
         DIAGNOSTIC_TABLES,
         RECORD_TABLES,
     )
+    from roboirg.evaluation.analysis.tables.paper_tables import WHICH
 
     alone = (*DIAGNOSTIC_TABLES, *RECORD_TABLES)
+    if which not in (*WHICH, *alone, _ALL):
+        raise UnknownNameError("table", which, (*WHICH, *alone, _ALL))
     asked = [which] * (which != _ALL) + ["--by"] * (by is not None)
     if {*alone, "--by"} & {*asked} and (published or floors or len(asked) > 1):
         raise InvalidValueError(
             f"--by, and --which {', '.join(alone)}, show runs alone; each excludes the other, "
             "--published and --floors."
         )
-    if not sources and not published and which != "coverage":
+    if not runs and not published and which != "coverage":
         raise InvalidValueError("Tables need a run; give its folder, a pack, or --published.")
-    if by is not None:
-        return _breakdown_tables(sources, by)
-    if which not in alone:
-        return _paper_tables(which, sources, published=published, floors=floors)
-    data = RunData(read_frame(sources))
-    if which in DIAGNOSTIC_TABLES:
-        return [DIAGNOSTIC_TABLES[which](data)]
-    return [RECORD_TABLES[which](data, (one for source in sources for one in source.records()))]
 
 
-def _paper_tables(
-    which: str, sources: Sequence[Source], *, published: bool, floors: str | None
+def _tables(
+    which: str,
+    by: str | None,
+    sources: Sequence[Source],
+    data: RunData,
+    *,
+    published: bool,
+    floors: str | None,
 ) -> list[Table]:
-    from roboirg.evaluation.analysis.frame_reading import read_frame
-    from roboirg.evaluation.analysis.published import RATE_TABLES
-    from roboirg.evaluation.analysis.stats.chance import FLOORS
-    from roboirg.evaluation.analysis.stats.run_data import RunData
     from roboirg.evaluation.analysis.tables.diagnostic_tables import (
         DIAGNOSTIC_TABLES,
         RECORD_TABLES,
     )
+
+    if by is not None:
+        return _breakdown_tables(data, by)
+    if which in DIAGNOSTIC_TABLES:
+        return [DIAGNOSTIC_TABLES[which](data)]
+    if which in RECORD_TABLES:
+        records = (one for source in sources for one in source.records())
+        return [RECORD_TABLES[which](data, records)]
+    return _paper_tables(which, data, published=published, floors=floors)
+
+
+def _paper_tables(which: str, data: RunData, *, published: bool, floors: str | None) -> list[Table]:
+    from roboirg.evaluation.analysis.published import RATE_TABLES
+    from roboirg.evaluation.analysis.stats.chance import FLOORS
     from roboirg.evaluation.analysis.tables.paper_tables import WHICH, is_informative, make_table
 
-    if which not in (*WHICH, _ALL):
-        raise UnknownNameError("table", which, (*WHICH, *DIAGNOSTIC_TABLES, *RECORD_TABLES, _ALL))
-    data = RunData(read_frame(sources))
     shown = (*RATE_TABLES, "coverage") if published else ()
     applying = [one for one in WHICH if one in shown or is_informative(one, data)]
     added = () if floors is None else known_names("floor", floors, FLOORS)
@@ -300,12 +314,10 @@ def _paper_tables(
     return found
 
 
-def _breakdown_tables(sources: Sequence[Source], by: str) -> list[Table]:
-    from roboirg.evaluation.analysis.frame_reading import read_frame
+def _breakdown_tables(data: RunData, by: str) -> list[Table]:
     from roboirg.evaluation.analysis.tables.diagnostic_tables import make_breakdown_table
 
-    wanted, frame = _breakdowns(by), read_frame(sources, words=True)
-    tables = (make_breakdown_table(one, frame) for one in wanted)
+    tables = (make_breakdown_table(one, data.frame) for one in _breakdowns(by))
     if not (found := [table for table in tables if table.rows]):
         raise InvalidValueError(
             f"The runs have no instruction to break down by {by}; they need an implicit setting."

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Collection, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -18,9 +18,10 @@ from roboirg.core.plain_text import counted, printable, verb_for
 if TYPE_CHECKING:
     from rich.console import Console
 
+    from roboirg.evaluation.analysis.frame import Frame
     from roboirg.evaluation.plan.plan import Plan
     from roboirg.evaluation.plan.sources import Source
-    from roboirg.evaluation.records.record import Job, Summary
+    from roboirg.evaluation.records.record import Job
     from roboirg.evaluation.run.executor import Executor
     from roboirg.evaluation.run.runner import RunSummary
 
@@ -150,15 +151,15 @@ def print_tables_of(source: Source) -> None:
 
     frame, console = read_frame([source]), Console()
     print_run_tables(make_run_tables(frame), console)
-    warn_of_mixtures(source.results)
+    warn_of_mixtures(frame)
     print_failures(frame, console)
 
 
-def warn_of_mixtures(results: Collection[Summary]) -> None:
-    """Print on stderr which versions and render devices are mixed in results."""
-    from roboirg.evaluation.records.mixing import mixture_warnings
+def warn_of_mixtures(*frames: Frame) -> None:
+    """Print on stderr what the results do not have in common; control arms are left out."""
+    from roboirg.evaluation.records.mixing import mixtures
 
-    for sentence in mixture_warnings(results):
+    for sentence in mixtures([one for frame in frames for one in frame.told().played]):
         typer.echo(sentence, err=True)
 
 

@@ -52,3 +52,10 @@ def pool_of(split: str, wordings: str | None = None) -> PoolName:
         if wordings == pool:
             return pool
     return "train" if split in TRAINING_SPLITS else "test"
+
+
+def words_label(wordings: str | None) -> str:
+    """Return whose words instructions have, from a pool or the identity of a wording file."""
+    if wordings in POOLS:
+        return f"our own words for {wordings}"
+    return "our own words" if wordings is None else f"the words of {wordings}"

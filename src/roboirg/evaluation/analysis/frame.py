@@ -170,6 +170,11 @@ class Frame(Mapping[str, Any]):
         is_told = self["arm"] == TOLD
         return self.take(is_told) if is_told.any() and not is_told.all() else self
 
+    @property
+    def played(self) -> list[Summary]:
+        """The results, without episodes that were not played."""
+        return list(self["result"][self["outcome"] != MISSING])
+
     @cached_property
     def names(self) -> Mapping[PolicyRun, str]:
         """Labels of the policy runs, in order."""

@@ -13,20 +13,11 @@ from typing import NamedTuple
 from roboirg.core.arms import TOLD
 from roboirg.core.environment_options import ENVIRONMENT_OPTIONS, EnvironmentOptions
 from roboirg.core.subgoal_text import BETWEEN_VERSIONS, SCRIPTED_HANDS
-from roboirg.evaluation.analysis.stats.option_labels import words_label
+from roboirg.core.word_pools import words_label
 from roboirg.evaluation.records.record import Job, Summary
 
 CONDITIONS = ("split", *ENVIRONMENT_OPTIONS, "wordings", "arm")
 """The names of all conditions."""
-
-FAIRNESS = {
-    "split": "splits",
-    "wordings": "words",
-    "max_steps": "step limits",
-    "meshes": "kinds of meshes",
-    "arm": "arms",
-}
-"""Conditions that must be equal in a comparison, with their names in the plural."""
 
 PRIVILEGED = " (privileged)"
 """Mark of policies that read the simulator's state."""
@@ -71,12 +62,7 @@ class Versions(NamedTuple):
 
     @classmethod
     def of(cls, result: Summary) -> Versions:
-        policy, server = result.policy_version, result.server_version
-        return cls(
-            policy if server is None else f"{policy} (server {server})",
-            result.language_version,
-            result.environment_version,
-        )
+        return cls(result.played_version, result.language_version, result.environment_version)
 
 
 class PolicyRun(NamedTuple):

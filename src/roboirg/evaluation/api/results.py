@@ -21,6 +21,7 @@ from roboirg.evaluation.analysis.stats.option_labels import options_label
 from roboirg.evaluation.analysis.stats.run_data import RunData
 from roboirg.evaluation.analysis.tables.paper_tables import WHICH, is_informative, make_table
 from roboirg.evaluation.analysis.tables.rendering import get_format
+from roboirg.evaluation.analysis.tables.table_notes import with_mixtures
 from roboirg.evaluation.plan.sources import Source, opened_sources
 from roboirg.evaluation.records.record import Record, Summary
 from roboirg.evaluation.records.store import read_records
@@ -129,9 +130,8 @@ class Results:
         Raises:
             UnknownNameError: there is no such table or format.
         """
-        return get_format(format).draw(
-            make_table(which, self._data, published=published, floors=floors)
-        )
+        made = make_table(which, self._data, published=published, floors=floors)
+        return get_format(format).draw(with_mixtures(made, self._data.frame))
 
     def plot(self, which: str = "gaps", *, published: bool = False) -> Plot:
         """Return one of the figures: gaps, forms, context or failures.

@@ -14,7 +14,7 @@ from roboirg.core.errors import InvalidValueError
 from roboirg.evaluation.records.action_log import action_path
 from roboirg.evaluation.records.episode_log import log_path, logged_slugs
 from roboirg.evaluation.records.film import poster_name
-from roboirg.evaluation.records.mixing import mixture_warnings
+from roboirg.evaluation.records.mixing import mixtures
 from roboirg.evaluation.records.record import Summary
 from roboirg.evaluation.records.record_codec import (
     StoreError,
@@ -90,7 +90,7 @@ def merge_runs(folders: Sequence[Path], out: Path) -> MergeSummary:
                 kept[identity_key(one)] = one
                 added += before is None
             store.extend(_lines(run, wanted, folder, out))
-    mixed = mixture_warnings(tuple(kept.values()))
+    mixed = mixtures(kept.values())
     return MergeSummary(added, duplicates, tuple(conflicts), tuple(mixed))
 
 

@@ -1,43 +1,80 @@
-"""What results have in common that rates do not tell apart, and whether it is mixed."""
+"""What results should have in common, and sentences on everything in which they differ."""
 
 from __future__ import annotations
 
 import operator
-from collections.abc import Collection
-from typing import NamedTuple
+from collections.abc import Callable, Collection, Iterable, Iterator
+from typing import Any, NamedTuple
 
+from roboirg.core.environment_options import ENVIRONMENT_OPTIONS
+from roboirg.core.word_pools import words_label
 from roboirg.evaluation.records.record import Summary
 
 
-class _Mixture(NamedTuple):
-    """A fact of results that should be the same in all of them, and what it means if it is not."""
+class Trait(NamedTuple):
+    """What should be the same in all results, or in all of a policy.
 
-    name: str
+    Attributes:
+        path: of the field of a result.
+        plural: what several values are called.
+        meaning: of several values; empty if it is unknown.
+        text: returns a value in words, or None if it fits all others.
+    """
+
+    path: str
     plural: str
     meaning: str
+    text: Callable[[Any], str | None] = str
 
 
+_UNFAIR = "They are kept apart and cannot be compared."
 _APART = "They are kept apart and never averaged."
-_MIXTURES = (
-    _Mixture("language_version", "versions of the language", _APART),
-    _Mixture("environment_version", "versions of the environment", _APART),
-    _Mixture(
+
+FAIRNESS = (
+    Trait("split", "splits", _UNFAIR),
+    Trait("options.wordings", "words", _UNFAIR, words_label),
+    Trait("environment.max_steps", "step limits", _UNFAIR),
+    Trait("environment.meshes", "kinds of meshes", _UNFAIR),
+    Trait("arm", "arms", _UNFAIR),
+    Trait("language_version", "versions of the language", _UNFAIR),
+    Trait("environment_version", "versions of the environment", _UNFAIR),
+)
+"""What must be equal in a comparison of policies."""
+
+_COMMON = (
+    Trait(
         "render_device",
         "render devices",
         "Their pictures differ in some pixels by a brightness level, and rates average over them.",
+        lambda device: device,  # results for which nothing was rendered fit every device
+    ),
+    Trait("code", "states of the package's code", "Rates do not tell them apart."),
+)
+_OF_POLICY = (
+    Trait("played_version", "versions", _APART),
+    *(
+        Trait(path, name.replace("_", " "), _APART)
+        for name in ENVIRONMENT_OPTIONS
+        if (path := f"environment.{name}") not in {one.path for one in FAIRNESS}
     ),
 )
 
 
-def mixture_warnings(results: Collection[Summary]) -> list[str]:
-    """Return a sentence for each version, and for the render device, that is not the same in all.
-
-    Results for which nothing was rendered fit every device.
-    """
-    found = []
-    for name, plural, meaning in _MIXTURES:
-        read = operator.attrgetter(name)
-        values = sorted(str(value) for value in {*map(read, results)} if value is not None)
-        if len(values) > 1:
-            found.append(f"Mixed {plural}: {', '.join(values)}. {meaning}")
+def mixtures(results: Collection[Summary]) -> list[str]:
+    """Return a sentence for everything that is not the same in all results, or of a policy."""
+    found = [*differing(results, FAIRNESS), *differing(results, _COMMON)]
+    for policy in sorted({one.policy for one in results}):
+        own = [one for one in results if one.policy == policy]
+        found += differing(own, _OF_POLICY, f" of {policy}")
     return found
+
+
+def differing(
+    results: Collection[Summary], traits: Iterable[Trait], owner: str = ""
+) -> Iterator[str]:
+    """Yield a sentence for each of some traits of which results have several values."""
+    for trait in traits:
+        values = {*map(trait.text, {*map(operator.attrgetter(trait.path), results)})} - {None}
+        if len(values) > 1:
+            listed = ", ".join(sorted(map(str, values)))
+            yield f"Mixed {trait.plural}{owner}: {listed}. {trait.meaning}"

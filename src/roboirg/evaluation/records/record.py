@@ -359,6 +359,12 @@ class Summary(Job, frozen=False, kw_only=True, gc=False):  # type: ignore[misc]
         return self.ref.version
 
     @property
+    def played_version(self) -> str:
+        """The version of the policy with that of its server, if it reported one."""
+        server = self.server_version
+        return self.policy_version if server is None else f"{self.policy_version} (server {server})"
+
+    @property
     def identity(self) -> Job:
         """Its job, without the policy."""
         return Job(**{name: getattr(self, name) for name in IDENTITY})

@@ -5,6 +5,7 @@ A page of ten thousand episodes must open and filter at once.
 
 from __future__ import annotations
 
+import operator
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from typing import NamedTuple, get_args
@@ -13,9 +14,9 @@ from roboirg.core.episode import DIFFICULTIES
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.evaluation.analysis.frame import task_order
 from roboirg.evaluation.analysis.page.episodes import PageEpisodes
-from roboirg.evaluation.analysis.policy_run import FAIRNESS
 from roboirg.evaluation.analysis.stats.option_labels import options_label, options_sort_key
 from roboirg.evaluation.analysis.tables.diagnostic_tables import FAILURES, UNATTRIBUTED
+from roboirg.evaluation.records.mixing import FAIRNESS
 from roboirg.evaluation.records.record import ERROR_KINDS, Outcome, Summary
 from roboirg.tasks import all_tasks
 
@@ -90,13 +91,11 @@ def make_numbers(episodes: PageEpisodes) -> dict[str, Sequence[int | str]]:
     Episodes of the same scene have the same number in the column ``scene``; among them those that
     can be compared, in the column ``pair``.
     """
-    fairness = {
-        run: tuple(run.conditions.value(name) for name in FAIRNESS) for run in episodes.names
-    }
+    fairness = operator.attrgetter(*(trait.path for trait in FAIRNESS))
     records = [one.record for one in episodes.all]
     scenes = [(one.task, one.split, one.episode) for one in records]
     pairs = [
-        (*scene, one.record.policy_seed, one.options, fairness[one.policy_run])
+        (*scene, one.record.policy_seed, one.options, fairness(one.record))
         for scene, one in zip(scenes, episodes.all, strict=True)
     ]
     return {

@@ -25,8 +25,8 @@ from roboirg.core.episode import ENVIRONMENT_VERSION, Episode, Scene
 from roboirg.core.errors import RoboIRGError
 from roboirg.core.fact_traits import fact_traits
 from roboirg.core.plain_text import counted
+from roboirg.core.word_pools import words_label
 from roboirg.evaluation.analysis.page.episodes import PageEpisode
-from roboirg.evaluation.analysis.stats.option_labels import words_label
 from roboirg.evaluation.play.job_instruction import PreparedJob, instruct_job
 from roboirg.evaluation.records.record import EventRecord, Record, SubgoalRecord
 from roboirg.judging.episode_replay import Event, completed_stages

@@ -10,15 +10,15 @@ from typing import Any
 
 from roboirg.core.errors import InvalidValueError
 from roboirg.core.plain_text import counted, verb_for
+from roboirg.core.word_pools import words_label
 from roboirg.evaluation.analysis.frame import MISSING
 from roboirg.evaluation.analysis.page.episodes import PageEpisodes
-from roboirg.evaluation.analysis.policy_run import FAIRNESS, PolicyRun
+from roboirg.evaluation.analysis.policy_run import PolicyRun
 from roboirg.evaluation.analysis.stats.comparison import compare
 from roboirg.evaluation.analysis.stats.comparison_text import sentences
 from roboirg.evaluation.analysis.stats.headline import headline_notes
 from roboirg.evaluation.analysis.stats.heard_rates import heard_notes
-from roboirg.evaluation.analysis.stats.option_labels import words_label
-from roboirg.evaluation.records.mixing import mixture_warnings
+from roboirg.evaluation.records.mixing import mixtures
 from roboirg.language.settings import EXPLICIT
 from roboirg.tasks.splits.private_splits import SALT_VARIABLE, MissingSaltError, check_salt
 
@@ -44,7 +44,7 @@ def run_warnings(episodes: PageEpisodes) -> list[tuple[str, str]]:
     These are sentences above the results, each after its kind, ``warning`` or ``note``.
     """
     heard = heard_notes(episodes.frame, episodes.names)
-    warnings = (_incomplete(episodes), _mixed(episodes), heard)
+    warnings = (_incomplete(episodes), mixtures([one.record for one in episodes.all]), heard)
     headline = headline_notes(episodes.cells, episodes.names)
     notes = (_without_reference(episodes), _private(episodes), headline)
     return [
@@ -111,29 +111,6 @@ def _incomplete(episodes: PageEpisodes) -> Iterable[str]:
             f"{errors.total()} of {counted(total, 'episode')} ended in an error ({kinds}). Errors "
             "are left out of the rates; cells and averages with errors are marked “!”."
         )
-
-
-def _mixed(episodes: PageEpisodes) -> Iterable[str]:
-    runs = [one for one in episodes.names if one.versions is not None]
-    apart = "separate heat maps and are never averaged."
-    yield from mixture_warnings([one.record for one in episodes.all])
-    for name, plural in FAIRNESS.items():
-        values = {one.conditions.text(name) for one in runs}
-        if len(values) > 1:
-            yield f"Mixed {plural}: {', '.join(sorted(values))}. They have {apart}"
-    for policy in dict.fromkeys(one.policy for one in runs):
-        own = [one for one in runs if one.policy == policy]
-        versions = {one.versions.policy for one in own if one.versions is not None}
-        if len(versions) > 1:
-            found = ", ".join(sorted(versions))
-            yield f"{policy} played in several versions: {found}. They have {apart}"
-        conditions = {one.conditions for one in own}
-        if len(conditions) > 1:
-            count = f"{len(conditions)} sets of conditions"
-            yield f"{policy} played under {count}, which have separate heat maps."
-    codes = {one.record.code for one in episodes.all}
-    if len(codes) > 1:
-        yield f"Played with {len(codes)} different states of the package’s code."
 
 
 def _without_reference(episodes: PageEpisodes) -> Iterable[str]:

@@ -8,11 +8,12 @@ from typing import NamedTuple
 from roboirg.core.errors import InvalidValueError
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.evaluation.analysis.frame import Frame
-from roboirg.evaluation.analysis.policy_run import FAIRNESS, PolicyRun
+from roboirg.evaluation.analysis.policy_run import PolicyRun
 from roboirg.evaluation.analysis.stats.breakdowns import Breakdown, labeled, natural
 from roboirg.evaluation.analysis.stats.cells import ByTask, gather
 from roboirg.evaluation.analysis.stats.measure import Measured, measure_groups
 from roboirg.evaluation.analysis.stats.option_labels import REFERENCE, options_sort_key
+from roboirg.evaluation.records.mixing import FAIRNESS, differing
 
 
 class ComparisonKey(NamedTuple):
@@ -68,7 +69,7 @@ def compare(first: Frame, second: Frame, breakdowns: Sequence[Breakdown] = ()) -
     """
     first, second = first.told(), second.told()
     ours, theirs = _only_policy_run(first), _only_policy_run(second)
-    _check_fair(ours, theirs)
+    _check_fair(first, second)
     here, there = (dict(_groups(one, breakdowns)) for one in (first, second))
     others = {key: _shared(there[key], here[key]) for key in here if key in there}
     found = measure_groups(
@@ -135,20 +136,9 @@ def _only_policy_run(frame: Frame) -> PolicyRun:
     return policy_runs[0]
 
 
-def _check_fair(first: PolicyRun, second: PolicyRun) -> None:
-    if first.versions is None or second.versions is None:
+def _check_fair(first: Frame, second: Frame) -> None:
+    if not (first.played and second.played):
         raise InvalidValueError("One of the two policies has no results yet.")
-    for name in ("language", "environment"):
-        one, other = getattr(first.versions, name), getattr(second.versions, name)
-        if one != other:
-            raise InvalidValueError(
-                f"{first.policy} played {name} version {one} and {second.policy} version {other}; "
-                "only results of the same version can be compared."
-            )
-    for name in FAIRNESS:
-        one, other = first.conditions.label(name), second.conditions.label(name)
-        if one != other:
-            raise InvalidValueError(
-                f"{first.policy} played with {one} and {second.policy} with {other}; "
-                "only results under the same conditions can be compared."
-            )
+    differences = [*differing([*first.played, *second.played], FAIRNESS)]
+    if differences:
+        raise InvalidValueError(" ".join(differences))

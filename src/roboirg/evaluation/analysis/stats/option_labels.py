@@ -8,7 +8,6 @@ from typing import Any
 
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.core.plain_text import counted
-from roboirg.core.word_pools import POOLS
 from roboirg.language import STAGE_SETS
 from roboirg.language.settings import EXPLICIT, all_settings, setting_names
 
@@ -35,13 +34,6 @@ def options_label(options: InstructionOptions) -> str:
         if name not in ("setting", "wordings") and value != getattr(_DEFAULTS, name)
     ]
     return f"{options.setting} ({', '.join(changed)})" if changed else options.setting
-
-
-def words_label(wordings: str | None) -> str:
-    """Return whose words the instructions have, from the pool or the wording file."""
-    if wordings in POOLS:
-        return f"our own words for {wordings}"
-    return "our own words" if wordings is None else f"the words of {wordings}"
 
 
 def options_sort_key(options: InstructionOptions) -> tuple[object, ...]:

@@ -7,10 +7,10 @@ from collections import Counter, defaultdict
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
+from roboirg.core.word_pools import words_label
 from roboirg.evaluation.analysis.stats.option_labels import (
     options_label,
     options_sort_key,
-    words_label,
 )
 from roboirg.evaluation.analysis.stats.run_data import RunData
 from roboirg.evaluation.analysis.tables.table import Column, Row, Table

@@ -3,17 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import replace
 from decimal import Decimal
 from typing import TYPE_CHECKING
 
 from roboirg.core.plain_text import counted, verb_for
 from roboirg.evaluation.analysis.comparability import AllDifferences, comparison_notes
-from roboirg.evaluation.analysis.policy_run import (
-    CONDITIONS,
-    FAIRNESS,
-    EvalConditions,
-    PolicyRun,
-)
+from roboirg.evaluation.analysis.frame import Frame
+from roboirg.evaluation.analysis.policy_run import EvalConditions, PolicyRun
 from roboirg.evaluation.analysis.published import TRIALS, RateTable, published_rows
 from roboirg.evaluation.analysis.stats.cells import Cell, Cells
 from roboirg.evaluation.analysis.stats.headline import headline_notes
@@ -33,7 +30,9 @@ from roboirg.evaluation.analysis.tables.table import (
     Column,
     Entry,
     Row,
+    Table,
 )
+from roboirg.evaluation.records.mixing import mixtures
 from roboirg.language.settings import EXPLICIT
 from roboirg.tasks import every_task
 
@@ -67,21 +66,27 @@ def notes_of(
     entries = [entry for row in rows for entry in row.entries]
     policy_runs = list(dict.fromkeys(key.policy_run for key in shown))
     compared = {key: one for key, one in differences.items() if key in shown}
-    return (
+    notes = (
         RATES_NOTE,
         *_sign_notes(table, entries),
-        *_condition_notes([one.conditions for one in policy_runs]),
+        where_played([one.conditions for one in policy_runs]),
         *_size_notes(shown.values()),
         *_incomplete_notes(shown.values(), entries),
-        *_version_notes(policy_runs),
+        "Only one policy was played; nothing is compared." * (len(policy_runs) == 1),
         *(_omission_notes(table, cells, tasks) if table.name == "main" else ()),
         *(headline_notes(cells, names) if table.name == "main" else ()),
         *_absent_notes({key.task for key in shown}),
         *_twin_notes(rows),
-        *[_FLOORS_NOTE][: any(row.source == "chance" for row in rows)],
+        _FLOORS_NOTE * any(row.source == "chance" for row in rows),
         *_published_notes(table, rows),
         *comparison_notes(compared, names),
     )
+    return tuple(filter(None, notes))
+
+
+def with_mixtures(table: Table, frame: Frame) -> Table:
+    """Return a table with a note on everything that its results do not have in common."""
+    return replace(table, notes=(*table.notes, *mixtures(frame.told().played)))
 
 
 def _sign_notes(table: PaperTable, entries: Sequence[Entry]) -> list[str]:
@@ -142,21 +147,6 @@ def _absent_notes(names: Iterable[str]) -> list[str]:
     return [f"The package with {listed} is not installed: what its runs lack is not counted."]
 
 
-def _condition_notes(conditions: Sequence[EvalConditions]) -> list[str]:
-    """Say which episodes were played in whose words, and what is not the same in all rows."""
-    if not conditions:
-        return []
-    notes = [where_played(conditions)]
-    for name, plural in FAIRNESS.items():
-        values = _distinct(conditions, name)
-        if len(values) > 1:
-            notes.append(
-                f"Results of several {plural} ({', '.join(values)}) have separate rows; they are "
-                "not comparable."
-            )
-    return [note for note in notes if note]
-
-
 def where_played(conditions: Sequence[EvalConditions]) -> str:
     """Return a sentence with the split, the words and the limit, if all have the same."""
     usual = {
@@ -164,13 +154,9 @@ def where_played(conditions: Sequence[EvalConditions]) -> str:
         "wordings": "in {}",
         "max_steps": "with at most {} steps",
     }
-    same = {name: values[0] for name in usual if len(values := _distinct(conditions, name)) == 1}
-    words = ", ".join(usual[name].format(value) for name, value in same.items())
-    return f"Played {words}." if words else ""
-
-
-def _distinct(conditions: Iterable[EvalConditions], name: str) -> list[str]:
-    return sorted({one.text(name) for one in conditions})
+    found = {name: {one.text(name) for one in conditions} for name in usual}
+    words = [usual[name].format(*values) for name, values in found.items() if len(values) == 1]
+    return f"Played {', '.join(words)}." if words else ""
 
 
 def _size_notes(cells: Iterable[Cell]) -> list[str]:
@@ -204,38 +190,6 @@ def _incomplete_notes(cells: Iterable[Cell], entries: Iterable[Entry]) -> list[s
     if errors or missing:
         notes.append("Incomplete entries have no arrow, and their columns no best entry.")
     return notes
-
-
-def _version_notes(policy_runs: Sequence[PolicyRun]) -> list[str]:
-    """Say whether there is a policy to compare with, and which rows are not comparable."""
-    notes = []
-    if len(policy_runs) == 1:
-        notes.append("Only one policy was played; nothing is compared.")
-    for name in ("language", "environment"):
-        versions = _versions(policy_runs, name)
-        if len(versions) > 1:
-            notes.append(
-                f"Results of several {name} versions ({', '.join(versions)}) have separate rows; "
-                "they are not comparable."
-            )
-    policies = sorted({one.policy for one in policy_runs})
-    by_policy = {name: [one for one in policy_runs if one.policy == name] for name in policies}
-    for policy, own in by_policy.items():
-        versions = _versions(own, "policy")
-        if len(versions) > 1:
-            notes.append(
-                f"Several versions of {policy} ({', '.join(versions)}) have separate rows."
-            )
-    others = [name for name in CONDITIONS if name not in FAIRNESS]
-    for own in by_policy.values():
-        if any(len(_distinct([one.conditions for one in own], name)) > 1 for name in others):
-            notes.append("Results under different conditions have separate rows.")
-            break
-    return notes
-
-
-def _versions(policy_runs: Iterable[PolicyRun], name: str) -> list[str]:
-    return sorted({str(getattr(one.versions, name)) for one in policy_runs if one.versions})
 
 
 def _omission_notes(table: PaperTable, cells: Cells, tasks: Sequence[str]) -> list[str]:
