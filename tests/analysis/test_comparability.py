@@ -167,28 +167,6 @@ def test_the_table_of_a_run_marks_its_explicit_rates(result) -> None:
     assert "┃ direct ┃" in printed(play(result, settings=("direct",)))
 
 
-@pytest.mark.parametrize(
-    ("fields", "note"),
-    [
-        ({"wordings": None}, f"several words (our own words, the words of {WORDS})"),
-        ({"split": "val"}, "several splits (test, val)"),
-        ({"max_steps": 9}, "several step limits (1300, 9)"),
-        ({"meshes": "light"}, "several kinds of meshes (faithful, light)"),
-        ({"environment_version": 99}, f"several environment versions ({ENVIRONMENT_VERSION}, 99)"),
-    ],
-)
-def test_what_is_mixed_has_separate_rows_and_is_named(result, fields, note) -> None:
-    """In one folder and in several, and with the same policy or another."""
-    first = play(result, range(2))
-    for policy in ("listener", "other"):
-        second = play(result, range(2), policy=policy, **fields)
-        for runs in ([("a", [*first, *second])], [("a", first), ("b", second)]):
-            table = make_table("main", gather(runs))
-            assert len({row.name for row in table.rows}) == len(table.rows) == 2
-            assert f"Results of {note} have separate rows" in " ".join(table.notes)
-            assert len(make_run_tables([one for _, results in runs for one in results])) == 2
-
-
 def test_imported_words_have_the_columns_of_our_own(result) -> None:
     """The wording file is a condition; it is no option that would hide a result from a table."""
     cells = gather([("run", play(result, settings=("explicit", "direct")))])

@@ -99,21 +99,10 @@ def test_policies_with_other_seeds_are_compared_by_episode(result) -> None:
     assert finding.unpaired == 0
 
 
-@pytest.mark.parametrize(
-    ("changes", "words"),
-    [
-        ({"language_version": "2"}, "listener played language version 1 and forgetful version 2"),
-        ({"environment_version": 2}, "environment version 1"),
-        ({"max_steps": 9}, "max steps 1300 and forgetful with max steps 9"),
-        ({"split": "val"}, "split test and forgetful with split val"),
-        ({"wordings": "mine@0a"}, "with our own words and forgetful with the words of mine@0a"),
-        ({"task": "BinFill"}, "no episode in common"),
-        ({"setting": "direct"}, "no episode in common"),
-    ],
-)
-def test_what_cannot_be_compared_is_refused(result, changes, words) -> None:
-    with pytest.raises(InvalidValueError, match=re.escape(words)):
-        compared(play(result, GOOD, "11"), play(result, POOR, "11", **changes))
+def test_policies_without_a_common_episode_are_refused(result) -> None:
+    for changes in ({"task": "BinFill"}, {"setting": "direct"}):
+        with pytest.raises(InvalidValueError, match="no episode in common"):
+            compared(play(result, GOOD, "11"), play(result, POOR, "11", **changes))
 
 
 def test_a_side_is_one_policy_of_one_version(result) -> None:

@@ -141,8 +141,6 @@ def test_versions_stand_apart_and_are_named(result) -> None:
     ]
     table = make_table("main", gather([("run", results)]))
     assert len(table.rows) == 4
-    assert "several language versions (1, 2) have separate rows" in notes(table)
-    assert "Several versions of a (new, unknown) have separate rows" in notes(table)
     assert {row.name for row in table.rows} == {
         "a, policy unknown, language 1",
         "a, policy new, language 2",

@@ -219,7 +219,7 @@ def test_versions_and_words_that_differ_stand_apart_and_are_named() -> None:
     assert "Mixed versions of the language" in page.warnings
     assert len(page.data["matrix"]["policies"]) == 2
     again = Page(render([first, with_version(replace(first, episode=9), "2")]))
-    assert "several versions: 2, built-in" in again.warnings
+    assert ": 2, built-in. They are kept apart" in again.warnings
 
     found = one_record(settings=("direct",))
     page = Page(render([found, found.with_options(wordings="mine@1a")]))
@@ -318,7 +318,7 @@ def test_what_cannot_be_compared_says_why() -> None:
     first, second = records()[:2]
     page = Page(render([first, replace(second, language_version="9")]))
     (found,) = page.data["comparisons"]
-    assert "same version can be compared" in found["sentences"][0]
+    assert "cannot be compared" in found["sentences"][0]
 
 
 def test_the_head_says_which_run_it_was(tmp_path: Path) -> None:
