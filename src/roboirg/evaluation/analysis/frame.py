@@ -211,23 +211,19 @@ def make_frame(runs: Runs, planned: Sequence[Job] = (), *, named: str = "") -> F
     """
     jobs = {identity_key(job): job for job in planned}
     apart = _played_twice(runs) if len(runs) > 1 else set()
-    known: dict[PolicyRun, PolicyRun] = {}
-    owners: dict[tuple[str, EvalConditions], PolicyRun] = {}
     rows: list[tuple[PolicyRun, Job, str]] = []
     for name, results in runs:
         for one in results:
-            found = PolicyRun.of(one, named or name * (one.policy in apart))
-            owner = known.setdefault(found, found)
-            owners.setdefault((one.policy, owner.conditions), owner)
+            owner = PolicyRun.of(one, named or name * (one.policy in apart))
             rows.append((owner, one, one.outcome))
             if jobs:
                 jobs.pop(identity_key(one), None)
-    policies = list(dict.fromkeys(job.policy for job in planned))
+    owners = {(one.policy, one.conditions): one for one, _, _ in reversed(rows if jobs else [])}
     for job in jobs.values():
         conditions = EvalConditions.of(job)
         unplayed = PolicyRun(job.policy, conditions, None, named)
         rows.append((owners.get((job.policy, conditions), unplayed), job, MISSING))
-    return _sorted(rows, policies)
+    return _sorted(rows, list(dict.fromkeys(job.policy for job in planned)))
 
 
 def _sorted(rows: Sequence[tuple[PolicyRun, Job, str]], policies: Sequence[str]) -> Frame:
@@ -241,27 +237,19 @@ def _sorted(rows: Sequence[tuple[PolicyRun, Job, str]], policies: Sequence[str])
         versions = repr(one.versions)
         return (rank, one.policy, one.run, repr(one.conditions), versions, one.robot or "")
 
-    options = [job.column for _, job, _ in rows]
-    owners = _ranks(sorted({owner for owner, _, _ in rows}, key=place))
-    tasks = _ranks(task_order({job.task for _, job, _ in rows}))
-    columns = _ranks(sorted(set(options), key=options_sort_key))
-    order = sorted(
-        range(len(rows)),
-        key=lambda at: (
-            owners[rows[at][0]],
-            tasks[rows[at][1].task],
-            columns[options[at]],
-            rows[at][1].episode,
-            rows[at][1].policy_seed,
-        ),
-    )
+    owners, owner_at = _distinct((owner for owner, _, _ in rows), place)
+    options, options_at = _distinct((job.column for _, job, _ in rows), options_sort_key)
+    tasks = task_order({job.task for _, job, _ in rows})
+    task_at = [tasks.index(job.task) for _, job, _ in rows]
+    numbers = np.array([(job.policy_seed, job.episode) for _, job, _ in rows], dtype=int)
+    order = np.lexsort((*numbers.reshape(-1, 2).T, options_at, task_at, owner_at))
     frame = Frame(
         {
-            "place": np.array(order),
-            "run": as_column([rows[at][0] for at in order]),
-            "result": as_column([rows[at][1] for at in order]),
-            "outcome": as_column([rows[at][2] for at in order]),
-            "options": as_column([options[at] for at in order]),
+            "place": order,
+            "run": owners[owner_at[order]],
+            "result": as_column([job for _, job, _ in rows])[order],
+            "outcome": as_column([outcome for _, _, outcome in rows])[order],
+            "options": options[options_at[order]],
         }
     )
     # What a job knows stands in the rows of missing episodes, too.
@@ -271,8 +259,13 @@ def _sorted(rows: Sequence[tuple[PolicyRun, Job, str]], policies: Sequence[str])
     )
 
 
-def _ranks(values: Iterable[Any]) -> dict[Any, int]:
-    return {value: rank for rank, value in enumerate(values)}
+def _distinct(values: Iterable[Any], key: Callable[[Any], Any]) -> tuple[Values, NDArray[np.int64]]:
+    """Return the distinct values in the order of a key, and for each value its place there."""
+    seen: dict[Any, int] = {}
+    found = np.array([seen.setdefault(one, len(seen)) for one in values], dtype=np.int64)
+    ordered = sorted(seen, key=key)
+    ranks = {seen[one]: rank for rank, one in enumerate(ordered)}
+    return as_column(ordered), np.array([ranks[one] for one in range(len(seen))], np.int64)[found]
 
 
 def task_order(names: Iterable[str]) -> list[str]:

@@ -110,11 +110,17 @@ def with_columns(
         records: of its runs, in any order; they are read one by one, and none is kept.
         reads: returns the value of a record, by the name of the column.
     """
-    found = {_row_key(record): [read(record) for read in reads.values()] for record in records}
-    unknown = [None] * len(reads)
-    rows = [found.get(_row_key(one), unknown) for one in frame["result"]]
-    columns = zip(reads, zip(*rows, strict=True), strict=True)
-    return frame.extended({name: as_column(values) for name, values in columns})
+    places: dict[object, list[int]] = {}
+    for place, one in enumerate(frame["result"]):
+        places.setdefault(_row_key(one), []).append(place)
+    columns = {name: as_column([None] * len(frame["result"])) for name in reads}
+    known: dict[object, object] = {}  # equal values are kept once
+    for record in records:
+        if at := places.get(_row_key(record)):
+            for name, read in reads.items():
+                value = read(record)
+                columns[name][at] = as_column([known.setdefault((type(value), value), value)])
+    return frame.extended(columns)
 
 
 def _row_key(job: Job) -> tuple[object, ...]:

@@ -37,7 +37,7 @@ _COSTS: Mapping[str, str] = {
 _READ: Mapping[str, Callable[[Record], object]] = {
     "verdicts": lambda record: tuple(one.verdict for one in record.subgoals),
     "planner_failure": planner_failure,
-    "usage": lambda record: record.usage,
+    "usage": lambda record: tuple(record.usage.items()),
 }
 
 
@@ -56,7 +56,7 @@ def make_subgoal_table(data: RunData, records: Iterable[Record]) -> Table:
         if usage is not None:  # else the episode was not played
             counts = found[CellKey(run, task, options)]
             counts.update(("episodes", *verdicts, *([failure] if failure else ())))
-            counts.update({name: usage.get(name, 0) for name in _COSTS})
+            counts.update({name: value for name, value in usage if name in _COSTS})
     known = (*SUBGOAL_VERDICTS, *PLANNER_FAILURES)
     shown = {key: one for key, one in found.items() if any(one[name] for name in known)}
     if not shown:
