@@ -3,51 +3,47 @@
 from __future__ import annotations
 
 import html
-import json
 import re
 import tracemalloc
-from collections import Counter
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-import numpy as np
+import pandas as pd
 import pytest
 import typer
 from made_records import make_record
 from msgspec.structs import replace
-from page_text import render
-from roboirg.evaluation.analysis.stats.breakdown_rows import break_down
-from roboirg.evaluation.analysis.tables.breakdown_table import make_breakdown_table
 from typer.testing import CliRunner
 
+import roboirg
 from roboirg.cli.report_commands import compare as compare_command
 from roboirg.cli.report_commands import tables
 from roboirg.core.errors import InvalidValueError, UnknownNameError
-from roboirg.evaluation.analysis.stats.breakdowns import (
-    BREAKDOWNS,
+from roboirg.evaluation.analysis.frame import Frame, as_column, make_frame
+from roboirg.evaluation.analysis.frame_reading import (
     COMPETING,
     NO_RIVAL,
     RIVAL,
-    UNKNOWN,
-    InstructionKey,
-    cells_by_label,
-    find_breakdowns,
-    label_instructions,
+    WORD_COLUMNS,
+    read_frame,
+    with_columns,
 )
-from roboirg.evaluation.analysis.stats.cells import CellResults, gather
+from roboirg.evaluation.analysis.stats.breakdowns import (
+    BREAKDOWNS,
+    Breakdown,
+    break_down,
+    find_breakdowns,
+)
 from roboirg.evaluation.analysis.stats.comparison import compare
 from roboirg.evaluation.analysis.stats.comparison_text import sentences
-from roboirg.evaluation.analysis.stats.paired_tests import Pairs, measure_gap
+from roboirg.evaluation.analysis.tables.diagnostic_tables import make_breakdown_table
 from roboirg.evaluation.plan.plan import Plan
+from roboirg.evaluation.plan.sources import Source
 from roboirg.evaluation.plan.stored_plans import write_plan
-from roboirg.evaluation.records.record import Job, Record
+from roboirg.evaluation.records.record import Job, Record, Summary
 from roboirg.evaluation.records.record_codec import encode
-from roboirg.evaluation.records.store import (
-    RECORDS_FILE,
-    RecordStore,
-    iterate_records,
-    read_results,
-)
+from roboirg.evaluation.records.store import RECORDS_FILE, RecordStore, iterate_records
 
 app = typer.Typer()
 app.command("tables")(tables)
@@ -59,6 +55,7 @@ PLAN = Plan(
     settings=("explicit", "direct", "reasoning", "contextual"),
     episodes=tuple(range(8)),
 )
+LETTER = Breakdown("letters", "letter", "Made up.")
 
 
 def played(job: Job) -> Record:
@@ -78,15 +75,11 @@ def records() -> tuple[Record, ...]:
 @pytest.fixture(scope="module")
 def run(records: tuple[Record, ...], tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("runs") / "both"
-    write(folder, records)
-    write_plan(PLAN, folder)
-    return folder
-
-
-def write(folder: Path, records: tuple[Record, ...]) -> None:
     with RecordStore(folder) as store:
         for record in records:
             store.append(record)
+    write_plan(PLAN, folder)
+    return folder
 
 
 def call(*words: object) -> str:
@@ -95,199 +88,148 @@ def call(*words: object) -> str:
     return outcome.output
 
 
-def labels_of(name: str, record: Record, **metadata: object) -> tuple[str, ...]:
-    changed = replace(record, metadata={**record.metadata, **metadata})
-    return BREAKDOWNS[name].labels(changed)
-
-
-def one(records: tuple[Record, ...], task: str, setting: str, says: str | None = None) -> Record:
-    """The first record whose command has a class of expressions."""
-    return next(
-        r for r in records
-        if (r.task, r.setting) == (task, setting)
-        and (says is None or any(
-            mention.expression == says and mention.utterance == max(m.utterance for m in r.mentions)
-            for mention in r.mentions
-        ))
-    )  # fmt: skip
-
-
 # Labels
 
 
-def test_labels_are_what_the_record_says(records: tuple[Record, ...]) -> None:
-    direct, reasoning = (
-        one(records, "PickXtimes", "direct"),
-        one(records, "PickXtimes", "reasoning"),
-    )
-    contextual = one(records, "PickXtimes", "contextual", says="it")
-    assert BREAKDOWNS["pattern"].labels(reasoning) == (reasoning.metadata["pattern"],)
-    assert BREAKDOWNS["pattern"].labels(direct) == ()
-    assert BREAKDOWNS["expression"].labels(direct) == ("that",)
-    assert BREAKDOWNS["slots"].labels(direct) == ("2",)
-    assert BREAKDOWNS["slots"].labels(reasoning) == ("1",)
-    assert BREAKDOWNS["rival"].labels(direct) == ()
-    assert labels_of("rival", direct, rival_reference="contrast") == ("one of two: contrast",)
-    assert labels_of("rival", contextual, recency_rival="the printer") == (RIVAL,)
-    assert labels_of("rival", contextual, recency_rival=None) == (NO_RIVAL,)
-    assert labels_of("rival", contextual, distractor="competing") == (COMPETING,)
-    for task in PLAN.tasks:
-        explicit = one(records, task, "explicit")
-        assert all(
-            BREAKDOWNS[name].labels(explicit) == () for name in ("pattern", "slots", "rival")
-        )
-
-
-def test_a_rival_needs_a_pronoun_in_the_command(records: tuple[Record, ...]) -> None:
-    contextual = one(records, "PickXtimes", "contextual", says="it")
-    others = tuple(mention for mention in contextual.mentions if mention.expression != "it")
-    without = replace(contextual, mentions=others)
-    assert labels_of("rival", without, recency_rival="the printer") == ()
+def first(records: tuple[Record, ...], setting: str, says: str) -> Record:
+    """The first record whose command has a class of expressions."""
+    return next(
+        one for one in records
+        if one.setting == setting and says in WORD_COLUMNS["expression"].read(one)  # type: ignore[operator]
+    )  # fmt: skip
 
 
 @pytest.mark.parametrize(
-    ("name", "setting", "lacking"),
+    ("setting", "says", "metadata", "label"),
     [
-        ("pattern", "reasoning", "pattern"),
-        ("slots", "direct", "hidden_slots"),
-        ("rival", "contextual", "recency_rival"),
-        ("rival", "contextual", "distractor"),
+        ("direct", "that", {}, None),
+        ("direct", "that", {"rival_reference": "contrast"}, "one of two: contrast"),
+        ("contextual", "it", {"recency_rival": "the printer"}, RIVAL),
+        ("contextual", "it", {"recency_rival": None}, NO_RIVAL),
+        ("contextual", "it", {"distractor": "competing"}, COMPETING),
+        ("contextual", "that", {"recency_rival": "the printer"}, None),
     ],
 )
-def test_records_that_do_not_say_are_unknown(
-    records: tuple[Record, ...], name: str, setting: str, lacking: str
+def test_a_rival_is_what_it_could_mean(
+    records: tuple[Record, ...], setting: str, says: str, metadata: dict[str, Any], label: str
 ) -> None:
-    record = one(records, "PickXtimes", setting, says="it" if name == "rival" else None)
-    rest = {key: value for key, value in record.metadata.items() if key != lacking}
-    older = replace(record, metadata=rest)
-    assert BREAKDOWNS[name].labels(older) == (UNKNOWN,)
-    bare = replace(record, mentions=())
-    assert BREAKDOWNS["expression"].labels(bare) == (UNKNOWN,)
-
-
-def test_what_one_record_tells_holds_for_the_same_instruction_in_an_older_one(
-    records: tuple[Record, ...],
-) -> None:
-    new = one(records, "PickXtimes", "direct")
-    old = replace(new, policy="older", metadata={"pattern": None})
-    for order in ([new, old], [old, new]):
-        found = label_instructions(find_breakdowns(["slots"]), order)["slots"]
-        assert found == {InstructionKey.of(new): ("2",)}
-    other = replace(old, language_version="0.9")
-    found = label_instructions(find_breakdowns(["slots"]), [new, other])["slots"]
-    assert found[InstructionKey.of(other)] == (UNKNOWN,)
-
-
-def test_a_break_down_that_does_not_exist() -> None:
-    with pytest.raises(UnknownNameError, match="pattern, expression, slots, rival"):
-        find_breakdowns(["pattern", "colour"])
+    one = first(records, setting, says)
+    if says != "it":  # a pronoun in the context is none in the command
+        one = replace(one, mentions=tuple(m for m in one.mentions if m.expression != "it"))
+    changed = replace(one, metadata={**one.metadata, **metadata})
+    assert WORD_COLUMNS["rival"].read(changed) == label
 
 
 def test_only_the_command_s_expressions_count(records: tuple[Record, ...]) -> None:
-    found = {
-        label
-        for record in records
-        if record.setting == "contextual"
-        for label in BREAKDOWNS["expression"].labels(record)
-    }
-    said = {m.expression for r in records if r.setting == "contextual" for m in r.mentions}
+    read = WORD_COLUMNS["expression"].read
+    contextual = [record for record in records if record.setting == "contextual"]
+    found = {label for record in contextual for label in read(record)}  # type: ignore[attr-defined]
+    said = {mention.expression for record in contextual for mention in record.mentions}
     assert "them" in said - found, "said of the referents in a reinforcement"
-    resolved = make_record(
-        PLAN.jobs()[0].with_options(setting="contextual", form="resolved"),
-        "success",
-    )
+    job = PLAN.jobs()[0].with_options(setting="contextual", form="resolved")
+    resolved = make_record(job, "success")
     assert any(mention.expression for mention in resolved.mentions)
-    assert BREAKDOWNS["expression"].labels(resolved) == ()
+    assert read(resolved) == ()
 
 
 # Numbers
 
 
-def test_rows_partition_the_trials_and_are_paired_with_explicit(
-    records: tuple[Record, ...],
-) -> None:
-    cells = gather([("", records)])
-    for name in ("pattern", "slots", "rival"):
-        labels = label_instructions(find_breakdowns([name]), records)[name]
-        rows = break_down(cells, labels)
-        counted = Counter(
-            (r.policy, r.setting, *BREAKDOWNS[name].labels(r))
-            for r in records
-            if r.setting != "explicit" and BREAKDOWNS[name].labels(r)
-        )
-        assert {
-            (row.policy_run.policy, row.results.options.setting, row.label): row.results.trials
-            for row in rows
-        } == counted
-        for row in rows:
-            assert row.gap is not None
-            assert row.gap.episodes == row.results.episodes
-
-
-def hand_made(result: Any) -> tuple[list[Any], dict[InstructionKey, tuple[str, ...]]]:
-    """Explicit wins in episodes 0 to 5 of 12, direct in 0 to 2; even episodes are labeled *a*."""
-    results, labels = [], {}
-    for episode in range(12):
-        results.append(result("success" if episode < 6 else "failure", episode))
-        direct = result("success" if episode < 3 else "failure", episode, setting="direct")
-        results.append(direct)
-        key = InstructionKey("PickXtimes", "test", episode, direct.options, "1", 1)
-        labels[key] = ("a",) if episode % 2 == 0 else ("b", "c")
-    return results, labels
-
-
-def test_gaps_are_those_of_the_very_same_episodes(result: Any) -> None:
-    results, labels = hand_made(result)
-    rows = break_down(gather([("", results)]), labels)
-    assert [(row.label, row.results.episodes) for row in rows] == [("a", 6), ("b", 6), ("c", 6)]
-    gaps = [row.gap for row in rows]
-    # Even episodes: explicit 0, 2, 4 and direct 0, 2; odd ones: explicit 1, 3, 5 and direct 1.
-    assert [gap and round(gap.value * 6) for gap in gaps] == [-1, -2, -2]
-    by_hand = measure_gap(
-        [
-            Pairs.of(
-                CellResults({(e, 0): e < 3 for e in range(0, 12, 2)}),  # type: ignore[misc]
-                CellResults({(e, 0): e < 6 for e in range(12)}),  # type: ignore[misc]
-            )
-        ],
-        np.random.default_rng(0),
+@pytest.mark.parametrize("breakdown", BREAKDOWNS.values(), ids=BREAKDOWNS)
+def test_rows_are_what_pandas_gives(run: Path, breakdown: Breakdown) -> None:
+    """An episode counts once in each of its labels, and its gap is to itself in explicit."""
+    by = ["policy", "setting", "label"]
+    whole = roboirg.results(run)
+    labeled = whole.assign(label=whole[breakdown.name]).explode("label").dropna(subset="label")
+    if not breakdown.in_explicit:
+        labeled = labeled[labeled["setting"] != "explicit"]
+    text = [f"{one:g}" if breakdown.name == "slots" else str(one) for one in labeled["label"]]
+    explicit = whole[whole["setting"] == "explicit"][["policy", "task", "episode", "success"]]
+    paired = labeled.assign(label=text, success=labeled["success"].astype(float)).merge(
+        explicit.astype({"success": float}), on=["policy", "task", "episode"], suffixes=("", "_0")
     )
-    assert by_hand is not None
-    assert rows[0].gap is not None
-    assert rows[0].gap.p_value == by_hand.p_value
-    assert rows[0].gap.overlap == by_hand.overlap
-    smallest = min(gap.p_value for gap in gaps if gap)
-    assert min(row.p_holm for row in rows if row.p_holm is not None) == min(1.0, 3 * smallest)
-
-
-def test_a_label_without_explicit_has_no_gap(result: Any) -> None:
-    results, labels = hand_made(result)
-    direct = [one for one in results if one.setting == "direct"]
-    rows = break_down(gather([("", direct)]), labels)
-    assert {row.gap for row in rows} == {None}
-    table = make_breakdown_table(BREAKDOWNS["slots"], gather([("", direct)]), labels)
-    assert [entry.text for entry in table.rows[0].entries] == ["6", "33.33", "–", "–", "–"]
-    assert "– without explicit on the same episodes." in table.notes
-
-
-def test_trials_that_no_record_describes_are_unknown_and_last(result: Any) -> None:
-    results, labels = hand_made(result)
-    some = {key: value for key, value in labels.items() if key.episode < 10}
-    cells = gather([("", results)])
-    rows = break_down(cells, some)
-    assert [(row.label, row.results.episodes) for row in rows][-1] == (UNKNOWN, 2)
-    numbers = dict.fromkeys(labels, ("zebra", "10", "9", UNKNOWN, "2 b"))
-    direct = {key: cell for key, cell in cells.items() if key.options.setting == "direct"}
-    assert list(cells_by_label(direct, numbers)) == ["2 b", "9", "10", "zebra", UNKNOWN]
+    assert len(paired) == len(labeled), "explicit is the reference of every label"
+    means = paired.groupby([*by, "task"])[["success", "success_0"]].mean().groupby(by).mean()
+    expected = pd.DataFrame(
+        {
+            "episodes": paired.groupby(by).size(),
+            "rate": means["success"],
+            "gap": means["success"] - means["success_0"],
+        }
+    )
+    rows = break_down(read_frame([Source(run)], words=True), breakdown)
+    found = {
+        (one.key.run.policy, one.key.options.setting, one.key.label): (
+            one.episodes, float(one.rate or 0), one.gap.value if one.gap else 0.0,
+        )
+        for one in rows
+    }  # fmt: skip
+    assert found.keys() == set(expected.index)
+    for key, values in found.items():
+        assert values == pytest.approx(tuple(expected.loc[key]))
 
 
 def test_the_order_of_the_records_makes_no_difference(records: tuple[Record, ...]) -> None:
-    labels = label_instructions(find_breakdowns(["expression"]), records)["expression"]
+    reads = {name: column.read for name, column in WORD_COLUMNS.items()}
     tables_of = [
-        make_breakdown_table(BREAKDOWNS["expression"], gather([("", order)]), labels)
+        make_breakdown_table(
+            BREAKDOWNS["expression"], with_columns(make_frame([("", order)]), records, reads)
+        )
         for order in (records, records[::-1])
     ]
     assert tables_of[0] == tables_of[1]
+
+
+def hand_made(result: Callable[..., Summary], *settings: str) -> Frame:
+    """Explicit wins in episodes 0 to 5 of 12, others in 0 to 2; even ones have two labels."""
+    results = [
+        result("success" if episode < wins else "failure", episode, setting=setting)
+        for setting, wins in (("explicit", 6), ("direct", 3))
+        if setting in settings
+        for episode in range(12)
+    ]
+    frame = make_frame([("", [*results, result("error", 12, setting="direct")])])
+    labels = [("10 b",) if episode % 2 else ("9", "zebra") for episode in frame["episode"]]
+    return frame.extended({"letters": as_column(labels)})
+
+
+def test_gaps_are_those_of_the_very_same_episodes(result: Callable[..., Summary]) -> None:
+    """Explicit wins 0, 2, 4 and 1, 3, 5; direct 0, 2 and 1."""
+    rows = break_down(hand_made(result, "explicit", "direct"), LETTER)
+    assert [(one.key.label, one.episodes) for one in rows] == [("9", 6), ("10 b", 6), ("zebra", 6)]
+    gaps = [one.gap for one in rows]
+    assert [gap and round(gap.value * 6) for gap in gaps] == [-1, -2, -1]
+    # Of one and of two episodes that differ; both by 3 are more than 1.
+    assert [gap and gap.p_value for gap in gaps] == [1.0, 0.5, 1.0]
+    assert [one.p_holm for one in rows] == [1.0, 1.0, 1.0]
+
+
+def test_a_label_without_explicit_has_no_gap(result: Callable[..., Summary]) -> None:
+    table = make_breakdown_table(LETTER, hand_made(result, "direct"))
+    assert [entry.text for entry in table.rows[0].entries] == ["6", "33.33", "–", "–", "–"]
+    assert "– without explicit on the same episodes." in table.notes
+    assert table.notes[-1].startswith("Incomplete: 1 trial without a verdict")
+
+
+def test_a_compared_label_is_the_difference_on_its_episodes(result: Callable[..., Summary]) -> None:
+    direct = hand_made(result, "direct")
+    better = Frame({
+        **direct, "run": as_column([one._replace(policy="better") for one in direct["run"]]),
+        "outcome": as_column(["success"] * len(direct["run"])),
+    })  # fmt: skip
+    found = compare(better, direct, [LETTER])
+    parts = found.parts["letter"]
+    assert [(part.key.label, round(part.gap.value * 6)) for part in parts] == [
+        ("9", 4), ("10 b", 5), ("zebra", 4),
+    ]  # fmt: skip
+    assert [part.p_holm for part in parts] == pytest.approx(
+        [2 * 2 / 2**4, 3 * 2 / 2**5, 2 * 2 / 2**4]
+    )
+    assert "  direct, 9: " in "\n".join(sentences(found, "better", "listener"))
+    nothing = as_column([()] * len(direct["run"]))
+    bare = [one.extended({"letters": nothing}) for one in (better, direct)]
+    text = list(sentences(compare(*bare, [LETTER]), "better", "listener"))
+    assert "By letter: no instruction has one." in text
 
 
 # Commands
@@ -300,111 +242,60 @@ def test_tables_by_everything(run: Path, tmp_path: Path, monkeypatch: pytest.Mon
         assert f"Gap to explicit by {breakdown.title}" in output
     row = r"│ it +│ +\d+ │ +([\d.]+) │ +([−±\d.]+) │ +\S+ to \S+ │ +[01]\.\d{3} │"
     found = re.findall(row, output)
-    assert found[:2] == [("0.00", "−100.0")] * 2, "direct and contextual of the forgetful one"
+    # Direct and contextual, of the listener and of the forgetful one, in the order of the plan.
+    assert found[:4] == [("100.00", "±0.0")] * 2 + [("0.00", "−100.0")] * 2
     call("tables", run, "--by", "pattern, slots", "--format", "csv", "--out", tmp_path)
     assert sorted(path.name for path in tmp_path.iterdir()) == ["by_pattern.csv", "by_slots.csv"]
-    lines = (tmp_path / "by_slots.csv").read_text().splitlines()
-    assert any(line.startswith("by_slots,ours,") and ",gap," in line for line in lines)
-    for name in ("markdown", "latex"):
-        text = call("tables", run, "--by", "rival", "--format", name)
-        assert "no recency rival" in text
-        assert "−" not in text if name == "latex" else "−" in text
 
 
-def test_wrong_use_of_by(run: Path, tmp_path: Path) -> None:
-    with pytest.raises(UnknownNameError, match="breakdown"):
-        call("tables", run, "--by", "colour")
-    with pytest.raises(InvalidValueError, match="--by prints tables of its own"):
-        call("tables", run, "--by", "slots", "--published")
-    with pytest.raises(InvalidValueError, match="--by needs a run"):
-        call("tables", "--by", "slots")
-    explicit = tuple(played(job) for job in PLAN.jobs() if job.setting == "explicit")
-    write(tmp_path / "explicit", explicit)
+def test_a_breakdown_that_does_not_exist() -> None:
+    with pytest.raises(UnknownNameError, match=r"breakdown 'colour'.*pattern, expression, slots"):
+        find_breakdowns(["pattern", "colour"])
+
+
+def test_explicit_alone_has_nothing_to_break_down(
+    records: tuple[Record, ...], tmp_path: Path
+) -> None:
+    with RecordStore(tmp_path) as store:
+        store.append(next(record for record in records if record.setting == "explicit"))
     with pytest.raises(InvalidValueError, match="need an implicit setting"):
-        call("tables", tmp_path / "explicit", "--by", "slots")
-
-
-def test_older_runs_are_unknown(records: tuple[Record, ...], tmp_path: Path) -> None:
-    write(tmp_path, records)
-    lines = [json.loads(line) for line in (tmp_path / RECORDS_FILE).read_text().splitlines()]
-    for line in lines:
-        del line["metadata"]["hidden_slots"]
-    text = "".join(f"{json.dumps(line)}\n" for line in lines)
-    (tmp_path / RECORDS_FILE).write_text(text)
-    output = call("tables", tmp_path, "--by", "slots")
-    rows = [line for line in output.splitlines() if line.startswith("│")]
-    assert rows
-    assert all("unknown" in line for line in rows)
-    assert "Unknown: the records are older than this field." in output
+        call("tables", tmp_path, "--by", "slots")
 
 
 def test_policies_are_compared_by_label(run: Path) -> None:
     output = call("compare", f"{run}:listener", f"{run}:forgetful", "--by", "pattern,rival")
     assert "By reasoning pattern:" in output
-    assert "By recency rival:" in output
     assert "  contextual, recency rival: " in output
     assert "  reasoning, color exclusion: no clear difference" in output
     assert "Each breakdown is corrected separately, over all its rows." in output
     assert "By " not in call("compare", f"{run}:listener", f"{run}:forgetful")
 
 
-def test_a_compared_label_is_the_difference_on_its_episodes(result: Any) -> None:
-    results, labels = hand_made(result)
-    direct = [one for one in results if one.setting == "direct"]
-    better = [replace(one, policy="better", outcome="success") for one in direct]
-    found = compare(
-        gather([("", better)]),
-        gather([("", direct)]),
-        {"letter": labels},
-    )
-    parts = found.parts["letter"]
-    assert [(part.key.label, round(part.gap.value * 6)) for part in parts] == [
-        ("a", 4), ("b", 5), ("c", 5),
-    ]  # fmt: skip
-    assert all(part.p_holm >= part.gap.p_value for part in parts)
-    assert "  direct, a: " in "\n".join(sentences(found, "better", "listener"))
-    empty = compare(
-        gather([("", better)]),
-        gather([("", direct)]),
-        {"letter": dict.fromkeys(labels, ())},
-    )
-    assert "By letter: no instruction has one." in list(sentences(empty, "better", "listener"))
-
-
 # The page
 
 
-def test_the_page_has_the_same_tables(records: tuple[Record, ...]) -> None:
-    pytest.importorskip("jinja2")
-    page = render(records)
-    cells = gather([("", records)])
-    labels = label_instructions(find_breakdowns(BREAKDOWNS), records)
-    for name, breakdown in BREAKDOWNS.items():
-        assert f"<summary>By {breakdown.title}</summary>" in page
-        table = make_breakdown_table(breakdown, cells, labels[name])
-        for row in table.rows:
-            cells_of = [re.escape(html.escape(entry.text)) for entry in row.entries]
-            texts = r"\s*".join(f"<td>{text}</td>" for text in cells_of)
-            assert re.search(rf'<th scope="row">{row.name}</th>\s*{texts}', page), row
-    explicit = [record for record in records if record.setting == "explicit"]
-    assert "By difficulty" in render(explicit)
-    assert "By reasoning pattern" not in render(explicit)
-
-
 @pytest.mark.browser
-def test_tables_open_with_the_keyboard_and_fit_a_telephone(
-    records: tuple[Record, ...], open_page: Any, tmp_path: Path
+def test_the_page_has_the_same_tables_and_they_open_with_the_keyboard(
+    records: tuple[Record, ...], run: Path, open_page: Any, tmp_path: Path
 ) -> None:
     pytest.importorskip("jinja2")
+    from page_text import render
+
+    text, frame = render(records), read_frame([Source(run)], words=True)
+    for breakdown in BREAKDOWNS.values():
+        assert f"<summary>By {breakdown.title}</summary>" in text
+        for row in make_breakdown_table(breakdown, frame).rows:
+            cells = [re.escape(html.escape(entry.text)) for entry in row.entries]
+            texts = r"\s*".join(f"<td>{text}</td>" for text in cells)
+            assert re.search(rf'<th scope="row">{row.name}</th>\s*{texts}', text), row
     path = tmp_path / "page.html"
-    path.write_text(render(records))
+    path.write_text(text)
     with open_page(path.as_uri()) as page:
         heads = page.locator("#kinds summary")
         assert heads.count() == len(BREAKDOWNS)
-        assert page.locator("#kinds table:visible").count() == 0
         for number in range(heads.count()):
+            assert page.locator("#kinds table:visible").count() == number
             heads.nth(number).press("Enter")
-            assert page.locator("#kinds table:visible").count() == number + 1
         page.set_viewport_size({"width": 400, "height": 800})
         assert page.evaluate("document.documentElement.scrollWidth") == 400
 
@@ -412,51 +303,16 @@ def test_tables_open_with_the_keyboard_and_fit_a_telephone(
 # Memory
 
 
-def test_labels_are_read_line_by_line(records: tuple[Record, ...], tmp_path: Path) -> None:
+def test_words_are_read_line_by_line(records: tuple[Record, ...], tmp_path: Path) -> None:
     """The long parts of records are dropped at once: labels take a small share of the file."""
     long = replace(records[1], details="x" * 20_000)
     with (tmp_path / RECORDS_FILE).open("w") as file:
         for episode in range(2000):
             file.write(encode(replace(long, episode=episode)).decode() + "\n")
-    size = (tmp_path / RECORDS_FILE).stat().st_size
+    reads = {name: column.read for name, column in WORD_COLUMNS.items()}
     tracemalloc.start()
-    labels = label_instructions(find_breakdowns(BREAKDOWNS), iterate_records(tmp_path))
+    frame = with_columns(make_frame([("", [long])]), iterate_records(tmp_path), reads)
     _, peak = tracemalloc.get_traced_memory()
     tracemalloc.stop()
-    assert len(labels["slots"]) == 2000
-    assert peak < size / 5
-
-
-def test_a_stored_instruction_has_the_labels_of_its_record(
-    records: tuple[Record, ...], run: Path
-) -> None:
-    whole = label_instructions(find_breakdowns(BREAKDOWNS), records)
-    assert label_instructions(find_breakdowns(BREAKDOWNS), iterate_records(run)) == whole
-    assert len(read_results(run)) == len(records)
-
-
-def test_difficulty_has_rows_for_explicit_and_gaps_on_the_same_episodes(
-    records: tuple[Record, ...], run: Path
-) -> None:
-    (breakdown,) = find_breakdowns(["difficulty"])
-    cells = gather([("", records)])
-    table = make_breakdown_table(
-        breakdown, cells, label_instructions([breakdown], records)["difficulty"]
-    )
-    texts = {
-        (row.group.replace(" (privileged)", ""), row.name): [entry.text for entry in row.entries]
-        for row in table.rows
-    }
-    # Of eight episodes of two tasks four are easy, two medium and two hard.
-    for level, episodes in (("easy", "8"), ("medium", "4"), ("hard", "4")):
-        entry = texts["forgetful, explicit", level]
-        assert entry[:3] == [episodes, "100.00", "–"]
-        own = [
-            one for one in records
-            if (one.policy, one.setting, one.difficulty) == ("forgetful", "direct", level)
-        ]  # fmt: skip
-        rate = 100 * sum(one.outcome == "success" for one in own) / len(own)
-        assert texts["forgetful, direct", level][:2] == [episodes, f"{rate:.2f}"]
-        gap = f"{rate - 100:+.1f}".replace("-", "−").replace("+0.0", "±0.0")
-        assert texts["forgetful, direct", level][2] == gap
-    assert "forgetful, explicit" not in call("tables", run, "--by", "slots", "--format", "csv")
+    assert frame["slots"].tolist() == [long.metadata["hidden_slots"] or None]
+    assert peak < (tmp_path / RECORDS_FILE).stat().st_size / 5

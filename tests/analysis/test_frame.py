@@ -1,0 +1,136 @@
+"""The frame of results: its columns, and which results belong to the same policy run."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pandas as pd
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from made_records import make_record
+
+import roboirg
+from roboirg.apps.leaderboard.packing import pack_run
+from roboirg.evaluation.analysis.frame import COLUMNS, make_frame
+from roboirg.evaluation.analysis.frame_reading import WORD_COLUMNS
+from roboirg.evaluation.analysis.stats.cells import cells_of
+from roboirg.evaluation.analysis.stats.measure import summarize
+from roboirg.evaluation.plan.plan_maker import make_plan
+from roboirg.evaluation.plan.stored_plans import write_plan
+from roboirg.evaluation.records.store import RecordStore
+
+OUTCOMES = ("success", "failure", "error")
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Of each task and setting the first episode is won, the next lost; one is an error."""
+    folder = tmp_path_factory.mktemp("runs") / "run"
+    plan = make_plan("oracle", tasks="PickXtimes,StopCube", settings="all", episodes="4")
+    with RecordStore(folder) as store:
+        for job in plan.jobs():
+            if job.episode < 3:
+                outcome = OUTCOMES[job.episode]
+                cause = None if outcome == "success" else "why"
+                store.append(make_record(job, outcome, cause, video=None))  # type: ignore[arg-type]
+    write_plan(plan, folder)
+    return folder
+
+
+def test_columns_have_their_types_and_lack_what_they_may_lack(run: Path) -> None:
+    found = roboirg.results(run)
+    declared = {**COLUMNS, **WORD_COLUMNS}
+    assert list(found) == list(declared)
+    kinds = {"text": "string", "number": "Float64", "flag": "boolean", "texts": "object"}
+    assert found.dtypes.astype(str).to_dict() == {
+        name: kinds[one.kind] for name, one in declared.items()
+    }
+    assert {name for name, one in declared.items() if not one.missing} <= {
+        name for name in found if found[name].notna().all()
+    }
+    assert len(found) == 2 * 5 * 3 - 3, "what is planned has no row; StopCube has no spatial"
+    assert (found["success"].isna() == (found["outcome"] == "error")).all()
+    assert (found["error"].notna() == (found["outcome"] == "error")).all()
+    assert (found["pattern"].notna() == (found["setting"] == "reasoning")).all()
+    assert found["privileged"].all()
+    assert set(found["suite"]) == {"counting"}
+
+
+def test_a_pack_has_the_results_of_its_folder(run: Path, tmp_path: Path) -> None:
+    pack_run(run, pack := tmp_path / "shipped.roboirg.zip")
+    whole = roboirg.results(run)
+    pd.testing.assert_frame_equal(roboirg.results(pack), whole)
+    pd.testing.assert_frame_equal(roboirg.results(f"{pack}:oracle"), whole)
+
+
+@pytest.mark.parametrize(
+    ("changes", "label"),
+    [
+        ({"language_version": "2"}, "listener, language 2"),
+        ({"environment_version": 2}, "listener, environment 2"),
+        ({"policy_version": "b"}, "listener, policy b"),
+        ({"max_steps": 100}, "listener, max steps 100"),
+        ({"meshes": "light"}, "listener, meshes light"),
+        ({"split": "val"}, "listener, split val"),
+    ],
+)
+def test_what_is_not_alike_is_not_averaged(result, changes, label) -> None:
+    frame = make_frame([("run", [result("success", 0), result("failure", 1, **changes)])])
+    assert {frame.names[key.policy_run]: cell.rate for key, cell in cells_of(frame).items()} == {
+        next(one for one in frame.names.values() if one != label): 1,
+        label: 0,
+    }
+
+
+def test_policies_of_their_own_versions_are_called_by_their_names(result) -> None:
+    both = [result(policy=name, policy_version=name) for name in "ba"]
+    assert list(make_frame([("run", both)]).names.values()) == ["a", "b"]
+    planned = [one.identity for one in both]
+    assert list(make_frame([("run", both)], planned).names.values()) == ["b", "a"]
+
+
+PLAYS = st.dictionaries(
+    st.tuples(
+        st.sampled_from(["explicit", "direct"]),
+        st.sampled_from(["PickXtimes", "BinFill"]),
+        st.integers(0, 5),
+        st.integers(0, 1),
+    ),
+    st.sampled_from([*OUTCOMES, "missing"]),
+)
+
+
+@given(PLAYS, st.randoms(use_true_random=False))
+def test_order_and_runs_of_the_records_make_no_difference(result, plays, random) -> None:
+    """Two runs complete each other, and what neither played is missing."""
+    planned = [
+        result("success", episode, setting=setting, task=task, policy_seed=seed).identity
+        for setting, task, episode, seed in plays
+    ]
+    results = [
+        result(
+            outcome, job.episode, setting=job.setting, task=job.task, policy_seed=job.policy_seed
+        )
+        for job, outcome in zip(planned, plays.values(), strict=True)
+        if outcome != "missing"
+    ]
+    whole = make_frame([("whole", results)], planned)
+    mixed = random.sample(results, len(results))
+    at = random.randint(0, len(mixed))
+    parts = make_frame([("a", mixed[:at]), ("b", mixed[at:])], planned)
+    for name in ("run", "outcome", "options", "task", "episode"):
+        assert list(parts[name]) == list(whole[name])
+    assert sorted(whole["outcome"]) == sorted(plays.values())
+    assert summarize(cells_of(parts)) == summarize(cells_of(whole))
+
+
+def test_the_same_episode_in_two_runs_stays_apart(result) -> None:
+    twice = make_frame([("a", [result("success", 0)]), ("b", [result("failure", 0)])])
+    assert list(twice.names.values()) == ["listener, a", "listener, b"]
+    assert [cell.rate for cell in cells_of(twice).values()] == [1, 0]
+
+
+def test_a_policy_that_has_not_begun_is_there(result) -> None:
+    ((key, cell),) = cells_of(make_frame([], [result(policy="late").identity])).items()
+    assert (key.policy_run.policy, key.policy_run.versions, cell.missing) == ("late", None, 1)

@@ -1,0 +1,138 @@
+"""Rates, gaps and corrected tests: against pandas and statsmodels, and by hand."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+
+import numpy as np
+import pandas as pd
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from made_records import make_record
+
+import roboirg
+from roboirg.core.instruction_options import InstructionOptions
+from roboirg.evaluation.analysis.frame import make_frame
+from roboirg.evaluation.analysis.stats.cells import cells_of
+from roboirg.evaluation.analysis.stats.intervals import wilson_interval
+from roboirg.evaluation.analysis.stats.measure import ALL_TASKS, summarize
+from roboirg.evaluation.analysis.stats.option_labels import REFERENCE
+from roboirg.evaluation.plan.plan_maker import make_plan
+from roboirg.evaluation.records.store import RecordStore
+
+Trials = dict[tuple[str, float], dict[float, bool]]
+
+
+@pytest.fixture(scope="module")
+def played(tmp_path_factory: pytest.TempPathFactory) -> pd.DataFrame:
+    """Two policies and tasks, three episodes with two seeds in three settings."""
+    folder = tmp_path_factory.mktemp("run")
+    plan = make_plan(
+        "listener,forgetful", tasks="PickXtimes,VideoUnmask",
+        settings="explicit,direct,reasoning", episodes="3", policy_seeds="0,1",
+    )  # fmt: skip
+    with RecordStore(folder) as store:
+        for job in plan.jobs():
+            store.append(make_record(job, "success"))
+    return roboirg.results(folder)
+
+
+def trials(rows: pd.DataFrame) -> Trials:
+    """Return the verdicts of each task and episode by seed."""
+    return {
+        at: dict(zip(own["policy_seed"], own["outcome"] == "success", strict=True))
+        for at, own in rows.groupby(["task", "episode"])
+    }
+
+
+def plain_gap(ours: Trials, theirs: Trials) -> float | None:
+    """First less second on the seeds of an episode that both have, on all if they share none."""
+    sides: dict[str, tuple[list[bool], list[bool]]] = {}
+    for at in ours.keys() & theirs.keys():
+        shared = ours[at].keys() & theirs[at].keys()
+        for number, one in enumerate((ours[at], theirs[at])):
+            own = sides.setdefault(at[0], ([], []))[number]
+            own.extend(won for seed, won in one.items() if seed in shared or not shared)
+    gaps = [np.mean(first) - np.mean(second) for first, second in sides.values()]
+    return float(np.mean(gaps)) if gaps else None
+
+
+@given(st.data())
+def test_measure_is_what_pandas_gives(played: pd.DataFrame, data: st.DataObject) -> None:
+    from statsmodels.stats.multitest import multipletests
+
+    outcomes = st.sampled_from(["success", "failure", "error"])
+    drawn = data.draw(st.lists(outcomes, min_size=len(played), max_size=len(played)))
+    frame = played.assign(outcome=drawn)
+    by = ("policy", "setting")
+    found = roboirg.measure(frame, by, against={"setting": "explicit"}, family=["policy"])
+    assert [one.key for one in found] == list(frame.groupby(list(by), sort=False).groups)
+    judged = frame[frame["outcome"] != "error"].assign(won=lambda one: one["outcome"] == "success")
+    rates = judged.groupby([*by, "task"])["won"].mean().groupby(list(by)).mean()
+    for one in found:
+        own, explicit = (
+            judged[(judged["policy"] == one.key[0]) & (judged["setting"] == setting)]
+            for setting in (one.key[1], "explicit")
+        )
+        assert (one.trials, one.successes) == (len(own), own["won"].sum())
+        assert one.errors == 3 * 2 * 2 - len(own)
+        assert (
+            one.rate is None if own.empty else float(one.rate or 0) == pytest.approx(rates[one.key])
+        )
+        gap = None if one.key[1] == "explicit" else plain_gap(trials(own), trials(explicit))
+        assert (one.gap and one.gap.value) == (None if gap is None else pytest.approx(gap))
+    for policy in ("listener", "forgetful"):
+        tested = [one for one in found if one.gap and one.key[0] == policy]
+        if tested:
+            corrected = multipletests(
+                [one.gap.p_value for one in tested if one.gap], method="holm"
+            )[1]
+            assert [one.p_holm for one in tested] == pytest.approx(list(corrected))
+
+
+def test_averages_are_unweighted_and_suites_stand_by_themselves(result) -> None:
+    results = [
+        *(result("success", episode, task="PickXtimes") for episode in range(9)),
+        result("failure", 0, task="BinFill"),
+        result("failure", 0, task="VideoUnmask"),
+        result("success", 0, task="SomethingElse"),
+    ]
+    found = summarize(cells_of(make_frame([("run", results)])))
+    rates = {key.scope: one.rate for key, one in found.items()}
+    tasks = {"PickXtimes": 1, "BinFill": 0, "VideoUnmask": 0, "SomethingElse": 1}
+    assert rates == {
+        **tasks,
+        "counting": Fraction(1, 2),
+        "permanence": 0,
+        ALL_TASKS: Fraction(1, 2),
+    }
+    assert list(rates)[-1] == ALL_TASKS
+
+
+def test_gaps_are_paired_and_corrected_and_forms_compared(result) -> None:
+    """All of 20 are won in explicit, none in direct, 15 in its resolved form, 19 in reasoning."""
+    won = {
+        REFERENCE: 20,
+        InstructionOptions("direct"): 0,
+        InstructionOptions("direct", "resolved"): 15,
+        InstructionOptions("reasoning"): 19,
+    }
+    results = [
+        result("success" if episode < least else "failure", episode, options=options)
+        for options, least in won.items()
+        for episode in range(20)
+    ]
+    summaries = summarize(cells_of(make_frame([("run", results)])))
+    found = {key.options: one for key, one in summaries.items() if key.scope == "PickXtimes"}
+    explicit, direct, resolved, reasoning = (found[options] for options in won)
+    assert (explicit.gap, explicit.p_holm, explicit.second_gap) == (None, None, None)
+    assert explicit.interval == wilson_interval(20, 20)
+    gaps = [one.gap.value for one in (direct, resolved, reasoning)]
+    assert gaps == pytest.approx([-1, -0.25, -0.05])
+    # Exact tests of 20, 5 and 1 episodes that differ, all to one side; Holm: by 3, 2 and 1.
+    assert [one.p_holm for one in (direct, resolved, reasoning)] == pytest.approx(
+        [3 * 2 / 2**20, 2 * 2 / 2**5, 1.0]
+    )
+    assert direct.second_gap.value == -0.75
+    assert direct.second_gap.overlap == (0, 0, 15, 5)
