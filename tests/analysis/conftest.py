@@ -8,32 +8,13 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
-from flat_jobs import nested
+from flat_jobs import make_result
 
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.evaluation.analysis.published import TRIALS, published_rows
 from roboirg.evaluation.records.record import Summary
 
 MakeResult = Callable[..., Summary]
-
-
-def make_result(outcome: str = "success", episode: int = 0, **fields: object) -> Summary:
-    usual = nested(**{
-        "policy": "listener",
-        "task": "PickXtimes",
-        "split": "test",
-        "seed": episode,
-        "difficulty": "easy",
-        "privileged": False,
-        "language_version": "1",
-        "environment_version": 1,
-        "package_version": "0",
-        "started_at": "now",
-        "duration_s": 0.0,
-        **fields,
-    })  # fmt: skip
-    error = {"error": "policy"} if outcome == "error" else {}
-    return Summary(outcome=outcome, episode=episode, **error, **usual)  # type: ignore[arg-type]
 
 
 def with_rate(

@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import pytest
+from flat_jobs import make_result
 
 from roboirg.core.errors import InvalidValueError
-from roboirg.core.instruction_options import InstructionOptions
-from roboirg.core.policy_ref import unknown_policy
-from roboirg.evaluation.analysis.figures import draw_figure
 from roboirg.evaluation.analysis.stats.arm_figures import ArmFigure, arm_figures
 from roboirg.evaluation.analysis.stats.chance import silent_chance
 from roboirg.evaluation.analysis.stats.run_data import RunData
@@ -16,25 +14,6 @@ from roboirg.evaluation.records.record import GoalOutcomes, Summary
 
 TASKS = ("PickXtimes", "VideoUnmask")
 SCENES = range(12)
-
-
-def result(outcome: str, episode: int, **fields: object) -> Summary:
-    return Summary(
-        outcome=outcome,  # type: ignore[arg-type]
-        episode=episode,
-        error="policy" if outcome == "error" else None,
-        options=InstructionOptions(),
-        split="test",
-        seed=episode,
-        difficulty="easy",
-        ref=unknown_policy(str(fields["policy"])),
-        language_version="1",
-        environment_version=1,
-        package_version="0",
-        started_at="now",
-        duration_s=0.0,
-        **fields,  # type: ignore[arg-type]
-    )
 
 
 def goals(arm: str, done: str) -> tuple[str, GoalOutcomes]:
@@ -55,7 +34,7 @@ def play(policy: str, acts: dict[str, str], scenes: range = SCENES) -> list[Summ
     for arm, done in acts.items():
         outcome, outcomes = goals(arm, done)
         found += [
-            result(outcome, scene, policy=policy, task=task, arm=arm, goals=outcomes)
+            make_result(outcome, scene, policy=policy, task=task, arm=arm, goals=outcomes)
             for task in TASKS
             for scene in scenes
         ]
@@ -72,7 +51,7 @@ def data_of(*results: list[Summary]) -> RunData:
 
 
 def figure(data: RunData, name: str) -> ArmFigure:
-    return next(one for one in arm_figures(data) if one.contrast.name == name)
+    return next(one for one in arm_figures(data.frame) if one.contrast.name == name)
 
 
 @pytest.mark.parametrize(
@@ -99,36 +78,31 @@ def test_all_paraphrases_against_their_mean():
     half += play("mine", {"paraphrase-2": "none"}, range(4, 8))
     found = figure(data_of(half), "paraphrases")
     assert found.rates == (0.5, 0.75)
-    assert found.gap.value == -0.25
-    assert found.gap.episodes == 16
+    assert (found.gap.value, found.gap.episodes) == (-0.25, 16)
 
 
 def test_a_trial_without_an_arm_and_an_error_count_in_no_figure():
     results = play("mine", LISTENER, range(3))
-    results += [result("success", 7, policy="mine", task=TASKS[0])]
-    results += [result("error", 8, policy="mine", task=TASKS[0], arm=arm) for arm in LISTENER]
-    found = figure(data_of(results), "words' worth")
-    assert found.gap.episodes == 6
+    results += [make_result("success", 7, policy="mine", task=TASKS[0])]
+    results += [make_result("error", 8, policy="mine", task=TASKS[0], arm=arm) for arm in LISTENER]
+    assert figure(data_of(results), "words' worth").gap.episodes == 6
 
 
-def test_tables_figures_and_sentences_have_each_policy_once():
-    data = data_of(play("mine", LISTENER), play("knows", HABIT))
-    table = make_arm_table(data)
+def test_tables_and_sentences_have_each_policy_once():
+    table = make_arm_table(data_of(play("mine", LISTENER), play("knows", HABIT)))
     assert len(table.rows) == 6
-    assert {row.group for row in table.rows} == {"mine, explicit", "knows, explicit"}
     uses = {row.group: row.entries for row in table.rows if row.name.startswith("language use")}
-    assert uses["mine, explicit"][1].text.startswith("100.0 (")
-    assert uses["knows, explicit"][1].text.startswith("0.0 (")
-    assert uses["knows, explicit"][0].text == "24"
-    assert draw_figure("gaps", data) is not None
-    with pytest.raises(InvalidValueError, match="--arms told"):
-        make_arm_table(data_of(play("mine", {"told": "own"})))
-    sides = data_of(play("mine", LISTENER)), data_of(play("knows", HABIT))
-    (sentence,) = language_use_sentences(*sides, ("mine", "knows"))
-    assert sentence.startswith("Language use, explicit: mine less knows +100.0 points")
-    assert not [
-        *language_use_sentences(sides[0], data_of(play("knows", {"told": "own"})), ("", ""))
+    assert [(group, entries[0].text, entries[1].text[:5]) for group, entries in uses.items()] == [
+        ("knows, explicit", "24", "0.0 ("),
+        ("mine, explicit", "24", "100.0"),
     ]
+    told = data_of(play("knows", {"told": "own"}))
+    with pytest.raises(InvalidValueError, match="--arms told"):
+        make_arm_table(told)
+    mine, knows = data_of(play("mine", LISTENER)), data_of(play("knows", HABIT))
+    (sentence,) = language_use_sentences(mine.frame, knows.frame, ("mine", "knows"))
+    assert sentence.startswith("Language use, explicit: mine less knows +100.0 points")
+    assert not [*language_use_sentences(mine.frame, told.frame, ("", ""))]
 
 
 def test_chance_in_silence_counts_goals_that_begin_alike():

@@ -39,6 +39,26 @@ def job_of(**given: object) -> Job:
     return Job(**{"ref": ref, **nested(**given)})
 
 
+def make_result(outcome: str = "success", episode: int = 0, **fields: object) -> Summary:
+    """Return a made-up result."""
+    usual = nested(**{
+        "policy": "listener",
+        "task": "PickXtimes",
+        "split": "test",
+        "seed": episode,
+        "difficulty": "easy",
+        "privileged": False,
+        "language_version": "1",
+        "environment_version": 1,
+        "package_version": "0",
+        "started_at": "now",
+        "duration_s": 0.0,
+        **fields,
+    })  # fmt: skip
+    error = {"error": "policy"} if outcome == "error" else {}
+    return Summary(outcome=outcome, episode=episode, **error, **usual)  # type: ignore[arg-type]
+
+
 def with_version(record: Stored, version: str) -> Stored:
     """Return the record of another version of its policy."""
     return msgspec.structs.replace(record, ref=replace(record.ref, version=version))
