@@ -59,25 +59,36 @@ def test_results_are_those_of_the_records(unplayed: None, tmp_path: Path) -> Non
         out=tmp_path, **QUICK,
     )  # fmt: skip
     assert results.records == read_records(tmp_path)
-    assert (results.errors, results.missing, results.folder) == (0, 0, tmp_path)
-    rates = results.rates()
-    assert (rates["forgetful", "direct"], rates["listener", "direct (resolved)"]) == (0.0, 1.0)
-    frame = results.frame
-    assert frame.groupby("policy")["success"].mean()["forgetful"] == pytest.approx(1 / 3)
+    assert [one.identity for one in results.summaries] == [one.identity for one in results.records]
+    assert (len(results.records), results.errors, results.missing) == (2 * 3 * 3, 0, 0)
+    assert results.rates() == {
+        (policy, setting): float(policy == "listener" or setting == "explicit")
+        for policy in ("listener", "forgetful")
+        for setting in ("explicit", "direct", "direct (resolved)")
+    }
+    assert results.frame.equals(roboirg.results(tmp_path))
+    assert "listener" in results.table(published=True)
+    assert results.table("main", "latex").startswith("% needs")
     assert "direct: no clear difference, +100.0 points" in results.compare("listener", "forgetful")
     assert results._repr_markdown_().startswith("### Success by task and setting")
     assert "forgetful explicit: 100.0 %" in repr(results)
+    for wrong in (
+        lambda: results.plot("averagse"),
+        lambda: results.table("mian"),
+        lambda: results.compare("listener", "nobody"),
+    ):
+        with pytest.raises(UnknownNameError):
+            wrong()
+
+
+def test_results_have_figures_and_a_page(unplayed: None, tmp_path: Path) -> None:
+    results = roboirg.evaluate(
+        "listener", settings="explicit,direct", forms="implicit,resolved", out=tmp_path, **QUICK
+    )
     assert results.plot("forms")._repr_png_().startswith(b"\x89PNG")
     assert results.report().read_text().startswith("<!doctype html>")
     results.plot("gaps", published=True).save(tmp_path / "a.svg")
     assert "<!-- MemER -->" in (tmp_path / "a.svg").read_text()
-    for ask, wrong in (
-        (results.plot, ["averagse"]),
-        (results.table, ["mian"]),
-        (results.compare, ["listener", "nobody"]),
-    ):
-        with pytest.raises(UnknownNameError):
-            ask(*wrong)
     with pytest.raises(InvalidValueError, match="nothing to draw for 'context'"):
         results.plot("context")
 
@@ -101,17 +112,16 @@ def test_classes_and_objects_play_in_this_process(unplayed: None, tmp_path: Path
     assert plan is not None
     assert plan.hosting.policy_process == "shared"
     assert {one.policy for one in results.records} == {"mine", "class"}
-    again = roboirg.evaluate({"mine": given}, out=tmp_path, **{**QUICK, "progress": True})
-    assert again.errors == 0
-    assert (
-        "No other process has mine: all episodes are played in this one" in capsys.readouterr().err
-    )
-    with pytest.raises(InvalidValueError, match="exists in this process only"):
-        roboirg.evaluate(given, out=tmp_path, **{**QUICK, "workers": 2})
-    with pytest.raises(InvalidValueError, match="same name"):
-        roboirg.evaluate([Still(), Still], out=tmp_path, **QUICK)
-    with pytest.raises(InvalidValueError, match="has no method"):
-        roboirg.evaluate(object(), out=tmp_path, **QUICK)
+    roboirg.evaluate({"mine": given}, out=tmp_path, **{**QUICK, "progress": True})
+    heard = capsys.readouterr().err
+    assert "No other process has mine: all episodes are played in this one" in heard
+    for policy, options, words in (
+        (given, {"workers": 2}, "exists in this process only"),
+        ([Still(), Still], {}, "same name"),
+        (object(), {}, "has no method"),
+    ):
+        with pytest.raises(InvalidValueError, match=words):
+            roboirg.evaluate(policy, out=tmp_path, **{**QUICK, **options})
 
 
 class Insider(Still):

@@ -17,14 +17,19 @@ from roboirg.evaluation.analysis.stats.power import (
 )
 
 
-def test_power_by_hand() -> None:
+@pytest.mark.parametrize(
+    ("episodes", "gap", "discordance", "power"),
+    [
+        (6, 1.0, 1.0, 1.0),
+        (5, 1.0, 1.0, 0.0),
+        (6, 0.5, 1.0, 0.75**6 + 0.25**6),  # shares 3/4 and 1/4
+        (6, 0.5, 0.5, 0.5**6),
+        (6, 0.0, 0.0, 0.0),
+    ],
+)
+def test_power_by_hand(episodes: int, gap: float, discordance: float, power: float) -> None:
     """Six episodes, all to one side: the test rejects 6 of 6 and 0 of 6 only (p = 1/32)."""
-    assert mcnemar_power(6, 1.0, 1.0) == pytest.approx(1.0)
-    assert mcnemar_power(5, 1.0, 1.0) == 0.0
-    # Discordance 1, gap 0.5: shares 3/4 and 1/4.
-    assert mcnemar_power(6, 0.5, 1.0) == pytest.approx(0.75**6 + 0.25**6)
-    assert mcnemar_power(6, 0.5, 0.5) == pytest.approx(0.5**6)
-    assert mcnemar_power(6, 0.0, 0.0) == 0.0
+    assert mcnemar_power(episodes, gap, discordance) == pytest.approx(power)
 
 
 @pytest.mark.parametrize(("episodes", "gap", "discordance"), [(50, 0.2, 0.3), (40, -0.25, 0.5)])
@@ -52,16 +57,12 @@ def test_the_needed_episodes_are_enough_and_half_are_not(share: float, discordan
     assert mcnemar_power(max(1, needed // 2), gap, discordance) < 0.8
 
 
-def test_a_run_says_what_it_can_find() -> None:
+def test_a_run_has_a_smallest_gap_that_it_can_find() -> None:
     gap = smallest_gap(50, 0.3)
     assert gap is not None
     assert mcnemar_power(50, gap, 0.3) >= 0.8 > mcnemar_power(50, gap - 0.001, 0.3)
-    assert smallest_gap(5, 0.5) is None
-    assert episodes_needed(0.0, 0.3) is None
-    assert episodes_needed(0.0001, 0.3) is None
-
-
-def test_what_cannot_be_is_refused() -> None:
+    nothing = smallest_gap(5, 0.5), episodes_needed(0.0, 0.3), episodes_needed(0.0001, 0.3)
+    assert nothing == (None, None, None)
     with pytest.raises(InvalidValueError, match=r"gap of 0\.5 with a discordance of 0\.3"):
         episodes_needed(0.5, 0.3)
     with pytest.raises(InvalidValueError, match="at least 1"):
