@@ -17,7 +17,7 @@ from roboirg.apps.learning.policy.paper_experiment import (
 )
 from roboirg.apps.learning.policy.paper_page import results_text
 from roboirg.core.errors import InvalidValueError
-from roboirg.evaluation.analysis.stats.cells import gather
+from roboirg.evaluation.analysis.frame import make_frame
 from roboirg.evaluation.plan.plan_maker import make_plan
 
 FILES = {row_name(memory): Path(f"{memory}-explicit-0.pt") for memory in SYSTEMS}
@@ -63,14 +63,32 @@ def values(section, row):
     return [None if text == "–" else float(text) for text in texts]
 
 
-def test_the_same_questions_have_the_same_answers_for_equal_rates(published_like):
-    results = [
+def rows_like(found, *systems):
+    """Return published-like results as those of the rows of the systems, by default of all."""
+    return [
         msgspec.structs.replace(one, policy=ROW_OF[one.policy])
-        for one in published_like("main")
-        if one.policy in ROW_OF
+        for one in found
+        if one.policy in (systems or ROW_OF)
     ]
-    text = results_text({"main": gather([("main", results)])})
-    carried, apart, where, kept = text.split("\n## ")[1:]
+
+
+def resolved(results):
+    """Return their implicit results in the resolved form, all won."""
+    return [
+        msgspec.structs.replace(
+            one, outcome="success", options=replace(one.options, form="resolved")
+        )
+        for one in results
+        if one.options.setting != "explicit"
+    ]
+
+
+def sections(part, *results):
+    return results_text({part: make_frame([(part, [*results])])}).split("\n## ")[1:]
+
+
+def test_the_same_questions_have_the_same_answers_for_equal_rates(published_like):
+    carried, apart, where, kept = sections("main", *rows_like(published_like("main")))
     for system, row in ROW_OF.items():
         assert values(carried, row) == pytest.approx(values(carried, system), abs=0.11)
         assert values(kept, row) == pytest.approx(values(kept, system), abs=1.01)
@@ -81,54 +99,20 @@ def test_the_same_questions_have_the_same_answers_for_equal_rates(published_like
     assert values(carried, "FrameS-Modul")[0] == pytest.approx(-16.1, abs=0.1)
 
 
-def test_resolved_forms_are_compared_with_references(published_like):
-    results = [
-        msgspec.structs.replace(one, policy="small-none") for one in published_like("main", "pi0.5")
-    ]
-    better = [
-        msgspec.structs.replace(
-            one, outcome="success", options=replace(one.options, form="resolved")
-        )
-        for one in results
-        if one.options.setting != "explicit"
-    ]
-    found = gather([("main", [*results, *better])])
-    recovered = values(results_text({"main": found}).split("\n## ")[-1], "small-none")
+def test_resolved_forms_are_compared_with_references_and_with_nothing_else(published_like):
+    found = rows_like(published_like("main"), "pi0.5", "TTT-Expert")
+    alone, both = sections("main", *found), sections("main", *found, *resolved(found))
     lost = [100 - 21.2, 100 - 13.6, 100 - 17.3, 100 - 12.4]
-    assert recovered == pytest.approx(lost, abs=0.2)
+    assert values(both[-1], "small-none") == pytest.approx(lost, abs=0.2)
+    assert values(alone[1], "small-ttt") == values(both[1], "small-ttt")
 
 
 def test_stages_are_compared_with_the_fewest(published_like):
-    results = [
-        msgspec.structs.replace(one, policy=ROW_OF[one.policy])
-        for one in published_like("context")
-        if one.policy in ROW_OF
-    ]
-    section = results_text({"context": gather([("context", results)])}).split("\n## ")[-1]
+    section = sections("context", *rows_like(published_like("context")))[-1]
     for system in ("FrameS-Modul", "GroundSG-QwenVL"):
         published = values(section, system)
         assert values(section, ROW_OF[system]) == pytest.approx(published, abs=0.11)
     assert values(section, "FrameS-Modul")[-1] == pytest.approx(24.44 - 29.11, abs=0.1)
-
-
-def test_other_forms_are_not_compared_with_the_row_without_memory(published_like):
-    results = [
-        msgspec.structs.replace(one, policy=ROW_OF[one.policy])
-        for one in published_like("main")
-        if one.policy in ("pi0.5", "TTT-Expert")
-    ]
-    resolved = [
-        msgspec.structs.replace(
-            one, outcome="success", options=replace(one.options, form="resolved")
-        )
-        for one in results
-        if one.options.setting != "explicit"
-    ]
-    alone, both = (
-        results_text({"main": gather([("main", found)])}).split("\n## ")[2]
-        for found in (results, [*results, *resolved])
-    )
-    assert values(alone, "small-ttt") == values(both, "small-ttt")
 
 
 @pytest.mark.parametrize(

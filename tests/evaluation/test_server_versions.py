@@ -11,7 +11,9 @@ from evaluation_fakes import FakePlay
 from made_records import make_record
 from wire_servers import ChallengeServer
 
-from roboirg.evaluation.analysis.stats.cells import Versions, gather, labels
+from roboirg.evaluation.analysis.frame import make_frame
+from roboirg.evaluation.analysis.policy_run import Versions
+from roboirg.evaluation.analysis.stats.cells import cells_of
 from roboirg.evaluation.plan.plan import Plan
 from roboirg.evaluation.plan.plan_maker import make_plan
 from roboirg.evaluation.records.merging import merge_runs
@@ -73,9 +75,9 @@ def test_errors_before_the_server_told_its_version_do_not_count(tmp_path: Path) 
     plan = plan_of(3, tries=1)
     run_plan(plan, tmp_path, Told("refused", "a", "refused"), InProcess())
     assert versions(tmp_path) == ["a"] * 3
-    cells = gather([("run", read_results(tmp_path))])
-    assert list(labels(cells).values()) == ["random"]
-    (cell,) = cells.values()
+    frame = make_frame([("run", read_results(tmp_path))])
+    assert list(frame.names.values()) == ["random"]
+    (cell,) = cells_of(frame).values()
     assert (cell.trials, cell.errors) == (1, 2)
 
 
@@ -97,7 +99,7 @@ def test_runs_of_two_versions_are_neither_merged_nor_averaged(tmp_path: Path) ->
         merge_runs(runs, tmp_path / "out")
     assert not (tmp_path / "out").exists()
     results = [(folder.name, read_results(folder)) for folder in runs]
-    found = labels(gather(results)).values()
+    found = make_frame(results).names.values()
     assert {label.partition(" (server")[2] for label in found} == {" a)", " b)"}
 
 

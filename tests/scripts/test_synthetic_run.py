@@ -7,8 +7,9 @@ from pathlib import Path
 import pytest
 from benchmarks.synthetic_run import write_synthetic_run
 
+from roboirg.evaluation.analysis.frame import make_frame
 from roboirg.evaluation.analysis.page.report import make_view
-from roboirg.evaluation.analysis.stats.cells import gather
+from roboirg.evaluation.analysis.stats.cells import cells_of
 from roboirg.evaluation.plan.sources import Source
 from roboirg.evaluation.plan.stored_plans import read_plan
 from roboirg.evaluation.records.merging import merge_runs
@@ -42,11 +43,11 @@ def test_its_records_are_those_of_its_plan(run: Path, tmp_path: Path) -> None:
 def test_parts_of_records_give_the_cells_of_whole_records(run: Path) -> None:
     plan = read_plan(run)
     assert plan is not None
-    runs = [
-        gather([("", records)], plan.jobs()) for records in (read_records(run), read_results(run))
-    ]
-    assert runs[0] == runs[1]
-    assert list(runs[0]) == list(runs[1])
+    whole, parts = (
+        cells_of(make_frame([("", records)], plan.jobs()))
+        for records in (read_records(run), read_results(run))
+    )
+    assert list(whole.items()) == list(parts.items())
 
 
 def test_a_page_reads_one_record_after_the_other(run: Path) -> None:

@@ -82,7 +82,7 @@ def rows_of(answers, kind, dataset=None):
     (score,) = [
         one for one in score_answers(dataset or items(), answers, "model") if one.kind == kind
     ]
-    return score, {row.summary.options.setting: row for row in score_rows(score)}
+    return score, {row.summary.key.options.setting: row for row in score_rows(score)}
 
 
 def item_of(task, setting="direct", index=0):

@@ -5,6 +5,7 @@ import write_paper_results as written
 from played_again import assert_holds_here
 
 from roboirg.apps.learning.policy.paper_experiment import CONTEXT, MAIN, SYSTEMS, row_name
+from roboirg.evaluation.analysis.stats.cells import cells_of
 from roboirg.evaluation.analysis.stats.option_labels import staged_options
 from roboirg.language.settings import plain_settings, settings_of
 from roboirg.tasks import all_tasks, get_task
@@ -21,7 +22,7 @@ def test_the_pages_have_the_tables_of_the_packs():
 def test_the_rows_of_the_main_table_are_whole():
     found = {
         (key.policy_run.policy, key.task, key.options.setting)
-        for key in written.played()[MAIN]
+        for key in cells_of(written.played()[MAIN])
         if key.options.form == "implicit"
     }
     rows = {row for row, _, _ in found}
@@ -39,7 +40,7 @@ def test_the_rows_of_the_main_table_are_whole():
 def test_the_context_has_all_stages():
     stages = {one.stages for one in staged_options()}
     by_row: dict[str, set] = {}
-    for key in written.played()[CONTEXT]:
+    for key in cells_of(written.played()[CONTEXT]):
         by_row.setdefault(key.policy_run.policy, set()).add(key.options.stages)
     assert len(by_row) > 1
     assert all(found == stages for found in by_row.values())
@@ -47,7 +48,7 @@ def test_the_context_has_all_stages():
 
 @pytest.mark.parametrize("part", written.PACKS)
 def test_no_episode_is_missing(part):
-    for key, cell in written.played()[part].items():
+    for key, cell in cells_of(written.played()[part]).items():
         assert (cell.trials, cell.errors, cell.missing) == (EPISODES, 0, 0), key
 
 
