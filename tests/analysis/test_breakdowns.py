@@ -169,17 +169,6 @@ def test_rows_are_what_pandas_gives(run: Path, breakdown: Breakdown) -> None:
         assert values == pytest.approx(tuple(expected.loc[key]))
 
 
-def test_the_order_of_the_records_makes_no_difference(records: tuple[Record, ...]) -> None:
-    reads = {name: column.read for name, column in WORD_COLUMNS.items()}
-    tables_of = [
-        make_breakdown_table(
-            BREAKDOWNS["expression"], with_columns(make_frame([("", order)]), records, reads)
-        )
-        for order in (records, records[::-1])
-    ]
-    assert tables_of[0] == tables_of[1]
-
-
 def hand_made(result: Callable[..., Summary], *settings: str) -> Frame:
     """Explicit wins in episodes 0 to 5 of 12, others in 0 to 2; even ones have two labels."""
     results = [
@@ -235,17 +224,15 @@ def test_a_compared_label_is_the_difference_on_its_episodes(result: Callable[...
 # Commands
 
 
-def test_tables_by_everything(run: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("COLUMNS", "200")
+def test_commands_break_everything_down(run: Path) -> None:
     output = call("tables", run, "--by", "all")
+    sides = call("compare", f"{run}:listener", f"{run}:forgetful", "--by", "pattern,rival")
     for breakdown in BREAKDOWNS.values():
         assert f"Gap to explicit by {breakdown.title}" in output
-    row = r"│ it +│ +\d+ │ +([\d.]+) │ +([−±\d.]+) │ +\S+ to \S+ │ +[01]\.\d{3} │"
-    found = re.findall(row, output)
-    # Direct and contextual, of the listener and of the forgetful one, in the order of the plan.
-    assert found[:4] == [("100.00", "±0.0")] * 2 + [("0.00", "−100.0")] * 2
-    call("tables", run, "--by", "pattern, slots", "--format", "csv", "--out", tmp_path)
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["by_pattern.csv", "by_slots.csv"]
+        is_wanted = breakdown.name in ("pattern", "rival")
+        assert (f"By {breakdown.title}:" in sides) == is_wanted
+    assert "  contextual, recency rival: " in sides
+    assert "Each breakdown is corrected separately, over all its rows." in sides
 
 
 def test_a_breakdown_that_does_not_exist() -> None:
@@ -260,15 +247,6 @@ def test_explicit_alone_has_nothing_to_break_down(
         store.append(next(record for record in records if record.setting == "explicit"))
     with pytest.raises(InvalidValueError, match="need an implicit setting"):
         call("tables", tmp_path, "--by", "slots")
-
-
-def test_policies_are_compared_by_label(run: Path) -> None:
-    output = call("compare", f"{run}:listener", f"{run}:forgetful", "--by", "pattern,rival")
-    assert "By reasoning pattern:" in output
-    assert "  contextual, recency rival: " in output
-    assert "  reasoning, color exclusion: no clear difference" in output
-    assert "Each breakdown is corrected separately, over all its rows." in output
-    assert "By " not in call("compare", f"{run}:listener", f"{run}:forgetful")
 
 
 # The page

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-from fractions import Fraction
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -29,12 +28,6 @@ DOCS = Path(__file__).parents[2] / "docs" / "statistics.md"
 def job(task: str, setting: str, episode: int = 2, **fields: object) -> Job:
     usual = {"policy": "any", "split": "test", **fields}
     return job_of(task=task, setting=setting, episode=episode, **usual)
-
-
-def test_by_hand() -> None:
-    """StopCube has the second to the fifth visit, VideoRepick one to three repeats."""
-    assert floor_level(CHANCE, [job("StopCube", "direct")]) == Fraction(1, 4)
-    assert floor_level(CHANCE, [job("VideoRepick", "direct")]) == Fraction(1, 3)
 
 
 @pytest.mark.parametrize(

@@ -84,12 +84,6 @@ def test_what_has_no_counterpart_or_no_verdict_is_left_out_and_counted(result) -
     assert "Incomplete: 1 trial without a verdict (an error, or still to be played)" in words
 
 
-def test_policies_with_other_seeds_are_compared_by_episode(result) -> None:
-    first = play(result, GOOD, "1111", policy_seed=1) + play(result, GOOD, "0000", policy_seed=2)
-    (finding,) = compared(first, play(result, POOR, "0000", policy_seed=3)).averages
-    assert (finding.gap.value, finding.gap.p_value, finding.unpaired) == (0.5, 2 / 2**4, 0)
-
-
 def test_control_arms_are_left_out(result) -> None:
     first, second = play(result, GOOD, "11"), play(result, POOR, "01")
     silent = play(result, GOOD, "00", arm="silent")
