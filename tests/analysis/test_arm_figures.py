@@ -61,27 +61,22 @@ def figure(data: RunData, name: str) -> ArmFigure:
 def test_who_listens_and_who_has_a_habit(acts, use, habit, worth):
     data = data_of(play("mine", acts))
     found = figure(data, "language use")
-    assert found.rates == (use, habit)
-    assert found.gap.value == use - habit
+    assert (found.rates, found.gap.value) == ((use, habit), use - habit)
     assert found.gap.episodes == len(TASKS) * len(SCENES)
     assert found.p_holm < 0.001
     for interval, rate in zip(found.intervals, found.rates, strict=True):
-        assert interval is not None
         assert interval.low <= rate <= interval.high
-    assert figure(data, "words' worth").gap.value == worth
-    assert figure(data, "order's worth").gap.value == worth
+    worths = {figure(data, one).gap.value for one in ("words' worth", "order's worth")}
+    assert worths == {worth}
 
 
-def test_all_paraphrases_against_their_mean():
+def test_paraphrases_against_their_mean_and_what_counts_in_no_figure():
     half = play("mine", {"told": "own", "paraphrase-1": "own"}, range(8))
     half += play("mine", {"paraphrase-2": "own"}, range(4))
     half += play("mine", {"paraphrase-2": "none"}, range(4, 8))
     found = figure(data_of(half), "paraphrases")
-    assert found.rates == (0.5, 0.75)
-    assert (found.gap.value, found.gap.episodes) == (-0.25, 16)
-
-
-def test_a_trial_without_an_arm_and_an_error_count_in_no_figure():
+    assert (found.rates, found.gap.value, found.gap.episodes) == ((0.5, 0.75), -0.25, 16)
+    # A trial without another arm, and errors.
     results = play("mine", LISTENER, range(3))
     results += [make_result("success", 7, policy="mine", task=TASKS[0])]
     results += [make_result("error", 8, policy="mine", task=TASKS[0], arm=arm) for arm in LISTENER]

@@ -17,9 +17,7 @@ from roboirg.evaluation.analysis.stats.cells import (
 )
 from roboirg.evaluation.analysis.stats.intervals import (
     resampled_rates,
-    unseen_share,
     wilson_interval,
-    without_spread,
 )
 from roboirg.evaluation.analysis.stats.paired_tests import Pairs, measure_gap, sign_flip_test
 
@@ -99,27 +97,18 @@ def test_resampling_agrees_with_scipy_but_for_the_expansion_in_any_order() -> No
     assert theirs.high - 0.001 <= ours.high <= theirs.high + 0.04
 
 
-def test_where_all_is_alike_what_was_not_seen_is_allowed_for() -> None:
-    """By hand: z² / (50 + z²) = 3.8415 / 53.8415 = 0.07135."""
-    assert unseen_share(50) == pytest.approx(0.07135, abs=1e-5)
-    assert without_spread(0.0, 50) == pytest.approx((0, 0.07135), abs=1e-5)
-    assert without_spread(1.0, 50) == pytest.approx((0.92865, 1), abs=1e-5)
-    assert without_spread(0.0, 50, least=-1) == pytest.approx((-0.07135, 0.07135), abs=1e-5)
-    assert without_spread(-1.0, 50, least=-1) == pytest.approx((-1, -0.85730), abs=1e-5)
-    none = cell(np.zeros((50, 3), dtype=bool))
-    assert clustered_interval([none], np.random.default_rng(0)) == without_spread(0.0, 50)
-
-
-def test_with_several_seeds_the_clustered_interval_is_shown() -> None:
+def test_one_seed_has_wilsons_interval_and_others_one_over_episodes() -> None:
+    """If all of 50 are lost, up to z² / (50 + z²) = 3.8415 / 53.8415 = 0.07135 may be won."""
     rng = np.random.default_rng(2)
     once, thrice = (cell(played(rng, 0.4, 50, seeds, 0.5)) for seeds in (1, 3))
-    assert cell_interval(once, np.random.default_rng(0)) == wilson_interval(once.successes, 50)
-    assert cell_interval(thrice, np.random.default_rng(0)) == clustered_interval(
-        [thrice], np.random.default_rng(0)
-    )
+    assert cell_interval(once, rng) == wilson_interval(once.successes, 50)
+    theirs = clustered_interval([thrice], np.random.default_rng(0))
+    assert cell_interval(thrice, np.random.default_rng(0)) == theirs
+    lost = cell_interval(cell(np.zeros((50, 3), dtype=bool)), rng)
+    assert lost == pytest.approx((0, 0.07135), abs=1e-5)
+    few = cell(np.ones((1, 3), dtype=bool))
+    assert [clustered_interval(one, rng) for one in ([few], [once, Cell()])] == [None, None]
     assert cell_interval(Cell(), rng) is None
-    assert clustered_interval([once, Cell()], rng) is None
-    assert clustered_interval([cell(np.ones((1, 3), dtype=bool))], rng) is None
 
 
 @pytest.mark.parametrize("alike", [0.0, 0.5])
@@ -141,20 +130,15 @@ def test_the_clustered_interval_covers(rate: float, alike: float) -> None:
 @pytest.mark.parametrize("seeds", [1, 3])
 def test_the_intervals_of_gap_and_retention_cover(seeds: int) -> None:
     rng = np.random.default_rng(13)
-    hits = np.zeros(2)
+    hits = []
     for _ in range(RUNS):
-        ease = rng.beta(2, 2, size=50)
-        second = rng.random((50, seeds)) < ease[:, None]
-        first = rng.random((50, seeds)) < 0.6 * ease[:, None]
-        gap = measure_gap([Pairs.of(cell(first), cell(second))], rng, DRAWS)
+        ease = rng.beta(2, 2, size=(50, 1))
+        second, first = (cell(rng.random((50, seeds)) < share * ease) for share in (1, 0.6))
+        gap = measure_gap([Pairs.of(first, second)], rng, DRAWS)
         assert gap is not None
-        assert gap.interval is not None
-        assert gap.retention_interval is not None
-        hits += [
-            gap.interval.low <= -0.2 <= gap.interval.high,
-            gap.retention_interval.low <= 0.6 <= gap.retention_interval.high,
-        ]
-    assert all(map(is_nominal, hits / RUNS))
+        ends = (gap.interval, -0.2), (gap.retention_interval, 0.6)
+        hits.append([one is not None and one.low <= true <= one.high for one, true in ends])
+    assert all(map(is_nominal, np.mean(hits, axis=0)))
 
 
 @pytest.mark.parametrize("seeds", [1, 3])

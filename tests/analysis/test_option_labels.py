@@ -42,7 +42,7 @@ def test_staged_options_have_every_set_of_stages() -> None:
     assert {one.setting for one in staged_options()} == {"contextual"}
 
 
-def test_an_unknown_setting_of_old_records_has_rows_too(result) -> None:
+def test_a_setting_that_is_not_installed_has_rows_too(result) -> None:
     results = [result(setting=name) for name in ("retired", "direct", "explicit")]
     table = make_table("main", make_frame([("run", results)]), floors=(CHANCE,))
     ours = [row.group for row in table.rows if row.source == "ours"]
