@@ -11,7 +11,7 @@ from msgspec.structs import replace
 from roboirg.core.episode import ENVIRONMENT_VERSION
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.core.policy_ref import unknown_policy
-from roboirg.evaluation.analysis.comparability import IMPLICIT, REAL, differences_of, merged
+from roboirg.evaluation.analysis.comparability import IMPLICIT, REAL, differences_of
 from roboirg.evaluation.analysis.frame import make_frame
 from roboirg.evaluation.analysis.published import MAX_STEPS
 from roboirg.evaluation.analysis.stats.cells import cells_of
@@ -87,12 +87,6 @@ def test_other_settings_other_robots_and_other_tasks_are_not_comparable(result) 
     assert differences(play(result, tasks=("Outside",))) is None
     planned = [one.identity for one in play(result)]
     assert differences([], planned) is None
-
-
-def test_an_average_differs_in_what_any_of_its_cells_does() -> None:
-    assert merged([(), ()]) == ()
-    assert merged([("a",), (), ("b", "a")]) == ("a", "b")
-    assert merged([("a",), None]) is None
 
 
 def test_every_format_marks_the_cells_and_says_what_differs(result) -> None:

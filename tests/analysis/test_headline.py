@@ -9,7 +9,6 @@ from roboirg.evaluation.analysis.frame import make_frame
 from roboirg.evaluation.analysis.stats import headline
 from roboirg.evaluation.analysis.stats.cells import cells_of
 from roboirg.evaluation.analysis.stats.headline import headline_notes, measure_headline
-from roboirg.evaluation.analysis.stats.measure import ALL_TASKS, ScopeKey, summarize
 from roboirg.evaluation.analysis.stats.measured_floors import (
     RANDOM,
     FloorKey,
@@ -89,15 +88,6 @@ def test_the_mean_over_settings_of_the_means_over_their_tasks(result) -> None:
     assert found.gap == pytest.approx(((-1 / 4 - 1 / 2) / 2 + -1) / 2)
     assert (found.episodes, found.is_complete) == (6, True)
     assert found.interval.low <= found.gap <= found.interval.high
-
-
-def test_of_one_setting_it_is_its_gap(result) -> None:
-    found = headline_of(by_hand(result), ("reasoning",))
-    summaries = summarize(cells_of(make_frame([("run", by_hand(result))])))
-    policy_run = next(iter(summaries)).policy_run
-    gap = summaries[ScopeKey(policy_run, ALL_TASKS, InstructionOptions("reasoning"))].gap
-    assert found.gap == pytest.approx(gap.value)
-    assert found.interval == pytest.approx(gap.interval, abs=0.1)
 
 
 def test_settings_share_their_episodes(result) -> None:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import io
 from collections import Counter
 from collections.abc import Callable
 from pathlib import Path
@@ -121,13 +119,6 @@ def run(tmp_path: Path) -> Path:
         for policy, tokens in (("cutting", 64), ("whole", 1000), ("silent", None)):
             store.append(long_record(policy, tokens))
     return tmp_path
-
-
-def test_the_command_prints_it_on_request(run: Path) -> None:
-    said = CliRunner().invoke(main.app, ["tables", str(run), "--which", "heard", "--format", "csv"])
-    assert said.exit_code == 0, said.output
-    found = {line["group"].split(",")[0] for line in csv.DictReader(io.StringIO(said.output))}
-    assert found == {"cutting", "whole"}
 
 
 def test_the_page_says_what_was_cut(tmp_path: Path) -> None:

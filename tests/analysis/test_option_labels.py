@@ -9,10 +9,8 @@ from roboirg.evaluation.analysis.stats.option_labels import (
     has_default_options,
     options_label,
     options_sort_key,
-    staged_options,
 )
 from roboirg.evaluation.analysis.tables.paper_tables import make_table
-from roboirg.language import STAGE_SETS
 from roboirg.language.settings import plain_settings, setting_names
 
 
@@ -35,11 +33,6 @@ def test_settings_have_the_order_of_the_language_and_unknown_ones_are_last() -> 
     assert {one.form for one in ordered[::2]} == {"implicit"}
     shown = dict.fromkeys(one.setting for one in ordered if has_default_options(one))
     assert list(shown) == [*plain_settings(), "alpha", "zeta"]
-
-
-def test_staged_options_have_every_set_of_stages() -> None:
-    assert [one.stages for one in staged_options()] == list(STAGE_SETS)
-    assert {one.setting for one in staged_options()} == {"contextual"}
 
 
 def test_a_setting_that_is_not_installed_has_rows_too(result) -> None:
