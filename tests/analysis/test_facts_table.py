@@ -14,7 +14,6 @@ from typer.testing import CliRunner
 
 from roboirg.core.inference_facts import InferenceFacts, inference_facts
 from roboirg.evaluation.analysis.tables.facts_table import NOT_APPLICABLE, NOT_REPORTED, RUN
-from roboirg.evaluation.analysis.tables.rendering import FORMATS
 from roboirg.evaluation.plan.plan_maker import make_plan
 from roboirg.evaluation.plan.stored_plans import write_plan
 from roboirg.evaluation.records.record import Record
@@ -129,16 +128,6 @@ def test_a_policy_has_what_it_declares_and_its_process_reports(
     short = {**fields, "steps": 10, "calls": 1, "executed": 10} if "steps" in fields else fields
     both = (record(at, policy_metadata=metadata, **own) for at, own in enumerate((fields, short)))
     assert facts(tmp_path, *both)["mine"].items() >= expected.items()
-
-
-@pytest.mark.parametrize("name", FORMATS)
-def test_every_format_has_all_facts(tmp_path: Path, name: str) -> None:
-    long = "resized to 96 × 96, and " * 20
-    facts(tmp_path, record(0, policy_metadata={"preprocessing": long}))
-    shown = CliRunner().invoke(app, ["tables", str(tmp_path), "--which", "facts", "--format", name])
-    for word in ("language version", "preprocessing", NOT_REPORTED):
-        assert word in shown.output
-    assert name != "terminal" or max(map(len, shown.output.splitlines())) <= 130
 
 
 class Network:
