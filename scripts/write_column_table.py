@@ -9,8 +9,8 @@ from pathlib import Path
 
 from written_parts import with_part
 
-from roboirg.evaluation.analysis.frame import COLUMNS
-from roboirg.evaluation.analysis.frame_reading import WORD_COLUMNS
+from roboirg.evaluation.analysis.results.frame import COLUMNS
+from roboirg.evaluation.analysis.results.reading import WORD_COLUMNS
 
 PAGE = Path(__file__).parent.parent / "docs" / "own-tables.md"
 

@@ -14,8 +14,8 @@ from written_parts import rate_text, with_part
 from roboirg.apps.learning.policy.paper_experiment import CONTEXT, MAIN, PLANNER, SYSTEMS, row_name
 from roboirg.apps.learning.policy.paper_page import answers_text, row_frame, tables_text
 from roboirg.apps.learning.policy.policy_plan import PLANNERS
-from roboirg.evaluation.analysis.frame import Frame
 from roboirg.evaluation.analysis.published import published_rows
+from roboirg.evaluation.analysis.results.frame import Frame
 from roboirg.evaluation.analysis.stats.cells import cells_of
 from roboirg.evaluation.analysis.stats.measure import ALL_TASKS, Measured, ScopeKey, summarize
 from roboirg.evaluation.plan.plan_file import read_plan_file

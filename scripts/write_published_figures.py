@@ -24,6 +24,7 @@ from roboirg.evaluation.analysis.published import (
     published_rows,
     published_tasks,
 )
+from roboirg.evaluation.analysis.results.option_labels import staged_options
 from roboirg.evaluation.analysis.stats.intervals import (
     SEED,
     Z_95,
@@ -32,7 +33,6 @@ from roboirg.evaluation.analysis.stats.intervals import (
     resampled_rates,
     wilson_interval,
 )
-from roboirg.evaluation.analysis.stats.option_labels import staged_options
 from roboirg.language.settings import EXPLICIT
 
 PAGE = Path(__file__).parent.parent / "docs" / "published-figures.md"

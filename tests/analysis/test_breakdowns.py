@@ -20,8 +20,8 @@ import roboirg
 from roboirg.cli.report_commands import compare as compare_command
 from roboirg.cli.report_commands import tables
 from roboirg.core.errors import InvalidValueError, UnknownNameError
-from roboirg.evaluation.analysis.frame import Frame, as_column, make_frame
-from roboirg.evaluation.analysis.frame_reading import (
+from roboirg.evaluation.analysis.results.frame import Frame, as_column, make_frame
+from roboirg.evaluation.analysis.results.reading import (
     COMPETING,
     NO_RIVAL,
     RIVAL,

@@ -12,9 +12,10 @@ from roboirg.core.episode import ENVIRONMENT_VERSION
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.core.policy_ref import unknown_policy
 from roboirg.evaluation.analysis.comparability import IMPLICIT, REAL, differences_of
-from roboirg.evaluation.analysis.frame import make_frame
 from roboirg.evaluation.analysis.published import MAX_STEPS
+from roboirg.evaluation.analysis.results.frame import make_frame
 from roboirg.evaluation.analysis.stats.cells import cells_of
+from roboirg.evaluation.analysis.stats.run_data import RunData
 from roboirg.evaluation.analysis.tables.paper_tables import make_table
 from roboirg.evaluation.analysis.tables.rendering import FORMATS
 from roboirg.evaluation.analysis.tables.run_tables import make_run_tables
@@ -37,6 +38,10 @@ def play(result, episodes=range(50), tasks=TASKS[:1], settings=("explicit",), **
 
 def frame_of(*results):
     return make_frame([("run", [one for own in results for one in own])])
+
+
+def data_of(*results):
+    return RunData(frame_of(*results))
 
 
 def differences(results, planned=()) -> tuple[str, ...] | None:
@@ -91,7 +96,7 @@ def test_other_settings_other_robots_and_other_tasks_are_not_comparable(result) 
 
 def test_every_format_marks_the_cells_and_says_what_differs(result) -> None:
     results = play(result, settings=("explicit", "direct"))
-    table = make_table("main", frame_of(results, play(result, range(4), TASKS[1:])), published=True)
+    table = make_table("main", data_of(results, play(result, range(4), TASKS[1:])), published=True)
     for name, unlike in (("terminal", "≠"), ("markdown", "≠"), ("latex", r"$\neq$")):
         # LaTeX may break its lines after more signs than spaces.
         text = " ".join(FORMATS[name].draw(table).replace(r"\allowbreak{}", "").split())
@@ -111,7 +116,7 @@ def test_every_format_marks_the_cells_and_says_what_differs(result) -> None:
     assert signs["ours", "direct", "PickXtimes"] == ("no", IMPLICIT[0])
     assert signs["ours", "explicit", "Avg"] == ("", "")  # most tasks were not played
     assert signs["published", "explicit", "PickXtimes"] == ("", "")
-    plain = make_table("main", frame_of(results))
+    plain = make_table("main", data_of(results))
     assert "comparable" not in " ".join(plain.notes)
     assert {entry.signs for row in plain.rows for entry in row.entries} == {"", "*"}
 
@@ -120,12 +125,10 @@ def test_differences_are_listed_by_policy_if_they_are_not_the_same(result) -> No
     ours = play(result, wordings=None)
     different = "≠ not comparable with the published rate"
     same = make_table(
-        "main", frame_of(ours, play(result, wordings=None, policy="b")), published=True
+        "main", data_of(ours, play(result, wordings=None, policy="b")), published=True
     )
     assert f"{different}: our own words." in same.notes
-    table = make_table(
-        "main", frame_of(ours, play(result, policy="b", max_steps=9)), published=True
-    )
+    table = make_table("main", data_of(ours, play(result, policy="b", max_steps=9)), published=True)
     assert f"{different} (listener, max steps 1300, our own words): our own words." in table.notes
 
 
@@ -170,7 +173,7 @@ def test_what_is_mixed_has_separate_rows_and_is_named(result, fields, note) -> N
         second = play(result, range(2), policy=policy, **fields)
         for runs in ([("a", [*first, *second])], [("a", first), ("b", second)]):
             frame = make_frame(runs)
-            table = make_table("main", frame)
+            table = make_table("main", RunData(frame))
             assert len({row.name for row in table.rows}) == len(make_run_tables(frame)) == 2
             is_named = policy == "listener" or "policy_version" not in fields
             assert (f"{note} have separate rows" in " ".join(table.notes)) == is_named

@@ -7,7 +7,7 @@ import re
 import pytest
 
 from roboirg.core.errors import InvalidValueError
-from roboirg.evaluation.analysis.frame import make_frame
+from roboirg.evaluation.analysis.results.frame import make_frame
 from roboirg.evaluation.analysis.stats.comparison import compare
 from roboirg.evaluation.analysis.stats.comparison_text import sentences
 

@@ -12,8 +12,8 @@ from made_records import make_record
 
 import roboirg
 from roboirg.apps.leaderboard.packing import pack_run
-from roboirg.evaluation.analysis.frame import COLUMNS, make_frame
-from roboirg.evaluation.analysis.frame_reading import WORD_COLUMNS
+from roboirg.evaluation.analysis.results.frame import COLUMNS, make_frame
+from roboirg.evaluation.analysis.results.reading import WORD_COLUMNS
 from roboirg.evaluation.analysis.stats.cells import cells_of
 from roboirg.evaluation.analysis.stats.measure import summarize
 from roboirg.evaluation.plan.plan_maker import make_plan

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from roboirg.core.instruction_options import InstructionOptions
-from roboirg.evaluation.analysis.frame import make_frame
+from roboirg.evaluation.analysis.results.frame import make_frame
 from roboirg.evaluation.analysis.stats import headline
 from roboirg.evaluation.analysis.stats.cells import cells_of
 from roboirg.evaluation.analysis.stats.headline import headline_notes, measure_headline
@@ -15,6 +15,7 @@ from roboirg.evaluation.analysis.stats.measured_floors import (
     measured_floors,
     settings_at_chance,
 )
+from roboirg.evaluation.analysis.stats.run_data import RunData
 from roboirg.evaluation.analysis.tables.paper_tables import make_table
 from roboirg.evaluation.analysis.tables.run_tables import make_run_tables
 from roboirg.language.settings import all_settings, settings_of
@@ -110,7 +111,7 @@ def test_it_stands_next_to_every_table_or_why_there_is_none(result, two_settings
     assert note.endswith("reasoning, spatial; 20 episodes.")
     frame = make_frame([("run", enough(result))])
     (run_table,) = make_run_tables(frame)
-    assert note in make_table("main", frame).notes
+    assert note in make_table("main", RunData(frame)).notes
     assert note in run_table.notes
     error = result("error", 20, options=InstructionOptions("spatial"))
     assert notes_of([*enough(result), error])[0].endswith("20 episodes, incomplete.")

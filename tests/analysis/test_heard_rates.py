@@ -16,10 +16,10 @@ from typer.testing import CliRunner
 
 from roboirg import main
 from roboirg.core.instruction_options import InstructionOptions
-from roboirg.evaluation.analysis.frame import make_frame
 from roboirg.evaluation.analysis.page.details import EpisodeDetails
 from roboirg.evaluation.analysis.page.episodes import PageEpisodes
 from roboirg.evaluation.analysis.page.run_warnings import run_warnings
+from roboirg.evaluation.analysis.results.frame import make_frame
 from roboirg.evaluation.analysis.stats.heard_rates import count_heard
 from roboirg.evaluation.analysis.stats.run_data import RunData
 from roboirg.evaluation.analysis.tables.diagnostic_tables import make_heard_table

@@ -13,11 +13,11 @@ from made_records import make_record
 
 import roboirg
 from roboirg.core.instruction_options import InstructionOptions
-from roboirg.evaluation.analysis.frame import make_frame
+from roboirg.evaluation.analysis.results.frame import make_frame
+from roboirg.evaluation.analysis.results.option_labels import REFERENCE
 from roboirg.evaluation.analysis.stats.cells import cells_of
 from roboirg.evaluation.analysis.stats.intervals import wilson_interval
 from roboirg.evaluation.analysis.stats.measure import ALL_TASKS, summarize
-from roboirg.evaluation.analysis.stats.option_labels import REFERENCE
 from roboirg.evaluation.plan.plan_maker import make_plan
 from roboirg.evaluation.records.store import RecordStore
 

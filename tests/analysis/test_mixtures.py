@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from roboirg.core.errors import InvalidValueError
-from roboirg.evaluation.analysis.frame import make_frame
+from roboirg.evaluation.analysis.results.frame import make_frame
 from roboirg.evaluation.analysis.stats.comparison import compare
 from roboirg.evaluation.analysis.stats.run_data import RunData
 from roboirg.evaluation.analysis.tables.paper_tables import make_table

@@ -17,7 +17,7 @@ from roboirg.apps.learning.policy.paper_experiment import (
 )
 from roboirg.apps.learning.policy.paper_page import results_text
 from roboirg.core.errors import InvalidValueError
-from roboirg.evaluation.analysis.frame import make_frame
+from roboirg.evaluation.analysis.results.frame import make_frame
 from roboirg.evaluation.plan.plan_maker import make_plan
 
 FILES = {row_name(memory): Path(f"{memory}-explicit-0.pt") for memory in SYSTEMS}

@@ -16,10 +16,11 @@ from hypothesis import strategies as st
 from msgspec.structs import replace
 from rich.console import Console
 
-from roboirg.evaluation.analysis.frame import Frame, make_frame
+from roboirg.evaluation.analysis.results.frame import Frame, make_frame
 from roboirg.evaluation.analysis.stats.chance import CHANCE, FLOORS
 from roboirg.evaluation.analysis.stats.measured_floors import LEARNED
 from roboirg.evaluation.analysis.stats.rates import mean_percent, percent
+from roboirg.evaluation.analysis.stats.run_data import RunData
 from roboirg.evaluation.analysis.tables.paper_tables import WHICH, is_informative, make_table
 from roboirg.evaluation.analysis.tables.rendering import get_format
 from roboirg.evaluation.analysis.tables.rendering.terminal import renderable
@@ -64,7 +65,7 @@ def whole(result, policy: str = "a", settings=("explicit", "direct"), **fields) 
 
 
 def table_of(which: str, *results: list, planned=(), **options) -> Table:
-    return make_table(which, frame_of(*results, planned=planned), **options)
+    return make_table(which, RunData(frame_of(*results, planned=planned)), **options)
 
 
 def frame_of(*results: list, planned=()) -> Frame:
@@ -99,7 +100,7 @@ def test_what_is_incomplete_is_marked_and_compared_with_nothing(result) -> None:
 
 def test_only_informative_tables_are_wanted(result) -> None:
     def wanted(*results: list) -> set[str]:
-        return {one for one in WHICH if is_informative(one, frame_of(*results))}
+        return {one for one in WHICH if is_informative(one, RunData(frame_of(*results)))}
 
     two = [*whole(result), *whole(result, "b")]
     assert wanted(whole(result, settings=("explicit", "contextual"))) == {"main"}

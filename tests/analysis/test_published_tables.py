@@ -9,14 +9,15 @@ from importlib import resources
 import pytest
 
 from roboirg.core.errors import UnknownNameError
-from roboirg.evaluation.analysis.frame import make_frame
 from roboirg.evaluation.analysis.published import (
     RATE_TABLES,
     TRIALS,
     published_coverage,
     published_rows,
 )
+from roboirg.evaluation.analysis.results.frame import make_frame
 from roboirg.evaluation.analysis.stats.rates import mean_percent, percent
+from roboirg.evaluation.analysis.stats.run_data import RunData
 from roboirg.evaluation.analysis.tables.paper_tables import WHICH, make_table
 from roboirg.evaluation.analysis.tables.rendering import FORMATS
 from roboirg.evaluation.analysis.tables.table import Entry, Table
@@ -45,7 +46,7 @@ def place(line: dict[str, str]) -> tuple[str, str]:
 @pytest.fixture(scope="module", params=RATE_TABLES)
 def made(request, published_like) -> Table:
     results = published_like(request.param)
-    return make_table(request.param, make_frame([("run", results)]), published=True)
+    return make_table(request.param, RunData(make_frame([("run", results)])), published=True)
 
 
 def rows_of(table: Table, source: str) -> dict[tuple[str, str], dict[str, Entry]]:

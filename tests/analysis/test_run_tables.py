@@ -9,7 +9,7 @@ import pytest
 from flat_jobs import make_result
 from rich.console import Console
 
-from roboirg.evaluation.analysis.frame import Frame, make_frame
+from roboirg.evaluation.analysis.results.frame import Frame, make_frame
 from roboirg.evaluation.analysis.stats.rates import points
 from roboirg.evaluation.analysis.tables.run_tables import (
     make_run_tables,

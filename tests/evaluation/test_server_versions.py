@@ -11,8 +11,8 @@ from evaluation_fakes import FakePlay
 from made_records import make_record
 from wire_servers import ChallengeServer
 
-from roboirg.evaluation.analysis.frame import make_frame
-from roboirg.evaluation.analysis.policy_run import Versions
+from roboirg.evaluation.analysis.results.frame import make_frame
+from roboirg.evaluation.analysis.results.policy_run import Versions
 from roboirg.evaluation.analysis.stats.cells import cells_of
 from roboirg.evaluation.plan.plan import Plan
 from roboirg.evaluation.plan.plan_maker import make_plan

@@ -6,10 +6,10 @@ from pathlib import Path
 
 import pytest
 from benchmarks.synthetic_run import write_synthetic_run
-
-from roboirg.evaluation.analysis.frame import make_frame
 from roboirg.evaluation.analysis.page.entries import Run
+
 from roboirg.evaluation.analysis.page.report import make_view, render_runs
+from roboirg.evaluation.analysis.results.frame import make_frame
 from roboirg.evaluation.analysis.stats.cells import cells_of
 from roboirg.evaluation.plan.sources import Source
 from roboirg.evaluation.plan.stored_plans import read_plan

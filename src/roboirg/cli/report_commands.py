@@ -129,7 +129,7 @@ def figures(
     """
     from roboirg.evaluation.analysis.figures import FIGURES, write_figures
     from roboirg.evaluation.analysis.figures.figure_style import check_figure_support
-    from roboirg.evaluation.analysis.frame_reading import read_frame
+    from roboirg.evaluation.analysis.results.reading import read_frame
     from roboirg.evaluation.analysis.stats.run_data import RunData
     from roboirg.evaluation.plan.sources import opened_sources
     from roboirg.evaluation.records.packs import MEDIA_FOLDERS
@@ -177,7 +177,7 @@ def tables(
     Example: roboirg tables runs/first --which main --published
     """
     from roboirg.cli.run_commands import warn_of_mixtures
-    from roboirg.evaluation.analysis.frame_reading import read_frame
+    from roboirg.evaluation.analysis.results.reading import read_frame
     from roboirg.evaluation.analysis.stats.run_data import RunData
     from roboirg.evaluation.analysis.tables.rendering import get_format
     from roboirg.evaluation.analysis.tables.table_notes import with_mixtures
@@ -220,7 +220,7 @@ def compare(
     from rich.text import Text
 
     from roboirg.cli.run_commands import warn_of_mixtures
-    from roboirg.evaluation.analysis.frame_reading import read_frame
+    from roboirg.evaluation.analysis.results.reading import read_frame
     from roboirg.evaluation.analysis.stats.cells import cells_of
     from roboirg.evaluation.analysis.stats.comparison import compare as compare_frames
     from roboirg.evaluation.analysis.stats.comparison_text import sentences

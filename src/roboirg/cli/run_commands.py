@@ -18,7 +18,7 @@ from roboirg.core.plain_text import counted, printable, verb_for
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from roboirg.evaluation.analysis.frame import Frame
+    from roboirg.evaluation.analysis.results.frame import Frame
     from roboirg.evaluation.plan.plan import Plan
     from roboirg.evaluation.plan.sources import Source
     from roboirg.evaluation.records.record import Job
@@ -142,7 +142,7 @@ def print_tables_of(source: Source) -> None:
     """Print the tables of a run, what is mixed in it, and its unsuccessful episodes."""
     from rich.console import Console
 
-    from roboirg.evaluation.analysis.frame_reading import read_frame
+    from roboirg.evaluation.analysis.results.reading import read_frame
     from roboirg.evaluation.analysis.tables.run_tables import (
         make_run_tables,
         print_failures,

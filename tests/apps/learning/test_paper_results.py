@@ -5,8 +5,8 @@ import write_paper_results as written
 from played_again import assert_holds_here
 
 from roboirg.apps.learning.policy.paper_experiment import CONTEXT, MAIN, SYSTEMS, row_name
+from roboirg.evaluation.analysis.results.option_labels import staged_options
 from roboirg.evaluation.analysis.stats.cells import cells_of
-from roboirg.evaluation.analysis.stats.option_labels import staged_options
 from roboirg.language.settings import plain_settings, settings_of
 from roboirg.tasks import all_tasks, get_task
 

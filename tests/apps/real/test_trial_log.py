@@ -9,7 +9,8 @@ from page_text import render
 from roboirg.apps.real.study.failure_choices import failure_choices
 from roboirg.apps.real.study.trial_log import VOID, WITHDRAWN, TrialLog, trial_metadata
 from roboirg.core.errors import InvalidValueError
-from roboirg.evaluation.analysis.frame import make_frame
+from roboirg.evaluation.analysis.results.frame import make_frame
+from roboirg.evaluation.analysis.stats.run_data import RunData
 from roboirg.evaluation.analysis.tables.paper_tables import make_table
 from roboirg.evaluation.records.record_codec import encode, read_record
 from roboirg.evaluation.records.store import RecordStore, read_records, read_results
@@ -46,7 +47,7 @@ def test_a_score_is_a_record_like_any_other(small):
     assert record.plan == plan.fingerprint
     # All that reads records reads these.
     assert read_record(encode(record), Path(), 1) == record
-    table = make_table("real", make_frame([("run", read_results(folder))]))
+    table = make_table("real", RunData(make_frame([("run", read_results(folder))])))
     assert {row.name for row in table.rows} == {f"{name}, on a robot" for name in plan.policies}
     assert "slipped" in render(read_records(folder))
 

@@ -7,10 +7,10 @@ from itertools import pairwise
 
 from roboirg.apps.grounding.answer_scores import GroundingScore, ScoreRow, score_rows
 from roboirg.core.plain_text import counted
-from roboirg.evaluation.analysis.frame import as_column
+from roboirg.evaluation.analysis.results.frame import as_column
+from roboirg.evaluation.analysis.results.option_labels import options_label
 from roboirg.evaluation.analysis.stats.breakdowns import Breakdown
 from roboirg.evaluation.analysis.stats.intervals import Interval
-from roboirg.evaluation.analysis.stats.option_labels import options_label
 from roboirg.evaluation.analysis.stats.rates import NOT_APPLICABLE, gap_words
 from roboirg.evaluation.analysis.tables.diagnostic_tables import make_breakdown_table
 from roboirg.evaluation.analysis.tables.table import Row, Table, named_columns

@@ -13,8 +13,8 @@ from roboirg.core.environment_options import DEFAULT_MESHES
 from roboirg.core.episode import ENVIRONMENT_VERSION
 from roboirg.core.plain_text import counted
 from roboirg.core.word_pools import words_label
-from roboirg.evaluation.analysis.policy_run import PolicyRun
 from roboirg.evaluation.analysis.published import MAX_STEPS, TRIALS, published_tasks
+from roboirg.evaluation.analysis.results.policy_run import PolicyRun
 from roboirg.evaluation.analysis.stats.cells import Cell, CellKey
 from roboirg.language.settings import EXPLICIT
 from roboirg.language.worded_command import ROBOMME_NAME

@@ -12,7 +12,7 @@ from typing import Literal, NamedTuple
 
 from roboirg.core.errors import UnknownNameError
 from roboirg.core.instruction_options import InstructionOptions
-from roboirg.evaluation.analysis.stats.option_labels import options_label, staged_options
+from roboirg.evaluation.analysis.results.option_labels import options_label, staged_options
 from roboirg.evaluation.analysis.stats.rates import DIGITS, mean_percent
 
 RateTable = Literal["main", "planner", "context", "real", "harder", "other"]

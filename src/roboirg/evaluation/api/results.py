@@ -12,12 +12,12 @@ from typing import TYPE_CHECKING, Any
 from roboirg.core.errors import InvalidValueError, MissingDependencyError, UnknownNameError
 from roboirg.core.plain_text import counted
 from roboirg.evaluation.analysis.figures import FIGURES, draw_figure
-from roboirg.evaluation.analysis.frame import COLUMNS, MISSING
-from roboirg.evaluation.analysis.frame_reading import WORD_COLUMNS, read_frame
+from roboirg.evaluation.analysis.results.frame import COLUMNS, MISSING
+from roboirg.evaluation.analysis.results.option_labels import options_label
+from roboirg.evaluation.analysis.results.reading import WORD_COLUMNS, read_frame
 from roboirg.evaluation.analysis.stats.comparison import compare
 from roboirg.evaluation.analysis.stats.comparison_text import sentences
 from roboirg.evaluation.analysis.stats.measure import ALL_TASKS
-from roboirg.evaluation.analysis.stats.option_labels import options_label
 from roboirg.evaluation.analysis.stats.run_data import RunData
 from roboirg.evaluation.analysis.tables.paper_tables import WHICH, is_informative, make_table
 from roboirg.evaluation.analysis.tables.rendering import get_format

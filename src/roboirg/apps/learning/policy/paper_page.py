@@ -23,12 +23,12 @@ from roboirg.apps.learning.policy.paper_experiment import (
     run_of,
 )
 from roboirg.core.instruction_options import InstructionOptions
-from roboirg.evaluation.analysis.frame import Frame, make_frame
 from roboirg.evaluation.analysis.published import TRIALS, PublishedRow, published_rows
+from roboirg.evaluation.analysis.results.frame import Frame, make_frame
+from roboirg.evaluation.analysis.results.option_labels import staged_options
 from roboirg.evaluation.analysis.stats.cells import Cell, CellKey, Cells, cells_of
 from roboirg.evaluation.analysis.stats.intervals import ALPHA, SEED, Z_95, Interval
 from roboirg.evaluation.analysis.stats.measure import ALL_TASKS, Measured, ScopeKey, summarize
-from roboirg.evaluation.analysis.stats.option_labels import staged_options
 from roboirg.evaluation.analysis.stats.paired_tests import Gap, Pairs, holm, measure_gap
 from roboirg.evaluation.analysis.stats.run_data import RunData
 from roboirg.evaluation.analysis.tables.paper_tables import is_informative, make_table

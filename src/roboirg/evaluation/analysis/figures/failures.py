@@ -6,7 +6,7 @@ from collections import Counter
 from typing import TYPE_CHECKING
 
 from roboirg.evaluation.analysis.figures.bars import Bar, Part, draw_bars
-from roboirg.evaluation.analysis.stats.option_labels import options_label, options_sort_key
+from roboirg.evaluation.analysis.results.option_labels import options_label, options_sort_key
 from roboirg.evaluation.analysis.stats.run_data import RunData
 from roboirg.evaluation.analysis.tables.diagnostic_tables import FAILURES, count_failures
 from roboirg.evaluation.analysis.tables.table_notes import where_played

@@ -19,15 +19,15 @@ from roboirg.evaluation.analysis.comparability import (
     differences_of,
 )
 from roboirg.evaluation.analysis.figures.rates import Rate, RateRow, draw_rates
-from roboirg.evaluation.analysis.policy_run import PolicyRun
 from roboirg.evaluation.analysis.published import TRIALS, RateTable, published_rows
-from roboirg.evaluation.analysis.stats.cells import ByTask, CellKey, Cells
-from roboirg.evaluation.analysis.stats.measure import measure_groups
-from roboirg.evaluation.analysis.stats.option_labels import (
+from roboirg.evaluation.analysis.results.option_labels import (
     REFERENCE,
     setting_sort_key,
     staged_options,
 )
+from roboirg.evaluation.analysis.results.policy_run import PolicyRun
+from roboirg.evaluation.analysis.stats.cells import ByTask, CellKey, Cells
+from roboirg.evaluation.analysis.stats.measure import measure_groups
 from roboirg.evaluation.analysis.stats.run_data import RunData
 from roboirg.evaluation.analysis.tables.paper_tables import PAPER_TABLES
 from roboirg.evaluation.analysis.tables.table_notes import where_played
@@ -43,7 +43,7 @@ Tasks = Mapping[InstructionOptions, Sequence[str]]
 """The tasks of each column."""
 
 
-class Comparison(NamedTuple):
+class DrawnTable(NamedTuple):
     """The rates of a published table and the options that they are compared with."""
 
     table: RateTable
@@ -57,18 +57,18 @@ class Comparison(NamedTuple):
 def draw_gaps(content: RunData, *, published: bool = False) -> Figure | None:
     """Draw the implicit settings next to explicit; rates alone where either was not played."""
     words = "success", "success with explicit instructions", "with implicit ones"
-    return _draw(content, Comparison("main", REFERENCE), words, published=published)
+    return _draw(content, DrawnTable("main", REFERENCE), words, published=published)
 
 
 def draw_context(content: RunData, *, published: bool = False) -> Figure | None:
     """Draw success by the stages of the contextual discourse that are spoken."""
-    kind = Comparison("context", staged_options()[0])
+    kind = DrawnTable("context", staged_options()[0])
     words = "success", f"success with {kind.title(kind.reference)}", "with more stages"
     return _draw(content, kind, words, published=published)
 
 
 def _draw(
-    content: RunData, kind: Comparison, words: tuple[str, str, str], *, published: bool
+    content: RunData, kind: DrawnTable, words: tuple[str, str, str], *, published: bool
 ) -> Figure | None:
     tasks = _shared_tasks(content.cells, kind) if content.cells else _published_tasks(kind)
     if len(tasks) > 1:
@@ -103,7 +103,7 @@ def _draw(
     return draw_rates(columns, rows, words, notes) if columns else None
 
 
-def _cells_of(cells: Cells, kind: Comparison, tasks: Tasks) -> Cells:
+def _cells_of(cells: Cells, kind: DrawnTable, tasks: Tasks) -> Cells:
     """Return the cells with a verdict behind the columns and their references."""
     known = {kind.reference: {task for names in tasks.values() for task in names}, **tasks}
     return {
@@ -131,7 +131,7 @@ def _size_and_sign(policy_run: PolicyRun, cells: Cells, differences: AllDifferen
     return ", " + text.replace(" ", NO_BREAK)
 
 
-def _shared_tasks(cells: Cells, kind: Comparison) -> dict[InstructionOptions, list[str]]:
+def _shared_tasks(cells: Cells, kind: DrawnTable) -> dict[InstructionOptions, list[str]]:
     """Return by column the tasks that all policy runs with results in it played.
 
     Those that played the reference as well must have played these tasks with it.
@@ -150,7 +150,7 @@ def _shared_tasks(cells: Cells, kind: Comparison) -> dict[InstructionOptions, li
     return shared
 
 
-def _published_tasks(kind: Comparison) -> dict[InstructionOptions, list[str]]:
+def _published_tasks(kind: DrawnTable) -> dict[InstructionOptions, list[str]]:
     """Return by column the tasks that have published rates."""
     return {
         row.options: [task for task, rate in row.rates.items() if rate is not None]
@@ -159,7 +159,7 @@ def _published_tasks(kind: Comparison) -> dict[InstructionOptions, list[str]]:
 
 
 def _own_rates(
-    cells: Cells, policy_run: PolicyRun, kind: Comparison, tasks: Tasks
+    cells: Cells, policy_run: PolicyRun, kind: DrawnTable, tasks: Tasks
 ) -> dict[str, Rate]:
     """Return the rates of a policy run by column."""
 
@@ -184,7 +184,7 @@ def _own_rates(
     return rates
 
 
-def _published_rows(kind: Comparison, tasks: Tasks) -> list[RateRow]:
+def _published_rows(kind: DrawnTable, tasks: Tasks) -> list[RateRow]:
     """Return a row for each published policy, that with the best reference first."""
     published = {(row.model, row.options): row for row in published_rows(kind.table)}
     references = [row for row in published.values() if row.options == kind.reference]

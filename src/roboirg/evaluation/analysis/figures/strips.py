@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from roboirg.core.extras import extra_needed
 from roboirg.evaluation.analysis.figures.figure_style import GHOST, PAGE_INCHES, new_figure
-from roboirg.evaluation.analysis.stats.option_labels import (
+from roboirg.evaluation.analysis.results.option_labels import (
     REFERENCE,
     options_label,
     options_sort_key,

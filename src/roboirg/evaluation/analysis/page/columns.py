@@ -12,9 +12,9 @@ from typing import NamedTuple, get_args
 
 from roboirg.core.episode import DIFFICULTIES
 from roboirg.core.instruction_options import InstructionOptions
-from roboirg.evaluation.analysis.frame import task_order
 from roboirg.evaluation.analysis.page.episodes import PageEpisodes
-from roboirg.evaluation.analysis.stats.option_labels import options_label, options_sort_key
+from roboirg.evaluation.analysis.results.frame import task_order
+from roboirg.evaluation.analysis.results.option_labels import options_label, options_sort_key
 from roboirg.evaluation.analysis.tables.diagnostic_tables import FAILURES, UNATTRIBUTED
 from roboirg.evaluation.records.mixing import FAIRNESS
 from roboirg.evaluation.records.record import ERROR_KINDS, Outcome, Summary

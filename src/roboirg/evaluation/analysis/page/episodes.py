@@ -10,8 +10,8 @@ from pathlib import Path
 from typing import NamedTuple
 
 from roboirg.core.instruction_options import InstructionOptions
-from roboirg.evaluation.analysis.frame import Frame, join, make_frame
-from roboirg.evaluation.analysis.policy_run import PolicyRun
+from roboirg.evaluation.analysis.results.frame import Frame, join, make_frame
+from roboirg.evaluation.analysis.results.policy_run import PolicyRun
 from roboirg.evaluation.analysis.stats.cells import Cells, cells_of
 from roboirg.evaluation.plan.sources import Source
 from roboirg.evaluation.records.episode_log import log_path, logged_slugs

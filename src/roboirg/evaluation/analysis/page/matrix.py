@@ -8,14 +8,14 @@ from typing import Any
 from roboirg.core.episode import DIFFICULTIES
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.core.plain_text import counted
-from roboirg.evaluation.analysis.frame import suite, task_order
 from roboirg.evaluation.analysis.page.columns import setting_label
 from roboirg.evaluation.analysis.page.episodes import PageEpisodes
-from roboirg.evaluation.analysis.policy_run import PolicyRun
+from roboirg.evaluation.analysis.results.frame import suite, task_order
+from roboirg.evaluation.analysis.results.option_labels import options_label, options_sort_key
+from roboirg.evaluation.analysis.results.policy_run import PolicyRun
 from roboirg.evaluation.analysis.stats.cells import Cells, cells_of
 from roboirg.evaluation.analysis.stats.intervals import Interval
 from roboirg.evaluation.analysis.stats.measure import ALL_TASKS, Measured, ScopeKey, summarize
-from roboirg.evaluation.analysis.stats.option_labels import options_label, options_sort_key
 from roboirg.evaluation.analysis.stats.rates import p_text, points, whole_percent
 
 

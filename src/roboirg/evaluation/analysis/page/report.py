@@ -11,13 +11,13 @@ from pathlib import Path
 from typing import Any
 
 from roboirg.core.errors import InvalidValueError
-from roboirg.evaluation.analysis.frame import Frame
-from roboirg.evaluation.analysis.frame_reading import with_words
 from roboirg.evaluation.analysis.page.columns import make_filters, make_numbers
 from roboirg.evaluation.analysis.page.details import EpisodeDetails
 from roboirg.evaluation.analysis.page.episodes import PageEpisodes
 from roboirg.evaluation.analysis.page.matrix import make_matrix
 from roboirg.evaluation.analysis.page.run_warnings import comparisons, facts_of, run_warnings
+from roboirg.evaluation.analysis.results.frame import Frame
+from roboirg.evaluation.analysis.results.reading import with_words
 from roboirg.evaluation.analysis.stats.breakdowns import BREAKDOWNS
 from roboirg.evaluation.analysis.stats.run_data import RunData
 from roboirg.evaluation.analysis.tables.arm_table import make_arm_table

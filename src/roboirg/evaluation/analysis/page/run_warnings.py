@@ -11,9 +11,9 @@ from typing import Any
 from roboirg.core.errors import InvalidValueError
 from roboirg.core.plain_text import counted, verb_for
 from roboirg.core.word_pools import words_label
-from roboirg.evaluation.analysis.frame import MISSING
 from roboirg.evaluation.analysis.page.episodes import PageEpisodes
-from roboirg.evaluation.analysis.policy_run import PolicyRun
+from roboirg.evaluation.analysis.results.frame import MISSING
+from roboirg.evaluation.analysis.results.policy_run import PolicyRun
 from roboirg.evaluation.analysis.stats.comparison import compare
 from roboirg.evaluation.analysis.stats.comparison_text import sentences
 from roboirg.evaluation.analysis.stats.headline import headline_notes

@@ -20,12 +20,12 @@ from roboirg.core.arms import (
     paraphrase_number,
 )
 from roboirg.core.instruction_options import InstructionOptions
-from roboirg.evaluation.analysis.frame import Frame
-from roboirg.evaluation.analysis.policy_run import PolicyRun
+from roboirg.evaluation.analysis.results.frame import Frame
+from roboirg.evaluation.analysis.results.option_labels import options_sort_key
+from roboirg.evaluation.analysis.results.policy_run import PolicyRun
 from roboirg.evaluation.analysis.stats.cells import ByTask, Cell, Key, Trial, clustered_interval
 from roboirg.evaluation.analysis.stats.intervals import SEED, Interval
 from roboirg.evaluation.analysis.stats.measure import pair
-from roboirg.evaluation.analysis.stats.option_labels import options_sort_key
 from roboirg.evaluation.analysis.stats.paired_tests import Gap, measure_gap, with_holm
 from roboirg.evaluation.records.record import Summary
 

@@ -8,11 +8,11 @@ from typing import NamedTuple
 
 from roboirg.core.errors import UnknownNameError
 from roboirg.core.instruction_options import InstructionOptions
-from roboirg.evaluation.analysis.frame import Frame
-from roboirg.evaluation.analysis.policy_run import PolicyRun
+from roboirg.evaluation.analysis.results.frame import Frame
+from roboirg.evaluation.analysis.results.option_labels import REFERENCE, options_sort_key
+from roboirg.evaluation.analysis.results.policy_run import PolicyRun
 from roboirg.evaluation.analysis.stats.cells import NOTHING, ByTask, gather
 from roboirg.evaluation.analysis.stats.measure import Measured, measure_groups
-from roboirg.evaluation.analysis.stats.option_labels import REFERENCE, options_sort_key
 
 
 class Breakdown(NamedTuple):

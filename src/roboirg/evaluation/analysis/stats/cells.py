@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from roboirg.core.instruction_options import InstructionOptions
-from roboirg.evaluation.analysis.policy_run import PolicyRun
+from roboirg.evaluation.analysis.results.policy_run import PolicyRun
 from roboirg.evaluation.analysis.stats.intervals import (
     DRAWS,
     Interval,

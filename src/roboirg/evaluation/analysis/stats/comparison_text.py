@@ -7,9 +7,9 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
 from roboirg.core.plain_text import counted, verb_for
+from roboirg.evaluation.analysis.results.option_labels import options_label
 from roboirg.evaluation.analysis.stats.comparison import Compared, Comparison
 from roboirg.evaluation.analysis.stats.intervals import ALPHA
-from roboirg.evaluation.analysis.stats.option_labels import options_label
 from roboirg.evaluation.analysis.stats.paired_tests import Gap
 from roboirg.evaluation.analysis.stats.power import (
     MAX_EPISODES,

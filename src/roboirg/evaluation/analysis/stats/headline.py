@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.core.plain_text import counted
-from roboirg.evaluation.analysis.policy_run import PolicyRun
+from roboirg.evaluation.analysis.results.option_labels import REFERENCE
+from roboirg.evaluation.analysis.results.policy_run import PolicyRun
 from roboirg.evaluation.analysis.stats.cells import Cell, CellKey, Cells
 from roboirg.evaluation.analysis.stats.intervals import (
     SEED,
@@ -20,7 +21,6 @@ from roboirg.evaluation.analysis.stats.intervals import (
     resampled_rates,
 )
 from roboirg.evaluation.analysis.stats.measured_floors import measured_floors, settings_at_chance
-from roboirg.evaluation.analysis.stats.option_labels import REFERENCE
 from roboirg.evaluation.analysis.stats.paired_tests import Pairs
 from roboirg.evaluation.analysis.stats.rates import interval_note, points
 from roboirg.language.templates import LANGUAGE_VERSION

@@ -7,10 +7,10 @@ from collections.abc import Mapping, Sequence
 from fractions import Fraction
 
 from roboirg.core.instruction_options import InstructionOptions
-from roboirg.evaluation.analysis.frame import MISSING, Frame
-from roboirg.evaluation.analysis.policy_run import PolicyRun
+from roboirg.evaluation.analysis.results.frame import MISSING, Frame
+from roboirg.evaluation.analysis.results.option_labels import options_label, options_sort_key
+from roboirg.evaluation.analysis.results.policy_run import PolicyRun
 from roboirg.evaluation.analysis.stats.cells import Key
-from roboirg.evaluation.analysis.stats.option_labels import options_label, options_sort_key
 from roboirg.evaluation.analysis.stats.rates import whole_percent
 
 HeardCounts = Counter[str]

@@ -10,8 +10,9 @@ from typing import Any, Generic, NamedTuple, TypeVar
 import numpy as np
 
 from roboirg.core.instruction_options import InstructionOptions
-from roboirg.evaluation.analysis.frame import suite
-from roboirg.evaluation.analysis.policy_run import PolicyRun
+from roboirg.evaluation.analysis.results.frame import suite
+from roboirg.evaluation.analysis.results.option_labels import REFERENCE
+from roboirg.evaluation.analysis.results.policy_run import PolicyRun
 from roboirg.evaluation.analysis.stats.cells import (
     NOTHING,
     ByTask,
@@ -24,7 +25,6 @@ from roboirg.evaluation.analysis.stats.cells import (
     gather,
 )
 from roboirg.evaluation.analysis.stats.intervals import SEED, Interval
-from roboirg.evaluation.analysis.stats.option_labels import REFERENCE
 from roboirg.evaluation.analysis.stats.paired_tests import Gap, Pairs, measure_gap, with_holm
 
 ALL_TASKS = "all tasks"

@@ -6,8 +6,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
-from roboirg.evaluation.analysis.frame import Frame, Runs, make_frame
-from roboirg.evaluation.analysis.policy_run import PolicyRun
+from roboirg.evaluation.analysis.results.frame import Frame, Runs, make_frame
+from roboirg.evaluation.analysis.results.policy_run import PolicyRun
 from roboirg.evaluation.analysis.stats.cells import Cells, cells_of
 from roboirg.evaluation.analysis.stats.measure import Measured, ScopeKey, summarize
 from roboirg.evaluation.records.record import Job

@@ -8,7 +8,8 @@ import numpy as np
 
 from roboirg.core.errors import InvalidValueError
 from roboirg.core.instruction_options import InstructionOptions
-from roboirg.evaluation.analysis.frame import Frame
+from roboirg.evaluation.analysis.results.frame import Frame
+from roboirg.evaluation.analysis.results.option_labels import options_label
 from roboirg.evaluation.analysis.stats.arm_figures import (
     LANGUAGE_USE,
     MEANING,
@@ -19,7 +20,6 @@ from roboirg.evaluation.analysis.stats.arm_figures import (
 from roboirg.evaluation.analysis.stats.chance import silent_chance
 from roboirg.evaluation.analysis.stats.intervals import SEED, Interval
 from roboirg.evaluation.analysis.stats.measure import pair
-from roboirg.evaluation.analysis.stats.option_labels import options_label
 from roboirg.evaluation.analysis.stats.paired_tests import Gap, holm, measure_gap
 from roboirg.evaluation.analysis.stats.rates import (
     NOT_APPLICABLE,

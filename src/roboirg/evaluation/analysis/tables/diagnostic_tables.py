@@ -7,8 +7,15 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 
 from roboirg.core.errors import InvalidValueError
-from roboirg.evaluation.analysis.frame import Frame, suite
-from roboirg.evaluation.analysis.policy_run import PolicyRun
+from roboirg.evaluation.analysis.results.frame import Frame, suite
+from roboirg.evaluation.analysis.results.option_labels import (
+    REFERENCE,
+    has_default_options,
+    options_label,
+    options_sort_key,
+    setting_sort_key,
+)
+from roboirg.evaluation.analysis.results.policy_run import PolicyRun
 from roboirg.evaluation.analysis.stats.breakdowns import Breakdown, LabelKey, break_down
 from roboirg.evaluation.analysis.stats.cells import Counts, Key
 from roboirg.evaluation.analysis.stats.comparison_text import incomplete_note
@@ -19,13 +26,6 @@ from roboirg.evaluation.analysis.stats.heard_rates import (
     rate_of,
 )
 from roboirg.evaluation.analysis.stats.measure import ALL_TASKS, Measured, ScopeKey
-from roboirg.evaluation.analysis.stats.option_labels import (
-    REFERENCE,
-    has_default_options,
-    options_label,
-    options_sort_key,
-    setting_sort_key,
-)
 from roboirg.evaluation.analysis.stats.paired_tests import Gap, holm
 from roboirg.evaluation.analysis.stats.rates import NOT_APPLICABLE, gap_words, percent
 from roboirg.evaluation.analysis.stats.run_data import RunData

@@ -8,7 +8,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
 from roboirg.core.word_pools import words_label
-from roboirg.evaluation.analysis.stats.option_labels import (
+from roboirg.evaluation.analysis.results.option_labels import (
     options_label,
     options_sort_key,
 )

@@ -10,7 +10,6 @@ import numpy as np
 from roboirg.core.errors import UnknownNameError
 from roboirg.core.instruction_options import ALL_STAGES, InstructionOptions
 from roboirg.evaluation.analysis.comparability import AllDifferences, differences_of
-from roboirg.evaluation.analysis.policy_run import PolicyRun
 from roboirg.evaluation.analysis.published import (
     AVERAGE,
     PublishedRow,
@@ -19,16 +18,17 @@ from roboirg.evaluation.analysis.published import (
     published_rows,
     published_tasks,
 )
-from roboirg.evaluation.analysis.stats.cells import Cell, CellKey, Cells, cell_interval
-from roboirg.evaluation.analysis.stats.chance import floor_level
-from roboirg.evaluation.analysis.stats.intervals import SEED
-from roboirg.evaluation.analysis.stats.option_labels import (
+from roboirg.evaluation.analysis.results.option_labels import (
     REFERENCE,
     has_default_options,
     is_usual,
     setting_sort_key,
     staged_options,
 )
+from roboirg.evaluation.analysis.results.policy_run import PolicyRun
+from roboirg.evaluation.analysis.stats.cells import Cell, CellKey, Cells, cell_interval
+from roboirg.evaluation.analysis.stats.chance import floor_level
+from roboirg.evaluation.analysis.stats.intervals import SEED
 from roboirg.evaluation.analysis.stats.rates import percent
 from roboirg.evaluation.analysis.stats.run_data import RunData
 from roboirg.evaluation.analysis.tables.table import (

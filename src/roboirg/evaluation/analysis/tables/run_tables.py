@@ -15,7 +15,12 @@ from roboirg.evaluation.analysis.comparability import (
     comparison_notes,
     differences_of,
 )
-from roboirg.evaluation.analysis.frame import Frame
+from roboirg.evaluation.analysis.results.frame import Frame
+from roboirg.evaluation.analysis.results.option_labels import (
+    REFERENCE,
+    options_label,
+    options_sort_key,
+)
 from roboirg.evaluation.analysis.stats.cells import NOTHING, ByTask, CellKey, cells_of
 from roboirg.evaluation.analysis.stats.headline import headline_notes
 from roboirg.evaluation.analysis.stats.heard_rates import heard_notes
@@ -25,11 +30,6 @@ from roboirg.evaluation.analysis.stats.measure import (
     ScopeKey,
     by_scope,
     pair,
-)
-from roboirg.evaluation.analysis.stats.option_labels import (
-    REFERENCE,
-    options_label,
-    options_sort_key,
 )
 from roboirg.evaluation.analysis.stats.paired_tests import pooled_overlap
 from roboirg.evaluation.analysis.stats.rates import NOT_APPLICABLE, points, whole_percent

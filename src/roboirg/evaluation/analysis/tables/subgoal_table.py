@@ -6,9 +6,9 @@ from collections import Counter, defaultdict
 from collections.abc import Callable, Iterable, Iterator, Mapping
 
 from roboirg.core.errors import InvalidValueError
-from roboirg.evaluation.analysis.frame_reading import with_columns
+from roboirg.evaluation.analysis.results.option_labels import options_label
+from roboirg.evaluation.analysis.results.reading import with_columns
 from roboirg.evaluation.analysis.stats.cells import CellKey
-from roboirg.evaluation.analysis.stats.option_labels import options_label
 from roboirg.evaluation.analysis.stats.planner_failures import PLANNER_FAILURES, planner_failure
 from roboirg.evaluation.analysis.stats.run_data import RunData
 from roboirg.evaluation.analysis.tables.table import Column, Row, Table

@@ -9,18 +9,18 @@ from typing import TYPE_CHECKING
 
 from roboirg.core.plain_text import counted, verb_for
 from roboirg.evaluation.analysis.comparability import AllDifferences, comparison_notes
-from roboirg.evaluation.analysis.frame import Frame
-from roboirg.evaluation.analysis.policy_run import EvalConditions, PolicyRun
 from roboirg.evaluation.analysis.published import TRIALS, RateTable, published_rows
-from roboirg.evaluation.analysis.stats.cells import Cell, Cells
-from roboirg.evaluation.analysis.stats.headline import headline_notes
-from roboirg.evaluation.analysis.stats.intervals import wilson_interval
-from roboirg.evaluation.analysis.stats.option_labels import (
+from roboirg.evaluation.analysis.results.frame import Frame
+from roboirg.evaluation.analysis.results.option_labels import (
     is_usual,
     options_label,
     options_sort_key,
     staged_options,
 )
+from roboirg.evaluation.analysis.results.policy_run import EvalConditions, PolicyRun
+from roboirg.evaluation.analysis.stats.cells import Cell, Cells
+from roboirg.evaluation.analysis.stats.headline import headline_notes
+from roboirg.evaluation.analysis.stats.intervals import wilson_interval
 from roboirg.evaluation.analysis.stats.rates import NOT_APPLICABLE, change_text
 from roboirg.evaluation.analysis.tables.table import (
     ERROR_MARK,

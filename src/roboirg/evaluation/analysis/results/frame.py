@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from roboirg.core.arms import TOLD
-from roboirg.evaluation.analysis.policy_run import EvalConditions, PolicyRun, labels
-from roboirg.evaluation.analysis.stats.option_labels import options_label, options_sort_key
+from roboirg.evaluation.analysis.results.option_labels import options_label, options_sort_key
+from roboirg.evaluation.analysis.results.policy_run import EvalConditions, PolicyRun, labels
 from roboirg.evaluation.records.record import Job, Summary
 from roboirg.evaluation.records.record_codec import RecordKey, identity_key
 from roboirg.tasks import all_tasks
@@ -28,7 +28,7 @@ Runs = Sequence[tuple[str, Sequence[Summary]]]
 """Results of runs, each with its name."""
 
 
-class Column(NamedTuple):
+class FrameColumn(NamedTuple):
     """A column of the table.
 
     Attributes:
@@ -46,20 +46,20 @@ class Column(NamedTuple):
     read: Callable[[Any], object]
 
 
-def _field(name: str, kind: str, meaning: str, missing: str = "", path: str = "") -> Column:
-    return Column(name, kind, meaning, missing, operator.attrgetter(path or name))
+def _field(name: str, kind: str, meaning: str, missing: str = "", path: str = "") -> FrameColumn:
+    return FrameColumn(name, kind, meaning, missing, operator.attrgetter(path or name))
 
 
 def _of_failure(name: str) -> Callable[[Summary], str | None]:
     return lambda one: None if one.attribution is None else str(getattr(one.attribution, name))
 
 
-COLUMNS: Mapping[str, Column] = {
+COLUMNS: Mapping[str, FrameColumn] = {
     one.name: one
     for one in (
         _field("policy", "text", "name of the policy"),
         _field("policy_version", "text", "version of the policy"),
-        Column(
+        FrameColumn(
             "privileged",
             "flag",
             "whether the policy reads the simulator's state",
@@ -67,11 +67,13 @@ COLUMNS: Mapping[str, Column] = {
             lambda one: one.ref is not None and one.ref.is_privileged,
         ),
         _field("task", "text", "task"),
-        Column("suite", "text", "suite of the task", "not installed", lambda one: suite(one.task)),
+        FrameColumn(
+            "suite", "text", "suite of the task", "not installed", lambda one: suite(one.task)
+        ),
         _field("split", "text", "split of the episode"),
         _field("setting", "text", "setting of the instruction"),
         _field("form", "text", "implicit, or resolved: references replaced by names"),
-        Column(
+        FrameColumn(
             "instruction_options",
             "text",
             "the setting and the options that differ from its defaults",
@@ -84,15 +86,17 @@ COLUMNS: Mapping[str, Column] = {
         _field("policy_seed", "number", "seed of the policy"),
         _field("difficulty", "text", "easy, medium or hard"),
         _field("outcome", "text", "success, failure, or error (in no rate)"),
-        Column(
+        FrameColumn(
             "success",
             "flag",
             "whether the episode succeeded",
             "error",
             lambda one: {"success": True, "failure": False}.get(one.outcome),
         ),
-        Column("failure", "text", "how it failed", "no failure", _of_failure("failure")),
-        Column("failure_kind", "text", "grounding or execution", "no failure", _of_failure("kind")),
+        FrameColumn("failure", "text", "how it failed", "no failure", _of_failure("failure")),
+        FrameColumn(
+            "failure_kind", "text", "grounding or execution", "no failure", _of_failure("kind")
+        ),
         _field("error", "text", "kind of error", "no error"),
         _field("cause", "text", "why it failed, in words", "success"),
         _field(
@@ -150,7 +154,7 @@ class Frame(Mapping[str, Any]):
 
     def where(self, **values: object) -> Frame:
         """Return the rows that have certain values in some columns."""
-        chosen = np.ones(len(self["result"]), dtype=bool)
+        chosen = np.ones(len(self["outcome"]), dtype=bool)
         for name, value in values.items():
             chosen &= [one == value for one in self[name]]
         return self.take(chosen)

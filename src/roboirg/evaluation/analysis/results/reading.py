@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 from collections.abc import Callable, Iterable, Mapping, Sequence
 
-from roboirg.evaluation.analysis.frame import Column, Frame, as_column, make_frame
+from roboirg.evaluation.analysis.results.frame import Frame, FrameColumn, as_column, make_frame
 from roboirg.evaluation.plan.sources import Source
 from roboirg.evaluation.records.record import Job, Record
 from roboirg.evaluation.records.record_codec import identity_key
@@ -36,52 +36,54 @@ def _rival(record: Record) -> str | None:
     return NO_RIVAL if metadata.get("recency_rival") is None else RIVAL
 
 
-WORD_COLUMNS: Mapping[str, Column] = {
+WORD_COLUMNS: Mapping[str, FrameColumn] = {
     one.name: one
     for one in (
-        Column(
+        FrameColumn(
             "pattern",
             "text",
             "main reasoning pattern",
             "no reasoning",
             lambda one: one.metadata.get("pattern"),
         ),
-        Column(
+        FrameColumn(
             "expression",
             "texts",
             "classes of the command's referring expressions",
             "",
             _expressions,
         ),
-        Column(
+        FrameColumn(
             "slots",
             "number",
             "values of the goal that the command leaves to its context",
             "none",
             lambda one: one.metadata.get("hidden_slots") or None,
         ),
-        Column(
+        FrameColumn(
             "rival",
             "text",
             "what else “it” could mean, or how the words exclude it",
             "no “it”",
             _rival,
         ),
-        Column(
+        FrameColumn(
             "landmark",
             "texts",
             "landmarks in the words",
             "",
             lambda one: tuple(one.metadata.get("landmarks", ())),
         ),
-        Column(
+        FrameColumn(
             "words",
             "number",
             "words of all utterances",
             "",
             lambda one: sum(len(turn.text.split()) for turn in one.instruction),
         ),
-        Column("command", "text", "the same task in explicit words", "", lambda one: one.command),
+        FrameColumn(
+            "command", "text", "the same task in explicit words", "", lambda one: one.command
+        ),
     )
 }
 

@@ -1,0 +1,1 @@
+"""Results as one table, and what its rows and columns are called."""
