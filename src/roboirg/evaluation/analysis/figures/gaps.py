@@ -29,7 +29,7 @@ from roboirg.evaluation.analysis.results.policy_run import PolicyRun
 from roboirg.evaluation.analysis.stats.cells import ByTask, CellKey, Cells
 from roboirg.evaluation.analysis.stats.measure import measure_groups
 from roboirg.evaluation.analysis.stats.run_data import RunData
-from roboirg.evaluation.analysis.tables.paper_tables import PAPER_TABLES
+from roboirg.evaluation.analysis.tables.table_kinds import PAPER_TABLES
 from roboirg.evaluation.analysis.tables.table_notes import where_played
 
 if TYPE_CHECKING:

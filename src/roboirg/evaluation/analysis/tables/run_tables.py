@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence, Set
+from collections.abc import Iterable, Iterator, Mapping, Set
 from dataclasses import replace
 
 from rich.console import Console
@@ -42,7 +42,7 @@ from roboirg.evaluation.analysis.tables.table import (
     Row,
     Table,
 )
-from roboirg.evaluation.analysis.tables.table_notes import where_played
+from roboirg.evaluation.analysis.tables.table_notes import range_text, where_played
 from roboirg.evaluation.records.record import Summary
 
 MAX_FAILURES = 10
@@ -197,13 +197,8 @@ def _legend(found: Mapping[ScopeKey, Measured[ScopeKey]], gaps: Set[str]) -> Ite
 
 def _sizes(found: Mapping[ScopeKey, Measured[ScopeKey]]) -> str:
     single = [one.counts.trials for key, one in found.items() if key.scope != ALL_TASKS]
-    text = f"n = {_range(single)} {'episode' if max(single) == 1 else 'episodes'} per cell"
+    text = f"n = {range_text(single, 'episode')} per cell"
     if len({key.scope for key in found}) > 2:  # noqa: PLR2004 - a task and all of them
         every = [one.counts.trials for key, one in found.items() if key.scope == ALL_TASKS]
-        text += f", {_range(every)} for {ALL_TASKS}"
+        text += f", {range_text(every, 'episode')} for {ALL_TASKS}"
     return text
-
-
-def _range(counts: Sequence[int]) -> str:
-    low, high = min(counts), max(counts)
-    return f"{high}" if low == high else f"{low}–{high}"
