@@ -151,34 +151,6 @@ def test_the_table_of_a_run_marks_its_explicit_column(result, fields, signs, not
     assert f"≠ not comparable with the published rate: {note}" in table.notes
 
 
-@pytest.mark.parametrize(
-    ("fields", "note"),
-    [
-        ({"wordings": None}, f"Results of several words (our own words, the words of {WORDS})"),
-        ({"split": "val"}, "Results of several splits (test, val)"),
-        ({"max_steps": 9}, "Results of several step limits (1300, 9)"),
-        ({"meshes": "light"}, "Results of several kinds of meshes (faithful, light)"),
-        (
-            {"environment_version": 99},
-            f"Results of several environment versions ({ENVIRONMENT_VERSION}, 99)",
-        ),
-        ({"language_version": "2"}, "Results of several language versions (1, 2)"),
-        ({"policy_version": "b"}, "Several versions of listener (b, unknown)"),
-    ],
-)
-def test_what_is_mixed_has_separate_rows_and_is_named(result, fields, note) -> None:
-    """In one folder and in several, and with the same policy or another."""
-    first = play(result, range(2))
-    for policy in ("listener", "other"):
-        second = play(result, range(2), policy=policy, **fields)
-        for runs in ([("a", [*first, *second])], [("a", first), ("b", second)]):
-            frame = make_frame(runs)
-            table = make_table("main", RunData(frame))
-            assert len({row.name for row in table.rows}) == len(make_run_tables(frame)) == 2
-            is_named = policy == "listener" or "policy_version" not in fields
-            assert (f"{note} have separate rows" in " ".join(table.notes)) == is_named
-
-
 def test_imported_words_have_the_columns_of_our_own(result) -> None:
     """The wording file is a condition; it is no option that would hide a result from a table."""
     frame = make_frame([("run", play(result, settings=("explicit", "direct")))])

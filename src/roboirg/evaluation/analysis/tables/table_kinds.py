@@ -6,9 +6,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 from roboirg.core.instruction_options import ALL_STAGES, InstructionOptions
-from roboirg.evaluation.analysis.results.policy_run import PolicyRun
 from roboirg.evaluation.analysis.published import AVERAGE, RateTable, published_tasks
-from roboirg.evaluation.analysis.stats.cells import Cells
 from roboirg.evaluation.analysis.results.option_labels import (
     REFERENCE,
     has_default_options,
@@ -16,6 +14,8 @@ from roboirg.evaluation.analysis.results.option_labels import (
     setting_sort_key,
     staged_options,
 )
+from roboirg.evaluation.analysis.results.policy_run import PolicyRun
+from roboirg.evaluation.analysis.stats.cells import Cells
 from roboirg.evaluation.analysis.tables.table import POLICY, Column, Entry, Row
 from roboirg.tasks import all_tasks, every_task
 

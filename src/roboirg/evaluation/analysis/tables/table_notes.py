@@ -7,16 +7,16 @@ from dataclasses import replace
 
 from roboirg.core.plain_text import counted, verb_for
 from roboirg.evaluation.analysis.comparability import AllDifferences, comparison_notes
-from roboirg.evaluation.analysis.results.frame import Frame
-from roboirg.evaluation.analysis.results.policy_run import EvalConditions, PolicyRun
 from roboirg.evaluation.analysis.published import NOTES
-from roboirg.evaluation.analysis.stats.cells import Cells, Counts
-from roboirg.evaluation.analysis.stats.headline import headline_notes
+from roboirg.evaluation.analysis.results.frame import Frame
 from roboirg.evaluation.analysis.results.option_labels import (
     is_usual,
     options_label,
     options_sort_key,
 )
+from roboirg.evaluation.analysis.results.policy_run import EvalConditions, PolicyRun
+from roboirg.evaluation.analysis.stats.cells import Cells, Counts
+from roboirg.evaluation.analysis.stats.headline import headline_notes
 from roboirg.evaluation.analysis.stats.rates import NOT_APPLICABLE
 from roboirg.evaluation.analysis.tables.table import (
     ERROR_MARK,
@@ -110,8 +110,8 @@ def _sign_notes(table: PaperTable, entries: Sequence[Entry]) -> list[str]:
         (
             any(entry.change is not None for entry in entries),
             (
-                f"↑ above, ↓ below, → equal to {reference} of the same policy, by how many points, as "
-                "printed, on the same tasks; an arrow does not imply a significant difference."
+                f"↑ above, ↓ below, → equal to {reference} of the same policy, by how many points, "
+                "as printed, on the same tasks; an arrow does not imply a significant difference."
             ),
         ),
         (any(entry.best for entry in entries), f"Bold: the best {whose}."),
@@ -147,8 +147,8 @@ def _incomplete_notes(counts: Sequence[Counts], entries: Sequence[Entry]) -> lis
         (
             missing,
             (
-                f"{MISSING_MARK} {counted(missing, 'trial')} of the plan {verb_for(missing, 'are')} "
-                "still to be played."
+                f"{MISSING_MARK} {counted(missing, 'trial')} of the plan "
+                f"{verb_for(missing, 'are')} still to be played."
             ),
         ),
         (
