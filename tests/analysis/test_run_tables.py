@@ -51,7 +51,7 @@ listener
 ├─────────────┼──────────┼────────────────┼───────────────────┤
 │ all tasks   │       67 │ 20 (−40) 1! 2… │                 0 │
 └─────────────┴──────────┴────────────────┴───────────────────┘
-Played on the test split, in our own words, with at most 1300 steps. n = 1 to 4 episodes per cell, 1 to 6 episodes for
+Played on the test split, in our own words, with at most 1300 steps. n = 1 to 4 episodes per cell, 1 to 6 episodes for 
 all tasks
 ≠ not comparable with the published rate: our own words; 4 of 50 episodes (PickXtimes); 2 of 50 episodes (VideoUnmask).
 success rate in %, in brackets the gap to explicit on the same episodes in points; (–) explicit has no success either, 
