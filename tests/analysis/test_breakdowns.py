@@ -160,7 +160,7 @@ def test_rows_are_what_pandas_gives(run: Path, breakdown: Breakdown) -> None:
     rows = break_down(read_frame([Source(run)], words=True), breakdown)
     found = {
         (one.key.run.policy, one.key.options.setting, one.key.label): (
-            one.episodes, float(one.rate or 0), one.gap.value if one.gap else 0.0,
+            one.counts.episodes, float(one.rate or 0), one.gap.value if one.gap else 0.0,
         )
         for one in rows
     }  # fmt: skip
@@ -185,7 +185,7 @@ def hand_made(result: Callable[..., Summary], *settings: str) -> Frame:
 def test_gaps_are_those_of_the_very_same_episodes(result: Callable[..., Summary]) -> None:
     """Explicit wins 0, 2, 4 and 1, 3, 5; direct 0, 2 and 1."""
     rows = break_down(hand_made(result, "explicit", "direct"), LETTER)
-    assert [(one.key.label, one.episodes) for one in rows] == [("9", 6), ("10 b", 6), ("zebra", 6)]
+    assert [(one.key.label, one.counts.episodes) for one in rows] == [("9", 6), ("10 b", 6), ("zebra", 6)]
     gaps = [one.gap for one in rows]
     assert [gap and round(gap.value * 6) for gap in gaps] == [-1, -2, -1]
     # Of one and of two episodes that differ; both by 3 are more than 1.

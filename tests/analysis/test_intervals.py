@@ -101,7 +101,7 @@ def test_one_seed_has_wilsons_interval_and_others_one_over_episodes() -> None:
     """If all of 50 are lost, up to z² / (50 + z²) = 3.8415 / 53.8415 = 0.07135 may be won."""
     rng = np.random.default_rng(2)
     once, thrice = (cell(played(rng, 0.4, 50, seeds, 0.5)) for seeds in (1, 3))
-    assert cell_interval(once, rng) == wilson_interval(once.successes, 50)
+    assert cell_interval(once, rng) == wilson_interval(once.counts.successes, 50)
     theirs = clustered_interval([thrice], np.random.default_rng(0))
     assert cell_interval(thrice, np.random.default_rng(0)) == theirs
     lost = cell_interval(cell(np.zeros((50, 3), dtype=bool)), rng)
@@ -119,7 +119,7 @@ def test_the_clustered_interval_covers(rate: float, alike: float) -> None:
     hits = np.zeros(2)
     for _ in range(RUNS):
         one = cell(played(rng, rate, 50, 3, alike))
-        naive = wilson_interval(one.successes, one.trials)
+        naive = wilson_interval(one.counts.successes, one.counts.trials)
         intervals = clustered_interval([one], rng, DRAWS), naive
         hits += [each is not None and each.low <= rate <= each.high for each in intervals]
     clustered, by_trials = hits / RUNS

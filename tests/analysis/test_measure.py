@@ -75,7 +75,7 @@ def test_measure_is_what_pandas_gives(played: pd.DataFrame, data: st.DataObject)
             judged[(judged["policy"] == one.key[0]) & (judged["setting"] == setting)]
             for setting in (one.key[1], "explicit")
         )
-        assert (one.trials, one.successes) == (len(own), own["won"].sum())
+        assert (one.counts.trials, one.counts.successes) == (len(own), own["won"].sum())
         assert one.errors == 3 * 2 * 2 - len(own)
         assert (
             one.rate is None if own.empty else float(one.rate or 0) == pytest.approx(rates[one.key])

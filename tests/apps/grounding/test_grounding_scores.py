@@ -223,7 +223,7 @@ def test_scores_are_what_plain_counts_give():
     score, rows = rows_of(given, "slots")
     explicit, direct = rows["explicit"], rows["direct"]
     assert (explicit.summary.rate, direct.summary.rate, direct.summary.gap.value) == (1, 0, -1)
-    assert direct.summary.trials == 6 * len(TASKS)
+    assert direct.summary.counts.trials == 6 * len(TASKS)
     p_value = 2 * 0.5 ** (6 * len(TASKS))
     assert direct.summary.gap.p_value == pytest.approx(p_value)
     # Four settings are tested together; spatial has fewer tasks, so its p-value is larger.
