@@ -185,7 +185,11 @@ def hand_made(result: Callable[..., Summary], *settings: str) -> Frame:
 def test_gaps_are_those_of_the_very_same_episodes(result: Callable[..., Summary]) -> None:
     """Explicit wins 0, 2, 4 and 1, 3, 5; direct 0, 2 and 1."""
     rows = break_down(hand_made(result, "explicit", "direct"), LETTER)
-    assert [(one.key.label, one.counts.episodes) for one in rows] == [("9", 6), ("10 b", 6), ("zebra", 6)]
+    assert [(one.key.label, one.counts.episodes) for one in rows] == [
+        ("9", 6),
+        ("10 b", 6),
+        ("zebra", 6),
+    ]
     gaps = [one.gap for one in rows]
     assert [gap and round(gap.value * 6) for gap in gaps] == [-1, -2, -1]
     # Of one and of two episodes that differ; both by 3 are more than 1.

@@ -154,7 +154,7 @@ def test_gaps_are_those_of_the_summary() -> None:
     assert {setting for setting, _ in shown} == {"direct", "reasoning", "contextual", "spatial"}
     for (setting, label), (explicit, implicit) in shown.items():
         key = next(one for one, name in found.names.items() if label.startswith(name))
-        gap = found.summaries[key, ALL, InstructionOptions(setting)].gap
+        gap = found.summaries[key, ALL_TASKS, InstructionOptions(setting)].gap
         assert gap is not None
         assert implicit - explicit == pytest.approx(100 * gap.value)
 
@@ -295,7 +295,7 @@ def test_rates_without_another_setting_stand_alone(kept: str) -> None:
     found = content([one for one in results() if one.setting == kept and one.form == "implicit"])
     shown = dots(draw("gaps", found))
     assert {title for title, _ in shown} == {kept}
-    own = [found.summaries[key, ALL, InstructionOptions(kept)].rate for key in found.names]
+    own = [found.summaries[key, ALL_TASKS, InstructionOptions(kept)].rate for key in found.names]
     assert [*shown.values()] == [[100 * float(rate)] for rate in own if rate is not None]
     assert draw_figure("forms", found) is None
 

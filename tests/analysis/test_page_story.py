@@ -6,12 +6,12 @@ import math
 from pathlib import Path
 
 import pytest
-from roboirg.evaluation.analysis.stats.run_summary import ALL
 
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.evaluation.analysis.figures import write_figures
 from roboirg.evaluation.analysis.page.report import write_report
 from roboirg.evaluation.analysis.stats.chance import CHANCE, floor_level
+from roboirg.evaluation.analysis.stats.measure import ALL_TASKS
 from roboirg.evaluation.analysis.stats.run_data import RunData
 from roboirg.evaluation.plan.plan_maker import make_plan
 from roboirg.evaluation.plan.sources import Source
@@ -69,7 +69,7 @@ def test_elsewhere_it_guesses_and_every_miss_is_one_of_grounding(run: Path) -> N
 def test_the_whole_report_follows(run: Path, tmp_path: Path) -> None:
     content = RunData.of([("story", read_records(run))], PLAN.jobs())
     _, forgetful = content.names
-    direct = content.summaries[forgetful, ALL, InstructionOptions("direct")]
+    direct = content.summaries[forgetful, ALL_TASKS, InstructionOptions("direct")]
     assert direct.form_gap is not None
     assert direct.form_gap.value < -0.3
     assert direct.form_gap.overlap.only_first == direct.form_gap.overlap.neither == 0
