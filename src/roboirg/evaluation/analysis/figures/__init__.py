@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, cast
 
 from roboirg.core.errors import InvalidValueError, UnknownNameError
 from roboirg.evaluation.analysis.figures.figure_style import STYLE, check_figure_support, save
+from roboirg.evaluation.analysis.published import RateTable
 from roboirg.evaluation.analysis.stats.run_data import RunData
 from roboirg.evaluation.plan.sources import Source
 
@@ -71,13 +72,13 @@ def _drawn(
 ) -> Figure | None:
     from roboirg.evaluation.analysis.figures.failures import draw_failures
     from roboirg.evaluation.analysis.figures.forms import draw_forms
-    from roboirg.evaluation.analysis.figures.gaps import draw_context, draw_gaps
+    from roboirg.evaluation.analysis.figures.gaps import draw_next_to_reference
     from roboirg.evaluation.analysis.figures.strips import draw_strips
 
     if name == "strips":
         return draw_strips(runs)
     content = content.told
     if name in ("gaps", "context"):
-        draw = draw_gaps if name == "gaps" else draw_context
-        return draw(content, published=published)
+        which: RateTable = "main" if name == "gaps" else "context"
+        return draw_next_to_reference(which, content, published=published)
     return draw_forms(content) if name == "forms" else draw_failures(content)
