@@ -42,7 +42,13 @@ def test_columns_have_their_types_and_lack_what_they_may_lack(run: Path) -> None
     found = roboirg.results(run)
     declared = {**COLUMNS, **WORD_COLUMNS}
     assert list(found) == list(declared)
-    kinds = {"text": "string", "number": "Float64", "flag": "boolean", "texts": "object"}
+    kinds = {
+        "text": "string",
+        "texts": "object",
+        "number": "Int64",
+        "decimal": "Float64",
+        "flag": "boolean",
+    }
     assert found.dtypes.astype(str).to_dict() == {
         name: kinds[one.kind] for name, one in declared.items()
     }

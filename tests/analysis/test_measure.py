@@ -76,7 +76,7 @@ def test_measure_is_what_pandas_gives(played: pd.DataFrame, data: st.DataObject)
             for setting in (one.key[1], "explicit")
         )
         assert (one.counts.trials, one.counts.successes) == (len(own), own["won"].sum())
-        assert one.errors == 3 * 2 * 2 - len(own)
+        assert one.counts.errors == 3 * 2 * 2 - len(own)
         assert (
             one.rate is None if own.empty else float(one.rate or 0) == pytest.approx(rates[one.key])
         )

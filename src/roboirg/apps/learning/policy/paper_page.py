@@ -82,7 +82,8 @@ def write_paper_page(folder: Path) -> Path:
 
 def row_frame(part: str, results: Iterable[Summary]) -> Frame:
     """Return a part's results, without control arms; policies are rows."""
-    return make_frame([(part, [_of_row(one) for one in results])]).told()
+    rows = [_of_row(one) for one in results]
+    return make_frame([(part, rows)], planned=rows).told()  # in the order of the records
 
 
 def results_text(found: Mapping[str, Frame]) -> str:

@@ -176,7 +176,9 @@ class Frame(Mapping[str, Any]):
 
     @property
     def played(self) -> list[Summary]:
-        """The results, without episodes that were not played."""
+        """The results, without episodes that were not played; none of frames without results."""
+        if "result" not in self.columns:
+            return []
         return list(self["result"][self["outcome"] != MISSING])
 
     @cached_property

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 from roboirg.core.errors import InvalidValueError
 from roboirg.core.instruction_options import InstructionOptions
-from roboirg.evaluation.analysis.results.frame import Frame
+from roboirg.evaluation.analysis.results.frame import MISSING, Frame
 from roboirg.evaluation.analysis.results.option_labels import REFERENCE, options_sort_key
 from roboirg.evaluation.analysis.results.policy_run import PolicyRun
 from roboirg.evaluation.analysis.stats.breakdowns import Breakdown, labeled, natural
@@ -137,7 +137,7 @@ def _only_policy_run(frame: Frame) -> PolicyRun:
 
 
 def _check_fair(first: Frame, second: Frame) -> None:
-    if not (first.played and second.played):
+    if any({*one["outcome"]} <= {MISSING} for one in (first, second)):
         raise InvalidValueError("One of the two policies has no results yet.")
     differences = [*differing([*first.played, *second.played], FAIRNESS)]
     if differences:
