@@ -14,6 +14,7 @@ from roboirg.core.errors import InvalidValueError, UnknownNameError
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.evaluation.analysis.figures import draw_figure, failures, forms, write_figures
 from roboirg.evaluation.analysis.published import published_rows
+from roboirg.evaluation.analysis.stats.measure import ALL_TASKS
 from roboirg.evaluation.analysis.stats.run_data import RunData
 from roboirg.evaluation.analysis.tables.diagnostic_tables import (
     make_failure_table,

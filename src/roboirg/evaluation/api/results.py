@@ -9,7 +9,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from roboirg.core.errors import InvalidValueError, MissingDependencyError, UnknownNameError
+from roboirg.core.errors import InvalidValueError, UnknownNameError
+from roboirg.core.extras import extra_needed
 from roboirg.core.plain_text import counted
 from roboirg.evaluation.analysis.figures import FIGURES, draw_figure
 from roboirg.evaluation.analysis.results.frame import COLUMNS, MISSING
@@ -52,12 +53,8 @@ def results(*paths: str | Path) -> pd.DataFrame:
         StoreError: there are no records at a path.
         MissingDependencyError: pandas is not installed.
     """
-    try:
+    with extra_needed("A data frame needs pandas", "export"):
         import pandas as pd
-    except ImportError as error:
-        raise MissingDependencyError(
-            f"A data frame needs pandas, which is not installed ({error}); run: pip install pandas"
-        ) from error
     with opened_sources(paths) as sources:
         frame = read_frame(sources, words=True)
     played = frame.take(frame["outcome"] != MISSING)

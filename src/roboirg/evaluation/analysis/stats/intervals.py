@@ -13,6 +13,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from roboirg.core.extras import extra_needed
+
 Z_95 = 1.959963984540054
 """Two-sided 95 % quantile of the normal distribution."""
 ALPHA = 0.05
@@ -122,7 +124,8 @@ def _expanded_levels(sizes: Sequence[int]) -> tuple[float, float]:
     Student's; quantiles further out correct both (the expanded percentile interval of Hesterberg,
     The American Statistician 69, 2015).
     """
-    from scipy import special  # SciPy's statistics take a second to import
+    with extra_needed("Intervals of several seeds or tasks need SciPy", "report"):
+        from scipy import special  # SciPy's statistics take a second to import
 
     freedom = sum(sizes) - len(sizes)
     widening = math.sqrt(sum(sizes) / freedom)
