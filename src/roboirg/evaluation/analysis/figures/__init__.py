@@ -2,21 +2,31 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
 from roboirg.core.errors import InvalidValueError, UnknownNameError
+from roboirg.evaluation.analysis.figures.failures import draw_failures
 from roboirg.evaluation.analysis.figures.figure_style import STYLE, check_figure_support, save
-from roboirg.evaluation.analysis.published import RateTable
+from roboirg.evaluation.analysis.figures.forms import draw_forms
+from roboirg.evaluation.analysis.figures.gaps import draw_next_to_reference
+from roboirg.evaluation.analysis.figures.strips import draw_strips
 from roboirg.evaluation.analysis.stats.run_data import RunData
 from roboirg.evaluation.plan.sources import Source
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-FIGURES = ("gaps", "forms", "context", "failures", "strips")
+STRIPS = "strips"
+_DRAWINGS: Mapping[str, Callable[[RunData, bool], Figure | None]] = {
+    "gaps": partial(draw_next_to_reference, "main"),
+    "forms": lambda content, _published: draw_forms(content),
+    "context": partial(draw_next_to_reference, "context"),
+    "failures": lambda content, _published: draw_failures(content),
+}
+FIGURES = (*_DRAWINGS, STRIPS)
 
 
 def write_figures(
@@ -65,20 +75,6 @@ def draw_figure(name: str, content: RunData, *, published: bool = False) -> Figu
 
 
 def _drawn(
-    name: str,
-    content: RunData,
-    published: bool,
-    runs: Sequence[Source] = (),
+    name: str, content: RunData, published: bool, runs: Sequence[Source] = ()
 ) -> Figure | None:
-    from roboirg.evaluation.analysis.figures.failures import draw_failures
-    from roboirg.evaluation.analysis.figures.forms import draw_forms
-    from roboirg.evaluation.analysis.figures.gaps import draw_next_to_reference
-    from roboirg.evaluation.analysis.figures.strips import draw_strips
-
-    if name == "strips":
-        return draw_strips(runs)
-    content = content.told
-    if name in ("gaps", "context"):
-        which: RateTable = "main" if name == "gaps" else "context"
-        return draw_next_to_reference(which, content, published=published)
-    return draw_forms(content) if name == "forms" else draw_failures(content)
+    return draw_strips(runs) if name == STRIPS else _DRAWINGS[name](content.told, published)

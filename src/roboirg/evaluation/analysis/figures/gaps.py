@@ -45,9 +45,7 @@ Played = Mapping[tuple[InstructionOptions, PolicyRun], Mapping[str, Cell]]
 """By column and policy run, the tasks with a verdict."""
 
 
-def draw_next_to_reference(
-    which: RateTable, content: RunData, *, published: bool = False
-) -> Figure | None:
+def draw_next_to_reference(which: RateTable, content: RunData, published: bool) -> Figure | None:
     """Draw the rates of the table ``main`` or ``context``; alone those without a reference.
 
     None without data, and for contexts if there is only one, as in a run of the usual settings.
