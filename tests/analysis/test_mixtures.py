@@ -47,7 +47,7 @@ def test_each_difference_is_one_sentence(result, policy, fields, sentence) -> No
     found = mixtures([one for _, results in runs for one in results])
     assert [one.partition(". ")[0] + "." for one in found] == expected
     frame = make_frame(runs)
-    table = with_mixtures(make_table("main", RunData(frame)), frame)
+    (table,) = with_mixtures([make_table("main", RunData(frame))], frame)
     assert [*table.notes[-len(found) :]] * bool(found) == found
     assert len({row.name for row in table.rows}) == len(table.rows) == len(frame.names)
     if not is_same:

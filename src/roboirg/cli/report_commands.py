@@ -189,7 +189,7 @@ def tables(
     with opened_sources(runs or []) as sources:
         data = RunData(read_frame(sources, words=by is not None))
         made = _tables(which, by, sources, data, published=published, floors=floors)
-    found = [with_mixtures(table, data.frame) for table in made]
+    found = with_mixtures(made, data.frame)
     if format in ("csv", "json"):  # without notes
         warn_of_mixtures(data.frame)
     if out is not None:

@@ -128,7 +128,8 @@ class Results:
             UnknownNameError: there is no such table or format.
         """
         made = make_table(which, self._data, published=published, floors=floors)
-        return get_format(format).draw(with_mixtures(made, self._data.frame))
+        (noted,) = with_mixtures([made], self._data.frame)
+        return get_format(format).draw(noted)
 
     def plot(self, which: str = "gaps", *, published: bool = False) -> Plot:
         """Return one of the figures: gaps, forms, context or failures.

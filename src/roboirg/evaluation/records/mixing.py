@@ -17,7 +17,7 @@ class Trait(NamedTuple):
     Attributes:
         path: of the field of a result.
         plural: what several values are called.
-        meaning: of several values; empty if it is unknown.
+        meaning: of several values.
         text: returns a value in words, or None if it fits all others.
     """
 

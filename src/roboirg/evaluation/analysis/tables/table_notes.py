@@ -80,9 +80,10 @@ def notes_of(
     return tuple(filter(None, notes))
 
 
-def with_mixtures(table: Table, frame: Frame) -> Table:
-    """Return a table with a note on everything that its results do not have in common."""
-    return replace(table, notes=(*table.notes, *mixtures(frame.told().played)))
+def with_mixtures(tables: Sequence[Table], frame: Frame) -> list[Table]:
+    """Return tables with a note on everything that their results do not have in common."""
+    found = mixtures(frame.told().played)
+    return [replace(table, notes=(*table.notes, *found)) for table in tables]
 
 
 def where_played(conditions: Sequence[EvalConditions]) -> str:
