@@ -18,7 +18,6 @@ from roboirg.evaluation.analysis.stats.measure import ALL_TASKS
 from roboirg.evaluation.analysis.stats.run_data import RunData
 from roboirg.evaluation.analysis.tables.diagnostic_tables import (
     make_failure_table,
-    make_forms_table,
 )
 from roboirg.evaluation.plan.plan import Plan
 from roboirg.evaluation.records.record import Attribution, Summary
@@ -288,6 +287,8 @@ def test_wrong_names_and_places_are_one_sentence(tmp_path: Path) -> None:
     happy = [one for one in results() if one.outcome == "success"]
     with pytest.raises(InvalidValueError, match="nothing to draw for failures"):
         write_figures(content(happy), tmp_path, ["failures"])
+    with pytest.raises(InvalidValueError, match="No episode of the runs failed"):
+        make_failure_table(content(happy))
 
 
 @pytest.mark.parametrize("kept", ["explicit", "direct"])
@@ -298,12 +299,3 @@ def test_rates_without_another_setting_stand_alone(kept: str) -> None:
     own = [found.summaries[key, ALL_TASKS, InstructionOptions(kept)].rate for key in found.names]
     assert [*shown.values()] == [[100 * float(rate)] for rate in own if rate is not None]
     assert draw_figure("forms", found) is None
-
-
-def test_tables_without_failures_or_forms_are_one_sentence() -> None:
-    happy = content([one for one in results() if one.policy == "listener"])
-    with pytest.raises(InvalidValueError, match="No episode of the runs failed"):
-        make_failure_table(happy)
-    alone = content([one for one in results() if one.form == "implicit"])
-    with pytest.raises(InvalidValueError, match="--forms implicit,resolved"):
-        make_forms_table(alone)

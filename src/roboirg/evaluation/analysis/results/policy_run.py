@@ -39,13 +39,10 @@ class EvalConditions(NamedTuple):
     def of(cls, job: Job) -> EvalConditions:
         return cls._make(_read_conditions(job))
 
-    def value(self, name: str) -> object:
-        """Return one of `CONDITIONS`."""
-        return getattr(self.environment if name in ENVIRONMENT_OPTIONS else self, name)
-
     def text(self, name: str) -> str:
-        """Return the value of a condition in words."""
-        return words_label(self.wordings) if name == "wordings" else str(self.value(name))
+        """Return the value of one of `CONDITIONS` in words."""
+        value = getattr(self.environment if name in ENVIRONMENT_OPTIONS else self, name)
+        return words_label(value) if name == "wordings" else str(value)
 
     def label(self, name: str) -> str:
         """Return a condition with its value."""
@@ -126,7 +123,7 @@ def _label(policy_run: PolicyRun, policy_runs: Sequence[PolicyRun]) -> str:
     parts += [
         policy_run.conditions.label(name)
         for name in CONDITIONS
-        if len({other.conditions.value(name) for other in policy_runs}) > 1
+        if len({other.conditions.text(name) for other in policy_runs}) > 1
     ]
     parts += _version_labels(policy_run, policy_runs)
     if policy_run.robot is not None:
