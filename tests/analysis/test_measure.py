@@ -7,7 +7,7 @@ from fractions import Fraction
 import numpy as np
 import pandas as pd
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from made_records import make_record
 
@@ -58,6 +58,7 @@ def plain_gap(ours: Trials, theirs: Trials) -> float | None:
     return float(np.mean(gaps)) if gaps else None
 
 
+@settings(max_examples=20)
 @given(st.data())
 def test_measure_is_what_pandas_gives(played: pd.DataFrame, data: st.DataObject) -> None:
     from statsmodels.stats.multitest import multipletests
