@@ -1,9 +1,12 @@
-"""Reuse of freed memory."""
+"""Reuse of freed memory, and when Python looks for unused objects."""
 
 from __future__ import annotations
 
+import contextlib
 import ctypes
+import gc
 import sys
+from collections.abc import Iterator
 from typing import Final
 
 _MMAP_THRESHOLD: Final = -3
@@ -23,3 +26,18 @@ def keep_freed_memory() -> None:
     if mallopt is not None:
         mallopt(_MMAP_THRESHOLD, _LARGEST_BLOCK)
         mallopt(_TRIM_THRESHOLD, _MOST_KEPT)
+
+
+@contextlib.contextmanager
+def paused_collection() -> Iterator[None]:
+    """Do not look for cycles of unused objects within the block or the decorated function.
+
+    For code that makes very many objects and no cycles: each search visits all of them.
+    """
+    is_enabled = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if is_enabled:
+            gc.enable()

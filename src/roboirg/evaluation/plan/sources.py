@@ -14,6 +14,7 @@ from roboirg.evaluation.plan.stored_plans import read_plan
 from roboirg.evaluation.records.packs import PACK_SUFFIX, opened_run
 from roboirg.evaluation.records.record import Job, Record, Summary
 from roboirg.evaluation.records.store import StoredRun, iterate_records, read_summaries
+from roboirg.util.freed_memory import paused_collection
 
 AnyJob = TypeVar("AnyJob", bound=Job)
 
@@ -50,7 +51,8 @@ class Source:
         Raises:
             StoreError: there are none, or a line is not a record of this schema version.
         """
-        return read_summaries(self.folder)
+        with paused_collection():
+            return read_summaries(self.folder)
 
     @cached_property
     def results(self) -> tuple[Summary, ...]:

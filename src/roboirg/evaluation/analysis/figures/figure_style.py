@@ -97,6 +97,7 @@ def save(
             figure = draw()
             if figure is None:
                 return ()
+            _fix_layout(figure)
             try:
                 folder.mkdir(parents=True, exist_ok=True)
                 for one in own:
@@ -105,6 +106,16 @@ def save(
             except OSError as error:
                 raise InvalidValueError(f"Cannot write to {folder}: {error.strerror}.") from error
     return tuple(paths)
+
+
+def _fix_layout(figure: Figure) -> None:
+    """Place the axes as laid out, but rounded: the last digits differ each time."""
+    figure.set_dpi(DOTS_PER_INCH)
+    figure.draw_without_rendering()
+    figure.set_layout_engine("none")
+    for axes in figure.axes:
+        left, bottom, width, height = (round(one, 4) for one in axes.get_position().bounds)
+        axes.set_position((left, bottom, width, height))
 
 
 def paper() -> str:

@@ -29,6 +29,7 @@ from roboirg.evaluation.records.packs import PACK_SUFFIX
 from roboirg.evaluation.records.record import Record
 from roboirg.language.settings import EXPLICIT, all_settings
 from roboirg.util.atomic_write import replacing
+from roboirg.util.freed_memory import paused_collection
 from roboirg.util.web.page_templates import check_page_support, template_environment
 
 REPORT_FILE = "report.html"
@@ -55,6 +56,7 @@ Progress = Callable[[int, int], None]
 """Called after each episode: how many are done, and how many there are."""
 
 
+@paused_collection()
 def write_report(
     source: Source,
     *,
@@ -90,6 +92,7 @@ def write_report(
     return path
 
 
+@paused_collection()
 def make_view(source: Source, progress: Progress | None = None) -> str:
     """Return the page of a run as it is served, with links to its videos."""
     now = replace(source)  # without what was read before

@@ -9,6 +9,7 @@ from roboirg.evaluation.analysis.results.frame import Frame, FrameColumn, as_col
 from roboirg.evaluation.plan.sources import Source
 from roboirg.evaluation.records.record import Job, Record
 from roboirg.evaluation.records.record_codec import identity_key
+from roboirg.util.freed_memory import paused_collection
 
 RIVAL, NO_RIVAL = "recency rival", "no recency rival"
 COMPETING = "competing distractor"
@@ -88,6 +89,7 @@ WORD_COLUMNS: Mapping[str, FrameColumn] = {
 }
 
 
+@paused_collection()
 def read_frame(sources: Sequence[Source], *, words: bool = False) -> Frame:
     """Return the results of runs and what is missing in them, with `WORD_COLUMNS` if wanted."""
     runs = [(str(one.path), one.results) for one in sources]
