@@ -140,3 +140,12 @@ def test_the_same_episode_in_two_runs_stays_apart(result) -> None:
 def test_a_policy_that_has_not_begun_is_there(result) -> None:
     ((key, cell),) = cells_of(make_frame([], [result(policy="late").identity])).items()
     assert (key.policy_run.policy, key.policy_run.versions, cell.missing) == ("late", None, 1)
+
+
+def test_the_page_lists_the_columns() -> None:
+    page = (Path(__file__).parents[2] / "docs" / "own-tables.md").read_text(encoding="utf-8")
+    rows = [
+        f"| `{one.name}` | {one.kind} | {one.meaning} | {one.missing or 'never'} |"
+        for one in (*COLUMNS.values(), *WORD_COLUMNS.values())
+    ]
+    assert "\n".join(rows) in page, "\n".join(rows)

@@ -183,10 +183,11 @@ def tables(
     from roboirg.evaluation.analysis.tables.table_notes import with_mixtures
     from roboirg.evaluation.plan.sources import opened_sources
     from roboirg.util.atomic_write import write_atomically
+    from roboirg.util.freed_memory import paused_collection
 
     output = get_format(format)
     _check_choice(which, by, runs or [], published=published, floors=floors)
-    with opened_sources(runs or []) as sources:
+    with paused_collection(), opened_sources(runs or []) as sources:
         data = RunData(read_frame(sources, words=by is not None))
         made = _tables(which, by, sources, data, published=published, floors=floors)
     found = with_mixtures(made, data.frame)
