@@ -8,11 +8,10 @@ from pathlib import Path
 import pytest
 from evaluation_fakes import FakePlay, small_plan
 from msgspec.structs import replace
-from typer.testing import CliRunner
+from page_text import call
 
 from roboirg.evaluation.plan.plan import Plan
 from roboirg.evaluation.records.store import RecordStore
-from roboirg.main import app
 
 THEIRS = {"PickXtimes": "TheirTask", "direct": "theirs", "random": "their_package:Policy"}
 
@@ -40,22 +39,13 @@ def _write_plan(plan: Plan, folder: Path) -> None:
     (folder / "plan.json").write_text(text)
 
 
-def call(*words: object) -> str:
-    result = CliRunner().invoke(app, [str(word) for word in words], catch_exceptions=False)
-    assert result.exit_code == 0, result.output
-    return result.output
-
-
-def test_its_tables_are_shown(run: Path) -> None:
+def test_its_tables_are_shown_and_its_page_is_made(run: Path) -> None:
     shown = " ".join(call("tables", run, "--which", "other").split())
     assert "TheirTask" in shown
     assert "their_package:Policy" in shown
     assert (
         "The package with TheirTask is not installed: what its runs lack is not counted." in shown
     )
-
-
-def test_its_page_is_made(run: Path) -> None:
     call("report", run)
     page = (run / "report.html").read_text()
     assert "TheirTask" in page

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import html
 import re
 import tracemalloc
 from collections.abc import Callable
@@ -11,15 +10,12 @@ from typing import Any
 
 import pandas as pd
 import pytest
-import typer
 from made_records import make_record
 from msgspec.structs import replace
-from typer.testing import CliRunner
+from page_text import call, store
 
 import roboirg
-from roboirg.cli.report_commands import compare as compare_command
-from roboirg.cli.report_commands import tables
-from roboirg.core.errors import InvalidValueError, UnknownNameError
+from roboirg.core.errors import InvalidValueError
 from roboirg.evaluation.analysis.results.frame import Frame, as_column, make_frame
 from roboirg.evaluation.analysis.results.reading import (
     COMPETING,
@@ -33,21 +29,14 @@ from roboirg.evaluation.analysis.stats.breakdowns import (
     BREAKDOWNS,
     Breakdown,
     break_down,
-    find_breakdowns,
 )
 from roboirg.evaluation.analysis.stats.comparison import compare
 from roboirg.evaluation.analysis.stats.comparison_text import sentences
 from roboirg.evaluation.analysis.tables.diagnostic_tables import make_breakdown_table
 from roboirg.evaluation.plan.plan import Plan
 from roboirg.evaluation.plan.sources import Source
-from roboirg.evaluation.plan.stored_plans import write_plan
 from roboirg.evaluation.records.record import Job, Record, Summary
-from roboirg.evaluation.records.record_codec import encode
-from roboirg.evaluation.records.store import RECORDS_FILE, RecordStore, iterate_records
-
-app = typer.Typer()
-app.command("tables")(tables)
-app.command("compare")(compare_command)
+from roboirg.evaluation.records.store import RECORDS_FILE, iterate_records
 
 PLAN = Plan(
     policies=("listener", "forgetful"),
@@ -74,18 +63,7 @@ def records() -> tuple[Record, ...]:
 
 @pytest.fixture(scope="module")
 def run(records: tuple[Record, ...], tmp_path_factory: pytest.TempPathFactory) -> Path:
-    folder = tmp_path_factory.mktemp("runs") / "both"
-    with RecordStore(folder) as store:
-        for record in records:
-            store.append(record)
-    write_plan(PLAN, folder)
-    return folder
-
-
-def call(*words: object) -> str:
-    outcome = CliRunner().invoke(app, [str(word) for word in words], catch_exceptions=False)
-    assert outcome.exit_code == 0, outcome.output
-    return outcome.output
+    return store(tmp_path_factory.mktemp("runs") / "both", records, PLAN).folder
 
 
 # Labels
@@ -228,58 +206,18 @@ def test_a_compared_label_is_the_difference_on_its_episodes(result: Callable[...
 # Commands
 
 
-def test_commands_break_everything_down(run: Path) -> None:
-    output = call("tables", run, "--by", "all")
+def test_the_wanted_breakdowns_are_compared(run: Path) -> None:
     sides = call("compare", f"{run}:listener", f"{run}:forgetful", "--by", "pattern,rival")
-    for breakdown in BREAKDOWNS.values():
-        assert f"Gap to explicit by {breakdown.title}" in output
-        is_wanted = breakdown.name in ("pattern", "rival")
-        assert (f"By {breakdown.title}:" in sides) == is_wanted
+    assert re.findall(r"^By (.*?):", sides, re.MULTILINE) == ["reasoning pattern", "recency rival"]
     assert "  contextual, recency rival: " in sides
-    assert "Each breakdown is corrected separately, over all its rows." in sides
-
-
-def test_a_breakdown_that_does_not_exist() -> None:
-    with pytest.raises(UnknownNameError, match=r"breakdown 'colour'.*pattern, expression, slots"):
-        find_breakdowns(["pattern", "colour"])
 
 
 def test_explicit_alone_has_nothing_to_break_down(
     records: tuple[Record, ...], tmp_path: Path
 ) -> None:
-    with RecordStore(tmp_path) as store:
-        store.append(next(record for record in records if record.setting == "explicit"))
+    store(tmp_path, [record for record in records if record.setting == "explicit"])
     with pytest.raises(InvalidValueError, match="need an implicit setting"):
         call("tables", tmp_path, "--by", "slots")
-
-
-# The page
-
-
-@pytest.mark.browser
-def test_the_page_has_the_same_tables_and_they_open_with_the_keyboard(
-    records: tuple[Record, ...], run: Path, open_page: Any, tmp_path: Path
-) -> None:
-    pytest.importorskip("jinja2")
-    from page_text import render
-
-    text, frame = render(records), read_frame([Source(run)], words=True)
-    for breakdown in BREAKDOWNS.values():
-        assert f"<summary>By {breakdown.title}</summary>" in text
-        for row in make_breakdown_table(breakdown, frame).rows:
-            cells = [re.escape(html.escape(entry.text)) for entry in row.entries]
-            texts = r"\s*".join(f"<td>{text}</td>" for text in cells)
-            assert re.search(rf'<th scope="row">{row.name}</th>\s*{texts}', text), row
-    path = tmp_path / "page.html"
-    path.write_text(text)
-    with open_page(path.as_uri()) as page:
-        heads = page.locator("#kinds summary")
-        assert heads.count() == len(BREAKDOWNS)
-        for number in range(heads.count()):
-            assert page.locator("#kinds table:visible").count() == number
-            heads.nth(number).press("Enter")
-        page.set_viewport_size({"width": 400, "height": 800})
-        assert page.evaluate("document.documentElement.scrollWidth") == 400
 
 
 # Memory
@@ -288,9 +226,7 @@ def test_the_page_has_the_same_tables_and_they_open_with_the_keyboard(
 def test_words_are_read_line_by_line(records: tuple[Record, ...], tmp_path: Path) -> None:
     """The long parts of records are dropped at once: labels take a small share of the file."""
     long = replace(records[1], details="x" * 20_000)
-    with (tmp_path / RECORDS_FILE).open("w") as file:
-        for episode in range(2000):
-            file.write(encode(replace(long, episode=episode)).decode() + "\n")
+    store(tmp_path, [replace(long, episode=episode) for episode in range(2000)])
     reads = {name: column.read for name, column in WORD_COLUMNS.items()}
     tracemalloc.start()
     frame = with_columns(make_frame([("", [long])]), iterate_records(tmp_path), reads)

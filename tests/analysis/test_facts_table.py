@@ -10,15 +10,13 @@ from types import SimpleNamespace
 import pytest
 from flat_jobs import job_of
 from made_records import make_record
-from typer.testing import CliRunner
+from page_text import call, store
 
 from roboirg.core.inference_facts import InferenceFacts, inference_facts
 from roboirg.evaluation.analysis.tables.facts_table import NOT_APPLICABLE, NOT_REPORTED, RUN
 from roboirg.evaluation.plan.plan_maker import make_plan
 from roboirg.evaluation.plan.stored_plans import write_plan
 from roboirg.evaluation.records.record import Record
-from roboirg.evaluation.records.store import RecordStore
-from roboirg.main import app
 
 Facts = dict[str, dict[str, str]]
 
@@ -31,12 +29,8 @@ def record(episode: int, outcome: str = "success", **fields) -> Record:
 
 
 def facts(folder: Path, *records: Record) -> Facts:
-    with RecordStore(folder) as store:
-        for one in records:
-            store.append(one)
-    printed = CliRunner().invoke(app, ["tables", str(folder), "--which", "facts", "--format=json"])
-    assert printed.exit_code == 0, printed.output
-    rows = json.loads(printed.output)
+    store(folder, records)
+    rows = json.loads(call("tables", folder, "--which", "facts", "--format", "json"))
     return {
         one["of"]: {row["fact"]: row["value"] for row in rows if row["of"] == one["of"]}
         for one in rows

@@ -7,20 +7,16 @@ from itertools import combinations
 from pathlib import Path
 
 import pytest
-from made_records import make_record
 from msgspec.structs import replace
+from page_text import played
 
-from roboirg.core.errors import InvalidValueError, UnknownNameError
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.evaluation.analysis.figures import draw_figure, failures, forms, write_figures
 from roboirg.evaluation.analysis.published import published_rows
 from roboirg.evaluation.analysis.stats.measure import ALL_TASKS
 from roboirg.evaluation.analysis.stats.run_data import RunData
-from roboirg.evaluation.analysis.tables.diagnostic_tables import (
-    make_failure_table,
-)
 from roboirg.evaluation.plan.plan import Plan
-from roboirg.evaluation.records.record import Attribution, Summary
+from roboirg.evaluation.records.record import Summary
 from roboirg.judging.failure_attribution import EXECUTION, GROUNDING
 
 pytest.importorskip("matplotlib")
@@ -41,16 +37,7 @@ PLAN = Plan(
 
 
 def results() -> list[Summary]:
-    """The listener succeeds; the forgetful fails where it must remember."""
-    found = []
-    for number, job in enumerate(PLAN.jobs()):
-        lost = job.policy == "forgetful" and job.form == "implicit" and job.setting != "explicit"
-        kind = "execution" if number % 2 else "grounding"
-        failure = (EXECUTION if number % 2 else GROUNDING)[number % 5]
-        attribution = Attribution(kind=kind, failure=failure, step=9, sentence="So.")
-        record = make_record(job, "failure" if lost else "success")
-        found.append(replace(record, attribution=attribution if lost else None))
-    return found
+    return [*played(PLAN)]
 
 
 def content(found: list[Summary] | None = None, **options: object) -> RunData:
@@ -260,7 +247,7 @@ def test_no_text_leaves_the_figure_or_lies_on_another(
             assert min(across, down) <= 1, (one, other)
 
 
-def test_incomplete_policies_and_runs_of_the_same_episodes_have_labels_of_their_own() -> None:
+def test_incomplete_policies_are_labeled_so() -> None:
     lost = ("forgetful", InstructionOptions(), 0)
     played = [one for one in results() if (one.policy, one.column, one.episode) != lost]
     short = draw("gaps", content(played, planned=PLAN.jobs()))
@@ -269,26 +256,6 @@ def test_incomplete_policies_and_runs_of_the_same_episodes_have_labels_of_their_
         "listener (privileged), n = 3",
         "forgetful (privileged) (incomplete), n = 2 to 3",
     ]
-    both = RunData.of([("one", results()), ("two", results())])
-    titles = [panel.get_title(loc="left") for panel in draw("failures", both).axes]
-    assert titles == [
-        f"{policy}, {run} (privileged)"
-        for policy in ("forgetful", "listener")
-        for run in ("one", "two")
-    ]
-
-
-def test_wrong_names_and_places_are_one_sentence(tmp_path: Path) -> None:
-    with pytest.raises(UnknownNameError, match="Did you mean 'gaps'"):
-        write_figures(content(), tmp_path, ["gap"])
-    (tmp_path / "file").write_text("")
-    with pytest.raises(InvalidValueError, match="Cannot write to"):
-        write_figures(content(), tmp_path / "file", ["gaps"])
-    happy = [one for one in results() if one.outcome == "success"]
-    with pytest.raises(InvalidValueError, match="nothing to draw for failures"):
-        write_figures(content(happy), tmp_path, ["failures"])
-    with pytest.raises(InvalidValueError, match="No episode of the runs failed"):
-        make_failure_table(content(happy))
 
 
 @pytest.mark.parametrize("kept", ["explicit", "direct"])

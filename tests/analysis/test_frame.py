@@ -9,6 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from made_records import make_record
+from page_text import store
 
 import roboirg
 from roboirg.apps.leaderboard.packing import pack_run
@@ -17,8 +18,6 @@ from roboirg.evaluation.analysis.results.reading import WORD_COLUMNS
 from roboirg.evaluation.analysis.stats.cells import cells_of
 from roboirg.evaluation.analysis.stats.measure import summarize
 from roboirg.evaluation.plan.plan_maker import make_plan
-from roboirg.evaluation.plan.stored_plans import write_plan
-from roboirg.evaluation.records.store import RecordStore
 
 OUTCOMES = ("success", "failure", "error")
 
@@ -28,14 +27,12 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Of each task and setting the first episode is won, the next lost; one is an error."""
     folder = tmp_path_factory.mktemp("runs") / "run"
     plan = make_plan("oracle", tasks="PickXtimes,StopCube", settings="all", episodes="4")
-    with RecordStore(folder) as store:
-        for job in plan.jobs():
-            if job.episode < 3:
-                outcome = OUTCOMES[job.episode]
-                cause = None if outcome == "success" else "why"
-                store.append(make_record(job, outcome, cause, video=None))  # type: ignore[arg-type]
-    write_plan(plan, folder)
-    return folder
+    found = [
+        make_record(job, OUTCOMES[job.episode], "why" if job.episode else None, video=None)  # type: ignore[arg-type]
+        for job in plan.jobs()
+        if job.episode < 3
+    ]
+    return store(folder, found, plan).folder
 
 
 def test_columns_have_their_types_and_lack_what_they_may_lack(run: Path) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections import Counter
 from collections.abc import Callable
 from pathlib import Path
@@ -11,14 +12,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from made_records import make_record
-from page_text import store
-from typer.testing import CliRunner
+from page_text import call, store
 
-from roboirg import main
 from roboirg.core.instruction_options import InstructionOptions
-from roboirg.evaluation.analysis.page.details import EpisodeDetails
-from roboirg.evaluation.analysis.page.episodes import PageEpisodes
-from roboirg.evaluation.analysis.page.run_warnings import run_warnings
 from roboirg.evaluation.analysis.results.frame import make_frame
 from roboirg.evaluation.analysis.stats.heard_rates import count_heard
 from roboirg.evaluation.analysis.stats.run_data import RunData
@@ -27,7 +23,6 @@ from roboirg.evaluation.analysis.tables.run_tables import make_run_tables
 from roboirg.evaluation.play.episode_record import audit_record
 from roboirg.evaluation.play.job_instruction import PreparedJob
 from roboirg.evaluation.records.record import Job, Record, Summary
-from roboirg.evaluation.records.store import RecordStore
 from roboirg.policies.prompt_length.prompt_audit import PromptLimit, most_tokens
 
 VERDICTS = st.sampled_from(["heard", "cut", "unknown"])
@@ -115,39 +110,27 @@ def long_record(policy: str, tokens: int | None, **fields: object) -> Record:
 
 @pytest.fixture
 def run(tmp_path: Path) -> Path:
-    with RecordStore(tmp_path) as store:
-        for policy, tokens in (("cutting", 64), ("whole", 1000), ("silent", None)):
-            store.append(long_record(policy, tokens))
-    return tmp_path
-
-
-def test_the_page_says_what_was_cut(tmp_path: Path) -> None:
-    cut, whole = long_record("cutting", 64), long_record("whole", 1000)
-    episodes = PageEpisodes.of({"run": store(tmp_path, [cut, whole])}, videos=False)
-    (warning,) = [text for kind, text in run_warnings(episodes) if "limited" in text]
-    assert warning.startswith("cutting did not read every instruction to its end")
-    page = EpisodeDetails(tmp_path, embeds=False)
-    details = page.details_of(cut)
-    assert details["reached"] == cut.prompt.reached  # type: ignore[union-attr]
-    prompt = list(page.strings)[details["prompt"]]
-    assert prompt.startswith("cut: needs ")
-    assert "the model reads 64 (counted with some.model)" in prompt
-    assert "mentions lost" in prompt
-    for record in (whole, long_record("silent", None)):
-        assert not {"reached", "prompt"} & set(page.details_of(record))
+    limits = ("cutting", 64), ("whole", 1000), ("silent", None)
+    return store(tmp_path, [long_record(policy, tokens) for policy, tokens in limits]).folder
 
 
 @pytest.mark.browser
 def test_the_page_strikes_out_what_was_cut(open_page: Any, run: Path) -> None:
-    said = CliRunner().invoke(main.app, ["report", str(run)])
-    assert said.exit_code == 0, said.output
+    call("report", run)
     with open_page((run / "report.html").as_uri()) as page:
-        page.select_option("#filters [name=policy]", "cutting")
-        row = page.locator("#rows > li").first
-        row.locator("h3 button").click()
-        struck = " ".join(row.locator(".turns del").all_inner_texts())
+        warnings = page.locator(".warning").all_inner_texts()
+        assert any("cutting did not read every instruction to its end" in one for one in warnings)
+        prompt = r"cut: needs .* the model reads 64 \(counted with some\.model\).* mentions lost"
+        found = {}
+        for policy in ("whole", "silent", "cutting"):
+            page.select_option("#filters [name=policy]", policy)
+            row = page.locator("#rows > li").first
+            row.locator("h3 button").click()
+            struck = "".join(row.locator(".turns del").all_inner_texts())
+            found[policy] = struck.replace(" ", ""), bool(re.search(prompt, row.inner_text()))
         record = long_record("cutting", 64)
         assert record.prompt is not None
         texts = [turn.text for turn in record.instruction]
         lost = "".join(text[end:] for text, end in zip(texts, record.prompt.reached, strict=True))
-        assert struck.replace(" ", "") == lost.replace(" ", "")
+        cut = lost.replace(" ", ""), True
+        assert found == {"whole": ("", False), "silent": ("", False), "cutting": cut}

@@ -10,6 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from made_records import make_record
+from page_text import store
 
 import roboirg
 from roboirg.core.instruction_options import InstructionOptions
@@ -19,7 +20,6 @@ from roboirg.evaluation.analysis.stats.cells import cells_of
 from roboirg.evaluation.analysis.stats.intervals import wilson_interval
 from roboirg.evaluation.analysis.stats.measure import ALL_TASKS, summarize
 from roboirg.evaluation.plan.plan_maker import make_plan
-from roboirg.evaluation.records.store import RecordStore
 
 Trials = dict[tuple[str, float], dict[float, bool]]
 
@@ -32,9 +32,7 @@ def played(tmp_path_factory: pytest.TempPathFactory) -> pd.DataFrame:
         "listener,forgetful", tasks="PickXtimes,VideoUnmask",
         settings="explicit,direct,reasoning", episodes="3", policy_seeds="0,1",
     )  # fmt: skip
-    with RecordStore(folder) as store:
-        for job in plan.jobs():
-            store.append(make_record(job, "success"))
+    store(folder, [make_record(job, "success") for job in plan.jobs()])
     return roboirg.results(folder)
 
 

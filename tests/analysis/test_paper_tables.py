@@ -17,8 +17,7 @@ from msgspec.structs import replace
 from rich.console import Console
 
 from roboirg.evaluation.analysis.results.frame import Frame, make_frame
-from roboirg.evaluation.analysis.stats.chance import CHANCE, FLOORS
-from roboirg.evaluation.analysis.stats.measured_floors import LEARNED
+from roboirg.evaluation.analysis.stats.chance import CHANCE
 from roboirg.evaluation.analysis.stats.rates import mean_percent, percent
 from roboirg.evaluation.analysis.stats.run_data import RunData
 from roboirg.evaluation.analysis.tables.paper_tables import WHICH, is_informative, make_table
@@ -111,33 +110,6 @@ def test_only_informative_tables_are_wanted(result) -> None:
     assert wanted([result(task="PutInBox")]) == {"real"}
     assert wanted([result(task="Outside")]) == {"other"}
     assert wanted([result(arm="silent"), *two]) == {"main"}
-
-
-def test_spatial_is_compared_with_explicit_on_the_tasks_that_have_it(result) -> None:
-    """Explicit is 50 % on those and 100 % on the others: no change, though its average is more."""
-    explicit = [
-        one if all_tasks()[one.task].spatial else replace(one, outcome="success")
-        for one in whole(result, settings=("explicit",))
-    ]
-    table = table_of("main", explicit, whole(result, settings=("spatial",)))
-    assert entries(table, "explicit")["Avg"].percent > Decimal(60)
-    assert str(entries(table, "spatial")["Avg"]) == "50.00 →0.00"
-    assert entries(table, "spatial")["Reference Avg"].text == "–"
-
-
-def test_the_floors_stand_below(result) -> None:
-    table = table_of("main", whole(result), floors=FLOORS)
-    names = ["chance", "first-mention", "last-mention", "elimination", "surface"]
-    # Of explicit, which leaves nothing open, nothing is measured.
-    below = {"explicit": names, "direct": [*names, *LEARNED]}
-    assert [(row.group, row.name) for row in table.rows if row.source == "chance"] == [
-        (setting, name) for setting, own in below.items() for name in own
-    ]
-    averages = {row.name: row.entries[-1].text for row in table.rows if row.group == "direct"}
-    expected = {"surface": "100.00", "first-mention": "81.82", "elimination": "4.04"}
-    assert averages.items() >= expected.items()
-    ours = [row for row in table.rows if row.source != "chance"]
-    assert ours == list(table_of("main", whole(result)).rows)
 
 
 NAME = "a_package.with_a_long_name.policies:" + "Net" * 40

@@ -5,7 +5,6 @@ from __future__ import annotations
 import io
 from collections.abc import Sequence
 
-import pytest
 from flat_jobs import make_result
 from rich.console import Console
 
@@ -111,18 +110,3 @@ def test_policies_and_conditions_have_tables_of_their_own_in_the_order_of_the_pl
 def test_points_have_a_sign() -> None:
     assert [points(gap) for gap in (-0.5, 0.25, 0.0, -0.001)] == ["−50", "+25", "±0", "±0"]
     assert [points(gap, 1) for gap in (-0.5, 0.0004, 0.0006)] == ["−50.0", "±0.0", "+0.1"]
-
-
-@pytest.mark.parametrize(("width", "parts"), [(10, 2), (80, 2), (400, 1)])
-def test_wide_tables_are_drawn_in_parts_and_names_are_whole(width: int, parts: int) -> None:
-    results = [
-        play("1", setting, form=form, task=name)
-        for setting in ("explicit", "direct", "reasoning", "contextual", "spatial")
-        for form in ("implicit", "resolved")
-        for name in ("VideoUnmaskSwap", "PickXtimes")
-    ]
-    text = printed(frame_of(*results), width)
-    lines = [line for line in text.splitlines() if line.startswith("│ VideoUnmaskSwap ")]
-    assert len(lines) == parts
-    assert "spatial (resolved)" in text
-    assert "…" not in text

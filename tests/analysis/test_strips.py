@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from made_records import make_record
 from msgspec.structs import replace
+from page_text import store
 
 from roboirg.evaluation.analysis.figures import write_figures
 from roboirg.evaluation.analysis.figures.strips import PICTURES, draw_strips, shown_steps
@@ -16,7 +17,6 @@ from roboirg.evaluation.plan.plan import Plan
 from roboirg.evaluation.plan.sources import Source
 from roboirg.evaluation.play.video_writer import VideoWriter
 from roboirg.evaluation.records.record import Attribution, Record, SubgoalRecord
-from roboirg.evaluation.records.store import RecordStore
 
 pytest.importorskip("matplotlib")
 pytest.importorskip("av")
@@ -75,10 +75,7 @@ def a_run(folder: Path, found: list[Record]) -> Path:
     for number, record in enumerate(found):
         if record.video is not None:
             film(folder / record.video, demonstration=5 * number)
-    with RecordStore(folder) as store:
-        for record in found:
-            store.append(record)
-    return folder
+    return store(folder, found).folder
 
 
 def drawn(figure: Figure | None) -> list[list[tuple[str, float, bool]]]:

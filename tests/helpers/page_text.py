@@ -1,4 +1,4 @@
-"""The page of records that need not be in a folder."""
+"""Records of policies that listen and forget, runs of them, what commands print, and the page."""
 
 from __future__ import annotations
 
@@ -6,13 +6,62 @@ import tempfile
 from collections.abc import Sequence
 from pathlib import Path
 
+from made_records import make_record
+from msgspec.structs import replace
+from typer.testing import CliRunner
+
 from roboirg.evaluation.analysis.page.report import write_report
 from roboirg.evaluation.plan.plan import Plan
 from roboirg.evaluation.plan.sources import Source
 from roboirg.evaluation.plan.stored_plans import write_plan
-from roboirg.evaluation.records.record import Record
+from roboirg.evaluation.records.record import Attribution, EventRecord, Record
 from roboirg.evaluation.records.record_codec import encode
 from roboirg.evaluation.records.store import RECORDS_FILE
+from roboirg.judging.failure_attribution import EXECUTION, GROUNDING
+from roboirg.main import app
+
+PLAN = Plan(
+    policies=("listener", "forgetful"),
+    tasks=("PickXtimes", "VideoUnmask", "StopCube"),
+    episodes=(0, 1, 2),
+    forms=("implicit", "resolved"),
+)
+MISSES = [
+    *(("grounding", failure) for failure in GROUNDING),
+    *(("execution", failure) for failure in EXECUTION),
+]
+
+
+def played(plan: Plan) -> list[Record]:
+    """Return the records of a plan: the forgetful policy fails where it must remember."""
+    found = []
+    for number, job in enumerate(plan.jobs()):
+        lost = job.policy == "forgetful" and job.form == "implicit" and job.setting != "explicit"
+        outcome = ("failure", "picked up the wrong cube") if lost else ("success",)
+        record = make_record(job, *outcome, steps=80, started_at="2026-01-02T03:04:05+00:00")
+        subject = f"cube_{record.goal.get('color', 'red')}"
+        events = (
+            EventRecord(step=-20, kind="still", subject="robot"),
+            EventRecord(step=-10, kind="over", subject=subject, place="target"),
+            EventRecord(step=40, kind="picked", subject=subject),
+            EventRecord(step=60, kind="picked", subject=subject, holds=False),
+            EventRecord(step=60, kind="placed", subject=subject, place="target"),
+            EventRecord(step=70, kind="placed", subject=subject, place="target", holds=False),
+        )
+        kind, failure = MISSES[number % len(MISSES)]
+        wrong = Attribution(
+            kind=kind, failure=failure, subject=subject, step=60, sentence="The wrong cube."
+        )
+        course = {"events": events, "attribution": wrong if lost else None}
+        found.append(replace(record, demonstration_steps=20, package_version="0", **course))
+    return found
+
+
+def broken(record: Record) -> Record:
+    """Return it as that of a policy that raised an error with markup in its text."""
+    cause, details = "policy: ValueError: </script><b>&", "Traceback <script>alert(1)</script>"
+    error = {"outcome": "error", "error": "policy", "cause": cause, "details": details}
+    return replace(record, attribution=None, **error)
 
 
 def store(folder: Path, records: Sequence[Record], plan: Plan | None = None) -> Source:
@@ -28,3 +77,16 @@ def render(records: Sequence[Record], plan: Plan | None = None) -> str:
     """Return the page of one run."""
     with tempfile.TemporaryDirectory() as folder:
         return write_report(store(Path(folder) / "run", records, plan)).read_text()
+
+
+def call(*words: object) -> str:
+    """Return what a command prints, which must succeed; errors are raised."""
+    outcome = CliRunner().invoke(app, [str(word) for word in words], catch_exceptions=False)
+    assert outcome.exit_code == 0, outcome.output
+    return outcome.output
+
+
+def words(text: str) -> str:
+    """Return the lines of a text that are not blank, with single spaces."""
+    lines = [" ".join(line.split()) for line in text.splitlines()]
+    return "\n".join([*filter(None, lines), ""])
