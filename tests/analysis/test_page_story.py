@@ -72,7 +72,7 @@ def test_the_whole_report_follows(run: Path, tmp_path: Path) -> None:
     direct = content.summaries[forgetful, ALL_TASKS, InstructionOptions("direct")]
     assert direct.second_gap is not None
     assert direct.second_gap.value < -0.3
-    assert direct.second_gap.overlap.only_first == direct.form_gap.overlap.neither == 0
+    assert direct.second_gap.overlap.only_first == direct.second_gap.overlap.neither == 0
     paths = write_figures(content, tmp_path)
     names = {path.stem.removesuffix("-dark") for path in paths}
     assert names == {"gaps", "forms", "failures"}
