@@ -13,6 +13,7 @@ from made_records import make_record
 from page_text import store
 
 import roboirg
+from roboirg.core.errors import InvalidValueError
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.evaluation.analysis.results.frame import make_frame
 from roboirg.evaluation.analysis.results.option_labels import REFERENCE
@@ -88,6 +89,30 @@ def test_measure_is_what_pandas_gives(played: pd.DataFrame, data: st.DataObject)
                 [one.gap.p_value for one in tested if one.gap], method="holm"
             )[1]
             assert [one.p_holm for one in tested] == pytest.approx(list(corrected))
+
+
+def test_rows_of_several_settings_are_pooled_in_any_order(played: pd.DataFrame) -> None:
+    """By policy alone an episode has a row for each setting and form; none gets lost."""
+    rates = played.groupby(["policy", "task"])["success"].mean().groupby("policy").mean()
+    for frame in (played, played[::-1]):
+        for one in roboirg.measure(frame, ["policy"]):
+            assert float(one.rate or 0) == pytest.approx(rates[one.key[0]])
+            assert one.counts.trials == (played["policy"] == one.key[0]).sum()
+
+
+@pytest.mark.parametrize(
+    ("asked", "words"),
+    [
+        ({"by": ["polcy"]}, "There is no column 'polcy'"),
+        ({"by": ["policy"], "family": ["task"]}, "The column 'task' is not in by: policy."),
+        ({"by": ["policy"], "against": {"setting": "direct"}}, "'setting' is not in by"),
+        ({"by": ["setting"], "against": {"setting": "drect"}}, "no row with the setting 'drect'"),
+        ({"by": ["setting"]}, "Several rows of a group are about"),
+    ],
+)
+def test_a_wrong_question_is_one_sentence(played: pd.DataFrame, asked, words) -> None:
+    with pytest.raises(InvalidValueError, match=words):
+        roboirg.measure(pd.concat([played, played.assign(policy="copy")]), **asked)
 
 
 def test_averages_are_unweighted_and_suites_stand_by_themselves(result) -> None:

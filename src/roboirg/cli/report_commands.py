@@ -45,7 +45,9 @@ def report(
         str | None,
         typer.Option(help="Another run or pack, to compare with episode by episode."),
     ] = None,
-    videos: Annotated[bool, typer.Option(help="Show the videos, in the page or next to it.")] = True,
+    videos: Annotated[
+        bool, typer.Option(help="Show the videos, in the page or next to it.")
+    ] = True,
     out: Annotated[
         Path | None,
         typer.Option(

@@ -9,6 +9,7 @@ from typing import Any, Generic, NamedTuple, TypeVar
 
 import numpy as np
 
+from roboirg.core.errors import InvalidValueError, UnknownNameError
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.evaluation.analysis.results.frame import suite
 from roboirg.evaluation.analysis.results.option_labels import REFERENCE
@@ -28,6 +29,11 @@ from roboirg.evaluation.analysis.stats.intervals import SEED, Interval
 from roboirg.evaluation.analysis.stats.paired_tests import Gap, Pairs, measure_gap, with_holm
 
 ALL_TASKS = "all tasks"
+TRIAL = (
+    *("split", "setting", "form", "delivery", "arm", "policy_seed", "max_steps"),
+    *("language_version", "environment_version"),
+)
+"""Columns that tell trials of a policy in an episode apart, unless they are grouped by."""
 
 K = TypeVar("K", bound=tuple[Any, ...])
 
@@ -88,8 +94,18 @@ def measure(
 
     Returns:
         A row for each group, in the order in which they occur.
+
+    Raises:
+        UnknownNameError: the frame has no such column, or a column no such value.
+        InvalidValueError: a column is not in `by`, or rows of a group are about the same trial.
     """
-    groups, changed = gather(frame, by), against or {}
+    changed = against or {}
+    _check(frame, by, changed, family)
+    # What else tells trials of an episode apart takes the place of the policy seed.
+    apart = [name for name in TRIAL if name in frame and name not in by]
+    rows = {name: frame[name] for name in (*by, "task", "episode", "outcome")}
+    rows["policy_seed"] = list(zip(*(frame[name] for name in apart), strict=True))
+    groups = gather(rows, by)
 
     def reference(key: tuple[Any, ...]) -> ByTask:
         other = tuple(changed.get(name, one) for name, one in zip(by, key, strict=True))
@@ -97,6 +113,20 @@ def measure(
 
     places = [list(by).index(name) for name in family]
     return measure_groups(groups, [reference], lambda key: tuple(key[place] for place in places))
+
+
+def _check(
+    frame: Columns, by: Sequence[str], against: Mapping[str, object], family: Sequence[str]
+) -> None:
+    for name in (*by, *family, *against, "task", "episode", "policy_seed", "outcome"):
+        if name not in frame:
+            raise UnknownNameError("column", name, map(str, frame))
+    for name in (*family, *against):
+        if name not in by:
+            raise InvalidValueError(f"The column {name!r} is not in by: {', '.join(by)}.")
+    for name, value in against.items():
+        if value not in (known := set(frame[name])):
+            raise UnknownNameError(f"row with the {name}", value, sorted(map(str, known)))
 
 
 def measure_groups(

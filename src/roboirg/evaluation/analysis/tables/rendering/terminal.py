@@ -74,6 +74,8 @@ def split_columns(table: Table, shown: Sequence[int], room: int) -> list[list[in
 def _titles(table: Table, parts: Sequence[Sequence[int]]) -> list[str]:
     if len(parts) == 1:
         return [table.title]
+    if not any(column.group for column in table.columns):
+        return [f"{table.title} ({number} of {len(parts)})" for number, _ in enumerate(parts, 1)]
     groups = [dict.fromkeys(table.columns[at].group or ALL_TASKS for at in part) for part in parts]
     return [f"{table.title}: {', '.join(one)}" for one in groups]
 
