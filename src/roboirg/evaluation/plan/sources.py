@@ -13,6 +13,7 @@ from roboirg.core.errors import InvalidValueError, UnknownNameError
 from roboirg.evaluation.plan.stored_plans import read_plan
 from roboirg.evaluation.records.packs import PACK_SUFFIX, opened_run
 from roboirg.evaluation.records.record import Job, Record, Summary
+from roboirg.evaluation.records.record_codec import StoreError
 from roboirg.evaluation.records.store import StoredRun, iterate_records, read_summaries
 from roboirg.util.freed_memory import paused_collection
 
@@ -51,8 +52,11 @@ class Source:
         Raises:
             StoreError: there are none, or a line is not a record of this schema version.
         """
-        with paused_collection():
-            return read_summaries(self.folder)
+        try:
+            with paused_collection():
+                return read_summaries(self.folder)
+        except StoreError as error:  # of a pack, the temporary folder means nothing
+            raise StoreError(str(error).replace(str(self.folder), str(self.path))) from error
 
     @cached_property
     def results(self) -> tuple[Summary, ...]:
@@ -102,12 +106,12 @@ def opened_sources(
     Raises:
         StoreError: there is no such path, or the file is no pack.
     """
-    named: dict[Path, list[str | None]] = {}
+    named: dict[Path, tuple[Path, list[str | None]]] = {}
     for path, policy in map(_split, map(str, paths)):
-        named.setdefault(path, []).append(policy)
+        named.setdefault(path.resolve(), (path, []))[1].append(policy)
     with contextlib.ExitStack() as stack:
         found = []
-        for path, policies in named.items():
+        for path, policies in named.values():
             folder = stack.enter_context(opened_run(path, folders))
             wanted = None if None in policies else tuple(dict.fromkeys(filter(None, policies)))
             found.append(Source(path, None if folder == path else folder, wanted))
@@ -120,5 +124,9 @@ def _split(text: str) -> tuple[Path, str | None]:
         raise InvalidValueError("The name of the run's folder is empty.")
     ends = [len(text), *(place for place in reversed(range(len(text))) if text[place] == ":")]
     end = next((end for end in ends if Path(text[:end]).exists()), None)
-    path, _, policy = text.partition(":") if end is None else (text[:end], "", text[end + 1 :])
+    path, colon, policy = (
+        text.partition(":") if end is None else (text[:end], text[end : end + 1], text[end + 1 :])
+    )
+    if colon and not policy:
+        raise InvalidValueError(f"The name of the policy after {text!r} is empty.")
     return Path(path), policy or None

@@ -10,6 +10,7 @@ from typing import NamedTuple
 
 import msgspec
 
+from roboirg.core.arms import TOLD
 from roboirg.core.errors import InvalidValueError
 from roboirg.evaluation.records.action_log import action_path
 from roboirg.evaluation.records.episode_log import log_path, logged_slugs
@@ -90,7 +91,7 @@ def merge_runs(folders: Sequence[Path], out: Path) -> MergeSummary:
                 kept[identity_key(one)] = one
                 added += before is None
             store.extend(_lines(run, wanted, folder, out))
-    mixed = mixtures(kept.values())
+    mixed = mixtures([one for one in kept.values() if one.arm == TOLD])
     return MergeSummary(added, duplicates, tuple(conflicts), tuple(mixed))
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 import contextlib
 import json
+import re
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -70,18 +71,19 @@ def write_report(
     Args:
         source: the run.
         against: another run, to compare with episode by episode.
-        out: file to write; without it, ``report.html`` in the run's folder, or a page next to its
-            pack, with the pack's name.
+        out: file to write; without it, ``report.html`` (or ``report-POLICY.html``) in the run's
+            folder, or a page next to its pack, with the pack's name.
         videos: whether to show the videos: in the page, or of more than `MAX_EMBEDDED_BYTES` next
             to it. Those of a pack cannot be next to it, as the files are gone when it is closed.
         progress: called after each episode.
     """
-    beside = source.path.with_name(f"{source.path.name.removesuffix(PACK_SUFFIX)}.html")
-    path = out or (beside if source.unpacked else source.folder / REPORT_FILE)
+    path = out or _usual_path(source)
     sources = [source] if against is None else [source, against]
     runs = {one.name: one for one in sources}
     if len(runs) < len(sources):
         runs = {str(one.path): one for one in sources}
+    if len(runs) < len(sources):
+        raise InvalidValueError(f"{source.path} is on both sides; name another run or policy.")
     episodes = PageEpisodes.of(runs, videos=videos)
     embeds = sum(path.stat().st_size for path in _media(episodes).values()) <= MAX_EMBEDDED_BYTES
     gone = [one.unpacked for one in sources if one.unpacked is not None]
@@ -90,6 +92,14 @@ def write_report(
     with replacing(path) as part, part.open("w", encoding="utf-8") as file:
         file.writelines(pieces)
     return path
+
+
+def _usual_path(source: Source) -> Path:
+    """Return where the page goes: into the run's folder, or next to its pack."""
+    if source.unpacked:
+        return source.path.with_name(f"{source.path.name.removesuffix(PACK_SUFFIX)}.html")
+    name = re.sub(r"\W+", "-", "-".join(("report", *(source.policies or ()))))
+    return source.folder / f"{name}.html"
 
 
 @paused_collection()

@@ -59,6 +59,12 @@ COLUMNS: Mapping[str, FrameColumn] = {
     for one in (
         _field("policy", "text", "name of the policy"),
         _field("policy_version", "text", "version of the policy"),
+        _field(
+            "label",
+            "text",
+            "the policy as tables name it, with what tells its runs apart",
+            path="policy",
+        ),
         FrameColumn(
             "privileged",
             "flag",
@@ -104,7 +110,23 @@ COLUMNS: Mapping[str, FrameColumn] = {
         ),
         _field("steps", "number", "control steps that the policy played"),
         _field("demonstration_steps", "number", "frames of the video before its turn"),
+        _field("wordings", "text", "pool or file of other words", "own words", "options.wordings"),
         _field("max_steps", "number", "limit of control steps", path="environment.max_steps"),
+        _field("meshes", "text", "kind of meshes", path="environment.meshes"),
+        _field(
+            "observe_every",
+            "number",
+            "control steps between pictures",
+            "as the policy asks",
+            "environment.observe_every",
+        ),
+        _field(
+            "demonstration_frames",
+            "text",
+            "frames of the video",
+            "as the policy asks",
+            "environment.demonstration_frames",
+        ),
         _field("duration_s", "decimal", "wall-clock time, seconds"),
         _field("started_at", "text", "ISO 8601, UTC"),
         _field("language_version", "text", "version of the words"),
@@ -135,7 +157,9 @@ class Frame(Mapping[str, Any]):
         self.columns = dict(columns)  # those that were read so far
 
     def __getitem__(self, name: str) -> Values:
-        if name not in self.columns:
+        if name == "policy_label" and name not in self.columns:
+            self.columns[name] = as_column([self.names[run] for run in self["run"]])
+        elif name not in self.columns:
             read, rows = COLUMNS[name].read, zip(self["result"], self["outcome"], strict=True)
             found = [None if outcome == MISSING else read(one) for one, outcome in rows]
             self.columns[name] = as_column(found)
@@ -205,14 +229,16 @@ def join(frames: Iterable[Frame]) -> Frame:
     return Frame({name: np.concatenate([one[name] for one in found]) for name in found[0].columns})
 
 
-def make_frame(runs: Runs, planned: Sequence[Job] = (), *, named: str = "") -> Frame:
+def make_frame(
+    runs: Runs, planned: Sequence[Job] = (), policies: Sequence[str] = (), *, named: str = ""
+) -> Frame:
     """Return the results of one or several runs, sorted by policy run, task, options and episode.
 
     Args:
         runs: the results of a run have different identities. Runs that hold the same episodes of a
             policy stay apart; others complete each other.
-        planned: jobs that should have a result; those without one are missing. Policies have the
-            order of these jobs; others follow by name.
+        planned: jobs that should have a result; those without one are missing.
+        policies: in order, by default that of the planned jobs; others follow by name.
         named: name of a run that its policy runs bear in any case.
     """
     jobs = {identity_key(job): job for job in planned}
@@ -229,7 +255,7 @@ def make_frame(runs: Runs, planned: Sequence[Job] = (), *, named: str = "") -> F
         conditions = EvalConditions.of(job)
         unplayed = PolicyRun(job.policy, conditions, None, named)
         rows.append((owners.get((job.policy, conditions), unplayed), job, MISSING))
-    return _sorted(rows, list(dict.fromkeys(job.policy for job in planned)))
+    return _sorted(rows, policies or list(dict.fromkeys(job.policy for job in planned)))
 
 
 def _sorted(rows: Sequence[tuple[PolicyRun, Job, str]], policies: Sequence[str]) -> Frame:

@@ -10,7 +10,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from roboirg.core.errors import InvalidValueError
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.evaluation.analysis.results.policy_run import PolicyRun
 from roboirg.evaluation.analysis.stats.intervals import (
@@ -130,21 +129,12 @@ def gather(frame: Columns, by: Sequence[str]) -> Groups:
     """Group the rows of a frame by some columns, in the order in which their values occur.
 
     The frame has the columns ``task``, ``episode``, ``policy_seed`` and ``outcome``, too.
-
-    Raises:
-        InvalidValueError: two rows of a group are about the same trial.
     """
     found: dict[Key, dict[str, Cell]] = {}
     names = (*by, "task", "episode", "policy_seed", "outcome")
     for *key, task, episode, seed, outcome in zip(*(frame[name] for name in names), strict=True):
         cell = found.setdefault(tuple(key), {}).setdefault(task, Cell())
-        trial = Trial(episode, seed)
-        if trial in cell.verdicts:
-            raise InvalidValueError(
-                f"Several rows of a group are about {task}, episode {episode} and {seed}; choose "
-                f"some of them, or group by the column in which they differ, next to {list(by)}."
-            )
-        cell.add(trial, outcome)
+        cell.add(Trial(episode, seed), outcome)
     return found
 
 

@@ -1,4 +1,4 @@
-"""Rates of groups of trials, and their gaps to others on the same episodes: all that is printed."""
+"""Rates of groups of trials, and their gaps to others on the same episodes."""
 
 from __future__ import annotations
 
@@ -29,9 +29,10 @@ from roboirg.evaluation.analysis.stats.intervals import SEED, Interval
 from roboirg.evaluation.analysis.stats.paired_tests import Gap, Pairs, measure_gap, with_holm
 
 ALL_TASKS = "all tasks"
+TRIAL_OF = ("task", "episode", "outcome")
 TRIAL = (
-    *("split", "setting", "form", "delivery", "arm", "policy_seed", "max_steps"),
-    *("language_version", "environment_version"),
+    *("split", "setting", "form", "delivery", "wordings", "arm", "policy_seed", "max_steps"),
+    *("meshes", "language_version", "environment_version"),
 )
 """Columns that tell trials of a policy in an episode apart, unless they are grouped by."""
 
@@ -103,9 +104,15 @@ def measure(
     _check(frame, by, changed, family)
     # What else tells trials of an episode apart takes the place of the policy seed.
     apart = [name for name in TRIAL if name in frame and name not in by]
-    rows = {name: frame[name] for name in (*by, "task", "episode", "outcome")}
+    rows = {name: [_known(one) for one in frame[name]] for name in (*by, *TRIAL_OF)}
     rows["policy_seed"] = list(zip(*(frame[name] for name in apart), strict=True))
     groups = gather(rows, by)
+    counts = [cell.counts for own in groups.values() for cell in own.values()]
+    if sum(one.trials + one.errors + one.missing for one in counts) < len(rows["task"]):
+        raise InvalidValueError(
+            "Several rows of a group are about the same trial of an episode; choose some of them, "
+            f"or group by a column in which they differ, next to {', '.join(by)}."
+        )
 
     def reference(key: tuple[Any, ...]) -> ByTask:
         other = tuple(changed.get(name, one) for name, one in zip(by, key, strict=True))
@@ -115,10 +122,16 @@ def measure(
     return measure_groups(groups, [reference], lambda key: tuple(key[place] for place in places))
 
 
+def _known(value: object) -> object:
+    """Return a value, or None for pandas's many missing ones, which are not equal to themselves."""
+    is_missing = type(value).__name__ == "NAType" or value != value  # noqa: PLR0124
+    return None if is_missing else value
+
+
 def _check(
     frame: Columns, by: Sequence[str], against: Mapping[str, object], family: Sequence[str]
 ) -> None:
-    for name in (*by, *family, *against, "task", "episode", "policy_seed", "outcome"):
+    for name in (*by, *family, *against, *TRIAL_OF, "policy_seed"):
         if name not in frame:
             raise UnknownNameError("column", name, map(str, frame))
     for name in (*family, *against):

@@ -10,6 +10,7 @@ from roboirg.core.errors import InvalidValueError
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.evaluation.analysis.results.frame import Frame
 from roboirg.evaluation.analysis.results.option_labels import options_label
+from roboirg.evaluation.analysis.results.policy_run import labels
 from roboirg.evaluation.analysis.stats.arm_figures import (
     LANGUAGE_USE,
     MEANING,
@@ -50,7 +51,7 @@ def make_arm_table(data: RunData) -> Table:
         raise InvalidValueError(
             "The runs have no control arms; play them with --arms told,other-goal,silent,scrambled."
         )
-    names = data.told.names
+    names = {**labels(one.policy_run for one in found), **data.told.names}
     return Table(
         key="arms",
         title="Control arms",

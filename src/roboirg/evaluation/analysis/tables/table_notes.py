@@ -83,7 +83,10 @@ def notes_of(
 def with_mixtures(tables: Sequence[Table], frame: Frame) -> list[Table]:
     """Return tables with a note on everything that their results do not have in common."""
     found = mixtures(frame.told().played)
-    return [replace(table, notes=(*table.notes, *found)) for table in tables]
+    return [
+        table if table.key == "coverage" else replace(table, notes=(*table.notes, *found))
+        for table in tables
+    ]
 
 
 def where_played(conditions: Sequence[EvalConditions]) -> str:
