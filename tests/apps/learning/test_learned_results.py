@@ -56,7 +56,7 @@ def test_the_pack_has_whole_rows_without_errors():
         assert sorted(by_task) == sorted(tasks), (row, setting)
         for trained in by_task.values():
             assert not any(one.errors or one.missing for one in trained.values())
-            assert {one.trials for one in trained.values()} == {50}
+            assert {len(one.verdicts) for one in trained.values()} == {50}
 
 
 def test_all_rates_are_stored_by_task():
