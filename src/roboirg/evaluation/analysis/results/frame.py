@@ -60,7 +60,7 @@ COLUMNS: Mapping[str, FrameColumn] = {
         _field("policy", "text", "name of the policy"),
         _field("policy_version", "text", "version of the policy"),
         _field(
-            "label",
+            "policy_label",
             "text",
             "the policy as tables name it, with what tells its runs apart",
             path="policy",
