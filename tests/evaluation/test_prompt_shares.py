@@ -18,7 +18,7 @@ from typer.testing import CliRunner
 
 from roboirg import main
 from roboirg.core.errors import InvalidValueError
-from roboirg.evaluation.analysis.stats.cells import PolicyRun
+from roboirg.evaluation.analysis.results.frame import make_frame
 from roboirg.evaluation.analysis.stats.heard_rates import count_heard
 from roboirg.evaluation.analysis.tables.run_tables import make_run_tables, print_run_tables
 from roboirg.evaluation.plan.plan_file import read_plan_file
@@ -254,14 +254,14 @@ def test_a_server_that_cuts_is_told_from_one_that_hears_everything_and_fails(
     assert instruction in (tmp_path / "read-None.txt").read_text()
     assert instruction not in (tmp_path / "read-64.txt").read_text()
     console = Console(file=io.StringIO(), width=200)
-    tables = make_run_tables(list(records.values()))
-    print_run_tables(tables, console)
+    frame = make_frame([("", list(records.values()))])
+    print_run_tables(make_run_tables(frame), console)
     printed = console.file.getvalue()  # type: ignore[attr-defined]
     assert "Cutting did not read every instruction to its end" in printed
     assert "100 % cut, success 0 % of 1, none heard whole" in printed
     assert "Served did not" not in printed
-    counts = count_heard((PolicyRun.of(one), one) for one in records.values())
-    assert {key.policy_run.policy: one.cut for key, one in counts.items() if one.cut} == {
+    counts = count_heard(frame, ("policy",))
+    assert {policy: one["cut"] for (_, policy), one in counts.items() if one["cut"]} == {
         "Cutting": 1
     }
 
