@@ -304,12 +304,13 @@ def _paper_tables(which: str, data: RunData, *, published: bool, floors: str | N
     from roboirg.evaluation.analysis.tables.paper_tables import WHICH, is_informative, make_table
 
     shown = (*RATE_TABLES, "coverage") if published else ()
-    applying = [one for one in WHICH if one in shown or is_informative(one, data)]
+    asked = (
+        [one for one in WHICH if one in shown or is_informative(one, data)]
+        if which == _ALL
+        else [which]
+    )
     added = () if floors is None else known_names("floor", floors, FLOORS)
-    found = [
-        make_table(one, data, published=published, floors=added)
-        for one in (applying if which == _ALL else [which])
-    ]
+    found = [make_table(one, data, published=published, floors=added) for one in asked]
     if which not in (_ALL, "coverage") and not found[0].rows:
         raise InvalidValueError(
             f"The runs have no results for the table {which!r}; --which all shows what they have."

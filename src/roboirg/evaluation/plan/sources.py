@@ -101,7 +101,7 @@ def opened_sources(
 
     Args:
         paths: of folders and packs; ``PATH:policy`` for one policy, whose name may contain colons.
-        folders: what is unpacked of packs besides records and plans, as in `opened_run`.
+        folders: what is unpacked of packs in addition to records and plans, as in `opened_run`.
 
     Raises:
         StoreError: there is no such path, or the file is no pack.

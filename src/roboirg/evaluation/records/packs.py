@@ -35,7 +35,7 @@ PACK_SUFFIX = ".roboirg.zip"
 MANIFEST = "manifest.json"
 MEDIA_FOLDERS = (LOG_FOLDER, VIDEO_FOLDER)
 PACKED_FOLDERS = (ACTION_FOLDER, *MEDIA_FOLDERS)
-"""What a pack may hold besides records and plans."""
+"""What a pack may hold in addition to records and plans."""
 MOST_PACKED_BYTES = 20 << 30
 """Most bytes that a pack may hold unpacked."""
 _MAX_MANIFEST_BYTES = 64 << 20
@@ -69,7 +69,7 @@ def opened_run(path: Path, folders: Collection[str] = PACKED_FOLDERS) -> Iterato
 
     Args:
         path: of a folder or a pack.
-        folders: of `PACKED_FOLDERS`, what is unpacked besides records and plans.
+        folders: of `PACKED_FOLDERS`, what is unpacked in addition to records and plans.
 
     Raises:
         StoreError: there is no such path, the file is no pack, or a file that is unpacked is not

@@ -62,7 +62,7 @@ COLUMNS: Mapping[str, FrameColumn] = {
         _field(
             "policy_label",
             "text",
-            "the policy as tables name it, with what tells its runs apart",
+            "the policy as tables name it, with what distinguishes its runs",
             path="policy",
         ),
         FrameColumn(

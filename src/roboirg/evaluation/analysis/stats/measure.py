@@ -34,7 +34,7 @@ TRIAL = (
     *("split", "setting", "form", "delivery", "wordings", "arm", "policy_seed", "max_steps"),
     *("meshes", "language_version", "environment_version"),
 )
-"""Columns that tell trials of a policy in an episode apart, unless they are grouped by."""
+"""Columns that distinguish trials of a policy in an episode, unless they are grouped by."""
 
 K = TypeVar("K", bound=tuple[Any, ...])
 
@@ -102,7 +102,7 @@ def measure(
     """
     changed = against or {}
     _check(frame, by, changed, family)
-    # What else tells trials of an episode apart takes the place of the policy seed.
+    # What else distinguishes trials of an episode takes the place of the policy seed.
     apart = [name for name in TRIAL if name in frame and name not in by]
     rows = {name: [_known(one) for one in frame[name]] for name in (*by, *TRIAL_OF)}
     rows["policy_seed"] = list(zip(*(frame[name] for name in apart), strict=True))

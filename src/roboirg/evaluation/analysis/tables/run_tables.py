@@ -77,7 +77,7 @@ def make_run_tables(frame: Frame) -> list[Table]:
         notes = (
             f"{where_played([policy_run.conditions])} {_sizes(own)}",
             *comparison_notes(differences, names),
-            *heard_notes(frame, names),
+            *heard_notes(frame.where(run=policy_run), names),
             *headline_notes(cells, names),
         )
         tables.append(_make_run_table(label, own, gaps, differences, notes))
