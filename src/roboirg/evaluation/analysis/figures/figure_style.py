@@ -25,13 +25,15 @@ MOST_ROW_LETTERS = 28
 """Letters of a line of a row's label."""
 ROW_LETTERS, TITLE_LETTERS, NOTE_LETTERS, KEY_LETTERS = 14, 10, 21, 19
 """Letters that fit into an inch of a row's label, a panel's title, a note and the legend."""
+TITLE_POINTS, MOST_TITLE_SHRINKING = 8.5, 1.4
+"""Size of a panel's title, and by which factor it may be smaller so that its longest word fits."""
 KEY_SIGN_LETTERS, MOST_KEY_COLUMNS = 5, 4
 DOTS_PER_INCH = 300
 STYLE = {
     "font.size": 7.5,
     "axes.linewidth": 0.6,
     "axes.edgecolor": "#999999",
-    "axes.titlesize": 8.5,
+    "axes.titlesize": TITLE_POINTS,
     "axes.titleweight": "bold",
     "lines.color": "#0072B2",
     "grid.color": "#dddddd",
@@ -184,7 +186,11 @@ def panels(
     labels = [[folded(label, MOST_ROW_LETTERS) for label in own] for own in rows.values()]
     longest = max(len(line) for own in labels for label in own for line in label.split("\n"))
     room = (width - longest / ROW_LETTERS) / across
-    titles = [folded(title, TITLE_LETTERS * room) for title in rows]
+    fitting = TITLE_LETTERS * room
+    longest_word = max(len(word) for title in rows for word in title.split())
+    # A long word, such as a setting's name, is drawn smaller rather than broken.
+    letters = min(max(fitting, longest_word), fitting * MOST_TITLE_SHRINKING)
+    titles = [folded(title, letters) for title in rows]
     sizes = [[label.count("\n") + 2 for label in own] for own in labels]
     text = "\n".join(folded(note, NOTE_LETTERS * width) for note in notes)
     key_letters = max(map(len, keys), default=0) + KEY_SIGN_LETTERS
@@ -200,7 +206,7 @@ def panels(
     grid = figure.subplots(down, across, sharey=is_shared, squeeze=False).ravel()
     found = []
     for axes, title, own, size in zip(grid, titles, labels, sizes, strict=False):
-        axes.set_title(title, loc="left")
+        axes.set_title(title, loc="left").set_size(TITLE_POINTS * fitting / letters)
         clear_axes(axes, grid="x")
         found.append((axes, _label_rows(axes, own, size, headings)))
     for axes in grid[len(rows) :]:
