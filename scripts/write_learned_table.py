@@ -17,6 +17,7 @@ from written_parts import rate_text, with_part
 from roboirg.apps.learning.listener.study_report import TrainedRate, trained_rate
 from roboirg.apps.learning.policy.paper_experiment import row_of
 from roboirg.core.arms import TOLD
+from roboirg.evaluation.analysis.results.frame import make_frame
 from roboirg.evaluation.analysis.stats.arm_figures import (
     LANGUAGE_USE,
     ORDERS_WORTH,
@@ -59,7 +60,7 @@ Verdicts = NDArray[np.int64]
 def played() -> RunData:
     """Return the episodes of the pack."""
     with opened_run(PACK, ()) as run:
-        return RunData.of([("val", read_results(run))])
+        return RunData(make_frame([("val", read_results(run))]))
 
 
 def told(data: RunData) -> Cells:

@@ -6,6 +6,7 @@ import pytest
 from flat_jobs import make_result
 
 from roboirg.core.errors import InvalidValueError
+from roboirg.evaluation.analysis.results.frame import make_frame
 from roboirg.evaluation.analysis.stats.arm_figures import ArmFigure, arm_figures
 from roboirg.evaluation.analysis.stats.chance import silent_chance
 from roboirg.evaluation.analysis.stats.run_data import RunData
@@ -47,7 +48,7 @@ FIXED = {"told": "other", "other-goal": "other", "silent": "other", "scrambled":
 
 
 def data_of(*results: list[Summary]) -> RunData:
-    return RunData.of([("", [one for each in results for one in each])])
+    return RunData(make_frame([("", [one for each in results for one in each])]))
 
 
 def figure(data: RunData, name: str) -> ArmFigure:

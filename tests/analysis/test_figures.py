@@ -13,6 +13,7 @@ from page_text import played
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.evaluation.analysis.figures import draw_figure, failures, forms, write_figures
 from roboirg.evaluation.analysis.published import published_rows
+from roboirg.evaluation.analysis.results.frame import make_frame
 from roboirg.evaluation.analysis.stats.measure import ALL_TASKS
 from roboirg.evaluation.analysis.stats.run_data import RunData
 from roboirg.evaluation.plan.plan import Plan
@@ -41,7 +42,7 @@ def results() -> list[Summary]:
 
 
 def content(found: list[Summary] | None = None, **options: object) -> RunData:
-    return RunData.of([("run", results() if found is None else found)], **options)  # type: ignore[arg-type]
+    return RunData(make_frame([("run", results() if found is None else found)], **options))  # type: ignore[arg-type]
 
 
 def drawn_texts(figure: Figure) -> list[Text]:
@@ -139,7 +140,7 @@ def test_gaps_are_those_of_the_summary() -> None:
     shown = dots(draw("gaps", found))
     assert {setting for setting, _ in shown} == {"direct", "reasoning", "contextual", "spatial"}
     for (setting, label), (explicit, implicit) in shown.items():
-        key = next(one for one, name in found.names.items() if label.startswith(name))
+        key = next(one for one, name in found.frame.names.items() if label.startswith(name))
         gap = found.summaries[key, ALL_TASKS, InstructionOptions(setting)].gap
         assert gap is not None
         assert implicit - explicit == pytest.approx(100 * gap.value)
@@ -263,6 +264,7 @@ def test_rates_without_another_setting_stand_alone(kept: str) -> None:
     found = content([one for one in results() if one.setting == kept and one.form == "implicit"])
     shown = dots(draw("gaps", found))
     assert {title for title, _ in shown} == {kept}
-    own = [found.summaries[key, ALL_TASKS, InstructionOptions(kept)].rate for key in found.names]
+    options = InstructionOptions(kept)
+    own = [found.summaries[key, ALL_TASKS, options].rate for key in found.frame.names]
     assert [*shown.values()] == [[100 * float(rate)] for rate in own if rate is not None]
     assert draw_figure("forms", found) is None

@@ -76,7 +76,7 @@ def sample(result: MakeResult) -> list[Summary]:
 
 
 def test_tables_have_rates_over_what_was_heard_next_to_rates_over_all(result: MakeResult) -> None:
-    data = RunData.of([("", sample(result))])
+    data = RunData(make_frame([("", sample(result))]))
     table = make_heard_table(data)
     rows = {(row.group, row.name): [entry.text for entry in row.entries] for row in table.rows}
     assert rows == {

@@ -13,6 +13,7 @@ import pytest
 from msgspec.structs import replace
 
 from roboirg.evaluation.analysis.published import RATE_TABLES
+from roboirg.evaluation.analysis.results.frame import make_frame
 from roboirg.evaluation.analysis.stats.run_data import RunData
 from roboirg.evaluation.analysis.tables.paper_tables import WHICH, make_table
 from roboirg.evaluation.analysis.tables.rendering.latex import latex
@@ -59,10 +60,10 @@ FACTS = Table(
 
 
 def all_tables(like) -> list[Table]:
-    data = RunData.of([("run", [*like("main"), *like("real"), *like("context")])])
+    data = RunData(make_frame([("run", [*like("main"), *like("real"), *like("context")])]))
     perfect = [replace(one, outcome="success") for one in like("main", "MemER")]
     return [
-        make_table("main", RunData.of([("run", perfect)]), published=True),
+        make_table("main", RunData(make_frame([("run", perfect)])), published=True),
         *(make_table(one, data, published=True) for one in WHICH if one != "other"),
         crowded(policies=2, tasks=7),
         crowded(policies=40, tasks=2),

@@ -10,6 +10,7 @@ import pytest
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.evaluation.analysis.figures import write_figures
 from roboirg.evaluation.analysis.page.report import write_report
+from roboirg.evaluation.analysis.results.frame import make_frame
 from roboirg.evaluation.analysis.stats.chance import CHANCE, floor_level
 from roboirg.evaluation.analysis.stats.measure import ALL_TASKS
 from roboirg.evaluation.analysis.stats.run_data import RunData
@@ -67,8 +68,8 @@ def test_elsewhere_it_guesses_and_every_miss_is_one_of_grounding(run: Path) -> N
 
 
 def test_the_whole_report_follows(run: Path, tmp_path: Path) -> None:
-    content = RunData.of([("story", read_records(run))], PLAN.jobs())
-    _, forgetful = content.names
+    content = RunData(make_frame([("story", read_records(run))], PLAN.jobs()))
+    _, forgetful = content.frame.names
     direct = content.summaries[forgetful, ALL_TASKS, InstructionOptions("direct")]
     assert direct.second_gap is not None
     assert direct.second_gap.value < -0.3

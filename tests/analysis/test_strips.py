@@ -12,6 +12,7 @@ from page_text import store
 
 from roboirg.evaluation.analysis.figures import write_figures
 from roboirg.evaluation.analysis.figures.strips import PICTURES, draw_strips, shown_steps
+from roboirg.evaluation.analysis.results.frame import make_frame
 from roboirg.evaluation.analysis.stats.run_data import RunData
 from roboirg.evaluation.plan.plan import Plan
 from roboirg.evaluation.plan.sources import Source
@@ -108,7 +109,7 @@ def test_a_strip_shows_the_pictures_of_its_steps_and_marks_the_moment(tmp_path: 
     assert [label.partition("\n")[0] for label, _, marked in failed if marked] == ["3.6 s"]
     assert ["lift the red" in label for label, *_ in failed] == [False, False, True, True, True]
     out = tmp_path / "figures"
-    assert write_figures(RunData.of([("run", found)]), out, ["strips"], runs=[source])
+    assert write_figures(RunData(make_frame([("run", found)])), out, ["strips"], runs=[source])
     assert "Picked the wrong." in (out / "strips.svg").read_text()
 
 

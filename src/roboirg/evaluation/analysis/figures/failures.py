@@ -38,7 +38,7 @@ def draw_failures(content: RunData) -> Figure | None:
     if not any(own[name] for own in counts.values() for name in PARTS):
         return None
     columns = sorted({options for _, options in counts}, key=options_sort_key)
-    names = [one for one in content.names if any(run == one for run, _ in counts)]
+    names = [one for one in content.frame.names if any(run == one for run, _ in counts)]
     rows = {
         content.name(one): [_bar(options, counts.get((one, options), {})) for options in columns]
         for one in names

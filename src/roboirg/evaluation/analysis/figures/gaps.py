@@ -62,7 +62,7 @@ def draw_next_to_reference(which: RateTable, content: RunData, published: bool) 
         for key, cell in content.cells.items()
         if cell.verdicts and key.task in every.get(key.options, ())
     }
-    own = {one: _own_rates(which, one, played, tasks) for one in content.names}
+    own = {one: _own_rates(which, one, played, tasks) for one in content.frame.names}
     own = {one: rates for one, rates in own.items() if rates}
     paper = list(_published_rates(which, tasks)) if published else []
     differences = {key: differences_of(key, cell) for key, cell in cells.items() if paper}
@@ -75,7 +75,7 @@ def draw_next_to_reference(which: RateTable, content: RunData, published: bool) 
         episodes, seeds = TRIALS[which]
         rows += [RateRow(f"published, n = {episodes} × {seeds}", {}), *paper]
         signs = (COMPARABLE_SIGN, DIFFERENT_SIGN)
-        found = comparison_notes(differences, content.names)
+        found = comparison_notes(differences, content.frame.names)
         signed = (one if one.startswith(signs) else f"{DIFFERENT_SIGN} {one}" for one in found)
         notes += [PUBLISHED_NOTE, *signed]
     columns = {

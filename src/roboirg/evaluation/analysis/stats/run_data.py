@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 
-from roboirg.evaluation.analysis.results.frame import Frame, Runs, make_frame
+from roboirg.evaluation.analysis.results.frame import Frame
 from roboirg.evaluation.analysis.results.policy_run import PolicyRun
 from roboirg.evaluation.analysis.stats.cells import Cells, cells_of
 from roboirg.evaluation.analysis.stats.measure import Measured, ScopeKey, summarize
-from roboirg.evaluation.records.record import Job
 
 
 @dataclass(frozen=True)
@@ -18,11 +17,6 @@ class RunData:
     """The results of some runs; what is measured of them is measured when it is asked for."""
 
     frame: Frame
-
-    @classmethod
-    def of(cls, runs: Runs, planned: Sequence[Job] = ()) -> RunData:
-        """Gather runs, each with its name; see `make_frame`."""
-        return cls(make_frame(runs, planned))
 
     @cached_property
     def cells(self) -> Cells:
@@ -32,11 +26,6 @@ class RunData:
     def summaries(self) -> Mapping[ScopeKey, Measured[ScopeKey]]:
         """What `summarize` measures, by policy run, scope and options."""
         return summarize(self.cells)
-
-    @property
-    def names(self) -> Mapping[PolicyRun, str]:
-        """Labels of the policy runs, in order."""
-        return self.frame.names
 
     @cached_property
     def told(self) -> RunData:
@@ -48,4 +37,4 @@ class RunData:
         """Return the label of a policy run, marked if some planned trial has no verdict."""
         own = (one for key, one in self.cells.items() if key.policy_run == policy_run)
         is_complete = all(one.counts.is_complete for one in own)
-        return self.names[policy_run] + ("" if is_complete else " (incomplete)")
+        return self.frame.names[policy_run] + ("" if is_complete else " (incomplete)")

@@ -51,7 +51,7 @@ def make_arm_table(data: RunData) -> Table:
         raise InvalidValueError(
             "The runs have no control arms; play them with --arms told,other-goal,silent,scrambled."
         )
-    names = {**labels(one.policy_run for one in found), **data.told.names}
+    names = {**labels(one.policy_run for one in found), **data.told.frame.names}
     return Table(
         key="arms",
         title="Control arms",

@@ -89,7 +89,7 @@ def form_rows(data: RunData) -> Iterator[tuple[ScopeKey, Gap]]:
         and key.scope not in one.cells
     }
     suites = {suite(key.task) for key in data.cells} - {None}
-    runs = list(data.names)
+    runs = list(data.frame.names)
     scopes = list(dict.fromkeys(key.scope for key in found))
     for key in sorted(
         found,
@@ -114,7 +114,7 @@ def make_forms_table(data: RunData) -> Table:
             "The runs have no episode in both forms; play them with --forms implicit,resolved."
         )
     rows = []
-    for run, name in data.names.items():
+    for run, name in data.frame.names.items():
         own = [(key, gap) for key, gap in found if key.policy_run == run]
         corrected = holm([gap.p_value for _, gap in own])
         for (key, gap), p_value in zip(own, corrected, strict=True):
@@ -224,7 +224,7 @@ def _in_order(found: Iterable[Key], data: RunData) -> Iterator[tuple[Key, str, s
 
     They are left out if there is only one task.
     """
-    runs = list(data.names)
+    runs = list(data.frame.names)
     keys = sorted(
         found,
         key=lambda key: (runs.index(key[0]), options_sort_key(key[1]), key[2] == ALL_TASKS),
@@ -232,7 +232,7 @@ def _in_order(found: Iterable[Key], data: RunData) -> Iterator[tuple[Key, str, s
     for group, own in itertools.groupby(keys, lambda key: key[:2]):
         scopes = list(own)
         for key in scopes if len(scopes) > 2 else scopes[:1]:  # noqa: PLR2004 - a task and all
-            yield key, f"{data.names[group[0]]}, {options_label(group[1])}", key[2]
+            yield key, f"{data.frame.names[group[0]]}, {options_label(group[1])}", key[2]
 
 
 def make_breakdown_table(

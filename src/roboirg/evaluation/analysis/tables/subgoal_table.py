@@ -79,7 +79,7 @@ def make_subgoal_table(data: RunData, records: Iterable[Record]) -> Table:
         ),
         rows=tuple(
             Row(
-                f"{data.names[key.policy_run]}, {options_label(key.options)}",
+                f"{data.frame.names[key.policy_run]}, {options_label(key.options)}",
                 key.task,
                 tuple(_words(counts, failures, costs)),
             )
