@@ -264,7 +264,8 @@ def test_rates_without_another_setting_stand_alone(kept: str) -> None:
     found = content([one for one in results() if one.setting == kept and one.form == "implicit"])
     shown = dots(draw("gaps", found))
     assert {title for title, _ in shown} == {kept}
-    options = InstructionOptions(kept)
-    own = [found.summaries[key, ALL_TASKS, options].rate for key in found.frame.names]
+    own = [
+        found.summaries[key, ALL_TASKS, InstructionOptions(kept)].rate for key in found.frame.names
+    ]
     assert [*shown.values()] == [[100 * float(rate)] for rate in own if rate is not None]
     assert draw_figure("forms", found) is None
