@@ -97,7 +97,7 @@ def test_a_tokenizer_that_is_no_path_matters_where_prompts_are_counted():
     with pytest.raises(InvalidValueError, match="tokenizer is <object"):
         PolicyNeeds.of(thinking)
     assert act(thinking, {})[0].shape == (1, 7)  # of a server
-    with pytest.raises(InvalidValueError, match="acts in 'ee_pose'"):
+    with pytest.raises(InvalidValueError, match="needs actions='ee_pose'"):
         play(SimpleNamespace(actions="waypoint"), thinking)
 
 

@@ -12,14 +12,17 @@ import numpy as np
 from roboirg.core.errors import InvalidValueError
 from roboirg.core.plain_text import clip_text, printable
 
+MAX_DEPTH = 16
+"""Most containers around a value."""
 _MAX_LISTED = 64
 """Numbers of an array that are written out."""
 _MAX_TEXT_LENGTH = 1000
+_TOO_LARGE = 2**63
 _MAX_SHOWN = 80
 
 
-def as_json(value: Any, owner: str | None = None, key: str = "") -> Any:  # noqa: ANN401
-    """Return a value as JSON values.
+def as_json(value: Any, owner: str | None = None, key: str = "", depth: int = 1) -> Any:  # noqa: ANN401
+    """Return a value as JSON values that every reader of records can read.
 
     Numbers and arrays of NumPy, PyTorch and JAX become numbers and lists, paths and keys texts;
     large arrays are described.
@@ -29,14 +32,23 @@ def as_json(value: Any, owner: str | None = None, key: str = "") -> Any:  # noqa
         owner: whose value it is, for the error; None for a stranger's, in which all else becomes
             text, cut and without characters that control a terminal.
         key: of the value.
+        depth: containers around it, and one.
 
     Raises:
-        InvalidValueError: the owner's value is something else, or a number that is not finite.
-        RecursionError: it is nested too deep.
+        InvalidValueError: the owner's value is something else, a number that is not finite, a
+            whole one of more than 63 bits, or nested too deep.
     """
+    if depth > MAX_DEPTH:
+        if owner is not None:
+            raise InvalidValueError(
+                f"{owner} are nested more than {MAX_DEPTH} deep; make them flat."
+            )
+        value = "…"
     if isinstance(value, Mapping):
         return {
-            _text(one, owner, key): as_json(held, owner, f"{key}.{one}" if key else str(one))
+            _text(one, owner, key): as_json(
+                held, owner, f"{key}.{one}" if key else str(one), depth + 1
+            )
             for one, held in value.items()
         }
     if hasattr(value, "tolist") and hasattr(value, "shape") and not isinstance(value, type):
@@ -44,10 +56,14 @@ def as_json(value: Any, owner: str | None = None, key: str = "") -> Any:  # noqa
             return f"array of shape {tuple(value.shape)}, {value.dtype}"
         found = value.tolist()
         # Number types that NumPy does not know, such as bfloat16, stay themselves.
-        return as_json(float(value) if isinstance(found, np.generic) else found, owner, key)
+        return as_json(float(value) if isinstance(found, np.generic) else found, owner, key, depth)
     if isinstance(value, Sequence) and not isinstance(value, str | bytes | bytearray | memoryview):
-        return [as_json(held, owner, f"{key}[{index}]") for index, held in enumerate(value)]
-    if isinstance(value, int | float) and abs(value) < math.inf:
+        return [
+            as_json(held, owner, f"{key}[{index}]", depth + 1) for index, held in enumerate(value)
+        ]
+    if isinstance(value, int | float) and (
+        abs(value) < (_TOO_LARGE if isinstance(value, int) else math.inf)
+    ):
         # Of a subclass, too.
         kind = next(one for one in (bool, int, float) if isinstance(value, one))
         return kind(value)

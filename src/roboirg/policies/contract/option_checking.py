@@ -33,7 +33,7 @@ def check_options(kind: type[Options], values: Mapping[str, Any], origin: str) -
     except ValidationError as error:
         first = error.errors()[0]
         path = [str(part) for part in first["loc"]]
-        name = ".".join(path) or "options"
+        name = ".".join(dict.fromkeys(path)) or "options"  # a model's model is *model*
         if first["type"] == "extra_forbidden":
             raise UnknownNameError(f"option of {origin}", name, _names(kind)) from None
         if first["type"] == "missing":

@@ -15,6 +15,12 @@ from roboirg.policies.contract.base import Policy, PrivilegedPolicy, tell_policy
 if TYPE_CHECKING:
     from roboirg.envs.environment import RoboIRGEnv
 
+_MET = (
+    *("actions", "demonstration_frames", "observe_every", "history_cameras"),
+    *("depth", "calibration"),
+)
+"""Needs that an environment has to meet; one that it does not is a mistake in how it was made."""
+
 
 class EpisodeLoop:
     """The turns of an episode; subclasses guard, record or split its calls."""
@@ -78,21 +84,12 @@ def play(env: RoboIRGEnv, policy: Policy) -> dict[str, Any]:
 def _check(env: RoboIRGEnv, policy: Policy) -> None:
     """Raise if the environment does not meet the policy's needs."""
     needs = PolicyNeeds.of(policy, *ENV_NEEDS)
-    if needs.actions != env.actions:
-        raise InvalidValueError(
-            f"{type(policy).__name__} acts in {needs.actions!r}, but the environment takes "
-            f"{env.actions!r}; make it with actions={needs.actions!r}."
-        )
-    for attribute in ("demonstration_frames", "observe_every", "history_cameras"):
-        value, given = getattr(needs, attribute), getattr(env, attribute)
-        if hasattr(policy, attribute) and value != given:
+    for name in _MET:
+        value, given = getattr(needs, name), getattr(env, name)
+        # What a policy does not declare, it takes as it comes.
+        is_open = not value or not (name == "actions" or hasattr(policy, name))
+        if value != given and not is_open:
             raise InvalidValueError(
-                f"{type(policy).__name__} needs {attribute}={value!r}, but the environment has "
-                f"{given!r}; make it with {attribute}={value!r}."
-            )
-    for attribute in ("depth", "calibration"):
-        if getattr(needs, attribute) and not getattr(env, attribute):
-            raise InvalidValueError(
-                f"{type(policy).__name__} needs {attribute}=True, but the environment has none; "
-                f"make it with {attribute}=True."
+                f"{type(policy).__name__} needs {name}={value!r}, but the environment has "
+                f"{given!r}; make it with {name}={value!r}."
             )

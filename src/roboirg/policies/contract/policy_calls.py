@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import re
 from collections.abc import Mapping
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,16 +25,12 @@ MAX_ROWS = 10_000
 MAX_METADATA_LENGTH = 65_536
 """Most characters of JSON in a policy's metadata."""
 
-MAX_METADATA_DEPTH = 16
-"""Most containers of a policy's metadata around a value."""
-
 REAL_TRIAL = "real_trial"
 """Key of a study's trial in a record's metadata of the policy."""
 
 SERVER = "server"
 """Key under which clients of remote policies name the address of the server."""
 
-_NEVER = (REAL_TRIAL,)
 _TOO_LARGE = 2**63
 _METADATA = "the policy's metadata"
 
@@ -63,13 +59,13 @@ def policy_subgoal(policy: Policy) -> str | None:
     subgoal = getattr(policy, "subgoal", None)
     if subgoal is None or subgoal == "":
         return None
-    if not isinstance(subgoal, str) or not re.fullmatch(SUBGOAL, subgoal):
+    is_text = isinstance(subgoal, str) and re.fullmatch(SUBGOAL, subgoal) is not None
+    if not (is_text and is_encodable(subgoal)):
         raise InvalidValueError(
-            f"The policy's subgoal is {clip_text(repr(subgoal), 80)}; it must be a text of at "
-            f"most {MOST_SUBGOAL_LETTERS} characters, without control characters."
+            f"The policy's subgoal is {clip_text(repr(subgoal), 80)}; it must be a text of "
+            f"at most {MOST_SUBGOAL_LETTERS} characters, without control characters or lone "
+            "surrogates."
         )
-    if not is_encodable(subgoal):
-        raise InvalidValueError("The policy's subgoal has lone surrogates.")
     return str.__str__(subgoal)  # of a subclass, too
 
 
@@ -84,12 +80,7 @@ def policy_metadata(policy: Policy, *, is_ours: bool = True) -> dict[str, JsonVa
         InvalidValueError: they hold something that is not JSON, are too long or too deep, their
             text is not Unicode, or a key is reserved.
     """
-    metadata = getattr(policy, "metadata", {})
-    try:
-        found = as_json(metadata, _METADATA) if isinstance(metadata, Mapping) else metadata
-    except RecursionError:
-        raise InvalidValueError(f"{_METADATA} are nested too deep.") from None
-    return _checked(found, is_ours=is_ours)
+    return _checked(getattr(policy, "metadata", {}), is_ours=is_ours)
 
 
 def dump_metadata(policy: Policy) -> str:
@@ -100,17 +91,16 @@ def dump_metadata(policy: Policy) -> str:
 def read_metadata(text: str) -> dict[str, JsonValue]:
     """Return the metadata in a JSON text of a policy's process; raises like `policy_metadata`."""
     try:
-        found = json.loads(text)
+        return _checked(json.loads(text), is_ours=False)
     except RecursionError:
         raise InvalidValueError(f"{_METADATA} are nested too deep.") from None
-    return _checked(found, is_ours=False)
 
 
-def _checked(found: object, *, is_ours: bool) -> dict[str, JsonValue]:
-    if not isinstance(found, dict):
-        raise InvalidValueError(f"{_METADATA} are a {type(found).__name__}, not a dict.")
-    _check_values(found)
-    plain = json.dumps(found, allow_nan=False, ensure_ascii=False)
+def _checked(metadata: object, *, is_ours: bool) -> dict[str, JsonValue]:
+    if not isinstance(metadata, Mapping):
+        raise InvalidValueError(f"{_METADATA} are a {type(metadata).__name__}, not a dict.")
+    found: dict[str, JsonValue] = as_json(metadata, _METADATA)
+    plain = json.dumps(found, ensure_ascii=False)
     if len(plain) > MAX_METADATA_LENGTH:
         raise InvalidValueError(
             f"{_METADATA} have {len(plain)} characters of JSON; "
@@ -118,33 +108,15 @@ def _checked(found: object, *, is_ours: bool) -> dict[str, JsonValue]:
         )
     if not is_encodable(plain):
         raise InvalidValueError(f"{_METADATA} hold text with lone surrogates.")
-    _check_keys(found, is_ours=is_ours)
-    return cast("dict[str, JsonValue]", found)
-
-
-def _check_values(value: object, depth: int = 1) -> None:
-    """Raise for what readers of records could not read: deep nests, and huge numbers."""
-    if depth > MAX_METADATA_DEPTH:
-        raise InvalidValueError(
-            f"{_METADATA} are nested more than {MAX_METADATA_DEPTH} deep; make them flat."
-        )
-    if isinstance(value, int) and abs(value) >= _TOO_LARGE:
-        raise InvalidValueError(f"{_METADATA} hold a whole number of more than 63 bits.")
-    if isinstance(value, dict | list):
-        for one in value.values() if isinstance(value, dict) else value:
-            _check_values(one, depth + 1)
-
-
-def _check_keys(metadata: dict[str, Any], *, is_ours: bool) -> None:
-    """Raise for keys with a meaning that only our own code may give."""
     # A planner's metadata have those of the policy behind it under "policy".
-    behind = metadata.get("policy")
-    for table in (metadata, behind if isinstance(behind, dict) else {}):
-        for key in _NEVER if is_ours else (*_NEVER, SERVER):
-            if key in table:
-                raise InvalidValueError(
-                    f"{_METADATA} have the key {key!r}, which is reserved; choose another name."
-                )
+    behind = found.get("policy")
+    keys = (*found, *(behind if isinstance(behind, dict) else ()))
+    for key in (REAL_TRIAL,) if is_ours else (REAL_TRIAL, SERVER):
+        if key in keys:
+            raise InvalidValueError(
+                f"{_METADATA} have the key {key!r}, which is reserved; choose another name."
+            )
+    return found
 
 
 def policy_usage(policy: Policy) -> dict[str, float]:
@@ -163,9 +135,8 @@ def policy_usage(policy: Policy) -> dict[str, float]:
             raise InvalidValueError(
                 f"usage() has {shown} as {name!r}; it must be a number."
             ) from None
-    if len(usage) > MAX_COSTS or not all(
-        len(name) <= MAX_COSTS and is_encodable(name) for name in usage
-    ):
+    is_short = all(len(name) <= MAX_COSTS and is_encodable(name) for name in usage)
+    if len(usage) > MAX_COSTS or not is_short:
         raise InvalidValueError(
             f"usage() has {len(usage)} entries; it may have at most {MAX_COSTS}, with names of at "
             f"most {MAX_COSTS} characters."
