@@ -96,7 +96,7 @@ class ComparingOracle(OraclePolicy):
 
     def reset(self, instruction: str, demonstration: Demonstration) -> None:
         """Compare, then plan as the oracle."""
-        env, row, result = self._attached(), self._row, self._result
+        env, row, result = self.env, self._row, self._result
         frames, steps = len(demonstration["joint_positions"]) + 1, env.session.world.elapsed
         result.lengths = (frames, steps), (row["frames"], row["elapsed"])
         result.joints = _joint_difference(env, row)

@@ -303,9 +303,7 @@ class It:
 
 
 def test_which_policies_get_a_process(tmp_path: Path) -> None:
-    (tmp_path / "mine.toml").write_text(
-        'name = "mine"\nabout = "Mine."\npolicy = "somewhere:Mine"\n'
-    )
+    (tmp_path / "mine.toml").write_text('name = "mine"\npolicy = "somewhere:Mine"\n')
     foreign = ["somewhere:Mine", f"system:{tmp_path}/mine.toml"]
     ours = ["oracle", "random", "openpi://localhost:1", "system:GroundSG-QwenVL"]
     assert [read_policy(one).is_foreign for one in foreign] == [True, True]

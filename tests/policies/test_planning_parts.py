@@ -18,8 +18,7 @@ from roboirg.core.policy_needs import (
     merge_observe_every,
 )
 from roboirg.core.subgoal_text import MOST_SUBGOAL_LETTERS, split_point
-from roboirg.policies.planners.memories import merge_keyframes
-from roboirg.policies.planners.memory import MAX_GAP
+from roboirg.policies.planners.model_planners import MAX_GAP, merge_keyframes
 from roboirg.policies.planners.observation_merging import (
     DemonstrationSubset,
     select_history,

@@ -25,9 +25,9 @@ from roboirg.policies import Policy, PrivilegedPolicy, play
 from roboirg.policies.builtin.oracle_policy import OraclePolicy
 from roboirg.policies.hands.scripted_hands import ScriptedHands
 from roboirg.policies.planners import make_planner as make_by_kind
-from roboirg.policies.planners.hierarchical_policy import HierarchicalPolicy, with_planner
+from roboirg.policies.planners.hierarchical_policy import HierarchicalPolicy
 from roboirg.policies.planners.oracle_planner import OracleOptions, OraclePlanner
-from roboirg.policies.planners.vlm_planner import PlannerOptions
+from roboirg.policies.vlm.models import ModelOptions
 
 CHUNK = 16
 GO = "pick up the red cube at <|box_start|>(500,250)<|box_end|>"
@@ -78,7 +78,7 @@ class Fingers(OraclePolicy):
 
 
 def make_planner(kind, server, provider="openai", **more):
-    own = {key: more.pop(key) for key in list(more) if key in PlannerOptions.model_fields}
+    own = {key: more.pop(key) for key in list(more) if key not in ModelOptions.model_fields}
     model = model_options(server, provider, **more)
     return make_by_kind(kind, {"model": model, **own}, "the test")
 
@@ -156,7 +156,7 @@ def clip(body):
     ("kind", "answer", "options", "steps"),
     [
         ("qwen", GO, {}, range(0, 321, 16)),
-        ("qwen", GO, {"keep": 3}, range(0, 321, 48)),
+        ("qwen", GO, {"asked": "every 40 steps"}, [0, 48, 80, 128, 160, 208, 240, 288, 320]),
         ("qwen", "press the button at (3,4)", {}, [0, *range(96, 321, 16)]),
         ("qwen", "press the button at (3,4) to stop", {}, range(0, 321, 16)),
         ("qwen", "press the first button at (3,4)", {}, [0, *range(112, 321, 16)]),
@@ -300,7 +300,7 @@ def test_memer_shows_recent_frames_and_remembers_what_it_chose():
     # 0; 0, 4, 16 make 4 and 16, where 16 and 18 make 18; then 64 besides.
     memory = [[], [0], [4, 16], [4, 18], [4, 18]]
     assert shown == [kept + new for kept, new in zip(memory, recent, strict=True)]
-    assert list(planner.memory.frames) == [4, 18, 64]
+    assert list(planner.frames) == [4, 18, 64]
 
 
 @pytest.mark.parametrize("positions", [[0], [9], ["1"], [True], "1", None])
@@ -309,7 +309,7 @@ def test_memer_refuses_positions_that_there_are_not(positions):
         planner = make_planner("memer", server)
         drive(planner, 16)
         assert planner.usage()["unparsed"] == 2
-        assert planner.memory.frames == {}
+        assert planner.frames == {}
 
 
 def test_memer_may_be_told_to_keep_the_newest_key_frames_only():
@@ -317,7 +317,7 @@ def test_memer_may_be_told_to_keep_the_newest_key_frames_only():
     with fake_vlm([choose]) as server:
         planner = make_planner("memer", server, most=2)
         drive(planner, 96)
-        assert list(planner.memory.frames) == [66, 82]
+        assert list(planner.frames) == [66, 82]
 
 
 @pytest.mark.parametrize("subgoals", ["simple", "grounded"])
@@ -390,7 +390,7 @@ def test_who_cannot_follow_cannot_be_led():
         def act(self, observation): ...
 
     with pytest.raises(InvalidValueError, match=r"Headstrong has no method follow"):
-        with_planner(OraclePlanner(), Headstrong())
+        HierarchicalPolicy(OraclePlanner(), Headstrong())
 
 
 class Wishful(Follower):
@@ -417,7 +417,7 @@ def test_requirements_of_both_are_met():
 
 
 def test_the_oracle_needs_an_environment_that_names_pixels():
-    policy = with_planner(OraclePlanner(), Follower())
+    policy = HierarchicalPolicy(OraclePlanner(), Follower())
     assert isinstance(policy, PrivilegedPolicy)
     with pytest.raises(InvalidValueError, match="grounded=True"):
         policy.attach(roboirg.make("PickXtimes", cameras=()))
@@ -426,7 +426,7 @@ def test_the_oracle_needs_an_environment_that_names_pixels():
 @pytest.mark.sim
 def test_the_oracles_subgoals_are_those_of_the_episode():
     env = roboirg.make("PickXtimes", cameras=(), grounded=True, demonstration_frames="none")
-    policy = with_planner(OraclePlanner(), Fingers())
+    policy = HierarchicalPolicy(OraclePlanner(), Fingers())
     policy.policy.demonstration_frames = policy.demonstration_frames = "none"
     assert play(env, policy)["status"] == "success"
     told = list(dict.fromkeys(policy.policy.told))
@@ -440,7 +440,7 @@ def test_the_oracles_subgoals_are_those_of_the_episode():
 def test_planners_play_whole_episodes(kind):
     with fake_vlm([ANSWERS[kind]]) as server:
         more = {"observe_every": 8} if kind == "gemini" else {}
-        policy = with_planner(make_planner(kind, server, **more), Fingers())
+        policy = HierarchicalPolicy(make_planner(kind, server, **more), Fingers())
         env = roboirg.make(
             "PickXtimes",
             cameras=policy.cameras,
@@ -488,7 +488,7 @@ class Silent:
 
 @pytest.mark.sim
 def test_a_planner_that_knows_the_order_sees_what_silent_hands_have_done():
-    policy = with_planner(make_by_kind("listener", {}, "test"), Silent())
+    policy = HierarchicalPolicy(make_by_kind("listener", {}, "test"), Silent())
     assert not policy.reports
     env = roboirg.make("VideoRepick", setting="explicit", cameras=(), demonstration_frames="none")
     assert play(env, policy)["status"] == "success"

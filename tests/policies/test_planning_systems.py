@@ -29,15 +29,6 @@ PLANNERS = {
     "GroundSG-oracle": "oracle",
     "MemER": "memer",
 }
-FACTS = {
-    "pi0.5": ("pi05_baseline", "pi05_baseline", "--args.no-use-history"),
-    "TTT-Expert": ("mme_vla_suite", "recurrent-ttt-expert", ""),
-    "FrameS-Modul": ("mme_vla_suite", "perceptual-framesamp-modul", ""),
-    "GroundSG-oracle": ("mme_vla_suite", "symbolic-grounded-subgoal", "--args.use-oracle"),
-    "GroundSG-QwenVL": ("mme_vla_suite", "symbolic-grounded-subgoal", "--args.use-qwenvl"),
-    "GroundSG-Gemini": ("mme_vla_suite", "symbolic-grounded-subgoal", "--args.use-gemini"),
-    "MemER": ("mme_vla_suite", "symbolic-grounded-subgoal", "--args.use-memer"),
-}
 LISTENER = "vlm-listener:openai?base_url=http://localhost:8000/v1&model=qwen"
 
 
@@ -67,32 +58,17 @@ def test_a_system_is_a_policy_offline(name):
     policy.close()
 
 
-@pytest.mark.parametrize("name", PAPER)
-def test_commands_are_those_of_the_release(name):
-    config, folder, flag = FACTS[name]
-    published = find_system(name, {}).published
-    assert f"--policy.config={config} " in published.server + " "
-    assert re.search(rf"--policy\.dir=runs/ckpts/{config}/{folder}/79999 ", published.server)
-    assert "--seed=7" in published.server
-    assert flag in published.flags
-    assert bool(flag) == bool(published.flags)
-    assert ("grounded_subgoal" in published.flags) == (name in PLANNERS)
-    assert (published.vlm is not None) == (name in {"GroundSG-QwenVL", "MemER"})
-    port = re.search(r"--port=(\d+)", published.server)[1]
-    assert f"localhost:{port}" in find_system(name, {}).policy
-
-
 def test_a_spec_overrides_entries():
     spec = (
         "system:GroundSG-QwenVL?server=gpu:9001&vlm=http://other:8000/v1&model=mine"
-        "&planner.keep=2&planner.model.timeout_s=7.5&policy.execute=8"
+        "&planner.video_frames=2&planner.model.timeout_s=7.5&policy.execute=8"
     )
     policy = make_policy(spec, 3)
     assert policy.policy.options.execute == 8
     assert "gpu:9001" in find_system("GroundSG-QwenVL", {"server": "gpu:9001"}).policy
     assert policy.policy.options.version == "symbolic-grounded-subgoal-79999"
     options = policy.planner.options
-    assert (options.keep, options.model.timeout_s, options.model.model) == (2, 7.5, "mine")
+    assert (options.video_frames, options.model.timeout_s, options.model.model) == (2, 7.5, "mine")
     assert options.model.base_url == "http://other:8000/v1"
     assert policy.metadata["system"] == "GroundSG-QwenVL"
 
@@ -129,8 +105,8 @@ def test_a_listener_by_its_spec():
         ("system:none.toml", InvalidValueError, "cannot be read"),
         ("system:pi0.5?vlm=http://x", InvalidValueError, "has no planner"),
         ("system:pi0.5?sever=x:1", UnknownNameError, "Did you mean 'server'"),
-        ("system:MemER?planner.kep=2", UnknownNameError, "Did you mean 'keep'"),
-        ("system:MemER?planner.keep=0", InvalidValueError, "keep is '0'.*greater than"),
+        ("system:MemER?planner.mots=2", UnknownNameError, "Did you mean 'most'"),
+        ("system:MemER?planner.most=0", InvalidValueError, "most is '0'.*greater than"),
         ("openpi://localhost:1?connect=1e10", InvalidValueError, "'1e10'.*equal to 2147483"),
         ("mme-vla://localhost:1?timeout=1e30", InvalidValueError, "'1e30'.*equal to 2147483"),
         ("vlm-listener:openai?model=x&patience_s=1e30", InvalidValueError, "equal to 2147483"),
@@ -144,7 +120,7 @@ def test_a_listener_by_its_spec():
         (
             "vlm-listener:openai?model=x&frame=3",
             UnknownNameError,
-            "option of vlm-listener: 'frame'.*mean 'frames'",
+            "option of policy vlm-listener:openai 'frame'.*mean 'frames'",
         ),
         ("vlm-listener:openai?model=x&frames=no", InvalidValueError, "frames is 'no'"),
         ("vlm-listener:openai?model=x&prompts=none.toml", InvalidValueError, "cannot be read"),
@@ -165,15 +141,15 @@ def test_wrong_specs_are_explained(spec, error, words):
 
 def test_own_systems_are_files(tmp_path):
     file = tmp_path / "mine.toml"
-    file.write_text('name = "mine"\nabout = "x"\npolicy = "random"\n[planner]\nkind = "oracle"\n')
+    file.write_text('name = "mine"\npolicy = "random"\n[planner]\nkind = "oracle"\n')
     with pytest.raises(InvalidValueError, match="RandomPolicy has no method follow"):
         load_system(str(file))
     with pytest.raises(InvalidValueError, match="not a URL"):
         load_system(str(file), {"server": "x:1"})
-    file.write_text('name = "mine"\nabout = "x"\npolicy = "random"\n')
-    assert load_system(str(file), seed=4).seed == 4
     file.write_text('name = "mine"\npolicy = "random"\n')
-    with pytest.raises(InvalidValueError, match="option about is missing"):
+    assert load_system(str(file), seed=4).seed == 4
+    file.write_text('name = "mine"\n')
+    with pytest.raises(InvalidValueError, match="option policy is missing"):
         load_system(str(file))
     file.write_text("name = ")
     with pytest.raises(InvalidValueError, match="not TOML"):

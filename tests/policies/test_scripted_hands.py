@@ -21,7 +21,7 @@ from roboirg.policies.by_name.finding import read_policy
 from roboirg.policies.hands.scripted_hands import ScriptedHands
 from roboirg.policies.hands.subgoal_words import read_subgoal
 from roboirg.policies.planners import make_planner
-from roboirg.policies.planners.hierarchical_policy import MOST_REFUSALS, with_planner
+from roboirg.policies.planners.hierarchical_policy import MOST_REFUSALS, HierarchicalPolicy
 from roboirg.policies.planners.oracle_planner import OracleOptions, OraclePlanner
 from roboirg.tasks import all_tasks, get_task
 from roboirg.tasks.choices import choices_of
@@ -51,7 +51,7 @@ def do(env, hands, subgoal):
 
 
 def play_with(planner, task, episode=0, setting="explicit"):
-    policy = with_planner(planner, ScriptedHands())
+    policy = HierarchicalPolicy(planner, ScriptedHands())
     needs = PolicyNeeds.of(policy).env_options
     env = roboirg.make(task, episode=episode, setting=setting, **needs)
     return play(env, policy), policy
@@ -184,15 +184,6 @@ def test_planners_guess_by_the_seed_of_the_policy():
     env.close()
 
 
-@pytest.mark.sim
-def test_a_fixed_plan_is_not_looked_at_again():
-    """Cubes do not move before they are picked; in PickXtimes the second pick is elsewhere."""
-    assert play_with(make_planner("fixed", {}, "x"), "VideoUnmask")[0]["status"] == "success"
-    info, policy = play_with(make_planner("fixed", {}, "x"), "PickXtimes", 0)
-    assert info["status"] == "failure"
-    assert "refused" in {one.how for one in policy.endings}
-
-
 class Askew(OraclePlanner):
     """The oracle, 40 pixels off."""
 
@@ -263,8 +254,11 @@ def test_specs_name_planners_and_hands(model):
     ("spec", "words"),
     [
         ("planner:stateless", "option model is missing"),
-        ("planner:stateless?model=x&recent=3", "remembers pictures has no option recent"),
-        ("planner:qwen?model=x&asked=often", "each-chunk, when-done or 'every N steps'"),
+        (
+            "planner:stateless?model=x&recent=3",
+            "no option of the planner of system planner:stateless 'recent'",
+        ),
+        ("planner:qwen?model=x&asked=often", "each-chunk|when-done|every"),
         ("planner:qwen?model=x&asked=when-done&hands=mme-vla://localhost:1", "does not report"),
         ("planner:orakel", "no planner 'orakel'"),
         ("system:pi0.5?hands=scripted", "has no planner"),

@@ -46,7 +46,7 @@ from roboirg.policies.by_name.finding import make_policy
 from roboirg.policies.by_name.policy_kinds import make_follower
 from roboirg.policies.contract.base import Policy, close_policy
 from roboirg.policies.contract.policy_calls import policy_usage
-from roboirg.policies.planners.hierarchical_policy import HierarchicalPolicy, with_planner
+from roboirg.policies.planners.hierarchical_policy import HierarchicalPolicy
 from roboirg.policies.prompt_length.prompt_audit import PromptLimit
 from roboirg.policies.prompt_length.tokenizer_file import prompt_limit
 from roboirg.policies.vlm.models.reply_store import ReplySettings, use_replies
@@ -243,7 +243,7 @@ def load_hosted_policy(
     if ref.place != "split":
         return HostedPolicy(hosts, ref, seed, alone=alone)
     hosted = HostedPlanner(hosts, ref.hosted_part, seed, alone=alone)
-    return with_planner(hosted, make_follower(SCRIPTED, seed), f"{ref.kind}:{ref.target}")
+    return HierarchicalPolicy(hosted, make_follower(SCRIPTED, seed), f"{ref.kind}:{ref.target}")
 
 
 def _policy_and_seed(prepared: PreparedJob) -> tuple[PolicyRef, int]:

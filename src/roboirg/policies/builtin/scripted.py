@@ -13,6 +13,7 @@ from roboirg.core.conditions import Fact
 from roboirg.core.episode import HANDLES_HELD, Goal, Stage
 from roboirg.core.observations import Demonstration, Observation
 from roboirg.judging import Judge
+from roboirg.policies.contract.base import AttachedPolicy
 from roboirg.tasks import get_task, with_goal
 
 if TYPE_CHECKING:
@@ -45,7 +46,7 @@ READING: Mapping[str, str] = {
 """Metadata of those that read it with `roboirg.reader`."""
 
 
-class ScriptedPolicy(ABC):
+class ScriptedPolicy(AttachedPolicy, ABC):
     """Decides on a goal once it has heard the command, and executes it with the scripted expert.
 
     Privileged: the expert reads the poses of all objects. It remembers everything that is said, and
@@ -53,6 +54,7 @@ class ScriptedPolicy(ABC):
 
     Attributes:
         listens: whether it waits for the command.
+        stages: of the goal that it has decided on; empty before, and if there is none.
         stage: the stage that the last chunk belongs to; None before the first one.
     """
 
@@ -61,7 +63,7 @@ class ScriptedPolicy(ABC):
 
     def __init__(self, seed: int = 0) -> None:
         self.seed = seed
-        self._env: RoboIRGEnv | None = None
+        self.stages: tuple[Stage, ...] = ()
         # No generator of a method: the cycle would keep the world until the next collection.
         self._chunks: Iterator[_StagedChunk] = iter(())
         self._heard: list[str] = []
@@ -77,47 +79,33 @@ class ScriptedPolicy(ABC):
     def decide(self, env: RoboIRGEnv, instruction: str) -> Goal | None:
         """Return the goal to execute, one of the scene's; None to hold still."""
 
-    def attach(self, env: RoboIRGEnv) -> None:
-        """Receive the environment in which the expert acts."""
-        self._env = env
-
     def reset(self, instruction: str, demonstration: Demonstration) -> None:  # noqa: ARG002
         """Decide on a goal, or listen for the rest of the instruction."""
-        env = self._attached()
-        self._heard = [instruction]
-        if self.listens and env.unheard:
-            self._chunks = _get_ready(env)
+        self._heard, self.stages = [instruction], ()
+        if self.listens and self.env.unheard:
+            self._chunks = _get_ready(self.env)
         else:
-            self.begin(env)
+            self.begin(self.env)
 
     def hear(self, text: str, step: int) -> None:  # noqa: ARG002
         """Remember an utterance, and decide on a goal after the last one."""
-        env = self._attached()
         self._heard.append(text)
-        if self.listens and len(self._heard) == len(env.instruction.utterances):
-            self.begin(env)
+        if self.listens and len(self._heard) == len(self.env.instruction.utterances):
+            self.begin(self.env)
 
     def begin(self, env: RoboIRGEnv) -> None:
         """Decide on a goal and plan its stages; everything has been heard."""
         goal = self.decide(env, " ".join(self._heard))
-        if goal is None:
-            self._chunks = iter(())
-            return
-        stages = with_goal(env.episode, goal).stages
-        self._chunks = _execute(env, stages, self.make_primitives(env))
+        self.stages = () if goal is None else with_goal(env.episode, goal).stages
+        self._chunks = _execute(env, self.stages, self.make_primitives(env))
 
     def act(self, observation: Observation) -> NDArray[np.floating[Any]]:  # noqa: ARG002
         """Return the next chunk of the motion; without one, actions that hold still."""
         staged = next(self._chunks, None)
         if staged is None:
-            return _hold_still(self._attached())
+            return _hold_still(self.env)
         self.stage, chunk = staged
         return chunk
-
-    def _attached(self) -> RoboIRGEnv:
-        if self._env is None:
-            raise RuntimeError(f"{type(self).__name__} needs attach(env) before reset().")
-        return self._env
 
 
 def _execute(

@@ -163,7 +163,7 @@ class WaypointExpert(OraclePolicy):
 
     def _meaning(self, action: NDArray[np.float64]) -> tuple[str | None, str]:
         """Return the anchor of a move, and how the tool turns in it."""
-        env = self._attached()
+        env = self.env
         tool = np.asarray(env.session.world.robot.tool_pose.p)
         primitive = self._stage_primitive()
         turn = _TURNS.get(primitive.kind, "keep")
@@ -182,7 +182,7 @@ class WaypointExpert(OraclePolicy):
         return self.stage.primitive
 
     def _here(self, gripper: float) -> NDArray[np.float64]:
-        robot = self._attached().session.world.robot
+        robot = self.env.session.world.robot
         return self._pose_at(robot.arm_positions, gripper)
 
     def _pose_at(self, arm: NDArray[np.floating[Any]], gripper: float) -> NDArray[np.float64]:

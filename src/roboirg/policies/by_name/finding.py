@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-import importlib
+import contextlib
+import pkgutil
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -64,7 +65,7 @@ def read_policy(spec: str, name: str | None = None) -> PolicyRef:
         MissingDependencyError: a library that the URL's scheme needs is not installed.
     """
     ref = split_spec(spec if name is None else name, spec)
-    system, kind = system_of(ref), ref.kind
+    system, kind = system_of(ref.kind, ref.target, dict(ref.options)), ref.kind
     is_foreign = not known_kinds().get(kind, True) or (kind == CLASS and ":" in ref.body)
     is_split = False
     asks: Asker | None = "listener" if kind == LISTENER else None
@@ -181,10 +182,8 @@ def _refuse_undeclared(ref: PolicyRef, made: object) -> None:
 
 
 def _can_be_imported(policy: type[Any]) -> bool:
-    if policy.__module__ == "__main__":
-        return False
-    try:
-        module = importlib.import_module(policy.__module__)
-    except ImportError:
-        return False
-    return getattr(module, policy.__name__, None) is policy
+    """Return whether a process of its own finds the class under its name."""
+    with contextlib.suppress(ImportError, AttributeError):
+        found = pkgutil.resolve_name(f"{policy.__module__}:{policy.__name__}")
+        return policy.__module__ != "__main__" and found is policy
+    return False

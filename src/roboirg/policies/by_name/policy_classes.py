@@ -16,7 +16,6 @@ from roboirg.policies.contract.base import Policy
 from roboirg.policies.contract.batch_policy import make_batched, parameters_of, takes_batches
 from roboirg.policies.contract.contract_check import check_policy
 from roboirg.policies.contract.policy_urls import is_url
-from roboirg.policies.planners.planner import Planner
 from roboirg.policies.remote.protocols import protocols_by_scheme
 from roboirg.util.discovery import entry_names
 
@@ -33,8 +32,12 @@ def url_schemes() -> tuple[str, ...]:
     return (*protocols_by_scheme(), *CHECKPOINTS)
 
 
-def find_class(spec: str) -> type[Any]:
+def find_class(spec: str, methods: tuple[str, ...] = ("reset", "act")) -> type[Any]:
     """Return the class of a built-in name, ``package.module:Class``, or a URL.
+
+    Args:
+        spec: any of them.
+        methods: that the class must have.
 
     Raises:
         UnknownNameError: the spec is none of them, or the URL has an unknown option.
@@ -44,33 +47,22 @@ def find_class(spec: str) -> type[Any]:
     """
     if is_url(spec):
         policy_class = _url_class(spec)
-        check_policy(spec, policy_class(spec), ("reset", "act"))
+        check_policy(spec, policy_class(spec), methods)
         return policy_class
-    return _import_class(spec, ("reset", "act"))
-
-
-def make_planner_of_class(spec: str, seed: int) -> Planner:
-    """Make a planner of ``package.module:Class``; raises like `find_class`."""
-    planner: Planner = _construct(spec, _import_class(spec, ("reset", "plan")), seed)
-    return planner
-
-
-def _import_class(spec: str, methods: tuple[str, ...]) -> type[Any]:
     if spec not in BUILTIN and ":" not in spec:
-        raise UnknownNameError("policy", spec, [*BUILTIN, "package.module:Class", *_examples()])
+        urls = (f"{scheme}://…" for scheme in url_schemes())
+        kinds = (f"{kind}:…" for kind in entry_names(KINDS_GROUP))
+        ours = ("system:NAME", "planner:KIND", "vlm-listener:PROVIDER")
+        known = [*BUILTIN, "package.module:Class", *urls, *ours, *kinds]
+        raise UnknownNameError("policy", spec, known)
     module_name, _, name = BUILTIN.get(spec, spec).partition(":")
     module = _module(spec, module_name)
-    if not hasattr(module, name):
+    found = getattr(module, name, None)
+    if not inspect.isclass(found):
         names = [key for key, one in vars(module).items() if inspect.isclass(one)]
         raise InvalidValueError(
             f"Policy {spec!r}: module {module_name} has no class {name!r}; "
             f"it has {', '.join(names[:_MAX_NAMED]) or 'none'}."
-        )
-    found = getattr(module, name)
-    if not inspect.isclass(found):
-        raise InvalidValueError(
-            f"Policy {spec!r}: {name!r} in module {module_name} is of type "
-            f"{type(found).__name__}, not a class."
         )
     check_policy(spec, found, methods)
     return found
@@ -109,12 +101,6 @@ def _url_class(spec: str) -> type[Any]:
     if scheme not in protocols:
         raise UnknownNameError("policy scheme", scheme, url_schemes())
     return protocols[scheme].clients[scheme]
-
-
-def _examples() -> list[str]:
-    urls = (f"{scheme}://…" for scheme in url_schemes())
-    kinds = (f"{kind}:…" for kind in entry_names(KINDS_GROUP))
-    return [*urls, "system:NAME", "planner:KIND", "vlm-listener:PROVIDER", *kinds]
 
 
 def _module(spec: str, name: str) -> ModuleType:

@@ -30,14 +30,14 @@ from roboirg.policies.by_name.policy_classes import (
     KINDS_GROUP,
     find_class,
     make_from_class,
-    make_planner_of_class,
 )
 from roboirg.policies.contract.base import Policy
 from roboirg.policies.contract.batch_policy import make_batched, takes_batches
 from roboirg.policies.contract.option_checking import check_options
 from roboirg.policies.contract.policy_urls import is_url, parse_query, split_url
 from roboirg.policies.planners import make_planner
-from roboirg.policies.planners.hierarchical_policy import with_planner
+from roboirg.policies.planners.hierarchical_policy import HierarchicalPolicy
+from roboirg.policies.planners.planner import Planner
 from roboirg.policies.planners.planner_alone import PlannerAlone
 from roboirg.policies.planners.systems import System, find_system
 from roboirg.policies.vlm.models import ModelOptions
@@ -116,23 +116,26 @@ def maker_of(ref: PolicyRef) -> PolicyMaker:
     return find_kind(ref.kind).read(ref.body, ref.target, dict(ref.options))
 
 
-def system_of(ref: PolicyRef) -> System | None:
-    """Return the planner and the hands that a spec puts together; None if it is no such spec."""
-    options = dict(ref.options)
-    if ref.kind == SYSTEM and not ref.target:
-        raise InvalidValueError(f"Policy {ref.spec!r} names no system.")
-    if ref.kind == SYSTEM:
-        return find_system(ref.target, options)
-    if ref.kind != PLANNER:
+def system_of(kind: str, target: str, options: Mapping[str, str]) -> System | None:
+    """Return the planner and the hands that a spec puts together; None for another kind."""
+    if kind == SYSTEM:
+        if not target:
+            raise InvalidValueError(f"Policy '{SYSTEM}:' names no system.")
+        return find_system(target, options)
+    if kind != PLANNER:
         return None
-    if ":" in ref.target and (others := sorted(options.keys() - {HANDS})):
-        raise UnknownNameError(f"option of {ref.body}:", others[0], [HANDS])
-    # The options of a planner's model stand next to its own.
-    of_model = {key: value for key, value in options.items() if key in ModelOptions.model_fields}
-    own: dict[str, Any] = {key: value for key, value in options.items() if key not in of_model}
+    name, own = f"{PLANNER}:{target}", dict(options)
     hands = own.pop(HANDS, SCRIPTED)
-    planner = {"kind": ref.target, **own, **({"model": of_model} if of_model else {})}
-    return System(name=f"{PLANNER}:{ref.target}", about="", policy=hands, planner=planner)
+    if ":" in target and own:
+        raise UnknownNameError(f"option of {name}:", min(own), [HANDS])
+    return System(name=name, policy=hands, planner={"kind": target, **_with_model(own)})
+
+
+def _with_model(options: Mapping[str, str]) -> dict[str, Any]:
+    """Return options with those of a model, which stand next to the others, in a table."""
+    of_model = {key: value for key, value in options.items() if key in ModelOptions.model_fields}
+    own = {key: value for key, value in options.items() if key not in of_model}
+    return {**own, **({"model": of_model} if of_model else {})}
 
 
 def make_follower(spec: str, seed: int) -> Policy:
@@ -146,36 +149,26 @@ def _build(system: System, seed: int) -> Policy:
     options = dict(system.planner)
     kind = str(options.pop("kind", ""))
     if ":" in kind:
-        planner = make_planner_of_class(kind, seed)
+        planner = cast("Planner", make_from_class(kind, find_class(kind, ("reset", "plan")), seed))
     else:
         planner = make_planner(kind, options, f"the planner of system {system.name}", seed)
     if system.policy == ELSEWHERE:
         return PlannerAlone(planner)
-    return with_planner(planner, make_follower(system.policy, seed), system.name)
+    return HierarchicalPolicy(planner, make_follower(system.policy, seed), system.name)
 
 
 def _of_class(spec: str, _target: str, _options: Mapping[str, str]) -> PolicyMaker:
     return functools.partial(make_from_class, spec, find_class(spec))
 
 
-def _of_system(kind: str, spec: str, target: str, options: Mapping[str, str]) -> PolicyMaker:
-    pairs = tuple(options.items())
-    ref = PolicyRef(name=spec, spec=spec, kind=kind, target=target, options=pairs)
-    return functools.partial(_build, cast("System", system_of(ref)))
+def _of_system(kind: str, _spec: str, target: str, options: Mapping[str, str]) -> PolicyMaker:
+    return functools.partial(_build, cast("System", system_of(kind, target, options)))
 
 
 def _of_listener(_spec: str, name: str, options: Mapping[str, str]) -> PolicyMaker:
     """Return what makes VLM listeners; its options and its model's stand side by side."""
-    own = [option for option in ListenerOptions.model_fields if option != "model"]
-    of_model = [option for option in ModelOptions.model_fields if option != "provider"]
-    for option in options:
-        if option not in (*own, *of_model):
-            raise UnknownNameError(f"option of {LISTENER}:", option, [*own, *of_model])
-    values: dict[str, Any] = {key: value for key, value in options.items() if key in own}
-    model: dict[str, Any] = {key: value for key, value in options.items() if key not in own}
-    origin = f"policy {LISTENER}:{name}"
-    values["model"] = check_options(ModelOptions, {"provider": name, **model}, origin)
-    checked = check_options(ListenerOptions, values, origin)
+    values = _with_model({**options, "provider": name})
+    checked = check_options(ListenerOptions, values, f"policy {LISTENER}:{name}")
     return functools.partial(VLMListener, checked)
 
 

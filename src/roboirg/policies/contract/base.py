@@ -108,6 +108,23 @@ class PrivilegedPolicy(Policy, Protocol):
         """Receive the environment of the next episode; called before ``reset``."""
 
 
+class AttachedPolicy:
+    """Keeps the environment of the episode, for policies and planners that read it."""
+
+    _env: RoboIRGEnv | None = None
+
+    @property
+    def env(self) -> RoboIRGEnv:
+        """The environment of the episode."""
+        if self._env is None:
+            raise RuntimeError(f"{type(self).__name__} needs attach(env) before reset().")
+        return self._env
+
+    def attach(self, env: RoboIRGEnv) -> None:
+        """Receive the environment of the next episode."""
+        self._env = env
+
+
 def close_policy(policy: object) -> None:
     """Call the ``close`` of a policy or planner, if it has one."""
     close = getattr(policy, "close", None)

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,12 +15,10 @@ from roboirg.core.episode import HANDLES_HELD, PICKS, ROBOT, Primitive
 from roboirg.core.errors import MotionPlanningError
 from roboirg.core.observations import Demonstration, Observation
 from roboirg.core.subgoal_text import EMPTY_HAND, SCRIPTED_HANDS, UNKNOWN_WORDS, split_point
-from roboirg.policies.contract.base import EndKind, SubgoalEnd
+from roboirg.policies.contract.base import AttachedPolicy, EndKind, SubgoalEnd
 from roboirg.policies.hands.subgoal_words import WAIT_STEPS, Request, read_subgoal
 
 if TYPE_CHECKING:
-    from roboirg.envs.environment import RoboIRGEnv
-    from roboirg.simulation.expert.primitives import MotionPrimitives
     from roboirg.simulation.world import World
 
 REACH_PIXELS = 24
@@ -66,7 +64,7 @@ class _Underway:
     next: NDArray[np.float64] | None = None
 
 
-class ScriptedHands:
+class ScriptedHands(AttachedPolicy):
     """Executes subgoals of RoboMME's grammar on what their words or their point select.
 
     Privileged: it reads the poses of all objects, but neither the goal nor the instruction. A
@@ -80,32 +78,20 @@ class ScriptedHands:
 
     cameras: tuple[str, ...] = ()
     version = SCRIPTED_HANDS
+    metadata: ClassVar[Mapping[str, str]] = {"hands": "scripted"}
 
     def __init__(self, seed: int = 0) -> None:
         self.seed = seed
         self.endings: list[SubgoalEnd] = []
-        self._env: RoboIRGEnv | None = None
-        self._expert: MotionPrimitives | None = None
-        self._underway: _Underway | None = None
-        self._last: _Underway | None = None
-        self._began = 0
-
-    def attach(self, env: RoboIRGEnv) -> None:
-        """Receive the environment in which the expert acts."""
-        self._env = env
 
     def reset(self, instruction: str, demonstration: Demonstration) -> None:  # noqa: ARG002
         """Begin an episode; the instruction is the planner's."""
         from roboirg.simulation.expert.primitives import MotionPrimitives
 
-        world = self._world
-        self.endings, self._underway, self._last = [], None, None
-        self._expert, self._began = MotionPrimitives(world), world.elapsed
-
-    @property
-    def metadata(self) -> dict[str, Any]:
-        """What acts, for the records."""
-        return {"hands": "scripted"}
+        self.endings = []
+        self._underway: _Underway | None = None
+        self._last: _Underway | None = None
+        self._expert, self._began = MotionPrimitives(self._world), self._world.elapsed
 
     def usage(self) -> dict[str, float]:
         """Return how many subgoals were refused, and how many came to nothing."""
@@ -129,7 +115,10 @@ class ScriptedHands:
         if self._last is not None and _act_of(motion) == _act_of(self._last.motion):
             self._report(subgoal, "done", thing=thing)
             return
-        moves = self._wait(motion.steps) if motion.kind == "hold" else self._moves(motion)
+        if motion.kind == "hold":
+            moves = iter([self._still(motion.steps)] if motion.steps else [])
+        else:
+            moves = self._expert.execute(motion)
         self._underway = _Underway(subgoal, motion, thing, moves, self._world.elapsed)
 
     def settle(self) -> None:
@@ -148,7 +137,9 @@ class ScriptedHands:
             return
         if now.next is None:
             came = self._came_about(now)
-            self._end(now, "done" if came else "missed", "" if came else _why_missed(now.motion))
+            empty = "nothing is in the gripper"
+            why = empty if now.motion.kind in PICKS else "the motion had no effect"
+            self._end(now, "done" if came else "missed", "" if came else why)
 
     def act(self, observation: Observation) -> NDArray[np.floating[Any]]:  # noqa: ARG002
         """Return the next move; without a motion, actions that hold still."""
@@ -159,14 +150,8 @@ class ScriptedHands:
         return rows
 
     @property
-    def _attached(self) -> RoboIRGEnv:
-        if self._env is None:
-            raise RuntimeError("ScriptedHands needs attach(env) before reset().")
-        return self._env
-
-    @property
     def _world(self) -> World:
-        return self._attached.session.world
+        return self.env.session.world
 
     def _end(self, now: _Underway, how: EndKind, why: str) -> None:
         self._underway = None
@@ -234,28 +219,18 @@ class ScriptedHands:
         """Return the tool height at which this task's expert lets go of what it puts down."""
         from roboirg.tasks.choices import choices_of
 
-        motions = (one.primitives[0] for one in choices_of(self._attached.episode))
+        motions = (one.primitives[0] for one in choices_of(self.env.episode))
         heights = [one.height for one in motions if one.kind == "put_down"]
         return heights[0] if heights else Primitive("put_down", ROBOT).height
-
-    def _moves(self, motion: Primitive) -> Iterator[NDArray[np.float64]]:
-        if self._expert is None:
-            raise RuntimeError("ScriptedHands needs reset() before follow().")
-        return self._expert.execute(motion)
-
-    def _wait(self, steps: int) -> Iterator[NDArray[np.float64]]:
-        if steps:
-            yield self._still(steps)
 
     def _still(self, steps: int) -> NDArray[np.float64]:
         """Return actions that keep the arm and the gripper as they are."""
         arm = self._world.robot.arm_positions
-        gripper = 1.0 if self._expert is None else self._expert.gripper
-        return np.tile(np.append(arm, gripper), (steps, 1))
+        return np.tile(np.append(arm, self._expert.gripper), (steps, 1))
 
     def _came_about(self, now: _Underway) -> bool:
         """Return whether a motion had its effect."""
-        session, motion = self._attached.session, now.motion
+        session, motion = self.env.session, now.motion
         if motion.kind in ("press", "press_below"):
             pressed = Fact("pressed", motion.subject)
             late = (one for one in reversed(session.events) if one.step > now.since)
@@ -279,9 +254,3 @@ def _says_the_same(subgoal: str, other: str) -> bool:
 def _act_of(motion: Primitive) -> tuple[str, ...]:
     """Return what a motion does, however it gets there."""
     return motion.kind.removesuffix("_below"), motion.subject, motion.place or ""
-
-
-def _why_missed(motion: Primitive) -> str:
-    if motion.kind in PICKS:
-        return "nothing is in the gripper"
-    return "the motion had no effect"

@@ -6,25 +6,24 @@ import pkgutil
 from collections.abc import Mapping
 from typing import Any
 
-from pydantic import BaseModel
-
 from roboirg.core.errors import UnknownNameError
 from roboirg.policies.contract.option_checking import check_options
 from roboirg.policies.planners.planner import Planner
 
 _HERE = "roboirg.policies.planners"
 _OF_GOALS = ("listener", "forgetful", "first-mention", "last-mention", "elimination", "surface")
-OF_MODELS = ("qwen", "gemini", "memer", "stateless")
+OF_MODELS: Mapping[str, str] = {
+    kind: f"{_HERE}.model_planners:{kind.title()}Planner"
+    for kind in ("qwen", "gemini", "memer", "stateless")
+}
 """Planners that query a model."""
 
 PLANNERS: Mapping[str, str] = {
     "oracle": f"{_HERE}.oracle_planner:OraclePlanner",
     **dict.fromkeys(_OF_GOALS, f"{_HERE}.goal_planner:GoalPlanner"),
-    "fixed": f"{_HERE}.goal_planner:FixedPlanner",
-    **dict.fromkeys(OF_MODELS, f"{_HERE}.vlm_planner:VLMPlanner"),
+    **OF_MODELS,
 }
-"""Import paths of the classes. ``options_type`` is the type of a class's options, and ``settings``,
-if it has that, the defaults that belong to a kind."""
+"""Import paths of the classes; ``options_type`` is the type of a class's options."""
 
 
 def make_planner(kind: str, options: Mapping[str, Any], origin: str, seed: int = 0) -> Planner:
@@ -43,7 +42,6 @@ def make_planner(kind: str, options: Mapping[str, Any], origin: str, seed: int =
     if kind not in PLANNERS:
         raise UnknownNameError("planner", kind, PLANNERS)
     planner_class = pkgutil.resolve_name(PLANNERS[kind])
-    options_type: type[BaseModel] = planner_class.options_type
-    values = {**getattr(planner_class, "settings", {}).get(kind, {}), **options}
-    planner: Planner = planner_class(check_options(options_type, values, origin), kind, seed)
+    checked = check_options(planner_class.options_type, options, origin)
+    planner: Planner = planner_class(checked, kind, seed)
     return planner

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import functools
+from collections import Counter
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, cast
 
@@ -40,7 +42,7 @@ class HierarchicalPolicy:
     """Gets a subgoal from the planner before each chunk and passes it to the policy.
 
     The needs of both are merged: the environment shows what either needs, and each receives its
-    own part. Costs are added.
+    own part. Costs are added. Together they are privileged if either is.
 
     Args:
         planner: names subgoals.
@@ -65,6 +67,8 @@ class HierarchicalPolicy:
                 "subgoals from a planner."
             )
         self.planner, self.policy, self.name = planner, policy, name
+        if any(hasattr(one, "attach") for one in (planner, policy)):
+            self.attach = functools.partial(_attach, (planner, policy))
         own, of_planner = PolicyNeeds.of(policy), PolicyNeeds.of_planner(planner)
         self._parts = of_planner, own
         self.needs = own.merge(of_planner)
@@ -73,9 +77,6 @@ class HierarchicalPolicy:
             # Only the history shows how many control steps an action took.
             self.needs = replace(self.needs, observe_every=1)
         self.needs.declare_on(self)
-        self._observed = self._step = self._rows = 0
-        self.subgoal: str | None = None
-        self._told, self._gave_up = 0, False
         reports = isinstance(policy, ReportingFollower)
         if getattr(planner, "asked", None) == WHEN_DONE and not reports:
             raise InvalidValueError(
@@ -105,7 +106,7 @@ class HierarchicalPolicy:
 
     def reset(self, instruction: str, demonstration: Demonstration) -> None:
         """Begin an episode with both."""
-        self.subgoal = None
+        self.subgoal: str | None = None
         self._observed = self._step = self._rows = self._told = 0
         self._gave_up = False
         views = [
@@ -146,7 +147,7 @@ class HierarchicalPolicy:
         for _ in range(MOST_REFUSALS):
             self._tell()
             subgoal = self.planner.plan(view, self._step)
-            if subgoal is None or not isinstance(self.policy, SubgoalFollower):
+            if subgoal is None:
                 return
             self.subgoal = subgoal
             self.policy.follow(subgoal)
@@ -160,19 +161,16 @@ class HierarchicalPolicy:
         """Tell the planner how its subgoals ended."""
         new = self.endings[self._told :]
         self._told += len(new)
-        for end in new:
-            if hasattr(self.planner, "learn"):
-                # Names of objects are the world's: they would do the remembering.
-                self.planner.learn(end._replace(thing=None))
+        for end in new if hasattr(self.planner, "learn") else ():
+            # Names of objects are the world's: they would do the remembering.
+            self.planner.learn(end._replace(thing=None))  # type: ignore[attr-defined]
 
     def usage(self) -> dict[str, float]:
         """Return the cost of both."""
-        total: dict[str, float] = {}
+        total: Counter[str] = Counter()
         for one in (self.planner, self.policy):
-            usage = one.usage() if hasattr(one, "usage") else {}
-            for name, value in usage.items():
-                total[name] = total.get(name, 0) + value
-        return total
+            total.update(one.usage() if hasattr(one, "usage") else {})
+        return dict(total)
 
     def close(self) -> None:
         """Close both, the second even if closing the first fails."""
@@ -182,28 +180,14 @@ class HierarchicalPolicy:
             close_policy(self.policy)
 
 
-class PrivilegedHierarchicalPolicy(HierarchicalPolicy):
-    """A planner and a policy of which at least one is privileged."""
-
-    def attach(self, env: RoboIRGEnv) -> None:
-        """Pass the environment on."""
-        for one in (self.planner, self.policy):
-            if hasattr(one, "attach"):
-                one.attach(env)
+def _attach(parts: tuple[object, ...], env: RoboIRGEnv) -> None:
+    """Pass the environment on; no method, as the cycle would keep the world."""
+    for one in parts:
+        if hasattr(one, "attach"):
+            one.attach(env)
 
 
 def joint_version(*parts: object) -> str:
     """Return the versions of a planner and its policy as one, of their files if they have none."""
     found = (read_version(one) or file_fingerprint(one) or UNKNOWN_VERSION for one in parts)
     return BETWEEN_VERSIONS.join(found)
-
-
-def with_planner(planner: Planner, policy: Policy, name: str | None = None) -> HierarchicalPolicy:
-    """Join a planner and a policy; the result is privileged if either is.
-
-    Raises:
-        InvalidValueError: the policy has no method ``follow``.
-    """
-    privileged = any(hasattr(one, "attach") for one in (planner, policy))
-    kind = PrivilegedHierarchicalPolicy if privileged else HierarchicalPolicy
-    return kind(planner, policy, name)

@@ -11,7 +11,7 @@ from roboirg.core.episode import HANDLES_HELD, Stage
 from roboirg.core.errors import InvalidValueError
 from roboirg.core.observations import Demonstration, Observation
 from roboirg.core.subgoal_text import EMPTY_HAND
-from roboirg.policies.contract.base import SubgoalEnd
+from roboirg.policies.contract.base import AttachedPolicy, SubgoalEnd
 
 if TYPE_CHECKING:
     from roboirg.envs.environment import RoboIRGEnv
@@ -33,7 +33,7 @@ class OracleOptions(BaseModel):
     subgoals: Subgoals = "grounded"
 
 
-class OraclePlanner:
+class OraclePlanner(AttachedPolicy):
     """Returns the judge's current stage as a subgoal. Privileged.
 
     To hands that report, it says how many steps to wait, and names the pick again where what it
@@ -52,19 +52,11 @@ class OraclePlanner:
     ) -> None:
         self.options, self.kind = options or OracleOptions(), kind
         self.grounded = self.options.subgoals == "grounded"
-        self._env: RoboIRGEnv | None = None
         self._last: SubgoalEnd | None = None
 
     @property
     def metadata(self) -> dict[str, Any]:
         return {"kind": self.kind, **self.options.model_dump(mode="json")}
-
-    @property
-    def env(self) -> RoboIRGEnv:
-        """The environment of the episode."""
-        if self._env is None:
-            raise RuntimeError(f"{type(self).__name__} needs attach(env) before plan().")
-        return self._env
 
     def attach(self, env: RoboIRGEnv) -> None:
         """Receive the environment.
@@ -77,7 +69,7 @@ class OraclePlanner:
                 "The oracle planner needs pixels, which the environment does not provide; make it "
                 "with grounded=True, or set subgoals=simple."
             )
-        self._env = env
+        super().attach(env)
 
     def reset(self, instruction: str, demonstration: Demonstration) -> None:  # noqa: ARG002
         """Begin an episode."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 import tomllib
 from collections.abc import Mapping
 from importlib import resources
+from importlib.abc import Traversable
 from pathlib import Path
 from typing import Any
 from urllib.parse import urlencode
@@ -26,44 +27,20 @@ SHORTCUTS: Mapping[str, str] = {VLM: "planner.model.base_url", MODEL: "planner.m
 OPTIONS = (SERVER, HANDS, *SHORTCUTS, "policy.OPTION", "planner.OPTION", "planner.model.OPTION")
 
 
-class Published(BaseModel):
-    """Origin of a system, and the commands that start its servers.
-
-    Attributes:
-        checkpoint: of the policy, in its public release.
-        server: command that serves the policy, in the release's repository.
-        vlm: command that serves the planner's model, if it is served locally.
-        flags: of RoboMME's own client, specific to this system.
-        differs: differences of this configuration from the release.
-    """
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
-
-    checkpoint: str
-    server: str
-    vlm: str | None = None
-    flags: str
-    differs: str = ""
-
-
 class System(BaseModel):
     """A system to evaluate.
 
     Attributes:
         name: as on the command line.
-        about: one sentence.
         policy: spec of the low-level policy.
         planner: ``kind`` and options of its planner, or None.
-        published: its origin; None for systems of your own.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
     name: str
-    about: str
     policy: str
     planner: dict[str, Any] | None = None
-    published: Published | None = None
 
 
 def all_systems() -> tuple[str, ...]:
@@ -87,19 +64,16 @@ def find_system(name_or_file: str, overrides: Mapping[str, str]) -> System:
         UnknownNameError: there is no such system or option.
         InvalidValueError: the file cannot be read, or an option has an invalid value.
     """
+    file: Path | Traversable = Path(name_or_file)
     if name_or_file in all_systems():
         file = resources.files(PACKAGE).joinpath(FOLDER, f"{name_or_file}{SUFFIX}")
-        content = file.read_bytes()
-    elif name_or_file.endswith(SUFFIX):
-        try:
-            content = Path(name_or_file).read_bytes()
-        except OSError as error:
-            raise InvalidValueError(f"System {name_or_file!r} cannot be read ({error}).") from error
-    else:
+    elif not name_or_file.endswith(SUFFIX):
         raise UnknownNameError("system", name_or_file, [*all_systems(), f"FILE{SUFFIX}"])
     try:
-        entries = tomllib.loads(content.decode())
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        entries = tomllib.loads(file.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise InvalidValueError(f"System {name_or_file!r} cannot be read ({error}).") from error
+    except ValueError as error:  # not Unicode, or not TOML
         raise InvalidValueError(f"System {name_or_file!r} is not TOML ({error}).") from error
     origin = f"system {name_or_file}"
     return _overridden(check_options(System, entries, origin), overrides, origin)
@@ -129,12 +103,9 @@ def _policy_with(spec: str, option: str, value: str, origin: str) -> str:
             f"Option {option!r}: the policy of {origin} is {spec!r}, which is not a URL."
         )
     url = split_url(spec)
-    place, options = url.place, dict(url.options)
-    if option == SERVER:
-        place = value
-    else:
-        options[option.removeprefix(POLICY)] = value
-    query = urlencode(options)
+    place = value if option == SERVER else url.place
+    changed = {} if option == SERVER else {option.removeprefix(POLICY): value}
+    query = urlencode({**url.options, **changed})
     return f"{url.scheme}://{place}" + (f"?{query}" if query else "")
 
 

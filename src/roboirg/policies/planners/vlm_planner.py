@@ -3,24 +3,28 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
-from dataclasses import dataclass, field
-from typing import Any
+from abc import ABC, abstractmethod
+from collections.abc import Iterable, Iterator
+from typing import Annotated, Any, ClassVar, Generic, Literal, TypeVar
 
-from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
+from pydantic import BaseModel, ConfigDict, Field
 
+from roboirg.core.environment_options import DemonstrationFrames
 from roboirg.core.observations import Demonstration, Observation
 from roboirg.core.subgoal_text import split_point
 from roboirg.policies.contract.base import SubgoalEnd
-from roboirg.policies.planners.memories import FINISHED, MEMORIES
-from roboirg.policies.planners.memory import Memory, MemoryOptions
 from roboirg.policies.planners.planner import EACH_CHUNK, WHEN_DONE
-from roboirg.policies.vlm.models import ModelOptions
+from roboirg.policies.planners.points import says_finished
+from roboirg.policies.vlm.model_content import ChatTurn, Part, summary_clip
+from roboirg.policies.vlm.models import ModelOptions, ModelQuery
 from roboirg.policies.vlm.models.model import config_version
-from roboirg.policies.vlm.prompt_files import load_prompts
+from roboirg.policies.vlm.prompt_files import SHARED, load_prompts
 from roboirg.policies.vlm.vlm_query import VLMQuery
+from roboirg.util.json_reply import UnparsableReplyError
+from roboirg.util.media import Clip, Pixels
 
-_EVERY = re.compile(r"every (\d+) steps")
+FINISHED = ""
+"""Stands for the answer that the task is complete."""
 MOST_USELESS = 5
 """Unusable replies in a row after which a planner that is asked when done asks no more."""
 
@@ -35,145 +39,70 @@ class SubgoalHold(BaseModel):
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
-    says: str
+    says: re.Pattern[str]
     until: int = Field(ge=0)
 
-    @field_validator("says")
-    @classmethod
-    def _compiles(cls, says: str) -> str:
-        try:
-            re.compile(says)
-        except re.error as error:
-            raise ValueError(f"{says!r} is not a regular expression ({error})") from error
-        return says
+
+Asked = Annotated[str, Field(pattern=rf"^({EACH_CHUNK}|{WHEN_DONE}|every [1-9]\d* steps)$")]
 
 
-HOLDS = (
-    SubgoalHold(says="press the button", until=90),
-    SubgoalHold(says="press the first button", until=100),
-    SubgoalHold(says="press the second button", until=250),
-)
-"""MME-VLA's rules for ButtonUnmask and ButtonUnmaskSwap, by the text of the subgoal, as a policy
-does not know its task. Only these tasks have such subgoals."""
-
-
-class PlannerOptions(MemoryOptions):
+class PlannerOptions(BaseModel):
     """Options of a planner that queries a model.
 
     Attributes:
         model: the model and its options.
+        subgoals: ``grounded``, with pixels, or ``simple``.
         asked: when it is queried: ``each-chunk``; ``when-done``, once its policy has reported the
             end of a subgoal, or something has been said; or ``every N steps``.
-        keep: chunks per query; the subgoal stays in between.
         first_pause: control steps before which there is no second query.
         holds: rules that keep a subgoal.
         prompts: a file with other prompts, or None for our own.
     """
 
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
     model: ModelOptions
-    asked: str = EACH_CHUNK
-    keep: int = Field(default=1, ge=1)
+    subgoals: Literal["grounded", "simple"] = "grounded"
+    asked: Asked = EACH_CHUNK
     first_pause: int = Field(default=0, ge=0)
     holds: tuple[SubgoalHold, ...] = ()
     prompts: str | None = None
 
-    @field_validator("asked")
-    @classmethod
-    def _is_a_time(cls, asked: str) -> str:
-        found = _EVERY.fullmatch(asked)
-        if asked in (EACH_CHUNK, WHEN_DONE) or (found is not None and int(found[1])):
-            return asked
-        raise ValueError(f"it must be {EACH_CHUNK}, {WHEN_DONE} or 'every N steps'")
 
-    @model_validator(mode="after")
-    def _has_no_idle_option(self) -> PlannerOptions:
-        known = MEMORIES[self.remembers].options
-        idle = self.model_fields_set & set(MemoryOptions.model_fields) - set(known)
-        if idle:
-            raise ValueError(
-                f"a planner that remembers {self.remembers} has no option {min(idle)}; it has "
-                f"{', '.join(known)}"
-            )
-        return self
-
-    @property
-    def period(self) -> int | None:
-        """Control steps between queries; None if no number of steps decides."""
-        found = _EVERY.fullmatch(self.asked)
-        return None if found is None else int(found[1])
+Options = TypeVar("Options", bound=PlannerOptions)
 
 
-SETTINGS: Mapping[str, Mapping[str, Any]] = {
-    "qwen": {"remembers": "subgoals", "holds": HOLDS},
-    # MME-VLA has the pause for the tasks with a long first action (eight of ours, all but StopCube,
-    # VideoUnmask and VideoUnmaskSwap); a policy does not know its task, so it holds for all.
-    "gemini": {"remembers": "conversation", "asked": "every 48 steps", "first_pause": 75},
-    "memer": {"remembers": "keyframes"},
-    "stateless": {"remembers": "pictures", "asked": WHEN_DONE},
-}
-"""The named settings: options that differ from the defaults."""
-
-
-@dataclass
-class _Planning:
-    """State of one episode.
-
-    Attributes:
-        instruction: everything that was said.
-        subgoal: the last one.
-        ends: how subgoals ended, each once.
-        chunks: chunks of the policy so far.
-        periods: number of the last period of ``every N steps``.
-        useless: unusable replies in a row.
-        news: whether something has happened on which ``when-done`` waits.
-        refused: whether the last subgoal was refused.
-        finished: whether the model said that the task is complete.
-    """
-
-    instruction: str
-    subgoal: str | None = None
-    ends: list[SubgoalEnd] = field(default_factory=list)
-    chunks: int = 0
-    periods: int = 0
-    useless: int = 0
-    news: bool = False
-    refused: bool = False
-    finished: bool = False
-
-
-class VLMPlanner:
+class VLMPlanner(ABC, Generic[Options]):
     """Queries a model for subgoals, with pictures of the front camera only.
 
     If the model gives no usable subgoal even at the second try, the last one stays.
 
     Args:
         options: when it asks, what it remembers, and its model.
-        kind: name of its setting, for the records.
+        kind: name of its prompts, also for the records.
         seed: unused.
+
+    Attributes:
+        subgoal: the last one; None before the first, and when the task is complete.
+        instruction: everything that was said.
+        ends: how subgoals ended, each once.
+        video: the demonstration's frames; None without one.
 
     Raises:
         InvalidValueError: the prompts cannot be read.
     """
 
-    options_type = PlannerOptions
-    settings = SETTINGS
+    options_type: ClassVar[type[PlannerOptions]]
     cameras = ("front",)
     reports = False
+    demonstration_frames: DemonstrationFrames = "all"
 
-    def __init__(self, options: PlannerOptions, kind: str, seed: int = 0) -> None:  # noqa: ARG002
-        self.options, self.kind = options, kind
-        memory_class = MEMORIES[options.remembers]
-        self.prompts = load_prompts(memory_class.prompts, options.prompts)
-        self.memory: Memory = memory_class(options, self.prompts)
-        self.observe_every = self.memory.observe_every
-        self.demonstration_frames = self.memory.demonstration_frames
+    def __init__(self, options: Options, kind: str, seed: int = 0) -> None:  # noqa: ARG002
+        self.options, self.kind, self.asked = options, kind, options.asked
+        self.prompts, self.shared = load_prompts(kind, options.prompts), load_prompts(SHARED)
+        self.fill = self.prompts.fill
         self.vlm = VLMQuery(options.model, self.prompts["again"])
-        self._now = _Planning("")
-
-    @property
-    def asked(self) -> str:
-        """When it is queried."""
-        return self.options.asked
+        VLMPlanner.reset(self, "", {})
 
     @property
     def version(self) -> str:
@@ -183,53 +112,52 @@ class VLMPlanner:
     @property
     def metadata(self) -> dict[str, Any]:
         """Options and prompts; there is no key among them."""
-        idle = set(MemoryOptions.model_fields) - set(self.memory.options)
-        own = self.options.model_dump(mode="json", exclude={"model", "prompts", *idle})
         return {
             "kind": self.kind,
             "model": self.options.model.about(),
-            "prompts": f"{self.prompts.fingerprint}-{self.memory.shared.fingerprint}",
-            **own,
+            "prompts": f"{self.prompts.fingerprint}-{self.shared.fingerprint}",
+            **self.options.model_dump(mode="json", exclude={"model", "prompts"}),
         }
 
     def reset(self, instruction: str, demonstration: Demonstration) -> None:
         """Forget the last episode and begin another."""
         self.vlm.start()
-        self._now = _Planning(instruction)
-        self.memory.begin(demonstration)
+        self.instruction = instruction
+        self.subgoal: str | None = None
+        self.ends: list[SubgoalEnd] = []
+        self._periods = self._useless = 0
+        self._news = self._refused = self._finished = False
+        seen = len(demonstration.get("joint_positions", ()))
+        self.video: Pixels | None = demonstration["front_rgb"] if seen else None
+        self._summary: Clip | None = None
 
     def hear(self, text: str, step: int) -> None:  # noqa: ARG002
         """Remember an utterance; the next query quotes everything that was said."""
-        self._now.instruction = f"{self._now.instruction} {text}"
-        self._now.news = True
+        self.instruction = f"{self.instruction} {text}"
+        self._news = True
 
     def learn(self, end: SubgoalEnd) -> None:
         """Remember how a subgoal ended; one that stands is done once."""
-        self._now.news = True
-        self._now.refused = end.how == "refused"
-        if not self._now.ends or self._now.ends[-1][:3] != end[:3]:
-            self._now.ends.append(end)
+        self._news = True
+        self._refused = end.how == "refused"
+        if not self.ends or self.ends[-1][:3] != end[:3]:
+            self.ends.append(end)
 
     def plan(self, observation: Observation, step: int) -> str | None:
         """Return the subgoal from now on: a new one if a query is due, else the last."""
-        now = self._now
-        if not now.refused:
-            self.memory.watch(observation, step)
-            is_turn = now.chunks % self.options.keep == 0
-            now.chunks += 1
-            if now.finished or not (is_turn and self._due(step)):
-                return now.subgoal
-        now.news = now.refused = False
-        query = self.memory.query(observation, now.instruction, now.ends)
-        answer = self.vlm.ask(query, lambda text: self.memory.parse(text, now.subgoal))
-        if answer is None:
-            now.useless += 1
-            now.news = True
+        if not self._refused:
+            self.watch(observation, step)
+            if self._finished or not self._due(step):
+                return self.subgoal
+        self._news = self._refused = False
+        subgoal = self.vlm.ask(self.query(observation), self.take)
+        if subgoal is None:
+            self._useless += 1
+            self._news = True
         else:
-            subgoal = self.memory.keep(answer, now.instruction)
-            now.useless, now.finished = 0, subgoal == FINISHED
-            now.subgoal = None if now.finished else subgoal
-        return now.subgoal
+            self._useless, self._finished = 0, subgoal == FINISHED
+            self.subgoal = subgoal or None
+        return self.subgoal
 
     def usage(self) -> dict[str, float]:
         """Return the cost of the episode, and how the planning ended, if the model ended it.
@@ -237,26 +165,67 @@ class VLMPlanner:
         ``finished``: it said that the task is complete; ``unreadable``: its last replies were of no
         use.
         """
-        ended = {"finished": self._now.finished, "unreadable": self._now.useless > 0}
+        ended = {"finished": self._finished, "unreadable": self._useless > 0}
         return {**self.vlm.usage(), **{name: 1.0 for name, holds in ended.items() if holds}}
 
     def close(self) -> None:
         self.vlm.close()
 
+    def watch(self, observation: Observation, step: int) -> None:
+        """Record an observation; called at every chunk, with or without a query."""
+
+    @abstractmethod
+    def query(self, observation: Observation) -> ModelQuery:
+        """Return the next query."""
+
+    @abstractmethod
+    def take(self, text: str) -> str:
+        """Return the subgoal of the reply to the last query, with pixels, and remember it.
+
+        Raises:
+            UnparsableReplyError: the reply holds no subgoal; nothing is remembered of it.
+        """
+
+    def forms(self) -> dict[str, str]:
+        """Return the forms of subgoals, one per line, and the prompt about points."""
+        text = "\n".join(f"- {form}" for form in self.shared.lines("forms"))
+        if self.options.subgoals == "simple":
+            text = text.replace(" [at]", "")
+        return {"forms": text, "places": self.fill(self.options.subgoals)}
+
+    def goal(self) -> str:
+        """Return the prompt with everything that was said."""
+        return self.fill("goal", instruction=self.instruction)
+
+    def video_parts(self, most: int) -> Iterator[Part]:
+        """Yield the demonstration as a clip of at most `most` frames, encoded once."""
+        if self.video is not None:
+            self._summary = self._summary or summary_clip(self.video, most, len(self.video))
+            yield self.fill("video")
+            yield self._summary
+
+    def single(self, parts: Iterable[Part], schema: dict[str, Any] | None = None) -> ModelQuery:
+        """Return a query of one turn."""
+        return ModelQuery(self.fill("system"), (ChatTurn("user", tuple(parts)),), schema)
+
+    def finishes(self, subgoal: str) -> bool:
+        """Return whether a subgoal says that the task is complete; not before anything was done."""
+        is_end = says_finished(subgoal)
+        if is_end and self.subgoal is None:
+            raise UnparsableReplyError("Nothing has been done yet.")
+        return is_end
+
     def _due(self, step: int) -> bool:
         """Return whether to query the model now."""
-        now, period = self._now, self.options.period
-        is_new = period is None or step // period > now.periods
-        now.periods = 0 if period is None else step // period
-        waits = self.options.asked == WHEN_DONE
-        if waits and now.useless >= MOST_USELESS:
+        waits, period = self.asked == WHEN_DONE, re.search(r"\d+", self.asked)
+        number = step // int(period[0]) if period else 0
+        is_new = period is None or number > self._periods
+        self._periods = number
+        if waits and self._useless >= MOST_USELESS:
             return False
-        if now.subgoal is None:
+        if self.subgoal is None:
             return True
-        words, _ = split_point(now.subgoal)
-        is_held = any(
-            step <= one.until and re.fullmatch(one.says, words) for one in self.options.holds
-        )
-        return (
-            is_new and (now.news or not waits) and step >= self.options.first_pause and not is_held
-        )
+        words, _ = split_point(self.subgoal)
+        is_held = any(step <= one.until and one.says.fullmatch(words) for one in self.options.holds)
+        is_early = step < self.options.first_pause
+        return is_new and (self._news or not waits) and not is_early and not is_held

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from roboirg.apps.learning.policy.recording import LOOK_EVERY
 from roboirg.apps.learning.policy.subgoals import POINT_NUMBERS
-from roboirg.policies.planners.memories import merge_keyframes
+from roboirg.policies.planners.model_planners import merge_keyframes
 from roboirg.util.media import evenly_spaced
 
 VIDEO_FRAMES, SWITCHES, KEYS, RECENT = 10, 4, 16, 8

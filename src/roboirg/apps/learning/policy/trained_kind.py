@@ -15,7 +15,7 @@ from roboirg.core.actions import JOINT_ANGLE, WAYPOINT
 from roboirg.core.errors import InvalidValueError, UnknownNameError
 from roboirg.core.policy_ref import HANDS
 from roboirg.policies.by_name.policy_kinds import PolicyKind, PolicyMaker, make_follower
-from roboirg.policies.planners.hierarchical_policy import HierarchicalPolicy, with_planner
+from roboirg.policies.planners.hierarchical_policy import HierarchicalPolicy
 
 if TYPE_CHECKING:
     from roboirg.apps.learning.policy.policy_model import PolicyModel
@@ -45,7 +45,7 @@ def _trained(spec: str, name: str, options: Mapping[str, str]) -> PolicyMaker:
             raise InvalidValueError(
                 f"Policy {spec!r} has no planner for other hands; learn one with --memory subgoal."
             )
-        return with_planner(LearnedPlanner(model, version), make_follower(hands, seed), spec)
+        return HierarchicalPolicy(LearnedPlanner(model, version), make_follower(hands, seed), spec)
 
     return make
 

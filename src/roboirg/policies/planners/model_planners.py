@@ -1,0 +1,355 @@
+"""The four planners that query a model: what each keeps of an episode, and what it asks."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Iterator, Mapping
+from fractions import Fraction
+from typing import Any
+
+import numpy as np
+from pydantic import Field
+
+from roboirg.core.observations import Demonstration, Observation
+from roboirg.core.subgoal_text import split_point
+from roboirg.policies.planners.planner import WHEN_DONE
+from roboirg.policies.planners.points import normalize_subgoal, parse_boxes, parse_points
+from roboirg.policies.planners.vlm_planner import (
+    FINISHED,
+    Asked,
+    PlannerOptions,
+    SubgoalHold,
+    VLMPlanner,
+)
+from roboirg.policies.vlm.model_content import ChatTurn, Part
+from roboirg.policies.vlm.models import ModelQuery
+from roboirg.util.json_reply import UnparsableReplyError, json_object, text_of
+from roboirg.util.media import VIDEO_RATE, Clip, Picture, Pixels, contact_sheets, evenly_spaced
+
+TEXT: Mapping[str, Any] = {"type": "string"}
+"""Schema of a field with words."""
+MIN_CLIP_FRAMES = 4
+"""With fewer frames a conversation gets only the last, as a picture."""
+MAX_GAP = 8
+"""Largest gap between neighbors of a group, control steps (MME-VLA; a comment there says 10)."""
+HOLDS = tuple(
+    SubgoalHold(says=re.compile(says), until=until)
+    for says, until in (
+        ("press the button", 90),
+        ("press the first button", 100),
+        ("press the second button", 250),
+    )
+)
+"""MME-VLA's rules for ButtonUnmask and ButtonUnmaskSwap, by the text of the subgoal, as a policy
+does not know its task. Only these tasks have such subgoals."""
+
+
+class QwenOptions(PlannerOptions):
+    """Options of the planner in QwenVL's style.
+
+    Attributes:
+        video_frames: maximum of demonstration frames.
+    """
+
+    holds: tuple[SubgoalHold, ...] = HOLDS
+    video_frames: int = Field(default=10, ge=1)
+
+
+class QwenPlanner(VLMPlanner[QwenOptions]):
+    """Remembers the subgoals that it named: QwenVL-style. Points come in box tokens."""
+
+    options_type = QwenOptions
+
+    def reset(self, instruction: str, demonstration: Demonstration) -> None:
+        """Begin an episode."""
+        super().reset(instruction, demonstration)
+        self._history: list[str] = []
+
+    def query(self, observation: Observation) -> ModelQuery:
+        """Show demonstration, task, past subgoals and the newest picture."""
+        history = "; ".join(f"{number}. {one}" for number, one in enumerate(self._history, 1))
+        said = self.fill("history", history=history) if history else self.fill("first")
+        video = self.video_parts(self.options.video_frames)
+        now = (self.fill("now"), Picture(front_picture(observation)))
+        return self.single((*video, self.goal(), said, *now, self.fill("question", **self.forms())))
+
+    def take(self, text: str) -> str:
+        """Return the subgoal; add it to the history if its words are new."""
+        subgoal = parse_boxes(text)
+        last = parse_boxes(self._history[-1]) if self._history else ""
+        if not last or split_point(last)[0] != split_point(subgoal)[0]:
+            self._history.append(normalize_subgoal(text))
+        return subgoal
+
+
+class GeminiOptions(PlannerOptions):
+    """Options of the planner in Gemini's style.
+
+    MME-VLA has the pause for the tasks with a long first action (eight of ours, all but StopCube,
+    VideoUnmask and VideoUnmaskSwap); a policy does not know its task, so it holds for all.
+
+    Attributes:
+        observe_every: control steps between the frames of clips.
+    """
+
+    asked: Asked = "every 48 steps"
+    first_pause: int = Field(default=75, ge=0)
+    observe_every: int = Field(default=1, ge=1)
+
+
+class GeminiPlanner(VLMPlanner[GeminiOptions]):
+    """Keeps one conversation, with clips of what has happened since the last turn: Gemini-style.
+
+    Turns stay, except for queries without a usable reply, whose frames are sent with the next.
+    """
+
+    options_type = GeminiOptions
+
+    def __init__(self, options: GeminiOptions, kind: str, seed: int = 0) -> None:
+        super().__init__(options, kind, seed)
+        self.observe_every = options.observe_every
+        self.demonstration_frames = "all" if options.observe_every == 1 else options.observe_every
+
+    def reset(self, instruction: str, demonstration: Demonstration) -> None:
+        """Begin a new conversation, without frames of the last episode."""
+        super().reset(instruction, demonstration)
+        self._frames: list[Pixels] = []
+        self._turns: list[ChatTurn] = []
+        self._quoted = ""
+
+    def watch(self, observation: Observation, step: int) -> None:
+        """Keep the frames since the last call."""
+        frames = [front_picture(earlier) for earlier in observation.get("history", ())]
+        # The last picture is in the history only if the chunk ends at a multiple of the period.
+        if not frames or step % self.options.observe_every:
+            frames.append(front_picture(observation))
+        self._frames += frames
+
+    def query(self, observation: Observation) -> ModelQuery:
+        """Add a turn with the frames since the last one."""
+        self._frames = self._frames or [front_picture(observation)]
+        schema = _schema(description=TEXT, subgoal=TEXT)
+        if not self._turns:
+            schema = _schema(subgoal_sequence=_list_of(TEXT), subgoal=TEXT)
+        self._turn = ChatTurn("user", tuple(self._parts("next" if self._turns else "first")))
+        system = self.fill("system", **self.forms())
+        return ModelQuery(system, (*self._turns, self._turn), schema)
+
+    def take(self, text: str) -> str:
+        """Return the subgoal, the last one if all is done; keep the turn and its reply."""
+        subgoal = parse_points(text_of(json_object(text), "subgoal"))
+        if self.finishes(subgoal):
+            subgoal = str(self.subgoal)
+        self._turns += [self._turn, ChatTurn("model", (text,))]
+        self._quoted, self._frames = self.instruction, []
+        return subgoal
+
+    def _parts(self, when: str) -> Iterator[Part]:
+        frames, has_clip = self._frames, len(self._frames) >= MIN_CLIP_FRAMES
+        clip = "clip"
+        if when == "first":
+            clip, has_clip = "video", self.video is not None
+            frames = [*(() if self.video is None else self.video), *frames]
+        if self._quoted != self.instruction:  # the first turn, or more has been said since
+            yield self.goal()
+        yield self.fill(f"{when}_{clip}" if has_clip else f"{when}_picture")
+        rate = Fraction(VIDEO_RATE, self.options.observe_every)
+        yield Clip(np.stack(frames), rate) if has_clip else Picture(frames[-1])
+        yield self.fill(f"{when}_question")
+
+
+class MemerOptions(PlannerOptions):
+    """Options of the planner in MemER's style.
+
+    Attributes:
+        video_frames: maximum of demonstration frames.
+        recent: recent frames that are sent along with key frames, the newest included.
+        stride: control steps between them.
+        near: largest gap between the key frames of one event, control steps.
+        most: maximum of key frames, the newest; None keeps all, like MME-VLA.
+    """
+
+    video_frames: int = Field(default=10, ge=1)
+    recent: int = Field(default=8, ge=1)
+    stride: int = Field(default=2, ge=1)
+    near: int = Field(default=MAX_GAP, ge=0)
+    most: int | None = Field(default=None, ge=1)
+
+
+class MemerPlanner(VLMPlanner[MemerOptions]):
+    """Remembers the frames that the model chooses among the recent ones: MemER-style.
+
+    Attributes:
+        frames: the key frames by control step.
+    """
+
+    options_type = MemerOptions
+
+    @property
+    def observe_every(self) -> int:
+        """Control steps between the recent frames."""
+        return self.options.stride
+
+    def reset(self, instruction: str, demonstration: Demonstration) -> None:
+        """Clear the memory."""
+        super().reset(instruction, demonstration)
+        self.frames: dict[int, Pixels] = {}
+        self._recent: dict[int, Pixels] = {}
+        self._last_step = 0
+
+    def watch(self, observation: Observation, step: int) -> None:
+        """Keep the frames to send: the newest, and those at multiples of the stride before it."""
+        for earlier in observation.get("history", ()):
+            self._last_step += self.options.stride
+            self._recent[self._last_step] = front_picture(earlier)
+        self._recent[step] = front_picture(observation)
+        # The history has no frames at odd distances from the newest; the nearest before serve.
+        kept = {
+            max((at for at in self._recent if at <= step - back * self.options.stride), default=-1)
+            for back in range(self.options.recent)
+        }
+        self._recent = {at: self._recent[at] for at in sorted(kept & self._recent.keys())}
+
+    def query(self, observation: Observation) -> ModelQuery:  # noqa: ARG002
+        """Show the demonstration, the task, the key frames and the recent frames."""
+        position = {"type": "integer", "enum": list(range(1, len(self._recent) + 1))}
+        schema = _schema(current_subtask=TEXT, keyframe_positions=_list_of(position))
+        return self.single(self._parts(), schema)
+
+    def take(self, text: str) -> str:
+        """Return the subgoal; add the chosen frames, which are counted from 1."""
+        reply, count = json_object(text), len(self._recent)
+        subgoal = parse_boxes(text_of(reply, "current_subtask"))
+        positions = reply.get("keyframe_positions")
+        if not isinstance(positions, list):
+            raise UnparsableReplyError(
+                "The field 'keyframe_positions' has to be a list of numbers."
+            )
+        if any(type(one) is not int or not 1 <= one <= count for one in positions):
+            raise UnparsableReplyError(f"Positions of frames are whole numbers from 1 to {count}.")
+        steps = tuple(self._recent)
+        frames = self.frames | {steps[one - 1]: self._recent[steps[one - 1]] for one in positions}
+        kept = merge_keyframes(frames, self.options.near)[-(self.options.most or len(frames)) :]
+        self.frames = {step: frames[step] for step in kept}
+        return subgoal
+
+    def _parts(self) -> Iterator[Part]:
+        yield from self.video_parts(self.options.video_frames)
+        yield self.goal()
+        for name, frames in (("remembered", self.frames), ("recent", self._recent)):
+            yield self.fill(f"{name}_begin")
+            yield from (Picture(frame) for frame in frames.values())
+            yield self.fill(f"{name}_end")
+        yield self.fill("question", count=str(len(self._recent)), **self.forms())
+
+
+class StatelessOptions(PlannerOptions):
+    """Options of the planner that is asked when a subgoal has ended.
+
+    Attributes:
+        video_frames: maximum of demonstration frames.
+        observe_every: control steps between the remembered pictures.
+        past: maximum of remembered pictures, evenly spread.
+    """
+
+    asked: Asked = WHEN_DONE
+    video_frames: int = Field(default=10, ge=1)
+    observe_every: int = Field(default=16, ge=1)
+    past: int = Field(default=32, ge=1)
+
+
+class StatelessPlanner(VLMPlanner[StatelessOptions]):
+    """Remembers how subgoals ended, and pictures of the past, on sheets with their steps.
+
+    The model answers in one line; it may answer that the task is complete.
+    """
+
+    options_type = StatelessOptions
+
+    @property
+    def observe_every(self) -> int:
+        """Control steps between the remembered pictures."""
+        return self.options.observe_every
+
+    def reset(self, instruction: str, demonstration: Demonstration) -> None:
+        """Begin an episode."""
+        super().reset(instruction, demonstration)
+        self._past: list[Pixels] = []
+
+    def watch(self, observation: Observation, step: int) -> None:  # noqa: ARG002
+        """Keep the pictures of the history."""
+        self._past += [front_picture(earlier) for earlier in observation.get("history", ())]
+
+    def query(self, observation: Observation) -> ModelQuery:
+        """Show task, video, done subgoals, pictures of the past and the newest picture."""
+        return self.single(self._parts(observation))
+
+    def take(self, text: str) -> str:
+        """Return the subgoal in the last line of the reply; the policy reports what comes of it."""
+        lines = [line for line in text.splitlines() if line.strip()]
+        subgoal = parse_points(lines[-1] if lines else "")
+        return FINISHED if self.finishes(subgoal) else subgoal
+
+    def _parts(self, observation: Observation) -> Iterator[Part]:
+        options = self.options
+        if self.video is not None:
+            yield self.fill("video")
+            yield from _sheets(self.video, options.video_frames, 1)
+        yield self.goal()
+        said = "\n".join(
+            f"{number}. {end.subgoal}: {end.how}{f', {end.why}' if end.why else ''} "
+            f"(step {end.step})"
+            for number, end in enumerate(self.ends, 1)
+        )
+        yield self.fill("history", history=said) if said else self.fill("first")
+        if self._past:
+            yield self.fill("past")
+            yield from _sheets(np.stack(self._past), options.past, options.observe_every)
+        yield self.fill("now")
+        yield Picture(front_picture(observation))
+        yield self.fill("question", **self.forms())
+
+
+def _sheets(frames: Pixels, most: int, every: int) -> Iterator[Picture]:
+    """Yield sheets of at most `most` evenly spread frames, each with its control step."""
+    kept = evenly_spaced(len(frames), most)
+    for sheet in contact_sheets(frames[kept], [str((place + 1) * every) for place in kept]):
+        yield Picture(sheet)
+
+
+def _list_of(item: Mapping[str, Any]) -> dict[str, Any]:
+    return {"type": "array", "items": item}
+
+
+def _schema(**fields: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the JSON schema of an object with these fields."""
+    return {
+        "type": "object",
+        "properties": fields,
+        "required": list(fields),
+        "additionalProperties": False,
+    }
+
+
+def merge_keyframes(steps: Iterable[int], near: int = MAX_GAP) -> tuple[int, ...]:
+    """Replace each group of near steps by its middle one, of two the later.
+
+    Args:
+        steps: of the frames, in any order, possibly repeated.
+        near: largest gap between neighbors of a group.
+
+    Returns:
+        Some of `steps`, ascending.
+    """
+    groups: list[list[int]] = []
+    for step in sorted(set(steps)):
+        if groups and step - groups[-1][-1] <= near:
+            groups[-1].append(step)
+        else:
+            groups.append([step])
+    return tuple(group[len(group) // 2] for group in groups)
+
+
+def front_picture(observation: Observation) -> Pixels:
+    """Return a copy of the front camera's picture, as the renderer may reuse the array."""
+    return observation["front_rgb"].copy()
