@@ -57,7 +57,7 @@ _MODULES: Mapping[str, tuple[str, ...]] = {
     "demonstrations": ("h5py",),
     "learn": ("torch",),
     "ray": ("ray",),
-    "remote": ("websockets", "msgpack", "httpx"),
+    "remote": ("websockets", "msgpack"),
     "tokens": ("sentencepiece", "tokenizers"),
     "vlm": ("openai", "google"),
 }

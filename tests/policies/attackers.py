@@ -4,15 +4,12 @@ import base64
 import hashlib
 import json
 import os
-import resource
 import socket
 import struct
 import subprocess
 import sys
 import threading
 from contextlib import contextmanager, suppress
-
-import httpx
 
 PATIENCE = 300
 """Seconds; far more than anything here takes on a loaded machine."""
@@ -78,8 +75,9 @@ class Served:
         return (self.status("VmHWM") - self._first_peak) // 1024
 
     def is_healthy(self):
-        address = f"http://127.0.0.1:{self.port}/healthz"
-        return httpx.get(address, trust_env=False, timeout=PATIENCE).text == "OK\n"
+        head = b"GET /healthz HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n"
+        with self.connect(head) as raw:
+            return read_all(raw).endswith(b"\r\n\r\nOK\n")
 
     def connect(self, data=b""):
         raw = socket.create_connection(("127.0.0.1", self.port), timeout=PATIENCE)
@@ -88,16 +86,11 @@ class Served:
 
 
 @contextmanager
-def serving(protocol, *options, policy="random", files=None, **variables):
-    """Serve a policy; `files` limits the descriptors of the process."""
-
-    def limit():
-        resource.setrlimit(resource.RLIMIT_NOFILE, (files, files))
-
+def serving(protocol, *options, **variables):
+    """Serve a policy in a process of its own."""
     with subprocess.Popen(
-        [sys.executable, "-c", SERVE, policy, "--protocol", protocol, "--port", "0", *options],
+        [sys.executable, "-c", SERVE, "random", "--protocol", protocol, "--port", "0", *options],
         stdout=subprocess.PIPE, text=True, env=environment(**variables),
-        preexec_fn=None if files is None else limit,  # noqa: PLW1509
     ) as process:  # fmt: skip
         try:
             line = process.stdout.readline()
@@ -106,10 +99,8 @@ def serving(protocol, *options, policy="random", files=None, **variables):
             process.kill()
 
 
-def opening(protocol, host="127.0.0.1", headers=""):
-    """The first request of a client: an upgrade, or the metadata."""
-    if "http" in protocol:
-        return f"GET /metadata HTTP/1.1\r\nHost: {host}\r\n{headers}\r\n".encode()
+def opening(host="127.0.0.1", headers=""):
+    """The first request of a client."""
     return f"GET / HTTP/1.1\r\nHost: {host}\r\n{UPGRADE}{headers}\r\n".encode()
 
 
@@ -203,16 +194,11 @@ def shake_hands(peer):
     )
 
 
-def frame(data, opcode=2, *, final=True, mask=False):
+def frame(data, opcode=2, *, final=True):
     head = bytes([opcode | (0x80 if final else 0)])
-    masked = 0x80 if mask else 0
     if len(data) < 126:
-        head += bytes([masked | len(data)])
-    elif len(data) < 65536:
-        head += struct.pack(">BH", masked | 126, len(data))
-    else:
-        head += struct.pack(">BQ", masked | 127, len(data))
-    return head + (b"\0\0\0\0" if mask else b"") + data
+        return head + bytes([len(data)]) + data
+    return head + struct.pack(">BQ", 127, len(data)) + data
 
 
 def wait_for_end(peer):

@@ -6,18 +6,17 @@ import sys
 import threading
 import tomllib
 from contextlib import contextmanager
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
-from wire_episode import INSTRUCTION, moment, video
+from wire_episode import INSTRUCTION, moment
 from wire_servers import ChallengeServer, unpack
 
 import roboirg
 from roboirg.apps.policy_check.policy_check import check_policy
 from roboirg.core.environment_options import EnvironmentOptions
-from roboirg.core.errors import InvalidValueError, UnknownNameError
+from roboirg.core.errors import UnknownNameError
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.evaluation.play.job_instruction import PreparedJob
 from roboirg.evaluation.play.policy_environment import job_needs, make_env
@@ -25,10 +24,8 @@ from roboirg.evaluation.records.record import Job
 from roboirg.policies import make_policy, play
 from roboirg.policies.by_name.policy_classes import url_schemes
 from roboirg.policies.policy_server import open_server
-from roboirg.policies.remote import protocols
 from roboirg.policies.remote.endpoints import RemoteOptions
-from roboirg.policies.remote.protocols import all_protocols, protocols_by_scheme
-from roboirg.policies.remote.transport import Transport
+from roboirg.policies.remote.protocols import protocols_by_scheme
 
 PAGE = (Path(__file__).parents[2] / "docs" / "servers.md").read_text()
 RECIPE = (Path(__file__).parents[2] / "docs" / "add-protocol.md").read_text()
@@ -49,11 +46,9 @@ def served(spec, protocol):
 @pytest.fixture
 def _fresh_registry():
     """The registry is read again, in the test and after it."""
-    for cached in (all_protocols, protocols_by_scheme):
-        cached.cache_clear()
+    protocols_by_scheme.cache_clear()
     yield
-    for cached in (all_protocols, protocols_by_scheme):
-        cached.cache_clear()
+    protocols_by_scheme.cache_clear()
 
 
 def fenced(language, word):
@@ -144,10 +139,8 @@ def test_a_challenge_server_is_shown_what_the_options_ask_for():
 
 def test_the_page_lists_every_scheme():
     rows = {
-        f"| `{scheme}://host:port` | {client.transport.name} | {protocol.summary} "
-        f"| {protocol.memory} |"
-        for protocol in all_protocols()
-        for scheme, client in protocol.clients.items()
+        f"| `{scheme}://host:port` | {protocol.summary} | {protocol.memory} |"
+        for scheme, protocol in protocols_by_scheme().items()
     }
     assert rows == {line for line in PAGE.splitlines() if "://host:port` |" in line}
 
@@ -155,17 +148,16 @@ def test_the_page_lists_every_scheme():
 def test_the_page_explains_every_option():
     common = PAGE.split("Options of all protocols")[1].split("Options of some")
     tables = {"common": common[0], "own": common[1].split("**One server")[0]}
-    for protocol in all_protocols():
-        for client in protocol.clients.values():
-            for option in client.options_type.model_fields:
-                table = tables["common" if option in RemoteOptions.model_fields else "own"]
-                assert f"`{option}`" in table, (protocol.name, option)
+    for protocol in protocols_by_scheme().values():
+        for option in protocol.client.options_type.model_fields:
+            table = tables["common" if option in RemoteOptions.model_fields else "own"]
+            assert f"`{option}`" in table, (protocol.name, option)
 
 
 def test_protocols_are_listed_without_their_network_libraries():
     program = """
 import sys
-for name in ("websockets", "msgpack", "httpx"):
+for name in ("websockets", "msgpack"):
     sys.modules[name] = None  # an import raises ImportError
 from roboirg.core.errors import MissingDependencyError
 from roboirg.policies import find_policy
@@ -196,59 +188,3 @@ main()
 def test_an_unknown_scheme_names_the_nearest():
     with pytest.raises(UnknownNameError, match="Did you mean 'openpi'"):
         make_policy("openpy://localhost:1", 0)
-
-
-@pytest.mark.usefixtures("_fresh_registry")
-def test_two_protocols_cannot_share_a_scheme(monkeypatch):
-    first = all_protocols()[0]
-    monkeypatch.setattr(protocols, "all_protocols", lambda: (first, replace(first, name="other")))
-    with pytest.raises(InvalidValueError, match=f"'{first.name}' and 'other' both have"):
-        protocols_by_scheme()
-
-
-class LocalConnection:
-    """A transport without a network: hands messages to the handler of the last server."""
-
-    handler = None
-    metadata = {"local": True}  # noqa: RUF012
-
-    def __init__(self, spec):
-        self.closed = False
-
-    def request(self, message):
-        return type(self).handler(message)
-
-    def close(self):
-        self.closed = True
-
-
-LOCAL = Transport("local", f"{__name__}:LocalConnection", f"{__name__}:open_local")
-
-
-def open_local(service, metadata, options):
-    LocalConnection.handler = service.connection()
-    raise OSError("there is nothing to listen to")
-
-
-@pytest.mark.parametrize(
-    "scheme", [one for one, protocol in protocols_by_scheme().items() if protocol.service]
-)
-def test_a_protocol_travels_over_any_transport(scheme, monkeypatch):
-    monkeypatch.setattr(protocols_by_scheme()[scheme].clients[scheme], "transport", LOCAL)
-    with pytest.raises(InvalidValueError, match="nothing to listen to"):
-        open_server("random", scheme)
-    client = make_policy(f"{scheme}://localhost:1?wait=0", 0)
-    client.reset(INSTRUCTION, video(2))
-    used = 16 if scheme == "mme-vla" else "all"
-    assert client.metadata == {"server": "localhost:1", "local": True, "execute": used}
-    assert client.act(moment(2, history=())).shape == (16, 8)
-    client.close()
-
-
-def test_a_server_sends_what_the_class_of_its_policy_declares():
-    with served("random", "openpi") as url:
-        client = make_policy(url, 0)
-        client.reset("Push the button.", {})
-        assert client.metadata["network"] == "none"
-        assert client.metadata["policy"] == "random"
-        client.close()

@@ -8,17 +8,11 @@ import time
 
 import numpy as np
 import pytest
+from attackers import answering, frame, shake_hands
 from wire_episode import INSTRUCTION, moment, video
-from wire_servers import (
-    ChallengeHttpServer,
-    ChallengeServer,
-    MmeVlaServer,
-    WireServer,
-    pack,
-)
+from wire_servers import ChallengeServer, MmeVlaServer, WireServer, pack
 
 from roboirg.core.errors import (
-    InvalidValueError,
     PolicyConnectionError,
     PolicyReplyError,
     PolicyTimeoutError,
@@ -39,6 +33,7 @@ MALFORMED = [
     ({"actions": np.zeros((0, 8))}, r"got shape \(0, 8\)"),
     ({"actions": np.full((20, 8), np.nan)}, "every value must be a finite number"),
     ({"actions": "left"}, "array of 8 real numbers; got str"),
+    ({"actions": {"__numpy__": "AAAA", "dtype": "<f8"}}, "dialect .keys '__numpy__', 'dtype'."),
     ({"actions": None}, "got NoneType"),
     (
         {"actions": {b"__ndarray__": True, b"data": b"xx", b"dtype": "|O", b"shape": [1]}},
@@ -54,7 +49,6 @@ PROTOCOLS = {
     "openpi": WireServer,
     "mme-vla": MmeVlaServer,
     "challenge": ChallengeServer,
-    "challenge+http": ChallengeHttpServer,
 }
 
 
@@ -71,10 +65,6 @@ def before_inference(protocol):
 @pytest.mark.parametrize("protocol", PROTOCOLS)
 @pytest.mark.parametrize(("reply", "words"), MALFORMED)
 def test_a_malformed_reply_is_reported_and_the_next_episode_works(protocol, reply, words):
-    if protocol == "challenge+http" and isinstance(reply, str):
-        pytest.skip("text comes with status 500 there")
-    if protocol == "challenge+http" and reply == {}:
-        reply = pack(reply)
     faults = [None] * before_inference(protocol) + [reply]
     with PROTOCOLS[protocol](faults=faults) as server:
         policy = make_policy(f"{protocol}://{server.place}?max_reply_mib=1", 0)
@@ -87,7 +77,7 @@ def test_a_malformed_reply_is_reported_and_the_next_episode_works(protocol, repl
         following.close()
 
 
-@pytest.mark.parametrize("protocol", ["mme-vla", "challenge", "challenge+http"])
+@pytest.mark.parametrize("protocol", ["mme-vla", "challenge"])
 def test_a_reset_has_to_be_confirmed(protocol):
     with PROTOCOLS[protocol](faults=[{"reset_finished": False}]) as server:
         policy = make_policy(f"{protocol}://{server.place}", 0)
@@ -122,7 +112,7 @@ def _played_in_time(policy):
     raise AssertionError("the server is always late")
 
 
-@pytest.mark.parametrize("protocol", ["mme-vla", "challenge", "challenge+http"])
+@pytest.mark.parametrize("protocol", ["mme-vla", "challenge"])
 def test_a_server_that_dies_ends_the_episode(protocol):
     with PROTOCOLS[protocol](faults=[None] * before_inference(protocol) + ["die"]) as server:
         policy = make_policy(f"{protocol}://{server.place}", 0)
@@ -148,49 +138,22 @@ def test_a_stateless_server_is_asked_once_more():
 
 
 def test_a_server_that_stalls_while_it_is_sent_to():
-    listener = socket.create_server(("127.0.0.1", 0))
-    policy = make_policy(f"openpi://127.0.0.1:{listener.getsockname()[1]}?timeout=0.5", 0)
     over = threading.Event()
-    answers = threading.Thread(target=_accept_and_wait, args=(listener, over))
-    answers.start()
-    start = time.monotonic()
-    policy.reset(INSTRUCTION, {})
-    with pytest.raises(PolicyTimeoutError, match=r"did not take in a message within 0\.5 s"):
-        policy.act(moment(0, size=2048))  # more than the kernel's buffers take
-    assert time.monotonic() - start < 300
-    over.set()
-    policy.close()
-    answers.join()
 
+    def never_read(peer):
+        peer.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
+        shake_hands(peer)
+        peer.sendall(frame(pack({})))
+        over.wait(600)
 
-def _accept_and_wait(listener, over):
-    """Shake hands, send the metadata, and never read again."""
-    import base64
-    import hashlib
-
-    peer, _ = listener.accept()
-    peer.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
-    head = peer.recv(65536).decode()
-    key = next(line.split(": ")[1] for line in head.split("\r\n") if "Sec-WebSocket-Key" in line)
-    digest = hashlib.sha1((key + "258EAFA5-E914-47DA-95CA-C5AB0DC85B11").encode()).digest()  # noqa: S324
-    peer.sendall(
-        b"HTTP/1.1 101 Switching Protocols\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n"
-        b"Sec-WebSocket-Accept: " + base64.b64encode(digest) + b"\r\n\r\n" + b"\x82\x01\x80"
-    )
-    over.wait(600)
-    peer.close()
-    listener.close()
-
-
-def test_a_server_that_says_nothing_at_first():
-    with WireServer() as server:
-        server.silent.set()
-        policy = make_policy(f"openpi://{server.place}?connect=2", 0)
-        with pytest.raises(PolicyTimeoutError, match="did not send its metadata within 2 s"):
-            policy.reset(INSTRUCTION, {})
-        server.silent.clear()
-        _played_in_time(policy)
-        policy.close()
+    with answering(never_read) as place:
+        policy = make_policy(f"openpi://{place}?timeout=0.5", 0)
+        start = time.monotonic()
+        policy.reset(INSTRUCTION, {})
+        with pytest.raises(PolicyTimeoutError, match=r"did not take in a message within 0\.5 s"):
+            policy.act(moment(0, size=2048))  # more than the kernel's buffers take
+        assert time.monotonic() - start < 300
+        over.set()
 
 
 def test_a_surplus_reply_is_not_taken_for_the_next():
@@ -239,22 +202,6 @@ def test_an_absent_server_is_reported_in_one_sentence():
         r"\((nothing listens there|Timeout)",
     ):
         policy.reset(INSTRUCTION, {})
-
-
-@pytest.mark.parametrize("server_class", [WireServer, ChallengeHttpServer])
-def test_a_server_may_want_a_key(server_class, monkeypatch):
-    scheme = "openpi" if server_class is WireServer else "challenge+http"
-    with server_class(token="sesame") as server:  # noqa: S106
-        policy = make_policy(f"{scheme}://{server.place}", 0)
-        with pytest.raises(PolicyConnectionError, match="HTTP status 401"):
-            policy.reset(INSTRUCTION, {})
-        policy = make_policy(f"{scheme}://{server.place}?api_key_env=SERVER_KEY", 0)
-        monkeypatch.delenv("SERVER_KEY", raising=False)
-        with pytest.raises(InvalidValueError, match=r"SERVER_KEY .* holds no key"):
-            policy.reset(INSTRUCTION, {})
-        monkeypatch.setenv("SERVER_KEY", "sesame")
-        policy.reset(INSTRUCTION, {})
-        policy.close()
 
 
 def test_connections_are_closed_and_none_is_left_over():

@@ -14,18 +14,17 @@ from roboirg.core import waiting
 from roboirg.core.errors import PolicyConnectionError, PolicyTimeoutError
 from roboirg.core.waiting import queued_seconds
 from roboirg.policies import make_policy
-from roboirg.policies.remote.client.server_lock import lock_server
 from roboirg.policies.remote.endpoints import Endpoint
+from roboirg.policies.remote.server_lock import lock_server
 
 SPAWN = multiprocessing.get_context("spawn")
 ONE, TWO = Endpoint("h", 8001), Endpoint("h", 8002)
 
 
 def hold(folder, endpoint, ready, seconds):
-    lock = lock_server([endpoint], wait=5, folder=folder)
-    ready.set()
-    time.sleep(seconds)
-    lock.release()
+    with lock_server([endpoint], wait=5, folder=folder).file:
+        ready.set()
+        time.sleep(seconds)
 
 
 @pytest.fixture
@@ -42,23 +41,25 @@ def holder(tmp_path):
 
 def test_another_process_waits_takes_another_server_or_inherits(holder, tmp_path):
     start = time.monotonic()
-    with pytest.raises(PolicyTimeoutError, match=r"h:8001 was used by other .* for 0\.2 s"):
+    with pytest.raises(PolicyTimeoutError, match=r"Other episodes used h:8001 for 0\.2 s"):
         lock_server([ONE], wait=0.2, folder=tmp_path)
     assert 0.2 <= time.monotonic() - start < 300
     lock = lock_server([ONE, TWO], wait=0, folder=tmp_path)
     assert lock.endpoint == TWO
-    with pytest.raises(PolicyTimeoutError, match="h:8001, h:8002 were"):
+    with pytest.raises(PolicyTimeoutError, match="used h:8001, h:8002 for"):
         lock_server([ONE, TWO], wait=0, folder=tmp_path, shared=True)
     os.kill(holder.pid, signal.SIGKILL)
-    assert lock_server([ONE, TWO], wait=300, folder=tmp_path).endpoint == ONE
-    lock.release()
+    again = lock_server([ONE, TWO], wait=300, folder=tmp_path)
+    assert again.endpoint == ONE
+    lock.file.close()
+    again.file.close()
 
 
 def test_waiting_for_a_server_is_told_and_counted_as_waiting(holder, tmp_path, monkeypatch):
     told = []
     monkeypatch.setattr(waiting, "_listeners", [told.append])
     before = queued_seconds()
-    lock_server([TWO], wait=5, folder=tmp_path).release()
+    lock_server([TWO], wait=5, folder=tmp_path).file.close()
     assert (told, queued_seconds()) == ([], before)
     with pytest.raises(PolicyTimeoutError):
         lock_server([ONE], wait=0.2, folder=tmp_path)
@@ -69,26 +70,26 @@ def test_waiting_for_a_server_is_told_and_counted_as_waiting(holder, tmp_path, m
 
 def test_those_who_share_do_not_exclude_each_other(tmp_path):
     locks = [lock_server([ONE], wait=0, folder=tmp_path, shared=True) for _ in range(3)]
-    with pytest.raises(PolicyTimeoutError):
+    with pytest.raises(PolicyConnectionError):
         lock_server([ONE], wait=0, folder=tmp_path)
     for lock in locks:
-        lock.release()
-        lock.release()
-    lock_server([ONE], wait=0, folder=tmp_path).release()
+        lock.file.close()
+    lock_server([ONE], wait=0, folder=tmp_path).file.close()
 
 
 def test_names_of_this_computer_are_one_server(tmp_path):
     lock = lock_server([Endpoint("localhost", 1)], wait=0, folder=tmp_path)
     with pytest.raises(PolicyConnectionError):
         lock_server([Endpoint("127.0.0.1", 1)], wait=0, folder=tmp_path)
-    lock.release()
+    lock_server([Endpoint("localhost", 1, "/a/b")], wait=0, folder=tmp_path).file.close()
+    lock.file.close()
 
 
 def test_a_thread_does_not_wait_for_itself():
     with MmeVlaServer() as server:
         first, second = (make_policy(f"mme-vla://{server.place}", 0) for _ in range(2))
         first.reset(INSTRUCTION, video(0))
-        with pytest.raises(PolicyConnectionError, match=r"another policy .*; close\(\) it"):
+        with pytest.raises(PolicyConnectionError, match=r"Another policy .*; close\(\) it"):
             second.reset(INSTRUCTION, video(0))
         first.close()
         second.reset(INSTRUCTION, video(0))

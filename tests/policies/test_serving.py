@@ -7,9 +7,9 @@ import subprocess
 import sys
 import threading
 from contextlib import contextmanager
+from http.client import HTTPConnection
 from typing import ClassVar
 
-import httpx
 import numpy as np
 import pytest
 from websockets.exceptions import ConnectionClosedError
@@ -21,7 +21,7 @@ from roboirg.core.errors import InvalidValueError, PolicyReplyError, UnknownName
 from roboirg.policies import make_policy
 from roboirg.policies.policy_server import open_server
 from roboirg.policies.remote.protocols import protocols_by_scheme
-from roboirg.policies.remote.server_options import ServerOptions
+from roboirg.policies.remote.websocket_server import ServerOptions
 
 HERE = f"{__name__}:Recorder"
 SERVED = [scheme for scheme, protocol in protocols_by_scheme().items() if protocol.service]
@@ -31,7 +31,7 @@ class Recorder:
     """Writes down what it is given; counts its calls in its actions."""
 
     episodes: ClassVar[list] = []
-    observe_every = 1
+    metadata: ClassVar[dict] = {"network": "none"}
 
     def __init__(self, seed=0):
         self.seed, self.calls, self.subgoals, self.closed = seed, [], [], False
@@ -55,6 +55,18 @@ class Recorder:
 
     def close(self):
         self.closed = True
+
+
+class Remembering(Recorder):
+    observe_every = 1
+
+
+class Seeing(Remembering):
+    depth = True
+
+
+class Posing(Recorder):
+    actions = "ee_pose"
 
 
 @pytest.fixture(autouse=True)
@@ -82,7 +94,6 @@ SEEN = {
     "openpi": ("front_rgb", "wrist_rgb", "joint_positions"),
     "mme-vla": ("front_rgb", "wrist_rgb", "joint_positions"),
     "challenge": ("front_rgb", "wrist_rgb", "joint_positions", "gripper", "end_effector"),
-    "challenge+http": ("front_rgb", "wrist_rgb", "joint_positions", "gripper", "end_effector"),
 }
 
 
@@ -98,6 +109,7 @@ def test_a_served_policy_gets_what_the_client_was_given(protocol, monkeypatch):
             assert [chunk.tolist() for chunk in rows] == [[[n] * 8] * 4 for n in (1, 2)]
             client.close()
             assert client.metadata["policy"] == HERE
+            assert client.metadata["network"] == "none"
             assert client.metadata["protocol"] == protocol
             assert client.metadata["device"]
             assert client.metadata["libraries"]["numpy"] == np.__version__
@@ -140,11 +152,10 @@ def test_a_served_policy_hears_what_the_prompt_says_next(protocol):
         assert (policy.instruction, policy.heard) == (said[0], [(said[1], 2), (said[2], 5)])
 
 
-@pytest.mark.parametrize("protocol", ["challenge", "challenge+http"])
-def test_a_served_policy_gets_depth_and_matrices_if_the_client_sends_them(protocol):
+def test_a_served_policy_gets_depth_and_matrices_if_the_client_sends_them():
     moments = [moment(number, sensors=True) for number in range(6)]
     shown = [field for field in moments[0] if field != "instruction"]
-    with served(HERE, protocol) as url:
+    with served(f"{__name__}:Seeing", "challenge") as url:
         client = make_policy(f"{url}?depth=yes&calibration=yes", 0)
         client.reset(INSTRUCTION, video(3, sensors=True))
         client.act({**moments[3], "history": ()})
@@ -175,6 +186,7 @@ def test_mme_vla_has_one_memory_for_all_connections():
         with connect(place) as one, connect(place) as other:
             assert unpack(one.recv())["policy"] == HERE
             other.recv()
+            assert len(Recorder.episodes) == 1  # idle connections make no policy
             buffer = {
                 "add_buffer": True,
                 "images": frames,
@@ -209,7 +221,7 @@ def test_mme_vla_has_one_memory_for_all_connections():
     ("message", "words"),
     [
         (b"\xc1", "the bytes are not a msgpack message"),
-        (pack({}), "'observation/state' must hold 8 real numbers; got nothing"),
+        (pack({}), "'observation/state' must be real numbers (8); got nothing"),
         (pack({"add_buffer": True, "images": np.zeros((2, 4, 4, 3), np.uint8)}), "'images' must"),
         ("hello", "Messages must be binary"),
     ],
@@ -246,9 +258,12 @@ def test_what_a_policy_raises_is_the_clients_error(protocol):
 @pytest.mark.parametrize("protocol", SERVED)
 def test_health_and_keys(protocol, monkeypatch):
     with served(HERE, protocol, key="sesame") as url:
-        place = url.split("://")[1]
-        health = httpx.get(f"http://{place}/healthz", trust_env=False, timeout=300)
-        assert (health.status_code, health.text) == (200, "OK\n")
+        health = HTTPConnection(url.split("://")[1], timeout=300)
+        health.request("GET", "/healthz")
+        assert health.getresponse().read() == b"OK\n"
+        monkeypatch.delenv("KEY", raising=False)
+        with pytest.raises(InvalidValueError, match=r"KEY .* holds no key"):
+            make_policy(f"{url}?api_key_env=KEY", 0).reset(INSTRUCTION, video(0))
         monkeypatch.setenv("KEY", "sesam")
         for query in ("", "?api_key_env=KEY"):
             with pytest.raises(OSError, match="HTTP status 401"):
@@ -259,18 +274,6 @@ def test_health_and_keys(protocol, monkeypatch):
         client.close()
 
 
-def test_the_http_interface_tells_what_is_wrong():
-    with served(HERE, "challenge+http") as url:
-        base = url.replace("challenge+http", "http")
-        with httpx.Client(base_url=base, trust_env=False, timeout=300) as client:
-            assert client.post("/infer").status_code == 400
-            assert client.post("/elsewhere", content=b"x").status_code == 404
-            failed = client.post("/infer", content=pack({"task_goal": "go"}))
-            assert failed.status_code == 500
-            assert "'task_goal' must be a list of texts" in failed.text
-            assert unpack(client.post("/reset").content) == {"reset_finished": True}
-
-
 @pytest.mark.parametrize(
     ("options", "error", "words"),
     [
@@ -278,15 +281,27 @@ def test_the_http_interface_tells_what_is_wrong():
         ({"spec": "randon"}, UnknownNameError, "Did you mean 'random'"),
         ({"protocol": "mmevla"}, UnknownNameError, "Did you mean 'mme-vla'"),
         ({"protocol": "vla-eval"}, InvalidValueError, "vla-eval:// is for clients only"),
-        ({"port": 70000}, InvalidValueError, "port is 70000"),
-        ({"timeout_s": 1e30}, InvalidValueError, "at most 2,147,483 seconds"),
+        ({"port": 70000}, InvalidValueError, "Cannot listen on 127.0.0.1:70000"),
+        (
+            {"spec": f"{__name__}:Seeing"},
+            InvalidValueError,
+            "declares depth and observe_every, which openpi does not carry; .* do: challenge",
+        ),
+        (
+            {"spec": f"{__name__}:Remembering"},
+            InvalidValueError,
+            "declares observe_every, which openpi does not carry; .* do: challenge, mme-vla",
+        ),
+        (
+            {"spec": f"{__name__}:Posing", "protocol": "mme-vla"},
+            InvalidValueError,
+            "declares actions, which mme-vla does not carry; .* do: challenge, openpi",
+        ),
         ({"host": "192.0.2.1"}, InvalidValueError, "Cannot listen on 192"),
     ],
 )
 def test_what_cannot_be_served_is_told(options, error, words):
-    place = ServerOptions(
-        **{name: options[name] for name in options if name in ("host", "port", "timeout_s")}
-    )
+    place = ServerOptions(**{name: options[name] for name in options if name in ("host", "port")})
     with pytest.raises(error, match=words):
         open_server(options.get("spec", "random"), options.get("protocol", "openpi"), place)
 

@@ -1,6 +1,5 @@
 """vla-eval's model servers: what they are shown, what they answer, and what goes wrong."""
 
-import threading
 import time
 
 import numpy as np
@@ -9,10 +8,9 @@ from wire_episode import INSTRUCTION, moment, video
 from wire_servers import VlaEvalServer
 
 import roboirg
-from roboirg.core.errors import InvalidValueError, PolicyReplyError, PolicyTimeoutError
+from roboirg.core.errors import InvalidValueError, PolicyReplyError
 from roboirg.policies import make_policy, play
 from roboirg.policies.contract.policy_calls import server_version
-from roboirg.policies.remote.message_codec import TEXT_KEYS, CodecError, pack, unpack
 
 
 def client_of(server, query=""):
@@ -36,6 +34,8 @@ def test_an_episode_is_what_the_harness_would_send():
         rows = [client.act(moment(n, history=())) for n in (3, 4)]
         client.close()
         wait_for_messages(server, 5)
+    assert client.metadata["model_server"] == "Test"
+    assert server_version(client.metadata) == "Test, vla-eval 0.8.0"
     assert [one.tolist() for one in rows] == [[[1.0] * 8], [[2.0] * 8]]
     assert kinds(server) == [
         "hello", "episode_start", "observation", "observation", "episode_end"
@@ -122,15 +122,6 @@ def test_another_action_space_or_protocol_is_refused():
             client_of(server).reset(INSTRUCTION, video(0))
 
 
-def test_the_server_is_told_apart_by_its_class_and_harness():
-    with VlaEvalServer() as server:
-        client = client_of(server)
-        client.reset(INSTRUCTION, video(0))
-        client.close()
-    assert client.metadata["model_server"] == "Test"
-    assert server_version(client.metadata) == "Test, vla-eval 0.8.0"
-
-
 @pytest.mark.parametrize(
     ("fault", "words"),
     [
@@ -138,10 +129,10 @@ def test_the_server_is_told_apart_by_its_class_and_harness():
         ("other-number", "type 'action' with number 4, where 'action' with number 3"),
         (b"\xc1", "something other than a message"),
         ("text", "replied with an error: text"),
-        ({"actions": np.zeros(7)}, r"got shape \(1, 7\)"),
+        ({"actions": np.zeros(7)}, r"got shape \(7,\)"),
         ({"actions": [float("nan")] * 8}, "finite"),
-        ({"actions": "left"}, "an action that is not an array"),
-        ({"actions": [[1.0], [2.0, 3.0]]}, "an action that is not an array"),
+        ({"actions": "left"}, "array of 8 real numbers; got str"),
+        ({"actions": [[1.0], [2.0, 3.0]]}, "array of 8 real numbers; got list"),
         ({"other": 1}, "without 'actions'; it holds 'other'"),
     ],
 )
@@ -185,35 +176,6 @@ def test_errors_of_the_server_are_named_also_when_an_episode_cannot_begin():
         client.close()
 
 
-def test_a_server_that_stalls_is_not_waited_for():
-    with VlaEvalServer(faults=["stall"]) as server:
-        client = client_of(server, "?timeout=2")
-        # A busy machine may be late with the first words already.
-        with pytest.raises(PolicyTimeoutError, match=r"within 2 s"):
-            _begin_and_act(client)
-        client.close()
-
-
-def _begin_and_act(client):
-    client.reset(INSTRUCTION, video(0))
-    client.act(moment(0))
-
-
-def test_two_episodes_at_once_have_a_connection_each():
-    with VlaEvalServer() as server:
-        clients = [client_of(server, "?shared=yes") for _ in range(2)]
-        for client in clients:
-            client.reset(INSTRUCTION, video(0))
-        threads = [threading.Thread(target=one.act, args=(moment(0),)) for one in clients]
-        for thread in threads:
-            thread.start()
-        for thread in threads:
-            thread.join()
-        for client in clients:
-            client.close()
-        assert server.connections == 2
-
-
 @pytest.mark.sim
 def test_a_server_plays_an_episode():
     with VlaEvalServer() as server:
@@ -225,16 +187,3 @@ def test_a_server_plays_an_episode():
     shown = [payload for kind, payload in server.payloads if kind == "observation"]
     assert len(shown) == 3
     assert shown[0]["video_history"][0].shape == (256, 256, 3)
-
-
-def test_arrays_have_keys_of_text():
-    array = np.arange(6, dtype=np.float32).reshape(2, 3)
-    data = pack({"x": array, "y": np.float32(0.5), "z": np.bool_(True)}, TEXT_KEYS)
-    assert b"__npgeneric__" not in data
-    found = unpack(data, TEXT_KEYS)
-    assert np.array_equal(found["x"], array)
-    assert (found["y"], found["z"]) == (0.5, True)
-    assert set(unpack(data)["x"]) == {"__ndarray__", "data", "dtype", "shape"}
-    bad = pack({"x": {"__ndarray__": True, "data": b"12345", "dtype": "<f4", "shape": [2]}})
-    with pytest.raises(CodecError, match="has 5 bytes"):
-        unpack(bad, TEXT_KEYS)

@@ -6,12 +6,9 @@ they compute in the event loop, so that nothing else is answered meanwhile.
 
 import asyncio
 import contextlib
-import http
-import socket
 import threading
 import time
 import traceback
-from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 
 import msgpack
 import numpy as np
@@ -50,16 +47,15 @@ def unpack(data):
 class WireServer:
     """A server whose policy is the method `answer`.
 
-    `faults` are consumed one for each message: None for none; "die" drops the connection, "stall"
-    says nothing, a number of seconds delays the reply, bytes or text are sent as they are, and a
-    dictionary is sent instead of the reply.
+    `faults` are consumed one for each message: None for none; "die" drops the connection, a
+    number of seconds delays the reply, bytes or text are sent as they are, and a dictionary is sent
+    instead of the reply.
     """
 
-    def __init__(self, port=0, token=None, faults=()):
+    def __init__(self, port=0, faults=()):
         self.metadata = {}
-        self.port, self.token, self.faults = port, token, list(faults)
+        self.port, self.faults = port, list(faults)
         self.messages, self.connections, self.open = [], 0, 0
-        self.silent = threading.Event()
         self._ready = threading.Event()
         self._thread = threading.Thread(target=lambda: asyncio.run(self._main()), daemon=True)
 
@@ -95,19 +91,12 @@ class WireServer:
             await self._stop.wait()
 
     def _request(self, connection, request):
-        if request.path == "/healthz":
-            return connection.respond(http.HTTPStatus.OK, "OK\n")
-        if self.token and request.headers.get("Authorization") != f"Api-Key {self.token}":
-            return connection.respond(http.HTTPStatus.UNAUTHORIZED, "no\n")
-        return None
+        self.path = request.path
 
     async def _handle(self, websocket):
         self.connections += 1
         self.open += 1
         try:
-            if self.silent.is_set():
-                await self._stop.wait()
-                return
             await websocket.send(pack(self.metadata))
             await self._converse(websocket)
         except ConnectionClosed:
@@ -122,9 +111,6 @@ class WireServer:
             fault = self.faults.pop(0) if self.faults else None
             if fault == "die":
                 websocket.transport.abort()
-                return
-            if fault == "stall":
-                await self._stop.wait()
                 return
             if isinstance(fault, int | float):
                 await asyncio.sleep(fault)
@@ -218,75 +204,6 @@ class ChallengeServer(WireServer):
         return {"actions": np.full((3, 8), float(self.seen))}
 
 
-class ChallengeHttpServer:
-    """The challenge's other interface; the same faults."""
-
-    def __init__(self, token=None, faults=()):
-        self.policy = ChallengeServer(faults=faults)
-        self.token, self.messages, self.faults = token, [], list(faults)
-        owner = self
-
-        class Handler(BaseHTTPRequestHandler):
-            protocol_version = "HTTP/1.1"
-
-            def do_GET(self):
-                owner.get(self)
-
-            def do_POST(self):
-                owner.post(self)
-
-            def log_message(self, *_):
-                pass
-
-        self._server = ThreadingHTTPServer(("127.0.0.1", 0), Handler)
-        self._server.daemon_threads = True
-        self.place = f"127.0.0.1:{self._server.server_address[1]}"
-
-    def __enter__(self):
-        self._thread = threading.Thread(target=self._server.serve_forever, args=(0.02,))
-        self._thread.start()
-        return self
-
-    def __exit__(self, *_):
-        self._server.shutdown()
-        self._thread.join()
-        self._server.server_close()
-
-    def send(self, handler, status, body, kind="application/msgpack"):
-        handler.send_response(status)
-        handler.send_header("Content-Type", kind)
-        handler.send_header("Content-Length", str(len(body)))
-        handler.end_headers()
-        handler.wfile.write(body)
-
-    def get(self, handler):
-        if self.token and handler.headers.get("Authorization") != f"Api-Key {self.token}":
-            return self.send(handler, 401, b"no", "text/plain")
-        if handler.path == "/metadata":
-            return self.send(handler, 200, pack(self.policy.metadata))
-        return self.send(handler, 200, b"OK\n", "text/plain")
-
-    def post(self, handler):
-        body = handler.rfile.read(int(handler.headers["Content-Length"]))
-        if not body and handler.path != "/reset":
-            return self.send(handler, 400, b"empty", "text/plain")
-        self.messages.append((handler.path, body))
-        fault = self.faults.pop(0) if self.faults else None
-        if fault == "die":
-            handler.close_connection = True
-            return handler.connection.shutdown(socket.SHUT_RDWR)
-        if isinstance(fault, int | float):
-            time.sleep(fault)
-            fault = None
-        if isinstance(fault, bytes):
-            return self.send(handler, 200, fault)
-        try:
-            message = {"reset": True} if handler.path == "/reset" else unpack(body)
-            return self.send(handler, 200, pack(fault or self.policy.answer(message)))
-        except Exception:  # noqa: BLE001
-            return self.send(handler, 500, traceback.format_exc().encode(), "text/plain")
-
-
 class VlaEvalServer(WireServer):
     """A model server of vla-eval: envelopes, texts as keys, one action per observation.
 
@@ -330,8 +247,6 @@ class VlaEvalServer(WireServer):
                 await websocket.send(envelope("error", {"error": "cannot start"}, number))
         elif kind == "observation":
             fault = self.faults.pop(0) if self.faults else None
-            if fault == "stall":
-                await self._stop.wait()
             await websocket.send(self._reply(message["payload"], number, fault))
 
     def _reply(self, shown, number, fault):

@@ -71,7 +71,7 @@ def serve(
     Example: roboirg serve my_policy:MyPolicy --protocol openpi
     """
     from roboirg.policies.policy_server import open_server
-    from roboirg.policies.remote.server_options import ServerOptions
+    from roboirg.policies.remote.websocket_server import ServerOptions
     from roboirg.util.freed_memory import keep_freed_memory
 
     keep_freed_memory()

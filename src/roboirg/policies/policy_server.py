@@ -10,8 +10,8 @@ from collections.abc import Mapping
 from typing import NamedTuple
 
 from roboirg.core.errors import InvalidValueError, UnknownNameError
-from roboirg.core.field_types import MOST_SECONDS
 from roboirg.core.inference_facts import inference_facts
+from roboirg.core.policy_needs import PolicyNeeds
 from roboirg.core.policy_ref import BUILT_IN
 from roboirg.policies.by_name.finding import make_policy, read_policy
 from roboirg.policies.by_name.policy_classes import find_class
@@ -20,11 +20,10 @@ from roboirg.policies.contract.base import Policy
 from roboirg.policies.contract.json_values import as_json
 from roboirg.policies.opening import opened
 from roboirg.policies.remote.endpoints import Endpoint
-from roboirg.policies.remote.protocols import protocols_by_scheme
-from roboirg.policies.remote.server_options import ServerOptions
-from roboirg.policies.remote.transport import ListeningServer
+from roboirg.policies.remote.protocols import Protocol, protocols_by_scheme
+from roboirg.policies.remote.websocket_server import ServerOptions, WebsocketServer
+from roboirg.util.web.request_origin import LOOPBACK
 
-_MAX_PORT = 65535
 FLAG_VARIABLES = (
     "XLA_FLAGS",
     "JAX_DEFAULT_MATMUL_PRECISION",
@@ -45,7 +44,7 @@ class PolicyServer(NamedTuple):
         url: names the policy for clients.
     """
 
-    listening: ListeningServer
+    listening: WebsocketServer
     url: str
 
 
@@ -77,13 +76,6 @@ def open_server(
     service = protocols[protocol].service
     if service is None:
         raise InvalidValueError(f"{protocol}:// is for clients only: no policy is served with it.")
-    if not 0 <= options.port <= _MAX_PORT:
-        raise InvalidValueError(f"The port is {options.port}; it must be 0 to {_MAX_PORT}.")
-    if not 0 < options.timeout_s <= MOST_SECONDS:
-        raise InvalidValueError(
-            f"timeout_s is {options.timeout_s}; it must be more than 0 and at most "
-            f"{MOST_SECONDS:,} seconds."
-        )
     policy = read_policy(spec)
     if policy.is_privileged:
         raise InvalidValueError(
@@ -93,11 +85,20 @@ def open_server(
 
     if policy.is_foreign:
         policy = opened(policy, seed)
+    if lacking := _lacking(policy.needs, protocols[protocol]):
+        able = [
+            one.name
+            for one in protocols.values()
+            if one.service and not _lacking(policy.needs, one)
+        ]
+        raise InvalidValueError(
+            f"Policy {spec!r} declares {' and '.join(lacking)}, which {protocol} does not carry; "
+            f"protocols that do: {', '.join(able) or 'none'}."
+        )
 
     def make() -> Policy:
         return make_policy(policy, seed)
 
-    found = protocols[protocol]
     process = inference_facts(None)
     declared = (
         getattr(find_class(policy.body), "metadata", {}) if policy.kind in (CLASS, BUILT_IN) else {}
@@ -112,15 +113,24 @@ def open_server(
         "libraries": process.libraries,
         **describe_arithmetic(),
     }
-    listen = found.clients[protocol].transport.load_server()
-    try:
-        listening = listen(service(make), metadata, options)
-    except OSError as error:  # of another package's transport
-        raise InvalidValueError(
-            f"Cannot listen on {options.host}:{options.port} ({error})."
-        ) from error
+    listening = WebsocketServer(service(make), metadata, options)
     endpoint = Endpoint(options.host, listening.socket.getsockname()[1])
     return PolicyServer(listening, f"{protocol}://{endpoint}")
+
+
+def _lacking(needs: PolicyNeeds | None, protocol: Protocol) -> list[str]:
+    """Return what a policy declares and a protocol does not carry.
+
+    Its client neither declares that itself nor has an option for it.
+    """
+    usual = PolicyNeeds()
+    shown = PolicyNeeds.of(protocol.client(f"{protocol.name}://{LOOPBACK}:1"))
+    return [
+        name
+        for name in ("depth", "calibration", "observe_every", "actions")
+        if getattr(needs or usual, name) != getattr(usual, name) == getattr(shown, name)
+        and name not in protocol.client.options_type.model_fields
+    ]
 
 
 def describe_arithmetic() -> dict[str, str]:

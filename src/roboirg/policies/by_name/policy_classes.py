@@ -100,7 +100,7 @@ def _url_class(spec: str) -> type[Any]:
     protocols = protocols_by_scheme()
     if scheme not in protocols:
         raise UnknownNameError("policy scheme", scheme, url_schemes())
-    return protocols[scheme].clients[scheme]
+    return protocols[scheme].client
 
 
 def _module(spec: str, name: str) -> ModuleType:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import socket
 from typing import Annotated, NamedTuple
-from urllib.parse import urlsplit
+from urllib.parse import quote, urlsplit
 
 from pydantic import AfterValidator, Field
 
@@ -22,20 +22,22 @@ ActionSpaceName = Annotated[str, AfterValidator(lambda name: find_action_space(n
 
 
 class Endpoint(NamedTuple):
-    """Host (lower case) and port of a server."""
+    """Host (lower case), port, and path (empty, or from its slash on) of a server."""
 
     host: str
     port: int
+    path: str = ""
 
     def __str__(self) -> str:
-        return f"[{self.host}]:{self.port}" if ":" in self.host else f"{self.host}:{self.port}"
+        host = f"[{self.host}]" if ":" in self.host else self.host
+        return f"{host}:{self.port}{self.path}"
 
     @property
     def identity(self) -> str:
         """A file name, the same for every spelling of this computer's address."""
         here = self.host in LOOPBACK_NAMES
         host = f"{socket.gethostname()}-itself" if here else self.host.replace(":", "_")
-        return f"{host}-{self.port}"
+        return f"{host}-{self.port}{quote(self.path, safe='')}"
 
 
 class RemoteOptions(UrlOptions):
@@ -46,7 +48,7 @@ class RemoteOptions(UrlOptions):
         connect: seconds to try to connect.
         wait: seconds to wait for a server that another episode uses.
         shared: whether several episodes may use a server at the same time.
-        tls: whether to encrypt (wss, https).
+        tls: whether to encrypt (wss).
         api_key_env: environment variable that holds the server's key.
         max_reply_mib: size limit of a reply, MiB.
         version: of the checkpoint, for the records.
@@ -55,7 +57,7 @@ class RemoteOptions(UrlOptions):
         tokenizer: file of the model's tokenizer.
     """
 
-    timeout: Seconds = Field(60.0, gt=0)
+    timeout: Seconds = Field(120.0, gt=0)
     connect: Seconds = Field(60.0, gt=0)
     wait: Seconds = Field(3600.0, ge=0)
     shared: bool = False
@@ -83,23 +85,14 @@ class RemoteOptions(UrlOptions):
             )
         return {"Authorization": f"Api-Key {key}"}
 
-    @property
-    def max_reply(self) -> int:
-        """Size limit of a reply, bytes."""
-        return int(self.max_reply_mib * MIB)
-
 
 def read_endpoints(url: PolicyUrl) -> tuple[Endpoint, ...]:
     """Return the servers of a URL, which commas separate.
 
     Raises:
-        InvalidValueError: a part is not ``host:port``, or occurs twice.
+        InvalidValueError: a part is not ``host:port`` or ``host:port/path``.
     """
-    found = tuple(_endpoint(url, part) for part in url.place.rstrip("/").split(","))
-    for endpoint in found:
-        if found.count(endpoint) > 1:
-            raise InvalidValueError(f"Policy {url.text!r} names {endpoint} twice.")
-    return found
+    return tuple(_endpoint(url, part) for part in url.place.split(","))
 
 
 def _endpoint(url: PolicyUrl, text: str) -> Endpoint:
@@ -113,9 +106,9 @@ def _endpoint(url: PolicyUrl, text: str) -> Endpoint:
         host, port = parts.hostname, parts.port
     except ValueError:
         host, port = None, None
-    if not host or not port or parts.path or parts.fragment or " " in text:
+    if not host or not port or parts.fragment or " " in text:
         raise InvalidValueError(
             f"Policy {url.text!r}: {text!r} is not a server; write {url.scheme}://host:port, "
             "several with commas."
         )
-    return Endpoint(host, port)
+    return Endpoint(host, port, parts.path.rstrip("/"))

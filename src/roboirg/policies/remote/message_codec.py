@@ -2,14 +2,15 @@
 
 An array is a map with four keys of type bytes: ``__ndarray__`` (true), ``data`` (C order),
 ``dtype`` (such as ``<f4``) and ``shape``; a NumPy scalar one with ``__npgeneric__``, ``data`` and
-``dtype``. vla-eval's keys are texts, and its scalars plain numbers. Nothing is unpickled.
+``dtype``. vla-eval's keys are texts, and its scalars plain numbers. The package msgpack-numpy has
+``nd``, ``type`` and ``kind`` instead. All are read, wherever they occur. Nothing is unpickled.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from functools import partial
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -26,45 +27,35 @@ _MAX_DTYPE_LENGTH = 32
 _MAX_SHOWN = 80
 
 
-class ArrayKeys(NamedTuple):
-    """Keys of the maps that stand for arrays and scalars; without `scalar`, those are numbers."""
-
-    array: str | bytes
-    scalar: str | bytes | None
-    data: str | bytes
-    dtype: str | bytes
-    shape: str | bytes
-
-
-BYTES_KEYS = ArrayKeys(b"__ndarray__", b"__npgeneric__", b"data", b"dtype", b"shape")
-TEXT_KEYS = ArrayKeys("__ndarray__", None, "data", "dtype", "shape")
-
-
 class CodecError(ValueError):
     """Malformed bytes, or a message that cannot be encoded."""
 
 
-def pack(message: Mapping[str, Any], keys: ArrayKeys = BYTES_KEYS) -> bytes:
+def pack(message: Mapping[str, Any], *, text_keys: bool = False) -> bytes:
     """Return a message as bytes; maps keep their order.
+
+    Args:
+        message: what to send.
+        text_keys: whether to describe arrays as vla-eval does.
 
     Raises:
         CodecError: it holds something that cannot be encoded.
     """
     try:
-        packed: bytes = msgpack.packb(message, default=partial(_encode, keys))
+        packed: bytes = msgpack.packb(message, default=partial(_encode, text_keys))
     except (TypeError, ValueError, OverflowError) as error:
         raise CodecError(f"the message cannot be encoded ({error})") from error
     return packed
 
 
-def unpack(data: bytes, keys: ArrayKeys = BYTES_KEYS) -> dict[str, Any]:
+def unpack(data: bytes) -> dict[str, Any]:
     """Return the message in bytes; its arrays are read-only views of them.
 
     Raises:
         CodecError: the bytes are malformed.
     """
     try:
-        message = msgpack.unpackb(data, object_hook=partial(_decode, keys))
+        message = msgpack.unpackb(data, object_hook=_decode)
     except (*_MALFORMED, msgpack.exceptions.UnpackException) as error:
         words = " ".join(str(error).split()) or type(error).__name__
         raise CodecError(f"the bytes are not a msgpack message ({words})") from error
@@ -76,41 +67,42 @@ def unpack(data: bytes, keys: ArrayKeys = BYTES_KEYS) -> dict[str, Any]:
     return message
 
 
-def _encode(keys: ArrayKeys, value: object) -> object:
+def _encode(text_keys: bool, value: object) -> object:
     if not isinstance(value, np.ndarray | np.generic):
         raise TypeError(f"type {type(value).__name__} cannot be encoded")
     if value.dtype.kind in _UNSUPPORTED:
         raise ValueError(f"arrays of dtype {value.dtype} are not sent")
     if isinstance(value, np.ndarray):
-        return {
-            keys.array: True,
-            # A view, as pictures are large: a contiguous array is copied once, into the message.
-            keys.data: np.ascontiguousarray(value).reshape(-1).view(np.uint8).data,
-            keys.dtype: value.dtype.str,
-            keys.shape: value.shape,
-        }
-    if keys.scalar is None:
+        # A view, as pictures are large: a contiguous array is copied once, into the message.
+        data = np.ascontiguousarray(value).reshape(-1).view(np.uint8).data
+        found = {"__ndarray__": True, "data": data, "dtype": value.dtype.str, "shape": value.shape}
+    elif text_keys:
         return value.item()
-    return {keys.scalar: True, keys.data: value.item(), keys.dtype: value.dtype.str}
+    else:
+        found = {"__npgeneric__": True, "data": value.item(), "dtype": value.dtype.str}
+    return found if text_keys else {key.encode(): held for key, held in found.items()}
 
 
-def _decode(keys: ArrayKeys, found: dict[Any, Any]) -> object:
-    if keys.array in found:
-        return _array(keys, found)
-    if keys.scalar is not None and keys.scalar in found:
-        dtype, data = _dtype(keys, found), found.get(keys.data)
+def _decode(found: dict[Any, Any]) -> object:
+    """Return what a map stands for: an array, a scalar, or itself."""
+    held = {key.decode("latin-1") if isinstance(key, bytes) else key: found[key] for key in found}
+    if "__ndarray__" in held:
+        return _array(held.get("dtype"), held.get("shape"), held.get("data"))
+    if "__npgeneric__" in held:
+        data, dtype = held.get("data"), _dtype(held.get("dtype"))
         if not isinstance(data, int | float | str):
             raise ValueError(f"a NumPy scalar holds {type(data).__name__}")
         return dtype.type(data)
+    # Of msgpack-numpy, a kind marks structures and pickled objects.
+    if held.keys() >= {"nd", "type", "data"} and not held.get("kind"):
+        return _array(held["type"], held.get("shape", []), held["data"])
     return found
 
 
-def _array(keys: ArrayKeys, found: dict[Any, Any]) -> np.ndarray[Any, Any]:
-    dtype, shape, data = _dtype(keys, found), found.get(keys.shape), found.get(keys.data)
+def _array(described: object, shape: Any, data: object) -> np.ndarray[Any, Any]:  # noqa: ANN401
+    dtype = _dtype(described)
     if not isinstance(data, bytes):
         raise ValueError(f"the data of an array is {type(data).__name__}, not bytes")
-    if not isinstance(shape, list):
-        raise ValueError(f"the shape of an array is {repr(shape)[:_MAX_SHOWN]}")
     try:
         return np.frombuffer(data, dtype).reshape(shape)  # read-only, as the bytes are
     except (TypeError, ValueError) as error:
@@ -118,14 +110,10 @@ def _array(keys: ArrayKeys, found: dict[Any, Any]) -> np.ndarray[Any, Any]:
         raise ValueError(f"an array {dtype.str} of shape {shown} has {len(data)} bytes") from error
 
 
-def _dtype(keys: ArrayKeys, found: dict[Any, Any]) -> np.dtype[Any]:
-    text = found.get(keys.dtype)
+def _dtype(text: object) -> np.dtype[Any]:
     if not isinstance(text, str) or len(text) > _MAX_DTYPE_LENGTH:
         raise ValueError(f"the dtype of an array is {str(text)[:_MAX_DTYPE_LENGTH]!r}")
     dtype = np.dtype(text)
     if dtype.kind in _UNSUPPORTED:
         raise ValueError(f"arrays of dtype {text!r} are not accepted")
     return dtype
-
-
-MSGPACK = "application/msgpack"

@@ -9,34 +9,36 @@ from __future__ import annotations
 import functools
 import sys
 from collections.abc import Mapping
+from dataclasses import dataclass
 
-from roboirg.core.errors import InvalidValueError
-from roboirg.policies.remote.protocol import Protocol
+from roboirg.policies.remote.remote_policy import RemotePolicy
+from roboirg.policies.remote.service import Service
 from roboirg.util.discovery import discover
 
-__all__ = ["all_protocols", "protocols_by_scheme"]
+__all__ = ["Protocol", "protocols_by_scheme"]
 
 
-@functools.cache
-def all_protocols() -> tuple[Protocol, ...]:
-    """Return every protocol: ours by file name, then those of installed packages."""
-    return tuple(discover(sys.modules[__name__], "PROTOCOL", Protocol, "roboirg.protocols"))
+@dataclass(frozen=True)
+class Protocol:
+    """A wire format between policy servers and their clients: msgpack over a websocket.
+
+    Attributes:
+        name: unique among all protocols; the scheme of URLs.
+        summary: which servers speak it, in a few words.
+        memory: what a server remembers between requests, in a few words.
+        client: makes policies of URLs.
+        service: answers the messages of clients with any policy; None if only a client exists.
+    """
+
+    name: str
+    summary: str
+    memory: str
+    client: type[RemotePolicy]
+    service: type[Service] | None = None
 
 
 @functools.cache
 def protocols_by_scheme() -> Mapping[str, Protocol]:
-    """Return the protocol of each URL scheme.
-
-    Raises:
-        InvalidValueError: two protocols have the same scheme.
-    """
-    found: dict[str, Protocol] = {}
-    for protocol in all_protocols():
-        for scheme in protocol.schemes:
-            if scheme in found:
-                raise InvalidValueError(
-                    f"The protocols {found[scheme].name!r} and {protocol.name!r} both have the "
-                    f"scheme {scheme}://; rename one."
-                )
-            found[scheme] = protocol
-    return found
+    """Return all protocols by name: ours by file, then those of installed packages."""
+    found = discover(sys.modules[__name__], "PROTOCOL", Protocol, "roboirg.protocols")
+    return {protocol.name: protocol for protocol in found}

@@ -1,4 +1,4 @@
-"""challenge://host:port and challenge+http://host:port: servers for the RoboMME challenge.
+"""challenge://host:port: servers for the RoboMME challenge.
 
 A request holds everything seen since the last one; the server decides how many actions it returns,
 and all are executed. The protocol has no parts: the video is one message.
@@ -11,17 +11,12 @@ from typing import Any, ClassVar, cast
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field
 
-from roboirg.core.errors import InvalidValueError
 from roboirg.core.observations import CAMERAS, Demonstration, Observation
-from roboirg.policies.contract.base import Policy, close_policy
-from roboirg.policies.contract.option_checking import Seconds
-from roboirg.policies.remote.client.remote_policy import RemotePolicy
 from roboirg.policies.remote.endpoints import ActionSpaceName, RemoteOptions
-from roboirg.policies.remote.protocol import Protocol
-from roboirg.policies.remote.service import Handler, MakePolicy, Message, Service, act, tell_change
-from roboirg.policies.remote.transport import HTTP, Transport
+from roboirg.policies.remote.protocols import Protocol
+from roboirg.policies.remote.remote_policy import RemotePolicy
+from roboirg.policies.remote.service import Message, Service
 
 FIELDS: Mapping[str, str] = {
     "front_rgb_list": "front_rgb",
@@ -44,7 +39,7 @@ INTRINSIC_FIELDS: Mapping[str, str] = {
 
 
 class ChallengeOptions(RemoteOptions):
-    """Options of challenge:// and challenge+http://.
+    """Options of challenge://.
 
     Attributes:
         actions: action space of the submission.
@@ -52,14 +47,13 @@ class ChallengeOptions(RemoteOptions):
         calibration: whether to send the cameras' matrices.
     """
 
-    timeout: Seconds = Field(120.0, gt=0)
     actions: ActionSpaceName = "joint_angle"
     depth: bool = False
     calibration: bool = False
 
 
 class ChallengePolicy(RemotePolicy):
-    """Client of a RoboMME challenge server, over a websocket."""
+    """Client of a RoboMME challenge server."""
 
     options_type: ClassVar[type[RemoteOptions]] = ChallengeOptions
     options: ChallengeOptions
@@ -81,19 +75,8 @@ class ChallengePolicy(RemotePolicy):
         self.request_confirmed({"reset": True}, "reset_finished")
 
     def request_actions(self, observation: Observation) -> NDArray[np.floating[Any]]:
-        """Send everything seen since the last call; return all actions of the reply.
-
-        Raises:
-            InvalidValueError: pictures, or the depth or calibration that the URL's options ask for,
-                are missing.
-        """
+        """Send everything seen since the last call; return all actions of the reply."""
         intrinsic = INTRINSIC_FIELDS if self.calibration else {}
-        for field in (*self._fields.values(), *intrinsic.values()):
-            if field not in observation:
-                raise InvalidValueError(
-                    f"Observations lack {field!r}; make the environment with cameras={CAMERAS}, "
-                    f"depth={self.depth} and calibration={self.calibration}."
-                )
         demonstration, self._demonstration = self._demonstration, None
         first = demonstration is not None
         seen = (observation,) if first else observation["history"] or (observation,)
@@ -106,41 +89,28 @@ class ChallengePolicy(RemotePolicy):
         return self.read_actions(self.request(message))
 
 
-class ChallengeHttpPolicy(ChallengePolicy):
-    """Client of a RoboMME challenge server, over HTTP."""
-
-    transport: ClassVar[Transport] = HTTP
-
-
 class ChallengeService(Service):
-    """Answers ``reset`` and requests for actions; all connections share one policy."""
+    """Answers ``reset`` and requests for actions; all connections share a memory."""
 
-    def __init__(self, make_policy: MakePolicy) -> None:
-        super().__init__(make_policy)
-        self._policy: Policy | None = None
-        self._said, self._steps = "", 0
+    _steps = 0
 
-    def new_handler(self) -> Handler:
-        """Return the handler that all connections share."""
-        return self._handle
-
-    def _handle(self, message: Message) -> dict[str, Any]:
+    def handle(self, message: Message) -> dict[str, Any]:
+        """Return the reply to a reset or a request for actions."""
         if message.get("reset"):
-            close_policy(self._policy)
-            self._policy = None
+            self.forget()
             return {"reset_finished": True}
         observations = _read_observations(message)
         now = observations[-1]
-        if message.get("is_first_step") or self._policy is None:
-            self._policy = self.make_policy()
-            self._policy.reset(now["instruction"], _stack(observations))
-            self._said, self._steps = now["instruction"], 0
+        if message.get("is_first_step") or self.policy is None:
+            self.forget()
+            self.begin(now["instruction"], _stack(observations))
+            self._steps = 0
             now["history"] = ()
         else:
             self._steps += len(observations)
-            self._said = tell_change(self._policy, self._said, now, self._steps)
+            self.hear(now["instruction"], self._steps)
             now["history"] = tuple(cast("Observation", dict(seen)) for seen in observations)
-        actions, _ = act(self._policy, now)
+        actions, _ = self.act(now)
         return {"actions": actions}
 
 
@@ -189,6 +159,6 @@ PROTOCOL = Protocol(
     name="challenge",
     summary="RoboMME challenge submissions",
     memory="up to the server",
-    clients={"challenge": ChallengePolicy, "challenge+http": ChallengeHttpPolicy},
+    client=ChallengePolicy,
     service=ChallengeService,
 )

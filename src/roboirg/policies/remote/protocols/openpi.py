@@ -17,12 +17,11 @@ from pydantic import Field
 
 from roboirg.core.errors import PolicyConnectionError
 from roboirg.core.observations import Demonstration, Observation, proprioception
-from roboirg.policies.contract.base import Policy, close_policy
-from roboirg.policies.contract.option_checking import Seconds
-from roboirg.policies.remote.client.remote_policy import RemotePolicy
+from roboirg.policies.contract.base import close_policy
 from roboirg.policies.remote.endpoints import MIB, ActionSpaceName, RemoteOptions
-from roboirg.policies.remote.protocol import Protocol
-from roboirg.policies.remote.service import Handler, MakePolicy, Message, Service, act, read_request
+from roboirg.policies.remote.protocols import Protocol
+from roboirg.policies.remote.remote_policy import RemotePolicy
+from roboirg.policies.remote.service import Message, Service, read_request
 
 
 class OpenpiOptions(RemoteOptions):
@@ -37,7 +36,6 @@ class OpenpiOptions(RemoteOptions):
         prompt: key of the instruction.
     """
 
-    timeout: Seconds = Field(120.0, gt=0)
     shared: bool = True
     execute: int | None = Field(None, ge=1)
     actions: ActionSpaceName = "joint_angle"
@@ -77,40 +75,28 @@ class OpenpiPolicy(RemotePolicy):
             reply = self.request(message)
         except PolicyConnectionError:
             # The request is complete in itself, so a new connection can answer it.
-            self.reconnect()
+            self.connection.reconnect()
+            self.greet()
             reply = self.request(message)
         return self.read_actions(reply)[: self.options.execute]
 
 
 class OpenpiService(Service):
-    """Answers requests for actions, with one policy per connection."""
+    """Answers requests with one policy per connection, which is reset when the prompt changes."""
 
     max_request_bytes: ClassVar[int] = 64 * MIB
 
-    def new_handler(self) -> Handler:
-        """Return a handler with a policy of its own."""
-        return _OpenpiConversation(self.make_policy).handle
-
-
-class _OpenpiConversation:
-    """One connection: a policy that is reset whenever the prompt changes."""
-
-    def __init__(self, make_policy: MakePolicy) -> None:
-        self._make_policy = make_policy
-        self._policy: Policy | None = None
-        self._prompt: str | None = None
+    def connection(self) -> Service:
+        """Return a service with a policy of its own."""
+        return OpenpiService(self.make_policy)
 
     def handle(self, message: Message) -> dict[str, Any]:
         """Return the reply to a request for actions."""
         observation = read_request(message)
-        if self._policy is None:
-            self._policy = self._make_policy()
-        if observation["instruction"] != self._prompt:
-            if self._prompt is not None:
-                close_policy(self._policy)
-            self._prompt = observation["instruction"]
-            self._policy.reset(self._prompt, _empty_video(observation["front_rgb"].shape))
-        actions, milliseconds = act(self._policy, observation)
+        if self.policy is None or observation["instruction"] != self.said:
+            close_policy(self.policy)
+            self.begin(observation["instruction"], _empty_video(observation["front_rgb"].shape))
+        actions, milliseconds = self.act(observation)
         return {"actions": actions, "server_timing": {"infer_ms": milliseconds}}
 
 
@@ -127,6 +113,6 @@ PROTOCOL = Protocol(
     name="openpi",
     summary="openpi servers and compatible ones",
     memory="none",
-    clients={"openpi": OpenpiPolicy},
+    client=OpenpiPolicy,
     service=OpenpiService,
 )

@@ -8,29 +8,24 @@ an episode begins and ends with a message of its own, and an observation has one
 from __future__ import annotations
 
 import contextlib
+import time
 from collections.abc import Mapping
 from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field
 
 from roboirg.core.errors import InvalidValueError, PolicyReplyError, RoboIRGError
 from roboirg.core.observations import Demonstration, Observation, proprioception
-from roboirg.policies.contract.option_checking import Seconds
-from roboirg.policies.remote.client.remote_policy import RemotePolicy
+from roboirg.core.version import __version__
 from roboirg.policies.remote.endpoints import ActionSpaceName, RemoteOptions
-from roboirg.policies.remote.protocol import Protocol
-from roboirg.policies.remote.transport import Transport
+from roboirg.policies.remote.protocols import Protocol
+from roboirg.policies.remote.remote_policy import RemotePolicy
 
+PROTOCOL_VERSION = 1
 TASK = {"name": "RoboIRGBench"}
 """Sent at the beginning of an episode. The harness sends the task here, which would give away more
 than the instruction."""
-_ENVELOPE = Transport(
-    "websocket",
-    "roboirg.policies.remote.client.envelope_connection:EnvelopeConnection",
-    "roboirg.policies.remote.serving.websocket_server:WebsocketServer",
-)
 
 
 class VlaEvalOptions(RemoteOptions):
@@ -43,7 +38,6 @@ class VlaEvalOptions(RemoteOptions):
         video: likewise the demonstration.
     """
 
-    timeout: Seconds = Field(120.0, gt=0)
     actions: ActionSpaceName = "joint_angle"
     wrist: bool = True
     state: bool = True
@@ -55,7 +49,6 @@ class VlaEvalPolicy(RemotePolicy):
 
     options_type: ClassVar[type[RemoteOptions]] = VlaEvalOptions
     options: VlaEvalOptions
-    transport: ClassVar[Transport] = _ENVELOPE
     deterministic: ClassVar[bool] = False
 
     def __init__(self, url: str, seed: int = 0) -> None:
@@ -65,6 +58,24 @@ class VlaEvalPolicy(RemotePolicy):
         self._demonstration: Demonstration | None = None
         self._subgoal: str | None = None
         self._in_episode = False
+        self._number = 0
+
+    def greet(self) -> Mapping[str, Any]:
+        """Send a hello, and return that of the server, with a version made of it.
+
+        Raises:
+            PolicyReplyError: it is of another version of the protocol.
+        """
+        self._number = 0
+        ours = {"harness_version": f"roboirg {__version__}", "protocol_version": PROTOCOL_VERSION}
+        hello = self._send("hello", ours, awaited="hello")
+        if hello.get("protocol_version") != PROTOCOL_VERSION:
+            raise PolicyReplyError(
+                f"{self.connection} speaks version {str(hello.get('protocol_version'))[:80]} of "
+                f"vla-eval's protocol; this client speaks version {PROTOCOL_VERSION}."
+            )
+        version = f"{hello.get('model_server')}, vla-eval {hello.get('harness_version')}"
+        return {"version": version, **hello}
 
     def begin_episode(self, demonstration: Demonstration) -> None:
         """Begin an episode; the demonstration goes with the first observation."""
@@ -72,7 +83,7 @@ class VlaEvalPolicy(RemotePolicy):
         self._subgoal = None
         shows = self.options.video and self._wants("send_video_history")
         self._demonstration = demonstration if shows else None
-        self.request({"type": "episode_start", "payload": {"task": TASK}})
+        self._send("episode_start", {"task": TASK})
         self._in_episode = True
 
     def close(self) -> None:
@@ -80,7 +91,7 @@ class VlaEvalPolicy(RemotePolicy):
         if self._in_episode:
             self._in_episode = False
             with contextlib.suppress(RoboIRGError):  # it is over for the server too
-                self.request({"type": "episode_end", "payload": {}})
+                self._send("episode_end", {})
         super().close()
 
     def follow(self, subgoal: str) -> None:
@@ -104,7 +115,35 @@ class VlaEvalPolicy(RemotePolicy):
             shown["episode_restart"] = True
         if self._subgoal is not None:
             shown["subgoal"] = self._subgoal
-        return self.read_actions(_as_rows(self.request({"type": "observation", "payload": shown})))
+        reply = self._send("observation", shown, awaited="action")
+        alone = {"actions": reply["action"]} if "action" in reply else {}
+        return self.read_actions({**alone, **reply})
+
+    def _send(self, kind: str, payload: Mapping[str, Any], awaited: str = "") -> dict[str, Any]:
+        """Send a payload in an envelope; return that of the answer, if one is awaited.
+
+        An answer has the number of its request. The beginning of an episode has none; an error in
+        it comes before the next one.
+        """
+        from roboirg.policies.remote.message_codec import pack
+
+        self._number += 1
+        sent = {"type": kind, "payload": payload, "seq": self._number, "timestamp": time.time()}
+        answer = self.connection.exchange(
+            pack(sent, text_keys=True), "a reply" if awaited else "", is_numbered=True
+        )
+        if not awaited:
+            return {}
+        found, number, inside = (answer.get(name) for name in ("type", "seq", "payload"))
+        if found == "error":
+            words = inside.get("error") if isinstance(inside, dict) else inside
+            raise self.connection.error_reply(str(words))
+        if found != awaited or number != self._number or not isinstance(inside, dict):
+            raise PolicyReplyError(
+                f"{self.connection} sent a message of type {str(found)[:80]!r} with number "
+                f"{str(number)[:80]}, where {awaited!r} with number {self._number} was expected."
+            )
+        return inside
 
     def _wants(self, name: str) -> bool:
         """Return whether the server wants to be shown something; by default it does."""
@@ -121,22 +160,9 @@ class VlaEvalPolicy(RemotePolicy):
             )
 
 
-def _as_rows(reply: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the reply with its action, which is a single one, as rows."""
-    name = next((name for name in ("actions", "action") if name in reply), None)
-    if name is None:
-        return dict(reply)
-    try:
-        return {"actions": np.atleast_2d(np.asarray(reply[name], np.float64))}
-    except (TypeError, ValueError) as error:
-        raise PolicyReplyError(
-            f"The server sent an action that is not an array: {error}."
-        ) from error
-
-
 PROTOCOL = Protocol(
     name="vla-eval",
     summary="model servers of vla-eval",
     memory="up to the server",
-    clients={"vla-eval": VlaEvalPolicy},
+    client=VlaEvalPolicy,
 )

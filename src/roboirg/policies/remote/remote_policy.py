@@ -1,4 +1,4 @@
-"""Base class of the clients of all protocols: the session of an episode, checked replies."""
+"""Base class of the clients of all protocols: the connection of an episode, checked replies."""
 
 from __future__ import annotations
 
@@ -17,16 +17,14 @@ from roboirg.core.observations import CAMERAS, Demonstration, Observation
 from roboirg.core.policy_ref import UNKNOWN_VERSION
 from roboirg.policies.contract.json_values import as_json
 from roboirg.policies.contract.policy_urls import read_options, split_url
-from roboirg.policies.remote.client.server_session import ServerSession
 from roboirg.policies.remote.endpoints import RemoteOptions, read_endpoints
-from roboirg.policies.remote.transport import WEBSOCKET, Transport
 
 
 class RemotePolicy(ABC):
     """A policy on a server, connected from `reset` to `close`.
 
-    Subclasses define `begin_episode` and `request_actions`, and set ``options_type`` and
-    ``transport`` if they differ. The constructor checks the URL and connects to nothing.
+    Subclasses define `begin_episode` and `request_actions`, and set ``options_type`` if it
+    differs. The constructor checks the URL and connects to nothing.
 
     Args:
         url: one or several servers, and options.
@@ -34,6 +32,7 @@ class RemotePolicy(ABC):
 
     Attributes:
         options: of the URL; one named ``actions`` selects the action space.
+        connection: to the server of the episode.
         metadata: of the server, as JSON values, from `reset` on.
         instruction: what was said last in the current episode; without `delivery` in turns, the
             whole instruction. Clients send it with every request if the protocol allows it.
@@ -41,15 +40,16 @@ class RemotePolicy(ABC):
     Raises:
         UnknownNameError: the URL has an unknown option.
         InvalidValueError: the URL names no server, or an option has a wrong value.
-        MissingDependencyError: the library of the transport is not installed.
+        MissingDependencyError: a library for connections is not installed.
     """
 
     options_type: ClassVar[type[RemoteOptions]] = RemoteOptions
-    transport: ClassVar[Transport] = WEBSOCKET
     cameras: tuple[str, ...] = CAMERAS
     actions: str = JOINT_ANGLE.name
 
     def __init__(self, url: str, seed: int = 0) -> None:
+        from roboirg.policies.remote.connection import ServerConnection
+
         del seed
         parts = split_url(url)
         self.options = read_options(parts, self.options_type)
@@ -60,11 +60,9 @@ class RemotePolicy(ABC):
         self._space = find_action_space(getattr(self.options, "actions", self.actions))
         self.actions = self._space.name
         self.instruction = ""
-        self._session = ServerSession(
-            parts.scheme, read_endpoints(parts), self.options, self.transport.load_client()
-        )
+        self.connection = ServerConnection(parts.scheme, read_endpoints(parts), self.options)
         # Without a close() the server is unlocked when the policy is deleted.
-        weakref.finalize(self, self._session.end)
+        weakref.finalize(self, self.connection.end)
 
     @property
     def version(self) -> str:
@@ -81,10 +79,10 @@ class RemotePolicy(ABC):
             PolicyReplyError: the server replied with an error or with something else.
         """
         self.instruction = instruction
-        server = self._session.begin()
-        used = {"execute": getattr(self.options, "execute", None) or "all"}
-        self.metadata = {"server": str(self._session.spec.endpoint), **as_json(server), **used}
         with self._closed_on_error():
+            self.connection.begin()
+            server = {"server": str(self.connection.endpoint), **as_json(self.greet())}
+            self.metadata = server | {"execute": getattr(self.options, "execute", None) or "all"}
             self.begin_episode(demonstration)
 
     def act(self, observation: Observation) -> NDArray[np.floating[Any]]:
@@ -99,6 +97,10 @@ class RemotePolicy(ABC):
         with self._closed_on_error():
             return self.request_actions(observation)
 
+    def greet(self) -> Mapping[str, Any]:
+        """Return what a server says about itself on a new connection, which it does first."""
+        return self.connection.exchange(None, "its metadata")
+
     @abstractmethod
     def begin_episode(self, demonstration: Demonstration) -> None:
         """Reset the server; the demonstration may be kept for `request_actions`."""
@@ -109,7 +111,7 @@ class RemotePolicy(ABC):
 
     def close(self) -> None:
         """End the episode: disconnect and unlock the server; repeated calls do nothing."""
-        self._session.end()
+        self.connection.end()
 
     def request(self, message: Mapping[str, Any]) -> dict[str, Any]:
         """Send a message to the server and return the reply.
@@ -119,7 +121,9 @@ class RemotePolicy(ABC):
             PolicyTimeoutError: the server took too long.
             PolicyReplyError: the server replied with an error, or with no message.
         """
-        return self._session.request(message)
+        from roboirg.policies.remote.message_codec import pack
+
+        return self.connection.exchange(pack(message))
 
     def request_confirmed(self, message: Mapping[str, Any], key: str) -> None:
         """Send a message whose reply must have True under a key.
@@ -130,13 +134,9 @@ class RemotePolicy(ABC):
         reply = self.request(message)
         if reply.get(key) is not True:
             raise PolicyReplyError(
-                f"{self._session.spec} did not confirm {next(iter(message))!r}: {key!r} in its "
+                f"{self.connection} did not confirm {next(iter(message))!r}: {key!r} in its "
                 f"reply is {str(reply.get(key))[:80]}."
             )
-
-    def reconnect(self) -> None:
-        """Connect to the server of the episode again."""
-        self._session.reconnect()
 
     def read_actions(self, reply: Mapping[str, Any]) -> NDArray[np.float64]:
         """Return the ``actions`` of a reply, (n, size).
@@ -144,16 +144,21 @@ class RemotePolicy(ABC):
         Raises:
             PolicyReplyError: there are none, or they have a wrong shape or are not finite.
         """
-        if "actions" not in reply:
-            keys = ", ".join(map(repr, list(reply)[:8])) or "nothing"
+        actions = reply.get("actions")
+        if isinstance(actions, Mapping):
             raise PolicyReplyError(
-                f"{self._session.spec} sent a reply without 'actions'; it holds {keys}."
+                f"{self.connection} sent actions encoded in another dialect "
+                f"(keys {_listed(actions)})."
+            )
+        if "actions" not in reply:
+            raise PolicyReplyError(
+                f"{self.connection} sent a reply without 'actions'; it holds {_listed(reply)}."
             )
         try:
             return check_chunk(reply["actions"], self._space)
         except InvalidActionError as error:
             raise PolicyReplyError(
-                f"{self._session.spec} sent actions that cannot be executed: {error}"
+                f"{self.connection} sent actions that cannot be executed: {error}"
             ) from error
 
     @contextlib.contextmanager
@@ -162,5 +167,9 @@ class RemotePolicy(ABC):
         try:
             yield
         except Exception:
-            self.close()
+            self.connection.end(is_broken=True)
             raise
+
+
+def _listed(names: Mapping[Any, Any]) -> str:
+    return ", ".join(map(repr, list(names)[:8])) or "nothing"

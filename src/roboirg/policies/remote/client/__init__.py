@@ -1,1 +1,0 @@
-"""The client of remote policies: connections, their deadlines, and a lock on the server."""

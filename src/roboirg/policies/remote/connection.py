@@ -1,0 +1,249 @@
+"""The connection to a policy server: a lock on it, a websocket, and the time limits of both.
+
+No pings are sent. The published servers compute in the thread that would answer them, so a ping's
+time limit would end a connection that is merely slow; the time limit of replies finds a dead one.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import socket
+import struct
+import time
+from collections.abc import Sequence
+from typing import Any
+
+from roboirg.core.errors import (
+    PolicyConnectionError,
+    PolicyReplyError,
+    PolicyTimeoutError,
+    RoboIRGError,
+)
+from roboirg.core.extras import extra_needed
+from roboirg.core.waiting import waiting
+from roboirg.policies.remote.endpoints import MIB, Endpoint, RemoteOptions
+from roboirg.policies.remote.message_codec import CodecError, unpack
+from roboirg.policies.remote.server_lock import lock_server
+
+with extra_needed("Remote policies need websockets 17.4 or newer", "remote"):
+    from websockets.exceptions import (
+        ConnectionClosed,
+        InvalidStatus,
+        TooManyFragments,
+        WebSocketException,
+    )
+    from websockets.protocol import State
+    from websockets.sync.client import ClientConnection, connect
+
+FIRST_PAUSE, MAX_PAUSE = 0.1, 5.0
+"""Seconds between two attempts to connect; each pause is twice the one before."""
+CLOSE_TIMEOUT = 2.0
+"""Seconds to wait for a server's closing frame."""
+_CHECK_S = 1.0
+"""Seconds between two looks at whether the library has refused what the server sends."""
+_TOO_BIG = 1009
+"""Websocket close code for a message above the size limit."""
+_RETRYABLE = frozenset({408, 425, 429, 500, 502, 503, 504})
+"""HTTP statuses of a server, or of a proxy, while the server starts."""
+_MAX_ERROR_LENGTH = 300
+_MAX_TRACEBACK_END = 4096
+
+
+class ServerConnection:
+    """One episode's use of a server; can begin again after its end.
+
+    Args:
+        scheme: of the policy's URL.
+        endpoints: the servers to choose from.
+        options: limits and headers.
+
+    Attributes:
+        endpoint: the server in use, or the last one; at first, the first to choose from.
+    """
+
+    def __init__(self, scheme: str, endpoints: Sequence[Endpoint], options: RemoteOptions) -> None:
+        self._scheme, self._endpoints, self._options = scheme, endpoints, options
+        self.endpoint = endpoints[0]
+        self._websocket: ClientConnection | None = None
+        self._held = contextlib.ExitStack()
+        """The lock, and connections."""
+
+    def __str__(self) -> str:
+        return f"Policy server {self._scheme}://{self.endpoint}"
+
+    def begin(self) -> None:
+        """Lock a server and connect to it.
+
+        Raises:
+            PolicyTimeoutError: all servers were in use for too long.
+            PolicyConnectionError: it cannot be reached in time, or refuses.
+        """
+        self.end()
+        options = self._options
+        lock = lock_server(self._endpoints, wait=options.wait, shared=options.shared)
+        self._held.enter_context(lock.file)
+        self.endpoint = lock.endpoint
+        self._connect()
+
+    def reconnect(self) -> None:
+        """Connect to the same server again, if there was a connection.
+
+        Raises:
+            PolicyConnectionError: it cannot be reached in time, or refuses.
+        """
+        if self._websocket is not None:
+            self._connect()
+
+    def exchange(
+        self, data: bytes | None, awaited: str = "a reply", *, is_numbered: bool = False
+    ) -> dict[str, Any]:
+        """Send a message, and return the one that comes next.
+
+        Args:
+            data: the message; None to send nothing, as the server speaks first.
+            awaited: what comes next, in words; empty to wait for nothing, and return ``{}``.
+            is_numbered: whether messages name what they answer. If not, a message that is there
+                before the request is refused, as it would be taken for the reply.
+
+        Raises:
+            PolicyConnectionError: the connection broke, or there is none.
+            PolicyTimeoutError: the server took too long.
+            PolicyReplyError: the server replied with an error, or with no message.
+        """
+        websocket, options = self._websocket, self._options
+        if websocket is None:
+            raise PolicyConnectionError(f"{self} is not connected; call reset() first.")
+        seconds = options.connect if data is None else options.timeout
+        end = time.monotonic() + seconds
+        try:
+            with waiting(f"the reply of {self._scheme}://{self.endpoint}"):
+                if data is not None:
+                    if not is_numbered:
+                        self._refuse_surplus(websocket)
+                    websocket.send(data)
+                while awaited and (left := end - time.monotonic()) > 0:
+                    with contextlib.suppress(TimeoutError):
+                        return self._read(websocket.recv(timeout=min(_CHECK_S, left)))
+                    if websocket.state is not State.OPEN:
+                        # The server does not end what the library has refused.
+                        _shut_down(websocket)
+        except ConnectionClosed as error:
+            raise self._broken(error) from error
+        if awaited:
+            raise PolicyTimeoutError(f"{self} did not send {awaited} within {seconds:g} s.")
+        return {}
+
+    def end(self, *, is_broken: bool = False) -> None:
+        """Disconnect and unlock the server; repeated calls do nothing.
+
+        A broken connection is ended without the server, which may not take part in that.
+        """
+        websocket, self._websocket = self._websocket, None
+        if is_broken and websocket is not None:
+            _shut_down(websocket)  # a thread that sends holds the lock that closing needs
+        self._held.close()
+
+    def error_reply(self, text: str) -> PolicyReplyError:
+        """Return the error for a server's traceback, of which the last line says most."""
+        # Only the end is split into lines: there may be millions.
+        lines = text[-_MAX_TRACEBACK_END:].rstrip().splitlines()
+        words = lines[-1].strip()[:_MAX_ERROR_LENGTH].rstrip(".") if lines else "an empty text"
+        return PolicyReplyError(f"{self} replied with an error: {words}.")
+
+    def _connect(self) -> None:
+        """Connect, with growing pauses between attempts."""
+        seconds, pause = self._options.connect, FIRST_PAUSE
+        end = time.monotonic() + seconds
+        with waiting(f"a connection to {self._scheme}://{self.endpoint}"):
+            while isinstance(found := self._attempt(end - time.monotonic()), str):
+                if time.monotonic() + pause >= end:
+                    raise PolicyConnectionError(
+                        f"{self} cannot be reached ({found}); tried for {seconds:g} s."
+                    )
+                time.sleep(pause)
+                pause = min(2 * pause, MAX_PAUSE)
+        # The kernel ends a send that a server does not take in; the library has no limit for it.
+        whole = int(self._options.timeout)
+        limit = struct.pack("ll", whole, int(1e6 * (self._options.timeout - whole)))
+        found.socket.setsockopt(socket.SOL_SOCKET, socket.SO_SNDTIMEO, limit)
+        self._websocket = found
+
+    def _attempt(self, left: float) -> ClientConnection | str:
+        """Return a connection, or the reason why there is none, which may pass."""
+        endpoint, options, headers = self.endpoint, self._options, self._options.headers
+        try:
+            return self._held.enter_context(
+                connect(
+                    f"{'wss' if options.tls else 'ws'}://{endpoint}",
+                    additional_headers=headers,
+                    compression=None,
+                    max_size=int(options.max_reply_mib * MIB),
+                    open_timeout=max(left, 0.001),
+                    close_timeout=CLOSE_TIMEOUT,
+                    ping_interval=None,
+                    proxy=None,
+                    # An explicit address is never redirected to another one.
+                    address=(endpoint.host, endpoint.port),
+                )
+            )
+        except InvalidStatus as error:
+            status = error.response.status_code
+            if status in _RETRYABLE:
+                return f"HTTP status {status}"
+            hint = "; name the key with api_key_env=NAME" if status in (401, 403) else ""
+            raise PolicyConnectionError(
+                f"{self} refused the connection with HTTP status {status}{hint}."
+            ) from error
+        except socket.gaierror as error:
+            raise PolicyConnectionError(
+                f"{self} cannot be reached: there is no host {endpoint.host!r}."
+            ) from error
+        except (OSError, EOFError, WebSocketException) as error:
+            return _describe(error)
+        except ValueError as error:
+            raise PolicyConnectionError(f"{self} refused: {_describe(error)}.") from error
+
+    def _refuse_surplus(self, websocket: ClientConnection) -> None:
+        with contextlib.suppress(TimeoutError):
+            surplus = websocket.recv(timeout=0)
+            if isinstance(surplus, str):
+                raise self.error_reply(surplus)
+            raise PolicyReplyError(f"{self} sent a message without a request.")
+
+    def _read(self, data: bytes | str) -> dict[str, Any]:
+        if isinstance(data, str):
+            raise self.error_reply(data)
+        try:
+            return unpack(data)
+        except CodecError as error:
+            raise PolicyReplyError(
+                f"{self} sent something other than a message: {error}."
+            ) from error
+
+    def _broken(self, error: ConnectionClosed) -> RoboIRGError:
+        """Return the error for a connection that has ended."""
+        if isinstance(error.__cause__, BlockingIOError):
+            seconds = self._options.timeout
+            return PolicyTimeoutError(f"{self} did not take in a message within {seconds:g} s.")
+        if isinstance(error.__cause__, TooManyFragments):
+            return PolicyReplyError(f"{self} sent a reply in too many pieces.")
+        if error.sent is not None and error.sent.code == _TOO_BIG:
+            return PolicyReplyError(
+                f"{self} sent a reply of more than {self._options.max_reply_mib:g} MiB; "
+                "option max_reply_mib raises that limit."
+            )
+        code = f"close code {error.rcvd.code}" if error.rcvd else "without a close code"
+        return PolicyConnectionError(f"{self} ended the connection ({code}).")
+
+
+def _shut_down(websocket: ClientConnection) -> None:
+    """Wake the threads that use a socket, also one with TLS, whose state is left alone."""
+    with contextlib.suppress(OSError):
+        socket.socket.shutdown(websocket.socket, socket.SHUT_RDWR)
+
+
+def _describe(error: BaseException) -> str:
+    if isinstance(error, ConnectionRefusedError):
+        return "nothing listens there"
+    message = " ".join(str(error).split()).rstrip(".")
+    return f"{type(error).__name__}: {message}" if message else type(error).__name__

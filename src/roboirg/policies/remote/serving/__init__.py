@@ -1,1 +1,0 @@
-"""Any policy of this process behind a network connection."""

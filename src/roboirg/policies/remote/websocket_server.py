@@ -1,0 +1,143 @@
+"""Serve over a websocket: metadata first, then a reply per message, errors as text.
+
+Connections are coroutines of one thread; the policy has a thread of its own, so health checks are
+answered while it computes.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import hmac
+import http
+import traceback
+from collections.abc import Mapping
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+from roboirg.core.extras import extra_needed
+from roboirg.policies.remote.message_codec import pack, unpack
+from roboirg.policies.remote.service import Service
+from roboirg.util.web.listening import TIMEOUT_S, listen
+from roboirg.util.web.request_origin import LOOPBACK, is_own_request, names_of_this_machine
+
+with extra_needed("Serving policies needs websockets 17.4 or newer", "remote"):
+    from websockets.asyncio.server import ServerConnection, serve
+    from websockets.exceptions import ConnectionClosed
+
+if TYPE_CHECKING:
+    from websockets.http11 import Request, Response
+
+CLOSE_TIMEOUT_S = 2.0
+_INTERNAL_ERROR = 1011
+
+
+@dataclass(frozen=True)
+class ServerOptions:
+    """Where a policy server listens, and whom it answers.
+
+    Attributes:
+        host: address to listen at.
+        port: port to listen at; 0 for any free one.
+        key: clients must send ``Authorization: Api-Key KEY``; None admits all clients.
+        timeout_s: how long a connection may be idle, and a message may take to arrive.
+    """
+
+    host: str = LOOPBACK
+    port: int = 0
+    key: str | None = field(default=None, repr=False)
+    timeout_s: float = TIMEOUT_S
+
+
+class WebsocketServer:
+    """Listens from the start and answers while `serve_forever` runs.
+
+    Args:
+        service: answers messages.
+        metadata: sent first on every connection.
+        options: address, key and time limit.
+
+    Attributes:
+        socket: that listens.
+    """
+
+    def __init__(
+        self, service: Service, metadata: Mapping[str, Any], options: ServerOptions
+    ) -> None:
+        self._service, self._metadata, self._options = service, pack(metadata), options
+        self.socket = listen(options.host, options.port)
+        # One thread, as a policy may belong to the thread that made it.
+        self._policy = ThreadPoolExecutor(1, "policy")
+        self._runner = asyncio.Runner(loop_factory=asyncio.new_event_loop)
+        self._loop, self._stop = self._runner.get_loop(), asyncio.Event()
+
+    def serve_forever(self) -> None:
+        """Answer until `shutdown` is called by another thread."""
+        with self._runner:
+            self._runner.run(self._serve())
+
+    def shutdown(self) -> None:
+        """Stop."""
+        with contextlib.suppress(RuntimeError):  # it has stopped
+            self._loop.call_soon_threadsafe(self._stop.set)
+
+    async def _serve(self) -> None:
+        async with serve(
+            self._converse,
+            sock=self.socket,
+            compression=None,
+            max_size=self._service.max_request_bytes,
+            process_request=self._check_request,
+            close_timeout=CLOSE_TIMEOUT_S,
+            max_queue=1,  # clients wait for a reply before they send more
+            ping_interval=None,  # a pong would wait behind a large message
+        ):
+            await self._stop.wait()
+        self._policy.shutdown(wait=False, cancel_futures=True)
+
+    def _check_request(self, connection: ServerConnection, request: Request) -> Response | None:
+        """Return the response to a request that opens no connection."""
+        headers, options = request.headers, self._options
+        names = {*names_of_this_machine(), options.host.lower()}
+        if not is_own_request(headers.get_all("Host"), headers.get_all("Origin"), names):
+            return connection.respond(
+                http.HTTPStatus.FORBIDDEN,
+                "The Origin or Host of this request is not this server's; if clients reach it "
+                "under another name, list it in ROBOIRG_HOST_NAMES of roboirg serve.\n",
+            )
+        if request.path == "/healthz":
+            return connection.respond(http.HTTPStatus.OK, "OK\n")
+        sent = "\n".join(headers.get_all("Authorization")).encode()
+        if options.key is not None and not hmac.compare_digest(
+            sent, f"Api-Key {options.key}".encode()
+        ):
+            return connection.respond(
+                http.HTTPStatus.UNAUTHORIZED, "The key is missing or wrong.\n"
+            )
+        return None
+
+    async def _converse(self, connection: ServerConnection) -> None:
+        service, timeout_s = self._service.connection(), self._options.timeout_s
+        with contextlib.suppress(ConnectionClosed, TimeoutError):
+            await connection.send(self._metadata)
+            while True:
+                async with asyncio.timeout(timeout_s):
+                    data = await connection.recv()
+                reply = await self._loop.run_in_executor(self._policy, _answer, service, data)
+                del data  # may be large
+                async with asyncio.timeout(timeout_s):
+                    await connection.send(reply)
+                if isinstance(reply, str):
+                    await connection.close(_INTERNAL_ERROR, "Internal server error.")
+                    return
+
+
+def _answer(service: Service, data: bytes | str) -> bytes | str:
+    """Return the reply to a message, or the traceback of an error as text."""
+    try:
+        if isinstance(data, str):
+            raise TypeError("Messages must be binary, not text.")
+        return pack(service.handle(unpack(data)))
+    except Exception:  # noqa: BLE001 - the boundary: the policy's author needs the traceback
+        return traceback.format_exc()
