@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterable, Sequence
-from itertools import accumulate
 from typing import NamedTuple
 
 from roboirg.core.delivery import PromptVerdict
@@ -40,13 +39,6 @@ class Tokens(NamedTuple):
         """Number of all tokens."""
         return self.before + len(self.ends) + self.after
 
-    def reach(self, limit: int, length: int) -> int:
-        """Return how many of `length` characters a model reads within a limit of tokens."""
-        room = limit - self.before
-        if room >= len(self.ends):
-            return length
-        return self.ends[room - 1] if room > 0 else 0
-
 
 Tokenize = Callable[[str], Tokens]
 """Splits a cleaned prompt into tokens."""
@@ -68,22 +60,6 @@ class PromptLimit(NamedTuple):
     tokenize: Tokenize | None = None
     tokenizer: str | None = None
     lowers: bool = False
-
-
-class MessageAudit(NamedTuple):
-    """What of one message reaches the model.
-
-    Attributes:
-        least: tokens that it needs at least.
-        most: tokens that it needs at most; equal to `least` if they were counted and none added.
-        reached: characters from its beginning that can arrive.
-        verdict: ``heard`` if all of it arrives, ``cut`` if something is lost, else ``unknown``.
-    """
-
-    least: int
-    most: int
-    reached: int
-    verdict: PromptVerdict
 
 
 class InstructionAudit(NamedTuple):
@@ -144,27 +120,6 @@ def most_tokens(text: str) -> Tokens:
     return Tokens(ADDED_TOKENS - LINE_BREAK_TOKENS, tuple(ends), LINE_BREAK_TOKENS)
 
 
-def audit_message(text: str, limit: PromptLimit) -> MessageAudit:
-    """Return what of one message reaches the model."""
-    if limit.tokenize is None:
-        # Lower case needs no more tokens than what is counted here.
-        cleaned = clean_prompt(text)
-        bounds = fewest_tokens(cleaned), most_tokens(cleaned)
-    else:
-        cleaned = clean_prompt(text, lowers=limit.lowers)
-        bounds = (limit.tokenize(cleaned),) * 2
-    least, most = bounds[0].total, bounds[1].total + limit.added
-    indent = len(text) - len(text.lstrip())
-    found = bounds[0].reach(limit.tokens, len(cleaned))
-    reached = len(text) if found == len(cleaned) else indent + found
-    verdict: PromptVerdict = "unknown"
-    if most <= limit.tokens:
-        verdict = "heard"
-    elif least > limit.tokens:
-        verdict = "cut"
-    return MessageAudit(least, most, reached, verdict)
-
-
 def audit_instruction(messages: Sequence[Sequence[str]], limit: PromptLimit) -> InstructionAudit:
     """Return what of an instruction reaches the model.
 
@@ -172,19 +127,28 @@ def audit_instruction(messages: Sequence[Sequence[str]], limit: PromptLimit) -> 
         messages: each with its utterances, which are sent together, joined by spaces.
         limit: of every message.
     """
-    audits = [audit_message(" ".join(turns), limit) for turns in messages]
-    verdicts = {one.verdict for one in audits}
+    least = most = 0
     reached: list[int] = []
-    for turns, audit in zip(messages, audits, strict=True):
-        starts = accumulate((len(turn) + 1 for turn in turns[:-1]), initial=0)
-        reached += [
-            min(max(audit.reached - start, 0), len(turn))
-            for start, turn in zip(starts, turns, strict=True)
-        ]
-    verdict: PromptVerdict = "heard" if verdicts <= {"heard"} else "unknown"
+    for turns in messages:
+        low, high, end = _audit_message(" ".join(turns), limit)
+        least, most = max(least, low), max(most, high)
+        for turn in turns:
+            reached.append(min(max(end, 0), len(turn)))
+            end -= len(turn) + 1
+    verdict: PromptVerdict = "cut" if least > limit.tokens else "unknown"
     return InstructionAudit(
-        max((one.least for one in audits), default=0),
-        max((one.most for one in audits), default=0),
-        tuple(reached),
-        "cut" if "cut" in verdicts else verdict,
+        least, most, tuple(reached), "heard" if most <= limit.tokens else verdict
     )
+
+
+def _audit_message(text: str, limit: PromptLimit) -> tuple[int, int, int]:
+    """Return the fewest and the most tokens of a message, and how many characters arrive."""
+    # Lower case needs no more tokens than what is counted without a tokenizer.
+    cleaned = clean_prompt(text, lowers=limit.lowers and limit.tokenize is not None)
+    least = (limit.tokenize or fewest_tokens)(cleaned)
+    most = most_tokens(cleaned) if limit.tokenize is None else least
+    room = limit.tokens - least.before
+    reached = len(text)
+    if room < len(least.ends):
+        reached = len(text) - len(text.lstrip()) + (least.ends[room - 1] if room > 0 else 0)
+    return least.total, most.total + limit.added, reached

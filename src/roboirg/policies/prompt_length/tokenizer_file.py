@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import functools
-import os
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -24,17 +23,13 @@ JSON = ".json"
 _MAX_BYTES = 256 * 2**20
 
 
+@functools.cache
 def read_tokenizer(path: str) -> Tokenize:
     """Return the tokenizer of a file, read once per process.
 
     Args:
         path: ``.json`` for the library `tokenizers`, anything else for SentencePiece.
     """
-    return _read(os.path.abspath(path))  # noqa: PTH100 - links stay: the suffix names the kind
-
-
-@functools.cache
-def _read(path: str) -> Tokenize:
     try:
         content = read_regular(Path(path), _MAX_BYTES)  # a policy may name any file
     except OSError as error:
@@ -44,11 +39,7 @@ def _read(path: str) -> Tokenize:
     with _attributed_to(path):
         tokenize = (_read_json if path.endswith(JSON) else _read_sentencepiece)(path, content)
 
-    def tokenize_or_raise(text: str) -> Tokens:
-        with _attributed_to(path):
-            return tokenize(text)
-
-    return tokenize_or_raise
+    return _attributed_to(path)(tokenize)
 
 
 @contextlib.contextmanager
@@ -109,7 +100,7 @@ def prompt_limit(needs: PolicyNeeds) -> PromptLimit | None:
     return PromptLimit(
         needs.prompt_tokens,
         needs.prompt_added,
-        None if path is None else read_tokenizer(path),
+        None if path is None else read_tokenizer(str(Path(path).absolute())),
         None if path is None else Path(path).name,
         needs.lowers_prompt,
     )
