@@ -59,7 +59,7 @@ _MODULES: Mapping[str, tuple[str, ...]] = {
     "ray": ("ray",),
     "remote": ("websockets", "msgpack"),
     "tokens": ("sentencepiece", "tokenizers"),
-    "vlm": ("openai", "google"),
+    "vlm": ("httpx",),
 }
 """Modules that each extra brings. Where two bring one, the extra with which it is mostly used."""
 

@@ -8,11 +8,11 @@ from __future__ import annotations
 
 import functools
 import json
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from roboirg.core.episode import Goal, SlotValue, Split
+from roboirg.core.episode import Goal
 from roboirg.core.goal_slots import COLOR_SLOTS, SLOT_TYPE_NAMES
 from roboirg.tasks import get_task
 from roboirg.tasks.splits.splits import split_episodes
@@ -21,9 +21,6 @@ from roboirg.util.json_reply import UnparsableReplyError, json_object
 Answer = Mapping[str, Any]
 """JSON values by field: numbers, words and lists of words."""
 
-SOURCE: Split = "train"
-AMOUNT = "amount"
-LISTED = "colors"
 MAX_QUOTE_LENGTH = 80
 
 
@@ -51,6 +48,16 @@ class Field:
             return one
         least, most = self.lengths
         return {"type": "array", "items": one, "minItems": least, "maxItems": most}
+
+    def allows(self, value: object) -> bool:
+        """Return whether a value in JSON is one of the field's."""
+        items = [value] if self.lengths is None else value
+        least, most = self.lengths or (1, 1)
+        return (
+            isinstance(items, list)
+            and least <= len(items) <= most
+            and all(type(one) is type(self.values[0]) and one in self.values for one in items)
+        )
 
 
 @dataclass(frozen=True)
@@ -97,12 +104,11 @@ class GoalSchema:
             if field.name not in reply:
                 raise UnparsableReplyError(f"The field {field.name!r} is missing.")
             answer[field.name] = _normalize(reply[field.name])
-        try:
-            return self.goals[_canonical(answer)]
-        except KeyError:
-            pass
+        goal = self.goals.get(_canonical(answer))
+        if goal is not None:
+            return goal
         for field in self.fields:
-            if not _allowed(answer[field.name], field):
+            if not field.allows(answer[field.name]):
                 raise UnparsableReplyError(
                     f"The field {field.name!r} cannot be "
                     f"{json.dumps(answer[field.name])[:MAX_QUOTE_LENGTH]}; "
@@ -115,62 +121,34 @@ class GoalSchema:
 def goal_schema(task: str) -> GoalSchema:
     """Return the goal schema of a task."""
     known_task = get_task(task)
-    goals: dict[str, Goal] = {}
-    for episode in split_episodes([known_task.name], [SOURCE]):
-        for goal in known_task.goals(episode.scene):
-            goals.setdefault(_canonical(_answer(goal)), goal)
-    return _complete(goals, known_task.commands.colored)
+    episodes = split_episodes([known_task.name], ["train"])
+    goals = dict.fromkeys(goal for episode in episodes for goal in known_task.goals(episode.scene))
+    answers = [_answer(goal) for goal in goals]
+    names = max(answers, key=len)
+    # A goal does not name the colors of which it has none.
+    zeros = dict.fromkeys(names, 0)
+    filled = [{**zeros, **answer} for answer in answers]
+    fields = tuple(_field(name, [answer[name] for answer in filled]) for name in names)
+    named = dict(zip(map(_canonical, filled), goals, strict=True))
+    return GoalSchema(fields, named, known_task.commands.colored)
 
 
-def _answer(goal: Goal) -> dict[str, Any]:
-    """Return the answer that names a goal; colors with a count of 0 are left out."""
+def _answer(goal: Goal) -> Answer:
+    """Return the answer that names a goal; of counted colors, those that it names."""
     slots = goal.as_mapping()
     if "counts" in slots:
         return dict(zip(goal.texts("colors"), goal.numbers("counts"), strict=True))
-    return {
-        slot: list(value) if isinstance(value, tuple) else value for slot, value in slots.items()
-    }
+    return slots
 
 
-def _complete(goals: Mapping[str, Goal], thing: str) -> GoalSchema:
-    """Return the schema of all goals; amounts that a goal does not name are 0."""
-    answers = [_answer(goal) for goal in goals.values()]
-    names = max(answers, key=len).keys()
-    counted = any("counts" in goal.as_mapping() for goal in goals.values())
-    fields = tuple(_field(name, [one.get(name, 0) for one in answers], counted) for name in names)
-    order = {field.name: 0 for field in fields}
-    filled = {
-        _canonical(order | answer): goal
-        for answer, goal in zip(answers, goals.values(), strict=True)
-    }
-    return GoalSchema(fields, filled, thing)
-
-
-def _field(name: str, values: Iterable[SlotValue | list[str]], counted: bool) -> Field:
-    values = list(values)
-    if counted:
-        return Field(name, AMOUNT, _sorted(values))
-    if isinstance(values[0], list):
-        items = _sorted(item for value in values if isinstance(value, list) for item in value)
-        lengths = [len(value) for value in values if isinstance(value, list)]
-        return Field(name, LISTED, items, (min(lengths), max(lengths)))
-    kind = "color" if name in COLOR_SLOTS else SLOT_TYPE_NAMES[name]
-    return Field(name, kind, _sorted(values))
-
-
-def _sorted(values: Iterable[Any]) -> tuple[Any, ...]:
-    return tuple(sorted(set(values)))
-
-
-def _allowed(value: object, field: Field) -> bool:
-    if field.lengths is None:
-        return type(value) is type(field.values[0]) and value in field.values
-    least, most = field.lengths
-    return (
-        isinstance(value, list)
-        and least <= len(value) <= most
-        and all(item in field.values for item in value)
-    )
+def _field(name: str, values: list[Any]) -> Field:
+    """Return a field with all its values; a name that is no slot's is a color that is counted."""
+    kind: str = "color" if name in COLOR_SLOTS else SLOT_TYPE_NAMES.get(name, "amount")
+    lengths = None
+    if isinstance(values[0], tuple):
+        kind, lengths = "colors", (min(map(len, values)), max(map(len, values)))
+        values = [item for value in values for item in value]
+    return Field(name, kind, tuple(sorted(set(values))), lengths)
 
 
 def _normalize(value: object) -> object:

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import NamedTuple, TypeVar
 
-from roboirg.policies.vlm.goal_schema import Field, GoalSchema
+from roboirg.policies.vlm.goal_schema import GoalSchema
 from roboirg.policies.vlm.prompt_files import Prompts
 
 PROMPTS = "listener"
@@ -70,13 +70,10 @@ def _describe_fields(prompts: Prompts, schema: GoalSchema, reasoning: str | None
         yield f"- reasoning: {reasoning}"
     for field in schema.fields:
         meaning = prompts.fill(f"meanings.{field.kind}", color=field.name, thing=schema.thing)
-        values = _describe_values(prompts, field)
+        values = ", ".join(map(str, field.values))
+        if field.lengths is None:
+            values = prompts.fill("values.one", values=values)
+        else:
+            least, most = map(str, field.lengths)
+            values = prompts.fill("values.list", values=values, least=least, most=most)
         yield prompts.fill("field", name=field.name, meaning=meaning, values=values)
-
-
-def _describe_values(prompts: Prompts, field: Field) -> str:
-    listed = ", ".join(map(str, field.values))
-    if field.lengths is None:
-        return prompts.fill("values.one", values=listed)
-    least, most = map(str, field.lengths)
-    return prompts.fill("values.list", values=listed, least=least, most=most)

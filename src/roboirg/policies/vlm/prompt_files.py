@@ -12,7 +12,6 @@ from typing import Any
 from roboirg.core.errors import InvalidValueError
 from roboirg.util.short_hash import short_hash
 
-FOLDER = "prompts"
 SHARED = "subgoals"
 """The file with the forms of subgoals, for the prompts of all planners."""
 
@@ -76,17 +75,13 @@ def load_prompts(name: str, file: str | None = None) -> Prompts:
     Raises:
         InvalidValueError: the file cannot be read or is not TOML.
     """
-    if file is None:
-        origin = f"{name}.toml"
-        content = resources.files(__package__).joinpath(FOLDER, origin).read_bytes()
-    else:
-        origin = file
-        try:
-            content = Path(file).read_bytes()
-        except OSError as error:
-            raise InvalidValueError(f"Prompts {file!r} cannot be read ({error}).") from error
+    origin = file or f"{name}.toml"
+    source = Path(file) if file else resources.files(__package__) / "prompts" / origin
     try:
+        content = source.read_bytes()
         texts = tomllib.loads(content.decode())
+    except OSError as error:
+        raise InvalidValueError(f"Prompts {origin!r} cannot be read ({error}).") from error
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
         raise InvalidValueError(f"Prompts {origin!r} are not TOML ({error}).") from error
     return Prompts(texts, short_hash(content), origin)

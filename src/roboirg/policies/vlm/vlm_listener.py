@@ -18,13 +18,13 @@ from roboirg.core.observations import Demonstration
 from roboirg.policies.builtin.scripted import ScriptedPolicy
 from roboirg.policies.vlm.goal_schema import GoalSchema, goal_schema
 from roboirg.policies.vlm.listener_query import PROMPTS, question_texts
-from roboirg.policies.vlm.model_content import ChatTurn, summary_clip
+from roboirg.policies.vlm.model_content import ChatTurn, Part, summary_clip
 from roboirg.policies.vlm.models import Model, ModelOptions, ModelQuery, make_model
 from roboirg.policies.vlm.models.model import config_version
 from roboirg.policies.vlm.prompt_files import load_prompts
 from roboirg.policies.vlm.vlm_query import VLMQuery
 from roboirg.tasks import goals_of
-from roboirg.util.media import Clip, Picture
+from roboirg.util.media import Picture
 
 if TYPE_CHECKING:
     from roboirg.envs.environment import RoboIRGEnv
@@ -52,10 +52,6 @@ class ListenerOptions(BaseModel):
     pictures: bool = True
     reasoning: bool = False
     prompts: str | None = None
-
-
-class NotUnderstoodError(Exception):
-    """The model named no goal of this scene; caught by `VLMListener.reset`."""
 
 
 class VLMListener(ScriptedPolicy):
@@ -88,31 +84,29 @@ class VLMListener(ScriptedPolicy):
         if not options.pictures:
             self.cameras, self.demonstration_frames = (), "none"
         self.prompts = load_prompts(PROMPTS, options.prompts)
+        self._about = {
+            "model": options.model.about(),
+            "prompts": self.prompts.fingerprint,
+            **options.model_dump(mode="json", exclude={"model", "prompts"}),
+        }
         self.understood: Goal | None = None
         self._vlm = VLMQuery(options.model, self.prompts["again"], connect)
         self._demonstration: Demonstration = {}
-        self._impossible = 0
+        self._impossible = False
 
     @property
     def version(self) -> str:
         """The model, and a fingerprint of the options and prompts that may change its answers."""
-        return config_version(self.options.model, self.metadata_of_options())
+        return config_version(self.options.model, self._about)
 
     @property
     def metadata(self) -> dict[str, Any]:
-        """Options and prompts, and the goal that the model named (None if none was valid)."""
-        goal = self.understood
-        understood = None if goal is None else dict(goal.as_mapping())
-        return {**self.metadata_of_options(), "understood": understood}
+        """Options and prompts, and the goal that the model named (None if none was valid).
 
-    def metadata_of_options(self) -> dict[str, Any]:
-        """Return the options and prompts; there is no key among them."""
-        own = self.options.model_dump(mode="json", exclude={"model", "prompts"})
-        return {
-            "model": self.options.model.about(),
-            "prompts": self.prompts.fingerprint,
-            **own,
-        }
+        There is no key among them.
+        """
+        goal = self.understood
+        return {**self._about, "understood": None if goal is None else dict(goal.as_mapping())}
 
     def reset(self, instruction: str, demonstration: Demonstration) -> None:
         """Query the goal and begin to execute it, or first hear the rest of the instruction.
@@ -123,38 +117,20 @@ class VLMListener(ScriptedPolicy):
             PolicyReplyError: it replied with an error.
         """
         self._vlm.start()
-        self._demonstration, self.understood, self._impossible = demonstration, None, 0
+        self._demonstration, self.understood, self._impossible = demonstration, None, False
         super().reset(instruction, demonstration)
 
-    def begin(self, env: RoboIRGEnv) -> None:
-        """Query the goal and begin to execute it; errors are those of `reset`."""
-        self._chunks = iter(())
-        try:
-            super().begin(env)
-        except NotUnderstoodError:
-            return
-        finally:
-            self._demonstration = {}
-
-    def decide(self, env: RoboIRGEnv, instruction: str) -> Goal:
-        """Return the goal that the model names.
-
-        Raises:
-            NotUnderstoodError: there was no valid answer, or the scene has no such goal.
-        """
+    def decide(self, env: RoboIRGEnv, instruction: str) -> Goal | None:
+        """Return the goal that the model names; None if it names none, or none of this scene."""
         schema = goal_schema(env.episode.task)
-        goal = self._vlm.ask(self._build_query(env, schema, instruction), schema.read)
-        self.understood = goal
-        if goal is None:
-            raise NotUnderstoodError
-        if goal not in goals_of(env.episode):
-            self._impossible += 1
-            raise NotUnderstoodError
-        return goal
+        query = self._build_query(env, schema, instruction)
+        goal = self.understood = self._vlm.ask(query, schema.read)
+        self._impossible = goal is not None and goal not in goals_of(env.episode)
+        return None if self._impossible else goal
 
     def usage(self) -> dict[str, float]:
         """Return the cost of the episode."""
-        return {**self._vlm.usage(), "impossible": self._impossible}
+        return {**self._vlm.usage(), "impossible": int(self._impossible)}
 
     def close(self) -> None:
         self._vlm.close()
@@ -163,14 +139,9 @@ class VLMListener(ScriptedPolicy):
         reasoning = self.prompts.fill("reasoning_field") if self.options.reasoning else None
         steps = len(self._demonstration.get("joint_positions", ()))
         texts = question_texts(self.prompts, schema, instruction, steps, reasoning)
-        parts: tuple[str | Picture | Clip, ...] = texts.instruction, texts.question
+        parts: tuple[Part, ...] = texts.instruction, texts.question
         if self.options.pictures:
-            parts = texts.parts(*self._media(env, steps))
+            shown, most = self._demonstration, self.options.frames
+            video = (summary_clip(shown[f"{CAMERA}_rgb"], most, steps),) if steps else ()
+            parts = texts.parts(video, Picture(env.picture(CAMERA)))
         return ModelQuery(texts.system, (ChatTurn("user", parts),), schema.schema(reasoning))
-
-    def _media(self, env: RoboIRGEnv, steps: int) -> tuple[tuple[Clip, ...], Picture]:
-        picture = Picture(env.picture(CAMERA))
-        if not steps:
-            return (), picture
-        frames = self._demonstration[f"{CAMERA}_rgb"]
-        return (summary_clip(frames, self.options.frames, steps),), picture

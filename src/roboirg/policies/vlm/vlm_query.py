@@ -1,46 +1,51 @@
-"""Query a model, with one retry if the reply does not parse, and count the cost."""
+"""Query a model, again if the reply does not parse; keep, count and wait for its replies."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import contextlib
+import time
+from collections import defaultdict
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from string import Template
 from typing import TypeVar
 
+from roboirg.core.errors import ModelBusyError, PolicyConnectionError
+from roboirg.core.waiting import waiting
 from roboirg.policies.vlm.model_content import ChatTurn
 from roboirg.policies.vlm.models import Model, ModelOptions, ModelQuery, ModelReply, make_model
-from roboirg.policies.vlm.models.paid_model import PaidModel, cost_of
+from roboirg.policies.vlm.models.reply_store import ReplyStore, current_store, digest
 from roboirg.util.json_reply import UnparsableReplyError
 
 Value = TypeVar("Value")
 
 SILENCE = "(no answer)"
 """Stands for an empty reply when it is quoted back; services refuse empty turns."""
+TRIES = 2
+FIRST_PAUSE_S = 1.0
+LONGEST_PAUSE_S = 60.0
+ALWAYS = ("calls", "input_tokens", "output_tokens", "unparsed", "cost_usd")
+"""Counts that stand in records even if they are 0; the cost only if prices are known."""
 
 
 @dataclass
 class VLMQuery:
-    """Queries one model and counts the cost of an episode.
+    """Queries one model, unless the run has stored its reply, and counts the cost of an episode.
 
     Attributes:
-        options: of the model, which is connected at the first query.
+        options: of the model, which is connected at the first query that is sent.
         again: prompt for the second try, with ``$why``.
         connect: connects the model.
-        calls: requests, second tries included.
-        input_tokens, output_tokens: of all calls.
-        unparsed: queries without a usable reply even at the second try.
-        cost_usd: of all calls; None if the prices are not known.
     """
 
     options: ModelOptions
     again: Template
     connect: Callable[[ModelOptions], Model] = make_model
-    calls: int = field(default=0, init=False)
-    input_tokens: int = field(default=0, init=False)
-    output_tokens: int = field(default=0, init=False)
-    unparsed: int = field(default=0, init=False)
-    cost_usd: float | None = field(default=None, init=False)
-    _model: PaidModel | None = field(default=None, init=False, repr=False)
+    _model: Model | None = field(default=None, init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        self._service = f"{self.options.model} at {self.options.address()}"
+        self.start()
 
     def ask(self, query: ModelQuery, parse: Callable[[str], Value]) -> Value | None:
         """Return the parsed reply; None if `parse` rejects two replies.
@@ -49,58 +54,96 @@ class VLMQuery:
             PolicyConnectionError: the service cannot be reached or is overloaded.
             PolicyTimeoutError: there was no reply in time.
             PolicyReplyError: the service replied with an error or with something else.
+            BudgetError: the run has spent what it may.
         """
-        reply = self._request(query)
-        try:
-            return parse(reply.text)
-        except UnparsableReplyError as error:
-            rejected = ChatTurn("model", (reply.text or SILENCE,))
-            retry = ChatTurn("user", (self.again.substitute(why=str(error)),))
-        try:
-            second = self._request(query._replace(turns=(*query.turns, rejected, retry)))
-            return parse(second.text)
-        except UnparsableReplyError:
-            self.unparsed += 1
-            return None
+        for _ in range(TRIES):
+            reply = self._request(query)
+            try:
+                return parse(reply.text)
+            except UnparsableReplyError as error:
+                rejected = ChatTurn("model", (reply.text or SILENCE,))
+                retry = ChatTurn("user", (self.again.substitute(why=str(error)),))
+                query = query._replace(turns=(*query.turns, rejected, retry))
+        self._counts["unparsed"] += 1
+        return None
 
     def start(self) -> None:
         """Reset the counts for a new episode."""
-        self.calls = self.input_tokens = self.output_tokens = self.unparsed = 0
-        self.cost_usd = cost_of(self.options)
-        if self._model is not None:
-            self._model.start()
+        known = ALWAYS if self.options.has_prices else ALWAYS[:-1]
+        self._counts = defaultdict[str, float](int, dict.fromkeys(known, 0))
 
     def usage(self) -> dict[str, float]:
         """Return calls, tokens and queries without a usable reply; the cost if prices are known.
 
         What was ``stored`` by an earlier try cost nothing again; ``anew`` is what was stored with
-        something else sent; ``answered_s`` the time that its answers took, and ``waited_s`` that in
-        queues and while it was busy.
+        something else sent, as by another machine; ``answered_s`` the time that its answers took,
+        and ``waited_s`` that in queues and while it was busy.
         """
-        usage: dict[str, float] = {
-            "calls": self.calls,
-            "input_tokens": self.input_tokens,
-            "output_tokens": self.output_tokens,
-            "unparsed": self.unparsed,
+        found = {
+            name: round(count, 3) if name.endswith("_s") else count
+            for name, count in self._counts.items()
         }
-        if self.cost_usd is not None:
-            usage["cost_usd"] = self.cost_usd
-        if self._model is not None:
-            usage |= {name: count for name, count in self._model.counts().items() if count}
-        return usage
+        return {name: count for name, count in found.items() if count or name in ALWAYS}
 
     def close(self) -> None:
+        """Close the connection."""
         model, self._model = self._model, None
         if model is not None:
             model.close()
 
+    @contextlib.contextmanager
+    def _timed(self, name: str) -> Iterator[None]:
+        """Count the seconds of the block, unless it raises."""
+        start = time.monotonic()
+        yield
+        self._counts[name] += time.monotonic() - start
+
     def _request(self, query: ModelQuery) -> ModelReply:
-        if self._model is None:
-            self._model = PaidModel(self.connect(self.options), self.options)
-        self.calls += 1
-        reply = self._model.answer(query)
-        self.input_tokens += reply.input_tokens
-        self.output_tokens += reply.output_tokens
-        if self.cost_usd is not None:
-            self.cost_usd += cost_of(self.options, reply) or 0.0
+        self._counts["calls"] += 1
+        reply = self._find_or_send(query)
+        self._counts["input_tokens"] += reply.input_tokens
+        self._counts["output_tokens"] += reply.output_tokens
+        if self.options.has_prices:
+            self._counts["cost_usd"] += self.options.cost_usd(reply)
         return reply
+
+    def _find_or_send(self, query: ModelQuery) -> ModelReply:
+        """Return the run's reply to a query; a new one is stored before anything sees it."""
+        store = current_store()
+        if store is None:
+            return self._send(query, None)
+        sent, stored = digest(query, self.options), store.replies()
+        reply = stored.get(sent)
+        if reply is None:
+            store.check_budget(self.options)
+            self._counts["anew"] += bool(stored)
+            reply = self._send(query, store)
+            store.keep(sent, reply, self.options.cost_usd(reply))
+        else:
+            self._counts["stored"] += 1
+        store.calls += 1
+        return reply
+
+    def _send(self, query: ModelQuery, store: ReplyStore | None) -> ModelReply:
+        """Send a query, again while the service is busy or, a few times, cannot be reached."""
+        model = self._model = self._model or self.connect(self.options)
+        pause, unreachable = FIRST_PAUSE_S, 0
+        end = time.monotonic() + self.options.patience_s
+        while True:
+            if store is not None:
+                with self._timed("waited_s"):
+                    store.wait_for_turn(self._service, self.options.requests_per_minute)
+            try:
+                with self._timed("answered_s"):
+                    return model.answer(query)
+            except PolicyConnectionError as error:
+                is_busy = isinstance(error, ModelBusyError)
+                unreachable += not is_busy
+                seconds = getattr(error, "retry_after_s", None) or pause
+                if unreachable > self.options.retries or time.monotonic() + seconds > end:
+                    raise
+            if store is not None and is_busy:  # makes the other processes of the run wait, too
+                store.pause(self._service, seconds)
+            with self._timed("waited_s"), waiting(f"{self._service}, which is busy", is_queue=True):
+                time.sleep(seconds)
+            pause = min(2 * pause, LONGEST_PAUSE_S)

@@ -1,4 +1,4 @@
-"""Models by provider, each through the provider's own client library."""
+"""Models by provider: requests over HTTP, stored replies, limits."""
 
 from __future__ import annotations
 
@@ -9,10 +9,7 @@ __all__ = ["Model", "ModelOptions", "ModelQuery", "ModelReply", "make_model"]
 
 def make_model(options: ModelOptions) -> Model:
     """Return a connection to a model; nothing is sent before the first query."""
-    if options.provider == "google":
-        from roboirg.policies.vlm.models.google import GoogleModel
-
-        return GoogleModel(options)
+    from roboirg.policies.vlm.models.google import GoogleModel
     from roboirg.policies.vlm.models.openai_compatible import OpenAIModel
 
-    return OpenAIModel(options)
+    return (GoogleModel if options.provider == "google" else OpenAIModel)(options)

@@ -85,12 +85,10 @@ class ModelOptions(BaseModel):
             MissingDependencyError: the environment variable is not set; a run stops, as it could
                 play no episode.
         """
-        variable = self.api_key_env
+        variable = self.api_key_env or (None if self.base_url else KEY_VARIABLES[self.provider])
         if variable is None:
-            if self.base_url is not None:
-                return NO_KEY
-            variable = KEY_VARIABLES[self.provider]
-        key = os.environ.get(variable, "")
+            return NO_KEY
+        key = os.environ.get(variable, "").strip()
         if not key:
             raise MissingDependencyError(
                 f"Model {self.model!r} needs a key in the environment variable {variable}, "
@@ -104,9 +102,26 @@ class ModelOptions(BaseModel):
 
     def about(self) -> dict[str, str | float | int | bool | None]:
         """Return, for records, the address and all that may change a reply; never a key."""
-        omitted = {"base_url", "api_key_env", "timeout_s", "retries", "input_price", "output_price"}
-        omitted |= {"patience_s", "requests_per_minute"}
-        return {**self.model_dump(mode="json", exclude=omitted), "address": self.address()}
+        return {
+            **self.model_dump(
+                mode="json",
+                exclude={
+                    *("base_url", "api_key_env", "timeout_s", "retries", "patience_s"),
+                    *("requests_per_minute", "input_price", "output_price"),
+                },
+            ),
+            "address": self.address(),
+        }
+
+    @property
+    def has_prices(self) -> bool:
+        """Whether the cost of replies is known."""
+        return (self.input_price, self.output_price) != (None, None)
+
+    def cost_usd(self, reply: ModelReply) -> float:
+        """Return what a reply costs; 0 without prices."""
+        paid = ((reply.input_tokens, self.input_price), (reply.output_tokens, self.output_price))
+        return sum(tokens * (price or 0.0) for tokens, price in paid) / 1_000_000
 
 
 class ModelQuery(NamedTuple):
@@ -148,13 +163,9 @@ class Model(Protocol):
 
 
 def config_version(model: ModelOptions, about: Mapping[str, Any]) -> str:
-    """Return the model's name and a fingerprint of all else that may change its answers."""
-    canonical = json.dumps(_without_address(about), sort_keys=True)
-    return f"{model.model} {short_hash(canonical)}"
+    """Return the model's name and a fingerprint of all else that may change its answers.
 
-
-def _without_address(about: object) -> object:
-    """Leave out addresses: a model at another port is the same model."""
-    if isinstance(about, Mapping):
-        return {name: _without_address(value) for name, value in about.items() if name != "address"}
-    return about
+    The address is left out: a model at another port is the same model.
+    """
+    own = {name: value for name, value in model.about().items() if name != "address"}
+    return f"{model.model} {short_hash(json.dumps({**about, 'model': own}, sort_keys=True))}"

@@ -9,16 +9,20 @@ from __future__ import annotations
 
 import contextlib
 import functools
+import hashlib
+import json
 import sqlite3
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+from itertools import chain
 from pathlib import Path
 from typing import NamedTuple
 
 from roboirg.core.errors import BudgetError
 from roboirg.core.waiting import waiting
-from roboirg.policies.vlm.models.model import ModelReply
+from roboirg.policies.vlm.models.model import ModelOptions, ModelQuery, ModelReply
+from roboirg.util.media import Clip, Picture
 
 REPLIES_FILE = "models.sqlite"
 _LOCK_S = 60.0
@@ -30,6 +34,11 @@ CREATE TABLE IF NOT EXISTS replies (
     PRIMARY KEY (episode, call, sent)
 ) WITHOUT ROWID;
 CREATE TABLE IF NOT EXISTS services (name TEXT PRIMARY KEY, next_at REAL) WITHOUT ROWID;
+"""
+
+_POSTPONE = """
+INSERT INTO services VALUES (?, ?)
+ON CONFLICT (name) DO UPDATE SET next_at = max(next_at, excluded.next_at)
 """
 
 
@@ -45,18 +54,6 @@ class ReplySettings(NamedTuple):
     folder: Path
     max_cost_usd: float | None = None
     anew: bool = False
-
-
-class Found(NamedTuple):
-    """What the store knows of a call.
-
-    Attributes:
-        reply: that was stored; None if there is none for what is sent now.
-        differs: whether the same call of the episode was stored with something else sent.
-    """
-
-    reply: ModelReply | None
-    differs: bool
 
 
 @dataclass
@@ -91,36 +88,41 @@ class ReplyStore:
         if "_database" in vars(self):
             self._database.close()
 
-    def find(self, sent: str) -> Found:
-        """Return what is stored of the next call, whose content has the digest `sent`."""
+    def replies(self) -> dict[str, ModelReply]:
+        """Return the stored replies to the next call, by the digest of what was sent.
+
+        There are none in a run that passes them over.
+        """
+        if self.settings.anew:
+            return {}
         rows = self._database.execute(
             "SELECT sent, text, input_tokens, output_tokens FROM replies "
             "WHERE episode = ? AND call = ?",
             (self.episode, self.calls),
-        ).fetchall()
-        if self.settings.anew:
-            return Found(None, differs=False)
-        for digest, text, input_tokens, output_tokens in rows:
-            if digest == sent:
-                return Found(ModelReply(text, input_tokens, output_tokens), differs=False)
-        return Found(None, differs=bool(rows))
+        )
+        return {sent: ModelReply(*reply) for sent, *reply in rows}
 
     def keep(self, sent: str, reply: ModelReply, cost_usd: float) -> None:
-        """Store the reply to a call; when this returns, it is on disk."""
+        """Store the reply to the next call; when this returns, it is on disk."""
         self._database.execute(
             "INSERT OR REPLACE INTO replies VALUES (?, ?, ?, ?, ?, ?, ?)",
             (self.episode, self.calls, sent, *reply, cost_usd),
         )
 
-    def check_budget(self) -> None:
-        """Raise if the run has spent what it may.
+    def check_budget(self, model: ModelOptions) -> None:
+        """Raise if the run may not ask a model.
 
         Raises:
-            BudgetError: it has.
+            BudgetError: it has spent what it may, or what the model costs is not known.
         """
         most = self.settings.max_cost_usd
         if most is None:
             return
+        if not model.has_prices:
+            raise BudgetError(
+                f"--max-cost needs the prices of model {model.model!r}; give input_price and "
+                "output_price, in US dollars per million tokens."
+            )
         spent = float(self._database.execute("SELECT total(cost_usd) FROM replies").fetchone()[0])
         if spent >= most:
             raise BudgetError(
@@ -136,38 +138,39 @@ class ReplyStore:
             per_minute: requests that it takes; None for as many as there are.
         """
         gap = 0.0 if per_minute is None else 60.0 / per_minute
-        with self._transaction():
+        with self._database:  # which commits
+            self._database.execute("BEGIN IMMEDIATE")
+            (next_at,) = self._database.execute(
+                "SELECT total(next_at) FROM services WHERE name = ?", (service,)
+            ).fetchone()
             now = time.time()
-            turn = max(now, self._next_turn(service))
-            self._set_turn(service, turn + gap)
+            turn = max(now, next_at)
+            self._database.execute(_POSTPONE, (service, turn + gap))
         if turn > now:
             with waiting(f"its turn at {service}", is_queue=True):
                 time.sleep(turn - now)
 
     def pause(self, service: str, seconds: float) -> None:
         """Ask a service nothing for so long, in all processes of the run."""
-        with self._transaction():
-            until = max(time.time() + seconds, self._next_turn(service))
-            self._set_turn(service, until)
+        self._database.execute(_POSTPONE, (service, time.time() + seconds))
 
-    def _next_turn(self, service: str) -> float:
-        row = self._database.execute(
-            "SELECT next_at FROM services WHERE name = ?", (service,)
-        ).fetchone()
-        return 0.0 if row is None else float(row[0])
 
-    def _set_turn(self, service: str, at: float) -> None:
-        self._database.execute("INSERT OR REPLACE INTO services VALUES (?, ?)", (service, at))
-
-    @contextlib.contextmanager
-    def _transaction(self) -> Iterator[None]:
-        self._database.execute("BEGIN IMMEDIATE")
-        try:
-            yield
-        except BaseException:
-            self._database.execute("ROLLBACK")
-            raise
-        self._database.execute("COMMIT")
+def digest(query: ModelQuery, options: ModelOptions) -> str:
+    """Return a digest of everything that is sent and may change the reply."""
+    found = hashlib.sha256()
+    turns = ((turn.role, *turn.parts) for turn in query.turns)
+    schema = None if query.schema is None else dict(query.schema)
+    for part in (options.about(), query.system, schema, *chain.from_iterable(turns)):
+        if isinstance(part, Picture):
+            found.update(f"picture {part.pixels.shape}".encode())
+            found.update(part.pixels.tobytes())
+        elif isinstance(part, Clip):
+            found.update(f"clip {part.rate} {len(part.frames)}".encode())
+            found.update(part.frames.tobytes())
+        else:
+            text = part if isinstance(part, str) else json.dumps(part, sort_keys=True)
+            found.update(f"text {len(text)} {text}".encode())
+    return found.hexdigest()
 
 
 _stores: list[ReplyStore] = []

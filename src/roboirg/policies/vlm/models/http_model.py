@@ -1,0 +1,139 @@
+"""A model's service behind HTTP: one JSON request and one reply for each query."""
+
+from __future__ import annotations
+
+import json
+import math
+import threading
+from abc import ABC, abstractmethod
+from collections.abc import Mapping
+from concurrent.futures import Future
+from http import HTTPStatus
+from typing import Any
+
+from roboirg.core.errors import (
+    ModelBusyError,
+    PolicyConnectionError,
+    PolicyReplyError,
+    PolicyTimeoutError,
+)
+from roboirg.core.extras import extra_needed
+from roboirg.core.waiting import waiting
+from roboirg.policies.vlm.models.model import ModelOptions, ModelQuery, ModelReply
+
+with extra_needed("Models need httpx", "vlm"):
+    import httpx
+
+BUSY = frozenset({408, 409, 429, 502, 503, 504})
+"""HTTP statuses of a service that is up but cannot answer now."""
+MAX_RESPONSE_MIB = 64
+MAX_ERROR_LENGTH = 300
+MALFORMED = (
+    ArithmeticError, AttributeError, LookupError, RecursionError, TypeError, ValueError,
+)  # fmt: skip
+"""What reading a reply of the wrong form raises."""
+
+Fetched = tuple[httpx.Response, bytes]
+
+
+class HttpModel(ABC):
+    """Posts queries; a subclass writes them as its provider's API wants, and reads the replies."""
+
+    def __init__(self, options: ModelOptions) -> None:
+        self.options, self.key = options, options.key()
+        self._name = f"Model {options.model!r} at {options.address()}"
+        self._client = httpx.Client(timeout=options.timeout_s)
+
+    @abstractmethod
+    def write(self, query: ModelQuery) -> tuple[str, dict[str, str], bytes]:
+        """Return URL, headers and JSON of the request for a query; its schema is to be sent."""
+
+    @abstractmethod
+    def read(self, reply: Any) -> ModelReply:  # noqa: ANN401 - depends on what the server sends
+        """Return the text and the tokens of a reply in JSON.
+
+        It may raise any error of a missing or wrong value.
+        """
+
+    def answer(self, query: ModelQuery) -> ModelReply:
+        """Send a query; see `Model`."""
+        if not self.options.structured:
+            query = query._replace(schema=None)
+        # No error is chained: the service's message may hold the key, and tracebacks are recorded.
+        try:
+            url, headers, body = self.write(query)
+            with waiting(f"the reply of {self._name}"):
+                # The client's limits are those of single reads: they begin again with every byte.
+                found: Future[Fetched] = Future()
+                threading.Thread(
+                    target=self._fetch, args=(url, headers, body, found), daemon=True
+                ).start()
+                response, content = found.result(timeout=self.options.timeout_s)
+            if response.status_code == HTTPStatus.OK:
+                text, *tokens = self.read(json.loads(content))
+                return ModelReply(str(text), *map(int, tokens))
+        except (TimeoutError, httpx.TimeoutException):
+            raise PolicyTimeoutError(
+                f"{self._name} did not answer within {self.options.timeout_s:g} s; raise "
+                "timeout_s, or shorten answers with max_output_tokens."
+            ) from None
+        except (httpx.TransportError, httpx.InvalidURL) as error:
+            raise PolicyConnectionError(
+                f"{self._name} cannot be reached ({type(error).__name__}: {self._quote(error)})."
+            ) from None
+        except MALFORMED as error:
+            raise PolicyReplyError(
+                f"{self._name} replied with something else ({type(error).__name__}: "
+                f"{self._quote(error)})."
+            ) from None
+        status = response.status_code
+        words = f"HTTP status {status}: {self._quote(content.decode(errors='replace'))}"
+        if status in BUSY:
+            raise ModelBusyError(
+                f"{self._name} is not available: {words}", retry_after_s(response.headers)
+            )
+        raise PolicyReplyError(f"{self._name} refused or failed: {words}")
+
+    def close(self) -> None:
+        """Close the connection."""
+        self._client.close()
+
+    def _fetch(
+        self, url: str, headers: Mapping[str, str], body: bytes, found: Future[Fetched]
+    ) -> None:
+        """Post a request; put the response and its content, or any error, where another waits.
+
+        The error is a `ValueError` if the content is too large, or compressed.
+        """
+        # A few compressed kilobytes may become gigabytes: nothing is asked for or unpacked.
+        sent = {"Content-Type": "application/json", "Accept-Encoding": "identity", **headers}
+        content = bytearray()
+        try:
+            with self._client.stream("POST", url, content=body, headers=sent) as response:
+                encoding = response.headers.get("Content-Encoding", "identity")
+                if encoding.strip().lower() != "identity":
+                    raise ValueError("the response is compressed, which was not asked for")
+                for piece in response.iter_raw():
+                    content += piece
+                    if len(content) > MAX_RESPONSE_MIB * 2**20:
+                        raise ValueError(f"the response has more than {MAX_RESPONSE_MIB} MiB")
+            found.set_result((response, bytes(content)))
+        except BaseException as error:  # noqa: BLE001 - raised again in the waiting thread
+            found.set_exception(error)
+
+    def _quote(self, words: object) -> str:
+        return " ".join(str(words).replace(self.key, "…").split())[:MAX_ERROR_LENGTH]
+
+
+def given(**entries: Any) -> dict[str, Any]:  # noqa: ANN401 - JSON
+    """Return the entries that are not None."""
+    return {name: value for name, value in entries.items() if value is not None}
+
+
+def retry_after_s(headers: Mapping[str, str]) -> float | None:
+    """Return the seconds after which a service wants to be asked again; None if it names none."""
+    try:
+        seconds = float(headers.get("retry-after", "nan"))
+    except ValueError:  # a date
+        return None
+    return seconds if 0 <= seconds < math.inf else None
