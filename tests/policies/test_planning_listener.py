@@ -217,6 +217,7 @@ def test_what_is_not_in_the_scene_is_counted_and_nothing_is_done():
     absent = next(color for color in ("red", "green", "blue") if color != there)
     with fake_vlm([json.dumps({"color": absent, "repeats": 1})]) as server:
         policy = make_listener(server)
+        policy.make_primitives = lambda env: None  # there is no arm here
         policy.attach(stand_in(episode))
         policy.reset("Do it.", {})
         assert spent(policy) == usage(calls=1, impossible=1)
@@ -240,6 +241,7 @@ def test_a_model_that_reads_text_only_gets_no_picture():
 def test_a_new_episode_has_a_new_account():
     with fake_vlm(["?"]) as server:
         policy = make_listener(server, input_price=2.0, output_price=10.0)
+        policy.make_primitives = lambda env: None  # there is no arm here
         policy.attach(stand_in(get_episode("PickXtimes", "test", 0)))
         for _ in range(2):
             policy.reset("Do it.", {})
