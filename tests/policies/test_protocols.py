@@ -138,11 +138,8 @@ def test_a_challenge_server_is_shown_what_the_options_ask_for():
 
 
 def test_the_page_lists_every_scheme():
-    rows = {
-        f"| `{scheme}://host:port` | {protocol.summary} | {protocol.memory} |"
-        for scheme, protocol in protocols_by_scheme().items()
-    }
-    assert rows == {line for line in PAGE.splitlines() if "://host:port` |" in line}
+    listed = re.findall(r"^\| `(.*)://host:port` \|", PAGE, flags=re.MULTILINE)
+    assert sorted(listed) == sorted(protocols_by_scheme())
 
 
 def test_the_page_explains_every_option():

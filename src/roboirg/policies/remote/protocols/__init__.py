@@ -24,15 +24,11 @@ class Protocol:
 
     Attributes:
         name: unique among all protocols; the scheme of URLs.
-        summary: which servers speak it, in a few words.
-        memory: what a server remembers between requests, in a few words.
         client: makes policies of URLs.
         service: answers the messages of clients with any policy; None if only a client exists.
     """
 
     name: str
-    summary: str
-    memory: str
     client: type[RemotePolicy]
     service: type[Service] | None = None
 

@@ -157,8 +157,6 @@ def _stack(observations: list[Observation]) -> dict[str, Any]:
 
 PROTOCOL = Protocol(
     name="challenge",
-    summary="RoboMME challenge submissions",
-    memory="up to the server",
     client=ChallengePolicy,
     service=ChallengeService,
 )

@@ -202,8 +202,6 @@ def _demonstration(
 
 PROTOCOL = Protocol(
     name="mme-vla",
-    summary="the policies published with RoboMME",
-    memory="shared by all connections",
     client=MmeVlaPolicy,
     service=MmeVlaService,
 )

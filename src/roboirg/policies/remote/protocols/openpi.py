@@ -111,8 +111,6 @@ def _empty_video(shape: tuple[int, ...]) -> dict[str, Any]:
 
 PROTOCOL = Protocol(
     name="openpi",
-    summary="openpi servers and compatible ones",
-    memory="none",
     client=OpenpiPolicy,
     service=OpenpiService,
 )

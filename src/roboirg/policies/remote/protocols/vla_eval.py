@@ -162,7 +162,5 @@ class VlaEvalPolicy(RemotePolicy):
 
 PROTOCOL = Protocol(
     name="vla-eval",
-    summary="model servers of vla-eval",
-    memory="up to the server",
     client=VlaEvalPolicy,
 )
