@@ -19,7 +19,7 @@ import numpy as np
 from msgspec.msgpack import Ext, encode
 
 from roboirg.evaluation.hosting import host_process
-from roboirg.evaluation.hosting.messages import receive_calls, send
+from roboirg.evaluation.hosting.messages import receive_call, send
 
 NEEDLE = "9035768"
 """Stands in the world's secret, read backward; this file does not hold it."""
@@ -213,15 +213,21 @@ class Forger(Hostile):
     message: Any = None
 
     def act(self, observation: Any) -> Any:
-        send(host_of(sys._getframe())._line, self.message)
+        send(line_of(host_of(sys._getframe())), self.message)
         time.sleep(3600)
 
 
 def host_of(frame: Any) -> Any:
     """Return the object that carries out the calls of this process."""
-    while not hasattr(frame.f_locals.get("self"), "_asking"):
+    while not hasattr(frame.f_locals.get("self"), "_under_way"):
         frame = frame.f_back
     return frame.f_locals["self"]
+
+
+def line_of(host: Any) -> socket.socket:
+    """Return the line to the world of the episode whose call is under way."""
+    line: socket.socket = host._under_way[0].line
+    return line
 
 
 class ForgesReply(Forger):
@@ -231,41 +237,51 @@ class ForgesReply(Forger):
 
 
 class ForgesLost(Forger):
-    message = ({"type": "outcome", "again": True},)
+    message: ClassVar = {"type": "outcome", "again": True}
 
 
 class ForgesKind(Forger):
-    message = ({"type": "outcome", "error": "infrastructure", "message": "x"},)
+    message: ClassVar = {"type": "outcome", "error": "infrastructure", "message": "x"}
 
 
 class ForgesSeconds(Forger):
-    message = ({"type": "outcome", "seconds": float("nan")},)
+    message: ClassVar = {"type": "outcome", "seconds": float("nan")}
 
 
 class ForgesSize(Forger):
-    message = ({"type": "outcome", "rows": bytes(64), "size": 0},)
+    message: ClassVar = {"type": "outcome", "rows": bytes(64), "size": 0}
 
 
 class ForgesWant(Forger):
-    message = ({"type": "outcome", "want": ["front_rgb"]},)
+    message: ClassVar = {"type": "outcome", "want": ["front_rgb"]}
 
 
 class ForgesPrivilege(Forger):
-    message = ({"type": "outcome", "needs": {}, "version": "1", "is_privileged": True},)
+    message: ClassVar = {"type": "outcome", "needs": {}, "version": "1", "is_privileged": True}
 
 
 class ForgesVersion(Forger):
-    message = ({"type": "outcome", "needs": {}, "version": "\x1b[2J"},)
+    message: ClassVar = {"type": "outcome", "needs": {}, "version": "\x1b[2J"}
 
 
-class ForgesOtherEpisode(Forger):
-    message: ClassVar = {"type": "question", "session": 10**6}
+class ForgesTurn(Forger):
+    """Begins another call while one is under way."""
+
+    message: ClassVar = {"type": "begun"}
 
 
 class LyingArray(Forger):
     """An array of objects that exists nowhere."""
 
-    message = ({"type": "outcome", "rows": Ext(1, encode(("|O8", (2**40, 2**20))))},)
+    message: ClassVar = {"type": "outcome", "rows": Ext(1, encode(("|O8", (2**40, 2**20))))}
+
+
+class AnswersTwice(Forger):
+    """Sends a second outcome, which would be taken for that of the next call."""
+
+    def act(self, observation: Any) -> Any:
+        send(line_of(host_of(sys._getframe())), {"type": "outcome"})
+        return -np.ones((12, 8))
 
 
 class Announcer(Hostile):
@@ -274,14 +290,14 @@ class Announcer(Hostile):
     data: ClassVar = (2**62).to_bytes(8, "big")
 
     def act(self, observation: Any) -> Any:
-        host_of(sys._getframe())._line.sendall(self.data)
+        line_of(host_of(sys._getframe())).sendall(self.data)
         time.sleep(3600)
 
 
 class GiantList(Announcer):
-    """Five bytes that stand for four billion outcomes."""
+    """Five bytes that stand for four billion fields."""
 
-    data = (5).to_bytes(8, "big") + b"\xdd\xff\xff\xff\xff"
+    data = (5).to_bytes(8, "big") + b"\xdf\xff\xff\xff\xff"
 
 
 class Deep210(Hostile):
@@ -325,10 +341,9 @@ class Asker(Hostile):
         self.ask()
 
     def ask(self) -> None:
-        host = host_of(sys._getframe())
-        (session,) = host._asking
-        send(host._line, {"type": "question", "session": session})
-        receive_calls(host._line)
+        line = line_of(host_of(sys._getframe()))
+        send(line, {"type": "question"})
+        receive_call(line)
 
 
 class Pesterer(Asker):
@@ -414,11 +429,12 @@ FORGED = {
     "ForgesWant": "policy: the process sent no valid reply (Object contains unknown field `want",
     "ForgesPrivilege": "policy: the process sent no valid reply (Object contains unknown field ",
     "ForgesVersion": "policy: the process sent no valid reply (Expected `str` matching regex ",
-    "ForgesOtherEpisode": "policy: the process asked for the video of another episode",
+    "ForgesTurn": "policy: the process sent no valid reply (a message that nobody asked for)",
+    "AnswersTwice": "policy: the process sent no valid reply (a message that nobody asked for) in ",
     "Announcer": "policy: the process sent no valid reply (a message of 4,611,686,018,",
     "LyingArray": "policy: the process sent no valid reply (Expected `bytes`, got `ext` - at ",
     "GiantList": "policy: the process sent no valid reply (Input data was truncated)",
-    "Pesterer": "policy: the process asked for the video again and again in the policy's act()",
+    "Pesterer": "policy: the process sent no valid reply (it asked for the video again and again)",
     "Deep210": "policy: the policy's metadata are nested more than 16 deep; make them flat.",
     "Deep300": "policy: the policy's metadata are nested more than 16 deep; make them flat.",
     "NamesServer": "policy: the policy's metadata have the key 'server', which is reserved; ",

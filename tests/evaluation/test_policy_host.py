@@ -13,6 +13,7 @@ import threading
 import time
 from collections import deque
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
@@ -28,7 +29,7 @@ from roboirg.core.policy_needs import PolicyNeeds
 from roboirg.evaluation.episode_errors import EpisodeError, EpisodeLostError
 from roboirg.evaluation.hosting.host_pool import HostPool, HostSettings
 from roboirg.evaluation.hosting.hosted_policy import HostedPolicy
-from roboirg.evaluation.hosting.messages import Call, receive_calls, send
+from roboirg.evaluation.hosting.messages import Call, receive_call, send
 from roboirg.evaluation.hosting.policy_opening import open_policy
 from roboirg.evaluation.plan.plan import Plan
 from roboirg.evaluation.records.record import Job, Record
@@ -47,7 +48,7 @@ def _fakes_can_be_imported(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.fixture
 def pool() -> Iterator[HostPool]:
-    with HostPool(HostSettings(policy_timeout_s=60.0)) as opened:
+    with HostPool(HostSettings()) as opened:
         yield opened
 
 
@@ -70,9 +71,8 @@ def relayed(call: Call) -> Call:
     """Return a call as it arrives at the other end of a line."""
     ours, theirs = socket.socketpair()
     with ours, theirs:
-        threading.Thread(target=send, args=(ours, [call])).start()
-        (found,) = receive_calls(theirs)
-        return found
+        threading.Thread(target=send, args=(ours, call)).start()
+        return receive_call(theirs)
 
 
 def test_arrays_of_every_kind_travel_through_the_supervisor() -> None:
@@ -96,7 +96,7 @@ def test_arrays_of_every_kind_travel_through_the_supervisor() -> None:
 @pytest.mark.parametrize("value", [object(), np.array([object()]), {"world": PaperRunner}])
 def test_nothing_but_plain_data_and_arrays_is_sent(value: object) -> None:
     with pytest.raises(TypeError):
-        send(socket.socket(), [Call("act", value=value)])
+        send(socket.socket(), Call("act", value=value))
 
 
 def test_a_hosted_policy_gets_what_a_policy_gets(
@@ -414,6 +414,36 @@ def test_a_world_that_dies_in_a_call_does_not_stop_the_host(pool: HostPool) -> N
     line.close()
     after = HostedPolicy(pool.connect(), read_policy(spec), 1)
     after.close()
+
+
+def test_time_in_the_queue_is_not_the_calls_and_what_hangs_between_calls_is_ended(
+    pool: HostPool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Would catch a limit that begins when a call is sent, and a wait without any limit."""
+    spec = write_policy(
+        tmp_path,
+        monkeypatch,
+        "stopping",
+        """
+import signal, threading
+class It:
+    def reset(self, instruction, demonstration):
+        time.sleep(1.5)
+    def hear(self, text, step):
+        threading.Timer(0.2, os.kill, (os.getpid(), signal.SIGSTOP)).start()
+    def act(self, observation):
+        return np.zeros((1, 8))
+""",
+    )
+    worlds = [HostedPolicy(pool.connect(), read_policy(spec), 0, 4.0) for _ in range(4)]
+    with ThreadPoolExecutor() as threads:
+        list(threads.map(lambda world: world.reset("wait", {}), worlds))  # the last for 6 s
+    worlds[0].hear("stop", 0)
+    time.sleep(1)
+    with pytest.raises(EpisodeLostError, match="began no call within 4 s"):
+        worlds[1].act({})  # type: ignore[typeddict-item]
+    for world in worlds:
+        world.close()
 
 
 def host_pids(supervisor: int) -> list[int]:

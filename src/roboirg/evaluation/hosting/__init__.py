@@ -2,9 +2,8 @@
 
 | part | runs in | content |
 | --- | --- | --- |
-| `hosted_policy` | the world's process | a policy whose methods are calls to its host |
-| `host_pool`, `policy_host` | the supervisor | queues, batches, deadlines, attribution |
-| `policy_child` | the supervisor | one policy process: start, exchange messages, end |
-| `host_process` | the policy's process | carries out the calls; holds no world |
+| `hosted_policy`, `policy_line` | the world's process | a policy whose methods call its process |
+| `host_pool`, `policy_child` | the supervisor | starts and ends processes, passes on lines |
+| `host_process` | the policy's process | queues and carries out the calls; holds no world |
 | `messages` | all | schema of the messages and how they travel; nothing is ever unpickled |
 """

@@ -1,8 +1,9 @@
-"""The policy hosts of a run, and the lines on which worlds ask for them."""
+"""The policies' processes of a run, and the lines on which worlds ask for them."""
 
 from __future__ import annotations
 
 import contextlib
+import os
 import socket
 import threading
 from collections.abc import Callable, Iterator
@@ -11,9 +12,8 @@ from dataclasses import dataclass
 from typing import Any, Self
 
 from roboirg.core.policy_ref import PolicyRef
-from roboirg.evaluation.hosting.messages import receive_calls, send
+from roboirg.evaluation.hosting.messages import receive_request, send
 from roboirg.evaluation.hosting.policy_child import PolicyChild
-from roboirg.evaluation.hosting.policy_host import HostSession, PolicyHost
 
 DEFAULT_BATCH = 16
 
@@ -28,12 +28,10 @@ class HostSettings:
     Attributes:
         batch: most episodes that a policy is asked about together.
         devices: values of ``CUDA_VISIBLE_DEVICES``; each policy gets a process on each of them.
-        policy_timeout_s: seconds that one call of a policy may take; None for no limit.
     """
 
     batch: int = DEFAULT_BATCH
     devices: tuple[str, ...] = ()
-    policy_timeout_s: float | None = None
 
 
 @contextlib.contextmanager
@@ -52,7 +50,7 @@ def open_hosts(play: Any) -> Iterator[Connect | None]:  # noqa: ANN401 - what pl
 
 
 class HostPool:
-    """Starts a host for each policy on each device when a world first asks for it; a context.
+    """Starts a process for each policy on each device when a world first asks for it; a context.
 
     Args:
         settings: how policies are hosted.
@@ -60,17 +58,16 @@ class HostPool:
 
     def __init__(self, settings: HostSettings) -> None:
         self._settings = settings
-        self._hosts: dict[tuple[PolicyRef | None, str | None], PolicyHost] = {}
+        self._children: dict[tuple[PolicyRef | None, str | None], PolicyChild] = {}
         self._lines: list[socket.socket] = []
-        self._far_ends: list[socket.socket] = []
         self._lock, self._is_closed = threading.Lock(), False
         # The kernel ends a process with the thread that started it.
         self._starter = ThreadPoolExecutor(1, "policy starter")
 
     def connect(self) -> socket.socket:
-        """Return a new line, on which `HostedPolicy` begins episodes; no other process has it."""
+        """Return a new line, on which `PolicyLine` asks for a process; no other process has it."""
         ours, theirs = socket.socketpair()
-        self._far_ends.append(theirs)
+        self._lines.append(theirs)
         self.serve(ours)
         return theirs
 
@@ -79,25 +76,18 @@ class HostPool:
         self._lines.append(line)
         threading.Thread(target=self._serve, args=(line,), name="hosted world", daemon=True).start()
 
-    @property
-    def pids(self) -> list[int]:
-        """The process ids of the policies' processes."""
-        with self._lock:
-            children = [host.child for host in self._hosts.values()]
-        return [child.pid for child in children if child is not None]
-
     def close(self) -> None:
-        """End all hosts, and close the lines that `connect` returned."""
+        """End all processes, and close the lines."""
         with self._lock:
             self._is_closed = True
-            hosts = list(self._hosts.values())
-            self._hosts.clear()
+            children = list(self._children.values())
+            self._children.clear()
         for line in self._lines:
             with contextlib.suppress(OSError):
                 line.shutdown(socket.SHUT_RDWR)
-        for host in hosts:
-            host.stop()
-        for line in self._far_ends:
+        for child in children:
+            child.end()
+        for line in self._lines:
             line.close()
         self._starter.shutdown(wait=False)
 
@@ -108,52 +98,69 @@ class HostPool:
         self.close()
 
     def _serve(self, line: socket.socket) -> None:
-        """Carry out the calls of a world until it hangs up."""
-        host: PolicyHost | None = None
-        with line:
-            session = HostSession(line)
-            try:
-                with contextlib.suppress(EOFError, OSError):
-                    while True:
-                        (call,) = receive_calls(line)
-                        if call.method == "open":
-                            if host is not None:  # the world gave up the episode before
-                                host.leave(session)
-                            session = HostSession(line, call.alone)
-                            host = self._host_for(call.policy, session)
-                        if host is None:
-                            return
-                        send(line, host.call(session, call))
-                        if not session.started:
-                            host.leave(session)
-            finally:
-                if host is not None:
-                    host.leave(session)
+        """Do what a world asks for until it hangs up."""
+        child: PolicyChild | None = None
+        try:
+            with contextlib.suppress(EOFError, OSError):
+                while True:
+                    request, descriptors = receive_request(line)
+                    if request.method in ("open", "leave"):  # a world may have given up an episode
+                        self._leave(child)
+                        child = None
+                    if request.method == "open":
+                        child = self._enter(request.policy, descriptors)
+                    elif child is None:
+                        continue
+                    elif request.method == "loss":
+                        send(line, child.loss())
+                    elif request.method == "kill":
+                        child.kill()
+                    elif request.method == "check":
+                        child.check(request.limit_s)
+        finally:
+            self._leave(child)
+            line.close()
 
-    def _host_for(self, policy: PolicyRef | None, session: HostSession) -> PolicyHost | None:
-        """Return the host of a policy with the fewest episodes, and end what is not needed."""
-        with self._lock:
-            if self._is_closed:
-                return None
-            for device in self._settings.devices or (None,):
-                if (policy, device) not in self._hosts:
-                    self._hosts[policy, device] = self._new_host(device)
-            # A run plays one policy after the other: what has no episodes is over, most likely.
-            for other, device in tuple(self._hosts):
-                if other != policy and not self._hosts[other, device].sessions:
-                    over = self._hosts.pop((other, device))
-                    threading.Thread(target=over.stop, name="policy end", daemon=True).start()
-            chosen = min(
-                (host for (name, _), host in self._hosts.items() if name == policy),
-                key=lambda host: len(host.sessions),
-            )
-            chosen.sessions.add(session)
-            return chosen
+    def _leave(self, child: PolicyChild | None) -> None:
+        if child is not None:
+            with self._lock:
+                child.worlds -= 1
 
-    def _new_host(self, device: str | None) -> PolicyHost:
-        variables = {} if device is None else {"CUDA_VISIBLE_DEVICES": device}
+    def _enter(self, policy: PolicyRef | None, descriptors: list[int]) -> PolicyChild:
+        """Let the process of a policy with the fewest episodes serve one more.
 
-        def start() -> PolicyChild:
-            return self._starter.submit(PolicyChild, variables).result()
+        Raises:
+            EOFError: the run is ending.
+        """
+        try:
+            with self._lock:
+                if self._is_closed:
+                    raise EOFError
+                own = [
+                    self._child(policy, device, descriptors[1])
+                    for device in self._settings.devices or (None,)
+                ]
+                self._end_others(policy)
+                child = min(own, key=lambda one: one.worlds)
+                child.worlds += 1
+            child.serve(descriptors, self._settings.batch)
+        finally:
+            for descriptor in descriptors:
+                os.close(descriptor)
+        return child
 
-        return PolicyHost(start, self._settings.batch, self._settings.policy_timeout_s)
+    def _child(self, policy: PolicyRef | None, device: str | None, output: int) -> PolicyChild:
+        """Return the process of a policy on a device, a new one if there is none or it has died."""
+        child = self._children.get((policy, device))
+        if child is None or child.is_over:
+            variables = {} if device is None else {"CUDA_VISIBLE_DEVICES": device}
+            child = self._starter.submit(PolicyChild, variables, output).result()
+            self._children[policy, device] = child
+        return child
+
+    def _end_others(self, policy: PolicyRef | None) -> None:
+        """End what has no episodes: a run plays one policy after the other."""
+        for key, child in tuple(self._children.items()):
+            if key[0] != policy and not child.worlds:
+                del self._children[key]
+                threading.Thread(target=child.end, name="policy end", daemon=True).start()

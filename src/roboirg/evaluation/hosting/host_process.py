@@ -1,7 +1,11 @@
 """The policy's process: carries out the calls of many episodes, one after the other.
 
 It holds nothing of a world but what the contract gives to a policy: instruction, video,
-observations. It is started with a clean interpreter, and its only way out is one socket.
+observations. It is started with a clean interpreter. Each episode has a line of its own to its
+world; the line to the supervisor brings them.
+
+The call that waits longest is carried out, and with it those of other episodes that can be carried
+out together.
 """
 
 from __future__ import annotations
@@ -10,17 +14,20 @@ import contextlib
 import functools
 import io
 import os
+import selectors
 import socket
+import struct
 import sys
 import threading
+import time
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 from numpy.typing import NDArray
 
-from roboirg.core.actions import ActionSpace
+from roboirg.core.actions import JOINT_ANGLE, ActionSpace
 from roboirg.core.errors import MissingDependencyError
 from roboirg.core.inference_facts import inference_facts
 from roboirg.core.observations import FetchedDemonstration
@@ -29,10 +36,12 @@ from roboirg.core.policy_ref import PolicyRef
 from roboirg.evaluation.episode_errors import describe_error, one_line
 from roboirg.evaluation.hosting.messages import (
     MAX_TEXT,
+    Begun,
     Call,
     Outcome,
     Question,
-    receive_calls,
+    receive_call,
+    receive_request,
     send,
 )
 from roboirg.policies.by_name.finding import look_up, make_policy
@@ -47,41 +56,146 @@ from roboirg.policies.contract.policy_version import read_version
 from roboirg.policies.contract.random_state import RandomState
 from roboirg.policies.opening import opened
 
+GATHER_S = 0.003
+"""How long a call waits for others that could be carried out together with it."""
+STUCK_S = 60
+"""How long a world may take to send the rest of a message; then it is given up."""
+_STREAMS = (1, 2)
+"""Descriptors of stdout and stderr."""
 
-class HostProcess:
-    """Carries out calls until the line closes.
 
-    Args:
-        line: to the supervisor.
+@dataclass(eq=False)
+class Episode:
+    """An episode that this process plays.
+
+    Attributes:
+        line: to its world.
+        output: descriptor of where its world's output goes.
+        policy: of the episode; None before it is open.
+        random: its random numbers.
+        space: of its actions.
+        alone: whether it must not be asked about together with others.
     """
 
-    def __init__(self, line: socket.socket) -> None:
-        self._line = line
-        self._episodes: dict[int, tuple[Any, RandomState, ActionSpace]] = {}
+    line: socket.socket
+    output: int
+    policy: Any = None
+    random: RandomState = field(default_factory=lambda: RandomState(0))
+    space: ActionSpace = JOINT_ANGLE
+    alone: bool = False
+
+    def joins(self, call: Call) -> bool:
+        """Return whether a call can be carried out together with those of others."""
+        can_join = callable(getattr(self.policy, "act_together", None)) and not self.alone
+        return can_join and call.method == "act"
+
+
+class HostProcess:
+    """Carries out calls until the supervisor hangs up.
+
+    Args:
+        supervisor: the line to it.
+    """
+
+    def __init__(self, supervisor: socket.socket) -> None:
+        self._supervisor, self._batch = supervisor, 1
+        self._ready = selectors.DefaultSelector()
+        self._ready.register(supervisor, selectors.EVENT_READ)
+        self._episodes: set[Episode] = set()
+        self._waiting: dict[Episode, Call] = {}
+        self._under_way: Sequence[Episode] = ()
         self._read_fields: dict[str, None] = {}
-        self._asking: set[int] = set()
         self._home, self._thread = os.getcwd(), threading.get_ident()  # noqa: PTH109
+        self._nowhere = os.open(os.devnull, os.O_WRONLY)
 
     def serve(self) -> None:
-        """Answer every message."""
+        """Carry out every call."""
         with contextlib.suppress(EOFError, OSError):
             while True:
-                calls = receive_calls(self._line)
-                send(self._line, self._answer(calls))
+                self._collect(0 if self._waiting else None)
+                if self._waiting:
+                    self._carry_out(self._gather())
 
-    def _answer(self, calls: Sequence[Call]) -> list[Outcome]:
+    def _collect(self, seconds: float | None) -> None:
+        """Take in calls and new episodes; wait for the first one so long."""
+        for key, _ in self._ready.select(seconds):
+            episode: Episode | None = key.data
+            if episode is None:
+                self._obey()
+            elif episode not in self._waiting:
+                try:
+                    self._waiting[episode] = receive_call(episode.line)
+                except (EOFError, OSError):  # its world is gone
+                    self._waiting[episode] = Call("close")
+
+    def _obey(self) -> None:
+        """Do what the supervisor wants: serve an episode, or answer that this process can."""
+        request, descriptors = receive_request(self._supervisor)
+        if request.method == "check":
+            self._supervisor.send(b"!")
+            return
+        line, output = descriptors
+        episode = Episode(socket.socket(fileno=line), output)
+        for limit in (socket.SO_RCVTIMEO, socket.SO_SNDTIMEO):
+            episode.line.setsockopt(socket.SOL_SOCKET, limit, struct.pack("ll", STUCK_S, 0))
+        self._batch = request.batch
+        self._episodes.add(episode)
+        self._ready.register(episode.line, selectors.EVENT_READ, episode)
+
+    def _gather(self) -> dict[Episode, Call]:
+        """Return the calls that are carried out now: the oldest one, and what joins it."""
+        first, call = next(iter(self._waiting.items()))
+        found = {first: call}
+        if first.joins(call):
+            # Worlds that wait already, and those that are just about to.
+            wanted = min(self._batch, sum(not one.alone for one in self._episodes))
+            until = time.monotonic() + GATHER_S
+            while len(self._waiting) < wanted and (left := until - time.monotonic()) > 0:
+                self._collect(left)
+            joining = [pair for pair in self._waiting.items() if pair[0].joins(pair[1])]
+            found = dict(joining[: self._batch])
+        for one in found:
+            del self._waiting[one]
+        return found
+
+    def _carry_out(self, calls: Mapping[Episode, Call]) -> None:
+        """Carry out calls, and send their outcomes to their worlds."""
         with contextlib.suppress(OSError):
             os.chdir(self._home)  # an earlier episode may have changed it
-        self._asking = {call.session for call in calls}
         together = len(calls) > 1
-        outcomes = self._act_together(calls) if together else list(map(self._outcome, calls))
-        self._asking = set()
+        for episode in calls:
+            _reply(episode, Begun(together))
+        # What a call for several episodes prints is charged to the first.
+        self._print_to(next(iter(calls)).output)
+        self._under_way = tuple(calls)
+        if together:
+            outcomes = self._act_together(calls)
+        else:
+            outcomes = [self._outcome(*one) for one in calls.items()]
+        self._under_way = ()
+        self._print_to(self._nowhere)
+        for episode, outcome in zip(calls, outcomes, strict=True):
+            _reply(episode, outcome)
+            if calls[episode].method == "close":
+                self._forget(episode)
+
+    def _print_to(self, output: int) -> None:
         for stream in (sys.stdout, sys.stderr):
             with contextlib.suppress(Exception):  # a policy may have closed or replaced it
                 stream.flush()
-        return outcomes
+        for number in _STREAMS:
+            with contextlib.suppress(OSError):
+                os.dup2(output, number)
 
-    def _outcome(self, call: Call) -> Outcome:
+    def _forget(self, episode: Episode) -> None:
+        self._episodes.discard(episode)
+        with contextlib.suppress(KeyError, ValueError):
+            self._ready.unregister(episode.line)
+        episode.line.close()
+        with contextlib.suppress(OSError):
+            os.close(episode.output)
+
+    def _outcome(self, episode: Episode, call: Call) -> Outcome:
         try:
             if call.method == "describe":
                 found = opened(_policy(call))
@@ -91,38 +205,29 @@ class HostProcess:
                     version=found.version,
                 )
             if call.method == "open":
-                return self._open(call)
-            return self._carry_out(call, *self._episodes[call.session])
+                return self._open(episode, call)
+            return self._call(episode, call)
         except BaseException as error:  # noqa: BLE001 - policies may raise anything
             return _failure(error)
 
-    def _open(self, call: Call) -> Outcome:
+    def _open(self, episode: Episode, call: Call) -> Outcome:
         """Begin an episode with a policy of its own; returns what the world must know of it."""
-        random = RandomState(call.seed)
-        with random:
+        episode.random, episode.alone = RandomState(call.seed), call.alone
+        with episode.random:
             policy: Any = make_policy(_policy(call), call.seed)
-        # Pixels of subgoals are for privileged policies, and those have no host.
+        # Pixels of subgoals are for privileged policies, and those have no process of their own.
         needs = replace(PolicyNeeds.of(policy), grounded=False)
-        self._episodes[call.session] = policy, random, needs.action_space
-        return Outcome(
-            needs=needs,
-            version=_fallback(_policy(call)),
-            together=callable(getattr(policy, "act_together", None)),
-            reads=tuple(self._read_fields),
-        )
+        episode.policy, episode.space = policy, needs.action_space
+        version, reads = _fallback(_policy(call)), tuple(self._read_fields)
+        return Outcome(needs=needs, version=version, reads=reads)
 
-    def _carry_out(
-        self,
-        call: Call,
-        policy: Any,  # noqa: ANN401 - of any class
-        random: RandomState,
-        space: ActionSpace,
-    ) -> Outcome:
+    def _call(self, episode: Episode, call: Call) -> Outcome:
         """Call a method of a policy; `reset` and `hear` return its metadata."""
-        with random:
+        policy = episode.policy
+        with episode.random:
             match call.method:
                 case "reset":
-                    fetch = functools.partial(self._fetch, call.session)
+                    fetch = functools.partial(self._fetch, episode)
                     fields, arrays = call.value["fields"], call.value["arrays"]
                     video = FetchedDemonstration(fields, arrays, fetch)
                     policy.reset(call.value["instruction"], video)
@@ -134,43 +239,49 @@ class HostProcess:
                 case "hear":
                     tell_policy(policy, call.value)
                 case "act":
-                    return _acted(policy, space, policy.act(_observation(call)))
+                    return _acted(episode, policy.act(_observation(call)))
                 case "usage":
                     return Outcome(usage=policy_usage(policy))
                 case "close":
-                    del self._episodes[call.session]
                     close_policy(policy)
                     return Outcome()
             return Outcome(metadata=dump_metadata(policy))
 
-    def _act_together(self, calls: Sequence[Call]) -> list[Outcome]:
+    def _act_together(self, calls: Mapping[Episode, Call]) -> list[Outcome]:
         """Ask about several episodes at once; a failure is not attributed to any of them."""
         try:
-            policies, _, spaces = zip(*(self._episodes[one.session] for one in calls), strict=True)
+            policies = [episode.policy for episode in calls]
             RandomState.set_aside()
-            chunks = policies[0].act_together(list(policies), list(map(_observation, calls)))
-            return [_acted(*one) for one in zip(policies, spaces, chunks, strict=True)]
+            chunks = policies[0].act_together(policies, list(map(_observation, calls.values())))
+            return [_acted(*one) for one in zip(calls, chunks, strict=True)]
         except BaseException as error:  # noqa: BLE001 - policies may raise anything
             return [_failure(error)] * len(calls)
 
-    def _fetch(self, session: int, fields: Sequence[str]) -> Mapping[str, NDArray[Any]]:
+    def _fetch(self, episode: Episode, fields: Sequence[str]) -> Mapping[str, NDArray[Any]]:
         """Return fields of the video of an episode whose call is under way.
 
         Raises:
             RuntimeError: no call of this episode is under way in this thread, or the world is gone.
         """
-        if session not in self._asking or threading.get_ident() != self._thread:
+        if episode not in self._under_way or threading.get_ident() != self._thread:
             raise RuntimeError(
                 "pictures of the demonstration can be read only while a call of the policy is "
                 "under way, by the thread that was called"
             )
         self._read_fields.update(dict.fromkeys(fields))
-        send(self._line, Question(session, tuple(fields)))
-        (answer,) = receive_calls(self._line)
+        answer = Call("gone")
+        with contextlib.suppress(EOFError, OSError):
+            send(episode.line, Question(tuple(fields)))
+            answer = receive_call(episode.line)
         if answer.method == "gone":
             raise RuntimeError("the episode has ended")
         found: Mapping[str, NDArray[Any]] = answer.value
         return found
+
+
+def _reply(episode: Episode, message: Begun | Outcome) -> None:
+    with contextlib.suppress(OSError):  # its world may be gone
+        send(episode.line, message)
 
 
 def _policy(call: Call) -> PolicyRef:
@@ -192,10 +303,10 @@ def _observation(call: Call) -> Any:  # noqa: ANN401 - an `Observation`
     return call.value
 
 
-def _acted(policy: Any, space: ActionSpace, rows: Any) -> Outcome:  # noqa: ANN401
+def _acted(episode: Episode, rows: Any) -> Outcome:  # noqa: ANN401
     """Return what a policy's `act` returned, checked, for a message."""
-    chunk = check_rows(rows, space)
-    return Outcome(rows=chunk.tobytes(), size=chunk.shape[1], subgoal=policy_subgoal(policy))
+    chunk, subgoal = check_rows(rows, episode.space), policy_subgoal(episode.policy)
+    return Outcome(rows=chunk.tobytes(), size=chunk.shape[1], subgoal=subgoal)
 
 
 def _failure(error: BaseException) -> Outcome:
@@ -210,13 +321,13 @@ def _failure(error: BaseException) -> Outcome:
     return Outcome(kind, str(found)[:MAX_TEXT], found.details)
 
 
-def main(line: socket.socket) -> None:
-    """Serve a supervisor; runs in a process of its own."""
+def main(supervisor: socket.socket) -> None:
+    """Serve worlds; runs in a process of its own."""
     if isinstance(sys.stdout, io.TextIOWrapper):
         sys.stdout.reconfigure(line_buffering=True)
     if sys.path[-1] == str(Path.cwd()):  # where a command puts it: its policy's files come first
         sys.path.insert(0, sys.path.pop())
-    HostProcess(line).serve()
+    HostProcess(supervisor).serve()
     with contextlib.suppress(Exception):
         sys.stdout.flush()
     os._exit(0)  # threads that a policy left behind must not keep this process

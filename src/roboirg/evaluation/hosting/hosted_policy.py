@@ -1,4 +1,4 @@
-"""The world's side of a hosted policy: a policy whose methods are calls to its host.
+"""The world's side of a hosted policy: a policy whose methods are calls of its process.
 
 What comes back is checked like anything from outside: it is plain data, and errors in it are the
 policy's.
@@ -7,10 +7,7 @@ policy's.
 from __future__ import annotations
 
 import contextlib
-import os
 import socket
-import sys
-import time
 from collections.abc import Sequence
 from typing import Any, cast
 
@@ -23,15 +20,8 @@ from roboirg.core.inference_facts import InferenceFacts
 from roboirg.core.observations import Demonstration, Observation
 from roboirg.core.policy_ref import PolicyRef
 from roboirg.evaluation.episode_errors import EpisodeError, EpisodeLostError, describe_error
-from roboirg.evaluation.hosting.messages import (
-    Call,
-    Outcome,
-    Question,
-    Reply,
-    read_supervisor,
-    receive,
-    send,
-)
+from roboirg.evaluation.hosting.messages import Call, Outcome, Question
+from roboirg.evaluation.hosting.policy_line import PolicyLine
 from roboirg.policies.contract.base import SubgoalEnd
 from roboirg.policies.contract.policy_calls import read_metadata
 
@@ -40,19 +30,19 @@ _DRAWN = ("_rgb", "_depth")
 
 
 class HostedPolicy:
-    """A policy in its host's process, for one episode; a line has one after the other.
+    """A policy in a process of its own, for one episode.
 
     Args:
-        hosts: the line on which to ask for its host, of `HostPool.connect`.
+        hosts: the line on which to ask for its process, of `HostPool.connect`.
         ref: the policy, or the part of it that has a process of its own.
         seed: of its random choices.
+        limit_s: how long a call may take; None for no limit.
         alone: whether it must not be asked about this episode together with others.
 
     Attributes:
         version: that the policy declares when its `reset` has ended, else a fingerprint.
         metadata: as the policy reports them, from `reset` on.
         inference: what its process computes with, from `reset` on.
-        waited_s: seconds that its calls waited for others.
         subgoal: what it named after its last actions, if anything.
 
     Raises:
@@ -62,17 +52,27 @@ class HostedPolicy:
     """
 
     def __init__(
-        self, hosts: socket.socket, ref: PolicyRef, seed: int, *, alone: bool = False
+        self,
+        hosts: socket.socket,
+        ref: PolicyRef,
+        seed: int,
+        limit_s: float | None = None,
+        *,
+        alone: bool = False,
     ) -> None:
-        self._ref, self._hosts = ref, hosts
+        self._ref = ref
         self.metadata: dict[str, JsonValue] = {}
         self.inference: InferenceFacts | None = None
-        self.waited_s = 0.0
         self.subgoal: str | None = None
         self._demonstration: Demonstration = {}
-        self._is_open = True
-        found = self._call(Call("open", policy=ref, seed=seed, alone=alone))
-        found.needs.declare_on(self)
+        self._failure: Exception | None = None
+        self._line = PolicyLine(hosts, ref, limit_s, alone=alone)
+        try:
+            found = self._call(Call("open", policy=ref, seed=seed, alone=alone))
+            found.needs.declare_on(self)
+        except BaseException:
+            self._line.close()
+            raise
         self.version, self._reads = found.version, found.reads
 
     def reset(self, instruction: str, demonstration: Demonstration) -> None:
@@ -104,69 +104,49 @@ class HostedPolicy:
 
     def usage(self) -> dict[str, float]:
         """Return the cost of the episode; empty after an error."""
-        return dict(self._call(Call("usage")).usage) if self._is_open else {}
+        return dict(self._call(Call("usage")).usage) if self._line.is_open else {}
 
     def close(self) -> None:
         """End the episode; repeated calls do nothing."""
-        is_open, self._is_open = self._is_open, False
-        if is_open:
-            with contextlib.suppress(EpisodeLostError):  # what is lost needs no end
-                self._call(Call("close"))
+        try:
+            if self._line.is_open:
+                with contextlib.suppress(EpisodeLostError):  # what is lost needs no end
+                    self._call(Call("close"))
+        finally:
+            self._line.close()
 
     def _call(self, call: Call) -> Outcome:
-        """Call the host, draw what it asks for, and return the outcome.
+        """Call the policy, draw what it asks for, and return the outcome.
 
         Raises:
             EpisodeError: the policy raised, or broke its process; or the world cannot draw.
             EpisodeLostError: the process was lost through no fault of this episode.
             MissingDependencyError: a package that one of our own policies needs is missing.
         """
-        start = time.perf_counter()
-        try:
-            reply, failure = self._exchange(call)
-        except (EOFError, OSError) as error:
-            self._is_open = False
-            raise EpisodeLostError("infrastructure", "the policy's host is gone") from error
-        _print(reply.output)
-        self.waited_s += max(time.perf_counter() - start - reply.seconds, 0.0)
-        self._is_open = self._is_open and reply.outcome is not None
-        if failure is not None:
-            raise failure
-        if reply.outcome is None or reply.outcome.error is not None:
-            raise self._error(reply)
-        return reply.outcome
-
-    def _exchange(self, call: Call) -> tuple[Reply, Exception | None]:
-        """Return the reply to a call, and what was raised while pictures were drawn for it."""
-        failure: Exception | None = None
-        send(self._hosts, [call])
-        while isinstance(reply := read_supervisor(receive(self._hosts)), Question):
-            answer = Call("gone")
-            wanted = [field for field in self._demonstration if field in reply.fields]
-            try:
-                answer = Call("answer", value=self._drawn(wanted))
-            except EndOfRunError as error:  # raised once the policy has returned
-                failure = error
-            except Exception as error:  # noqa: BLE001 - likewise, as the world's
-                failure = describe_error("environment", error)
-            send(self._hosts, [answer])
-        return reply, failure
-
-    def _error(self, reply: Reply) -> Exception:
-        """Return what a loss, or a policy's exception, raises here."""
-        match reply.outcome:
-            case None if reply.again:
-                return EpisodeLostError(reply.kind, reply.message, alone=reply.alone)
-            case None:
-                return EpisodeError(reply.kind, reply.message, "")
-            case Outcome(error="missing", message=words):
+        self._failure = None
+        outcome = self._line.call(call, self._draw)
+        if self._failure is not None:
+            raise self._failure
+        match outcome:
+            case Outcome(error=None):
+                return outcome
+            case Outcome(error="missing", message=words) if not self._ref.is_foreign:
                 # Only our own code can ask the user to install something.
-                if self._ref.is_foreign:
-                    return EpisodeError("policy", words, "")
-                return MissingDependencyError(words)
+                raise MissingDependencyError(words)
             case Outcome(error, message, details):
-                kind: Any = error
-                return EpisodeError(kind, message, details)
+                kind: Any = "policy" if error == "missing" else error
+                raise EpisodeError(kind, message, details)
+
+    def _draw(self, question: Question) -> Call:
+        """Return fields of the video; what goes wrong is raised once the policy has returned."""
+        wanted = [field for field in self._demonstration if field in question.fields]
+        try:
+            return Call("answer", value=self._drawn(wanted))
+        except EndOfRunError as error:
+            self._failure = error
+        except Exception as error:  # noqa: BLE001 - the world's, whatever it is
+            self._failure = describe_error("environment", error)
+        return Call("gone")
 
     def _take_metadata(self, found: Outcome) -> None:
         try:
@@ -184,29 +164,17 @@ class HostedPolicy:
 
 
 class HostedPlanner(HostedPolicy):
-    """A planner in its host's process, whose hands are in this one."""
+    """A planner in a process of its own, whose hands are in this one."""
 
-    def __init__(
-        self, hosts: socket.socket, ref: PolicyRef, seed: int, *, alone: bool = False
-    ) -> None:
-        super().__init__(hosts, ref, seed, alone=alone)
-        self._ends: list[SubgoalEnd] = []
+    _ends: tuple[SubgoalEnd, ...] = ()
 
     def learn(self, end: SubgoalEnd) -> None:
         """Keep how a subgoal ended for the next call."""
-        self._ends.append(end)
+        self._ends += (end,)
 
     def plan(self, observation: Observation, step: int) -> str | None:
         """Return the subgoal from now on."""
-        seen: dict[str, Any] = {**observation, "step": step, "ends": list(self._ends)}
-        self._ends.clear()
+        seen: dict[str, Any] = {**observation, "step": step, "ends": self._ends}
+        self._ends = ()
         self.act(cast("Observation", seen))
         return self.subgoal
-
-
-def _print(output: bytes) -> None:
-    """Print what the policy printed, so that it is in the log of its episode."""
-    if output:
-        with contextlib.suppress(OSError):
-            sys.stderr.flush()
-            os.write(sys.__stderr__.fileno() if sys.__stderr__ else 2, output)

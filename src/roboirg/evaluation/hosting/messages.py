@@ -1,14 +1,15 @@
-"""Messages between a world, the supervisor of its policy, and the policy's process.
+"""Messages between a world, the policy's process that it speaks with, and the supervisor of both.
 
 Messages are msgpack with a fixed schema, so that a policy cannot run code in the process that reads
-them, nor send what only the supervisor may say: `Reply` is no part of what its process can send.
-The bytes of arrays follow a call; what comes from a policy's process has none.
+them. The bytes of arrays follow a call; what comes from a policy's process has none. Descriptors,
+such as a line's other end, travel with a request.
 """
 
 from __future__ import annotations
 
 import socket
-from typing import Annotated, Any, Literal
+from collections.abc import Callable, Sequence
+from typing import Annotated, Any, Literal, NoReturn
 
 import msgspec
 import numpy as np
@@ -21,7 +22,6 @@ from roboirg.core.policy_needs import PolicyNeeds
 from roboirg.core.policy_ref import PolicyRef
 from roboirg.core.subgoal_text import MOST_SUBGOAL_LETTERS
 from roboirg.evaluation.episode_errors import MAX_DETAILS_LENGTH
-from roboirg.evaluation.records.record import ErrorKind
 from roboirg.policies.contract.policy_calls import MAX_COSTS, MAX_METADATA_LENGTH
 
 MAX_MESSAGE = 16 * 2**20
@@ -31,6 +31,7 @@ MAX_TEXT = 2000
 _SIZE_BYTES = 8
 _ARRAY = 1
 """Code of the extension type of msgpack that stands for an array: its type and shape."""
+_LINE_BUFFER = 2**20
 _MOST_JOINED = 8 * 2**20
 """Bytes that are copied to be sent at once, which wakes the receiver once."""
 
@@ -38,28 +39,49 @@ Text = Annotated[str, Meta(max_length=MAX_TEXT)]
 Names = Annotated[tuple[Text, ...], Meta(max_length=64)]
 
 
+class Request(Struct, forbid_unknown_fields=True, omit_defaults=True):
+    """What a world asks of the supervisor, and the supervisor of a policy's process.
+
+    Attributes:
+        method: ``open`` serves an episode, whose line and output are the two descriptors that come
+            with it; ``leave`` ends that. ``loss`` asks how the process ended, ``kill`` ends it,
+            ``check`` ends it if it begins nothing more.
+        policy: that is meant.
+        limit_s: how long a call may take.
+        batch: most episodes that the policy is asked about together.
+    """
+
+    method: Literal["open", "leave", "loss", "kill", "check"]
+    policy: PolicyRef | None = None
+    limit_s: float = 0.0
+    batch: int = 1
+
+
 class Call(Struct, forbid_unknown_fields=True, omit_defaults=True):
     """A call of a policy, or the answer to what its process asked.
 
     Attributes:
         method: of the policy; or ``open``, ``describe``, ``answer``, ``gone``.
-        session: number of the episode.
         policy: that is meant, as are its `seed` and whether it is asked `alone`.
         value: what the method gets: maps, sequences, texts, numbers and arrays.
     """
 
     method: str
-    session: int = 0
     policy: PolicyRef | None = None
     seed: int = 0
     alone: bool = False
     value: Any = None
 
 
-class Question(Struct, tag="question", forbid_unknown_fields=True):
-    """A policy's process asks the world of an episode for fields of the video."""
+class Begun(Struct, tag="begun", forbid_unknown_fields=True):
+    """A call was waiting for its turn and begins now, maybe `together` with those of others."""
 
-    session: int
+    together: bool = False
+
+
+class Question(Struct, tag="question", forbid_unknown_fields=True):
+    """A policy's process asks the world for fields of the video."""
+
     fields: Names = ()
 
 
@@ -73,7 +95,6 @@ class Outcome(Struct, tag="outcome", forbid_unknown_fields=True, omit_defaults=T
         details: its traceback.
         needs: what the policy needs.
         version: of the policy.
-        together: whether it can be asked about several episodes at once.
         reads: fields of videos that its episodes have read so far.
         metadata: JSON.
         usage: costs of the episode.
@@ -88,7 +109,6 @@ class Outcome(Struct, tag="outcome", forbid_unknown_fields=True, omit_defaults=T
     details: Annotated[str, Meta(max_length=MAX_DETAILS_LENGTH)] = ""
     needs: PolicyNeeds = PolicyNeeds()
     version: Name = "unknown"
-    together: bool = False
     reads: Names = ()
     metadata: Annotated[str, Meta(max_length=MAX_METADATA_LENGTH)] = "{}"
     usage: Annotated[dict[Text, float], Meta(max_length=MAX_COSTS)] = {}
@@ -98,36 +118,50 @@ class Outcome(Struct, tag="outcome", forbid_unknown_fields=True, omit_defaults=T
     subgoal: Annotated[str, Meta(max_length=MOST_SUBGOAL_LETTERS)] | None = None
 
 
-class Reply(Struct, tag="reply", forbid_unknown_fields=True, omit_defaults=True):
-    """What the supervisor replies to a world.
-
-    Attributes:
-        outcome: of the call; None if the policy's process was lost.
-        seconds: that the call took, without waiting for others.
-        output: what the policy printed.
-        kind: of the error, if the process was lost.
-        message: how it ended.
-        again: whether the episode is played again, because it is not to blame.
-        alone: whether it must not be asked about together with others then.
-    """
-
-    outcome: Outcome | None = None
-    seconds: float = 0.0
-    output: bytes = b""
-    kind: ErrorKind = "infrastructure"
-    message: str = ""
-    again: bool = False
-    alone: bool = False
-
-
-read_child = msgspec.msgpack.Decoder(Question | list[Outcome]).decode
+read_child = msgspec.msgpack.Decoder(Begun | Question | Outcome).decode
 """Reads what a policy's process sends."""
-read_supervisor = msgspec.msgpack.Decoder(Question | Reply).decode
 _read_array = msgspec.msgpack.Decoder(tuple[str, tuple[int, ...]]).decode
 
 
-def send(line: socket.socket, message: object) -> None:
+def new_line() -> tuple[socket.socket, socket.socket]:
+    """Return both ends of a line, which takes in a call with two pictures at once."""
+    ends = socket.socketpair()
+    for end in ends:
+        end.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, _LINE_BUFFER)
+    return ends
+
+
+def ask(line: socket.socket, request: Request, descriptors: Sequence[int] = ()) -> None:
+    """Send a request with descriptors, in one piece."""
+    data = msgspec.msgpack.encode(request)
+    socket.send_fds(line, [len(data).to_bytes(_SIZE_BYTES, "big") + data], descriptors)
+
+
+def receive_request(line: socket.socket) -> tuple[Request, list[int]]:
+    """Return the next request of a line, and its descriptors; the sender is ours.
+
+    Raises:
+        EOFError: the line was closed.
+    """
+    head, descriptors, _, _ = socket.recv_fds(line, _SIZE_BYTES, 2)
+    if not head:
+        raise EOFError
+    data = bytearray(int.from_bytes(head, "big"))
+    _fill(line, data)
+    return msgspec.msgpack.decode(data, type=Request), descriptors
+
+
+def _give_up() -> NoReturn:
+    raise  # noqa: PLE0704 - what is being handled
+
+
+def send(line: socket.socket, message: object, on_timeout: Callable[[], None] = _give_up) -> None:
     """Send a message, led by its size and followed by the bytes of its arrays.
+
+    Args:
+        line: may have a time limit.
+        message: of plain data and arrays.
+        on_timeout: called when the limit passes, after which the waiting goes on.
 
     Raises:
         TypeError: it holds something other than plain data and arrays.
@@ -146,28 +180,40 @@ def send(line: socket.socket, message: object) -> None:
     if sum(map(len, parts)) <= _MOST_JOINED:
         parts = [b"".join(parts)]
     for part in parts:
-        line.sendall(part)
+        left = memoryview(part)
+        while left:
+            try:
+                left = left[line.send(left) :]
+            except TimeoutError:
+                on_timeout()
 
 
-def receive(line: socket.socket, limit: int | None = None) -> bytearray:
+def receive(
+    line: socket.socket, limit: int | None = None, on_timeout: Callable[[], None] = _give_up
+) -> bytearray:
     """Return the next message of a line, which has no arrays.
+
+    Args:
+        line: may have a time limit.
+        limit: most bytes of a message.
+        on_timeout: called when the time limit passes, after which the waiting goes on.
 
     Raises:
         EOFError: the line was closed.
         ValueError: the message is larger than the limit.
     """
     head = bytearray(_SIZE_BYTES)
-    _fill(line, head)
+    _fill(line, head, on_timeout)
     size = int.from_bytes(head, "big")
     if limit is not None and size > limit:
         raise ValueError(f"a message of {size:,} bytes; at most {limit:,} are read")
     data = bytearray(size)
-    _fill(line, data)
+    _fill(line, data, on_timeout)
     return data
 
 
-def receive_calls(line: socket.socket) -> list[Call]:
-    """Return the next calls of a line, with arrays of their own; the sender is ours.
+def receive_call(line: socket.socket) -> Call:
+    """Return the next call of a line, with arrays of their own; the sender is ours.
 
     Raises:
         EOFError: the line was closed.
@@ -179,13 +225,21 @@ def receive_calls(line: socket.socket) -> list[Call]:
         _fill(line, array.reshape(-1).view(np.uint8).data)
         return array
 
-    return msgspec.msgpack.decode(receive(line), type=list[Call], ext_hook=unpack)
+    return msgspec.msgpack.decode(receive(line), type=Call, ext_hook=unpack)
 
 
-def _fill(line: socket.socket, buffer: bytearray | memoryview) -> None:
+def _fill(
+    line: socket.socket,
+    buffer: bytearray | memoryview,
+    on_timeout: Callable[[], None] = _give_up,
+) -> None:
     left = memoryview(buffer)
     while left:
-        count = line.recv_into(left, 0, socket.MSG_WAITALL)
+        try:
+            count = line.recv_into(left, 0, socket.MSG_WAITALL)
+        except TimeoutError:
+            on_timeout()
+            continue
         if count == 0:
             raise EOFError
         left = left[count:]

@@ -2,19 +2,21 @@
 
 from __future__ import annotations
 
+import os
 from dataclasses import replace
+from pathlib import Path
 
 from roboirg.core.errors import InvalidValueError, MissingDependencyError
 from roboirg.core.policy_needs import PolicyNeeds
 from roboirg.core.policy_ref import SCRIPTED, PolicyRef
-from roboirg.evaluation.episode_errors import EpisodeLostError
+from roboirg.evaluation.episode_errors import EpisodeError, EpisodeLostError
+from roboirg.evaluation.hosting.host_pool import HostPool, HostSettings
 from roboirg.evaluation.hosting.messages import Call
-from roboirg.evaluation.hosting.policy_child import PolicyChild
+from roboirg.evaluation.hosting.policy_line import PolicyLine
 from roboirg.policies.by_name.policy_kinds import make_follower
 from roboirg.policies.contract.batch_policy import forget_batched
 from roboirg.policies.opening import opened
 from roboirg.policies.planners.hierarchical_policy import joint_version
-from roboirg.util.deadline_watch import DeadlineWatch
 
 LIMIT_S = 600.0
 
@@ -40,21 +42,18 @@ def open_policy(ref: PolicyRef, limit_s: float = LIMIT_S, device: str | None = N
     forget_batched(ref.body)
     if ref.place == "python":
         return opened(ref)
-    variables = {} if device is None else {"CUDA_VISIBLE_DEVICES": device}
-    child = PolicyChild(variables)
+    hosted, settings = ref.hosted_part, HostSettings(devices=() if device is None else (device,))
     try:
-        with DeadlineWatch(child.kill) as watch:
-            watch.begin(limit_s)
-            reply = child.exchange([Call("describe", policy=ref.hosted_part)])
-    except EpisodeLostError as error:
-        late = f"it was not opened within {limit_s:g} s"
-        why = error if watch.acted_after is None else late
+        with (
+            Path(os.devnull).open("wb") as nowhere,
+            HostPool(settings) as pool,
+            PolicyLine(pool.connect(), hosted, limit_s, output=nowhere.fileno()) as line,
+        ):
+            found = line.call(Call("describe", policy=hosted))
+    except (EpisodeError, EpisodeLostError) as error:
+        is_late = error.kind == "timeout"
+        why = f"it was not opened within {limit_s:g} s" if is_late else error
         raise InvalidValueError(f"Policy {ref.spec!r} cannot be opened: {why}.") from error
-    finally:
-        child.end()
-    if not isinstance(reply, list) or len(reply) != 1:
-        raise InvalidValueError(f"Policy {ref.spec!r} cannot be opened: it sent no description.")
-    (found,) = reply
     if found.error is not None:
         missing = found.error == "missing"
         raise (MissingDependencyError if missing else InvalidValueError)(found.message)

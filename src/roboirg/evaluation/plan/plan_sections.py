@@ -67,7 +67,7 @@ class Hosting:
         """The same for the hosts; None if policies run in the world's process."""
         if self.policy_process == "shared":
             return None
-        return HostSettings(self.batch, self.devices, self.policy_timeout_s)
+        return HostSettings(self.batch, self.devices)
 
 
 @dataclass(frozen=True, slots=True)

@@ -162,7 +162,7 @@ class EpisodeRunner:
                 if hosts is None:
                     policy = load_policy(prepared)
                 else:
-                    policy = load_hosted_policy(hosts, prepared, alone=alone)
+                    policy = load_hosted_policy(hosts, prepared, self.policy_timeout_s, alone=alone)
                 needs = job_needs(policy, job)
                 limit = prompt_limit(needs)
                 if self.refuse_long and limit is not None:
@@ -236,13 +236,13 @@ def load_policy(prepared: PreparedJob) -> Policy:
 
 
 def load_hosted_policy(
-    hosts: socket, prepared: PreparedJob, *, alone: bool = False
+    hosts: socket, prepared: PreparedJob, limit_s: float | None, *, alone: bool = False
 ) -> HostedPolicy | HierarchicalPolicy:
     """Return a policy in a process of its own; scripted hands of a user's planner are in this."""
     ref, seed = _policy_and_seed(prepared)
     if ref.place != "split":
-        return HostedPolicy(hosts, ref, seed, alone=alone)
-    hosted = HostedPlanner(hosts, ref.hosted_part, seed, alone=alone)
+        return HostedPolicy(hosts, ref, seed, limit_s, alone=alone)
+    hosted = HostedPlanner(hosts, ref.hosted_part, seed, limit_s, alone=alone)
     return HierarchicalPolicy(hosted, make_follower(SCRIPTED, seed), f"{ref.kind}:{ref.target}")
 
 
@@ -268,6 +268,3 @@ def _close_policy(policy: Policy, record: Record, guard: CallGuard) -> None:
                 close_policy(policy)
     except EpisodeError as error:
         record.details = record.details or error.details
-    hosted = getattr(policy, "planner", policy)
-    if isinstance(hosted, HostedPolicy):
-        record.timings["policy_wait"] = round(hosted.waited_s, 6)

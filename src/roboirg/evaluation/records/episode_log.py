@@ -77,10 +77,6 @@ class EpisodeLog:
             raise RoboIRGError(f"Cannot write the log {path}: {error.strerror}.") from error
         self._thread = threading.Thread(target=self._watch, name="episode log", daemon=True)
 
-    def append(self, output: bytes) -> None:
-        """Append what was printed elsewhere."""
-        os.write(self.descriptor, output)
-
     def trim(self) -> None:
         """Replace the middle of a log that is too long by a line that says how much it was."""
         head, length = int(self._limit * _HEAD_SHARE), int(self._limit * _TAIL_SHARE)

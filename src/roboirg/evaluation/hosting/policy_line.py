@@ -1,0 +1,193 @@
+"""The world's end of a line into a policy's process: one call after the other, each within a limit.
+
+A call that breaks the process, or exceeds its limit, is to blame for that. All that the process had
+not begun is lost with it, and is played again: no verdict depends on who shared a process.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import socket
+import time
+from collections.abc import Callable, Iterator, Mapping
+from typing import Self
+
+import msgspec
+
+from roboirg.core.errors import RoboIRGError
+from roboirg.core.policy_ref import PolicyRef
+from roboirg.core.waiting import waiting
+from roboirg.evaluation.episode_errors import EpisodeError, EpisodeLostError
+from roboirg.evaluation.hosting.messages import (
+    MAX_MESSAGE,
+    Begun,
+    Call,
+    Outcome,
+    Question,
+    Request,
+    ask,
+    new_line,
+    read_child,
+    receive,
+    send,
+)
+from roboirg.evaluation.records.record import ErrorKind
+
+MOST_QUESTIONS = 64
+"""How often a call may ask for the video of an episode; a field is kept once it is read."""
+MAX_WORDS = 300
+STDERR = 2
+"""Descriptor of where this process prints, such as the log of an episode."""
+PHASES: Mapping[str, str] = {
+    "describe": "policy's constructor",
+    "open": "policy's constructor",
+    "reset": "policy's reset()",
+    "act": "policy's act()",
+    "hear": "policy's hear()",
+    "usage": "policy's close()",
+    "close": "policy's close()",
+}
+
+Answer = Callable[[Question], Call]
+"""Returns the world's answer to a question of the policy's process."""
+
+
+class PolicyLine:
+    """A line into a policy's process, for one episode; a context.
+
+    Args:
+        hosts: the line on which to ask for that process, of `HostPool.connect`.
+        policy: that the process plays.
+        limit_s: how long a call may take, without its wait for others and without the time that the
+            world takes to answer; None for no limit.
+        alone: whether it must not be asked about this episode together with others.
+        output: descriptor of where the policy prints in a call.
+
+    Raises:
+        EpisodeLostError: the supervisor is gone.
+    """
+
+    def __init__(
+        self,
+        hosts: socket.socket,
+        policy: PolicyRef,
+        limit_s: float | None = None,
+        *,
+        alone: bool = False,
+        output: int = STDERR,
+    ) -> None:
+        self._hosts, self._limit_s, self._alone = hosts, limit_s, alone
+        self._line, theirs = new_line()
+        self._line.settimeout(limit_s)
+        with theirs, _supervised():
+            ask(hosts, Request("open", policy), [theirs.fileno(), output])
+
+    def call(self, call: Call, answer: Answer | None = None) -> Outcome:
+        """Call the policy and return the outcome, which may be an error of the policy.
+
+        Args:
+            call: of the policy.
+            answer: returns the world's answer to a question of the process; None if it has none.
+
+        Raises:
+            EpisodeError: this call broke the process, or took too long.
+            EpisodeLostError: the process was lost through no fault of this episode, or a call for
+                several episodes failed.
+        """
+        begun, phase = None, PHASES[call.method]
+        try:
+            begun = self._begin(call)
+            outcome = self._outcome(answer)
+        except TimeoutError:
+            words = f"the {phase} did not return within {self._limit_s:g} s"
+            raise self._lost(begun, phase, ("timeout", words)) from None
+        except (EOFError, OSError):
+            raise self._lost(begun, phase) from None
+        except (RoboIRGError, RecursionError, ValueError) as error:
+            words = f"the process sent no valid reply ({error})"[:MAX_WORDS] + f" in the {phase}"
+            if begun is None:  # a call of another episode may be under way
+                self.close()
+                raise EpisodeLostError("policy", words) from None
+            raise self._lost(begun, phase, ("policy", words)) from None
+        if outcome.error is not None and begun.together:
+            words = "a call for several episodes failed"
+            raise EpisodeLostError("policy", words, alone=True)
+        return outcome
+
+    @property
+    def is_open(self) -> bool:
+        """Whether the policy can be called: it is not closed, and its process was not lost."""
+        return self._line.fileno() >= 0
+
+    def close(self) -> None:
+        """End the episode; repeated calls do nothing."""
+        if self.is_open:
+            self._line.close()
+            with contextlib.suppress(OSError):
+                ask(self._hosts, Request("leave"))
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_exception: object) -> None:
+        self.close()
+
+    def _begin(self, call: Call) -> Begun:
+        """Send a call and wait for its turn."""
+        with waiting("its turn in the policy's process", is_queue=True):
+            send(self._line, call, self._check)
+            begun = read_child(receive(self._line, MAX_MESSAGE, self._check))
+        if not isinstance(begun, Begun) or (begun.together and self._alone):
+            raise ValueError("a message that nobody asked for")
+        return begun
+
+    def _check(self) -> None:
+        """Let the supervisor end the process if it begins no call at all."""
+        ask(self._hosts, Request("check", limit_s=self._limit_s or 0.0))
+
+    def _outcome(self, answer: Answer | None) -> Outcome:
+        """Return the outcome of a call that has begun; meanwhile answer questions."""
+        left_s = self._limit_s
+        for _ in range(MOST_QUESTIONS):
+            start = time.monotonic()
+            self._line.settimeout(left_s)
+            reply = read_child(receive(self._line, MAX_MESSAGE))
+            self._line.settimeout(self._limit_s)
+            if isinstance(reply, Outcome):
+                return reply
+            if answer is None or not isinstance(reply, Question):
+                raise ValueError("a message that nobody asked for")
+            if left_s is not None:  # what the world takes to draw is not the policy's time
+                left_s = max(left_s - (time.monotonic() - start), 0.001)
+            send(self._line, answer(reply))
+        raise ValueError("it asked for the video again and again")
+
+    def _lost(
+        self, begun: Begun | None, phase: str, fault: tuple[ErrorKind, str] | None = None
+    ) -> Exception:
+        """Return the loss of the process, for which only a call that has begun alone is to blame.
+
+        Args:
+            begun: what the process has said of the call; None if it has not begun.
+            phase: of the call, in words.
+            fault: of the process, which is killed for it; None if it has ended by itself.
+        """
+        with _supervised():
+            if fault is not None:
+                ask(self._hosts, Request("kill"))
+            ask(self._hosts, Request("loss"))
+            reply = receive(self._hosts)
+        kind, words = msgspec.msgpack.decode(reply, type=tuple[ErrorKind, str])
+        self.close()
+        if begun is not None and not begun.together:
+            return EpisodeError(*(fault or (kind, f"{words} in the {phase}")), "")
+        return EpisodeLostError(*(fault or (kind, words)), alone=begun is not None)
+
+
+@contextlib.contextmanager
+def _supervised() -> Iterator[None]:
+    """Turn the loss of the supervisor into an `EpisodeLostError`."""
+    try:
+        yield
+    except (EOFError, OSError) as error:
+        raise EpisodeLostError("infrastructure", "the policy's host is gone") from error
