@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import os
 import socket
 import threading
 from collections.abc import Callable, Iterator
@@ -103,12 +102,13 @@ class HostPool:
         try:
             with contextlib.suppress(EOFError, OSError):
                 while True:
-                    request, descriptors = receive_request(line)
+                    request, passed = receive_request(line)
                     if request.method in ("open", "leave"):  # a world may have given up an episode
                         self._leave(child)
                         child = None
-                    if request.method == "open":
-                        child = self._enter(request.policy, descriptors)
+                    if passed is not None:
+                        with passed:
+                            child = self._enter(request.policy, passed)
                     elif child is None:
                         continue
                     elif request.method == "loss":
@@ -126,35 +126,28 @@ class HostPool:
             with self._lock:
                 child.worlds -= 1
 
-    def _enter(self, policy: PolicyRef | None, descriptors: list[int]) -> PolicyChild:
+    def _enter(self, policy: PolicyRef | None, passed: socket.socket) -> PolicyChild:
         """Let the process of a policy with the fewest episodes serve one more.
 
         Raises:
             EOFError: the run is ending.
         """
-        try:
-            with self._lock:
-                if self._is_closed:
-                    raise EOFError
-                own = [
-                    self._child(policy, device, descriptors[1])
-                    for device in self._settings.devices or (None,)
-                ]
-                self._end_others(policy)
-                child = min(own, key=lambda one: one.worlds)
-                child.worlds += 1
-            child.serve(descriptors, self._settings.batch)
-        finally:
-            for descriptor in descriptors:
-                os.close(descriptor)
+        with self._lock:
+            if self._is_closed:
+                raise EOFError
+            own = [self._child(policy, device) for device in self._settings.devices or (None,)]
+            self._end_others(policy)
+            child = min(own, key=lambda one: one.worlds)
+            child.worlds += 1
+        child.serve(passed, self._settings.batch)
         return child
 
-    def _child(self, policy: PolicyRef | None, device: str | None, output: int) -> PolicyChild:
+    def _child(self, policy: PolicyRef | None, device: str | None) -> PolicyChild:
         """Return the process of a policy on a device, a new one if there is none or it has died."""
         child = self._children.get((policy, device))
         if child is None or child.is_over:
             variables = {} if device is None else {"CUDA_VISIBLE_DEVICES": device}
-            child = self._starter.submit(PolicyChild, variables, output).result()
+            child = self._starter.submit(PolicyChild, variables).result()
             self._children[policy, device] = child
         return child
 

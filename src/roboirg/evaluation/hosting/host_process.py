@@ -43,6 +43,7 @@ from roboirg.evaluation.hosting.messages import (
     receive_call,
     receive_request,
     send,
+    take_output,
 )
 from roboirg.policies.by_name.finding import look_up, make_policy
 from roboirg.policies.contract.base import close_policy, tell_policy
@@ -60,8 +61,6 @@ GATHER_S = 0.003
 """How long a call waits for others that could be carried out together with it."""
 STUCK_S = 60
 """How long a world may take to send the rest of a message; then it is given up."""
-_STREAMS = (1, 2)
-"""Descriptors of stdout and stderr."""
 
 
 @dataclass(eq=False)
@@ -70,7 +69,6 @@ class Episode:
 
     Attributes:
         line: to its world.
-        output: descriptor of where its world's output goes.
         policy: of the episode; None before it is open.
         random: its random numbers.
         space: of its actions.
@@ -78,7 +76,6 @@ class Episode:
     """
 
     line: socket.socket
-    output: int
     policy: Any = None
     random: RandomState = field(default_factory=lambda: RandomState(0))
     space: ActionSpace = JOINT_ANGLE
@@ -106,7 +103,7 @@ class HostProcess:
         self._under_way: Sequence[Episode] = ()
         self._read_fields: dict[str, None] = {}
         self._home, self._thread = os.getcwd(), threading.get_ident()  # noqa: PTH109
-        self._nowhere = os.open(os.devnull, os.O_WRONLY)
+        self._output = os.dup(1)  # the policy may close it
 
     def serve(self) -> None:
         """Carry out every call."""
@@ -130,12 +127,11 @@ class HostProcess:
 
     def _obey(self) -> None:
         """Do what the supervisor wants: serve an episode, or answer that this process can."""
-        request, descriptors = receive_request(self._supervisor)
-        if request.method == "check":
+        request, line = receive_request(self._supervisor)
+        if line is None:
             self._supervisor.send(b"!")
             return
-        line, output = descriptors
-        episode = Episode(socket.socket(fileno=line), output)
+        episode = Episode(line)
         for limit in (socket.SO_RCVTIMEO, socket.SO_SNDTIMEO):
             episode.line.setsockopt(socket.SOL_SOCKET, limit, struct.pack("ll", STUCK_S, 0))
         self._batch = request.batch
@@ -165,35 +161,33 @@ class HostProcess:
         together = len(calls) > 1
         for episode in calls:
             _reply(episode, Begun(together))
-        # What a call for several episodes prints is charged to the first.
-        self._print_to(next(iter(calls)).output)
         self._under_way = tuple(calls)
         if together:
             outcomes = self._act_together(calls)
         else:
             outcomes = [self._outcome(*one) for one in calls.items()]
         self._under_way = ()
-        self._print_to(self._nowhere)
-        for episode, outcome in zip(calls, outcomes, strict=True):
+        output = self._printed()
+        for (episode, call), outcome in zip(calls.items(), outcomes, strict=True):
+            outcome.output = output  # what a call for several episodes prints is of all of them
             _reply(episode, outcome)
-            if calls[episode].method == "close":
+            if call.method == "close":
                 self._forget(episode)
 
-    def _print_to(self, output: int) -> None:
+    def _printed(self) -> bytes:
+        """Return what the call under way has printed."""
         for stream in (sys.stdout, sys.stderr):
             with contextlib.suppress(Exception):  # a policy may have closed or replaced it
                 stream.flush()
-        for number in _STREAMS:
-            with contextlib.suppress(OSError):
-                os.dup2(output, number)
+        with contextlib.suppress(OSError):
+            return take_output(self._output)
+        return b""
 
     def _forget(self, episode: Episode) -> None:
         self._episodes.discard(episode)
         with contextlib.suppress(KeyError, ValueError):
             self._ready.unregister(episode.line)
         episode.line.close()
-        with contextlib.suppress(OSError):
-            os.close(episode.output)
 
     def _outcome(self, episode: Episode, call: Call) -> Outcome:
         try:

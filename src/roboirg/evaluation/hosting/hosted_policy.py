@@ -7,7 +7,9 @@ policy's.
 from __future__ import annotations
 
 import contextlib
+import os
 import socket
+import sys
 from collections.abc import Sequence
 from typing import Any, cast
 
@@ -124,7 +126,10 @@ class HostedPolicy:
             MissingDependencyError: a package that one of our own policies needs is missing.
         """
         self._failure = None
-        outcome = self._line.call(call, self._draw)
+        try:
+            outcome = self._line.call(call, self._draw)
+        finally:
+            _print(self._line.output)
         if self._failure is not None:
             raise self._failure
         match outcome:
@@ -178,3 +183,11 @@ class HostedPlanner(HostedPolicy):
         self._ends = ()
         self.act(cast("Observation", seen))
         return self.subgoal
+
+
+def _print(output: bytes) -> None:
+    """Print what the policy printed, so that it is in the log of its episode."""
+    if output:
+        with contextlib.suppress(OSError):
+            sys.stderr.flush()
+            os.write(sys.__stderr__.fileno() if sys.__stderr__ else 2, output)

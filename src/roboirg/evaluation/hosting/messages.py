@@ -7,8 +7,9 @@ such as a line's other end, travel with a request.
 
 from __future__ import annotations
 
+import os
 import socket
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from typing import Annotated, Any, Literal, NoReturn
 
 import msgspec
@@ -22,11 +23,14 @@ from roboirg.core.policy_needs import PolicyNeeds
 from roboirg.core.policy_ref import PolicyRef
 from roboirg.core.subgoal_text import MOST_SUBGOAL_LETTERS
 from roboirg.evaluation.episode_errors import MAX_DETAILS_LENGTH
+from roboirg.evaluation.records.record import ErrorKind
 from roboirg.policies.contract.policy_calls import MAX_COSTS, MAX_METADATA_LENGTH
 
 MAX_MESSAGE = 16 * 2**20
 """Largest message that is read from a policy; 10,000 actions have 640,000 bytes."""
 MAX_TEXT = 2000
+MAX_OUTPUT = 256 * 2**10
+"""Bytes that are kept of what a policy prints in a call."""
 
 _SIZE_BYTES = 8
 _ARRAY = 1
@@ -43,9 +47,9 @@ class Request(Struct, forbid_unknown_fields=True, omit_defaults=True):
     """What a world asks of the supervisor, and the supervisor of a policy's process.
 
     Attributes:
-        method: ``open`` serves an episode, whose line and output are the two descriptors that come
-            with it; ``leave`` ends that. ``loss`` asks how the process ended, ``kill`` ends it,
-            ``check`` ends it if it begins nothing more.
+        method: ``open`` serves an episode, whose line comes with it; ``leave`` ends that. ``loss``
+            asks how the process ended, ``kill`` ends it, ``check`` ends it if it begins nothing
+            more.
         policy: that is meant.
         limit_s: how long a call may take.
         batch: most episodes that the policy is asked about together.
@@ -102,6 +106,7 @@ class Outcome(Struct, tag="outcome", forbid_unknown_fields=True, omit_defaults=T
         rows: actions as bytes of float64.
         size: numbers in an action.
         subgoal: that the policy named with them.
+        output: what it has printed since the last outcome.
     """
 
     error: Literal["policy", "invalid_action", "timeout", "connection", "missing"] | None = None
@@ -116,6 +121,21 @@ class Outcome(Struct, tag="outcome", forbid_unknown_fields=True, omit_defaults=T
     rows: bytes = b""
     size: Annotated[int, Meta(ge=1, le=64)] = 1
     subgoal: Annotated[str, Meta(max_length=MOST_SUBGOAL_LETTERS)] | None = None
+    output: bytes = b""
+
+
+class Loss(Struct):
+    """How a policy's process ended.
+
+    Attributes:
+        kind: of the error.
+        words: for its cause.
+        output: what it has printed since its last outcome.
+    """
+
+    kind: ErrorKind
+    words: str
+    output: bytes
 
 
 read_child = msgspec.msgpack.Decoder(Begun | Question | Outcome).decode
@@ -131,24 +151,26 @@ def new_line() -> tuple[socket.socket, socket.socket]:
     return ends
 
 
-def ask(line: socket.socket, request: Request, descriptors: Sequence[int] = ()) -> None:
-    """Send a request with descriptors, in one piece."""
+def ask(line: socket.socket, request: Request, passed: socket.socket | None = None) -> None:
+    """Send a request, and with it the end of a line, in one piece."""
     data = msgspec.msgpack.encode(request)
+    descriptors = [] if passed is None else [passed.fileno()]
     socket.send_fds(line, [len(data).to_bytes(_SIZE_BYTES, "big") + data], descriptors)
 
 
-def receive_request(line: socket.socket) -> tuple[Request, list[int]]:
-    """Return the next request of a line, and its descriptors; the sender is ours.
+def receive_request(line: socket.socket) -> tuple[Request, socket.socket | None]:
+    """Return the next request of a line, and the end of a line that came with it.
 
     Raises:
         EOFError: the line was closed.
     """
-    head, descriptors, _, _ = socket.recv_fds(line, _SIZE_BYTES, 2)
+    head, descriptors, _, _ = socket.recv_fds(line, _SIZE_BYTES, 1)
     if not head:
         raise EOFError
     data = bytearray(int.from_bytes(head, "big"))
     _fill(line, data)
-    return msgspec.msgpack.decode(data, type=Request), descriptors
+    passed = socket.socket(fileno=descriptors[0]) if descriptors else None
+    return msgspec.msgpack.decode(data, type=Request), passed
 
 
 def _give_up() -> NoReturn:
@@ -243,3 +265,12 @@ def _fill(
         if count == 0:
             raise EOFError
         left = left[count:]
+
+
+def take_output(file: int) -> bytes:
+    """Return what a policy's process has printed into a file, and empty that."""
+    output = os.pread(file, MAX_OUTPUT + 1, 0)
+    if output:
+        os.ftruncate(file, 0)
+    note = b"\n[roboirg: what else this call printed is left out]\n"
+    return output[:MAX_OUTPUT] + note if len(output) > MAX_OUTPUT else output

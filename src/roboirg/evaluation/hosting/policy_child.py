@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import fcntl
 import json
 import os
 import select
@@ -10,10 +11,13 @@ import signal
 import socket
 import subprocess
 import sys
-from collections.abc import Mapping, Sequence
+import threading
+import time
+import weakref
+from collections.abc import Mapping
+from tempfile import TemporaryFile
 
-from roboirg.evaluation.hosting.messages import Request, ask
-from roboirg.evaluation.records.record import ErrorKind
+from roboirg.evaluation.hosting.messages import MAX_OUTPUT, Loss, Request, ask, take_output
 from roboirg.tasks.splits.private_splits import SALT_VARIABLE
 from roboirg.util.child_process import GRACE_S, ChildExit, without_interrupts
 from roboirg.util.process_guard import descendants
@@ -29,6 +33,10 @@ GUARD_S = 5.0
 """How long a guard may take to end all that a policy has started."""
 
 
+PERIOD_S = 0.25
+"""How often the size of its output is checked."""
+
+
 class PolicyChild:
     """A policy process in an interpreter that knows nothing of this one, and the line to it.
 
@@ -38,15 +46,22 @@ class PolicyChild:
 
     Args:
         variables: environment variables next to those of this process.
-        output: descriptor of where it prints until the first call.
 
     Attributes:
         worlds: how many it serves.
     """
 
-    def __init__(self, variables: Mapping[str, str], output: int) -> None:
+    def __init__(self, variables: Mapping[str, str]) -> None:
         self.worlds = 0
         self._fault: str | None = None
+        # A file without a name: a path would name the run.
+        if sys.platform == "linux":
+            self._output = os.memfd_create("output")
+        else:
+            with TemporaryFile() as file:
+                self._output = os.dup(file.fileno())
+        weakref.finalize(self, os.close, self._output)
+        fcntl.fcntl(self._output, fcntl.F_SETFL, os.O_APPEND)
         self._line, theirs = socket.socketpair()
         environment = {**os.environ, **variables}
         environment.pop(SALT_VARIABLE, None)
@@ -57,20 +72,21 @@ class PolicyChild:
                 [sys.executable, "-P", "-c", _BOOT, *arguments],
                 pass_fds=[number],
                 stdin=subprocess.DEVNULL,
-                stdout=output,
-                stderr=output,
+                stdout=self._output,
+                stderr=self._output,
                 env=environment,
             )
+        threading.Thread(target=self._bound_output, name="policy output", daemon=True).start()
 
-    def serve(self, descriptors: Sequence[int], batch: int) -> None:
-        """Let it serve a world; if it has just died, the world's line ends.
+    def serve(self, passed: socket.socket, batch: int) -> None:
+        """Let it serve a world at the other end of a line, which ends if it has just died.
 
         Args:
-            descriptors: of the other end of the world's line, and of its output.
+            passed: its end of the line.
             batch: most episodes that are asked about together.
         """
         with contextlib.suppress(OSError):
-            ask(self._line, Request("open", batch=batch), descriptors)
+            ask(self._line, Request("open", batch=batch), passed)
 
     def check(self, limit_s: float) -> None:
         """Kill it unless it is between two calls at some time before the limit."""
@@ -92,17 +108,18 @@ class PolicyChild:
             hung_up = True
         return self._wait(GRACE_S if hung_up else 0.0) is not None
 
-    def loss(self) -> tuple[ErrorKind, str]:
+    def loss(self) -> Loss:
         """Let it exit by closing its line, kill it after `GRACE_S`; return how it ended."""
         self._line.close()
         code = self._wait(GRACE_S)
         if code is None:
             self.kill()
             self._guard.wait()
+        output = take_output(self._output)
         if self._fault is not None:
-            return "timeout", self._fault
+            return Loss("timeout", self._fault, output)
         ended = ChildExit(code)
-        return "infrastructure" if ended.was_killed else "policy", str(ended)
+        return Loss("infrastructure" if ended.was_killed else "policy", str(ended), output)
 
     def kill(self) -> None:
         """Let the guard kill all; if something has stopped it, kill it and them."""
@@ -123,3 +140,10 @@ class PolicyChild:
         with contextlib.suppress(subprocess.TimeoutExpired):
             self._guard.wait(seconds)
         return self._guard.poll()
+
+    def _bound_output(self) -> None:
+        """Cut off what it prints in a call without end, as long as it lives."""
+        while self._guard.poll() is None:
+            time.sleep(PERIOD_S)
+            if os.fstat(self._output).st_size > 2 * MAX_OUTPUT:
+                os.ftruncate(self._output, MAX_OUTPUT + 1)

@@ -22,6 +22,7 @@ from roboirg.evaluation.hosting.messages import (
     MAX_MESSAGE,
     Begun,
     Call,
+    Loss,
     Outcome,
     Question,
     Request,
@@ -36,8 +37,6 @@ from roboirg.evaluation.records.record import ErrorKind
 MOST_QUESTIONS = 64
 """How often a call may ask for the video of an episode; a field is kept once it is read."""
 MAX_WORDS = 300
-STDERR = 2
-"""Descriptor of where this process prints, such as the log of an episode."""
 PHASES: Mapping[str, str] = {
     "describe": "policy's constructor",
     "open": "policy's constructor",
@@ -61,7 +60,9 @@ class PolicyLine:
         limit_s: how long a call may take, without its wait for others and without the time that the
             world takes to answer; None for no limit.
         alone: whether it must not be asked about this episode together with others.
-        output: descriptor of where the policy prints in a call.
+
+    Attributes:
+        output: what the policy printed in the last call.
 
     Raises:
         EpisodeLostError: the supervisor is gone.
@@ -74,13 +75,13 @@ class PolicyLine:
         limit_s: float | None = None,
         *,
         alone: bool = False,
-        output: int = STDERR,
     ) -> None:
         self._hosts, self._limit_s, self._alone = hosts, limit_s, alone
+        self.output = b""
         self._line, theirs = new_line()
         self._line.settimeout(limit_s)
         with theirs, _supervised():
-            ask(hosts, Request("open", policy), [theirs.fileno(), output])
+            ask(hosts, Request("open", policy), theirs)
 
     def call(self, call: Call, answer: Answer | None = None) -> Outcome:
         """Call the policy and return the outcome, which may be an error of the policy.
@@ -95,6 +96,7 @@ class PolicyLine:
                 several episodes failed.
         """
         begun, phase = None, PHASES[call.method]
+        self.output = b""
         try:
             begun = self._begin(call)
             outcome = self._outcome(answer)
@@ -109,6 +111,7 @@ class PolicyLine:
                 self.close()
                 raise EpisodeLostError("policy", words) from None
             raise self._lost(begun, phase, ("policy", words)) from None
+        self.output = outcome.output
         if outcome.error is not None and begun.together:
             words = "a call for several episodes failed"
             raise EpisodeLostError("policy", words, alone=True)
@@ -176,12 +179,15 @@ class PolicyLine:
             if fault is not None:
                 ask(self._hosts, Request("kill"))
             ask(self._hosts, Request("loss"))
-            reply = receive(self._hosts)
-        kind, words = msgspec.msgpack.decode(reply, type=tuple[ErrorKind, str])
+            loss = msgspec.msgpack.decode(receive(self._hosts), type=Loss)
         self.close()
-        if begun is not None and not begun.together:
-            return EpisodeError(*(fault or (kind, f"{words} in the {phase}")), "")
-        return EpisodeLostError(*(fault or (kind, words)), alone=begun is not None)
+        if begun is None:
+            return EpisodeLostError(loss.kind, loss.words)
+        self.output = loss.output
+        kind, words = fault or (loss.kind, f"{loss.words} in the {phase}")
+        if begun.together:
+            return EpisodeLostError(kind, words, alone=True)
+        return EpisodeError(kind, words, "")
 
 
 @contextlib.contextmanager

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import os
 from dataclasses import replace
-from pathlib import Path
 
 from roboirg.core.errors import InvalidValueError, MissingDependencyError
 from roboirg.core.policy_needs import PolicyNeeds
@@ -45,9 +43,8 @@ def open_policy(ref: PolicyRef, limit_s: float = LIMIT_S, device: str | None = N
     hosted, settings = ref.hosted_part, HostSettings(devices=() if device is None else (device,))
     try:
         with (
-            Path(os.devnull).open("wb") as nowhere,
             HostPool(settings) as pool,
-            PolicyLine(pool.connect(), hosted, limit_s, output=nowhere.fileno()) as line,
+            PolicyLine(pool.connect(), hosted, limit_s) as line,
         ):
             found = line.call(Call("describe", policy=hosted))
     except (EpisodeError, EpisodeLostError) as error:
