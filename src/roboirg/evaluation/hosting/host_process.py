@@ -64,7 +64,7 @@ STUCK_S = 60
 
 
 @dataclass(eq=False)
-class Episode:
+class HostedEpisode:
     """An episode that this process plays.
 
     Attributes:
@@ -98,9 +98,9 @@ class HostProcess:
         self._supervisor, self._batch = supervisor, 1
         self._ready = selectors.DefaultSelector()
         self._ready.register(supervisor, selectors.EVENT_READ)
-        self._episodes: set[Episode] = set()
-        self._waiting: dict[Episode, Call] = {}
-        self._under_way: Sequence[Episode] = ()
+        self._episodes: set[HostedEpisode] = set()
+        self._waiting: dict[HostedEpisode, Call] = {}
+        self._under_way: Sequence[HostedEpisode] = ()
         self._read_fields: dict[str, None] = {}
         self._home, self._thread = os.getcwd(), threading.get_ident()  # noqa: PTH109
         self._output = os.dup(1)  # the policy may close it
@@ -116,7 +116,7 @@ class HostProcess:
     def _collect(self, seconds: float | None) -> None:
         """Take in calls and new episodes; wait for the first one so long."""
         for key, _ in self._ready.select(seconds):
-            episode: Episode | None = key.data
+            episode: HostedEpisode | None = key.data
             if episode is None:
                 self._obey()
             elif episode not in self._waiting:
@@ -131,14 +131,14 @@ class HostProcess:
         if line is None:
             self._supervisor.send(b"!")
             return
-        episode = Episode(line)
+        episode = HostedEpisode(line)
         for limit in (socket.SO_RCVTIMEO, socket.SO_SNDTIMEO):
             episode.line.setsockopt(socket.SOL_SOCKET, limit, struct.pack("ll", STUCK_S, 0))
         self._batch = request.batch
         self._episodes.add(episode)
         self._ready.register(episode.line, selectors.EVENT_READ, episode)
 
-    def _gather(self) -> dict[Episode, Call]:
+    def _gather(self) -> dict[HostedEpisode, Call]:
         """Return the calls that are carried out now: the oldest one, and what joins it."""
         first, call = next(iter(self._waiting.items()))
         found = {first: call}
@@ -154,7 +154,7 @@ class HostProcess:
             del self._waiting[one]
         return found
 
-    def _carry_out(self, calls: Mapping[Episode, Call]) -> None:
+    def _carry_out(self, calls: Mapping[HostedEpisode, Call]) -> None:
         """Carry out calls, and send their outcomes to their worlds."""
         with contextlib.suppress(OSError):
             os.chdir(self._home)  # an earlier episode may have changed it
@@ -183,13 +183,13 @@ class HostProcess:
             return take_output(self._output)
         return b""
 
-    def _forget(self, episode: Episode) -> None:
+    def _forget(self, episode: HostedEpisode) -> None:
         self._episodes.discard(episode)
         with contextlib.suppress(KeyError, ValueError):
             self._ready.unregister(episode.line)
         episode.line.close()
 
-    def _outcome(self, episode: Episode, call: Call) -> Outcome:
+    def _outcome(self, episode: HostedEpisode, call: Call) -> Outcome:
         try:
             if call.method == "describe":
                 found = opened(_policy(call))
@@ -204,7 +204,7 @@ class HostProcess:
         except BaseException as error:  # noqa: BLE001 - policies may raise anything
             return _failure(error)
 
-    def _open(self, episode: Episode, call: Call) -> Outcome:
+    def _open(self, episode: HostedEpisode, call: Call) -> Outcome:
         """Begin an episode with a policy of its own; returns what the world must know of it."""
         episode.random, episode.alone = RandomState(call.seed), call.alone
         with episode.random:
@@ -215,7 +215,7 @@ class HostProcess:
         version, reads = _fallback(_policy(call)), tuple(self._read_fields)
         return Outcome(needs=needs, version=version, reads=reads)
 
-    def _call(self, episode: Episode, call: Call) -> Outcome:
+    def _call(self, episode: HostedEpisode, call: Call) -> Outcome:
         """Call a method of a policy; `reset` and `hear` return its metadata."""
         policy = episode.policy
         with episode.random:
@@ -241,7 +241,7 @@ class HostProcess:
                     return Outcome()
             return Outcome(metadata=dump_metadata(policy))
 
-    def _act_together(self, calls: Mapping[Episode, Call]) -> list[Outcome]:
+    def _act_together(self, calls: Mapping[HostedEpisode, Call]) -> list[Outcome]:
         """Ask about several episodes at once; a failure is not attributed to any of them."""
         try:
             policies = [episode.policy for episode in calls]
@@ -251,7 +251,7 @@ class HostProcess:
         except BaseException as error:  # noqa: BLE001 - policies may raise anything
             return [_failure(error)] * len(calls)
 
-    def _fetch(self, episode: Episode, fields: Sequence[str]) -> Mapping[str, NDArray[Any]]:
+    def _fetch(self, episode: HostedEpisode, fields: Sequence[str]) -> Mapping[str, NDArray[Any]]:
         """Return fields of the video of an episode whose call is under way.
 
         Raises:
@@ -273,7 +273,7 @@ class HostProcess:
         return found
 
 
-def _reply(episode: Episode, message: Begun | Outcome) -> None:
+def _reply(episode: HostedEpisode, message: Begun | Outcome) -> None:
     with contextlib.suppress(OSError):  # its world may be gone
         send(episode.line, message)
 
@@ -297,7 +297,7 @@ def _observation(call: Call) -> Any:  # noqa: ANN401 - an `Observation`
     return call.value
 
 
-def _acted(episode: Episode, rows: Any) -> Outcome:  # noqa: ANN401
+def _acted(episode: HostedEpisode, rows: Any) -> Outcome:  # noqa: ANN401
     """Return what a policy's `act` returned, checked, for a message."""
     chunk, subgoal = check_rows(rows, episode.space), policy_subgoal(episode.policy)
     return Outcome(rows=chunk.tobytes(), size=chunk.shape[1], subgoal=subgoal)

@@ -43,7 +43,7 @@ Text = Annotated[str, Meta(max_length=MAX_TEXT)]
 Names = Annotated[tuple[Text, ...], Meta(max_length=64)]
 
 
-class Request(Struct, forbid_unknown_fields=True, omit_defaults=True):
+class HostRequest(Struct, forbid_unknown_fields=True, omit_defaults=True):
     """What a world asks of the supervisor, and the supervisor of a policy's process.
 
     Attributes:
@@ -151,14 +151,14 @@ def new_line() -> tuple[socket.socket, socket.socket]:
     return ends
 
 
-def ask(line: socket.socket, request: Request, passed: socket.socket | None = None) -> None:
+def ask(line: socket.socket, request: HostRequest, passed: socket.socket | None = None) -> None:
     """Send a request, and with it the end of a line, in one piece."""
     data = msgspec.msgpack.encode(request)
     descriptors = [] if passed is None else [passed.fileno()]
     socket.send_fds(line, [len(data).to_bytes(_SIZE_BYTES, "big") + data], descriptors)
 
 
-def receive_request(line: socket.socket) -> tuple[Request, socket.socket | None]:
+def receive_request(line: socket.socket) -> tuple[HostRequest, socket.socket | None]:
     """Return the next request of a line, and the end of a line that came with it.
 
     Raises:
@@ -170,7 +170,7 @@ def receive_request(line: socket.socket) -> tuple[Request, socket.socket | None]
     data = bytearray(int.from_bytes(head, "big"))
     _fill(line, data)
     passed = socket.socket(fileno=descriptors[0]) if descriptors else None
-    return msgspec.msgpack.decode(data, type=Request), passed
+    return msgspec.msgpack.decode(data, type=HostRequest), passed
 
 
 def _give_up() -> NoReturn:

@@ -17,7 +17,7 @@ import weakref
 from collections.abc import Mapping
 from tempfile import TemporaryFile
 
-from roboirg.evaluation.hosting.messages import MAX_OUTPUT, Loss, Request, ask, take_output
+from roboirg.evaluation.hosting.messages import MAX_OUTPUT, HostRequest, Loss, ask, take_output
 from roboirg.tasks.splits.private_splits import SALT_VARIABLE
 from roboirg.util.child_process import GRACE_S, ChildExit, without_interrupts
 from roboirg.util.process_guard import descendants
@@ -86,12 +86,12 @@ class PolicyChild:
             batch: most episodes that are asked about together.
         """
         with contextlib.suppress(OSError):
-            ask(self._line, Request("open", batch=batch), passed)
+            ask(self._line, HostRequest("open", batch=batch), passed)
 
     def check(self, limit_s: float) -> None:
         """Kill it unless it is between two calls at some time before the limit."""
         with contextlib.suppress(OSError):
-            ask(self._line, Request("check"))
+            ask(self._line, HostRequest("check"))
             if select.select([self._line], [], [], limit_s)[0] and self._line.recv(1):
                 return
         self._fault = f"the process began no call within {limit_s:g} s"

@@ -10,7 +10,6 @@ import contextlib
 import socket
 import time
 from collections.abc import Callable, Iterator, Mapping
-from typing import Self
 
 import msgspec
 
@@ -22,10 +21,10 @@ from roboirg.evaluation.hosting.messages import (
     MAX_MESSAGE,
     Begun,
     Call,
+    HostRequest,
     Loss,
     Outcome,
     Question,
-    Request,
     ask,
     new_line,
     read_child,
@@ -52,7 +51,7 @@ Answer = Callable[[Question], Call]
 
 
 class PolicyLine:
-    """A line into a policy's process, for one episode; a context.
+    """A line into a policy's process, for one episode.
 
     Args:
         hosts: the line on which to ask for that process, of `HostPool.connect`.
@@ -81,7 +80,7 @@ class PolicyLine:
         self._line, theirs = new_line()
         self._line.settimeout(limit_s)
         with theirs, _supervised():
-            ask(hosts, Request("open", policy), theirs)
+            ask(hosts, HostRequest("open", policy), theirs)
 
     def call(self, call: Call, answer: Answer | None = None) -> Outcome:
         """Call the policy and return the outcome, which may be an error of the policy.
@@ -127,13 +126,7 @@ class PolicyLine:
         if self.is_open:
             self._line.close()
             with contextlib.suppress(OSError):
-                ask(self._hosts, Request("leave"))
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *_exception: object) -> None:
-        self.close()
+                ask(self._hosts, HostRequest("leave"))
 
     def _begin(self, call: Call) -> Begun:
         """Send a call and wait for its turn."""
@@ -146,7 +139,7 @@ class PolicyLine:
 
     def _check(self) -> None:
         """Let the supervisor end the process if it begins no call at all."""
-        ask(self._hosts, Request("check", limit_s=self._limit_s or 0.0))
+        ask(self._hosts, HostRequest("check", limit_s=self._limit_s or 0.0))
 
     def _outcome(self, answer: Answer | None) -> Outcome:
         """Return the outcome of a call that has begun; meanwhile answer questions."""
@@ -177,8 +170,8 @@ class PolicyLine:
         """
         with _supervised():
             if fault is not None:
-                ask(self._hosts, Request("kill"))
-            ask(self._hosts, Request("loss"))
+                ask(self._hosts, HostRequest("kill"))
+            ask(self._hosts, HostRequest("loss"))
             loss = msgspec.msgpack.decode(receive(self._hosts), type=Loss)
         self.close()
         if begun is None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from dataclasses import replace
 
 from roboirg.core.errors import InvalidValueError, MissingDependencyError
@@ -44,7 +45,7 @@ def open_policy(ref: PolicyRef, limit_s: float = LIMIT_S, device: str | None = N
     try:
         with (
             HostPool(settings) as pool,
-            PolicyLine(pool.connect(), hosted, limit_s) as line,
+            contextlib.closing(PolicyLine(pool.connect(), hosted, limit_s)) as line,
         ):
             found = line.call(Call("describe", policy=hosted))
     except (EpisodeError, EpisodeLostError) as error:
