@@ -4,6 +4,7 @@ import base64
 import hashlib
 import io
 import json
+import os
 import re
 import threading
 import time
@@ -225,14 +226,22 @@ def golden(body):
     """A request with every picture and clip replaced by a description of its content."""
     if isinstance(body, dict):
         if "data" in body:
-            # The library's spelling of it is its own business.
-            kind = body.get("mimeType") or body["mime_type"]
+            kind = body["mime_type"]
             return {"mimeType": kind, "data": _described(kind, body["data"])}
         return {key: golden(held) for key, held in body.items()}
     if isinstance(body, list):
         return [golden(held) for held in body]
     found = re.fullmatch(r"data:(.*?);base64,(.*)", body) if isinstance(body, str) else None
     return _described(found[1], found[2]) if found else body
+
+
+def check_capture(name, body):
+    """Compare with the capture of that name; written anew where ROBOIRG_CAPTURE=1 says so."""
+    file = Path(__file__).parent / "captures" / "planning" / f"{name}.json"
+    if os.environ.get("ROBOIRG_CAPTURE") == "1":
+        file.parent.mkdir(parents=True, exist_ok=True)
+        file.write_text(json.dumps(body, indent=1, ensure_ascii=False) + "\n")
+    assert body == json.loads(file.read_text())
 
 
 def _described(kind, data):

@@ -2,8 +2,6 @@
 
 import base64
 import json
-import os
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,6 +9,7 @@ from planning_fakes import (
     KEY,
     KEY_VARIABLE,
     TOKENS,
+    check_capture,
     decoded,
     fake_vlm,
     golden,
@@ -332,15 +331,6 @@ def test_requests_are_as_captured(kind, subgoals):
               instruction="Put the red one into the bin.")  # fmt: skip
         name = f"planner-{kind}-{subgoals}"
         check_capture(name, [golden(server.requests[0]), golden(server.requests[-1])])
-
-
-def check_capture(name, body):
-    """Compare with the capture of that name; written anew where ROBOIRG_CAPTURE=1 says so."""
-    file = Path(__file__).parent / "captures" / "planning" / f"{name}.json"
-    if os.environ.get("ROBOIRG_CAPTURE") == "1":
-        file.parent.mkdir(parents=True, exist_ok=True)
-        file.write_text(json.dumps(body, indent=1, ensure_ascii=False) + "\n")
-    assert body == json.loads(file.read_text())
 
 
 def test_together_they_are_a_policy_and_costs_add_up(monkeypatch):

@@ -1,6 +1,5 @@
 """What of an instruction reaches a model that reads a limited number of tokens."""
 
-import subprocess
 import sys
 from importlib import resources
 from itertools import accumulate
@@ -218,10 +217,6 @@ def test_limits_are_attributes_of_own_policies():
         prompt_tokens, prompt_added = 64, 3
 
     assert prompt_limit(PolicyNeeds.of(Mine)) == PromptLimit(64, 3)
-    for attribute, value in (("prompt_tokens", "64"), ("prompt_tokens", True), ("tokenizer", 3)):
-        wrong = type("Wrong", (Mine,), {attribute: value})
-        with pytest.raises(InvalidValueError, match=f"{attribute} is {value!r}"):
-            PolicyNeeds.of(wrong)
 
 
 def test_the_systems_of_the_paper_have_limits():
@@ -243,13 +238,3 @@ def test_a_lerobot_checkpoint_says_its_limit_itself(tmp_path):
     for limit in ("many", None, 0, [48]):
         write_checkpoint(tmp_path, tokenizer_max_length=limit)
         assert LeRobotPolicy(f"lerobot://{tmp_path}").prompt_tokens is None
-
-
-def test_optional_libraries_are_imported_when_they_are_used():
-    code = (
-        "import sys; from roboirg.policies.by_name.finding import find_policy;"
-        "from roboirg.policies.prompt_length.tokenizer_file import prompt_limit;"
-        "prompt_limit(find_policy('openpi://localhost:1?prompt_tokens=64').needs);"
-        "sys.exit(bool({'sentencepiece', 'tokenizers'} & set(sys.modules)))"
-    )
-    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
