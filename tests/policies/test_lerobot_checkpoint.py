@@ -24,9 +24,6 @@ def test_a_checkpoint_asks_for_its_own_cameras_and_sizes(tmp_path):
 def test_folders_that_are_no_checkpoints_are_one_sentence_each(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     write_checkpoint(tmp_path / "outputs/act/checkpoints/last/pretrained_model")
-    (tmp_path / "data/meta").mkdir(parents=True)
-    (tmp_path / "data/meta/info.json").write_text("{}")
-    (tmp_path / "empty").mkdir()
     laptop = pictures(laptop=SQUARE)
     write_checkpoint(tmp_path / "laptop", laptop)
     write_checkpoint(tmp_path / "foreign")
@@ -37,17 +34,13 @@ def test_folders_that_are_no_checkpoints_are_one_sentence_each(tmp_path, monkeyp
         "nothing": "There is no folder 'nothing'",
         "./some/where/else": "There is no folder './some/where/else'",
         "/none/of/it": "There is no folder '/none/of/it'",
-        "outputs/act": f"has no config.json; name 'outputs/act/{last}'",
+        "outputs/act": f"has no config.json; a checkpoint of .* into {last}",
         f"outputs/act/{last}/config.json": "There is no folder",
-        "data": "has no config.json; it is a dataset, from which lerobot-train makes",
-        "empty": "has no config.json; a checkpoint of LeRobot holds config.json, model.saf",
         "laptop": "needs 'observation.images.laptop'; there are observation.state, obs",
         "foreign": "does not describe a LeRobot policy",
     }.items():
-        with pytest.raises(InvalidValueError) as caught:
+        with pytest.raises(InvalidValueError, match=f"^.*{said}.*$"):
             find_policy(f"lerobot://{place}")
-        assert said in str(caught.value)
-        assert "\n" not in str(caught.value)
 
 
 @pytest.mark.parametrize("name", FILES)

@@ -160,7 +160,6 @@ def clip(body):
         ("qwen", "press the button at (3,4) to stop", {}, range(0, 321, 16)),
         ("qwen", "press the first button at (3,4)", {}, [0, *range(112, 321, 16)]),
         ("qwen", "press the second button at (3,4)", {}, [0, *range(256, 321, 16)]),
-        ("qwen", "press the second button at (3,4)", {"holds": ()}, range(0, 321, 16)),
         ("memer", ANSWERS["memer"], {}, range(0, 321, 16)),
         ("gemini", ANSWERS["gemini"], {}, [0, 96, 144, 192, 240, 288]),
         ("gemini", ANSWERS["gemini"], {"first_pause": 0}, range(0, 321, 48)),

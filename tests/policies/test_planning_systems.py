@@ -59,7 +59,7 @@ def test_a_system_is_a_policy_offline(name):
 def test_a_spec_overrides_entries():
     spec = (
         "system:GroundSG-QwenVL?server=gpu:9001&vlm=http://other:8000/v1&model=mine"
-        "&planner.video_frames=2&planner.model.timeout_s=7.5&policy.execute=8"
+        "&video_frames=2&timeout_s=7.5&policy.execute=8"
     )
     policy = make_policy(spec, 3)
     assert policy.policy.options.execute == 8
@@ -103,13 +103,13 @@ def test_a_listener_by_its_spec():
         ("system:none.toml", InvalidValueError, "cannot be read"),
         ("system:pi0.5?vlm=http://x", InvalidValueError, "has no planner"),
         ("system:pi0.5?sever=x:1", UnknownNameError, "Did you mean 'server'"),
-        ("system:MemER?planner.mots=2", UnknownNameError, "Did you mean 'most'"),
-        ("system:MemER?planner.most=0", InvalidValueError, "most is '0'.*greater than"),
+        ("system:MemER?mots=2", UnknownNameError, "Did you mean 'most'"),
+        ("system:MemER?most=0", InvalidValueError, "most is '0'.*greater than"),
         ("openpi://localhost:1?connect=1e10", InvalidValueError, "'1e10'.*equal to 2147483"),
         ("mme-vla://localhost:1?timeout=1e30", InvalidValueError, "'1e30'.*equal to 2147483"),
         ("vlm-listener:openai?model=x&patience_s=1e30", InvalidValueError, "equal to 2147483"),
-        ("system:MemER?planner.kind=x", UnknownNameError, "planner 'x'; known: oracle"),
-        ("system:MemER?planner.model.vidio=x", UnknownNameError, "Did you mean 'model.video'"),
+        ("system:MemER?kind=x", UnknownNameError, "planner 'x'; known: oracle"),
+        ("system:MemER?vidio=x", UnknownNameError, "Did you mean 'video'"),
         ("system:MemER?policy.exekute=3", UnknownNameError, "Did you mean 'execute'"),
         ("system:MemER?server", InvalidValueError, r"\?name=value"),
         ("system:MemER?vlm=a&vlm=b", InvalidValueError, "'vlm' twice"),

@@ -99,7 +99,7 @@ def test_an_edited_policy_has_another_version(tmp_path, monkeypatch):
             "module json has no class 'loads'; it has JSONDecoder",
         ),
         (f"{__name__}:pytest", InvalidValueError, "no class 'pytest'"),
-        (f"{__name__}:Numb", InvalidValueError, "act of class Numb is not a method"),
+        (f"{__name__}:Numb", InvalidValueError, r"class Numb has no method act\(\)"),
     ],
 )
 def test_wrong_specs_are_explained(spec, error, words):

@@ -15,8 +15,8 @@ PICTURE = "observation.images.{}"
 STATE = "observation.state"
 _CONFIG = "config.json"
 _FILES = (_CONFIG, "model.safetensors", "policy_preprocessor.json", "policy_postprocessor.json")
-_TRAINED = ("pretrained_model", "last/pretrained_model", "checkpoints/last/pretrained_model")
-"""Where lerobot-train puts a checkpoint, seen from the folders around it."""
+_TRAINED = "checkpoints/last/pretrained_model"
+"""Where lerobot-train puts a checkpoint in its output folder."""
 _HUB_ID = re.compile(r"\w[\w.-]*/\w[\w.-]*")
 
 
@@ -103,7 +103,7 @@ def _local_config(place: str) -> Path | None:
     if folder.exists() or not is_id or folder.parent.is_dir():
         raise InvalidValueError(
             f"There is no folder {place!r}; lerobot:// takes the folder of a checkpoint, such as "
-            "outputs/act/checkpoints/last/pretrained_model, or an id of the Hub, OWNER/NAME."
+            f"outputs/act/{_TRAINED}, or an id of the Hub, OWNER/NAME."
         )
     try:
         from huggingface_hub import try_to_load_from_cache
@@ -116,14 +116,9 @@ def _local_config(place: str) -> Path | None:
 
 def _check_folder(folder: Path) -> None:
     """Raise unless a folder holds a whole checkpoint."""
-    missing = [name for name in _FILES if not (folder / name).is_file()]
-    if not missing:
-        return
-    nearer = [folder / one for one in _TRAINED if (folder / one / _CONFIG).is_file()]
-    if nearer:
-        hint = f"name {str(nearer[0])!r}."
-    elif (folder / "meta" / "info.json").is_file():
-        hint = "it is a dataset, from which lerobot-train makes a checkpoint."
-    else:
-        hint = f"a checkpoint of LeRobot holds {', '.join(_FILES)}."
-    raise InvalidValueError(f"The folder {str(folder)!r} has no {missing[0]}; {hint}")
+    for name in _FILES:
+        if not (folder / name).is_file():
+            raise InvalidValueError(
+                f"The folder {str(folder)!r} has no {name}; a checkpoint of LeRobot holds "
+                f"{', '.join(_FILES)}, and lerobot-train puts it into {_TRAINED}."
+            )

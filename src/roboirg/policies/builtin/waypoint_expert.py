@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from roboirg.core.actions import ARM_JOINTS, JOINT_ANGLE, POSE_SIZE, WAYPOINT
-from roboirg.core.episode import HANDLES_HELD, Goal, Primitive
+from roboirg.core.episode import HANDLES_HELD, Goal
 from roboirg.core.observations import Observation
 from roboirg.policies.builtin.oracle_policy import OraclePolicy
 from roboirg.simulation.controllers import WaypointController
@@ -87,18 +87,12 @@ class WaypointExpert(OraclePolicy):
     """
 
     actions: ClassVar[str] = WAYPOINT.name
+    last: ExpertWaypoint
     labels: NDArray[np.float64]
 
     def __init__(self, seed: int = 0, disturbance: Disturbance | None = None) -> None:
         super().__init__(seed)
         self._disturbance = disturbance
-        self._rng = np.random.default_rng(seed)
-        self.last: ExpertWaypoint | None = None
-        self._gripper = OPEN
-        self._primitives: _WaypointPrimitives | None = None
-        self._stalled: ExpertWaypoint | None = None
-        self._missed: NDArray[np.float64] | None = None
-        self._waits = 0
 
     def make_primitives(self, env: RoboIRGEnv) -> MotionPrimitives:
         """Return the expert that executes the stages, without the retry in a narrow grip."""
@@ -107,7 +101,9 @@ class WaypointExpert(OraclePolicy):
 
     def decide(self, env: RoboIRGEnv, instruction: str) -> Goal | None:
         """Return the episode's goal; the instruction is ignored."""
-        self._gripper, self._stalled, self._missed, self._waits = OPEN, None, None, 0
+        self._gripper, self._waits = OPEN, 0
+        self._stalled: ExpertWaypoint | None = None
+        self._missed: NDArray[np.float64] | None = None
         self._rng = np.random.default_rng((env.episode.seed, self.seed))
         return super().decide(env, instruction)
 
@@ -165,21 +161,15 @@ class WaypointExpert(OraclePolicy):
         """Return the anchor of a move, and how the tool turns in it."""
         env = self.env
         tool = np.asarray(env.session.world.robot.tool_pose.p)
-        primitive = self._stage_primitive()
-        turn = _TURNS.get(primitive.kind, "keep")
         is_up = action[2] > tool[2] + UP and np.hypot(*(action[:2] - tool[:2])) < ASIDE
-        if is_up:
+        if is_up or self.stage is None:
             return None, "keep"
+        primitive = self.stage.primitive
         name = primitive.place if primitive.kind in HANDLES_HELD else primitive.subject
         body = env.session.world.bodies.get(str(name))
         if body is not None and np.hypot(*(action[:2] - body.position[:2])) < ON_THING:
-            return str(name), turn
+            return str(name), _TURNS.get(primitive.kind, "keep")
         return None, "keep"
-
-    def _stage_primitive(self) -> Primitive:
-        if self.stage is None:
-            raise RuntimeError("WaypointExpert has no stage before its first chunk.")
-        return self.stage.primitive
 
     def _here(self, gripper: float) -> NDArray[np.float64]:
         robot = self.env.session.world.robot
@@ -187,8 +177,6 @@ class WaypointExpert(OraclePolicy):
 
     def _pose_at(self, arm: NDArray[np.floating[Any]], gripper: float) -> NDArray[np.float64]:
         """Return the waypoint at joint positions (7)."""
-        if self._primitives is None:
-            raise RuntimeError("WaypointExpert needs reset() before act().")
         position, rotation = self._primitives.tool_at(np.asarray(arm, np.float64))
         return np.concatenate([position, rotation.as_euler("xyz"), [gripper]])
 

@@ -39,8 +39,7 @@ from roboirg.policies.planners import make_planner
 from roboirg.policies.planners.hierarchical_policy import HierarchicalPolicy
 from roboirg.policies.planners.planner import Planner
 from roboirg.policies.planners.planner_alone import PlannerAlone
-from roboirg.policies.planners.systems import System, find_system
-from roboirg.policies.vlm.models import ModelOptions
+from roboirg.policies.planners.systems import System, find_system, with_options
 from roboirg.policies.vlm.vlm_listener import ListenerOptions, VLMListener
 from roboirg.util.discovery import entry_names, find_entry
 
@@ -128,14 +127,7 @@ def system_of(kind: str, target: str, options: Mapping[str, str]) -> System | No
     hands = own.pop(HANDS, SCRIPTED)
     if ":" in target and own:
         raise UnknownNameError(f"option of {name}:", min(own), [HANDS])
-    return System(name=name, policy=hands, planner={"kind": target, **_with_model(own)})
-
-
-def _with_model(options: Mapping[str, str]) -> dict[str, Any]:
-    """Return options with those of a model, which stand next to the others, in a table."""
-    of_model = {key: value for key, value in options.items() if key in ModelOptions.model_fields}
-    own = {key: value for key, value in options.items() if key not in of_model}
-    return {**own, **({"model": of_model} if of_model else {})}
+    return System(name=name, policy=hands, planner=with_options({"kind": target}, own))
 
 
 def make_follower(spec: str, seed: int) -> Policy:
@@ -167,7 +159,7 @@ def _of_system(kind: str, _spec: str, target: str, options: Mapping[str, str]) -
 
 def _of_listener(_spec: str, name: str, options: Mapping[str, str]) -> PolicyMaker:
     """Return what makes VLM listeners; its options and its model's stand side by side."""
-    values = _with_model({**options, "provider": name})
+    values = with_options({}, {**options, "provider": name})
     checked = check_options(ListenerOptions, values, f"policy {LISTENER}:{name}")
     return functools.partial(VLMListener, checked)
 

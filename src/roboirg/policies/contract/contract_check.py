@@ -30,13 +30,9 @@ def check_policy(spec: str, policy: object, methods: tuple[str, ...]) -> None:
             "policy is asked about one episode at a time."
         )
     for method in () if takes_batches(policy) else methods:
-        if not hasattr(policy, method):
+        if not callable(getattr(policy, method, None)):
             raise InvalidValueError(
                 f"Policy {spec!r}: class {kind.__name__} has no method {method}()."
-            )
-        if not callable(getattr(policy, method)):
-            raise InvalidValueError(
-                f"Policy {spec!r}: {method} of class {kind.__name__} is not a method."
             )
         if policy is kind and method in ARGUMENTS:
             _check_arguments(spec, getattr(policy, method), ARGUMENTS[method])

@@ -32,8 +32,7 @@ def check_options(kind: type[Options], values: Mapping[str, Any], origin: str) -
         return kind.model_validate(dict(values))
     except ValidationError as error:
         first = error.errors()[0]
-        path = [str(part) for part in first["loc"]]
-        name = ".".join(dict.fromkeys(path)) or "options"  # a model's model is *model*
+        name = str(first["loc"][-1]) if first["loc"] else "options"
         if first["type"] == "extra_forbidden":
             raise UnknownNameError(f"option of {origin}", name, _names(kind)) from None
         if first["type"] == "missing":
@@ -50,13 +49,11 @@ def _quoted(value: object) -> str:
     return re.sub(r"//[^/@]*@", "//…@", repr(value))
 
 
-def _names(kind: type[BaseModel], before: str = "") -> list[str]:
-    """Return the names of all options, those in tables with dots."""
+def _names(kind: type[BaseModel]) -> list[str]:
+    """Return the names of all options, those in tables in place of the table."""
     names: list[str] = []
     for name, field in kind.model_fields.items():
-        annotation = field.annotation
-        if isinstance(annotation, type) and issubclass(annotation, BaseModel):
-            names += _names(annotation, f"{before}{name}.")
-        else:
-            names.append(f"{before}{name}")
+        table = field.annotation
+        is_table = isinstance(table, type) and issubclass(table, BaseModel)
+        names += _names(table) if is_table else [name]  # type: ignore[arg-type]
     return names

@@ -9,7 +9,7 @@ from urllib.parse import parse_qsl, unquote
 
 from pydantic import BaseModel, ConfigDict
 
-from roboirg.core.errors import InvalidValueError, UnknownNameError
+from roboirg.core.errors import InvalidValueError
 from roboirg.policies.contract.option_checking import check_options
 
 _SEPARATOR = "://"
@@ -85,7 +85,4 @@ def read_options(url: PolicyUrl, kind: type[Options]) -> Options:
         UnknownNameError: the scheme has no such option; the message names the nearest.
         InvalidValueError: an option has an invalid value.
     """
-    for name in url.options:
-        if name not in kind.model_fields:
-            raise UnknownNameError(f"{url.scheme}{_SEPARATOR} option", name, kind.model_fields)
     return check_options(kind, url.options, f"Policy {url.text!r}")

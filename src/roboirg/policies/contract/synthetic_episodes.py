@@ -64,11 +64,10 @@ class SyntheticEpisodes:
         """Return an observation `steps` control steps later."""
         last = self._observation(episode.instruction)
         if self._every is not None:
-            count = steps // self._every
-            last["history"] = tuple(self._observation(episode.instruction) for _ in range(count))
-            if count and steps % self._every == 0:
-                now = {field: value for field, value in last.items() if field != "history"}
-                last["history"] = (*last["history"][:-1], now)
+            past = [self._observation(episode.instruction) for _ in range(steps // self._every)]
+            if past and steps % self._every == 0:
+                past[-1] = dict(last)
+            last["history"] = tuple(past)
         return cast("Observation", last)
 
     def _observation(self, instruction: str) -> dict[str, Any]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, ClassVar
@@ -95,9 +96,9 @@ class ScriptedHands(AttachedPolicy):
 
     def usage(self) -> dict[str, float]:
         """Return how many subgoals were refused, and how many came to nothing."""
-        ends = [one.how for one in self.endings]
-        failed = sum(how not in ("done", "refused") for how in ends)
-        return {"refused": ends.count("refused"), "missed": failed}
+        ends = Counter(one.how for one in self.endings)
+        refused = ends["refused"]
+        return {"refused": refused, "missed": ends.total() - ends["done"] - refused}
 
     def follow(self, subgoal: str) -> None:
         """Begin the motion of a subgoal, or refuse it; without effect while a motion is made."""
@@ -126,20 +127,20 @@ class ScriptedHands(AttachedPolicy):
         now = self._underway
         if now is None or now.next is not None:
             return
-        took = self._world.elapsed - now.since
-        if took > MOST_STEPS and now.motion.kind != "hold":
-            self._end(now, "time-out", f"it took more than {MOST_STEPS} steps")
-            return
-        try:
-            now.next = next(now.chunks, None)
-        except MotionPlanningError as error:
-            self._end(now, "blocked", str(error))
-            return
-        if now.next is None:
-            came = self._came_about(now)
-            empty = "nothing is in the gripper"
-            why = empty if now.motion.kind in PICKS else "the motion had no effect"
-            self._end(now, "done" if came else "missed", "" if came else why)
+        how: EndKind | None = None
+        if self._world.elapsed - now.since > MOST_STEPS and now.motion.kind != "hold":
+            how, why = "time-out", f"it took more than {MOST_STEPS} steps"
+        else:
+            try:
+                now.next = next(now.chunks, None)
+                if now.next is None:
+                    how, why = self._outcome(now)
+            except MotionPlanningError as error:
+                how, why = "blocked", str(error)
+        if how is not None:
+            self._underway = None
+            self._last = now if how == "done" and now.motion.kind != "hold" else None
+            self._report(now.subgoal, how, why, now.thing)
 
     def act(self, observation: Observation) -> NDArray[np.floating[Any]]:  # noqa: ARG002
         """Return the next move; without a motion, actions that hold still."""
@@ -152,11 +153,6 @@ class ScriptedHands(AttachedPolicy):
     @property
     def _world(self) -> World:
         return self.env.session.world
-
-    def _end(self, now: _Underway, how: EndKind, why: str) -> None:
-        self._underway = None
-        self._last = now if how == "done" and now.motion.kind != "hold" else None
-        self._report(now.subgoal, how, why, now.thing)
 
     def _report(self, subgoal: str, how: EndKind, why: str = "", thing: str | None = None) -> None:
         step = self._world.elapsed - self._began
@@ -228,19 +224,21 @@ class ScriptedHands(AttachedPolicy):
         arm = self._world.robot.arm_positions
         return np.tile(np.append(arm, self._expert.gripper), (steps, 1))
 
-    def _came_about(self, now: _Underway) -> bool:
-        """Return whether a motion had its effect."""
+    def _outcome(self, now: _Underway) -> tuple[EndKind, str]:
+        """Return how a motion ended that was made to its end, and why it had no effect."""
         session, motion = self.env.session, now.motion
         if motion.kind in ("press", "press_below"):
-            pressed = Fact("pressed", motion.subject)
-            late = (one for one in reversed(session.events) if one.step > now.since)
-            return any(one.holds and one.fact == pressed for one in late)
-        wanted = _EFFECTS.get(motion.kind)
-        subject = ROBOT if motion.kind == "hover" else motion.subject
-        place = motion.subject if motion.kind == "hover" else motion.place
-        return wanted is None or any(
-            Fact(kind, subject, place) in session.world.facts for kind in wanted
-        )
+            late = (one for one in session.events if one.step > now.since and one.holds)
+            came = any(one.fact == Fact("pressed", motion.subject) for one in late)
+        else:
+            is_hover = motion.kind == "hover"
+            things = (ROBOT, motion.subject) if is_hover else (motion.subject, motion.place)
+            wanted = {Fact(kind, *things) for kind in _EFFECTS.get(motion.kind, ())}
+            came = not wanted or not wanted.isdisjoint(session.world.facts)
+        if came:
+            return "done", ""
+        is_pick = motion.kind in PICKS
+        return "missed", "nothing is in the gripper" if is_pick else "the motion had no effect"
 
 
 def _says_the_same(subgoal: str, other: str) -> bool:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import functools
 from collections import Counter
 from dataclasses import replace
@@ -38,7 +39,41 @@ MOST_REFUSALS = 5
 """Refusals in a row after which a planner is asked no more in the episode."""
 
 
-class HierarchicalPolicy:
+class PlannerParts:
+    """What a planner, alone or with a policy, does as a policy.
+
+    Args:
+        parts: the planner, and the policy that follows it, if there is one here.
+    """
+
+    def __init__(self, *parts: object) -> None:
+        self._all = parts
+
+    @property
+    def version(self) -> str:
+        """The versions of all, which they may set until their `reset` ends."""
+        return joint_version(*self._all)
+
+    def hear(self, text: str, step: int) -> None:
+        """Pass an utterance on to all that remember language."""
+        for one in self._all:
+            tell_policy(one, [{"text": text, "step": step}])
+
+    def usage(self) -> dict[str, float]:
+        """Return the cost of all."""
+        total: Counter[str] = Counter()
+        for one in self._all:
+            total.update(one.usage() if hasattr(one, "usage") else {})
+        return dict(total)
+
+    def close(self) -> None:
+        """Close all, the others even if closing one fails."""
+        with contextlib.ExitStack() as stack:
+            for one in reversed(self._all):
+                stack.callback(close_policy, one)
+
+
+class HierarchicalPolicy(PlannerParts):
     """Gets a subgoal from the planner before each chunk and passes it to the policy.
 
     The needs of both are merged: the environment shows what either needs, and each receives its
@@ -66,6 +101,7 @@ class HierarchicalPolicy:
                 f"{type(policy).__name__} has no method follow(subgoal), so it cannot take "
                 "subgoals from a planner."
             )
+        super().__init__(planner, policy)
         self.planner, self.policy, self.name = planner, policy, name
         if any(hasattr(one, "attach") for one in (planner, policy)):
             self.attach = functools.partial(_attach, (planner, policy))
@@ -91,11 +127,6 @@ class HierarchicalPolicy:
         return self.policy.endings if isinstance(self.policy, ReportingFollower) else []
 
     @property
-    def version(self) -> str:
-        """The versions of both."""
-        return joint_version(self.planner, self.policy)
-
-    @property
     def metadata(self) -> dict[str, Any]:
         """The metadata of both."""
         return {
@@ -117,11 +148,6 @@ class HierarchicalPolicy:
         ]
         self.planner.reset(instruction, views[0])
         self.policy.reset(instruction, views[1])
-
-    def hear(self, text: str, step: int) -> None:
-        """Pass an utterance on to both, as far as they remember language."""
-        for one in (self.planner, self.policy):
-            tell_policy(one, [{"text": text, "step": step}])
 
     def act(self, observation: Observation) -> NDArray[np.floating[Any]]:
         """Pass the planner's subgoal to the policy, and return the policy's actions."""
@@ -164,20 +190,6 @@ class HierarchicalPolicy:
         for end in new if hasattr(self.planner, "learn") else ():
             # Names of objects are the world's: they would do the remembering.
             self.planner.learn(end._replace(thing=None))  # type: ignore[attr-defined]
-
-    def usage(self) -> dict[str, float]:
-        """Return the cost of both."""
-        total: Counter[str] = Counter()
-        for one in (self.planner, self.policy):
-            total.update(one.usage() if hasattr(one, "usage") else {})
-        return dict(total)
-
-    def close(self) -> None:
-        """Close both, the second even if closing the first fails."""
-        try:
-            close_policy(self.planner)
-        finally:
-            close_policy(self.policy)
 
 
 def _attach(parts: tuple[object, ...], env: RoboIRGEnv) -> None:

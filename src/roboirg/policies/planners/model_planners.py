@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterable, Iterator, Mapping
 from fractions import Fraction
 from typing import Any
@@ -13,12 +12,11 @@ from pydantic import Field
 from roboirg.core.observations import Demonstration, Observation
 from roboirg.core.subgoal_text import split_point
 from roboirg.policies.planners.planner import WHEN_DONE
-from roboirg.policies.planners.points import normalize_subgoal, parse_boxes, parse_points
+from roboirg.policies.planners.points import normalize_subgoal, parse_points
 from roboirg.policies.planners.vlm_planner import (
     FINISHED,
     Asked,
     PlannerOptions,
-    SubgoalHold,
     VLMPlanner,
 )
 from roboirg.policies.vlm.model_content import ChatTurn, Part
@@ -32,16 +30,14 @@ MIN_CLIP_FRAMES = 4
 """With fewer frames a conversation gets only the last, as a picture."""
 MAX_GAP = 8
 """Largest gap between neighbors of a group, control steps (MME-VLA; a comment there says 10)."""
-HOLDS = tuple(
-    SubgoalHold(says=re.compile(says), until=until)
-    for says, until in (
-        ("press the button", 90),
-        ("press the first button", 100),
-        ("press the second button", 250),
-    )
-)
-"""MME-VLA's rules for ButtonUnmask and ButtonUnmaskSwap, by the text of the subgoal, as a policy
-does not know its task. Only these tasks have such subgoals."""
+HOLDS: Mapping[str, int] = {
+    "press the button": 90,
+    "press the first button": 100,
+    "press the second button": 250,
+}
+"""Subgoals that the model tends to consider reached too early, and the last control steps at which
+they are kept: MME-VLA's rules for ButtonUnmask and ButtonUnmaskSwap, by the text of the subgoal, as
+a policy does not know its task. Only these tasks have such subgoals."""
 
 
 class QwenOptions(PlannerOptions):
@@ -51,7 +47,6 @@ class QwenOptions(PlannerOptions):
         video_frames: maximum of demonstration frames.
     """
 
-    holds: tuple[SubgoalHold, ...] = HOLDS
     video_frames: int = Field(default=10, ge=1)
 
 
@@ -59,6 +54,7 @@ class QwenPlanner(VLMPlanner[QwenOptions]):
     """Remembers the subgoals that it named: QwenVL-style. Points come in box tokens."""
 
     options_type = QwenOptions
+    holds = HOLDS
 
     def reset(self, instruction: str, demonstration: Demonstration) -> None:
         """Begin an episode."""
@@ -75,8 +71,8 @@ class QwenPlanner(VLMPlanner[QwenOptions]):
 
     def take(self, text: str) -> str:
         """Return the subgoal; add it to the history if its words are new."""
-        subgoal = parse_boxes(text)
-        last = parse_boxes(self._history[-1]) if self._history else ""
+        subgoal = parse_points(text)
+        last = parse_points(self._history[-1]) if self._history else ""
         if not last or split_point(last)[0] != split_point(subgoal)[0]:
             self._history.append(normalize_subgoal(text))
         return subgoal
@@ -219,7 +215,7 @@ class MemerPlanner(VLMPlanner[MemerOptions]):
     def take(self, text: str) -> str:
         """Return the subgoal; add the chosen frames, which are counted from 1."""
         reply, count = json_object(text), len(self._recent)
-        subgoal = parse_boxes(text_of(reply, "current_subtask"))
+        subgoal = parse_points(text_of(reply, "current_subtask"))
         positions = reply.get("keyframe_positions")
         if not isinstance(positions, list):
             raise UnparsableReplyError(

@@ -29,26 +29,19 @@ class DemonstrationSubset(Mapping[str, NDArray[Any]]):
         available: DemonstrationFrames,
         wanted: DemonstrationFrames,
     ) -> None:
-        self._all = demonstration
-        self._hidden = PICTURE_FIELDS if wanted == "none" else ()
-        available_stride, wanted_stride = (
-            1 if frames in ("all", "none") else int(frames) for frames in (available, wanted)
-        )
-        self._stride = wanted_stride // available_stride
+        own, other = (1 if one in ("all", "none") else int(one) for one in (wanted, available))
+        self._all, self._stride = demonstration, max(own // other, 1)
 
     def __getitem__(self, field: str) -> NDArray[Any]:
-        """Return the selected entries of a field; KeyError if the field is not wanted."""
-        if field in self._hidden:
-            raise KeyError(field)
-        values = self._all[field]
-        return values[:: self._stride] if field in PICTURE_FIELDS and self._stride > 1 else values
+        """Return the selected entries of a field."""
+        return self._all[field][:: self._stride if field in PICTURE_FIELDS else 1]
 
     def __iter__(self) -> Iterator[str]:
-        return (field for field in self._all if field not in self._hidden)
+        return iter(self._all)
 
     def __len__(self) -> int:
         """Return the number of fields."""
-        return sum(1 for _ in self)
+        return len(self._all)
 
 
 def select_history(

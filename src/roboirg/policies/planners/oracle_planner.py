@@ -86,16 +86,14 @@ class OraclePlanner(AttachedPolicy):
         if not self.reports or stage is None:
             return self.env.subgoal
         index, kind = judge.index, stage.primitive.kind
-        lost = kind in HANDLES_HELD and self._lost()
+        end = self._last
+        fell = end is not None and (end.how == "missed" or end.why == EMPTY_HAND)
+        lost = fell and kind in HANDLES_HELD
         # A stage is published one step longer than it is due, which counts for waiting only.
         if lost or (kind != "hold_until" and judge.stages[index] is not stage):
             index -= 1
         # The environment's own pixel is of what is seen: the arm may hide the object in part.
         return stage_subgoal(self.env, judge.stages, index, grounded=self.grounded)
-
-    def _lost(self) -> bool:
-        end = self._last
-        return end is not None and (end.how == "missed" or end.why == EMPTY_HAND)
 
 
 def stage_subgoal(env: RoboIRGEnv, stages: Sequence[Stage], index: int, *, grounded: bool) -> str:

@@ -9,12 +9,12 @@ from numpy.typing import NDArray
 
 from roboirg.core.observations import Demonstration, Observation
 from roboirg.core.policy_needs import PolicyNeeds
-from roboirg.policies.contract.base import SubgoalEnd, close_policy, tell_policy
-from roboirg.policies.planners.hierarchical_policy import joint_version
+from roboirg.policies.contract.base import SubgoalEnd
+from roboirg.policies.planners.hierarchical_policy import PlannerParts
 from roboirg.policies.planners.planner import Planner
 
 
-class PlannerAlone:
+class PlannerAlone(PlannerParts):
     """Names subgoals and does nothing; its process holds no world.
 
     Args:
@@ -25,15 +25,11 @@ class PlannerAlone:
     """
 
     def __init__(self, planner: Planner) -> None:
+        super().__init__(planner)
         self.planner: Any = planner
         planner.reports = True  # type: ignore[attr-defined]
         PolicyNeeds.of_planner(planner).declare_on(self)
         self.subgoal: str | None = None
-
-    @property
-    def version(self) -> str:
-        """The planner's, which it may set until its `reset` ends."""
-        return joint_version(self.planner)
 
     @property
     def metadata(self) -> Any:  # noqa: ANN401 - of any class
@@ -45,10 +41,6 @@ class PlannerAlone:
         self.subgoal = None
         self.planner.reset(instruction, demonstration)
 
-    def hear(self, text: str, step: int) -> None:
-        """Pass on what was said."""
-        tell_policy(self.planner, [{"text": text, "step": step}])
-
     def act(self, observation: Observation) -> NDArray[np.float64]:
         """Let the planner name a subgoal; the action means nothing."""
         seen: dict[str, Any] = dict(observation)
@@ -57,11 +49,3 @@ class PlannerAlone:
             self.planner.learn(SubgoalEnd(*end))
         self.subgoal = self.planner.plan(cast("Observation", seen), step)
         return np.zeros((1, 8))
-
-    def usage(self) -> dict[str, float]:
-        """Return the planner's cost."""
-        return dict(self.planner.usage()) if hasattr(self.planner, "usage") else {}
-
-    def close(self) -> None:
-        """Close the planner."""
-        close_policy(self.planner)

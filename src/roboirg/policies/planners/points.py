@@ -16,8 +16,9 @@ PICTURE_SIZE = 256
 SCALE = 1000
 """The whole height or width in a model's coordinates."""
 
-_BOX = re.compile(r"(?:<\|box_start\|>)?\(\s*(\d+)\s*,\s*(\d+)\s*\)(?:<\|box_end\|>)?")
-_POINT = re.compile(r"<\s*(\d+)\s*,\s*(\d+)\s*>")
+_POINT = re.compile(
+    r"(?:<\|box_start\|>)?\(\s*(\d+)\s*,\s*(\d+)\s*\)(?:<\|box_end\|>)?|<\s*(\d+)\s*,\s*(\d+)\s*>"
+)
 _END = re.compile(r"<\|(?:im_end|endoftext)\|>\s*$")
 _FINISHED = re.compile(r"\b(?:complete|completed|finished|done)\b")
 
@@ -30,24 +31,24 @@ def to_pixel(value: int) -> int:
     return min(PICTURE_SIZE * value // SCALE, PICTURE_SIZE - 1)
 
 
-def parse_boxes(text: str) -> str:
-    """Convert a subgoal with box tokens ``<|box_start|>(y,x)<|box_end|>`` to one with pixels.
-
-    The tokens around the numbers may be missing, as servers strip them by default.
-
-    Raises:
-        UnparsableReplyError: there is no subgoal, or its points are malformed.
-    """
-    return _check_subgoal(_BOX.sub(_as_pixels, normalize_subgoal(text)))
-
-
 def parse_points(text: str) -> str:
-    """Convert a subgoal with points ``<y, x>`` of 0 to 1000 to one with pixels, in one pass.
+    """Convert a subgoal with a model's points to one with pixels, in one pass.
+
+    Points are ``<y, x>``, or box tokens ``<|box_start|>(y,x)<|box_end|>``; the tokens around the
+    numbers may be missing, as servers strip them by default.
 
     Raises:
         UnparsableReplyError: there is no subgoal, or its points are malformed.
     """
-    return _check_subgoal(_POINT.sub(_as_pixels, normalize_subgoal(text)))
+    subgoal = _POINT.sub(_as_pixels, normalize_subgoal(text))
+    if not subgoal:
+        raise UnparsableReplyError("There is no subgoal.")
+    if len(subgoal) > MOST_SUBGOAL_LETTERS:
+        raise UnparsableReplyError(f"A subgoal has at most {MOST_SUBGOAL_LETTERS} characters.")
+    rest = re.sub(r"<\d+, \d+>", "", subgoal)
+    if any(sign in rest for sign in "<>|{}"):
+        raise UnparsableReplyError("The subgoal holds signs that are part of no point.")
+    return subgoal
 
 
 def normalize_subgoal(text: str) -> str:
@@ -64,18 +65,7 @@ def says_finished(subgoal: str) -> bool:
 
 
 def _as_pixels(found: re.Match[str]) -> str:
-    row, column = (int(number) for number in found.groups())
+    row, column = (int(number) for number in found.groups() if number is not None)
     if max(row, column) > SCALE:
         raise UnparsableReplyError(f"The point {found[0]} is outside of 0 to {SCALE}.")
     return f"<{to_pixel(row)}, {to_pixel(column)}>"
-
-
-def _check_subgoal(subgoal: str) -> str:
-    if not subgoal:
-        raise UnparsableReplyError("There is no subgoal.")
-    if len(subgoal) > MOST_SUBGOAL_LETTERS:
-        raise UnparsableReplyError(f"A subgoal has at most {MOST_SUBGOAL_LETTERS} characters.")
-    rest = re.sub(r"<\d+, \d+>", "", subgoal)
-    if any(sign in rest for sign in "<>|{}"):
-        raise UnparsableReplyError("The subgoal holds signs that are part of no point.")
-    return subgoal

@@ -16,15 +16,12 @@ from roboirg.core.errors import InvalidValueError, UnknownNameError
 from roboirg.core.policy_ref import HANDS
 from roboirg.policies.contract.option_checking import check_options
 from roboirg.policies.contract.policy_urls import is_url, split_url
+from roboirg.policies.vlm.models import ModelOptions
 
 PACKAGE, FOLDER = "roboirg.policies.planners", "system_files"
 SUFFIX = ".toml"
 
-SERVER, VLM, MODEL = "server", "vlm", "model"
-POLICY, PLANNER = "policy.", "planner."
-SHORTCUTS: Mapping[str, str] = {VLM: "planner.model.base_url", MODEL: "planner.model.model"}
-"""Short names of options, and the entries that they set."""
-OPTIONS = (SERVER, HANDS, *SHORTCUTS, "policy.OPTION", "planner.OPTION", "planner.model.OPTION")
+SERVER, VLM, POLICY = "server", "vlm", "policy."
 
 
 class System(BaseModel):
@@ -55,10 +52,9 @@ def find_system(name_or_file: str, overrides: Mapping[str, str]) -> System:
 
     Args:
         name_or_file: a name such as ``GroundSG-QwenVL``, or a TOML file with the same entries.
-        overrides: ``server`` (host:port of the policy), ``vlm`` (URL of the planner's model),
-            ``model`` (its name), ``hands`` (``scripted``, or the spec of a policy that follows
-            subgoals, instead of its own), ``policy.OPTION``, ``planner.OPTION``,
-            ``planner.model.OPTION``.
+        overrides: ``server`` (host:port of the policy), ``policy.OPTION``, ``hands`` (``scripted``,
+            or the spec of a policy that follows subgoals, instead of its own), ``vlm`` (URL of the
+            planner's model), and options of the planner and its model.
 
     Raises:
         UnknownNameError: there is no such system or option.
@@ -76,24 +72,25 @@ def find_system(name_or_file: str, overrides: Mapping[str, str]) -> System:
     except ValueError as error:  # not Unicode, or not TOML
         raise InvalidValueError(f"System {name_or_file!r} is not TOML ({error}).") from error
     origin = f"system {name_or_file}"
-    return _overridden(check_options(System, entries, origin), overrides, origin)
-
-
-def _overridden(system: System, overrides: Mapping[str, str], origin: str) -> System:
+    system = check_options(System, entries, origin)
     policy, planner = system.policy, system.planner
-    for option, value in overrides.items():
-        entry = SHORTCUTS.get(option, option)
-        if option == HANDS and planner is not None:
-            policy = value
-        elif option == SERVER or option.startswith(POLICY):
-            policy = _policy_with(policy, option, value, origin)
-        elif option != HANDS and not entry.startswith(PLANNER):
-            raise UnknownNameError(f"option of {origin}", option, OPTIONS)
-        elif planner is None:
-            raise InvalidValueError(f"Option {option!r}: {origin} has no planner.")
-        else:
-            planner = _nested(planner, entry.removeprefix(PLANNER).split("."), value)
-    return system.model_copy(update={"policy": policy, "planner": planner})
+    own = {"base_url" if option == VLM else option: value for option, value in overrides.items()}
+    for option in [one for one in own if one == SERVER or one.startswith(POLICY)]:
+        policy = _policy_with(policy, option, own.pop(option), origin)
+    if planner is not None:
+        policy, planner = own.pop(HANDS, policy), with_options(planner, own)
+    elif own:
+        known = [SERVER, f"{POLICY}OPTION"]
+        raise UnknownNameError(f"option of {origin}, which has no planner,", min(own), known)
+    return System(name=system.name, policy=policy, planner=planner)
+
+
+def with_options(planner: Mapping[str, Any], options: Mapping[str, str]) -> dict[str, Any]:
+    """Return a planner's entries with options set; those of its model stand next to the others."""
+    of_model = {name: value for name, value in options.items() if name in ModelOptions.model_fields}
+    own = {name: value for name, value in options.items() if name not in of_model}
+    model = {**planner.get("model", {}), **of_model}
+    return {**planner, **own, **({"model": model} if model else {})}
 
 
 def _policy_with(spec: str, option: str, value: str, origin: str) -> str:
@@ -107,11 +104,3 @@ def _policy_with(spec: str, option: str, value: str, origin: str) -> str:
     changed = {} if option == SERVER else {option.removeprefix(POLICY): value}
     query = urlencode({**url.options, **changed})
     return f"{url.scheme}://{place}" + (f"?{query}" if query else "")
-
-
-def _nested(entries: Mapping[str, Any], path: list[str], value: str) -> dict[str, Any]:
-    first, *rest = path
-    if not rest:
-        return {**entries, first: value}
-    table = entries.get(first, {})
-    return {**entries, first: _nested(table if isinstance(table, dict) else {}, rest, value)}

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from abc import ABC, abstractmethod
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from typing import Annotated, Any, ClassVar, Generic, Literal, TypeVar
 
 from pydantic import BaseModel, ConfigDict, Field
@@ -29,20 +29,6 @@ MOST_USELESS = 5
 """Unusable replies in a row after which a planner that is asked when done asks no more."""
 
 
-class SubgoalHold(BaseModel):
-    """A rule that keeps a subgoal which the model tends to consider reached too early.
-
-    Attributes:
-        says: regular expression for the whole subgoal without points.
-        until: last control step at which it is kept.
-    """
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
-
-    says: re.Pattern[str]
-    until: int = Field(ge=0)
-
-
 Asked = Annotated[str, Field(pattern=rf"^({EACH_CHUNK}|{WHEN_DONE}|every [1-9]\d* steps)$")]
 
 
@@ -55,7 +41,6 @@ class PlannerOptions(BaseModel):
         asked: when it is queried: ``each-chunk``; ``when-done``, once its policy has reported the
             end of a subgoal, or something has been said; or ``every N steps``.
         first_pause: control steps before which there is no second query.
-        holds: rules that keep a subgoal.
         prompts: a file with other prompts, or None for our own.
     """
 
@@ -65,7 +50,6 @@ class PlannerOptions(BaseModel):
     subgoals: Literal["grounded", "simple"] = "grounded"
     asked: Asked = EACH_CHUNK
     first_pause: int = Field(default=0, ge=0)
-    holds: tuple[SubgoalHold, ...] = ()
     prompts: str | None = None
 
 
@@ -93,6 +77,8 @@ class VLMPlanner(ABC, Generic[Options]):
     """
 
     options_type: ClassVar[type[PlannerOptions]]
+    holds: ClassVar[Mapping[str, int]] = {}
+    """Subgoals without points that are kept, and the last control steps at which they are."""
     cameras = ("front",)
     reports = False
     demonstration_frames: DemonstrationFrames = "all"
@@ -226,6 +212,5 @@ class VLMPlanner(ABC, Generic[Options]):
         if self.subgoal is None:
             return True
         words, _ = split_point(self.subgoal)
-        is_held = any(step <= one.until and one.says.fullmatch(words) for one in self.options.holds)
-        is_early = step < self.options.first_pause
-        return is_new and (self._news or not waits) and not is_early and not is_held
+        is_held = step <= self.holds.get(words, -1) or step < self.options.first_pause
+        return is_new and (self._news or not waits) and not is_held
