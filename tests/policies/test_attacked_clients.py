@@ -190,7 +190,6 @@ def test_a_bad_model_endpoint_is_a_named_error(provider, answer, words):
         model = make_model(options)
         with pytest.raises(PolicyServerError) as caught:
             model.answer(ModelQuery("", (ChatTurn("user", ("hello",)),)))
-        model.close()
     assert words in str(caught.value)
     assert str(caught.value).isprintable()
 

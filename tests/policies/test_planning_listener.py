@@ -147,7 +147,6 @@ def test_a_listener_that_is_told_the_truth_decides_on_the_true_goal_in_all_setti
                 env = stand_in(episode, setting)
                 server.answer = hearing(episode)
                 assert policy.decide(env, env.instruction.text) == episode.goal
-        policy.close()
     assert len(server.requests) == policy.usage()["calls"] > EPISODES * len(every_task())
 
 

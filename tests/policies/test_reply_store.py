@@ -39,11 +39,8 @@ def query(words: str, shade: int | None = None) -> ModelQuery:
 def play(server, settings: ReplySettings | None, episode: str, *words: str, shade=None, **options):
     """Ask the questions of an episode, as a policy does; returns replies and what they cost."""
     vlm = VLMQuery(model_options(server, **options), Template("$why"))
-    try:
-        with use_replies(settings, episode):
-            replies = [vlm.ask(query(one, shade), str) for one in words]
-    finally:
-        vlm.close()
+    with use_replies(settings, episode):
+        replies = [vlm.ask(query(one, shade), str) for one in words]
     return replies, Counter(vlm.usage())
 
 

@@ -90,7 +90,6 @@ def test_the_listener_and_our_scores_agree():
         for item in items():
             server.answer = lambda _body, item=item: replies()[item.id]
             assert listener_verdict(policy, item) == own_verdicts()[item.id], item.id
-        policy.close()
 
 
 def test_the_listener_is_asked_what_the_dataset_asks():
@@ -98,7 +97,6 @@ def test_the_listener_is_asked_what_the_dataset_asks():
     with fake_vlm([item.answer]) as server:
         policy = make_listener(server)
         assert listener_verdict(policy, item)
-        policy.close()
         system, user = server.requests[0]["messages"]
     texts = [part["text"] for part in user["content"] if part["type"] == "text"]
     assert texts == [item.said, item.shown, item.now, item.slots_question]

@@ -154,9 +154,6 @@ class VLMPlanner(ABC, Generic[Options]):
         ended = {"finished": self._finished, "unreadable": self._useless > 0}
         return {**self.vlm.usage(), **{name: 1.0 for name, holds in ended.items() if holds}}
 
-    def close(self) -> None:
-        self.vlm.close()
-
     def watch(self, observation: Observation, step: int) -> None:
         """Record an observation; called at every chunk, with or without a query."""
 

@@ -132,9 +132,6 @@ class VLMListener(ScriptedPolicy):
         """Return the cost of the episode."""
         return {**self._vlm.usage(), "impossible": int(self._impossible)}
 
-    def close(self) -> None:
-        self._vlm.close()
-
     def _build_query(self, env: RoboIRGEnv, schema: GoalSchema, instruction: str) -> ModelQuery:
         reasoning = self.prompts.fill("reasoning_field") if self.options.reasoning else None
         steps = len(self._demonstration.get("joint_positions", ()))

@@ -85,12 +85,6 @@ class VLMQuery:
         }
         return {name: count for name, count in found.items() if count or name in ALWAYS}
 
-    def close(self) -> None:
-        """Close the connection."""
-        model, self._model = self._model, None
-        if model is not None:
-            model.close()
-
     @contextlib.contextmanager
     def _timed(self, name: str) -> Iterator[None]:
         """Count the seconds of the block, unless it raises."""

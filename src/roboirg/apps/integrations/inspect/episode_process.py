@@ -51,9 +51,6 @@ class PipeModel:
         except EOFError as error:
             raise PolicyConnectionError("Inspect ended the episode.") from error
 
-    def close(self) -> None:
-        """Do nothing; the pipe ends with the process."""
-
 
 class PipedListener(VLMListener):
     """The VLM listener of this process."""

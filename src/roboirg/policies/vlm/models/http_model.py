@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 import threading
+import weakref
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from concurrent.futures import Future
@@ -43,6 +44,7 @@ class HttpModel(ABC):
         self.options, self.key = options, options.key()
         self._name = f"Model {options.model!r} at {options.address()}"
         self._client = httpx.Client(timeout=options.timeout_s)
+        weakref.finalize(self, self._client.close)  # the connection ends with this object
 
     @abstractmethod
     def write(self, query: ModelQuery) -> tuple[str, dict[str, str], bytes]:
@@ -93,10 +95,6 @@ class HttpModel(ABC):
                 f"{self._name} is not available: {words}", retry_after_s(response.headers)
             )
         raise PolicyReplyError(f"{self._name} refused or failed: {words}")
-
-    def close(self) -> None:
-        """Close the connection."""
-        self._client.close()
 
     def _fetch(
         self, url: str, headers: Mapping[str, str], body: bytes, found: Future[Fetched]

@@ -147,7 +147,7 @@ class ModelReply(NamedTuple):
 
 
 class Model(Protocol):
-    """A connection to a model."""
+    """A connection to a model, which ends with this object."""
 
     def answer(self, query: ModelQuery) -> ModelReply:
         """Send a query and return the reply.
@@ -157,9 +157,6 @@ class Model(Protocol):
             PolicyTimeoutError: there was no reply in time.
             PolicyReplyError: the service replied with an error or with something else.
         """
-
-    def close(self) -> None:
-        """Close the connection."""
 
 
 def config_version(model: ModelOptions, about: Mapping[str, Any]) -> str:
