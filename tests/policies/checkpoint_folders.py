@@ -2,7 +2,6 @@
 
 import json
 
-FILES = ("model.safetensors", "policy_preprocessor.json", "policy_postprocessor.json")
 FRONT = "observation.images.front"
 WRIST = "observation.images.wrist"
 STATE = {"observation.state": {"type": "STATE", "shape": [8]}}
@@ -19,8 +18,6 @@ def pictures(**shapes):
 def write_checkpoint(folder, features=None, **config):
     """Make a folder a checkpoint that takes these inputs; return it."""
     folder.mkdir(parents=True, exist_ok=True)
-    for name in FILES:
-        (folder / name).write_text("{}")
     content = {"type": "act", "input_features": STATE | (features or {}), **config}
     (folder / "config.json").write_text(json.dumps(content))
     return folder

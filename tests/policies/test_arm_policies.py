@@ -15,7 +15,6 @@ from roboirg.evaluation.analysis.stats.intervals import wilson_interval
 from roboirg.language import expressible
 from roboirg.language.arms import ArmWords, say_arm
 from roboirg.policies import make_policy
-from roboirg.policies.by_name.finding import read_policy
 from roboirg.tasks import all_tasks, with_goal
 from roboirg.tasks.other_goals import begins_with
 from roboirg.tasks.splits.splits import get_episode
@@ -113,12 +112,3 @@ def test_the_planted_cheats_are_found_by_the_arms_alone():
     # All paraphrases at once are harder than one for who guesses.
     both = rate("forgetful", "paraphrase-1", "paraphrase-2", count=12)
     assert both < min(rate("forgetful", f"paraphrase-{one}", count=12) for one in (1, 2))
-
-
-def test_they_are_privileged_and_hold_still_without_a_goal():
-    assert read_policy("habit").is_privileged
-    assert read_policy("previous-goal").is_privileged
-    first = get_episode("VideoUnmask", "test", 0)
-    said = say_arm(first, InstructionOptions())
-    last = get_episode("VideoUnmask", "test", 49)
-    assert chosen("previous-goal", said) in (last.goal, None)

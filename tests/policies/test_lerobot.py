@@ -267,13 +267,6 @@ def test_rows_of_a_batch_depend_on_their_own_episode(checkpoint):
     assert not np.array_equal(again[0].act(moments[0]), together[0])  # other noise in each call
 
 
-def test_a_batch_executes_what_the_checkpoint_says(checkpoint):
-    checkpoint.config.n_action_steps = 3
-    episodes = [begun(seed, "?batch=4") for seed in range(2)]
-    chunks = episodes[0].act_together(episodes, [moment(1)] * 2)
-    assert [chunk.shape for chunk in chunks] == [(3, 8)] * 2
-
-
 @pytest.mark.parametrize("changes", [{"type": "diffusion"}, {"temporal_ensemble_coeff": 0.01}])
 def test_checkpoints_that_remember_are_asked_one_by_one(checkpoint, changes):
     vars(checkpoint.config).update(changes, is_noisy=True)
@@ -289,12 +282,6 @@ def test_what_cannot_be_loaded_is_one_sentence(checkpoint, monkeypatch):
 
     configs = sys.modules["lerobot.configs.policies"]
     monkeypatch.setattr(configs.PreTrainedConfig, "from_pretrained", fail)
-    said = r"^The checkpoint 'x/y' cannot be loaded: OSError: no such repository$"
+    said = r"^The checkpoint 'x/y' \(no folder .*\) cannot be loaded: OSError: no such repository$"
     with pytest.raises(InvalidValueError, match=said):
-        begun()
-
-
-def test_a_checkpoint_that_wants_another_camera_is_told(checkpoint):
-    checkpoint.config.input_features = {"observation.images.laptop": None}
-    with pytest.raises(InvalidValueError, match=r"needs 'observation\.images\.laptop'"):
         begun()

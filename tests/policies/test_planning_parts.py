@@ -13,7 +13,6 @@ from planning_fakes import decoded
 from roboirg.core.environment_options import DemonstrationFrames
 from roboirg.core.errors import InvalidValueError
 from roboirg.core.policy_needs import (
-    merge_cameras,
     merge_demonstration_frames,
     merge_observe_every,
 )
@@ -54,11 +53,6 @@ def test_points_are_scaled_row_first_all_at_once(points):
 @given(thousandths)
 def test_a_pixel_is_floored_and_stays_in_the_picture(value):
     assert to_pixel(value) == min(int(Fraction(256 * value, 1000)), 255)
-
-
-def test_examples_of_points():
-    assert [to_pixel(value) for value in (0, 3, 4, 500, 999, 1000)] == [0, 0, 1, 128, 255, 255]
-    assert parse_points("from <500, 300> to <128, 76>") == "from <128, 76> to <32, 19>"
 
 
 @pytest.mark.parametrize(
@@ -248,8 +242,3 @@ def test_each_sees_the_moments_that_it_asked_for(one, other, chunks):
     for wish, who in ((one, True), (other, False)):
         expected = [] if wish is None else list(range(wish, step + 1, wish))
         assert seen[who] == expected
-
-
-def test_cameras_are_united_in_the_usual_order():
-    assert merge_cameras(("wrist",), ("front",)) == ("front", "wrist")
-    assert merge_cameras((), ()) == ()

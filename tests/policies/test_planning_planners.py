@@ -16,7 +16,6 @@ from planning_fakes import (
     model_options,
     spent,
 )
-from selection import slow_but
 
 import roboirg
 from roboirg.core.errors import InvalidValueError
@@ -196,12 +195,6 @@ def test_gemini_asks_once_in_a_period_whatever_the_chunks():
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_subgoals_have_pixels_and_are_passed_on(kind):
-    with fake_vlm([ANSWERS[kind]]) as server:
-        assert drive(make_planner(kind, server), 32).policy.told == [SUBGOAL] * 3
-
-
-@pytest.mark.parametrize("kind", KINDS)
 def test_a_useless_reply_leaves_the_last_subgoal(kind):
     with fake_vlm(["{}", "{}", ANSWERS[kind], "{}"]) as server:
         planner = make_planner(kind, server, **({"first_pause": 0} if kind == "gemini" else {}))
@@ -354,26 +347,7 @@ def test_together_they_are_a_policy_and_costs_add_up(monkeypatch):
         policy.close()
 
 
-def test_two_policies_do_not_mix():
-    with fake_vlm([GO]) as one, fake_vlm(["put it down"]) as two:
-        first, second = make_planner("qwen", one), make_planner("qwen", two)
-        here, there = HierarchicalPolicy(first, Follower()), HierarchicalPolicy(second, Follower())
-        for policy, words in ((here, "One."), (there, "Two.")):
-            policy.reset(words, NO_VIDEO)
-        for step in (0, 16, 32):
-            for policy in (here, there):
-                policy.act(moment(step))
-        assert here.policy.told == [SUBGOAL] * 3
-        assert there.policy.told == ["put it down"] * 3
-        assert all("One." in json.dumps(body) for body in one.requests)
-        assert not any("put it down." in json.dumps(body) for body in one.requests)
-        assert len(one.requests) == len(two.requests) == 3
-
-
 def test_who_cannot_follow_cannot_be_led():
-    class Deaf(Follower):
-        follow = None
-
     class Headstrong:
         def reset(self, instruction, demonstration): ...
         def act(self, observation): ...
@@ -422,29 +396,6 @@ def test_the_oracles_subgoals_are_those_of_the_episode():
     expected = [stage.subgoal.split(" {at}")[0] for stage in env.episode.stages]
     assert [subgoal.split(" at <")[0] for subgoal in told] == expected
     assert all(" at <" in subgoal for subgoal in told)
-
-
-@pytest.mark.sim
-@pytest.mark.parametrize("kind", slow_but(["qwen"], KINDS))
-def test_planners_play_whole_episodes(kind):
-    with fake_vlm([ANSWERS[kind]]) as server:
-        more = {"observe_every": 8} if kind == "gemini" else {}
-        policy = HierarchicalPolicy(make_planner(kind, server, **more), Fingers())
-        env = roboirg.make(
-            "PickXtimes",
-            cameras=policy.cameras,
-            demonstration_frames=policy.demonstration_frames,
-            observe_every=policy.observe_every,
-        )
-        info = play(env, policy)
-        assert info["status"] == "success"
-        assert set(policy.policy.told) == {SUBGOAL}
-        usage = policy.usage()
-        assert usage["unparsed"] == 0
-        assert usage["calls"] == len(server.requests)
-        most = info["steps"] // 48 + 1 if kind == "gemini" else len(policy.policy.told)
-        assert 1 <= usage["calls"] <= most
-        policy.close()
 
 
 @pytest.mark.parametrize("kind", ["qwen", "gemini", "memer"])

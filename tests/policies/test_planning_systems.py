@@ -17,7 +17,6 @@ from roboirg.policies import Policy, PrivilegedPolicy, find_policy, make_policy,
 from roboirg.policies.by_name.finding import read_policy
 from roboirg.policies.planners.hierarchical_policy import HierarchicalPolicy
 from roboirg.policies.planners.systems import all_systems, find_system
-from roboirg.policies.vlm.vlm_listener import VLMListener
 
 PAPER = ("FrameS-Modul", "GroundSG-Gemini", "GroundSG-QwenVL", "GroundSG-oracle", "MemER",
          "TTT-Expert", "pi0.5")  # fmt: skip
@@ -85,14 +84,6 @@ def test_the_page_s_code_runs():
     names: dict = {}
     exec(block, names)  # noqa: S102 - it is our own page
     assert isinstance(names["mine"], PrivilegedPolicy)
-
-
-def test_a_listener_by_its_spec():
-    policy = make_policy(f"{LISTENER}&frames=4&timeout_s=9&reasoning=yes", 5)
-    assert isinstance(policy, VLMListener)
-    assert (policy.options.frames, policy.options.reasoning) == (4, True)
-    assert policy.options.model.timeout_s == 9
-    assert read_policy(LISTENER).is_privileged
 
 
 @pytest.mark.parametrize(

@@ -4,14 +4,12 @@ import numpy as np
 import pytest
 
 import roboirg
-from roboirg.core.actions import JOINT_ANGLE, WAYPOINT, check_chunk
+from roboirg.core.actions import JOINT_ANGLE, check_chunk
 from roboirg.core.errors import InvalidValueError, UnknownNameError
-from roboirg.core.policy_needs import PolicyNeeds
 from roboirg.language.settings import plain_settings
 from roboirg.policies import Policy, PrivilegedPolicy, find_policy, make_policy
 from roboirg.policies.builtin import BUILTIN
 from roboirg.policies.builtin.listeners import ForgetfulPolicy, ListenerPolicy
-from roboirg.policies.by_name.finding import read_policy
 from roboirg.tasks import every_task
 
 
@@ -68,17 +66,6 @@ class Numb(Silent):
     act = 3
 
 
-def test_an_edited_policy_has_another_version(tmp_path, monkeypatch):
-    file = tmp_path / "edited_policy.py"
-    monkeypatch.syspath_prepend(tmp_path)
-    body = "class It:\n    def reset(self, a, b): pass\n    def act(self, o): pass\n"
-    file.write_text(body)
-    first = find_policy("edited_policy:It").version
-    assert find_policy("edited_policy:It").version == first
-    file.write_text(body + "    gain = 2\n")
-    assert find_policy("edited_policy:It").version != first
-
-
 @pytest.mark.parametrize(
     ("spec", "error", "words"),
     [
@@ -107,27 +94,6 @@ def test_wrong_specs_are_explained(spec, error, words):
         find_policy(spec)
 
 
-def test_cameras_may_be_a_list_or_a_property(monkeypatch):
-    monkeypatch.setattr(Silent, "cameras", ["wrist"], raising=False)
-    assert find_policy(f"{__name__}:Silent").needs.cameras == ("wrist",)
-    monkeypatch.setattr(Silent, "cameras", property(lambda _self: ("front",)))
-    assert PolicyNeeds.of(make_policy(f"{__name__}:Silent", 0)).cameras == ("front",)
-    assert PolicyNeeds.of(Deaf).cameras == ("front", "wrist")
-
-
-def test_a_policy_says_in_which_action_space_it_acts(monkeypatch):
-    assert PolicyNeeds.of(Silent).action_space is JOINT_ANGLE
-    monkeypatch.setattr(Silent, "actions", "waypoint", raising=False)
-    assert find_policy(f"{__name__}:Silent").needs.action_space is WAYPOINT
-    monkeypatch.setattr(Silent, "actions", property(lambda _self: "waypoint"))
-    assert PolicyNeeds.of(make_policy(f"{__name__}:Silent", 0)).action_space is WAYPOINT
-
-
-@pytest.mark.parametrize("name", BUILTIN)
-def test_built_in_policies_move_joints(name):
-    assert find_policy(name).needs.action_space is JOINT_ANGLE
-
-
 @pytest.mark.parametrize(
     ("attribute", "wish", "words"),
     [
@@ -150,30 +116,6 @@ def test_a_wrong_need_is_told_before_anything_starts(monkeypatch, attribute, wis
     monkeypatch.setattr(Silent, attribute, wish, raising=False)
     with pytest.raises(InvalidValueError, match=f"{__name__}:Silent'.*{words}"):
         find_policy(f"{__name__}:Silent")
-
-
-def test_a_policy_says_which_frames_it_wants(monkeypatch):
-    assert PolicyNeeds.of(Silent) == PolicyNeeds()
-    for wish in ("none", 4):
-        monkeypatch.setattr(Silent, "demonstration_frames", wish, raising=False)
-        assert find_policy(f"{__name__}:Silent").needs.demonstration_frames == wish
-    monkeypatch.setattr(Silent, "observe_every", property(lambda _self: 8), raising=False)
-    assert PolicyNeeds.of(make_policy(f"{__name__}:Silent", 0)).observe_every == 8
-
-
-@pytest.mark.parametrize("attribute", ["depth", "calibration"])
-def test_depth_and_matrices_are_wishes_and_need_a_camera(monkeypatch, attribute):
-    assert not getattr(PolicyNeeds.of(Silent), attribute)
-    monkeypatch.setattr(Silent, attribute, True, raising=False)
-    assert getattr(find_policy(f"{__name__}:Silent").needs, attribute)
-    monkeypatch.setattr(Silent, "cameras", (), raising=False)
-    with pytest.raises(InvalidValueError, match=f"{attribute} is True, but cameras is "):
-        find_policy(f"{__name__}:Silent")
-
-
-def test_privileged_policies_are_known_by_name():
-    names = ("oracle", "forgetful", "random")
-    assert [read_policy(name).is_privileged for name in names] == [True, True, False]
 
 
 def test_a_module_that_exits_or_complains_at_length_is_one_sentence(tmp_path, monkeypatch):

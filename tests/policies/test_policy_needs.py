@@ -1,17 +1,16 @@
 """What policies need: declared as attributes, carried as one value."""
 
 import json
-from dataclasses import FrozenInstanceError, asdict, dataclass, field, fields
+from dataclasses import FrozenInstanceError, asdict, fields
 from types import SimpleNamespace
 
 import pytest
 
 from roboirg.core.errors import InvalidValueError, UnknownNameError
-from roboirg.core.policy_needs import PolicyNeeds, need_rules
+from roboirg.core.policy_needs import PolicyNeeds
 from roboirg.envs.env_settings import EnvSettings
 from roboirg.policies import play
 from roboirg.policies.planners.hierarchical_policy import HierarchicalPolicy
-from roboirg.policies.remote.service import act
 
 
 class Demanding:
@@ -93,10 +92,9 @@ def test_a_planner_needs_what_it_declares_and_its_model_is_its_own():
 
 def test_a_tokenizer_that_is_no_path_matters_where_prompts_are_counted():
     thinking = Demanding()
-    thinking.tokenizer, thinking.act = object(), lambda _observation: [[0.0] * 7]
+    thinking.tokenizer = object()
     with pytest.raises(InvalidValueError, match="tokenizer is <object"):
         PolicyNeeds.of(thinking)
-    assert act(thinking, {})[0].shape == (1, 7)  # of a server
     with pytest.raises(InvalidValueError, match="needs actions='ee_pose'"):
         play(SimpleNamespace(actions="waypoint"), thinking)
 
@@ -106,22 +104,3 @@ def test_the_environment_has_an_option_for_each_of_its_needs():
     made = asdict(EnvSettings.of(options))
     assert {**made, **made["environment"]}.items() >= options.items()
     assert set(options) < {one.name for one in fields(PolicyNeeds)}
-
-
-def test_a_new_need_is_one_field():
-    @dataclass(frozen=True, kw_only=True)
-    class MoreNeeds(PolicyNeeds):
-        touch: int = field(default=0, metadata=need_rules(int, max, env=True))
-
-    class Touching(Demanding):
-        touch = "2"
-
-    class Feeling(Guide):
-        touch = 5
-
-    needs = MoreNeeds.of(Touching)
-    assert (needs.touch, needs.env_options["touch"]) == (2, 2)
-    assert needs.merge(MoreNeeds.of_planner(Feeling())).touch == 5
-    assert MoreNeeds(**json.loads(json.dumps(asdict(needs)))) == needs
-    needs.declare_on(standing_for := Demanding())
-    assert MoreNeeds.of(standing_for) == needs

@@ -310,16 +310,6 @@ def test_choices_are_robommes_in_every_episode(task, choices):
         assert [one.label for one in found] == list("abcd"[: len(found)])
 
 
-@pytest.mark.parametrize(
-    ("task", "choices"),
-    [("PutInBox", "pick_cube put_into"), ("PickByCount", "pick_cube place_on retreat")],
-)
-def test_tasks_of_the_real_robot_have_choices(task, choices):
-    found = choices_of(get_episode(task, "val", 0))
-    assert " ".join(one.primitives[0].kind for one in found) == choices
-    assert all(one.action for one in found)
-
-
 @pytest.mark.sim
 def test_a_program_acts_by_choices():
     from roboirg.simulation.expert.things import origin_pixel

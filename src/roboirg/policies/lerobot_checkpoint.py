@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import json
-import re
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from roboirg.core.errors import InvalidValueError
 from roboirg.core.observations import CAMERAS
@@ -14,10 +13,6 @@ from roboirg.core.observations import CAMERAS
 PICTURE = "observation.images.{}"
 STATE = "observation.state"
 _CONFIG = "config.json"
-_FILES = (_CONFIG, "model.safetensors", "policy_preprocessor.json", "policy_postprocessor.json")
-_TRAINED = "checkpoints/last/pretrained_model"
-"""Where lerobot-train puts a checkpoint in its output folder."""
-_HUB_ID = re.compile(r"\w[\w.-]*/\w[\w.-]*")
 
 
 class CheckpointFacts(NamedTuple):
@@ -33,37 +28,27 @@ class CheckpointFacts(NamedTuple):
 
 
 UNKNOWN = CheckpointFacts(dict.fromkeys(CAMERAS))
-"""Of a checkpoint that is not on this computer."""
+"""Of a checkpoint whose configuration is not on this computer, or not as LeRobot writes it."""
 
 
 def read_facts(place: str) -> CheckpointFacts:
-    """Return what a checkpoint takes; of one that is not on this computer, `UNKNOWN`.
+    """Return what a checkpoint takes, as far as its configuration is here and says so.
 
     Args:
         place: a folder, or the id of a repository of the Hub; nothing is downloaded.
 
     Raises:
-        InvalidValueError: there is no such folder, it holds no checkpoint, or the checkpoint needs
-            an input that does not exist.
+        InvalidValueError: the checkpoint needs an input that does not exist.
     """
-    path = _local_config(place)
-    if path is None:
-        return UNKNOWN
+    path = Path(place) / _CONFIG
     try:
-        config = json.loads(path.read_text(encoding="utf-8"))
-        shapes = {name: one.get("shape") for name, one in (config["input_features"] or {}).items()}
-        is_policy = isinstance(config["type"], str)
+        config = json.loads((path if path.is_file() else _cached(place)).read_text("utf-8"))
+        shapes = {name: one.get("shape") for name, one in config["input_features"].items()}
+        limit = config.get("tokenizer_max_length")
     except (OSError, ValueError, TypeError, KeyError, AttributeError):
-        is_policy = False
-    if not is_policy:
-        raise InvalidValueError(
-            f"{str(path)!r} does not describe a LeRobot policy: it must be JSON with `type` and "
-            "`input_features`."
-        )
-    limit = config.get("tokenizer_max_length")
-    return CheckpointFacts(
-        picture_sizes(place, shapes), limit if isinstance(limit, int) and limit > 0 else None
-    )
+        return UNKNOWN  # LeRobot names what is wrong where it loads the checkpoint
+    is_limit = isinstance(limit, int) and limit > 0
+    return CheckpointFacts(picture_sizes(place, shapes), limit if is_limit else None)
 
 
 def picture_sizes(place: str, shapes: Mapping[str, object]) -> dict[str, int | None]:
@@ -93,32 +78,10 @@ def _width(shape: object) -> int | None:
     return None
 
 
-def _local_config(place: str) -> Path | None:
-    """Return the configuration of a checkpoint; None if it is not on this computer."""
-    folder = Path(place)
-    if folder.is_dir():
-        _check_folder(folder)
-        return folder / _CONFIG
-    is_id = _HUB_ID.fullmatch(place) is not None
-    if folder.exists() or not is_id or folder.parent.is_dir():
-        raise InvalidValueError(
-            f"There is no folder {place!r}; lerobot:// takes the folder of a checkpoint, such as "
-            f"outputs/act/{_TRAINED}, or an id of the Hub, OWNER/NAME."
-        )
+def _cached(place: str) -> Path:
+    """Return the configuration of a repository of the Hub; raises OSError if it is not here."""
     try:
         from huggingface_hub import try_to_load_from_cache
-
-        cached: Any = try_to_load_from_cache(place, _CONFIG)
-    except (ImportError, ValueError):  # not installed, or no name of a repository
-        return None
-    return Path(cached) if isinstance(cached, str) else None
-
-
-def _check_folder(folder: Path) -> None:
-    """Raise unless a folder holds a whole checkpoint."""
-    for name in _FILES:
-        if not (folder / name).is_file():
-            raise InvalidValueError(
-                f"The folder {str(folder)!r} has no {name}; a checkpoint of LeRobot holds "
-                f"{', '.join(_FILES)}, and lerobot-train puts it into {_TRAINED}."
-            )
+    except ImportError as error:
+        raise FileNotFoundError(place) from error
+    return Path(str(try_to_load_from_cache(place, _CONFIG)))

@@ -215,12 +215,12 @@ class LeRobotPolicy:
 
     def _load(self) -> None:
         """Load the checkpoint; raises like `begin`."""
+        place = "" if Path(self.place).is_dir() else " (no folder here, so an id of the Hub)"
         try:
             self._load_model()
         except ImportError as error:
-            kind = "" if Path(self.place).is_dir() else " (no folder here, so an id of the Hub)"
             raise MissingDependencyError(
-                f"{self.place!r}{kind} needs LeRobot 0.6 in an environment of its own with Python "
+                f"{self.place!r}{place} needs LeRobot 0.6 in an environment of its own with Python "
                 f"3.12: see docs/training.md ({error})."
             ) from error
         except InvalidValueError:
@@ -228,7 +228,7 @@ class LeRobotPolicy:
         except (OSError, ValueError, TypeError) as error:
             words = " ".join(f"{type(error).__name__}: {error}".split())
             raise InvalidValueError(
-                f"The checkpoint {self.place!r} cannot be loaded: {words[:_MAX_WORDS]}"
+                f"The checkpoint {self.place!r}{place} cannot be loaded: {words[:_MAX_WORDS]}"
             ) from error
 
     def _load_model(self) -> None:
