@@ -71,11 +71,12 @@ class CheckpointEpisode:
 
     Attributes:
         rng: gives the seed of each call's noise.
-        memory: attributes of the model that its reset sets anew, such as queues.
+        model: shares the weights of the policy's, but nothing that its reset sets anew, such as
+            a queue of actions.
     """
 
     rng: np.random.Generator
-    memory: dict[str, Any]
+    model: Any
 
 
 class LeRobotPolicy:
@@ -122,14 +123,12 @@ class LeRobotPolicy:
         """
         if self.model is None:
             self._load()
-        model, before = self.model, dict(vars(self.model))
-        for name, one in before.items():
+        model = copy.copy(self.model)
+        for name, one in vars(self.model).items():
             if callable(getattr(one, "reset", None)):  # such as what ensembles actions over time
                 setattr(model, name, copy.copy(one))
         model.reset()
-        # What the reset replaced, such as a queue of actions, belongs to the episode.
-        own = {name: one for name, one in vars(model).items() if before.get(name) is not one}
-        return CheckpointEpisode(np.random.default_rng(seed), own)
+        return CheckpointEpisode(np.random.default_rng(seed), model)
 
     def act_batch(
         self, states: Sequence[CheckpointEpisode], observations: Sequence[Observation]
@@ -158,14 +157,14 @@ class LeRobotPolicy:
         torch.manual_seed(seeds[0])
         batch = self._before(self._batch([*observations, *[observations[-1]] * (size - count)]))
         if size == 1:
-            rows = self._select(states[0], batch)
+            rows = self._select(states[0].model, batch)
         else:
-            rows = self._predict([*seeds, *[seeds[-1]] * (size - count)], batch)
+            rows = self._predict(states[0].model, [*seeds, *[seeds[-1]] * (size - count)], batch)
         rows = torch.stack([self._after(rows[:, i]) for i in range(rows.shape[1])], dim=1)
         actions: NDArray[np.float64] = rows[:count].cpu().numpy().astype(np.float64)
         return list(actions)
 
-    def _predict(self, seeds: Sequence[int], batch: dict[str, Any]) -> Any:  # noqa: ANN401
+    def _predict(self, model: Any, seeds: Sequence[int], batch: dict[str, Any]) -> Any:  # noqa: ANN401
         """Return the chunks of several episodes, of which the model remembers nothing."""
         import torch
 
@@ -177,14 +176,12 @@ class LeRobotPolicy:
             ]
             options["noise"] = torch.stack(noise).to(self.options.device)
         steps = getattr(self._config, "n_action_steps", None)
-        return self.model.predict_action_chunk(batch, **options)[:, :steps]
+        return model.predict_action_chunk(batch, **options)[:, :steps]
 
-    def _select(self, state: CheckpointEpisode, batch: dict[str, Any]) -> Any:  # noqa: ANN401
+    def _select(self, model: Any, batch: dict[str, Any]) -> Any:  # noqa: ANN401
         """Return the actions of one episode that no observation can change any more, (1, n, 8)."""
         import torch
 
-        model = self.model
-        vars(model).update(state.memory)
         rows = [model.select_action(batch)]
         if self._config.type in _QUEUED:
             # The last ones wait for the observations that the next answer depends on.
@@ -192,7 +189,6 @@ class LeRobotPolicy:
             decided = len(queues.get("action", getattr(model, "_action_queue", ())))
             settled = decided - (self._config.n_obs_steps - 1)
             rows += [model.select_action(batch) for _ in range(settled)]
-        state.memory.update({name: vars(model)[name] for name in state.memory})
         return torch.stack(rows, dim=1)
 
     def _batch(self, observations: Sequence[Observation]) -> dict[str, Any]:
