@@ -102,13 +102,6 @@ def test_each_arm_has_a_policy_that_fails_it(policy, arm):
 def test_the_planted_cheats_are_found_by_the_arms_alone():
     # Told, habit is as good as the oracle; nothing but another goal tells them apart.
     assert rate("habit", *(arm for arm in ALL_ARMS if arm != "other-goal"), count=12) == 1.0
-    # Another seed changes who guesses, and who understands not at all.
-    differs = [
-        (succeeds("forgetful", one, "told"), succeeds("forgetful", one, "told", seed=1))
-        for one in scenes(12)
-    ]
-    assert any(first != second for first, second in differs)
-    assert rate("listener", "told", count=12, seed=1) == 1.0
     # All paraphrases at once are harder than one for who guesses.
     both = rate("forgetful", "paraphrase-1", "paraphrase-2", count=12)
     assert both < min(rate("forgetful", f"paraphrase-{one}", count=12) for one in (1, 2))

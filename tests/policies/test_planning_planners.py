@@ -213,11 +213,6 @@ def test_qwen_shows_video_task_history_and_picture():
         assert [pictures(body) for body in server.requests] == [[0], [16], [32], [48]]
     kinds = [[part["type"] for part in content] for content in contents]
     assert kinds == [["text", "video_url", "text", "text", "text", "image_url", "text"]] * 4
-    frames, rate = decoded(base64.b64decode(contents[0][1]["video_url"]["url"].partition(",")[2]))
-    assert len(frames) == 10
-    assert len(frames) / rate == 60 / 30
-    shades = frames[:, 0, 0, 0].astype(int)
-    assert np.abs(shades - np.linspace(0, 59, 10).round()).max() < 4
     told = [content[3]["text"] for content in contents]
     assert "nothing has been done" in told[0]
     # The same words at another place are not another subgoal.

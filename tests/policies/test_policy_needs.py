@@ -60,11 +60,6 @@ def test_a_message_is_checked_like_a_policy():
         PolicyNeeds(touch=True)
 
 
-def test_the_history_has_the_cameras_of_observations_unless_declared():
-    assert PolicyNeeds(cameras=("front",)).history_cameras == ("front",)
-    assert PolicyNeeds(history_cameras=["wrist"]).history_cameras == ("wrist",)
-
-
 def test_properties_count_for_objects_only():
     class Late(Demanding):
         actions = property(lambda _self: "waypoint")

@@ -36,13 +36,3 @@ def test_the_order_of_turns_changes_no_episode_s_numbers(turns):
                 found[turn].append(draw())
     for seed, numbers in enumerate(found):
         assert numbers == drawn_alone(seed, len(numbers))
-
-
-def test_two_episodes_with_the_same_seed_draw_the_same():
-    one, other = RandomState(5), RandomState(5)
-    with one:
-        first = draw()
-    with other:
-        assert draw() == first
-    with one:
-        assert draw() != first

@@ -3,7 +3,6 @@
 import math
 import re
 
-import numpy as np
 import planner_faults
 import pytest
 from made_records import make_record
@@ -131,15 +130,6 @@ def test_a_point_outweighs_words_and_the_record_has_both():
     hands.follow(f"pick up the cube at <{row}, {column}>")  # it is no longer there
     assert hands.endings[-1].how == "refused"
     assert do(env, hands, "put it down").thing == other.item.name
-
-
-@pytest.mark.sim
-def test_an_act_of_hands_without_a_subgoal_holds_still():
-    env, hands = world_of("PickXtimes")
-    arm = env.session.world.robot.arm_positions
-    rows = hands.act({})
-    assert rows.shape == (16, 8)
-    assert np.allclose(rows[:, :7], arm)
 
 
 @pytest.mark.sim

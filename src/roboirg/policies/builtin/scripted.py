@@ -23,8 +23,6 @@ if TYPE_CHECKING:
 _StagedChunk = tuple[Stage | None, NDArray[np.float64]]
 """A chunk of actions and the stage that it belongs to; None while the command is awaited."""
 
-HOVER = "hover"
-"""A primitive that touches nothing."""
 LISTENING_STEPS = 5
 """Control steps at rest between two observations while the command has not been heard."""
 MAX_RETRIES = 3
@@ -133,7 +131,7 @@ def _get_ready(env: RoboIRGEnv) -> Iterator[_StagedChunk]:
 
     task, scene = get_task(env.episode.task), env.episode.scene
     first, *others = {task.stages(scene, goal)[0].primitive for goal in task.goals(scene)}
-    if not others and first.kind == HOVER:
+    if not others and first.kind == "hover":
         for chunk in MotionPrimitives(env.session.world).execute(first):
             yield None, chunk
     while True:
