@@ -32,19 +32,14 @@ class AppServer:
 
     Args:
         app: answers requests.
-        host: address to listen at.
-        port: 0 for any free port.
-        timeout_s: how long a connection may be idle between two requests.
+        port: of this computer; 0 for any free one.
 
     Attributes:
         socket: that listens.
-        host: address at which it listens.
     """
 
-    def __init__(
-        self, app: ASGIApp, host: str = LOOPBACK, port: int = 0, timeout_s: float = TIMEOUT_S
-    ) -> None:
-        self.socket, self.host = listen(host, port), host
+    def __init__(self, app: ASGIApp, port: int = 0) -> None:
+        self.socket = listen(LOOPBACK, port)
         self._server = uvicorn.Server(
             uvicorn.Config(
                 app,
@@ -56,7 +51,7 @@ class AppServer:
                 access_log=False,  # addresses may hold a key
                 proxy_headers=False,
                 server_header=False,
-                timeout_keep_alive=max(1, int(timeout_s)),
+                timeout_keep_alive=int(TIMEOUT_S),
                 timeout_graceful_shutdown=_STOP_S,
             )
         )

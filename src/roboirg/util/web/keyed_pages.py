@@ -28,7 +28,7 @@ from roboirg.util.web.app_server import (
     RequestGuard,
     error_handler,
 )
-from roboirg.util.web.request_origin import is_own_request, names_of_this_machine
+from roboirg.util.web.request_origin import LOOPBACK, is_own_request, names_of_this_machine
 
 MAX_BODY_BYTES = 65_536
 PRIVATE_HEADERS = {
@@ -70,7 +70,7 @@ class KeyedPageServer(AppServer):
     @property
     def url(self) -> str:
         """Address to open, with the key."""
-        return f"http://{self.host}:{self.port}/?{urlencode({'key': self.key})}"
+        return f"http://{LOOPBACK}:{self.port}/?{urlencode({'key': self.key})}"
 
     @property
     def cookie(self) -> str:

@@ -46,7 +46,7 @@ class PageServer(AppServer):
         )
         # The browser asks again each time: the records change while a run goes on.
         guard = RequestGuard(app, _refuse, {"Cache-Control": "no-cache"})
-        super().__init__(guard, LOOPBACK, port)
+        super().__init__(guard, port)
 
     @property
     def address(self) -> str:
