@@ -24,7 +24,8 @@ from roboirg.policies.builtin.oracle_policy import OraclePolicy
 from roboirg.policies.hands.scripted_hands import ScriptedHands
 from roboirg.policies.planners import make_planner as make_by_kind
 from roboirg.policies.planners.hierarchical_policy import HierarchicalPolicy
-from roboirg.policies.planners.oracle_planner import OracleOptions, OraclePlanner
+from roboirg.policies.planners.oracle_planner import OraclePlanner
+from roboirg.policies.planners.planner import SubgoalOptions
 from roboirg.policies.vlm.models import ModelOptions
 
 CHUNK = 16
@@ -369,7 +370,9 @@ def test_requirements_of_both_are_met():
         assert HierarchicalPolicy(make_planner("qwen", server), Wishful()).observe_every == 1
         assert HierarchicalPolicy(OraclePlanner(), Follower()).grounded is True
         assert (
-            HierarchicalPolicy(OraclePlanner(OracleOptions(subgoals="simple")), Follower()).grounded
+            HierarchicalPolicy(
+                OraclePlanner(SubgoalOptions(subgoals="simple")), Follower()
+            ).grounded
             is False
         )
 

@@ -90,7 +90,7 @@ def test_the_page_s_code_runs():
     ("spec", "error", "words"),
     [
         ("system:GroundSG-Qwen", UnknownNameError, "Did you mean 'GroundSG-QwenVL'"),
-        ("system:", InvalidValueError, "names no system"),
+        ("system:", UnknownNameError, "no system ''; known: FrameS"),
         ("system:none.toml", InvalidValueError, "cannot be read"),
         ("system:pi0.5?vlm=http://x", InvalidValueError, "has no planner"),
         ("system:pi0.5?sever=x:1", UnknownNameError, "Did you mean 'server'"),

@@ -22,7 +22,7 @@ from roboirg.evaluation.play.job_instruction import PreparedJob
 from roboirg.evaluation.play.policy_environment import job_needs, make_env
 from roboirg.evaluation.records.record import Job
 from roboirg.policies import make_policy, play
-from roboirg.policies.by_name.policy_classes import url_schemes
+from roboirg.policies.by_name.policy_classes import url_classes
 from roboirg.policies.policy_server import open_server
 from roboirg.policies.remote.endpoints import RemoteOptions
 from roboirg.policies.remote.protocols import protocols_by_scheme
@@ -77,7 +77,7 @@ def _tiny_package(tmp_path, monkeypatch, _fresh_registry):
 
 @pytest.mark.usefixtures("_tiny_package")
 def test_the_recipe_serves_and_plays_over_loopback():
-    assert "tiny" in url_schemes()
+    assert "tiny" in url_classes()
     with served("random", "tiny") as url:
         assert url.startswith("tiny://127.0.0.1:")
         assert {result.verdict for result in check_policy(url)} <= {"pass", "note"}

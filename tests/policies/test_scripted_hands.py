@@ -21,7 +21,8 @@ from roboirg.policies.hands.scripted_hands import ScriptedHands
 from roboirg.policies.hands.subgoal_words import read_subgoal
 from roboirg.policies.planners import make_planner
 from roboirg.policies.planners.hierarchical_policy import MOST_REFUSALS, HierarchicalPolicy
-from roboirg.policies.planners.oracle_planner import OracleOptions, OraclePlanner
+from roboirg.policies.planners.oracle_planner import OraclePlanner
+from roboirg.policies.planners.planner import SubgoalOptions
 from roboirg.tasks import all_tasks, get_task
 from roboirg.tasks.choices import choices_of
 from roboirg.tasks.splits.splits import get_episode
@@ -187,7 +188,7 @@ class Askew(OraclePlanner):
 @pytest.mark.sim
 @pytest.mark.parametrize("task", slow_but(["VideoUnmask", "StopCube"], TASKS))
 def test_forty_pixels_off_is_another_thing_or_none(task):
-    info, policy = play_with(Askew(OracleOptions()), task)
+    info, policy = play_with(Askew(SubgoalOptions()), task)
     assert info["status"] != "success"
     ends = [one.how for one in policy.endings]
     if info["status"] == "timeout" and ends[-MOST_REFUSALS:] == ["refused"] * MOST_REFUSALS:

@@ -32,10 +32,10 @@ class ProtocolHelpCommand(TyperCommand):
     """A command whose help lists the protocols; they are imported only for that."""
 
     def get_help(self, ctx: Any) -> str:  # noqa: ANN401 - typer does not export its base class
-        from roboirg.policies.by_name.policy_classes import url_schemes
+        from roboirg.policies.by_name.policy_classes import url_classes
         from roboirg.policies.remote.protocols import protocols_by_scheme
 
-        urls = ", ".join(f"{scheme}://…" for scheme in url_schemes())
+        urls = ", ".join(f"{scheme}://…" for scheme in url_classes())
         schemes = protocols_by_scheme().items()
         served_schemes = [scheme for scheme, protocol in schemes if protocol.service is not None]
         for parameter in self.params:

@@ -42,10 +42,14 @@ def read_facts(place: str) -> CheckpointFacts:
     """
     path = Path(place) / _CONFIG
     try:
-        config = json.loads((path if path.is_file() else _cached(place)).read_text("utf-8"))
+        if not path.is_file():
+            from huggingface_hub import try_to_load_from_cache
+
+            path = Path(str(try_to_load_from_cache(place, _CONFIG)))
+        config = json.loads(path.read_text(encoding="utf-8"))
         shapes = {name: one.get("shape") for name, one in config["input_features"].items()}
         limit = config.get("tokenizer_max_length")
-    except (OSError, ValueError, TypeError, KeyError, AttributeError):
+    except (ImportError, OSError, ValueError, TypeError, KeyError, AttributeError):
         return UNKNOWN  # LeRobot names what is wrong where it loads the checkpoint
     is_limit = isinstance(limit, int) and limit > 0
     return CheckpointFacts(picture_sizes(place, shapes), limit if is_limit else None)
@@ -76,12 +80,3 @@ def _width(shape: object) -> int | None:
         case [_, int(height), int(width)] if height == width > 0:
             return width
     return None
-
-
-def _cached(place: str) -> Path:
-    """Return the configuration of a repository of the Hub; raises OSError if it is not here."""
-    try:
-        from huggingface_hub import try_to_load_from_cache
-    except ImportError as error:
-        raise FileNotFoundError(place) from error
-    return Path(str(try_to_load_from_cache(place, _CONFIG)))

@@ -100,8 +100,8 @@ class LeRobotPolicy:
         del seed
         parts = split_url(url)
         self.options = read_options(parts, LeRobotPolicyOptions)
-        self.place, self.version = parts.place, self.options.version
-        facts = read_facts(parts.place)
+        self.place, self.version = parts.target, self.options.version
+        facts = read_facts(parts.target)
         self.cameras = tuple(facts.sizes)
         self.prompt_tokens = self.options.prompt_tokens or facts.prompt_tokens
         self.prompt_added, self.tokenizer = self.options.prompt_added, self.options.tokenizer

@@ -29,7 +29,6 @@ class RandomPolicy:
 
     def __init__(self, seed: int = 0) -> None:
         self.seed = seed
-        self._rng = np.random.default_rng(seed)
 
     def reset(self, instruction: str, demonstration: Demonstration) -> None:  # noqa: ARG002
         """Begin a walk that depends on the seed and the instruction alone."""

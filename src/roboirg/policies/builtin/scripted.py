@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from roboirg.core.conditions import Fact
 from roboirg.core.episode import HANDLES_HELD, Goal, Stage
 from roboirg.core.observations import Demonstration, Observation
 from roboirg.judging import Judge
+from roboirg.judging.episode_replay import facts_by_step
 from roboirg.policies.contract.base import AttachedPolicy
 from roboirg.tasks import get_task, with_goal
 
@@ -61,10 +61,8 @@ class ScriptedPolicy(AttachedPolicy, ABC):
 
     def __init__(self, seed: int = 0) -> None:
         self.seed = seed
-        self.stages: tuple[Stage, ...] = ()
         # No generator of a method: the cycle would keep the world until the next collection.
         self._chunks: Iterator[_StagedChunk] = iter(())
-        self._heard: list[str] = []
         self.stage: Stage | None = None
 
     def make_primitives(self, env: RoboIRGEnv) -> MotionPrimitives:
@@ -79,7 +77,8 @@ class ScriptedPolicy(AttachedPolicy, ABC):
 
     def reset(self, instruction: str, demonstration: Demonstration) -> None:  # noqa: ARG002
         """Decide on a goal, or listen for the rest of the instruction."""
-        self._heard, self.stages = [instruction], ()
+        self._heard = [instruction]
+        self.stages: tuple[Stage, ...] = ()
         if self.listens and self.env.unheard:
             self._chunks = _get_ready(self.env)
         else:
@@ -110,13 +109,12 @@ def _execute(
     env: RoboIRGEnv, stages: tuple[Stage, ...], primitives: MotionPrimitives
 ) -> Iterator[_StagedChunk]:
     """Yield action chunks, stage by stage; a primitive that fails is retried."""
-    progress = StageProgress(env, stages)
-    index, retries = 0, 0
+    index, retries, since = 0, 0, env.session.world.elapsed
     while index < len(stages):
         stage = stages[index]
         for chunk in primitives.execute(stage.primitive):
             yield stage, chunk
-        if progress.completed() > index:
+        if completed_stages(env, stages, since) > index:
             index += 1
         elif retries < MAX_RETRIES:
             retries += 1
@@ -138,36 +136,13 @@ def _get_ready(env: RoboIRGEnv) -> Iterator[_StagedChunk]:
         yield None, _hold_still(env)[:LISTENING_STEPS]
 
 
-class StageProgress:
-    """Counts the completed stages of a plan.
-
-    Args:
-        env: of the episode; facts before now do not count.
-        stages: to be completed, in order.
-    """
-
-    def __init__(self, env: RoboIRGEnv, stages: tuple[Stage, ...]) -> None:
-        self._env = env
-        self._judge = Judge(stages)
-        self._facts: frozenset[Fact] = env.session.world.facts
-        self._step = env.session.world.elapsed
-        self._read = len(env.session.events)
-        self._judge.update(self._step, self._facts)
-
-    def completed(self) -> int:
-        """Return the number of stages that are completed now."""
-        session = self._env.session
-        changes = iter(session.events[self._read :])
-        change = next(changes, None)
-        while self._step < session.world.elapsed:
-            self._step += 1
-            while change is not None and change.step <= self._step:
-                fact = frozenset([change.fact])
-                self._facts = self._facts | fact if change.holds else self._facts - fact
-                change = next(changes, None)
-            self._judge.update(self._step, self._facts)
-        self._read = len(session.events)
-        return self._judge.index
+def completed_stages(env: RoboIRGEnv, stages: tuple[Stage, ...], since: int) -> int:
+    """Return how many stages of a plan are completed now; facts before a step do not count."""
+    judge, now = Judge(stages), env.session.world.elapsed
+    facts = facts_by_step(env.session.events, now)
+    for step in range(since, now + 1):
+        judge.update(step, facts[step])
+    return judge.index
 
 
 def _hold_still(env: RoboIRGEnv) -> NDArray[np.float64]:

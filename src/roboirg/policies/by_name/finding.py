@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import contextlib
-import pkgutil
+import sys
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -183,7 +182,7 @@ def _refuse_undeclared(ref: PolicyRef, made: object) -> None:
 
 def _can_be_imported(policy: type[Any]) -> bool:
     """Return whether a process of its own finds the class under its name."""
-    with contextlib.suppress(ImportError, AttributeError):
-        found = pkgutil.resolve_name(f"{policy.__module__}:{policy.__name__}")
-        return policy.__module__ != "__main__" and found is policy
-    return False
+    module = policy.__module__
+    return (
+        module != "__main__" and getattr(sys.modules.get(module), policy.__name__, None) is policy
+    )

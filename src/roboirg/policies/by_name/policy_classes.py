@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import importlib
 import inspect
-import pkgutil
 from collections.abc import Mapping
 from pathlib import Path
 from types import ModuleType
@@ -16,20 +15,22 @@ from roboirg.policies.contract.base import Policy
 from roboirg.policies.contract.batch_policy import make_batched, parameters_of, takes_batches
 from roboirg.policies.contract.contract_check import check_policy
 from roboirg.policies.contract.policy_urls import is_url
+from roboirg.policies.lerobot_policy import LeRobotPolicy
 from roboirg.policies.remote.protocols import protocols_by_scheme
 from roboirg.util.discovery import entry_names
 
 _MAX_NAMED = 20
-CHECKPOINTS: Mapping[str, str] = {"lerobot": "roboirg.policies.lerobot_policy:LeRobotPolicy"}
+CHECKPOINTS: Mapping[str, type[Any]] = {"lerobot": LeRobotPolicy}
 """Policies of this process that a URL names, by its scheme; called with ``(url, seed=)``."""
 
 KINDS_GROUP = "roboirg.policy_kinds"
 """Entry points of packages that add kinds of policies; our applications add theirs so, too."""
 
 
-def url_schemes() -> tuple[str, ...]:
-    """Return the schemes of all URLs that name policies."""
-    return (*protocols_by_scheme(), *CHECKPOINTS)
+def url_classes() -> Mapping[str, type[Any]]:
+    """Return the classes of policies that URLs name, by the scheme."""
+    clients = {scheme: one.client for scheme, one in protocols_by_scheme().items()}
+    return {**clients, **CHECKPOINTS}
 
 
 def find_class(spec: str, methods: tuple[str, ...] = ("reset", "act")) -> type[Any]:
@@ -46,11 +47,13 @@ def find_class(spec: str, methods: tuple[str, ...] = ("reset", "act")) -> type[A
         MissingDependencyError: a library that the URL's scheme needs is not installed.
     """
     if is_url(spec):
-        policy_class = _url_class(spec)
-        check_policy(spec, policy_class(spec), methods)
-        return policy_class
+        scheme, classes = spec.partition("://")[0], url_classes()
+        if scheme not in classes:
+            raise UnknownNameError("policy scheme", scheme, classes)
+        check_policy(spec, classes[scheme](spec), methods)
+        return classes[scheme]
     if spec not in BUILTIN and ":" not in spec:
-        urls = (f"{scheme}://…" for scheme in url_schemes())
+        urls = (f"{scheme}://…" for scheme in url_classes())
         kinds = (f"{kind}:…" for kind in entry_names(KINDS_GROUP))
         ours = ("system:NAME", "planner:KIND", "vlm-listener:PROVIDER")
         known = [*BUILTIN, "package.module:Class", *urls, *ours, *kinds]
@@ -89,18 +92,6 @@ def _construct(spec: str, policy_class: type[Any], seed: int) -> Any:  # noqa: A
     if is_url(spec):
         return policy_class(spec, seed=seed)
     return policy_class(seed=seed) if "seed" in parameters_of(policy_class) else policy_class()
-
-
-def _url_class(spec: str) -> type[Any]:
-    """Return the class of a URL's scheme."""
-    scheme = spec.partition("://")[0]
-    if scheme in CHECKPOINTS:
-        found: type[Any] = pkgutil.resolve_name(CHECKPOINTS[scheme])
-        return found
-    protocols = protocols_by_scheme()
-    if scheme not in protocols:
-        raise UnknownNameError("policy scheme", scheme, url_schemes())
-    return protocols[scheme].client
 
 
 def _module(spec: str, name: str) -> ModuleType:

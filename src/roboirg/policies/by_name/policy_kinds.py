@@ -20,9 +20,10 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from typing import Any, NamedTuple, cast
 
-from roboirg.core.errors import InvalidValueError, UnknownNameError
+from roboirg.core.errors import UnknownNameError
 from roboirg.core.policy_ref import BUILT_IN, ELSEWHERE, HANDS, PRIVILEGED, SCRIPTED, PolicyRef
 from roboirg.policies.builtin import BUILTIN
 from roboirg.policies.by_name.policy_classes import (
@@ -79,9 +80,8 @@ def split_spec(name: str, spec: str) -> PolicyRef:
     target, _, query = rest.partition("?")
     options = {}
     if is_url(body):
-        url = split_url(body)
-        target, options = url.place, dict(url.options)
-    elif colon and kind in known_kinds():
+        return replace(split_url(body), name=name, spec=spec)
+    if colon and kind in known_kinds():
         options = parse_query(body, query)
     else:
         kind, target = BUILT_IN if body in BUILTIN else CLASS, body
@@ -118,8 +118,6 @@ def maker_of(ref: PolicyRef) -> PolicyMaker:
 def system_of(kind: str, target: str, options: Mapping[str, str]) -> System | None:
     """Return the planner and the hands that a spec puts together; None for another kind."""
     if kind == SYSTEM:
-        if not target:
-            raise InvalidValueError(f"Policy '{SYSTEM}:' names no system.")
         return find_system(target, options)
     if kind != PLANNER:
         return None

@@ -35,7 +35,6 @@ class BatchedEpisode:
 
     def __init__(self, policy: Any, seed: int) -> None:  # noqa: ANN401 - any class with two methods
         self._policy, self._seed = policy, seed
-        self._state: Any = None
 
     def __getattr__(self, name: str) -> Any:  # noqa: ANN401
         if name in ("attach", "usage", "close", "follow") or name.startswith("_"):

@@ -38,15 +38,9 @@ def check_options(kind: type[Options], values: Mapping[str, Any], origin: str) -
         if first["type"] == "missing":
             raise InvalidValueError(f"{origin}: option {name} is missing.") from None
         message = first["msg"].removeprefix("Value error, ")
+        given = re.sub(r"//[^/@]*@", "//…@", repr(first["input"]))  # no password of a URL
         end = "" if message.endswith((".", "?")) else "."
-        raise InvalidValueError(
-            f"{origin}: option {name} is {_quoted(first['input'])}: {message}{end}"
-        ) from None
-
-
-def _quoted(value: object) -> str:
-    """Return the repr of a value, without the password of a URL."""
-    return re.sub(r"//[^/@]*@", "//…@", repr(value))
+        raise InvalidValueError(f"{origin}: option {name} is {given}: {message}{end}") from None
 
 
 def _names(kind: type[BaseModel]) -> list[str]:

@@ -15,12 +15,6 @@ from roboirg.policies.contract.base import Policy, PrivilegedPolicy, tell_policy
 if TYPE_CHECKING:
     from roboirg.envs.environment import RoboIRGEnv
 
-_MET = (
-    *("actions", "demonstration_frames", "observe_every", "history_cameras"),
-    *("depth", "calibration"),
-)
-"""Needs that an environment has to meet; one that it does not is a mistake in how it was made."""
-
 
 class EpisodeLoop:
     """The turns of an episode; subclasses guard, record or split its calls."""
@@ -84,7 +78,8 @@ def play(env: RoboIRGEnv, policy: Policy) -> dict[str, Any]:
 def _check(env: RoboIRGEnv, policy: Policy) -> None:
     """Raise if the environment does not meet the policy's needs."""
     needs = PolicyNeeds.of(policy, *ENV_NEEDS)
-    for name in _MET:
+    extras = ("depth", "calibration")
+    for name in ("actions", "demonstration_frames", "observe_every", "history_cameras", *extras):
         value, given = getattr(needs, name), getattr(env, name)
         # What a policy does not declare, it takes as it comes.
         is_open = not value or not (name == "actions" or hasattr(policy, name))

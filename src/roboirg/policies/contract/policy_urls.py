@@ -3,33 +3,15 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
-from typing import NamedTuple, TypeVar
 from urllib.parse import parse_qsl, unquote
 
 from pydantic import BaseModel, ConfigDict
 
 from roboirg.core.errors import InvalidValueError
-from roboirg.policies.contract.option_checking import check_options
+from roboirg.core.policy_ref import PolicyRef
+from roboirg.policies.contract.option_checking import Options, check_options
 
-_SEPARATOR = "://"
 _URL = re.compile(r"[\w+.-]*://")
-
-
-class PolicyUrl(NamedTuple):
-    """The parts of a URL.
-
-    Attributes:
-        text: the whole URL.
-        scheme: before ``://``.
-        place: from there to the query.
-        options: of the query.
-    """
-
-    text: str
-    scheme: str
-    place: str
-    options: Mapping[str, str]
 
 
 class UrlOptions(BaseModel):
@@ -38,25 +20,23 @@ class UrlOptions(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
 
-Options = TypeVar("Options", bound=UrlOptions)
-
-
 def is_url(spec: str) -> bool:
     """Return whether a policy's spec is a URL; a URL among its options does not count."""
     return _URL.match(spec) is not None
 
 
-def split_url(spec: str) -> PolicyUrl:
-    """Split a URL into its parts.
+def split_url(spec: str) -> PolicyRef:
+    """Return the policy of a URL: the scheme is its kind, its target what follows.
 
     Raises:
         InvalidValueError: there is nothing after the scheme, or the query is malformed.
     """
-    scheme, _, rest = spec.partition(_SEPARATOR)
+    scheme, _, rest = spec.partition("://")
     place, _, query = rest.partition("?")
     if not place.strip("/"):
-        raise InvalidValueError(f"Policy {spec!r} names nothing after {scheme}{_SEPARATOR}.")
-    return PolicyUrl(spec, scheme, unquote(place), parse_query(spec, query))
+        raise InvalidValueError(f"Policy {spec!r} names nothing after {scheme}://.")
+    options = tuple(parse_query(spec, query).items())
+    return PolicyRef(name=spec, spec=spec, kind=scheme, target=unquote(place), options=options)
 
 
 def parse_query(spec: str, query: str) -> dict[str, str]:
@@ -78,11 +58,11 @@ def parse_query(spec: str, query: str) -> dict[str, str]:
     return dict(pairs)
 
 
-def read_options(url: PolicyUrl, kind: type[Options]) -> Options:
+def read_options(url: PolicyRef, kind: type[Options]) -> Options:
     """Return the options of a URL, checked.
 
     Raises:
         UnknownNameError: the scheme has no such option; the message names the nearest.
         InvalidValueError: an option has an invalid value.
     """
-    return check_options(kind, url.options, f"Policy {url.text!r}")
+    return check_options(kind, dict(url.options), f"Policy {url.spec!r}")

@@ -43,7 +43,6 @@ class SyntheticEpisodes:
 
     def __init__(self, needs: PolicyNeeds, seed: int = 0) -> None:
         self._needs = needs
-        self._frames, self._every = needs.demonstration_frames, needs.observe_every
         self._rng = np.random.default_rng(seed)
 
     def episode(self, instruction: str, size: int) -> SyntheticEpisode:
@@ -52,20 +51,24 @@ class SyntheticEpisodes:
         video: dict[str, Any] = {}
         for field in observations[0]:
             is_picture = field.endswith(("_rgb", "_depth"))
-            if field != "instruction" and not (is_picture and self._frames == "none"):
-                every = self._frames if is_picture and isinstance(self._frames, int) else 1
+            frames = self._needs.demonstration_frames if is_picture else "all"
+            if field != "instruction" and frames != "none":
+                every = 1 if frames == "all" else int(frames)
                 video[field] = np.stack([one[field] for one in observations])[:size:every]
         first = self._observation(instruction)
-        if self._every is not None:
+        if self._needs.observe_every is not None:
             first["history"] = ()
         return SyntheticEpisode(instruction, video, cast("Observation", first))
 
     def after(self, episode: SyntheticEpisode, steps: int) -> Observation:
         """Return an observation `steps` control steps later."""
         last = self._observation(episode.instruction)
-        if self._every is not None:
-            past = [self._observation(episode.instruction) for _ in range(steps // self._every)]
-            if past and steps % self._every == 0:
+        if self._needs.observe_every is not None:
+            past = [
+                self._observation(episode.instruction)
+                for _ in range(steps // self._needs.observe_every)
+            ]
+            if past and steps % self._needs.observe_every == 0:
                 past[-1] = dict(last)
             last["history"] = tuple(past)
         return cast("Observation", last)

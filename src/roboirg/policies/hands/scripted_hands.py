@@ -81,8 +81,7 @@ class ScriptedHands(AttachedPolicy):
     version = SCRIPTED_HANDS
     metadata: ClassVar[Mapping[str, str]] = {"hands": "scripted"}
 
-    def __init__(self, seed: int = 0) -> None:
-        self.seed = seed
+    def __init__(self) -> None:
         self.endings: list[SubgoalEnd] = []
 
     def reset(self, instruction: str, demonstration: Demonstration) -> None:  # noqa: ARG002
@@ -161,6 +160,7 @@ class ScriptedHands(AttachedPolicy):
     def _find_motion(self, subgoal: str) -> tuple[Primitive, str | None]:
         """Return the motion of a subgoal, and the name of the object that it means."""
         from roboirg.simulation.expert.things import held_thing
+        from roboirg.tasks.choices import choices_of
 
         request = read_subgoal(subgoal)
         if request is None:
@@ -172,10 +172,16 @@ class ScriptedHands(AttachedPolicy):
         match request.kind:
             case "hold":
                 return Primitive("hold", ROBOT, steps=request.steps), None
-            case "press":
-                return self._press(request, thing), thing
-            case "put_down":
-                return Primitive("put_down", str(held), height=self._release_height()), held
+            case "press":  # the point may be that of a target
+                is_meant = request.thing == "button"
+                button = str(thing) if is_meant else self._select(Request("press", "button"))
+                is_above = Fact("hovering", ROBOT, button) in self._world.facts
+                return Primitive("press_below" if is_above else "press", button), thing
+            case "put_down":  # at the height at which this task's expert lets go
+                motions = (one.primitives[0] for one in choices_of(self.env.episode))
+                usual = Primitive("put_down", ROBOT).height
+                height = next((one.height for one in motions if one.kind == "put_down"), usual)
+                return Primitive("put_down", str(held), height=height), held
             case kind if kind in HANDLES_HELD:
                 return Primitive(kind, str(held), thing), thing
             case kind:
@@ -203,21 +209,6 @@ class ScriptedHands(AttachedPolicy):
             count = "nothing fits" if not fits else f"{len(fits)} things fit"
             raise RefusedError(f"{count} the words {request.meant!r}; a point would say which")
         return fits[0].name
-
-    def _press(self, request: Request, thing: str | None) -> Primitive:
-        """Return the press of a button; straight down if the hand is above it already."""
-        if request.thing != "button":  # the point is that of the target
-            thing = self._select(Request("press", "button"))
-        above = Fact("hovering", ROBOT, str(thing)) in self._world.facts
-        return Primitive("press_below" if above else "press", str(thing))
-
-    def _release_height(self) -> float:
-        """Return the tool height at which this task's expert lets go of what it puts down."""
-        from roboirg.tasks.choices import choices_of
-
-        motions = (one.primitives[0] for one in choices_of(self.env.episode))
-        heights = [one.height for one in motions if one.kind == "put_down"]
-        return heights[0] if heights else Primitive("put_down", ROBOT).height
 
     def _still(self, steps: int) -> NDArray[np.float64]:
         """Return actions that keep the arm and the gripper as they are."""

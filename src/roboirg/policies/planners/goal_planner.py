@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING
 from roboirg.core.episode import HANDLES_HELD
 from roboirg.core.observations import Demonstration, Observation
 from roboirg.policies.builtin import BUILTIN
-from roboirg.policies.builtin.scripted import MAX_RETRIES, ScriptedPolicy, StageProgress
+from roboirg.policies.builtin.scripted import MAX_RETRIES, ScriptedPolicy, completed_stages
 from roboirg.policies.contract.base import SubgoalEnd
-from roboirg.policies.planners.oracle_planner import OracleOptions, OraclePlanner, stage_subgoal
+from roboirg.policies.planners.oracle_planner import OraclePlanner, stage_subgoal
+from roboirg.policies.planners.planner import SubgoalOptions
 
 if TYPE_CHECKING:
     from roboirg.envs.environment import RoboIRGEnv
@@ -27,7 +28,7 @@ class GoalPlanner(OraclePlanner):
     """
 
     def __init__(
-        self, options: OracleOptions | None = None, kind: str = "listener", seed: int = 0
+        self, options: SubgoalOptions | None = None, kind: str = "listener", seed: int = 0
     ) -> None:
         super().__init__(options, kind)
         self.grounded = False  # it reads the pixels itself
@@ -41,7 +42,7 @@ class GoalPlanner(OraclePlanner):
     def reset(self, instruction: str, demonstration: Demonstration) -> None:
         """Begin an episode; decide on a goal if everything has been said."""
         self._index = self._retries = 0
-        self._progress: StageProgress | None = None
+        self._since: int | None = None
         self._decider.reset(instruction, demonstration)
 
     def hear(self, text: str, step: int) -> None:
@@ -63,8 +64,9 @@ class GoalPlanner(OraclePlanner):
         """Return the next stage in words, as things are now; None after the last."""
         stages = self._decider.stages
         if stages and not self.reports:
-            self._progress = self._progress or StageProgress(self.env, stages)
-            self._index = self._progress.completed()
+            if self._since is None:
+                self._since = self.env.session.world.elapsed
+            self._index = completed_stages(self.env, stages, self._since)
         if self._index >= len(stages):
             return None
         is_grounded = self.options.subgoals == "grounded"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
 from fractions import Fraction
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from pydantic import Field
@@ -30,14 +30,6 @@ MIN_CLIP_FRAMES = 4
 """With fewer frames a conversation gets only the last, as a picture."""
 MAX_GAP = 8
 """Largest gap between neighbors of a group, control steps (MME-VLA; a comment there says 10)."""
-HOLDS: Mapping[str, int] = {
-    "press the button": 90,
-    "press the first button": 100,
-    "press the second button": 250,
-}
-"""Subgoals that the model tends to consider reached too early, and the last control steps at which
-they are kept: MME-VLA's rules for ButtonUnmask and ButtonUnmaskSwap, by the text of the subgoal, as
-a policy does not know its task. Only these tasks have such subgoals."""
 
 
 class QwenOptions(PlannerOptions):
@@ -54,7 +46,14 @@ class QwenPlanner(VLMPlanner[QwenOptions]):
     """Remembers the subgoals that it named: QwenVL-style. Points come in box tokens."""
 
     options_type = QwenOptions
-    holds = HOLDS
+    holds: ClassVar[Mapping[str, int]] = {
+        "press the button": 90,
+        "press the first button": 100,
+        "press the second button": 250,
+    }
+    """The model tends to consider these reached too early: MME-VLA's rules for ButtonUnmask and
+    ButtonUnmaskSwap, by the text of the subgoal, as a policy does not know its task. Only these
+    tasks have such subgoals."""
 
     def reset(self, instruction: str, demonstration: Demonstration) -> None:
         """Begin an episode."""

@@ -3,34 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any
 
-from pydantic import BaseModel, ConfigDict
+from pydantic import BaseModel
 
 from roboirg.core.episode import HANDLES_HELD, Stage
 from roboirg.core.errors import InvalidValueError
 from roboirg.core.observations import Demonstration, Observation
 from roboirg.core.subgoal_text import EMPTY_HAND
 from roboirg.policies.contract.base import AttachedPolicy, SubgoalEnd
+from roboirg.policies.planners.planner import SubgoalOptions
 
 if TYPE_CHECKING:
     from roboirg.envs.environment import RoboIRGEnv
 
-Subgoals = Literal["grounded", "simple"]
 PRESS_STEPS = 28
 """Control steps of a press from above the button until the button is down; it varies by two."""
-
-
-class OracleOptions(BaseModel):
-    """Options of the planners without a model.
-
-    Attributes:
-        subgoals: ``grounded``, with pixels of the objects, or ``simple``.
-    """
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
-
-    subgoals: Subgoals = "grounded"
 
 
 class OraclePlanner(AttachedPolicy):
@@ -40,19 +28,18 @@ class OraclePlanner(AttachedPolicy):
     carried was lost.
     """
 
-    options_type: type[BaseModel] = OracleOptions
+    options_type: type[BaseModel] = SubgoalOptions
     version = "built-in"
     reports = False
 
     def __init__(
         self,
-        options: OracleOptions | None = None,
+        options: SubgoalOptions | None = None,
         kind: str = "oracle",
         seed: int = 0,  # noqa: ARG002 - of planners that choose
     ) -> None:
-        self.options, self.kind = options or OracleOptions(), kind
+        self.options, self.kind = options or SubgoalOptions(), kind
         self.grounded = self.options.subgoals == "grounded"
-        self._last: SubgoalEnd | None = None
 
     @property
     def metadata(self) -> dict[str, Any]:
@@ -73,7 +60,7 @@ class OraclePlanner(AttachedPolicy):
 
     def reset(self, instruction: str, demonstration: Demonstration) -> None:  # noqa: ARG002
         """Begin an episode."""
-        self._last = None
+        self._last: SubgoalEnd | None = None
 
     def learn(self, end: SubgoalEnd) -> None:
         """Remember how the last subgoal ended."""

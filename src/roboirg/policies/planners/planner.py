@@ -2,12 +2,26 @@
 
 from __future__ import annotations
 
-from typing import Protocol, runtime_checkable
+from typing import Literal, Protocol, runtime_checkable
+
+from pydantic import BaseModel, ConfigDict
 
 from roboirg.core.observations import Demonstration, Observation
 
 EACH_CHUNK, WHEN_DONE = "each-chunk", "when-done"
 """When a planner is asked; ``every N steps`` is the third."""
+
+
+class SubgoalOptions(BaseModel):
+    """Options of every planner of ours.
+
+    Attributes:
+        subgoals: ``grounded``, with pixels of the objects, or ``simple``.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    subgoals: Literal["grounded", "simple"] = "grounded"
 
 
 @runtime_checkable

@@ -42,8 +42,7 @@ class System(BaseModel):
 
 def all_systems() -> tuple[str, ...]:
     """Return the names of the systems in this package."""
-    files = resources.files(PACKAGE).joinpath(FOLDER).iterdir()
-    names = (one.name for one in files)
+    names = (one.name for one in resources.files(PACKAGE).joinpath(FOLDER).iterdir())
     return tuple(sorted(name.removesuffix(SUFFIX) for name in names if name.endswith(SUFFIX)))
 
 
@@ -100,7 +99,7 @@ def _policy_with(spec: str, option: str, value: str, origin: str) -> str:
             f"Option {option!r}: the policy of {origin} is {spec!r}, which is not a URL."
         )
     url = split_url(spec)
-    place = value if option == SERVER else url.place
+    place = value if option == SERVER else url.target
     changed = {} if option == SERVER else {option.removeprefix(POLICY): value}
-    query = urlencode({**url.options, **changed})
-    return f"{url.scheme}://{place}" + (f"?{query}" if query else "")
+    query = urlencode({**dict(url.options), **changed})
+    return f"{url.kind}://{place}" + (f"?{query}" if query else "")

@@ -5,15 +5,15 @@ from __future__ import annotations
 import re
 from abc import ABC, abstractmethod
 from collections.abc import Iterable, Iterator, Mapping
-from typing import Annotated, Any, ClassVar, Generic, Literal, TypeVar
+from typing import Annotated, Any, ClassVar, Generic, TypeVar
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
 from roboirg.core.environment_options import DemonstrationFrames
 from roboirg.core.observations import Demonstration, Observation
 from roboirg.core.subgoal_text import split_point
 from roboirg.policies.contract.base import SubgoalEnd
-from roboirg.policies.planners.planner import EACH_CHUNK, WHEN_DONE
+from roboirg.policies.planners.planner import EACH_CHUNK, WHEN_DONE, SubgoalOptions
 from roboirg.policies.planners.points import says_finished
 from roboirg.policies.vlm.model_content import ChatTurn, Part, summary_clip
 from roboirg.policies.vlm.models import ModelOptions, ModelQuery
@@ -32,22 +32,18 @@ MOST_USELESS = 5
 Asked = Annotated[str, Field(pattern=rf"^({EACH_CHUNK}|{WHEN_DONE}|every [1-9]\d* steps)$")]
 
 
-class PlannerOptions(BaseModel):
+class PlannerOptions(SubgoalOptions):
     """Options of a planner that queries a model.
 
     Attributes:
         model: the model and its options.
-        subgoals: ``grounded``, with pixels, or ``simple``.
         asked: when it is queried: ``each-chunk``; ``when-done``, once its policy has reported the
             end of a subgoal, or something has been said; or ``every N steps``.
         first_pause: control steps before which there is no second query.
         prompts: a file with other prompts, or None for our own.
     """
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
-
     model: ModelOptions
-    subgoals: Literal["grounded", "simple"] = "grounded"
     asked: Asked = EACH_CHUNK
     first_pause: int = Field(default=0, ge=0)
     prompts: str | None = None

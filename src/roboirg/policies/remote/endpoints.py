@@ -11,8 +11,9 @@ from pydantic import AfterValidator, Field
 
 from roboirg.core.actions import find_action_space
 from roboirg.core.errors import InvalidValueError
+from roboirg.core.policy_ref import PolicyRef
 from roboirg.policies.contract.option_checking import Seconds
-from roboirg.policies.contract.policy_urls import PolicyUrl, UrlOptions
+from roboirg.policies.contract.policy_urls import UrlOptions
 from roboirg.util.web.request_origin import LOOPBACK_NAMES
 
 MIB = 2**20
@@ -86,19 +87,19 @@ class RemoteOptions(UrlOptions):
         return {"Authorization": f"Api-Key {key}"}
 
 
-def read_endpoints(url: PolicyUrl) -> tuple[Endpoint, ...]:
+def read_endpoints(url: PolicyRef) -> tuple[Endpoint, ...]:
     """Return the servers of a URL, which commas separate.
 
     Raises:
         InvalidValueError: a part is not ``host:port`` or ``host:port/path``.
     """
-    return tuple(_endpoint(url, part) for part in url.place.split(","))
+    return tuple(_endpoint(url, part) for part in url.target.split(","))
 
 
-def _endpoint(url: PolicyUrl, text: str) -> Endpoint:
+def _endpoint(url: PolicyRef, text: str) -> Endpoint:
     if "@" in text:
         raise InvalidValueError(
-            f"A URL of {url.scheme}:// cannot hold a key or password; put it into an environment "
+            f"A URL of {url.kind}:// cannot hold a key or password; put it into an environment "
             "variable and name that with api_key_env=NAME."
         )
     try:
@@ -108,7 +109,7 @@ def _endpoint(url: PolicyUrl, text: str) -> Endpoint:
         host, port = None, None
     if not host or not port or parts.fragment or " " in text:
         raise InvalidValueError(
-            f"Policy {url.text!r}: {text!r} is not a server; write {url.scheme}://host:port, "
+            f"Policy {url.spec!r}: {text!r} is not a server; write {url.kind}://host:port, "
             "several with commas."
         )
     return Endpoint(host, port, parts.path.rstrip("/"))

@@ -60,7 +60,7 @@ class RemotePolicy(ABC):
         self._space = find_action_space(getattr(self.options, "actions", self.actions))
         self.actions = self._space.name
         self.instruction = ""
-        self.connection = ServerConnection(parts.scheme, read_endpoints(parts), self.options)
+        self.connection = ServerConnection(parts.kind, read_endpoints(parts), self.options)
         # Without a close() the server is unlocked when the policy is deleted.
         weakref.finalize(self, self.connection.end)
 
