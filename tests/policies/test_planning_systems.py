@@ -141,7 +141,7 @@ def test_own_systems_are_files(tmp_path):
     with pytest.raises(InvalidValueError, match="option policy is missing"):
         load_system(str(file))
     file.write_text("name = ")
-    with pytest.raises(InvalidValueError, match="not TOML"):
+    with pytest.raises(InvalidValueError, match="cannot be read as TOML"):
         load_system(str(file))
 
 

@@ -32,8 +32,6 @@ from roboirg.util.media import scaled_square
 _MAX_BRIGHTNESS = 255.0
 _BATCH = 8
 _MAX_WORDS = 300
-_NOISELESS = frozenset({"act"})
-"""Types of checkpoints that draw no noise when they act."""
 _WORDLESS = frozenset({"act", "diffusion", "tdmpc", "vqbet"})
 """Types of checkpoints that have no input for text."""
 _QUEUED = frozenset({
@@ -96,8 +94,7 @@ class LeRobotPolicy:
 
     demonstration_frames: ClassVar[str] = "none"
 
-    def __init__(self, url: str, seed: int = 0) -> None:
-        del seed
+    def __init__(self, url: str, seed: int = 0) -> None:  # noqa: ARG002
         parts = split_url(url)
         self.options = read_options(parts, LeRobotPolicyOptions)
         self.place, self.version = parts.target, self.options.version
@@ -250,9 +247,9 @@ class LeRobotPolicy:
         takes = inspect.signature(model.predict_action_chunk).parameters
         shape = getattr(config, "chunk_size", None), getattr(config, "max_action_dim", None)
         self._noise = shape if "noise" in takes and None not in shape else None
-        is_single = getattr(config, "temporal_ensemble_coeff", None) is not None
-        is_noiseless = config.type in _NOISELESS and not is_single
-        self._takes_batches = self._noise is not None or is_noiseless
+        # Of other types, ACT alone draws no noise; ensembling needs each episode's own plans.
+        is_ensembled = getattr(config, "temporal_ensemble_coeff", None) is not None
+        self._takes_batches = self._noise is not None or (config.type == "act" and not is_ensembled)
         self.metadata = _describe(config, self._before, self._after)
         self.model = model.to(device).eval()
 

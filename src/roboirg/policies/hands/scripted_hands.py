@@ -207,7 +207,9 @@ class ScriptedHands(AttachedPolicy):
             fits = [by_y[0 if request.side == "right" else -1]]
         if len(fits) != 1:
             count = "nothing fits" if not fits else f"{len(fits)} things fit"
-            raise RefusedError(f"{count} the words {request.meant!r}; a point would say which")
+            side = request.side and f"{request.side}-side"
+            meant = " ".join(word for word in (side, request.color, request.thing) if word)
+            raise RefusedError(f"{count} the words {meant!r}; a point would say which")
         return fits[0].name
 
     def _still(self, steps: int) -> NDArray[np.float64]:

@@ -64,12 +64,6 @@ class Request(NamedTuple):
     point: Point | None = None
     steps: int = WAIT_STEPS
 
-    @property
-    def meant(self) -> str:
-        """The object in words."""
-        words = (self.side and f"{self.side}-side", self.color, self.thing)
-        return " ".join(word for word in words if word)
-
 
 def read_subgoal(subgoal: str) -> Request | None:
     """Return what a subgoal asks for; None if it has no form of the grammar."""

@@ -69,5 +69,6 @@ class GoalPlanner(OraclePlanner):
             self._index = completed_stages(self.env, stages, self._since)
         if self._index >= len(stages):
             return None
-        is_grounded = self.options.subgoals == "grounded"
-        return stage_subgoal(self.env, stages, self._index, grounded=is_grounded)
+        return stage_subgoal(
+            self.env, stages, self._index, grounded=self.options.subgoals == "grounded"
+        )

@@ -102,7 +102,6 @@ class GeminiPlanner(VLMPlanner[GeminiOptions]):
 
     def __init__(self, options: GeminiOptions, kind: str, seed: int = 0) -> None:
         super().__init__(options, kind, seed)
-        self.observe_every = options.observe_every
         self.demonstration_frames = "all" if options.observe_every == 1 else options.observe_every
 
     def reset(self, instruction: str, demonstration: Demonstration) -> None:
@@ -159,14 +158,14 @@ class MemerOptions(PlannerOptions):
     Attributes:
         video_frames: maximum of demonstration frames.
         recent: recent frames that are sent along with key frames, the newest included.
-        stride: control steps between them.
+        observe_every: control steps between them.
         near: largest gap between the key frames of one event, control steps.
         most: maximum of key frames, the newest; None keeps all, like MME-VLA.
     """
 
     video_frames: int = Field(default=10, ge=1)
     recent: int = Field(default=8, ge=1)
-    stride: int = Field(default=2, ge=1)
+    observe_every: int = Field(default=2, ge=1)
     near: int = Field(default=MAX_GAP, ge=0)
     most: int | None = Field(default=None, ge=1)
 
@@ -180,11 +179,6 @@ class MemerPlanner(VLMPlanner[MemerOptions]):
 
     options_type = MemerOptions
 
-    @property
-    def observe_every(self) -> int:
-        """Control steps between the recent frames."""
-        return self.options.stride
-
     def reset(self, instruction: str, demonstration: Demonstration) -> None:
         """Clear the memory."""
         super().reset(instruction, demonstration)
@@ -193,14 +187,17 @@ class MemerPlanner(VLMPlanner[MemerOptions]):
         self._last_step = 0
 
     def watch(self, observation: Observation, step: int) -> None:
-        """Keep the frames to send: the newest, and those at multiples of the stride before it."""
+        """Keep the frames to send: the newest, and those at multiples of the period before it."""
         for earlier in observation.get("history", ()):
-            self._last_step += self.options.stride
+            self._last_step += self.options.observe_every
             self._recent[self._last_step] = front_picture(earlier)
         self._recent[step] = front_picture(observation)
         # The history has no frames at odd distances from the newest; the nearest before serve.
         kept = {
-            max((at for at in self._recent if at <= step - back * self.options.stride), default=-1)
+            max(
+                (at for at in self._recent if at <= step - back * self.options.observe_every),
+                default=-1,
+            )
             for back in range(self.options.recent)
         }
         self._recent = {at: self._recent[at] for at in sorted(kept & self._recent.keys())}
@@ -260,11 +257,6 @@ class StatelessPlanner(VLMPlanner[StatelessOptions]):
     """
 
     options_type = StatelessOptions
-
-    @property
-    def observe_every(self) -> int:
-        """Control steps between the remembered pictures."""
-        return self.options.observe_every
 
     def reset(self, instruction: str, demonstration: Demonstration) -> None:
         """Begin an episode."""

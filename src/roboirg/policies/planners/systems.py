@@ -66,10 +66,10 @@ def find_system(name_or_file: str, overrides: Mapping[str, str]) -> System:
         raise UnknownNameError("system", name_or_file, [*all_systems(), f"FILE{SUFFIX}"])
     try:
         entries = tomllib.loads(file.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise InvalidValueError(f"System {name_or_file!r} cannot be read ({error}).") from error
-    except ValueError as error:  # not Unicode, or not TOML
-        raise InvalidValueError(f"System {name_or_file!r} is not TOML ({error}).") from error
+    except (OSError, ValueError) as error:  # not Unicode, or not TOML
+        raise InvalidValueError(
+            f"System {name_or_file!r} cannot be read as TOML ({error})."
+        ) from error
     origin = f"system {name_or_file}"
     system = check_options(System, entries, origin)
     policy, planner = system.policy, system.planner

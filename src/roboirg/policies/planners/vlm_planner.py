@@ -81,6 +81,7 @@ class VLMPlanner(ABC, Generic[Options]):
 
     def __init__(self, options: Options, kind: str, seed: int = 0) -> None:  # noqa: ARG002
         self.options, self.kind, self.asked = options, kind, options.asked
+        self.observe_every: int | None = getattr(options, "observe_every", None)
         self.prompts, self.shared = load_prompts(kind, options.prompts), load_prompts(SHARED)
         self.fill = self.prompts.fill
         self.vlm = VLMQuery(options.model, self.prompts["again"])
