@@ -346,6 +346,15 @@ class Asker(Hostile):
         receive_call(line)
 
 
+class Inquirer(Asker):
+    """Asks as often as it may."""
+
+    def act(self, observation: Any) -> Any:
+        for _ in range(63):
+            self.ask()
+        return super().act(observation)
+
+
 class Pesterer(Asker):
     """Keeps its world busy, which is nobody's time."""
 
@@ -430,7 +439,7 @@ FORGED = {
     "ForgesPrivilege": "policy: the process sent no valid reply (Object contains unknown field ",
     "ForgesVersion": "policy: the process sent no valid reply (Expected `str` matching regex ",
     "ForgesTurn": "policy: the process sent no valid reply (a message that nobody asked for)",
-    "AnswersTwice": "policy: the process sent no valid reply (a message that nobody asked for) in ",
+    "AnswersTwice": "policy: the process sent no valid reply (a message ",
     "Announcer": "policy: the process sent no valid reply (a message of 4,611,686,018,",
     "LyingArray": "policy: the process sent no valid reply (Expected `bytes`, got `ext` - at ",
     "GiantList": "policy: the process sent no valid reply (Input data was truncated)",

@@ -27,9 +27,11 @@ from selection import slow_but
 from roboirg.core.errors import InvalidValueError, MissingDependencyError
 from roboirg.core.policy_needs import PolicyNeeds
 from roboirg.evaluation.episode_errors import EpisodeError, EpisodeLostError
+from roboirg.evaluation.hosting import host_pool
 from roboirg.evaluation.hosting.host_pool import HostPool, HostSettings
 from roboirg.evaluation.hosting.hosted_policy import HostedPolicy
-from roboirg.evaluation.hosting.messages import Call, receive_call, send
+from roboirg.evaluation.hosting.messages import Call, HostRequest, Loss, ask, receive_call, send
+from roboirg.evaluation.hosting.policy_child import PolicyChild
 from roboirg.evaluation.hosting.policy_opening import open_policy
 from roboirg.evaluation.plan.plan import Plan
 from roboirg.evaluation.records.record import Job, Record
@@ -37,6 +39,7 @@ from roboirg.evaluation.records.store import iterate_records, read_records
 from roboirg.evaluation.run.executor import Executor, InProcess, LocalProcesses
 from roboirg.evaluation.run.runner import run_plan
 from roboirg.policies.by_name.finding import read_policy
+from roboirg.util.process_guard import descendants
 
 KILLS = int(os.environ.get("ROBOIRG_TEST_KILLS", "24"))
 
@@ -53,7 +56,9 @@ def pool() -> Iterator[HostPool]:
 
 
 def write_policy(folder: Path, monkeypatch: pytest.MonkeyPatch, name: str, text: str) -> str:
-    (folder / f"{name}.py").write_text("import os, pathlib, sys, time\nimport numpy as np\n" + text)
+    (folder / f"{name}.py").write_text(
+        "import os, pathlib, sys, time\nimport hostile_policies\nimport numpy as np\n" + text
+    )
     monkeypatch.syspath_prepend(folder)
     return f"{name}:It"
 
@@ -444,6 +449,161 @@ class It:
         worlds[1].act({})  # type: ignore[typeddict-item]
     for world in worlds:
         world.close()
+
+
+def child_of(pool: HostPool) -> PolicyChild:
+    (child,) = pool._children.values()
+    return child
+
+
+def test_a_death_is_told_alike_to_all_who_ask_even_after_a_check(
+    pool: HostPool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Would catch output that the first one takes, and a death as a call that never began."""
+    text = """
+class It(hostile_policies.Hostile):
+    def reset(self, instruction, demonstration):
+        print("last words")
+        os._exit(7)
+"""
+    world = HostedPolicy(
+        pool.connect(), read_policy(write_policy(tmp_path, monkeypatch, "told", text)), 0
+    )
+    child = child_of(pool)
+    send(world._line._line, Call("reset", value={"instruction": "", "fields": [], "arrays": {}}))
+    while not child.is_over:
+        time.sleep(0.01)
+    child.check(0.1)
+    expected = Loss("policy", "the process ended with exit code 7", b"last words\n")
+    assert child.loss() == child.loss() == expected
+    world.close()
+
+
+def test_a_call_is_not_to_blame_for_a_process_that_another_world_has_ended(
+    pool: HostPool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Would catch a call that begins when an earlier one returns just after its limit."""
+    text = """
+class It(hostile_policies.Hostile):
+    def reset(self, instruction, demonstration):
+        pathlib.Path(__file__).with_name("begun").touch()
+        time.sleep(3600)
+"""
+    ref = read_policy(write_policy(tmp_path, monkeypatch, "sleepy", text))
+    hosts = pool.connect()
+    late, world = HostedPolicy(hosts, ref, 0), HostedPolicy(pool.connect(), ref, 0)
+    with ThreadPoolExecutor() as threads:
+        call = threads.submit(world.reset, "Pick it.", {})
+        while not (tmp_path / "begun").exists():
+            time.sleep(0.01)
+        ask(hosts, HostRequest("kill"))
+        with pytest.raises(EpisodeLostError, match="another episode broke the process"):
+            call.result()
+    late.close()
+
+
+def test_a_process_is_no_hanging_one_while_it_starts_or_its_world_draws(
+    pool: HostPool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    starting = PolicyChild({})
+    starting.check(0.01)
+    assert not starting.is_over
+    starting.end()
+    text = """
+class It(hostile_policies.Hostile):
+    def reset(self, instruction, demonstration):
+        self.metadata = {"sum": int(demonstration["front_rgb"].sum())}
+"""
+    world = HostedPolicy(
+        pool.connect(), read_policy(write_policy(tmp_path, monkeypatch, "viewer", text)), 0
+    )
+
+    class Video(dict[str, Any]):
+        def __getitem__(self, field: str) -> Any:
+            child_of(pool).check(10.0)  # of a world that waits
+            return super().__getitem__(field)
+
+    world.reset("Pick it.", Video(front_rgb=np.ones((2, 4, 4, 3), np.uint8)))
+    assert world.metadata == {"sum": 96}
+    world.close()
+
+
+def test_answers_that_nobody_asked_for_hide_no_process_that_hangs(
+    pool: HostPool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    text = """
+class It(hostile_policies.Hostile):
+    def reset(self, instruction, demonstration):
+        hostile_policies.host_of(sys._getframe())._supervisor.send(b"!" * 1000)
+"""
+    world = HostedPolicy(
+        pool.connect(), read_policy(write_policy(tmp_path, monkeypatch, "eager", text)), 0
+    )
+    world.reset("Pick it.", {})
+    *_, pid = descendants(os.getpid())
+    os.kill(pid, signal.SIGSTOP)
+    child_of(pool).check(0.1)
+    assert child_of(pool).is_over
+    world.close()
+
+
+def test_messages_in_pieces_take_no_longer_than_a_call_may(
+    pool: HostPool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    text = """
+from roboirg.evaluation.hosting import host_process
+from roboirg.evaluation.hosting.messages import Outcome, send
+head = (1000).to_bytes(8, "big")
+class It(hostile_policies.Hostile):
+    def reset(self, instruction, demonstration):
+        if instruction == "slowly":
+            line = hostile_policies.line_of(hostile_policies.host_of(sys._getframe()))
+            line.sendall(head)
+            while True:
+                time.sleep(0.1)
+                line.sendall(b"0")
+        def reply(line, message):
+            send(line, message)
+            if isinstance(message, Outcome):
+                line.sendall(head)
+        host_process.send = reply
+"""
+    ref = read_policy(write_policy(tmp_path, monkeypatch, "piecemeal", text))
+    early, world = HostedPolicy(pool.connect(), ref, 0), HostedPolicy(pool.connect(), ref, 0)
+    early.reset("too early", {})
+    with pytest.raises(EpisodeLostError, match="a message of 1,000 bytes"):
+        early.reset("again", {})
+    world._line._limit_s = 0.5
+    with pytest.raises(EpisodeError, match=r"did not return within 0[.]5 s"):
+        world.reset("slowly", {})
+
+
+def test_after_ctrl_c_in_a_call_no_other_call_follows(
+    pool: HostPool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Would catch an interrupt that is forgotten for an episode to be played again."""
+
+    class Video(dict[str, Any]):
+        def __getitem__(self, field: str) -> Any:
+            raise KeyboardInterrupt
+
+    world = HostedPolicy(pool.connect(), read_policy("hosting_fakes:Dice"), 0)
+    with pytest.raises(KeyboardInterrupt):
+        world.reset("Pick it.", Video(front_rgb=None))
+    assert world.usage() == {}
+    world.close()
+
+
+def test_a_world_whose_process_cannot_be_started_can_ask_again(
+    pool: HostPool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Would catch a worker that fails all its episodes, since nobody listens to it any more."""
+    hosts, ref = pool.connect(), read_policy("hosting_fakes:Dice")
+    with monkeypatch.context() as without:
+        without.setattr(host_pool, "PolicyChild", lambda _variables: os.open("/nonexistent", 0))
+        with pytest.raises(EpisodeLostError, match="could not be started"):
+            HostedPolicy(hosts, ref, 0)
+    HostedPolicy(hosts, ref, 0).close()
 
 
 def host_pids(supervisor: int) -> list[int]:

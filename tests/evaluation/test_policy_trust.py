@@ -111,7 +111,7 @@ def test_what_is_forged_is_an_error_of_its_own_episode_and_nothing_started_survi
     notes = tmp_path / "notes"
     notes.mkdir()
     monkeypatch.setenv("HOSTILE_NOTES", str(notes))
-    names = (*hostile_policies.FORGED, "Asker", "Forker", "GuardStopper", "Umlauts")
+    names = (*hostile_policies.FORGED, "Asker", "Inquirer", "Forker", "GuardStopper", "Umlauts")
     found = play(tmp_path / "run", names)
     for name in names:
         cause = hostile_policies.FORGED.get(name)

@@ -11,10 +11,12 @@ from dataclasses import dataclass
 from typing import Any, Self
 
 from roboirg.core.policy_ref import PolicyRef
-from roboirg.evaluation.hosting.messages import receive_request, send
+from roboirg.evaluation.hosting.messages import Loss, receive_request, send
 from roboirg.evaluation.hosting.policy_child import PolicyChild
 
 DEFAULT_BATCH = 16
+
+_NO_PROCESS = Loss("infrastructure", "the policy's process could not be started")
 
 Connect = Callable[[], socket.socket]
 """Returns a new line to a pool, for a process with worlds."""
@@ -107,12 +109,12 @@ class HostPool:
                         self._leave(child)
                         child = None
                     if passed is not None:
-                        with passed:
+                        with passed, contextlib.suppress(OSError):  # there is no room for one
                             child = self._enter(request.policy, passed)
+                    elif request.method == "loss":
+                        send(line, _NO_PROCESS if child is None else child.loss())
                     elif child is None:
                         continue
-                    elif request.method == "loss":
-                        send(line, child.loss())
                     elif request.method == "kill":
                         child.kill()
                     elif request.method == "check":

@@ -22,6 +22,7 @@ import threading
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from multiprocessing.connection import wait
 from pathlib import Path
 from typing import Any
 
@@ -61,6 +62,8 @@ GATHER_S = 0.003
 """How long a call waits for others that could be carried out together with it."""
 STUCK_S = 60
 """How long a world may take to send the rest of a message; then it is given up."""
+DRAW_S = 600
+"""How long a world may take to draw."""
 
 
 @dataclass(eq=False)
@@ -108,6 +111,7 @@ class HostProcess:
     def serve(self) -> None:
         """Carry out every call."""
         with contextlib.suppress(EOFError, OSError):
+            self._supervisor.send(b"!")  # it has started
             while True:
                 self._collect(0 if self._waiting else None)
                 if self._waiting:
@@ -266,6 +270,13 @@ class HostProcess:
         answer = Call("gone")
         with contextlib.suppress(EOFError, OSError):
             send(episode.line, Question(tuple(fields)))
+            until = time.monotonic() + DRAW_S
+            while episode.line not in (
+                ready := wait([episode.line, self._supervisor], until - time.monotonic())
+            ):
+                if not ready:
+                    raise TimeoutError
+                self._obey()  # a process whose world draws does not hang
             answer = receive_call(episode.line)
         if answer.method == "gone":
             raise RuntimeError("the episode has ended")

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import os
 import socket
+import time
 from collections.abc import Callable
 from typing import Annotated, Any, Literal, NoReturn
 
@@ -131,11 +132,13 @@ class Loss(Struct):
         kind: of the error.
         words: for its cause.
         output: what it has printed since its last outcome.
+        was_ended: whether it was killed for something else than what the world that asks did.
     """
 
     kind: ErrorKind
     words: str
-    output: bytes
+    output: bytes = b""
+    was_ended: bool = False
 
 
 read_child = msgspec.msgpack.Decoder(Begun | Question | Outcome).decode
@@ -211,7 +214,10 @@ def send(line: socket.socket, message: object, on_timeout: Callable[[], None] = 
 
 
 def receive(
-    line: socket.socket, limit: int | None = None, on_timeout: Callable[[], None] = _give_up
+    line: socket.socket,
+    limit: int | None = None,
+    on_timeout: Callable[[], None] = _give_up,
+    until: float | None = None,
 ) -> bytearray:
     """Return the next message of a line, which has no arrays.
 
@@ -219,18 +225,19 @@ def receive(
         line: may have a time limit.
         limit: most bytes of a message.
         on_timeout: called when the time limit passes, after which the waiting goes on.
+        until: time of the monotonic clock at which all of it must be here, instead of that limit.
 
     Raises:
         EOFError: the line was closed.
         ValueError: the message is larger than the limit.
     """
     head = bytearray(_SIZE_BYTES)
-    _fill(line, head, on_timeout)
+    _fill(line, head, on_timeout, until)
     size = int.from_bytes(head, "big")
     if limit is not None and size > limit:
         raise ValueError(f"a message of {size:,} bytes; at most {limit:,} are read")
     data = bytearray(size)
-    _fill(line, data, on_timeout)
+    _fill(line, data, on_timeout, until)
     return data
 
 
@@ -254,9 +261,12 @@ def _fill(
     line: socket.socket,
     buffer: bytearray | memoryview,
     on_timeout: Callable[[], None] = _give_up,
+    until: float | None = None,
 ) -> None:
     left = memoryview(buffer)
     while left:
+        if until is not None:
+            line.settimeout(max(until - time.monotonic(), 0.001))
         try:
             count = line.recv_into(left, 0, socket.MSG_WAITALL)
         except TimeoutError:
@@ -267,10 +277,10 @@ def _fill(
         left = left[count:]
 
 
-def take_output(file: int) -> bytes:
-    """Return what a policy's process has printed into a file, and empty that."""
+def take_output(file: int, *, keep: bool = False) -> bytes:
+    """Return what a policy's process has printed into a file, and empty that or `keep` it."""
     output = os.pread(file, MAX_OUTPUT + 1, 0)
-    if output:
+    if output and not keep:
         os.ftruncate(file, 0)
     note = b"\n[roboirg: what else this call printed is left out]\n"
     return output[:MAX_OUTPUT] + note if len(output) > MAX_OUTPUT else output

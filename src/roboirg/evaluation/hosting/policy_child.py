@@ -15,6 +15,7 @@ import threading
 import time
 import weakref
 from collections.abc import Mapping
+from multiprocessing.connection import wait
 from tempfile import TemporaryFile
 
 from roboirg.evaluation.hosting.messages import MAX_OUTPUT, HostRequest, Loss, ask, take_output
@@ -31,8 +32,8 @@ _MODULE = "roboirg.evaluation.hosting.host_process"
 
 GUARD_S = 5.0
 """How long a guard may take to end all that a policy has started."""
-
-
+MARGIN_S = 1.0
+"""How much sooner the world of a call that hangs says so than those that wait for it."""
 PERIOD_S = 0.25
 """How often the size of its output is checked."""
 
@@ -54,6 +55,7 @@ class PolicyChild:
     def __init__(self, variables: Mapping[str, str]) -> None:
         self.worlds = 0
         self._fault: str | None = None
+        self._asking, self._answered, self._was_ended = threading.Lock(), 0.0, False
         # A file without a name: a path would name the run.
         if sys.platform == "linux":
             self._output = os.memfd_create("output")
@@ -63,6 +65,7 @@ class PolicyChild:
         weakref.finalize(self, os.close, self._output)
         fcntl.fcntl(self._output, fcntl.F_SETFL, os.O_APPEND)
         self._line, theirs = socket.socketpair()
+        weakref.finalize(self, self._line.close)  # not before: another thread may wait for it
         environment = {**os.environ, **variables}
         environment.pop(SALT_VARIABLE, None)
         with theirs, without_interrupts():
@@ -89,40 +92,49 @@ class PolicyChild:
             ask(self._line, HostRequest("open", batch=batch), passed)
 
     def check(self, limit_s: float) -> None:
-        """Kill it unless it is between two calls at some time before the limit."""
-        with contextlib.suppress(OSError):
-            ask(self._line, HostRequest("check"))
-            if select.select([self._line], [], [], limit_s)[0] and self._line.recv(1):
+        """Kill it unless it is between two calls, or dead, at some time before the limit."""
+        asked = time.monotonic()
+        with self._asking, contextlib.suppress(OSError):
+            if self._answered > asked:  # to another world, meanwhile
                 return
-        self._fault = f"the process began no call within {limit_s:g} s"
-        self.kill()
+            with contextlib.suppress(BlockingIOError):  # what it has said unasked is no answer
+                self._answered = max(
+                    self._answered, bool(self._line.recv(MAX_OUTPUT, socket.MSG_DONTWAIT))
+                )
+            ask(self._line, HostRequest("check"))
+            patience_s = limit_s + MARGIN_S if self._answered else max(limit_s, GRACE_S)
+            if wait([self._line], patience_s) and self._line.recv(1):
+                self._answered = time.monotonic()
+                return
+        if not self.is_over:
+            self._fault = f"the process began no call within {limit_s:g} s"
+            self.kill()
 
     @property
     def is_over(self) -> bool:
         """Whether it has died; waits for the guard of one that has hung up."""
-        try:
-            hung_up = not self._line.recv(1, socket.MSG_PEEK | socket.MSG_DONTWAIT)
-        except BlockingIOError:
-            hung_up = False
-        except OSError:
-            hung_up = True
-        return self._wait(GRACE_S if hung_up else 0.0) is not None
+        poll = select.poll()
+        poll.register(self._line, 0)  # for nothing but its end
+        return self._wait(GRACE_S if poll.poll(0) else 0.0) is not None
 
     def loss(self) -> Loss:
-        """Let it exit by closing its line, kill it after `GRACE_S`; return how it ended."""
-        self._line.close()
-        code = self._wait(GRACE_S)
-        if code is None:
+        """Let it exit by hanging up, kill it after `GRACE_S`; return how it ended."""
+        was_ended = self._was_ended  # before the world that asks noticed anything
+        with contextlib.suppress(OSError):
+            self._line.shutdown(socket.SHUT_RDWR)
+        if self._wait(GRACE_S) is None:
             self.kill()
             self._guard.wait()
-        output = take_output(self._output)
+        output = take_output(self._output, keep=True)  # several worlds may ask
         if self._fault is not None:
-            return Loss("timeout", self._fault, output)
-        ended = ChildExit(code)
-        return Loss("infrastructure" if ended.was_killed else "policy", str(ended), output)
+            return Loss("timeout", self._fault, output, was_ended)
+        ended = ChildExit(None if self._was_ended else self._guard.returncode)
+        words = "another episode broke the process" if was_ended else str(ended)
+        return Loss("infrastructure" if ended.was_killed else "policy", words, output, was_ended)
 
     def kill(self) -> None:
         """Let the guard kill all; if something has stopped it, kill it and them."""
+        self._was_ended = True
         self._guard.terminate()
         if self._wait(GUARD_S) is None:
             for pid in descendants(self._guard.pid):

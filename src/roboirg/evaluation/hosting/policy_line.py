@@ -33,6 +33,8 @@ from roboirg.evaluation.hosting.messages import (
 )
 from roboirg.evaluation.records.record import ErrorKind
 
+MAX_BEGUN = 64
+"""Most bytes of a `Begun`."""
 MOST_QUESTIONS = 64
 """How often a call may ask for the video of an episode; a field is kept once it is read."""
 MAX_WORDS = 300
@@ -104,6 +106,9 @@ class PolicyLine:
             raise self._lost(begun, phase, ("timeout", words)) from None
         except (EOFError, OSError):
             raise self._lost(begun, phase) from None
+        except (KeyboardInterrupt, SystemExit):  # the call goes on, so none can follow
+            self.close()
+            raise
         except (RoboIRGError, RecursionError, ValueError) as error:
             words = f"the process sent no valid reply ({error})"[:MAX_WORDS] + f" in the {phase}"
             if begun is None:  # a call of another episode may be under way
@@ -132,7 +137,7 @@ class PolicyLine:
         """Send a call and wait for its turn."""
         with waiting("its turn in the policy's process", is_queue=True):
             send(self._line, call, self._check)
-            begun = read_child(receive(self._line, MAX_MESSAGE, self._check))
+            begun = read_child(receive(self._line, MAX_BEGUN, self._check))
         if not isinstance(begun, Begun) or (begun.together and self._alone):
             raise ValueError("a message that nobody asked for")
         return begun
@@ -144,10 +149,10 @@ class PolicyLine:
     def _outcome(self, answer: Answer | None) -> Outcome:
         """Return the outcome of a call that has begun; meanwhile answer questions."""
         left_s = self._limit_s
-        for _ in range(MOST_QUESTIONS):
+        for _ in range(MOST_QUESTIONS + 1):
             start = time.monotonic()
-            self._line.settimeout(left_s)
-            reply = read_child(receive(self._line, MAX_MESSAGE))
+            until = None if left_s is None else start + left_s
+            reply = read_child(receive(self._line, MAX_MESSAGE, until=until))
             self._line.settimeout(self._limit_s)
             if isinstance(reply, Outcome):
                 return reply
@@ -168,13 +173,12 @@ class PolicyLine:
             phase: of the call, in words.
             fault: of the process, which is killed for it; None if it has ended by itself.
         """
-        with _supervised():
+        with contextlib.closing(self), _supervised():
             if fault is not None:
                 ask(self._hosts, HostRequest("kill"))
             ask(self._hosts, HostRequest("loss"))
             loss = msgspec.msgpack.decode(receive(self._hosts), type=Loss)
-        self.close()
-        if begun is None:
+        if begun is None or (loss.was_ended and fault is None):
             return EpisodeLostError(loss.kind, loss.words)
         self.output = loss.output
         kind, words = fault or (loss.kind, f"{loss.words} in the {phase}")
