@@ -55,7 +55,8 @@ class PolicyChild:
     def __init__(self, variables: Mapping[str, str]) -> None:
         self.worlds = 0
         self._fault: str | None = None
-        self._asking, self._answered, self._was_ended = threading.Lock(), 0.0, False
+        self._asking, self._answered = threading.Lock(), 0.0
+        self._has_started = self._was_ended = False
         # A file without a name: a path would name the run.
         if sys.platform == "linux":
             self._output = os.memfd_create("output")
@@ -98,11 +99,9 @@ class PolicyChild:
             if self._answered > asked:  # to another world, meanwhile
                 return
             with contextlib.suppress(BlockingIOError):  # what it has said unasked is no answer
-                self._answered = max(
-                    self._answered, bool(self._line.recv(MAX_OUTPUT, socket.MSG_DONTWAIT))
-                )
+                self._has_started |= bool(self._line.recv(MAX_OUTPUT, socket.MSG_DONTWAIT))
             ask(self._line, HostRequest("check"))
-            patience_s = limit_s + MARGIN_S if self._answered else max(limit_s, GRACE_S)
+            patience_s = limit_s + MARGIN_S if self._has_started else max(limit_s, GRACE_S)
             if wait([self._line], patience_s) and self._line.recv(1):
                 self._answered = time.monotonic()
                 return
