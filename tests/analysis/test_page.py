@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 import itertools
+import os
 import threading
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
@@ -68,7 +69,7 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Source:
         film.add_frame(world, is_demonstration=step < 20)  # type: ignore[arg-type]
     assert film.finish()
     with EpisodeLog(log_path(folder, records()[0].slug)) as log:
-        log.append(LOG)
+        os.write(log.descriptor, LOG)
     return store(folder, records(), PLAN)
 
 

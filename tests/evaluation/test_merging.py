@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
 import pytest
@@ -81,7 +82,7 @@ def test_logs_are_copied_with_the_records_that_are_kept(tmp_path: Path) -> None:
         (sources[1], two, "of the second verdict"),
     ):
         with EpisodeLog(log_path(source, record.slug)) as log:
-            log.append(words.encode())
+            os.write(log.descriptor, words.encode())
     merge_runs(sources, tmp_path / "out")
     found = [log_path(tmp_path / "out", record.slug).read_text() for record in (one, two)]
     assert found == ["of the verdict", "of the first verdict"]

@@ -5,7 +5,7 @@ from checkpoint_folders import pictures, write_checkpoint
 
 from roboirg.core.errors import InvalidValueError
 from roboirg.policies import find_policy
-from roboirg.policies.lerobot_checkpoint import UNKNOWN, read_facts
+from roboirg.policies.lerobot.checkpoint_facts import UNKNOWN, read_facts
 
 SQUARE = [3, 96, 96]
 

@@ -13,7 +13,7 @@ from roboirg.core.errors import InvalidValueError, MissingDependencyError
 from roboirg.core.policy_needs import PolicyNeeds
 from roboirg.language.token_counts import count_tokens
 from roboirg.policies.by_name.finding import find_policy
-from roboirg.policies.lerobot_policy import LeRobotPolicy
+from roboirg.policies.lerobot.checkpoint_policy import LeRobotPolicy
 from roboirg.policies.planners.systems import all_systems
 from roboirg.policies.prompt_length.prompt_audit import (
     PromptLimit,

@@ -15,7 +15,7 @@ from roboirg.policies.contract.base import Policy
 from roboirg.policies.contract.batch_policy import make_batched, parameters_of, takes_batches
 from roboirg.policies.contract.contract_check import check_policy
 from roboirg.policies.contract.policy_urls import is_url
-from roboirg.policies.lerobot_policy import LeRobotPolicy
+from roboirg.policies.lerobot.checkpoint_policy import LeRobotPolicy
 from roboirg.policies.remote.protocols import protocols_by_scheme
 from roboirg.util.discovery import entry_names
 

@@ -26,7 +26,7 @@ from roboirg.core.errors import InvalidValueError, MissingDependencyError
 from roboirg.core.observations import Demonstration, Observation
 from roboirg.core.policy_ref import UNKNOWN_VERSION
 from roboirg.policies.contract.policy_urls import UrlOptions, read_options, split_url
-from roboirg.policies.lerobot_checkpoint import PICTURE, STATE, picture_sizes, read_facts
+from roboirg.policies.lerobot.checkpoint_facts import PICTURE, STATE, picture_sizes, read_facts
 from roboirg.util.media import scaled_square
 
 _MAX_BRIGHTNESS = 255.0
