@@ -109,7 +109,7 @@ def test_the_page_s_code_runs():
         (
             "vlm-listener:openai?model=x&frame=3",
             UnknownNameError,
-            "option of policy vlm-listener:openai 'frame'.*mean 'frames'",
+            "option of policy vlm-listener:openai named 'frame'.*mean 'frames'",
         ),
         ("vlm-listener:openai?model=x&frames=no", InvalidValueError, "frames is 'no'"),
         ("vlm-listener:openai?model=x&prompts=none.toml", InvalidValueError, "cannot be read"),

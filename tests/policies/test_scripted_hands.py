@@ -247,7 +247,7 @@ def test_specs_name_planners_and_hands(model):
         ("planner:stateless", "option model is missing"),
         (
             "planner:stateless?model=x&recent=3",
-            "no option of the planner of system planner:stateless 'recent'",
+            "no option of the planner of system planner:stateless named 'recent'",
         ),
         ("planner:qwen?model=x&asked=often", "each-chunk|when-done|every"),
         ("planner:qwen?model=x&asked=when-done&hands=mme-vla://localhost:1", "does not report"),

@@ -34,7 +34,7 @@ def check_options(kind: type[Options], values: Mapping[str, Any], origin: str) -
         first = error.errors()[0]
         name = str(first["loc"][-1]) if first["loc"] else "options"
         if first["type"] == "extra_forbidden":
-            raise UnknownNameError(f"option of {origin}", name, _names(kind)) from None
+            raise UnknownNameError(f"option of {origin} named", name, _names(kind)) from None
         if first["type"] == "missing":
             raise InvalidValueError(f"{origin}: option {name} is missing.") from None
         message = first["msg"].removeprefix("Value error, ")
