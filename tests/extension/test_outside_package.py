@@ -44,7 +44,7 @@ from roboirg_outside.protocol import PROTOCOL
 from roboirg_outside.setting import SETTING
 from roboirg_outside.task import TASK
 import json
-print(json.dumps([TASK.name, SETTING.name, PROTOCOL.name, list(PROTOCOL.schemes)]))
+print(json.dumps([TASK.name, SETTING.name, PROTOCOL.name]))
 """
 UNCHANGED = """\
 import sys
@@ -114,7 +114,7 @@ def roboirg(outside, tmp_path_factory):
 
 
 def test_commands_list_what_the_package_adds(roboirg, names):
-    task, setting, protocol, _ = names
+    task, setting, protocol = names
     listed = {line.split()[0]: line for line in roboirg("tasks").splitlines()}
     assert "explicit" in listed[task]
     assert setting in listed[WITH_SETTING]
@@ -159,14 +159,14 @@ def test_an_episode_of_each_is_played_and_shown(roboirg, names):
 
 @pytest.mark.sim
 def test_the_new_protocol_serves_and_plays(outside, roboirg, names):
-    _, _, protocol, schemes = names
+    _, _, protocol = names
     server = subprocess.Popen(
         [outside, "-m", "roboirg", "serve", "random", "--protocol", protocol, "--port", "0"],
         stdout=subprocess.PIPE,
         text=True,
     )
     try:
-        address = re.search(rf"{re.escape(schemes[0])}://[\w.:]+", server.stdout.readline())
+        address = re.search(rf"{re.escape(protocol)}://[\w.:]+", server.stdout.readline())
         assert address, "serve does not print its address"
         roboirg(
             "run", "--policy", address[0], "--tasks", WITH_SETTING, "--settings", "explicit",
