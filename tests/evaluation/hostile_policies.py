@@ -438,7 +438,7 @@ FORGED = {
     "ForgesWant": "policy: the process sent no valid reply (Object contains unknown field `want",
     "ForgesPrivilege": "policy: the process sent no valid reply (Object contains unknown field ",
     "ForgesVersion": "policy: the process sent no valid reply (Expected `str` matching regex ",
-    "ForgesTurn": "policy: the process sent no valid reply (a message that nobody asked for)",
+    "ForgesTurn": "policy: the process sent no valid reply (a message that was not asked for)",
     "AnswersTwice": "policy: the process sent no valid reply (a message ",
     "Announcer": "policy: the process sent no valid reply (a message of 4,611,686,018,",
     "LyingArray": "policy: the process sent no valid reply (Expected `bytes`, got `ext` - at ",

@@ -12,7 +12,7 @@ import sys
 import threading
 import time
 from collections import deque
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
@@ -41,6 +41,7 @@ from roboirg.evaluation.run.runner import run_plan
 from roboirg.policies.by_name.finding import read_policy
 from roboirg.util.process_guard import descendants
 
+Write = Callable[[str, str], str]
 KILLS = int(os.environ.get("ROBOIRG_TEST_KILLS", "24"))
 
 
@@ -55,12 +56,24 @@ def pool() -> Iterator[HostPool]:
         yield opened
 
 
-def write_policy(folder: Path, monkeypatch: pytest.MonkeyPatch, name: str, text: str) -> str:
-    (folder / f"{name}.py").write_text(
-        "import os, pathlib, sys, time\nimport hostile_policies\nimport numpy as np\n" + text
-    )
-    monkeypatch.syspath_prepend(folder)
-    return f"{name}:It"
+@pytest.fixture
+def write_policy(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Write:
+    """Return what writes a module of a name with a class ``It``, and returns its spec."""
+
+    def write(name: str, text: str) -> str:
+        (tmp_path / f"{name}.py").write_text(
+            "import os, pathlib, sys, time\nimport hostile_policies\nimport numpy as np\n" + text
+        )
+        monkeypatch.syspath_prepend(tmp_path)
+        return f"{name}:It"
+
+    return write
+
+
+@pytest.fixture
+def host(pool: HostPool, write_policy: Write) -> Callable[[str, str], HostedPolicy]:
+    """Return what writes a policy and begins an episode of it in a process of its own."""
+    return lambda name, text: HostedPolicy(pool.connect(), read_policy(write_policy(name, text)), 0)
 
 
 def play(plan: Plan, folder: Path, executor: Executor) -> dict[Job, dict[str, Any]]:
@@ -104,12 +117,8 @@ def test_nothing_but_plain_data_and_arrays_is_sent(value: object) -> None:
         send(socket.socket(), Call("act", value=value))
 
 
-def test_a_hosted_policy_gets_what_a_policy_gets(
-    pool: HostPool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_hosted_policy_gets_what_a_policy_gets(pool: HostPool, write_policy: Write) -> None:
     spec = write_policy(
-        tmp_path,
-        monkeypatch,
         "curious",
         """
 class It:
@@ -159,11 +168,10 @@ class It:
 
 
 def test_pictures_of_a_video_are_drawn_when_they_are_read_and_then_sent_at_once(
-    pool: HostPool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    pool: HostPool,
+    write_policy: Write,
 ) -> None:
     spec = write_policy(
-        tmp_path,
-        monkeypatch,
         "choosy",
         """
 class It:
@@ -248,12 +256,8 @@ def test_a_batch_that_fails_costs_only_the_episode_to_blame(tmp_path: Path) -> N
     assert set(causes) == {"policy: ValueError: one of them is bad"}
 
 
-def test_a_privileged_policy_stays_beside_the_world(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_privileged_policy_stays_beside_the_world(tmp_path: Path, write_policy: Write) -> None:
     spec = write_policy(
-        tmp_path,
-        monkeypatch,
         "insider",
         """
 class It:
@@ -266,18 +270,17 @@ class It:
         return np.ones((24, 8))
 """,
     )
-    plan = paper_plan(f"privileged:{spec}", 1)
-    play(plan.checked(), tmp_path / "run", LocalProcesses(1))
+    play(paper_plan(f"privileged:{spec}", 1).checked(), tmp_path / "run", LocalProcesses(1))
     (record,) = read_records(tmp_path / "run")
     assert record.privileged
     assert record.policy == "privileged:insider:It"
     assert "token" in str(record.policy_metadata["secret"])
 
 
-def test_each_device_has_a_process(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_each_device_has_a_process(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, write_policy: Write
+) -> None:
     spec = write_policy(
-        tmp_path,
-        monkeypatch,
         "located",
         """
 class It:
@@ -318,20 +321,13 @@ def test_which_policies_get_a_process(tmp_path: Path) -> None:
     assert not read_policy("lerobot://some/checkpoint").is_foreign
 
 
-def test_an_import_that_never_ends_is_ended(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    spec = write_policy(tmp_path, monkeypatch, "endless", "import time\ntime.sleep(3600)")
+def test_an_import_that_never_ends_is_ended(write_policy: Write) -> None:
     with pytest.raises(InvalidValueError, match=r"not opened within 0[.]5 s"):
-        open_policy(read_policy(spec), 0.5)
+        open_policy(read_policy(write_policy("endless", "time.sleep(3600)")), 0.5)
 
 
-def test_a_policy_is_described_without_being_imported(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_policy_is_described_without_being_imported(write_policy: Write) -> None:
     spec = write_policy(
-        tmp_path,
-        monkeypatch,
         "versioned",
         """
 class It:
@@ -364,22 +360,17 @@ class It:
     ],
 )
 def test_a_policy_that_cannot_be_loaded_is_reported_before_the_run(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, text: str, error: type, words: str
+    text: str, error: type, words: str, write_policy: Write
 ) -> None:
-    spec = write_policy(tmp_path, monkeypatch, "broken", text)
     with pytest.raises(error, match=words):
-        paper_plan(spec, 1).checked()
+        paper_plan(write_policy("broken", text), 1).checked()
 
 
 # Deaths
 
 
-def test_only_the_episode_to_blame_learns_of_a_crash(
-    pool: HostPool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_only_the_episode_to_blame_learns_of_a_crash(pool: HostPool, write_policy: Write) -> None:
     spec = write_policy(
-        tmp_path,
-        monkeypatch,
         "fragile",
         """
 class It:
@@ -412,22 +403,19 @@ class It:
 
 
 def test_a_world_that_dies_in_a_call_does_not_stop_the_host(pool: HostPool) -> None:
-    spec = f"{Path(hosting_fakes.__file__).stem}:Dice"
     line = pool.connect()
-    HostedPolicy(line, read_policy(spec), 0)
+    HostedPolicy(line, read_policy("hosting_fakes:Dice"), 0)
     line.sendall((1000).to_bytes(8, "big") + b"half a message")
     line.close()
-    after = HostedPolicy(pool.connect(), read_policy(spec), 1)
-    after.close()
+    HostedPolicy(pool.connect(), read_policy("hosting_fakes:Dice"), 1).close()
 
 
 def test_time_in_the_queue_is_not_the_calls_and_what_hangs_between_calls_is_ended(
-    pool: HostPool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    pool: HostPool,
+    write_policy: Write,
 ) -> None:
     """Would catch a limit that begins when a call is sent, and a wait without any limit."""
     spec = write_policy(
-        tmp_path,
-        monkeypatch,
         "stopping",
         """
 import signal, threading
@@ -457,7 +445,8 @@ def child_of(pool: HostPool) -> PolicyChild:
 
 
 def test_a_death_is_told_alike_to_all_who_ask_even_after_a_check(
-    pool: HostPool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    pool: HostPool,
+    host: Callable[[str, str], HostedPolicy],
 ) -> None:
     """Would catch output that the first one takes, and a death as a call that never began."""
     text = """
@@ -466,9 +455,7 @@ class It(hostile_policies.Hostile):
         print("last words")
         os._exit(7)
 """
-    world = HostedPolicy(
-        pool.connect(), read_policy(write_policy(tmp_path, monkeypatch, "told", text)), 0
-    )
+    world = host("told", text)
     child = child_of(pool)
     send(world._line._line, Call("reset", value={"instruction": "", "fields": [], "arrays": {}}))
     while not child.is_over:
@@ -480,7 +467,7 @@ class It(hostile_policies.Hostile):
 
 
 def test_a_call_is_not_to_blame_for_a_process_that_another_world_has_ended(
-    pool: HostPool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    pool: HostPool, tmp_path: Path, write_policy: Write
 ) -> None:
     """Would catch a call that begins when an earlier one returns just after its limit."""
     text = """
@@ -489,7 +476,7 @@ class It(hostile_policies.Hostile):
         pathlib.Path(__file__).with_name("begun").touch()
         time.sleep(3600)
 """
-    ref = read_policy(write_policy(tmp_path, monkeypatch, "sleepy", text))
+    ref = read_policy(write_policy("sleepy", text))
     hosts = pool.connect()
     late, world = HostedPolicy(hosts, ref, 0), HostedPolicy(pool.connect(), ref, 0)
     with ThreadPoolExecutor() as threads:
@@ -503,7 +490,8 @@ class It(hostile_policies.Hostile):
 
 
 def test_a_process_is_no_hanging_one_while_it_starts_or_its_world_draws(
-    pool: HostPool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    pool: HostPool,
+    host: Callable[[str, str], HostedPolicy],
 ) -> None:
     starting = PolicyChild({})
     starting.check(0.01)
@@ -514,9 +502,7 @@ class It(hostile_policies.Hostile):
     def reset(self, instruction, demonstration):
         self.metadata = {"sum": int(demonstration["front_rgb"].sum())}
 """
-    world = HostedPolicy(
-        pool.connect(), read_policy(write_policy(tmp_path, monkeypatch, "viewer", text)), 0
-    )
+    world = host("viewer", text)
 
     class Video(dict[str, Any]):
         def __getitem__(self, field: str) -> Any:
@@ -529,16 +515,15 @@ class It(hostile_policies.Hostile):
 
 
 def test_answers_that_nobody_asked_for_hide_no_process_that_hangs(
-    pool: HostPool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    pool: HostPool,
+    host: Callable[[str, str], HostedPolicy],
 ) -> None:
     text = """
 class It(hostile_policies.Hostile):
     def reset(self, instruction, demonstration):
         hostile_policies.host_of(sys._getframe())._supervisor.send(b"!" * 1000)
 """
-    world = HostedPolicy(
-        pool.connect(), read_policy(write_policy(tmp_path, monkeypatch, "eager", text)), 0
-    )
+    world = host("eager", text)
     world.reset("Pick it.", {})
     *_, pid = descendants(os.getpid())
     os.kill(pid, signal.SIGSTOP)
@@ -548,7 +533,7 @@ class It(hostile_policies.Hostile):
 
 
 def test_messages_in_pieces_take_no_longer_than_a_call_may(
-    pool: HostPool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    pool: HostPool, write_policy: Write
 ) -> None:
     text = """
 from roboirg.evaluation.hosting import host_process
@@ -568,7 +553,7 @@ class It(hostile_policies.Hostile):
                 line.sendall(head)
         host_process.send = reply
 """
-    ref = read_policy(write_policy(tmp_path, monkeypatch, "piecemeal", text))
+    ref = read_policy(write_policy("piecemeal", text))
     early, world = HostedPolicy(pool.connect(), ref, 0), HostedPolicy(pool.connect(), ref, 0)
     early.reset("too early", {})
     with pytest.raises(EpisodeLostError, match="a message of 1,000 bytes"):
@@ -579,7 +564,7 @@ class It(hostile_policies.Hostile):
 
 
 def test_after_ctrl_c_in_a_call_no_other_call_follows(
-    pool: HostPool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    pool: HostPool,
 ) -> None:
     """Would catch an interrupt that is forgotten for an episode to be played again."""
 
@@ -673,11 +658,9 @@ def _errors(folder: Path) -> list[Record]:
 
 
 def test_an_episode_that_is_lost_again_and_again_ends_in_an_error(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, write_policy: Write
 ) -> None:
     spec = write_policy(
-        tmp_path,
-        monkeypatch,
         "deserter",
         """
 import threading

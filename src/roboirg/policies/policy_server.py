@@ -7,16 +7,15 @@ import os
 import platform
 import subprocess
 from collections.abc import Mapping
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from roboirg.core.errors import InvalidValueError, UnknownNameError
 from roboirg.core.inference_facts import inference_facts
 from roboirg.core.policy_needs import PolicyNeeds
-from roboirg.core.policy_ref import BUILT_IN
+from roboirg.core.policy_ref import BUILT_IN, PolicyRef
 from roboirg.policies.by_name.finding import make_policy, read_policy
 from roboirg.policies.by_name.policy_classes import find_class
 from roboirg.policies.by_name.policy_kinds import CLASS
-from roboirg.policies.contract.base import Policy
 from roboirg.policies.contract.json_values import as_json
 from roboirg.policies.opening import opened
 from roboirg.policies.remote.endpoints import Endpoint
@@ -96,26 +95,28 @@ def open_server(
             f"protocols that do: {', '.join(able) or 'none'}."
         )
 
-    def make() -> Policy:
-        return make_policy(policy, seed)
+    make = functools.partial(make_policy, policy, seed)
+    listening = WebsocketServer(service(make), _metadata(policy, protocol), options)
+    endpoint = Endpoint(options.host, listening.socket.getsockname()[1])
+    return PolicyServer(listening, f"{protocol}://{endpoint}")
 
+
+def _metadata(policy: PolicyRef, protocol: str) -> dict[str, Any]:
+    """Return what a server reports of a policy and of this process."""
     process = inference_facts(None)
     declared = (
         getattr(find_class(policy.body), "metadata", {}) if policy.kind in (CLASS, BUILT_IN) else {}
     )
     has_metadata = isinstance(declared, Mapping)  # a property is of an object
-    metadata = {
+    return {
         **as_json(declared if has_metadata else {}, "the policy's metadata"),
-        "policy": spec,
+        "policy": policy.spec,
         "version": policy.version,
         "protocol": protocol,
         "python": process.python,
         "libraries": process.libraries,
         **describe_arithmetic(),
     }
-    listening = WebsocketServer(service(make), metadata, options)
-    endpoint = Endpoint(options.host, listening.socket.getsockname()[1])
-    return PolicyServer(listening, f"{protocol}://{endpoint}")
 
 
 def _lacking(needs: PolicyNeeds | None, protocol: Protocol) -> list[str]:

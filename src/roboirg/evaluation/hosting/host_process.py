@@ -118,7 +118,7 @@ class HostProcess:
                     self._carry_out(self._gather())
 
     def _collect(self, seconds: float | None) -> None:
-        """Take in calls and new episodes; wait for the first one so long."""
+        """Take in calls and new episodes; wait at most some seconds for the first one."""
         for key, _ in self._ready.select(seconds):
             episode: HostedEpisode | None = key.data
             if episode is None:

@@ -33,7 +33,7 @@ _MODULE = "roboirg.evaluation.hosting.host_process"
 GUARD_S = 5.0
 """How long a guard may take to end all that a policy has started."""
 MARGIN_S = 1.0
-"""How much sooner the world of a call that hangs says so than those that wait for it."""
+"""How much longer a check waits than a call may take: the call that hangs is named first."""
 PERIOD_S = 0.25
 """How often the size of its output is checked."""
 

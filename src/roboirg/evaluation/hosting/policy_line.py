@@ -139,7 +139,7 @@ class PolicyLine:
             send(self._line, call, self._check)
             begun = read_child(receive(self._line, MAX_BEGUN, self._check))
         if not isinstance(begun, Begun) or (begun.together and self._alone):
-            raise ValueError("a message that nobody asked for")
+            raise ValueError("a message that was not asked for")
         return begun
 
     def _check(self) -> None:
@@ -157,7 +157,7 @@ class PolicyLine:
             if isinstance(reply, Outcome):
                 return reply
             if answer is None or not isinstance(reply, Question):
-                raise ValueError("a message that nobody asked for")
+                raise ValueError("a message that was not asked for")
             if left_s is not None:  # what the world takes to draw is not the policy's time
                 left_s = max(left_s - (time.monotonic() - start), 0.001)
             send(self._line, answer(reply))

@@ -151,7 +151,7 @@ class ReplyStore:
                 time.sleep(turn - now)
 
     def pause(self, service: str, seconds: float) -> None:
-        """Ask a service nothing for so long, in all processes of the run."""
+        """Let no process of the run ask a service anything for some seconds."""
         self._database.execute(_POSTPONE, (service, time.time() + seconds))
 
 
