@@ -1,10 +1,11 @@
-"""Print what each group of tests costs: items and seconds, the most costly group first.
+"""Print what each group of tests costs: items, processor time and seconds, the most costly first.
 
 ``make test`` leaves a report in build/fast-tests.xml, as pytest's option --junitxml does:
 
     python scripts/test_costs.py build/fast-tests.xml [MORE.xml ...] [--by file] [--top 30]
 
-Seconds of the clock, fixtures included; what two workers did side by side counts for both.
+Fixtures are included, and in processor time the processes that a test has started and that have
+ended. Seconds are the clock's: what workers did side by side counts for each.
 """
 
 from __future__ import annotations
@@ -27,12 +28,14 @@ class TimedTest(NamedTuple):
         file: the file in which it stands, without suffix, such as ``tests/judging/test_judge``.
         name: its name with its parameters.
         markers: names of its markers, separated by spaces.
-        seconds: how long it took, fixtures included.
+        processor_s: the processor time that it took.
+        seconds: how long it took.
     """
 
     file: str
     name: str
     markers: str
+    processor_s: float
     seconds: float
 
     def group(self, by: By) -> str:
@@ -50,27 +53,39 @@ class TimedTest(NamedTuple):
 
 def read_report(path: Path) -> list[TimedTest]:
     """Return the tests of a JUnit XML that pytest has written."""
-    return [
-        TimedTest(
-            case.get("classname", "").replace(".", "/"),
-            case.get("name", ""),
-            next((one.get("value", "") for one in case.iterfind("./properties/property")), ""),
-            float(case.get("time", "0")),
+    tests = []
+    for case in ET.parse(path).iterfind(".//testcase"):  # noqa: S314 - our own
+        noted = {
+            one.get("name"): one.get("value", "") for one in case.iterfind("./properties/property")
+        }
+        tests.append(
+            TimedTest(
+                case.get("classname", "").replace(".", "/"),
+                case.get("name", ""),
+                noted.get("markers", ""),
+                float(noted.get("processor", "0")),
+                float(case.get("time", "0")),
+            )
         )
-        for case in ET.parse(path).iterfind(".//testcase")  # noqa: S314 - our own
-    ]
+    return tests
 
 
 def table(tests: list[TimedTest], by: By, top: int) -> str:
     """Return a line for each of the most costly groups, and one for all tests."""
-    groups: dict[str, list[float]] = defaultdict(list)
+    groups: dict[str, list[TimedTest]] = defaultdict(list)
     for test in tests:
-        groups[test.group(by)].append(test.seconds)
-    costly = sorted(groups.items(), key=lambda entry: sum(entry[1]), reverse=True)
-    rows = [*costly[:top], ("all", [test.seconds for test in tests])]
+        groups[test.group(by)].append(test)
+    costs = [
+        (sum(one.processor_s for one in group), sum(one.seconds for one in group), len(group), name)
+        for name, group in [*groups.items(), ("all", tests)]
+    ]
+    rows = [*sorted(costs[:-1], reverse=True)[:top], costs[-1]]
     return "\n".join(
-        ["  items  seconds  group"]
-        + [f"{len(seconds):7} {sum(seconds):8.1f}  {name}" for name, seconds in rows]
+        ["  items  processor  seconds  group"]
+        + [
+            f"{items:7} {spent:10.1f} {seconds:8.1f}  {name}"
+            for spent, seconds, items, name in rows
+        ]
     )
 
 

@@ -51,6 +51,8 @@ importlib.metadata.entry_points = lambda **wanted: _entry_points_on(tuple(sys.pa
 MARKERS = ("slow", "sim", "browser")
 """Those by which scripts/test_costs.py groups tests."""
 
+_BEGAN = pytest.StashKey[float]()
+
 OpenPage = Callable[..., AbstractContextManager[Any]]
 
 WAIT_S = 300.0
@@ -80,6 +82,24 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     for item in items:
         found = [name for name in MARKERS if item.get_closest_marker(name) is not None]
         item.user_properties.append(("markers", " ".join(found)))
+
+
+def _processor_s() -> float:
+    """Seconds of this process and of those of its children that have ended."""
+    return sum(os.times()[:4])
+
+
+@pytest.hookimpl(wrapper=True, tryfirst=True)
+def pytest_runtest_protocol(item: pytest.Item) -> Iterator[None]:
+    """Measure each test's processor time, with fixtures and what its children took."""
+    item.stash[_BEGAN] = _processor_s()
+    return (yield)
+
+
+@pytest.hookimpl(wrapper=True, tryfirst=True)
+def pytest_runtest_teardown(item: pytest.Item) -> Iterator[None]:
+    yield
+    item.user_properties.append(("processor", f"{_processor_s() - item.stash[_BEGAN]:.3f}"))
 
 
 def pytest_collection_finish() -> None:
