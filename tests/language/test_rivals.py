@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 import itertools
 import re
 from collections import Counter
@@ -15,7 +16,7 @@ from language_variants import TASKS, first_episodes
 
 from roboirg.core.errors import InvalidValueError
 from roboirg.core.instruction_options import InstructionOptions
-from roboirg.core.word_pools import POOLS, Pools
+from roboirg.core.word_pools import POOLS
 from roboirg.language import instruct, instruct_with
 from roboirg.language.generator import find_refusal
 from roboirg.language.rivals import rival_templates
@@ -32,7 +33,7 @@ RIVAL = InstructionOptions("direct-rival")
 POINTERS = {"former": 0, "first": 0, "latter": 1, "second": 1, "last": 1}
 
 
-def told(task, split="test", count=40):
+def told(task, split="test", count=12):
     """Episodes with a rival, each with its instruction."""
     for episode in first_episodes(task, split, count):
         if find_refusal(episode, RIVAL) is None:
@@ -45,7 +46,7 @@ def remark(instruction):
 
 
 @given(st.sampled_from(TASKS), st.integers(0, 10_000), st.sampled_from(POOLS))
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=30)
 def test_random_episodes_are_read_back(task, index, pool):
     """Exactly one goal with the context, two or more without; resolved, the command alone."""
     episode = get_episode(task, "random", index)
@@ -105,8 +106,9 @@ def test_what_cannot_have_a_rival_is_refused_by_name():
         instruct(episode, "direct-rival")
 
 
+@functools.cache
 def all_told():
-    return [one for task in all_tasks() for one in told(task, "train", 100)]
+    return [one for task in all_tasks() for one in told(task, "train", 60)]
 
 
 def test_a_block_of_four_has_every_order():
@@ -183,27 +185,6 @@ def test_only_understanding_finds_the_value():
 )
 def test_other_remarks_single_nothing_out(said):
     assert read_selection(split_sentences(said)[0]) is None
-
-
-def pools(module):
-    """Every pool of a module, by name."""
-    for name, value in vars(module).items():
-        if isinstance(value, Pools):
-            yield name, value
-        elif name == "CHOICES":
-            for group in value.values():
-                yield (
-                    name,
-                    Pools(*(tuple(itertools.chain(*one)) for one in zip(*group, strict=True))),
-                )
-
-
-def test_the_pools_are_disjoint_and_have_four_each():
-    for name, pool in pools(rival_templates):
-        assert not set(pool.train) & set(pool.test), name
-        least = 2 if name == "MENTIONED" else 4
-        assert len(pool.train) >= least, name
-        assert len(pool.test) >= least, name
 
 
 def test_both_orders_have_the_same_key_words():

@@ -43,7 +43,7 @@ def words_of(text):
     return re.findall(r"[a-z0-9]+", text.lower())
 
 
-@pytest.mark.parametrize("every", slow_but([10], [10, 1]))
+@pytest.mark.parametrize("every", slow_but([31], [31, 2]))
 @pytest.mark.parametrize("task", TASKS)
 def test_every_text_of_the_splits(task, every):
     """English, mentions and their referents, in every setting, form and option."""
@@ -113,7 +113,7 @@ def check_other(instruction, mention):
 
 @pytest.mark.parametrize("task", TASKS)
 def test_every_choice_is_noted(task):
-    for episode in itertools.islice(split_episodes(task), 24):
+    for episode in itertools.islice(split_episodes(task), 12):
         said = instruct(episode, "contextual", distractors=30)
         chosen = [int(one.split("/")[1]) for one in noted(said, "distractor/")]
         said_remarks = [one.text for one in said.utterances if one.stage == "distractor"]
@@ -240,7 +240,7 @@ def test_there_are_enough_paraphrases(pool):
 @pytest.mark.parametrize("task", TASKS)
 def test_the_patterns_that_an_episode_allows_come_up_alike(task):
     found: dict[tuple, Counter] = {}
-    for index in range(192):
+    for index in range(64):
         episode = get_episode(task, "random", index)
         request = request_of(episode)
         names = tuple(name for name, _ in reasoning.possible_patterns(request))
@@ -249,7 +249,7 @@ def test_the_patterns_that_an_episode_allows_come_up_alike(task):
     for (_, names), counts in found.items():
         assert set(counts) == set(names)
         if counts.total() >= 24:
-            assert min(counts.values()) >= 0.5 * counts.total() / len(names)
+            assert min(counts.values()) >= 0.4 * counts.total() / len(names)
 
 
 PATTERNS_OF = {
@@ -302,7 +302,7 @@ def test_as_few_colors_are_excluded_as_leave_one():
 
 
 def test_goals_of_both_of_two_colors_exclude_none():
-    for index in range(200):
+    for index in range(60):
         episode = get_episode("BinFill", "random", index)
         colors = {cube.color for cube in episode.scene.of_kind("cube")}
         if len(colors) == 2 == len(episode.goal.texts("colors")):
@@ -333,7 +333,7 @@ def test_a_relation_leaves_the_number_open():
 
 
 def test_amounts_keep_count_and_color_together():
-    for episode in split_episodes("BinFill"):
+    for episode in itertools.islice(split_episodes("BinFill"), 0, None, 3):
         amounts = list(
             zip(episode.goal.texts("colors"), episode.goal.numbers("counts"), strict=True)
         )
@@ -353,7 +353,7 @@ MOVING = {"VideoUnmaskSwap": "started", "ButtonUnmaskSwap": "now"}
 
 @pytest.mark.parametrize("pool", POOLS)
 def test_where_things_move_places_are_those_before(pool):
-    for task, form, index in itertools.product(SPATIAL_TASKS, FORMS, range(24)):
+    for task, form, index in itertools.product(SPATIAL_TASKS, FORMS, range(8)):
         said = instruct(get_episode(task, "test", index), "spatial", form, wordings=pool)
         # "The former" is the thing that the introduction names.
         pointed = "former" in said.command
@@ -374,7 +374,7 @@ def test_cubes_that_will_be_covered_are_pointed_at():
 @pytest.mark.parametrize("task", TASKS)
 def test_metadata_is_plain_and_complete(task):
     keys = None
-    for episode in itertools.islice(split_episodes(task), 8):
+    for episode in itertools.islice(split_episodes(task), 3):
         for options in expressible_options(episode):
             metadata = instruct_with(episode, options).metadata
             assert json.loads(json.dumps(metadata)) == dict(metadata)

@@ -11,13 +11,15 @@ from selection import slow_but
 
 from roboirg.apps.language_lab.validation.validation_results import ValidationResults
 from roboirg.apps.language_lab.validation.validation_run import Batch, validate_batch
-from roboirg.language import expressible, instruct
+from roboirg.core.instruction_options import InstructionOptions
+from roboirg.language import instruct
+from roboirg.language.generator import find_refusal
 from roboirg.language.settings import settings_of
 from roboirg.reader import interpret
 from roboirg.tasks import get_task
 from roboirg.tasks.splits.splits import SIZES, get_episode
 
-RANDOM_SCENES = 24
+RANDOM_SCENES = 16
 """For each task, beyond those of the test split."""
 
 
@@ -33,7 +35,7 @@ ALL = (("random", RANDOM_SCENES), ("test", SIZES["test"]))
 @pytest.mark.parametrize("task", TASKS)
 @pytest.mark.parametrize(
     ("split", "episodes"),
-    slow_but([("random", 6), ("test", 6)], [("random", 6), ("test", 6), *ALL]),
+    slow_but([("random", 3), ("test", 2)], [("random", 3), ("test", 2), *ALL]),
 )
 def test_every_instruction_is_valid(task, split, episodes):
     found = results(task, split, episodes)
@@ -69,10 +71,10 @@ def told(found: ValidationResults, task: str, setting: str) -> int:
 
 @pytest.mark.parametrize("task", TASKS)
 @pytest.mark.parametrize("distractor", ["neutral", "competing"])
-@pytest.mark.parametrize("distractors", [4, 16, 64])
+@pytest.mark.parametrize("distractors", [4, 64])
 def test_long_contexts_are_read_back(task, distractor, distractors):
     options = {"distractor": distractor, "distractors": distractors}
-    for episode in random_episodes(task, 4):
+    for episode in random_episodes(task, 3):
         said = instruct(episode, "contextual", **options)
         found = interpret(said.text, episode.scene, task)
         assert (found.goals, found.not_understood) == ((episode.goal,), ()), said.text
@@ -113,9 +115,9 @@ def test_the_exceptions_of_necessity_are_the_named_ones():
 @pytest.mark.parametrize("task", SPATIAL_TASKS)
 def test_hardly_any_episode_lacks_a_landmark(task):
     by_difficulty: dict[str, list[bool]] = {}
-    for index in range(200):
+    for index in range(80):
         episode = get_episode(task, "random", index)
-        told = "spatial" in expressible(episode)
+        told = find_refusal(episode, InstructionOptions("spatial")) is None
         by_difficulty.setdefault(episode.difficulty, []).append(told)
     everywhere = [told for values in by_difficulty.values() for told in values]
     assert everywhere.count(False) < 0.05 * len(everywhere)

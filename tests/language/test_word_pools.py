@@ -9,42 +9,39 @@ from dataclasses import replace
 import pytest
 from language_variants import TASKS, split_episodes
 from plan_files import plan_file
-from selection import slow_but
 from typer.testing import CliRunner
 
 from roboirg import main as cli
 from roboirg.apps.language_lab.validation.validation_run import Batch, validate_batch
 from roboirg.core.episode import SPLITS
 from roboirg.core.word_pools import POOLS, Pools, pool_of
-from roboirg.evaluation.plan.plan_maker import make_plan
-from roboirg.evaluation.play.job_instruction import instruct_job
 from roboirg.language import instruct, plain_settings
+from roboirg.language.grounded import grounded_templates
+from roboirg.language.rivals import rival_templates
 from roboirg.language.settings import all_settings
-from roboirg.language.slot_types.number import SAME_NUMBER
+from roboirg.language.slot_types import number
 from roboirg.language.templates import derivations, introductions, remarks
 from roboirg.language.variants import instructions
-from roboirg.tasks import all_tasks, every_task
+from roboirg.tasks import every_task
 from roboirg.tasks.splits.splits import get_episode
 
+
+def pools_in(name, value):
+    """Yield every pool in the values of a module, with its name."""
+    if isinstance(value, Pools):
+        yield name, value
+    elif isinstance(value, dict | tuple) and name not in ("OTHERS", "__builtins__"):
+        for part, one in value.items() if isinstance(value, dict) else enumerate(value):
+            yield from pools_in(f"{name}-{part}", one)
+
+
 KINDS = {
-    name: pools
-    for module in (introductions, remarks, derivations)
-    for name, pools in vars(module).items()
-    if isinstance(pools, Pools)
+    found: pools
+    for module in (introductions, remarks, derivations, rival_templates, grounded_templates, number)
+    for name, value in vars(module).items()
+    for found, pools in pools_in(name, value)
 }
 IMPLICIT = tuple(name for name in plain_settings() if all_settings()[name].implicit)
-
-OF_VERSION_1 = {
-    "COLOR_INTRODUCTIONS": 4, "NUMBER_INTRODUCTIONS": 4, "AMOUNT_INTRODUCTIONS": 4,
-    "REFERENCE_AMOUNT_INTRODUCTIONS": 3, "VISIT_INTRODUCTIONS": 3, "PLACEMENT_INTRODUCTIONS": 3,
-    "MOMENT_INTRODUCTIONS": 3, "PLACE_INTRODUCTIONS": 12, "EXCLUDED_INTRODUCTIONS": 4,
-    "SINGLED_INTRODUCTIONS": 3, "TWO_MOMENTS_INTRODUCTIONS": 3, "NEIGHBOR_INTRODUCTIONS": 3,
-    "COLOR_REINFORCEMENTS": 4, "NUMBER_REINFORCEMENTS": 3, "VISIT_REINFORCEMENTS": 3,
-    "VIDEO_REINFORCEMENTS": 3, "NEUTRAL_DISTRACTORS": 24, "COMPETING_COLOR_DISTRACTORS": 3,
-    "COMPETING_NUMBER_DISTRACTORS": 3, "COMPETING_VISIT_DISTRACTORS": 3,
-    "COMPETING_PLACEMENT_DISTRACTORS": 3, "COMPETING_MOMENT_DISTRACTORS": 3, "CUES": 5,
-}  # fmt: skip
-"""Templates of the version before the pools, by kind; places had four kinds of their own."""
 
 
 def words_of(template):
@@ -62,13 +59,9 @@ def test_no_template_is_in_both_pools(name):
     assert len(list(pools.everything)) == len(pools.train) + len(pools.test)
 
 
-def test_no_words_for_the_same_number_are_in_both_pools():
-    assert not set(SAME_NUMBER.train) & set(SAME_NUMBER.test)
-
-
-@pytest.mark.parametrize("name", OF_VERSION_1)
-def test_there_are_twice_as_many_templates_as_before_the_pools(name):
-    assert len(list(KINDS[name].everything)) >= 2 * OF_VERSION_1[name]
+def test_the_pools_of_every_module_are_found():
+    assert len(KINDS) >= 50
+    assert {"CUES", "SAME_NUMBER", "SINGLED"} <= KINDS.keys()
 
 
 @pytest.mark.parametrize("task", every_task().values(), ids=lambda task: task.name)
@@ -118,10 +111,11 @@ def test_a_pool_may_be_chosen(setting, pool):
 
 @functools.cache
 def implicit_texts(setting):
-    """The texts of the implicit form, by split."""
+    """The texts of the implicit form of every eleventh episode, by split."""
     found = {split: set() for split in SPLITS}
     for task in TASKS:
-        for episode, said in instructions(split_episodes(task), [setting], ["implicit"]):
+        some = itertools.islice(split_episodes(task), 0, None, 11)
+        for episode, said in instructions(some, [setting], ["implicit"]):
             found[episode.split].add(said.text)
     return found
 
@@ -129,7 +123,7 @@ def implicit_texts(setting):
 @pytest.mark.parametrize("setting", IMPLICIT)
 def test_no_text_of_the_test_split_is_in_training(setting):
     texts = implicit_texts(setting)
-    assert len(texts["test"]) >= 40 * sum(
+    assert len(texts["test"]) >= 4 * sum(
         setting in {one.name for one in all_settings().values() if one.applies_to(task)}
         for task in every_task().values()
     )
@@ -140,28 +134,15 @@ def test_no_text_of_the_test_split_is_in_training(setting):
 def test_every_setting_begins_in_many_ways(setting):
     texts = set().union(*implicit_texts(setting).values())
     openings = {tuple(re.findall(r"[\w']+", text.lower())[:3]) for text in texts}
-    assert len(openings) >= 60
+    assert len(openings) >= 40
 
 
-@pytest.mark.parametrize("pool", POOLS)
 @pytest.mark.parametrize("task", TASKS)
-@pytest.mark.parametrize("episodes", slow_but([3], [3, 12]))
-def test_every_split_is_valid_in_the_words_of_either_pool(task, pool, episodes):
-    for split in ("train", "test"):
-        found = validate_batch(Batch(task, split, 0, episodes, wordings_file=pool))
+def test_every_split_is_valid_in_the_words_of_the_other_pool(task):
+    for split, pool in (("train", "test"), ("test", "train")):
+        found = validate_batch(Batch(task, split, 2, 1, wordings_file=pool))
         assert not found.failures
-        # With a rival, too, where there is one.
-        assert 2 * episodes <= found.texts[task, "direct"] <= 4 * episodes
-
-
-@pytest.mark.parametrize("pool", POOLS)
-def test_a_plan_takes_a_pool_in_the_place_of_a_file(pool):
-    plan = make_plan(["random"], tasks="PickXtimes", settings="direct", episodes="2", wordings=pool)
-    (job, *_) = plan.jobs()
-    assert (job.options.wordings, job.wordings_file) == (pool, pool)
-    said = instruct_job(job)
-    assert said.metadata["pool"] == pool
-    assert said.text == instruct(get_episode("PickXtimes", "test", 0), "direct", wordings=pool).text
+        assert found.texts[task, "direct"] == 2
 
 
 def call(*words):
@@ -176,11 +157,10 @@ def test_the_commands_take_a_pool(pool, tmp_path):
     expected = instruct(episode, wordings=pool).text
     assert expected in call("show", "StopCube", "0", "--words", "--wordings", pool)
     out = tmp_path / "rows.jsonl"
-    words = ("--settings", "explicit", "--split", "val")
+    words = ("--tasks", "StopCube", "--settings", "explicit", "--split", "val")
     plan = plan_file(wordings=pool, forms="implicit")
     call("export", "instructions", "--out", str(out), *words, "--plan", plan)
-    rows = out.read_text().splitlines()
-    assert len(rows) == 50 * len(all_tasks())
+    assert len(out.read_text().splitlines()) == 50
     run = ("run", "--policy", "random", "--out", str(tmp_path / "run"), "--dry-run")
     assert "1 episode" in call(
         *run, "--tasks", "StopCube", "--settings", "direct", "--episodes", "1",
