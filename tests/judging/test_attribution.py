@@ -114,7 +114,7 @@ episodes = st.builds(get_episode, st.sampled_from(TASKS), st.just("test"), st.in
 
 
 @given(episodes, st.floats(0, 1, exclude_max=True))
-@settings(max_examples=150)
+@settings(max_examples=40)
 def test_right_acts_that_stop_early_fail_by_execution(episode: Episode, share: float) -> None:
     staged = Staged(episode).play(episode.stages)
     end = staged.turn + int(share * (staged.step - staged.turn))
@@ -128,7 +128,7 @@ def test_right_acts_that_stop_early_fail_by_execution(episode: Episode, share: f
 
 
 @given(episodes, st.data())
-@settings(max_examples=200)
+@settings(max_examples=60)
 def test_taking_one_thing_for_another_is_a_grounding_failure_or_none(
     episode: Episode, data: st.DataObject
 ) -> None:
@@ -167,7 +167,7 @@ def anything(episode: Episode) -> st.SearchStrategy[list[frozenset[Fact]]]:
 
 
 @given(episodes, st.data(), st.booleans())
-@settings(max_examples=300)
+@settings(max_examples=60)
 def test_whatever_happens_there_is_one_attribution_of_a_failure_and_none_else(
     episode: Episode, data: st.DataObject, timed_out: bool
 ) -> None:

@@ -19,7 +19,7 @@ from roboirg.language import instruct, mirrored_objects
 from roboirg.policies import make_policy, play
 from roboirg.policies.builtin.scripted import ScriptedPolicy
 from roboirg.simulation.expert.primitives import MotionPrimitives
-from roboirg.tasks import all_tasks, get_task
+from roboirg.tasks import every_task, get_task
 from roboirg.tasks.splits.splits import get_episode, split_episodes
 
 pytestmark = pytest.mark.sim
@@ -53,16 +53,21 @@ class Mistaken(ScriptedPolicy):
 
 
 @pytest.mark.parametrize(
-    "task", slow_but(["PickXtimes", "VideoUnmask", "VideoRepick"], all_tasks())
+    "task", slow_but(["PickXtimes", "VideoUnmask", "VideoRepick", "PutInBox"], every_task())
 )
 def test_hands_that_do_another_task_well_fail_by_grounding(task: str) -> None:
     episode = get_episode(task, "test", 3)
     others = [goal for goal in get_task(task).goals(episode.scene) if goal != episode.goal]
-    for goal in (others[0], others[-1]):
+    for goal in {others[0], others[-1]}:
         env = roboirg.make(episode, cameras=(), max_steps=1000)
         info = play(env, Mistaken(goal))
         found = finding(env, info)
-        assert (found is None) == (info["status"] == "success")
+        # A goal that includes more than the right one succeeds on the way.
+        planned = get_task(task).stages(episode.scene, goal)
+        succeeds = planned[: len(episode.stages)] == episode.stages
+        assert info["status"] in ({"success"} if succeeds else {"failure", "timeout"}), goal
+        assert (info["cause"] is None) == (info["status"] == "success") == info["is_success"]
+        assert (found is None) == succeeds
         assert found is None or found.kind == "grounding", (goal, found)
 
 
@@ -71,7 +76,6 @@ def test_hands_that_do_another_task_well_fail_by_grounding(task: str) -> None:
     [
         ("VideoUnmask", 1, "wrong_object", "container"),
         ("PickXtimes", 1, "wrong_count", "cube"),
-        ("VideoPlaceOrder", 1, "wrong_place", "cube"),
     ],
 )
 def test_the_forgetful_listener(task: str, episode: int, failure: str, subject: str) -> None:
@@ -145,17 +149,14 @@ def opened(rows: NDArray[np.float64]) -> NDArray[np.float64]:
         (missing, "missed_grasp"),
     ],
 )
-@pytest.mark.parametrize("task", ["PickXtimes", "VideoPlaceButton"])
-def test_what_the_hand_does(
-    task: str, work: Callable[[MotionPrimitives, str], Pieces], failure: str
-) -> None:
-    env = roboirg.make(task, episode=3, cameras=(), max_steps=400)
+def test_what_the_hand_does(work: Callable[[MotionPrimitives, str], Pieces], failure: str) -> None:
+    env = roboirg.make("PickXtimes", episode=3, cameras=(), max_steps=300)
     _, info = env.reset()
     cube = env.episode.stages[0].primitive.subject
     for piece in work(MotionPrimitives(env.session.world), cube):
         *_, info = env.step_chunk(piece)
     resting = np.append(env.session.world.robot.arm_positions, piece[-1, -1])
-    *_, info = env.step_chunk(np.repeat(resting[None], 400, axis=0))
+    *_, info = env.step_chunk(np.repeat(resting[None], 300, axis=0))
     assert info["status"] == "timeout"
     found = finding(env, info)
     assert found is not None

@@ -1,4 +1,4 @@
-"""Depth, segmentation and calibration fit each other and the scene."""
+"""Pictures are of their moment; depth, segmentation and calibration fit the scene."""
 
 import numpy as np
 import pytest
@@ -73,3 +73,31 @@ def test_one_drawing_gives_everything(world, cameras, takes):
         assert (picture[seen][:, 1:] < 60).all()
     assert len(takes) >= 1
     cube.put(cube.item.position)
+
+
+def test_pictures_do_not_depend_on_other_worlds_in_the_process():
+    episode = get_episode("PickXtimes", "test", 3)
+    first = World(episode.scene)
+    first.step(HOME_ACTION)
+    alone = [first.picture(camera) for camera in CAMERAS]
+    other_episode = get_episode("VideoUnmask", "test", 0)
+    other = World(other_episode.scene)
+    other.step(HOME_ACTION)
+    other.picture("front")
+    again = World(episode.scene)
+    again.step(HOME_ACTION)
+    for camera, picture in zip(CAMERAS, alone, strict=True):
+        assert np.array_equal(first.picture(camera), picture)
+        assert np.array_equal(again.picture(camera), picture)
+
+
+def test_a_picture_is_drawn_again_when_something_moves():
+    world = World(get_episode("PickXtimes", "test", 0).scene)
+    world.step(HOME_ACTION)
+    before = world.picture("front")
+    before[:] = 0  # callers may do with a picture what they like
+    still = world.picture("front")
+    assert still.any()
+    cube = next(body for body in world.bodies.values() if body.item.kind == "cube")
+    cube.put(cube.item.position._replace(x=0.1))
+    assert not np.array_equal(world.picture("front"), still)

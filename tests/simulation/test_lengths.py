@@ -54,21 +54,19 @@ def first_scenes(task, difficulty, count):
     return found
 
 
-@pytest.mark.parametrize(
-    ("task", "difficulty"), slow_but([one for one in VIDEOS if one[1] == "easy"], VIDEOS)
-)
+@pytest.mark.parametrize(("task", "difficulty"), slow_but([("VideoUnmaskSwap", "easy")], VIDEOS))
 def test_videos_are_as_long_as_the_known_ones_within_a_tenth(task, difficulty):
     low, high = VIDEOS[task, difficulty]
-    for episode in first_scenes(task, difficulty, 2):
-        frames = []
-        EpisodeSession(episode, visible=False).play_demonstration(frames.append)
-        assert 0.9 * low <= len(frames) <= 1.1 * high, episode.seed
+    (episode,) = first_scenes(task, difficulty, 1)
+    frames = []
+    EpisodeSession(episode, visible=False).play_demonstration(frames.append)
+    assert 0.9 * low <= len(frames) <= 1.1 * high
 
 
 def test_primitives_take_as_long_as_the_known_ones_within_fifteen_percent():
     steps = defaultdict(list)
     for task in ("VideoRepick", "VideoPlaceButton"):
-        for episode in first_scenes(task, "medium", 3):
+        for episode in first_scenes(task, "medium", 2):
             session = EpisodeSession(episode, visible=False)
             expert = MotionPrimitives(session.world)
             for stage in episode.demonstration:

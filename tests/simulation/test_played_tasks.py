@@ -1,41 +1,56 @@
-"""Every task in the simulator: one success, one failure, the same again, everything in sight."""
+"""Every task in the simulator: success and what it looks like, the same again, all in sight."""
 
 import hashlib
 import itertools
+from pathlib import Path
 
+import cv2
 import numpy as np
 import pytest
-from selection import slow_but
 
 import roboirg
-from roboirg.core.episode import DIFFICULTIES, Goal
+from roboirg.core.episode import DIFFICULTIES
 from roboirg.core.errors import SceneRejectedError
 from roboirg.core.motions import Away, Glow, Swap
 from roboirg.core.observations import CAMERAS
 from roboirg.policies import make_policy, play
-from roboirg.policies.builtin.scripted import ScriptedPolicy
 from roboirg.simulation import physics_settings
 from roboirg.simulation.world import World
-from roboirg.tasks import every_task, get_task
-from roboirg.tasks.splits.splits import get_episode, make_episode
+from roboirg.tasks import every_task
+from roboirg.tasks.splits.splits import make_episode
 
 pytestmark = pytest.mark.sim
 
 TASKS = tuple(every_task())
+PICTURES = Path(__file__).parent / "pictures"
+
+# Another version of the driver may move a pixel at an edge or change it by a level.
+FAR_OFF_LEVELS = 24
+FAR_OFF_SHARE = 0.01
+
+END = -1
+MOMENTS = {
+    ("PickXtimes", 2): {1: "start", 95: "middle", END: "end"},
+    ("StopCube", 3): {END: "stopped"},
+    ("SwingXtimes", 3): {END: "glowing"},
+    ("BinFill", 3): {160: "filling"},
+    ("VideoUnmaskSwap", 3): {90: "swapping"},
+    ("VideoUnmask", 3): {20: "start", 160: "middle", END: "end"},
+    ("ButtonUnmaskSwap", 3): {140: "swapping"},
+    ("ButtonUnmask", 3): {END: "lifted"},
+    ("VideoRepick", 2): {236: "swapping"},
+    ("VideoPlaceButton", 3): {END: "placed"},
+    ("VideoPlaceOrder", 3): {END: "placed"},
+    ("PutInBox", 0): {1: "start", END: "inside"},
+    ("PickByCount", 1): {1: "start", END: "done"},
+}
+"""Elapsed steps of the oracle's run; the last is the step of success, whichever it is."""
+BOTH_CAMERAS = {"PickXtimes", "VideoUnmask", "PutInBox", "PickByCount"}
+"""For the other tasks only the front picture is stored; the wrist's shows no other objects."""
+REPEATED = {"PickXtimes", "VideoUnmask", "PutInBox"}
 
 HIDDEN_KINDS = {"hidden_cube", "site", "marker"}
 """What the front camera need not see, because a container, nothing or a light shows it."""
-
-
-class Mistaken(ScriptedPolicy):
-    """The scripted expert with another goal."""
-
-    def __init__(self, goal: Goal) -> None:
-        super().__init__()
-        self.goal = goal
-
-    def decide(self, env, instruction):
-        return self.goal
 
 
 def scenes(task, count):
@@ -52,69 +67,48 @@ def _valid_scenes(task):
             continue
 
 
-def trace(episode):
-    """Verdict, events and every action and joint position of the oracle's play."""
-    env = roboirg.make(episode, cameras=())
-    digest = hashlib.sha256()
-    inner = env.step_chunk
+def trace(task, index, shoot=None):
+    """Rewards, events and a hash of every action and joint position of the oracle's play."""
+    env = roboirg.make(task, episode=index, cameras=())
+    env.set_frame_hook(shoot)
+    digest, rewards, inner = hashlib.sha256(), [], env.step_chunk
 
     def step_chunk(actions):
         result = inner(actions)
         digest.update(np.asarray(actions).tobytes() + result[0]["joint_positions"].tobytes())
+        rewards.append(result[1])
         return result
 
     env.step_chunk = step_chunk
-    info = play(env, make_policy("oracle", 0))
-    return info["status"], env.events, digest.hexdigest()
+    assert play(env, make_policy("oracle", 0))["status"] == "success"
+    return rewards, env.events, digest.hexdigest()
 
 
-@pytest.mark.parametrize("task", TASKS)
-def test_the_oracle_succeeds_and_repeats_itself_to_the_bit(task):
-    episode = get_episode(task, "test", 2)
-    first = trace(episode)
-    assert first[0] == "success"
-    assert trace(episode) == first
+@pytest.mark.parametrize(("task", "index"), MOMENTS)
+def test_the_oracle_succeeds_and_pictures_look_as_they_did_when_they_were_looked_at(task, index):
+    moments, taken = MOMENTS[task, index], {}
 
+    def shoot(env, _demonstration):
+        elapsed = env.session.world.elapsed if env.status == "ongoing" else END
+        if elapsed in moments:
+            cameras = CAMERAS if task in BOTH_CAMERAS else ("front",)
+            for camera in cameras:
+                taken[f"{task}_{moments[elapsed]}_{camera}.png"] = env.picture(camera)
 
-@pytest.mark.parametrize(
-    "task", slow_but(["SwingXtimes", "VideoUnmaskSwap", "VideoPlaceOrder", "PutInBox"], TASKS)
-)
-def test_another_goal_is_a_failure_with_a_cause(task):
-    episode = get_episode(task, "test", 3)
-    others = [goal for goal in get_task(task).goals(episode.scene) if goal != episode.goal]
-    env = roboirg.make(episode, cameras=())
-    info = play(env, Mistaken(others[-1]))
-    assert info["status"] in {"failure", "timeout"}
-    assert (info["status"] == "failure") == bool(info["cause"])
-
-
-@pytest.mark.parametrize("task", TASKS)
-def test_doing_nothing_runs_out_of_time(task):
-    env = roboirg.make(task, episode=0, cameras=(), max_steps=2)
-    env.reset()
-    outcomes = [env.step(physics_settings.HOME_ACTION) for _ in range(2)]
-    assert [(outcome[2], outcome[3]) for outcome in outcomes] == [(False, False), (False, True)]
-    assert [outcome[4]["status"] for outcome in outcomes] == ["ongoing", "timeout"]
-
-
-@pytest.mark.parametrize("task", TASKS)
-def test_the_same_seed_gives_the_same_pictures_to_the_bit(task):
-    episode = get_episode(task, "test", 1)
-
-    def pictures():
-        world = World(episode.scene)
-        reach = physics_settings.HOME_ACTION + np.append(np.full(7, 0.05), 0.0)
-        for _ in range(36):
-            world.step(reach)
-        return [world.picture(camera) for camera in CAMERAS]
-
-    for first, again in zip(pictures(), pictures(), strict=True):
-        assert np.array_equal(first, again)
+    first = trace(task, index, shoot)
+    assert sum(first[0]) == first[0][-1] == 1.0
+    assert len(taken) == len(moments) * (1 + (task in BOTH_CAMERAS))
+    for name, picture in taken.items():
+        known = cv2.cvtColor(cv2.imread(str(PICTURES / name)), cv2.COLOR_BGR2RGB).astype(int)
+        off = np.abs(picture.astype(int) - known).max(axis=2) > FAR_OFF_LEVELS
+        assert off.mean() < FAR_OFF_SHARE, f"{name} differs"
+    if task in REPEATED:  # to the bit, also without pictures
+        assert trace(task, index) == first
 
 
 @pytest.mark.parametrize("task", TASKS)
 def test_nothing_falls_or_drifts_while_the_robot_rests(task):
-    for episode in scenes(task, 3):
+    for episode in scenes(task, 2):
         world = World(episode.scene, visible=False)
         moved = set()
         for motion in episode.scene.motions:
