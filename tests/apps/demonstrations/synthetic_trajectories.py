@@ -1,5 +1,7 @@
 """Trajectories without a simulator: short, with pictures that are easy to tell apart."""
 
+import functools
+import io
 import zipfile
 
 import numpy as np
@@ -50,56 +52,53 @@ def arrays_of(episode, rows, video_length, *, has_depth, disturbed=False):
     return arrays
 
 
-def record(
-    episode,
-    policy,
-    path,
-    spec,
-    *,
-    options=None,
-    policy_name="oracle",
-    variation=0,
-    only_successes=True,
-    steps=STEPS,
-    status=None,
-):
+def record(episode, policy, path, spec, *, options=None, only_successes=True, **facts):
     """Stand in for `record_trajectory`; episode 1 of a task fails."""
-    status = status or ("failure" if episode.index == 1 else "success")
-    video_length = 4 if spec.video and episode.demonstration else 0
-    rows = video_length + 1 + steps + variation
+    content, found = _recorded(episode, spec, only_successes, **facts)
     with replacing(path) as part:
-        with zipfile.ZipFile(part, "w") as archive:
-            tracks = PictureTracks(archive, spec)
-            for row in range(rows):
-                seen = {f"{one}_rgb": picture(one, episode.seed, row) for one in CAMERAS}
-                seen |= {f"{one}_depth": depth(episode.seed, row) for one in CAMERAS}
-                tracks.add(seen, is_video=row < video_length)
-            facts = TrajectoryFacts(
-                task=episode.task,
-                split=episode.split,
-                episode=episode.index,
-                seed=episode.seed,
-                difficulty=episode.difficulty,
-                variation=variation,
-                policy=policy_name,
-                status=status,
-                cause="" if status == "success" else "dropped the cube",
-                video_length=video_length,
-                steps=steps + variation,
-                demonstration_source="planned" if video_length else "none",
-                environment_version=ENVIRONMENT_VERSION,
-                coding=spec.coding,
-                depth=spec.depth,
-                actions=spec.actions,
-                disturbed=spec.disturbed,
-                picture_error=tracks.finish(),
-            )
-            arrays = arrays_of(
-                episode, rows, video_length, has_depth=spec.depth, disturbed=spec.disturbed
-            )
-            counts = {f"{one}_histogram": tracks.histograms[one] for one in spec.cameras}
-            write_arrays(archive, facts, arrays | counts)
-        if only_successes and status != "success":
-            with zipfile.ZipFile(part, "w") as archive:
-                write_arrays(archive, facts, {})
-    return facts
+        part.write_bytes(content)
+    return found
+
+
+@functools.cache
+def _recorded(episode, spec, only_successes, policy_name="oracle", variation=0):
+    status = "failure" if episode.index == 1 else "success"
+    video_length = 4 if spec.video and episode.demonstration else 0
+    rows = video_length + 1 + STEPS + variation
+    file = io.BytesIO()
+    with zipfile.ZipFile(file, "w") as archive:
+        tracks = PictureTracks(archive, spec)
+        for row in range(rows):
+            seen = {f"{one}_rgb": picture(one, episode.seed, row) for one in CAMERAS}
+            seen |= {f"{one}_depth": depth(episode.seed, row) for one in CAMERAS}
+            tracks.add(seen, is_video=row < video_length)
+        facts = TrajectoryFacts(
+            task=episode.task,
+            split=episode.split,
+            episode=episode.index,
+            seed=episode.seed,
+            difficulty=episode.difficulty,
+            variation=variation,
+            policy=policy_name,
+            status=status,
+            cause="" if status == "success" else "dropped the cube",
+            video_length=video_length,
+            steps=STEPS + variation,
+            demonstration_source="planned" if video_length else "none",
+            environment_version=ENVIRONMENT_VERSION,
+            coding=spec.coding,
+            depth=spec.depth,
+            actions=spec.actions,
+            disturbed=spec.disturbed,
+            picture_error=tracks.finish(),
+        )
+        arrays = arrays_of(
+            episode, rows, video_length, has_depth=spec.depth, disturbed=spec.disturbed
+        )
+        counts = {f"{one}_histogram": tracks.histograms[one] for one in spec.cameras}
+        write_arrays(archive, facts, arrays | counts)
+    if only_successes and status != "success":
+        file = io.BytesIO()
+        with zipfile.ZipFile(file, "w") as archive:
+            write_arrays(archive, facts, {})
+    return file.getvalue(), facts

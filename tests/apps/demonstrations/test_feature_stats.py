@@ -16,6 +16,7 @@ from roboirg.apps.demonstrations.picture_coding import count_values
 FINITE = st.floats(-1e3, 1e3, width=32)
 
 
+@settings(max_examples=30)
 @given(arrays(np.float32, st.tuples(st.integers(1, 40), st.integers(1, 8)), elements=FINITE))
 def test_vectors_agree_with_numpy(values):
     stats = vector_stats(values)
@@ -29,7 +30,7 @@ def test_vectors_agree_with_numpy(values):
     assert stats["count"] == [len(values)]
 
 
-@settings(max_examples=30)
+@settings(max_examples=8)
 @given(st.integers(1, 3), st.integers(1, 6), st.integers(0, 2**32 - 1))
 def test_pictures_agree_with_numpy_on_all_pixels(count, colors, seed):
     rng = np.random.default_rng(seed)

@@ -13,81 +13,65 @@ from roboirg.apps.demonstrations.export_plan import RecordingJob
 from roboirg.apps.demonstrations.policy_choice import find_variation
 from roboirg.apps.demonstrations.trajectory import load_trajectory, read_depth, read_picture
 from roboirg.apps.demonstrations.trajectory_recorder import RecordingSpec, record_trajectory
+from roboirg.core.errors import MotionPlanningError
 from roboirg.envs.factory import make
-from roboirg.policies import make_policy, play
+from roboirg.policies import play
 from roboirg.policies.builtin.oracle_policy import VariedOraclePolicy
+from roboirg.simulation.physics_settings import HOME_ACTION
 from roboirg.tasks.splits.splits import get_episode
-from roboirg.util.media import scaled_square
 
 pytestmark = pytest.mark.sim
 
-EPISODE = ("VideoUnmask", "train", 0)
+
+class Impatient:
+    """Moves a little and gives up."""
+
+    actions = "joint_angle"
+
+    def reset(self, instruction, demonstration):
+        self.rows = np.linspace(HOME_ACTION, HOME_ACTION + 0.2, 13)
+
+    def act(self, observation):
+        rows, self.rows = self.rows, ()
+        if len(rows) == 0:
+            raise MotionPlanningError("It is too far.")
+        return rows
 
 
-@pytest.mark.usefixtures("without_cache")
-def test_pictures_are_the_simulators_bit_for_bit_and_actions_replay(tmp_path):
-    """The same actions in a new world lead to the same pictures, states and verdict."""
-    path, episode = tmp_path / "one.zip", get_episode(*EPISODE)
-    spec = RecordingSpec(video=True, depth=True)
-    facts = record_trajectory(episode, make_policy("oracle", 0), path, spec)
-    assert facts.status == "success"
+@pytest.mark.parametrize(
+    ("task", "spec"),
+    [
+        ("VideoUnmask", RecordingSpec(video=True, cameras=("front",))),
+        ("PickXtimes", RecordingSpec(depth=True)),
+    ],
+)
+def test_pictures_are_the_simulators_bit_for_bit_and_actions_replay(tmp_path, task, spec):
+    """The same actions in a new world lead to the same pictures and states."""
+    path, episode = tmp_path / "one.zip", get_episode(task, "train", 0)
+    facts = record_trajectory(episode, Impatient(), path, spec, only_successes=False)
+    assert (facts.status, facts.cause, facts.steps) == ("failure", "It is too far.", 13)
     recorded = load_trajectory(path)
-    env = make(episode, depth=True, grounded=True)
+    every = {"observe_every": 1, "demonstration_frames": 9}
+    env = make(episode, cameras=spec.cameras, depth=spec.depth, grounded=True, **every)
     observation, info = env.reset()
     shown, first = info["demonstration"], facts.video_length
-    assert first == shown.length > 0
+    assert first == shown.length
     assert np.array_equal(recorded.actions[:first].astype(np.float32), shown.actions.astype("f4"))
+    later = env.step_chunk(recorded.actions[first + 1 :])[0]["history"]
     with zipfile.ZipFile(path) as archive:
-        for row in range(0, first, 9):
-            for camera in ("front", "wrist"):
-                found = read_picture(archive, camera, row)
-                assert np.array_equal(found, shown[f"{camera}_rgb"][row])
-        for row in range(first, facts.rows):
-            if row > first:
-                observation, *_ = env.step(recorded.actions[row])
+        for camera in spec.cameras:
+            for number, picture in enumerate(shown[f"{camera}_rgb"]):
+                assert np.array_equal(read_picture(archive, camera, 9 * number), picture)
+        for row, seen in enumerate((observation, *later), first):
             for name in ("joint_positions", "gripper", "end_effector"):
-                assert np.array_equal(getattr(recorded, name)[row], observation[name])
-            if row % 9 == 0 or row == facts.rows - 1:
-                for camera in ("front", "wrist"):
-                    assert np.array_equal(
-                        read_picture(archive, camera, row), observation[f"{camera}_rgb"]
-                    )
-                    assert np.array_equal(
-                        read_depth(archive, camera, row), observation[f"{camera}_depth"]
-                    )
-    assert env.status == "success"
+                assert np.array_equal(getattr(recorded, name)[row], seen[name])
+            for camera in spec.cameras:
+                assert np.array_equal(read_picture(archive, camera, row), seen[f"{camera}_rgb"])
+                if spec.depth:
+                    assert np.array_equal(read_depth(archive, camera, row), seen[f"{camera}_depth"])
     assert recorded.grounded_online_subgoals[-1] == env.subgoal
-    # The tool follows its targets with a delay, but ends where the last ones are.
-    assert np.abs(recorded.pose_actions[-1, :3] - recorded.end_effector[-1, :3]).max() < 0.03
-
-
-def test_small_pictures_are_the_simulators_scaled(tmp_path):
-    path, episode = tmp_path / "one.zip", get_episode("StopCube", "train", 0)
-    spec = RecordingSpec(cameras=("wrist",), size=64)
-    assert record_trajectory(episode, make_policy("oracle", 0), path, spec).status == "success"
-    recorded, env = load_trajectory(path), make(episode)
-    with zipfile.ZipFile(path) as archive:
-        names = {name for name in archive.namelist() if name.endswith(".png")}
-        assert {name.partition("/")[0] for name in names} == {"wrist"}
-        seen, _ = env.reset()
-        for row in range(0, 30, 10):
-            found = read_picture(archive, "wrist", row)
-            assert np.array_equal(found, scaled_square(seen["wrist_rgb"], 64))
-            seen, *_ = env.step_chunk(recorded.actions[row + 1 : row + 11])
-    env.close()
-
-
-def test_an_export_without_pictures_replays_exactly(tmp_path, make_plan):
-    plan = make_plan(pictures="none", tasks=("StopCube",), episodes=(0,), settings=("explicit",))
-    export_run.run_export(plan, tmp_path / "data", 0, lambda *_: None)
-    (recorded,) = read_dataset(tmp_path / "data")
-    result = replay(recorded)
-    assert result.agrees
-    assert (result.status, result.largest, result.final) == ("success", 0.0, 0.0)
-    recorded.actions[len(recorded.actions) // 2 :, :7] += 0.2
-    changed = replay(recorded)
-    assert not changed.agrees
-    assert changed.largest > 0.01
+    # The tool follows its targets with a delay.
+    assert np.abs(recorded.pose_actions[-1, :3] - recorded.end_effector[-1, :3]).max() < 0.15
 
 
 @pytest.mark.parametrize("actions", ["joint_angle", "waypoint"])
@@ -105,7 +89,13 @@ def test_a_disturbed_expert_is_labeled_by_what_it_meant_and_replays_exactly(
     differs = np.abs(labels - recorded.actions).max(axis=1) > 1e-6
     assert 0 < differs.sum() < len(differs)
     result = replay(recorded)
-    assert (result.agrees, result.largest, result.final) == (True, 0.0, 0.0)
+    assert result.agrees
+    assert (result.status, result.largest, result.final) == ("success", 0.0, 0.0)
+    if actions == "joint_angle":
+        recorded.actions[len(recorded.actions) // 2 :, :7] += 0.2
+        changed = replay(recorded)
+        assert not changed.agrees
+        assert changed.largest > 0.01
 
 
 @pytest.mark.slow
@@ -119,6 +109,4 @@ def test_variations_differ_and_succeed():
         info = play(env, VariedOraclePolicy(seed))
         assert info["status"] == "success"
         steps.append(info["steps"])
-    env = make(episode, cameras=())
-    steps.append(play(env, make_policy("oracle", 0))["steps"])
-    assert len(set(steps)) == 3
+    assert len(set(steps)) == 2

@@ -61,7 +61,7 @@ def read_like_mme_vla(path):
             yield int(episode["setup/seed"][()]), goal, frames
 
 
-def test_time_steps_have_robommes_fields(export):
+def test_time_steps_have_robommes_fields_and_a_builder_reads_what_was_recorded(export):
     root = export(format="robomme-hdf5", video="prefix", settings=("explicit",))
     with h5py.File(root / "record_dataset_VideoUnmask.h5", "r") as file:
         assert sorted(file) == ["episode_0", "episode_2"]
@@ -77,10 +77,6 @@ def test_time_steps_have_robommes_fields(export):
         episode = get_episode("VideoUnmask", "train", 0)
         assert setup["difficulty"][()].decode() == episode.difficulty
         assert setup["front_camera_intrinsic"].shape == (3, 3)
-
-
-def test_a_builder_reads_what_was_recorded(export):
-    root = export(format="robomme-hdf5", video="prefix", settings=("explicit",))
     for task, video in (("PickXtimes", 0), ("VideoUnmask", 4)):
         found = list(read_like_mme_vla(root / f"record_dataset_{task}.h5"))
         assert len(found) == 2
@@ -106,7 +102,7 @@ def test_a_builder_reads_what_was_recorded(export):
             assert [frame["is_boundary"] for frame in frames] == changes
 
 
-def test_several_settings_share_their_time_steps(export):
+def test_several_settings_share_their_time_steps_and_actions_are_found_by_seed(export):
     root = export(format="robomme-hdf5", video="prefix")
     goals = []
     for folder in ("explicit-implicit", "direct-implicit"):
@@ -116,16 +112,9 @@ def test_several_settings_share_their_time_steps(export):
         assert [len(frames) for *_, frames in found] == [synthetic.STEPS] * 2
         goals.append(found[0][1])
     assert goals[0] != goals[1]
-
-
-def test_actions_are_found_by_seed(export):
-    root = export(format="robomme-hdf5", video="prefix")
-    found = [one for one in read_dataset(root) if one.task == "VideoUnmask"]
-    episode = get_episode("VideoUnmask", "train", 0)
-    assert [one.seed for one in found] == [
-        episode.seed,
-        get_episode("VideoUnmask", "train", 2).seed,
-    ]
+    recorded = [one for one in read_dataset(root) if one.task == "VideoUnmask"]
+    episode, other = (get_episode("VideoUnmask", "train", index) for index in (0, 2))
+    assert [one.seed for one in recorded] == [episode.seed, other.seed]
     expected = synthetic.arrays_of(episode, 4 + 1 + synthetic.STEPS, 4, has_depth=True)
-    assert np.array_equal(found[0].actions, expected["actions"][5:])
-    assert np.array_equal(found[0].states[:, :7], expected["joint_positions"][5:])
+    assert np.array_equal(recorded[0].actions, expected["actions"][5:])
+    assert np.array_equal(recorded[0].states[:, :7], expected["joint_positions"][5:])
