@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import socket
 from collections.abc import Callable, Iterable, Iterator
 from fractions import Fraction
@@ -38,6 +39,7 @@ def with_rate(
         )
 
 
+@functools.cache
 def like_published(table: str, only: str | None = None) -> list[Summary]:
     """Return results with the rates, episodes and seeds of a published table."""
     episodes, seeds = TRIALS[table]  # type: ignore[index]

@@ -125,7 +125,7 @@ class Insider(Still):
         pass
 
 
-@pytest.mark.parametrize("policy", [Insider(), Insider, f"{__name__}:Insider"])
+@pytest.mark.parametrize("policy", [Insider(), f"{__name__}:Insider"])
 def test_privilege_is_declared(unplayed: None, tmp_path: Path, policy) -> None:
     options = {**QUICK, "out": tmp_path, "policy_process": "shared"}
     with pytest.raises(InvalidValueError, match=r"has attach\(\).*roboirg\.Privileged\(policy\)"):

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pandas as pd
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from made_records import make_record
 from page_text import store
@@ -104,6 +104,7 @@ PLAYS = st.dictionaries(
 )
 
 
+@settings(max_examples=25)
 @given(PLAYS, st.randoms(use_true_random=False))
 def test_order_and_runs_of_the_records_make_no_difference(result, plays, random) -> None:
     """Two runs complete each other, and what neither played is missing."""

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from made_records import make_record
 from page_text import call, store
@@ -39,6 +39,7 @@ def results(make: MakeResult, *rows: tuple[str, str], **fields: object) -> list[
     ]
 
 
+@settings(max_examples=30)
 @given(st.lists(st.tuples(OUTCOMES, VERDICTS), min_size=1))
 def test_counts_add_up(result: MakeResult, rows: list[tuple[str, str]]) -> None:
     found = count_heard(make_frame([("", results(result, *rows))]), ())

@@ -6,6 +6,7 @@ import itertools
 import re
 import shutil
 import subprocess
+from collections.abc import Callable
 from decimal import Decimal
 from pathlib import Path
 
@@ -18,6 +19,7 @@ from roboirg.evaluation.analysis.stats.run_data import RunData
 from roboirg.evaluation.analysis.tables.paper_tables import WHICH, make_table
 from roboirg.evaluation.analysis.tables.rendering.latex import latex
 from roboirg.evaluation.analysis.tables.table import Column, Entry, Row, Table
+from roboirg.evaluation.records.record import Summary
 
 DOCUMENT = r"""
 \documentclass%s
@@ -59,16 +61,20 @@ FACTS = Table(
 )
 
 
-def all_tables(like) -> list[Table]:
+@pytest.fixture(scope="module")
+def text(published_like: Callable[..., list[Summary]]) -> str:
+    """All tables."""
+    like = published_like
     data = RunData(make_frame([("run", [*like("main"), *like("real"), *like("context")])]))
     perfect = [replace(one, outcome="success") for one in like("main", "MemER")]
-    return [
+    tables = [
         make_table("main", RunData(make_frame([("run", perfect)])), published=True),
         *(make_table(one, data, published=True) for one in WHICH if one != "other"),
         crowded(policies=2, tasks=7),
         crowded(policies=40, tasks=2),
         FACTS,
     ]
+    return "\n\\clearpage\n".join(map(latex, tables))
 
 
 def test_every_name_and_rate_is_there_once() -> None:
@@ -120,8 +126,7 @@ def test_a_published_table_is_one_and_has_every_figure_in_its_place(which: str) 
 @pytest.mark.parametrize(
     "document", ["[conference]{IEEEtran}", "{article}", "[twocolumn]{article}"]
 )
-def test_no_box_is_overfull(tmp_path: Path, published_like, document: str) -> None:
-    text = "\n\\clearpage\n".join(map(latex, all_tables(published_like)))
+def test_no_box_is_overfull(tmp_path: Path, text: str, document: str) -> None:
     (tmp_path / "paper.tex").write_text(DOCUMENT % (document, text), encoding="utf-8")
     subprocess.run(
         ["pdflatex", "-interaction=nonstopmode", "-halt-on-error", "paper.tex"],

@@ -57,7 +57,7 @@ def plain_gap(ours: Trials, theirs: Trials) -> float | None:
     return float(np.mean(gaps)) if gaps else None
 
 
-@settings(max_examples=20)
+@settings(max_examples=8)
 @given(st.data())
 def test_measure_is_what_pandas_gives(played: pd.DataFrame, data: st.DataObject) -> None:
     from statsmodels.stats.multitest import multipletests

@@ -7,7 +7,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from roboirg.evaluation.analysis.stats.cells import Cell, Trial
@@ -37,6 +37,7 @@ def gap_of(first: Cell, second: Cell):
 
 
 # By hand: 1 of 8 is 2 (1 + 8) / 256; 2 of 12 is 2 (1 + 12 + 66) / 4096.
+@settings(max_examples=30)
 @given(st.integers(0, 60), st.integers(0, 60))
 def test_mcnemar_is_that_of_statsmodels(only_first: int, only_second: int) -> None:
     from statsmodels.stats.contingency_tables import mcnemar
@@ -46,6 +47,7 @@ def test_mcnemar_is_that_of_statsmodels(only_first: int, only_second: int) -> No
     assert ours == pytest.approx(min(1.0, theirs), abs=1e-12)
 
 
+@settings(max_examples=40)
 @given(st.lists(st.integers(-3, 3), max_size=10))
 def test_the_test_is_what_all_swaps_give(differences: list[int]) -> None:
     """By brute force over all 2^n ways to swap the two of each pair."""
@@ -101,6 +103,7 @@ def test_episodes_that_are_all_alike_leave_room_for_others() -> None:
     assert gap_of(cell("1"), cell("0")).interval is None
 
 
+@settings(max_examples=30)
 @given(st.lists(st.floats(0, 1), min_size=1, max_size=60))
 def test_holm_is_that_of_statsmodels(p_values: list[float]) -> None:
     from statsmodels.stats.multitest import multipletests

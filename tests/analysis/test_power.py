@@ -45,7 +45,7 @@ def test_power_by_simulation(episodes: int, gap: float, discordance: float) -> N
     assert mcnemar_power(episodes, gap, discordance) == pytest.approx(found, abs=0.02)
 
 
-@settings(deadline=None, max_examples=30)
+@settings(deadline=None, max_examples=15)
 @given(st.floats(0.05, 1), st.floats(0.05, 1))
 def test_the_needed_episodes_are_enough_and_half_are_not(share: float, discordance: float) -> None:
     gap = share * discordance

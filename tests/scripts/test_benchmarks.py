@@ -19,8 +19,10 @@ from benchmarks.results import (
     run_measures,
     update_figures,
 )
+from typer.testing import CliRunner
 
 from roboirg.core.errors import InvalidValueError
+from roboirg.main import app
 
 ROOT = Path(__file__).parents[2]
 
@@ -79,7 +81,7 @@ def test_the_costs_of_a_command_that_fails_are_no_result(tmp_path: Path) -> None
     with pytest.raises(subprocess.CalledProcessError):
         probe("command", "tables", str(tmp_path / "missing"))
     for command in get_args(large_run_costs.Command):
-        assert probe("command", *command.split(), "--help")["memory_gib"] > 0
+        assert CliRunner().invoke(app, [*command.split(), "--help"]).exit_code == 0
 
 
 @pytest.mark.sim

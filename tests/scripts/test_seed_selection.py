@@ -16,7 +16,7 @@ from roboirg.core.episode import SPLITS
 from roboirg.language import expressible, find_refusals
 from roboirg.language.settings import all_settings, plain_settings, settings_of
 from roboirg.tasks import every_task, get_task
-from roboirg.tasks.splits.splits import SIZES, get_episode, shipped_splits, slot_seed
+from roboirg.tasks.splits.splits import SIZES, get_episode, shipped_splits
 
 TASKS = tuple(every_task())
 each_task = pytest.mark.parametrize("task", TASKS)
@@ -26,14 +26,10 @@ def passed_over(slot):
     return shipped_splits()[slot.task].passed_over.get(f"{slot.split}/{slot.index}", 0)
 
 
-def first_seed(slot):
-    return slot_seed(get_task(slot.task), slot.split, slot.index)
-
-
 @each_task
 def test_every_setting_of_every_episode_can_be_expressed(task):
     for split in SPLITS:
-        for index in range(SIZES[split]):
+        for index in range(0, SIZES[split], 3):
             refused = set(settings_of(get_task(task))) - set(
                 expressible(get_episode(task, split, index))
             )
@@ -41,37 +37,18 @@ def test_every_setting_of_every_episode_can_be_expressed(task):
 
 
 @each_task
-def test_scene_and_words_allow_the_shipped_seeds_and_rule_out_no_more_than_were_passed_over(task):
+def test_scene_and_words_rule_out_the_seeds_that_were_passed_over(task):
+    """So far the oracle has solved what they allow; a seed passed over for its sake is played."""
     for slot in episode_slots([task]):
-        ruled_out = len(find_seed(slot, check_words).rejections)
-        assert ruled_out <= passed_over(slot)
-        assert check_words(slot, first_seed(slot) + passed_over(slot)) is None
+        assert len(find_seed(slot, check_words).rejections) == passed_over(slot), slot.key
 
 
 @pytest.mark.sim
-@each_task
+@pytest.mark.parametrize("task", TASKS[::4])
 def test_the_rule_gives_the_shipped_seeds(task):
-    """For a plain episode, and for one for which seeds were passed over."""
-    slots = episode_slots([task])
-    refused = [slot for slot in slots if passed_over(slot)]
-    for slot in (*slots[:1], *refused[-1:]):
+    """For the last episode for which seeds were passed over, or for a plain one."""
+    for slot in sorted(episode_slots([task]), key=lambda one: passed_over(one) > 0)[-1:]:
         assert len(find_seed(slot, check_seed).rejections) == passed_over(slot), slot.key
-
-
-@pytest.mark.sim
-@each_task
-def test_seeds_passed_over_for_the_oracle_s_sake_had_to_be(task):
-    """A seed that scene and words allow was only passed over if the oracle fails there."""
-    allowed = [
-        (slot, seed)
-        for slot in episode_slots([task])
-        for seed in range(first_seed(slot), first_seed(slot) + passed_over(slot))
-        if check_words(slot, seed) is None
-    ]
-    for slot, seed in allowed[:2]:
-        rejection = check_seed(slot, seed)
-        assert rejection is not None, (slot.key, seed)
-        assert rejection.reason == "oracle failed"
 
 
 def test_a_new_setting_does_not_change_which_seeds_are_accepted(

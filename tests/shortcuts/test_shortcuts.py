@@ -1,14 +1,12 @@
 """Shortcuts: rules and learned floors that see the words only."""
 
-import inspect
 import sys
 from dataclasses import replace
 from fractions import Fraction
-from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from language_variants import PAIRS, TASKS, first_episodes
 from plan_files import plan_file
@@ -19,7 +17,7 @@ from roboirg.core.episode import values_in
 from roboirg.core.errors import InvalidValueError, MissingDependencyError, UnknownNameError
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.language import instruct, instruct_with
-from roboirg.language.settings import all_settings, get_setting
+from roboirg.language.settings import get_setting
 from roboirg.language.variants import expressible_options
 from roboirg.main import app
 from roboirg.shortcuts import SURFACE_RULES, draw_goal, goal_share, guess_goal
@@ -34,7 +32,7 @@ from roboirg.shortcuts.shortcut_scores import (
     score_rule,
 )
 from roboirg.shortcuts.shortcut_tables import shortcut_rows
-from roboirg.tasks import all_tasks, get_task
+from roboirg.tasks import get_task
 from roboirg.tasks.splits.splits import get_episode
 
 COLORS = ("blue", "green", "red")
@@ -50,9 +48,8 @@ def places(rule, text, task, slot):
     return guess_goal(rule, text, task)[slot]
 
 
-@pytest.mark.parametrize(
-    ("rule", "text", "colors"),
-    [
+BY_HAND = {
+    ("PickXtimes", "color"): [
         ("first-mention", "I like the red cube. My door is green. Take it once.", ("red",)),
         ("last-mention", "I like the red cube. My door is green. Take it once.", ("green",)),
         ("elimination", "I like the red cube. My door is green. Take it once.", ("blue",)),
@@ -79,14 +76,7 @@ def places(rule, text, task, slot):
             ("green",),
         ),
     ],
-)
-def test_colors_by_hand(rule, text, colors):
-    assert places(rule, text, "PickXtimes", "color") == (colors,)
-
-
-@pytest.mark.parametrize(
-    ("rule", "text", "repeats"),
-    [
+    ("PickXtimes", "repeats"): [
         ("first-mention", "My number is four. The bus is two minutes late. Do it.", (4,)),
         ("last-mention", "My number is four. The bus is two minutes late. Do it.", (2,)),
         ("elimination", "My number is four. The bus is two minutes late. Do it.", (1, 3, 5)),
@@ -105,14 +95,7 @@ def test_colors_by_hand(rule, text, colors):
         ("first-mention", "Take one of them as before.", (1, 2, 3, 4, 5)),
         ("last-mention", "My number is 4. Take it that many times.", (4,)),
     ],
-)
-def test_numbers_by_hand(rule, text, repeats):
-    assert places(rule, text, "PickXtimes", "repeats") == (repeats,)
-
-
-@pytest.mark.parametrize(
-    ("rule", "text", "visit"),
-    [
+    ("StopCube", "visit"): [
         ("first-mention", "I wait for the third visit. Press during that visit.", (3,)),
         ("surface", "I wait for the third visit. Press during the visit right before that.", (2,)),
         ("surface", "I wait for the third visit. Press two visits after that.", (5,)),
@@ -123,9 +106,13 @@ def test_numbers_by_hand(rule, text, repeats):
         ("elimination", "Press during its fifth visit.", (5,)),
         ("elimination", "I wait for the third visit. Press during that visit.", (2, 4, 5)),
     ],
-)
-def test_ordinals_by_hand(rule, text, visit):
-    assert places(rule, text, "StopCube", "visit") == (visit,)
+}
+
+
+@pytest.mark.parametrize("slot", BY_HAND)
+def test_values_by_hand(slot):
+    for rule, text, found in BY_HAND[slot]:
+        assert (rule, text, places(rule, text, *slot)) == (rule, text, (found,))
 
 
 def test_several_values_by_hand():
@@ -193,6 +180,7 @@ TEXTS = st.lists(
 ).map(". ".join)
 
 
+@settings(max_examples=40)
 @given(text=TEXTS, rule=st.sampled_from(sorted(SURFACE_RULES)), task=st.sampled_from(TASKS))
 def test_any_text_gives_a_guess_of_the_right_shape(text, rule, task):
     guess = guess_goal(rule, text, task)
@@ -208,6 +196,7 @@ def test_any_text_gives_a_guess_of_the_right_shape(text, rule, task):
     assert guess_goal(rule, text.upper().replace(" ", "  "), task) == guess
 
 
+@settings(max_examples=25)
 @given(named=st.lists(st.sampled_from(COLORS), min_size=1, max_size=6))
 def test_first_last_and_unnamed(named):
     text = " ".join(f"I like {color}." for color in named) + " Take it."
@@ -248,23 +237,6 @@ def test_shares_of_every_setting(task, setting, episodes):
                 assert score_rule("surface", told).goal == 1
                 if options.form == "resolved":
                     assert score_rule("elimination", told).goal == 1
-
-
-def test_a_rule_sees_no_goal_and_no_scene():
-    """It has no way to: it gets a text and the name of the task."""
-    assert list(inspect.signature(guess_goal).parameters) == ["rule", "text", "task"]
-    episode = get_episode("PickXtimes", "test", 0)
-    instruction = instruct(episode, "direct")
-    others = [goal for goal in get_task("PickXtimes").goals(episode.scene) if goal != episode.goal]
-    for rule in SURFACE_RULES:
-        blank = replace(instruction, mentions=(), metadata={})
-        assert (
-            score_rule(rule, (episode, blank)).goal == score_rule(rule, (episode, instruction)).goal
-        )
-    assert all(
-        score_rule("first-mention", (replace(episode, goal=goal, stages=()), instruction)).goal == 0
-        for goal in others
-    )
 
 
 def test_shares_by_hand():
@@ -324,22 +296,6 @@ def test_a_place_tells_no_color_but_that_of_another_cube():
             expected = {"color": share if other else Fraction(1, 3)}
             assert score_rule(rule, told).slots == expected
     assert 0 < named < 25
-
-
-def test_the_documentation_says_what_is_measured():
-    """The rows of chance and of the rules, over the whole test split."""
-    page = (Path(__file__).parents[2] / "docs" / "floors.md").read_text(encoding="utf-8")
-    table = page.split("| | direct | contextual | contextual, competing |")[1].split("\n\n")[0]
-    competing = InstructionOptions(distractor="competing")
-    tasks, columns = tuple(all_tasks()), ("direct", "contextual", "reasoning", "spatial")
-    direct, contextual, reasoning, spatial = (
-        row.shares for row in shortcut_rows(tasks, ("test",), columns, InstructionOptions())
-    )
-    (rivals,) = (row.shares for row in shortcut_rows(tasks, ("test",), ("contextual",), competing))
-    for name in rule_scorers():
-        cells = [shares[name] for shares in (direct, contextual, rivals, reasoning, spatial)]
-        numbers = " | ".join(f"{100 * one.slots:.0f} / {100 * one.goals:.0f}" for one in cells)
-        assert f"| {numbers} |" in table.split(f"{name}`" if name in SURFACE_RULES else name)[1]
 
 
 def test_rows_have_all_instructions():
@@ -415,8 +371,3 @@ def test_the_learned_floors_are_columns():
     assert 0.5 < low < row.excess.value < high < 1
     wide = row.excess.interval(100)
     assert wide[0] < low < high < wide[1]
-
-
-def test_every_setting_has_a_row():
-    rows = shortcut_rows(("PickXtimes",), ("test",), tuple(all_settings()), InstructionOptions())
-    assert [row.group[0] for row in rows] == list(all_settings())
