@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import linecache
 import os
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -21,6 +22,7 @@ from roboirg.evaluation.run.executor import InProcess
 from roboirg.evaluation.run.runner import run_plan
 from roboirg.policies.by_name.finding import policy_of, read_policy
 from roboirg.policies.contract.policy_version import file_fingerprint
+from roboirg.policies.opening import opened
 
 BODY = """
 import os, pathlib
@@ -51,61 +53,78 @@ FOUND = {"on the object": "7", "a property": "7", "a NumPy number": "7", "a path
 @pytest.fixture
 def write(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.delitem(sys.modules, "checkpointed", raising=False)
     monkeypatch.setenv("CKPT", "7")
 
     def write_policy(**parts: str) -> PolicyRef:
-        usual = {"on_class": "", "made": "pass", "reset": "pass"}
-        (tmp_path / "checkpointed.py").write_text(BODY.format(**{**usual, **parts}))
+        (tmp_path / "checkpointed.py").write_text(code(**parts))
         return read_policy("checkpointed:It", "mine")
 
     return write_policy
 
 
+def code(**parts: str) -> str:
+    return BODY.format(**{"on_class": "", "made": "pass", "reset": "pass", **parts})
+
+
+def found_here(**parts: str) -> PolicyRef:
+    """Open a class in this process, as a policy's own process does."""
+    namespace: dict[str, Any] = {"__name__": "no_module"}
+    exec(code(**parts), namespace)  # noqa: S102 - as a notebook does
+    return open_policy(policy_of(namespace["It"]))
+
+
 def play(folder: Path) -> None:
-    plan = paper_plan("mine=checkpointed:It", 2)
+    plan = paper_plan("mine=checkpointed:It", 1)
     plan = plan.model_copy(update={"policies": tuple(map(open_policy, plan.policies))})
     run_plan(plan, folder, paper_runner(plan, folder), InProcess())
 
 
 @pytest.mark.parametrize("spelling", SPELLINGS)
-def test_another_checkpoint_does_not_get_into_the_folder(
-    spelling: str, write, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+def test_a_checkpoint_may_be_named_in_many_ways(
+    spelling: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    ref = write(**SPELLINGS[spelling])
-    assert open_policy(ref).version == FOUND[spelling]
+    monkeypatch.setenv("CKPT", "7")
+    assert found_here(**SPELLINGS[spelling]).version == FOUND[spelling]
+
+
+def test_another_checkpoint_does_not_get_into_the_folder(
+    write, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    write(**SPELLINGS["a number behind a class's text"])
     for _ in range(2):  # the same one goes on
         play(tmp_path / "run")
     before = read_records(tmp_path / "run")
-    assert {record.policy_version for record in before} == {FOUND[spelling]}
+    assert {record.policy_version for record in before} == {"7.0"}
     monkeypatch.setenv("CKPT", "8")
-    with pytest.raises(StoreError, match=rf"version {FOUND[spelling]}, but the policy is now vers"):
+    with pytest.raises(StoreError, match=r"version 7.0, but the policy is now vers"):
+        play(tmp_path / "run")
+    write(made="self.version = 'b'", reset="raise KeyError('front')")
+    with pytest.raises(StoreError, match=r"7.0, but the policy cannot be opened .*KeyError"):
         play(tmp_path / "run")
     assert list(map(comparable, read_records(tmp_path / "run"))) == list(map(comparable, before))
 
 
 @pytest.mark.parametrize("value", ["None", "''", "(1, 2)", "True", "object()"])
-def test_what_is_no_version_is_one_sentence(value: str, write) -> None:
+def test_what_is_no_version_is_one_sentence(value: str) -> None:
     for parts in ({"made": f"self.version = {value}"}, {"on_class": f"version = {value}"}):
         with pytest.raises(InvalidValueError, match=r"version of It is .*; it must be a text, num"):
-            open_policy(write(**parts))
+            found_here(**parts)
 
 
 def test_one_that_differs_in_each_process_gives_no_verdict(write, tmp_path: Path) -> None:
     write(made="self.version = os.getpid()")
     play(tmp_path)
-    assert {record.outcome for record in read_records(tmp_path)} == {"error"}
-    assert "must be the same in every process" in str(read_records(tmp_path)[0].cause)
+    (record,) = read_records(tmp_path)
+    assert record.outcome == "error"
+    assert "must be the same in every process" in str(record.cause)
 
 
-def test_a_policy_that_cannot_begin_is_not_taken_for_an_earlier_one(write, tmp_path: Path) -> None:
-    write(made="self.version = 'a'")
-    play(tmp_path)
-    ref = open_policy(write(made="self.version = 'b'", reset="raise KeyError('front')"))
+def test_a_policy_that_cannot_begin_has_a_problem() -> None:
+    ref = found_here(made="self.version = 'b'", reset="raise KeyError('front')")
     assert (ref.version, ref.problem) == ("unknown", "reset(): KeyError: 'front'")
-    with pytest.raises(StoreError, match=r"version a, but the policy cannot be opened .*KeyError"):
-        play(tmp_path)
     with pytest.raises(InvalidValueError, match=r"cannot be made: ValueError: no GPU"):
-        open_policy(write(made="raise ValueError('no GPU')"))
+        found_here(made="raise ValueError('no GPU')")
 
 
 def test_a_command_opens_each_policy_once(write, tmp_path: Path) -> None:
@@ -115,51 +134,54 @@ def test_a_command_opens_each_policy_once(write, tmp_path: Path) -> None:
     assert note.read_text() == "Put the red cube on the target."
 
 
-def test_a_version_that_cannot_be_read_is_not_taken_for_none(write) -> None:
+def test_a_version_that_cannot_be_read_is_not_taken_for_none() -> None:
     for value in ("self.nett.name", 'os.environ["NOT_SET"]'):
-        ref = write(on_class=f"version = property(lambda self: {value})")
         with pytest.raises(InvalidValueError, match="version of It cannot be read"):
-            open_policy(ref)
+            found_here(on_class=f"version = property(lambda self: {value})")
 
 
-def test_versions_that_differ_in_what_a_name_cannot_hold_are_two(write) -> None:
+def test_versions_that_differ_in_what_a_name_cannot_hold_are_two() -> None:
     values = (r"'a\n'", r"'a\\n'", r"'a\udc80'", "'a?'")
-    assert len({open_policy(write(made=f"self.version = {one}")).version for one in values}) == 4
+    assert len({found_here(made=f"self.version = {one}").version for one in values}) == 4
 
 
 def test_without_a_version_another_class_or_part_of_a_system_is_another(
     write, tmp_path: Path
 ) -> None:
     write()
-    parts = """
+    file = tmp_path / "checkpointed.py"
+    file.write_text(
+        file.read_text() + """
 class Other(It): pass
 class Hands(It):
     def follow(self, subgoal): pass
 class Planner:
-    {slots}
-    def reset(self, instruction, demonstration): {reset}
+    version = property(lambda self: self.late)
+    def reset(self, instruction, demonstration): self.late = "set late"
+    def plan(self, observation, step): return None
+class Slots:
+    __slots__ = ("reports",)
+    def reset(self, instruction, demonstration): pass
     def plan(self, observation, step): return None
 """
-    file = tmp_path / "checkpointed.py"
-    before, found = file.read_text(), list[str]()
+    )
     planner = "planner:checkpointed:Planner"
-    for slots, reset in (
-        ("__slots__ = ('reports',)", "pass"),
-        ("version = property(lambda self: self.late)", "self.late = 'set late'"),
-    ):
-        file.write_text(before + parts.format(slots=slots, reset=reset))
-        for spec in (f"{planner}?hands=checkpointed:Hands", planner, "checkpointed:It",
-                     "checkpointed:Other"):  # fmt: skip
-            found.append(open_policy(read_policy(spec)).version)
+    hands = "?hands=checkpointed:Hands"
+    specs = ("checkpointed:It", "checkpointed:Other", planner + hands,
+             f"planner:checkpointed:Slots{hands}")  # fmt: skip
+    found = [opened(read_policy(spec)).version for spec in specs]
+    file.write_text(file.read_text() + "\n")  # the code of the class has changed
+    found += [opened(read_policy(spec)).version for spec in specs]
     assert len(set(found)) == 8
-    assert (found[4].partition(" + ")[0], found[5]) == ("set late", "set late + scripted hands")
+    assert found[2].partition(" + ")[0] == "set late"
+    assert open_policy(read_policy(planner)).version == "set late + scripted hands"
     assert "unknown" not in "".join(found)
 
 
 def test_two_versions_that_nobody_could_read_are_not_one(write, tmp_path: Path) -> None:
     write(reset="assert 'red cube on the target' not in instruction")
     plan = paper_plan("mine=checkpointed:It", 1, policy_process="shared")
-    plan = plan.model_copy(update={"policies": tuple(map(open_policy, plan.policies))})
+    plan = plan.model_copy(update={"policies": tuple(map(opened, plan.policies))})
     run_plan(plan, tmp_path, paper_runner(plan, tmp_path), InProcess())
     with pytest.raises(StoreError, match="cannot be opened to read its version"):
         run_plan(plan, tmp_path, paper_runner(plan, tmp_path), InProcess())
