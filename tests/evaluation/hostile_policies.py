@@ -425,10 +425,6 @@ class LateTurncoat(Hostile):
         self.attach = print
 
 
-class TerminalVersion(Hostile):
-    version = "\x1b[2J\u202e\n" + "9" * 5000
-
-
 FORGED = {
     "ForgesReply": "policy: the process sent no valid reply (Invalid value 'reply' - ",
     "ForgesLost": "policy: the process sent no valid reply (Object contains unknown field ",

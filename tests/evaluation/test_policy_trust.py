@@ -10,6 +10,7 @@ import sys
 import tempfile
 import time
 from collections import deque
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -25,7 +26,6 @@ from roboirg.core.errors import InvalidValueError
 from roboirg.evaluation.episode_errors import EpisodeError, Terminated
 from roboirg.evaluation.hosting.host_pool import HostPool, HostSettings
 from roboirg.evaluation.hosting.hosted_policy import HostedPolicy
-from roboirg.evaluation.hosting.policy_opening import open_policy
 from roboirg.evaluation.plan.plan import Plan
 from roboirg.evaluation.plan.plan_maker import make_plan
 from roboirg.evaluation.play.call_guard import attribute_errors
@@ -46,12 +46,14 @@ def _fakes_can_be_imported(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.syspath_prepend(Path(hosting_fakes.__file__).parent)
 
 
-def play(folder: Path, names: tuple[str, ...], **options: Any) -> dict[str, list[Record]]:
+def play(
+    folder: Path, names: tuple[str, ...], workers: int = 1, **options: Any
+) -> dict[str, list[Record]]:
     """Play two episodes of each policy, and an honest one between and after them."""
     specs = [spec for name in names for spec in (hostile_policies.SPEC(name), f"{name}+1={HONEST}")]
     plan = changed(paper_plan("Dice", 2), policies=specs, **options)
     folder.mkdir()
-    run_plan(plan, folder, paper_runner(plan, folder), LocalProcesses(2))
+    run_plan(plan, folder, paper_runner(plan, folder), LocalProcesses(workers))
     found: dict[str, list[Record]] = {}
     for record in read_records(folder):
         found.setdefault(record.policy, []).append(record)
@@ -64,7 +66,7 @@ def test_what_a_policy_breaks_is_its_own(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     names = (*hostile_policies.SPOILED, *hostile_policies.HARMLESS)
-    found = play(tmp_path / "run", names)
+    found = play(tmp_path / "run", names, workers=2)
     plan = paper_plan("Dice", 2, policy_process="shared")
     alone = InProcess().run(deque(plan.jobs()), paper_runner(plan, tmp_path))
     expected = {record.episode: record.outcome for record in alone}
@@ -134,7 +136,7 @@ def test_what_is_played_again_is_counted(tmp_path: Path, monkeypatch: pytest.Mon
     assert (record.outcome, record.attempt) == ("failure", 2)
 
 
-def test_a_run_needs_no_short_temporary_folder_and_few_descriptors(
+def test_honest_policies_play_alike_beside_a_cheat_in_a_long_folder_with_few_descriptors(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     folder = tmp_path / ("long" * 40)
@@ -145,24 +147,39 @@ def test_a_run_needs_no_short_temporary_folder_and_few_descriptors(
     used = max(map(int, os.listdir("/dev/fd")))  # noqa: PTH208
     resource.setrlimit(resource.RLIMIT_NOFILE, (used + 30, before[1]))
     try:
-        found = play(tmp_path / "run", ("Wanderer",))
+        beside = play(tmp_path / "beside", ("Leaker",))["Leaker+1"]
     finally:
         resource.setrlimit(resource.RLIMIT_NOFILE, before)
-    assert {record.error for records in found.values() for record in records} == {None}
+    plan = paper_plan("Dice", 2, policy_process="shared")
+    alone = InProcess().run(deque(plan.jobs()), paper_runner(plan, tmp_path))
+    unnamed = {"policy": "", "ref": None}
+    assert sorted((comparable(one) | unnamed for one in beside), key=str) == sorted(
+        (comparable(one) | unnamed for one in alone), key=str
+    )
+
+
+@pytest.fixture(scope="module")
+def hosted() -> Iterator[HostedPolicy]:
+    """An honest policy in the middle of an episode."""
+    with pytest.MonkeyPatch.context() as patch, HostPool(HostSettings()) as pool:
+        patch.syspath_prepend(Path(hosting_fakes.__file__).parent)
+        policy = HostedPolicy(pool.connect(), read_policy(HONEST), 3)
+        world = PaperWorld(paper_plan("Dice", 1).jobs()[0])
+        _, info = world.reset()
+        policy.reset("Pick the needle in the haystack.", info["demonstration"])
+        policy.act(world.observation())  # type: ignore[arg-type]
+        yield policy
+        policy.close()
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="reads /proc")
+@pytest.mark.usefixtures("hosted")
 def test_nobody_can_connect_to_the_supervisor() -> None:
-    with HostPool(HostSettings()) as pool:
-        policy = HostedPolicy(pool.connect(), read_policy(HONEST), 0)
-        ours = {
-            str(path.readlink()) for path in Path("/proc/self/fd").iterdir() if path.is_socket()
-        }
-        for line in Path("/proc/net/unix").read_text().splitlines()[1:]:
-            *_, flags, _kind, _state, inode = line.split()[:7]
-            assert f"socket:[{inode}]" not in ours or int(flags, 16) == 0, "it listens"
-        assert ours
-        policy.close()
+    ours = {str(path.readlink()) for path in Path("/proc/self/fd").iterdir() if path.is_socket()}
+    for line in Path("/proc/net/unix").read_text().splitlines()[1:]:
+        *_, flags, _kind, _state, inode = line.split()[:7]
+        assert f"socket:[{inode}]" not in ours or int(flags, 16) == 0, "it listens"
+    assert ours
 
 
 def test_an_episode_begins_where_the_run_began(
@@ -179,58 +196,33 @@ def test_an_episode_begins_where_the_run_began(
             policy.close()
 
 
-@pytest.mark.parametrize(("process", "elsewhere"), [("own", False), ("shared", True)])
-def test_a_policy_is_imported_only_in_its_own_process(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, process: str, elsewhere: bool
+def test_a_policy_and_files_beside_it_are_imported_only_in_its_own_process(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    for module in ("json", "multiprocessing", "numpy", "roboirg"):
+        (tmp_path / f"{module}.py").write_text(
+            f"open('imported {module}', 'w').close()\nraise ImportError('shadowed')\n"
+        )
     (tmp_path / "tattler.py").write_text(
         "import os, sys\nimport numpy as np\n"
         "with open('imports', 'a') as file: file.write(f'{sys.orig_argv}\\n')\n"
-        "class It:\n    cameras = ()\n    def reset(self, i, d): pass\n"
-        "    def act(self, o): return np.ones((24, 8))\n"
-    )
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(sys, "path", list(sys.path))
-    options = {"tasks": "PickXtimes", "settings": "direct", "policy_process": process}
-    sys.path.insert(0, str(tmp_path))
-    try:
-        plan = make_plan(["tattler:It"], **options)  # type: ignore[arg-type]
-        for _ in range(2):  # the second run compares versions
-            run_plan(plan, tmp_path, paper_runner(plan, tmp_path), LocalProcesses(2))
-            plan = make_plan(["tattler:It"], **options, max_steps=9)  # type: ignore[arg-type]
-    finally:
-        sys.modules.pop("tattler", None)
-    imports = (tmp_path / "imports").read_text().splitlines()
-    assert imports
-    assert any("host_process" not in one for one in imports) == elsewhere
-    assert {record.outcome for record in read_records(tmp_path)} == {"success"}
-
-
-def test_a_version_never_controls_a_terminal() -> None:
-    found = open_policy(read_policy(hostile_policies.SPEC("TerminalVersion")))
-    assert found.version.startswith(r"\x1b[2J\u202e\n999")
-
-
-@pytest.mark.parametrize("module", ["json", "multiprocessing", "numpy", "roboirg"])
-def test_files_beside_a_policy_are_imported_in_no_process_but_its_own(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, module: str
-) -> None:
-    (tmp_path / f"{module}.py").write_text(
-        "open('imported', 'w').close()\nraise ImportError('shadowed')\n"
-    )
-    (tmp_path / "neighbor.py").write_text(
-        "import os, sys\nimport numpy as np\n"
         "class It:\n    cameras = ()\n    def act(self, o): return np.ones((24, 8))\n"
         "    def reset(self, i, d): self.metadata = {'first': sys.path[0] == os.getcwd()}\n"
     )
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(sys, "path", [path for path in sys.path if path])
     add_working_directory(last=True)
-    plan = paper_plan("Dice", 1).model_copy(update={"policies": (read_policy("neighbor:It"),)})
-    run_plan(plan, tmp_path / "run", paper_runner(plan, tmp_path / "run"), LocalProcesses(1))
-    (record,) = read_records(tmp_path / "run")
-    assert (record.error, record.policy_metadata) == (None, {"first": True})
-    assert not (tmp_path / "imported").exists()
+    run = tmp_path / "run"
+    for executor, limit in ((LocalProcesses(1), 99), (InProcess(), 9)):  # versions are compared
+        plan = make_plan(["tattler:It"], tasks="PickXtimes", settings="direct", episodes="1",
+                         max_steps=limit)  # fmt: skip
+        run_plan(plan, run, paper_runner(plan, run), executor)
+    imports = (tmp_path / "imports").read_text().splitlines()
+    assert len(imports) == 4
+    assert all("host_process" in one for one in imports)
+    assert not list(tmp_path.glob("imported*"))
+    for record in read_records(run):
+        assert (record.error, record.policy_metadata) == (None, {"first": True})
 
 
 def memory_of(pid: int, needle: bytes) -> bool:
@@ -252,29 +244,14 @@ def memory_of(pid: int, needle: bytes) -> bool:
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="reads /proc")
-def test_the_memory_of_a_host_holds_no_goal_scene_or_seed() -> None:
-    job = paper_plan("Dice", 1).jobs()[0]
-    world = PaperWorld(job)
-    _, info = world.reset()
-    with HostPool(HostSettings()) as pool:
-        policy = HostedPolicy(pool.connect(), read_policy(HONEST), 3)
-        policy.reset("Pick the needle in the haystack.", info["demonstration"])
-        policy.act(world.observation())  # type: ignore[arg-type]
-        *_, pid = descendants(os.getpid())
-        secret = hosting_fakes.WHISPER.format(job.episode).encode()
-        assert memory_of(os.getpid(), secret)  # the search finds what is there
-        assert memory_of(pid, b"Pick the needle in the haystack.")
-        assert not memory_of(pid, secret)
-        policy.close()
-
-
-def test_a_policy_has_no_terminal() -> None:
-    with HostPool(HostSettings()) as pool:
-        policy = HostedPolicy(pool.connect(), read_policy(hostile_policies.SPEC("Wanderer")), 0)
-        policy.reset("Pick it.", {})
-        *_, pid = descendants(os.getpid())
-        assert os.getsid(pid) == pid
-        policy.close()
+@pytest.mark.usefixtures("hosted")
+def test_the_memory_of_a_host_holds_no_goal_and_it_has_no_terminal() -> None:
+    *_, pid = descendants(os.getpid())
+    secret = PaperWorld(paper_plan("Dice", 1).jobs()[0]).secret.encode()
+    assert memory_of(os.getpid(), secret)  # the search finds what is there
+    assert memory_of(pid, b"Pick the needle in the haystack.")
+    assert not memory_of(pid, secret)
+    assert os.getsid(pid) == pid
 
 
 def test_a_name_with_lone_surrogates_is_refused() -> None:
@@ -329,13 +306,3 @@ def test_in_a_worker_an_interrupt_is_the_policys(tmp_path: Path) -> None:
         for record in found[hostile_policies.SPEC(name)]:
             assert str(record.cause).startswith(hostile_policies.SPOILED[name])
         assert {record.error for record in found[f"{name}+1"]} == {None}
-
-
-def test_records_of_honest_policies_are_the_same_beside_any_cheat(tmp_path: Path) -> None:
-    beside = play(tmp_path / "beside", ("Leaker",))["Leaker+1"]
-    plan = paper_plan("Dice", 2)
-    alone = InProcess().run(deque(plan.jobs()), paper_runner(plan, tmp_path))
-    changed = {"policy": "", "ref": None}
-    assert sorted((comparable(one) | changed for one in beside), key=str) == sorted(
-        (comparable(one) | changed for one in alone), key=str
-    )

@@ -151,7 +151,8 @@ def test_without_a_version_another_class_or_part_of_a_system_is_another(
     write()
     file = tmp_path / "checkpointed.py"
     file.write_text(
-        file.read_text() + """
+        file.read_text()
+        + """
 class Other(It): pass
 class Hands(It):
     def follow(self, subgoal): pass
