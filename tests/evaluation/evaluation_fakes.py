@@ -167,5 +167,6 @@ if __name__ == "__main__":
     seeds = int(sys.argv[3]) if len(sys.argv) > 3 else 1
     seconds = float(sys.argv[4]) if len(sys.argv) > 4 else 0.15
     endless = int(sys.argv[5]) if len(sys.argv) > 5 else None
+    workers = int(sys.argv[6]) if len(sys.argv) > 6 else 2
     play = FakePlay(folder, seconds, endless=endless)
-    run_plan(small_plan(episodes, seeds=seeds), folder, play, LocalProcesses(2))
+    run_plan(small_plan(episodes, seeds=seeds), folder, play, LocalProcesses(workers))

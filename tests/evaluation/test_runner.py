@@ -12,7 +12,15 @@ from pathlib import Path
 
 import evaluation_fakes
 import pytest
-from evaluation_fakes import FakePlay, comparable, is_alive, small_plan, starts, worker_pids
+from evaluation_fakes import (
+    FakePlay,
+    changed,
+    comparable,
+    is_alive,
+    small_plan,
+    starts,
+    worker_pids,
+)
 from flat_jobs import with_version
 from msgspec.structs import replace
 
@@ -51,9 +59,10 @@ def line_count(folder: Path) -> int:
     return path.read_bytes().count(b"\n") if path.exists() else 0
 
 
-def begin(folder: Path) -> subprocess.Popen[bytes]:
+def begin(folder: Path, workers: int = 1) -> subprocess.Popen[bytes]:
     """The run of `evaluation_fakes` in a process of its own, until three episodes have ended."""
-    words = ["8", "1", "0", "2"]  # episodes, seeds, seconds of each; from 2 on they never end
+    # Episodes, seeds, seconds of each; from 2 on they never end; workers.
+    words = ["8", "1", "0", "2", str(workers)]
     child = subprocess.Popen([sys.executable, evaluation_fakes.__file__, folder, *words])
     wait_until(lambda: line_count(folder) >= 3 or child.poll() is not None)
     assert child.poll() is None
@@ -61,7 +70,7 @@ def begin(folder: Path) -> subprocess.Popen[bytes]:
 
 
 def finish(folder: Path) -> RunSummary:
-    return run_plan(small_plan(8), folder, FakePlay(), LocalProcesses(2))
+    return run_plan(small_plan(8), folder, FakePlay(), InProcess())
 
 
 @pytest.fixture(scope="module")
@@ -71,19 +80,17 @@ def uninterrupted(tmp_path_factory: pytest.TempPathFactory) -> list[dict[str, ob
     return all_comparable(read_records(folder))
 
 
-def test_one_and_two_workers_give_the_same_records(
+def test_two_workers_give_the_same_records(
     tmp_path: Path, uninterrupted: list[dict[str, object]]
 ) -> None:
-    for workers in (1, 2):
-        folder = tmp_path / str(workers)
-        run_plan(small_plan(8), folder, FakePlay(), LocalProcesses(workers))
-        assert all_comparable(read_records(folder)) == uninterrupted
+    run_plan(small_plan(8), tmp_path, FakePlay(), LocalProcesses(2))
+    assert all_comparable(read_records(tmp_path)) == uninterrupted
 
 
 def test_after_sigkill_the_workers_are_gone_and_the_same_command_goes_on(
     tmp_path: Path, uninterrupted: list[dict[str, object]]
 ) -> None:
-    child = begin(tmp_path)
+    child = begin(tmp_path, workers=2)
     child.send_signal(signal.SIGKILL)
     child.wait()
     wait_until(lambda: not any(map(is_alive, worker_pids(tmp_path))))
@@ -115,32 +122,26 @@ def test_a_stopped_run_ends_its_workers_and_keeps_what_ended(
 
 
 def test_a_worker_that_dies_twice_costs_one_error_and_the_rest_goes_on(tmp_path: Path) -> None:
-    summary = run_plan(small_plan(), tmp_path, FakePlay(tmp_path, deadly=2), LocalProcesses(2))
-    errors = [record for record in read_records(tmp_path) if record.outcome == "error"]
-    assert {record.episode for record in errors} == {2}
-    assert {record.error for record in errors} == {"infrastructure"}
-    assert {record.cause for record in errors} == {
-        "infrastructure: the process died of signal 9 in the environment"
-    }
-    assert (summary.total, len(summary.errors), summary.missing) == (8, 2, 0)
-    assert all(len(starts(tmp_path, record.identity)) == 2 for record in errors)
-    assert {record.attempt for record in errors} == {2}
+    plan = changed(small_plan(), settings="direct")
+    summary = run_plan(plan, tmp_path, FakePlay(tmp_path, deadly=2), LocalProcesses(1))
+    (error,) = (record for record in read_records(tmp_path) if record.outcome == "error")
+    assert (error.episode, error.error, error.attempt) == (2, "infrastructure", 2)
+    assert error.cause == "infrastructure: the process died of signal 9 in the environment"
+    assert (summary.total, len(summary.errors), summary.missing) == (4, 1, 0)
+    assert len(starts(tmp_path, error.identity)) == 2
+    # Errors are played again unless asked not to.
+    same = run_plan(plan, tmp_path, FakePlay(), InProcess(), retry_errors=False)
+    assert (same.played, len(same.errors)) == (0, 1)
+    mended = run_plan(plan, tmp_path, FakePlay(), InProcess())
+    assert (mended.played, len(mended.errors)) == (1, 0)
+    assert run_plan(plan, tmp_path, FakePlay(), InProcess()).played == 0
 
 
 def test_a_worker_that_dies_once_costs_nothing(tmp_path: Path) -> None:
     play = FakePlay(tmp_path, deadly=1, deaths=1)
-    summary = run_plan(small_plan(), tmp_path, play, LocalProcesses(1))
-    assert not summary.errors
-    assert len(read_records(tmp_path)) == 8
-
-
-def test_errors_are_played_again_unless_asked_not_to(tmp_path: Path) -> None:
-    run_plan(small_plan(), tmp_path, FakePlay(deadly=2), LocalProcesses(1))
-    same = run_plan(small_plan(), tmp_path, FakePlay(), InProcess(), retry_errors=False)
-    assert (same.played, len(same.errors)) == (0, 2)
-    mended = run_plan(small_plan(), tmp_path, FakePlay(), InProcess())
-    assert (mended.played, len(mended.errors)) == (2, 0)
-    assert run_plan(small_plan(), tmp_path, FakePlay(), InProcess()).played == 0
+    plan = changed(small_plan(3), settings="direct")
+    assert not run_plan(plan, tmp_path, play, LocalProcesses(1)).errors
+    assert len(read_records(tmp_path)) == 3
 
 
 def test_missing_graphics_stop_the_run_and_lose_nothing(tmp_path: Path) -> None:
