@@ -20,12 +20,14 @@ from roboirg.tasks.other_goals import begins_with
 from roboirg.tasks.splits.splits import get_episode
 
 SETTING = "direct"
+COUNT = 8
+"""Episodes of each task."""
 ALL_ARMS = ("told", "other-goal", "silent", "scrambled", "paraphrase-1", "paraphrase-2")
 Scene = tuple[str, int]
 
 
 @functools.cache
-def scenes(count: int = 50) -> tuple[Scene, ...]:
+def scenes(count: int = COUNT) -> tuple[Scene, ...]:
     return tuple(
         (task, index)
         for task in all_tasks()
@@ -61,11 +63,11 @@ def succeeds(policy: str, scene: Scene, arm: str, seed: int = 0) -> bool | None:
     return goal is not None and begins_with(stages, said.episode.stages)
 
 
-def rate(policy: str, *arms: str, count: int = 50, seed: int = 0) -> float:
+def rate(policy: str, *arms: str) -> float:
     """Return the share of scenes with all arms in which a policy succeeds in all of them."""
-    found = [[succeeds(policy, scene, arm, seed) for arm in arms] for scene in scenes(count)]
+    found = [[succeeds(policy, scene, arm) for arm in arms] for scene in scenes()]
     whole = [each for each in found if None not in each]
-    assert len(whole) > count
+    assert len(whole) > COUNT
     return sum(map(all, whole)) / len(whole)
 
 
@@ -78,9 +80,9 @@ def test_language_use_of_who_listens_and_who_does_not():
 
 
 def test_in_silence_who_listens_is_at_chance():
-    won = [succeeds("listener", scene, "silent") for scene in scenes()]
+    won = [succeeds("listener", scene, "silent") for scene in scenes(25)]
     low, high = wilson_interval(sum(map(bool, won)), len(won))
-    chance = sum(silent_chance(task, "test", index) for task, index in scenes()) / len(won)
+    chance = sum(silent_chance(task, "test", index) for task, index in scenes(25)) / len(won)
     assert low <= chance <= high
 
 
@@ -95,13 +97,13 @@ def test_in_silence_who_listens_is_at_chance():
     ],
 )
 def test_each_arm_has_a_policy_that_fails_it(policy, arm):
-    assert rate(policy, arm, count=12) < 0.7
-    assert rate("oracle", arm, count=12) == 1.0
+    assert rate(policy, arm) < 0.7
+    assert rate("oracle", arm) == 1.0
 
 
 def test_the_planted_cheats_are_found_by_the_arms_alone():
     # Told, habit is as good as the oracle; nothing but another goal tells them apart.
-    assert rate("habit", *(arm for arm in ALL_ARMS if arm != "other-goal"), count=12) == 1.0
+    assert rate("habit", *(arm for arm in ALL_ARMS if arm != "other-goal")) == 1.0
     # All paraphrases at once are harder than one for who guesses.
-    both = rate("forgetful", "paraphrase-1", "paraphrase-2", count=12)
-    assert both < min(rate("forgetful", f"paraphrase-{one}", count=12) for one in (1, 2))
+    both = rate("forgetful", "paraphrase-1", "paraphrase-2")
+    assert both < min(rate("forgetful", f"paraphrase-{one}") for one in (1, 2))

@@ -82,31 +82,31 @@ def make_planner(kind, server, provider="openai", **more):
     return make_by_kind(kind, {"model": model, **own}, "the test")
 
 
-def moment(step):
+def moment(step, size=64):
     """What is seen at a step: its number as a shade of grey."""
-    return {"front_rgb": np.full((256, 256, 3), step % 256, np.uint8)}
+    return {"front_rgb": np.full((size, size, 3), step % 256, np.uint8)}
 
 
-def video(steps, every=1):
+def video(steps, size=64):
     return {
-        "front_rgb": np.stack([moment(step)["front_rgb"] for step in range(0, steps, every)]),
+        "front_rgb": np.stack([moment(step, size)["front_rgb"] for step in range(steps)]),
         "joint_positions": np.zeros((steps, 7)),
     }
 
 
-NO_VIDEO = {"front_rgb": np.zeros((0, 256, 256, 3), np.uint8), "joint_positions": np.zeros((0, 7))}
+NO_VIDEO = {"front_rgb": np.zeros((0, 64, 64, 3), np.uint8), "joint_positions": np.zeros((0, 7))}
 
 
-def drive(planner, steps, chunk=CHUNK, demonstration=NO_VIDEO, instruction="Do it."):
+def drive(planner, steps, chunk=CHUNK, demonstration=NO_VIDEO, instruction="Do it.", size=64):
     """Play an episode in chunks; return the subgoal at each chunk's first step."""
     policy = HierarchicalPolicy(planner, Follower(chunk))
     policy.reset(instruction, demonstration)
     every = policy.observe_every
     for step in range(0, steps + 1, chunk):
-        observation = moment(step)
+        observation = moment(step, size)
         if every is not None:
             observation["history"] = tuple(
-                moment(at)
+                moment(at, size)
                 for at in range(max(step - chunk + 1, 1), step + 1)
                 if at % every == 0 and step
             )
@@ -315,8 +315,8 @@ def test_requests_are_as_captured(kind, subgoals):
         planner = make_planner(
             kind, server, provider, subgoals=subgoals, video="mp4", max_output_tokens=128
         )
-        drive(planner, 96 if kind == "gemini" else 16, demonstration=video(60),
-              instruction="Put the red one into the bin.")  # fmt: skip
+        drive(planner, 96 if kind == "gemini" else 16, demonstration=video(60, 256),
+              instruction="Put the red one into the bin.", size=256)  # fmt: skip
         name = f"planner-{kind}-{subgoals}"
         check_capture(name, [golden(server.requests[0]), golden(server.requests[-1])])
 

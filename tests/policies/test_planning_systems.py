@@ -183,15 +183,14 @@ class NoMemory(MmeVlaServer):
 
 
 @pytest.mark.sim
-@pytest.mark.parametrize("name", PAPER)
+@pytest.mark.parametrize("name", ["TTT-Expert", "GroundSG-Gemini", "GroundSG-oracle", "MemER"])
 def test_every_system_plays_a_whole_episode(name):
     """Against a policy server and a model's server on real sockets, each by its own protocol."""
     vlm_answers = {
-        "GroundSG-QwenVL": "put it down",
         "GroundSG-Gemini": '{"description": "x", "subgoal_sequence": [], "subgoal": "put it down"}',
         "MemER": '{"current_subtask": "put it down", "keyframe_positions": [1]}',
     }
-    remembers = name in {"TTT-Expert", "FrameS-Modul"}
+    remembers = name == "TTT-Expert"
     server = MmeVlaServer() if remembers else NoMemory()
     with server, fake_vlm([vlm_answers.get(name, "")]) as vlm:
         overrides = {"server": server.place, "policy.timeout": "300"}
@@ -218,5 +217,5 @@ def test_every_system_plays_a_whole_episode(name):
     else:
         assert subgoals == ["put it down" if name in vlm_answers else None] * 3
     assert any("add_buffer" in message for message in messages) == remembers
-    calls = {"GroundSG-QwenVL": 3, "GroundSG-Gemini": 1, "MemER": 3}
+    calls = {"GroundSG-Gemini": 1, "MemER": 3}
     assert len(vlm.requests) == calls.get(name, 0)

@@ -6,7 +6,7 @@ from itertools import accumulate
 
 import pytest
 from checkpoint_folders import write_checkpoint
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from roboirg.core.errors import InvalidValueError, MissingDependencyError
@@ -55,6 +55,7 @@ def audit(text, limit):
     return found, found.reached[0]
 
 
+@settings(max_examples=30)
 @given(TEXTS, LIMITS, st.integers(0, 30), TOKENIZERS)
 def test_bounds_are_in_order_and_verdicts_follow_from_them(text, tokens, added, tokenize):
     found, reached = audit(text, PromptLimit(tokens, added, tokenize))
@@ -64,6 +65,7 @@ def test_bounds_are_in_order_and_verdicts_follow_from_them(text, tokens, added, 
     assert reached == len(text) or found.verdict != "heard"
 
 
+@settings(max_examples=30)
 @given(TEXTS, LIMITS)
 def test_what_is_read_is_the_prefix_that_its_tokens_spell(text, tokens):
     found, reached = audit(text, PromptLimit(tokens, 0, halves))
@@ -73,6 +75,7 @@ def test_what_is_read_is_the_prefix_that_its_tokens_spell(text, tokens):
     assert reached == max(spelled.ends[: max(tokens - 1, 0)], default=0)
 
 
+@settings(max_examples=30)
 @given(TEXTS, LIMITS, LIMITS, TOKENIZERS)
 def test_a_larger_limit_never_hears_less(text, one, other, tokenize):
     (less, short), (more, long) = (
@@ -82,6 +85,7 @@ def test_a_larger_limit_never_hears_less(text, one, other, tokenize):
     assert short <= long
 
 
+@settings(max_examples=30)
 @given(ANY_TEXTS, LIMITS, TOKENIZERS, st.booleans())
 def test_any_text_is_counted(text, tokens, tokenize, lowers):
     _, reached = audit(text, PromptLimit(tokens, 0, tokenize, None, lowers))
@@ -89,6 +93,7 @@ def test_any_text_is_counted(text, tokens, tokenize, lowers):
     assert len(clean_prompt(text, lowers=lowers)) == len(clean_prompt(text))
 
 
+@settings(max_examples=30)
 @given(st.lists(st.lists(TEXTS, min_size=1, max_size=4), max_size=4), LIMITS, TOKENIZERS)
 def test_every_message_is_read_from_its_own_beginning(messages, tokens, tokenize):
     limit = PromptLimit(tokens, 0, tokenize)
@@ -131,6 +136,7 @@ def test_a_state_behind_the_words_shares_their_budget():
     assert crowded == (6, 16, (len("red cube"),), "unknown")
 
 
+@settings(max_examples=30)
 @given(TEXTS)
 def test_the_upper_bound_is_the_count_of_the_language(text):
     ascii_text = clean_prompt(text.replace("ü", "u"))
@@ -144,6 +150,7 @@ def sentencepiece_file():
     return str(resources.files(package) / "data" / "tokenizer.model.v1")
 
 
+@settings(max_examples=30)
 @given(ANY_TEXTS)
 def test_a_sentencepiece_model_says_where_its_pieces_end(sentencepiece_file, text):
     cleaned = clean_prompt(text)
@@ -153,6 +160,7 @@ def test_a_sentencepiece_model_says_where_its_pieces_end(sentencepiece_file, tex
         assert tokens.ends[-1] <= len(cleaned)
 
 
+@settings(max_examples=30)
 @given(st.lists(st.sampled_from([*WORDS[:6], "cubes,", "third"]), min_size=1).map(" ".join))
 def test_a_sentencepiece_model_lies_between_the_bounds(sentencepiece_file, text):
     tokens = read_tokenizer(sentencepiece_file)(text)

@@ -96,8 +96,7 @@ def test_a_limit_of_costs_needs_prices(tmp_path: Path) -> None:
     assert not server.requests
 
 
-@pytest.mark.parametrize("provider", ["openai", "google"])
-@pytest.mark.parametrize("code", [429, 503])
+@pytest.mark.parametrize(("provider", "code"), [("openai", 429), ("google", 503)])
 def test_a_busy_service_is_waited_for(tmp_path: Path, provider: str, code: int) -> None:
     """As long as it asks for, and other processes of the run wait, too."""
     busy = Status(code, headers={"Retry-After": "0.05"})
@@ -246,11 +245,12 @@ def test_processes_keep_one_limit_together(tmp_path: Path) -> None:
     """No turn is given twice: the next one is as many gaps away as there were requests."""
     per_minute, started = 1200.0, time.time()
     with fake_vlm(name_of) as server:
-        both = [Child(server, tmp_path, per_minute) for _ in range(2)]
-        for one, name in zip(both, ("a", "b"), strict=True):
-            one.write(name)
-            one.write("wait")
-        assert [one.end() for one in both] == [0, 0]
+        other = Child(server, tmp_path, per_minute)
+        other.write("a")
+        other.write("wait")
+        words = map("{}".format, range(CALLS))
+        play(server, ReplySettings(tmp_path), "b", *words, requests_per_minute=per_minute)
+        assert other.end() == 0
         assert len(server.requests) == 2 * CALLS
     with sqlite3.connect(tmp_path / REPLIES_FILE) as database:
         ((next_at,),) = database.execute("SELECT next_at FROM services")

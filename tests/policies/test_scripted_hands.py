@@ -28,6 +28,7 @@ from roboirg.tasks.choices import choices_of
 from roboirg.tasks.splits.splits import get_episode
 
 TASKS = [name for name in all_tasks() if get_task(name).suite != "real"]
+SOME = ("BinFill", "StopCube", "VideoUnmask", "VideoRepick", "VideoPlaceOrder")
 AS_READ = {"press_below": "press", "hold_until": "hold"}
 
 
@@ -134,7 +135,7 @@ def test_a_point_outweighs_words_and_the_record_has_both():
 
 
 @pytest.mark.sim
-@pytest.mark.parametrize("task", slow_but(["PickXtimes", "StopCube", "ButtonUnmaskSwap"], TASKS))
+@pytest.mark.parametrize("task", slow_but(["StopCube", "ButtonUnmaskSwap"], TASKS))
 def test_the_oracle_with_scripted_hands_succeeds(task):
     planner = make_planner("oracle", {}, "the test")
     info, policy = play_with(planner, task, episode=3)
@@ -151,7 +152,7 @@ def test_the_oracle_points_at_what_the_arm_hides():
 
 
 @pytest.mark.sim
-@pytest.mark.parametrize("task", slow_but(["StopCube", "VideoUnmask"], TASKS))
+@pytest.mark.parametrize("task", slow_but(["StopCube", "VideoUnmask"], SOME))
 def test_the_listener_plans_what_the_words_mean(task):
     planner = make_planner("listener", {}, "the test")
     assert play_with(planner, task, 1, "reasoning")[0]["status"] == "success"
@@ -186,7 +187,7 @@ class Askew(OraclePlanner):
 
 
 @pytest.mark.sim
-@pytest.mark.parametrize("task", slow_but(["VideoUnmask", "StopCube"], TASKS))
+@pytest.mark.parametrize("task", slow_but(["StopCube"], SOME))
 def test_forty_pixels_off_is_another_thing_or_none(task):
     info, policy = play_with(Askew(SubgoalOptions()), task)
     assert info["status"] != "success"
@@ -208,7 +209,7 @@ def test_forty_pixels_off_is_another_thing_or_none(task):
     ],
 )  # fmt: skip
 def test_the_record_says_how_a_planner_failed(fault, named):
-    records = (planner_faults.record_of(fault, index) for index in range(6))
+    records = (planner_faults.record_of(fault, index) for index in range(4))
     found = [planner_failure(record) for record in records if record is not None]
     assert found
     assert set(found) == {named}
@@ -293,7 +294,7 @@ def test_the_stateless_planner_asks_when_a_subgoal_has_ended():
     ],
 )
 def test_choices_are_robommes_in_every_episode(task, choices):
-    for index in range(50):
+    for index in range(20):
         found = choices_of(get_episode(task, "test", index))
         motions = [one.primitives[0].kind + "+" * (one.kind is not None) for one in found]
         if task != "StopCube" or len(found) == 3:  # some episodes leave no time to wait

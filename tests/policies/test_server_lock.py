@@ -39,11 +39,20 @@ def holder(tmp_path):
     process.join()
 
 
-def test_another_process_waits_takes_another_server_or_inherits(holder, tmp_path):
+def test_another_process_waits_takes_another_server_or_inherits(holder, tmp_path, monkeypatch):
+    """Waiting is told, and counted as waiting."""
+    told = []
+    monkeypatch.setattr(waiting, "_listeners", [told.append])
+    before = queued_seconds()
+    lock_server([TWO], wait=5, folder=tmp_path).file.close()
+    assert (told, queued_seconds()) == ([], before)
     start = time.monotonic()
     with pytest.raises(PolicyTimeoutError, match=r"Other episodes used h:8001 for 0\.2 s"):
         lock_server([ONE], wait=0.2, folder=tmp_path)
     assert 0.2 <= time.monotonic() - start < 300
+    (wait, end) = told
+    assert (wait.what, wait.is_queue, end) == ("a free server: h:8001", True, None)
+    assert queued_seconds() - before >= 0.2
     lock = lock_server([ONE, TWO], wait=0, folder=tmp_path)
     assert lock.endpoint == TWO
     with pytest.raises(PolicyTimeoutError, match="used h:8001, h:8002 for"):
@@ -53,19 +62,6 @@ def test_another_process_waits_takes_another_server_or_inherits(holder, tmp_path
     assert again.endpoint == ONE
     lock.file.close()
     again.file.close()
-
-
-def test_waiting_for_a_server_is_told_and_counted_as_waiting(holder, tmp_path, monkeypatch):
-    told = []
-    monkeypatch.setattr(waiting, "_listeners", [told.append])
-    before = queued_seconds()
-    lock_server([TWO], wait=5, folder=tmp_path).file.close()
-    assert (told, queued_seconds()) == ([], before)
-    with pytest.raises(PolicyTimeoutError):
-        lock_server([ONE], wait=0.2, folder=tmp_path)
-    (wait, end) = told
-    assert (wait.what, wait.is_queue, end) == ("a free server: h:8001", True, None)
-    assert queued_seconds() - before >= 0.2
 
 
 def test_those_who_share_do_not_exclude_each_other(tmp_path):
@@ -121,31 +117,31 @@ def play(url, length, results, steps=12):
 
 
 def test_processes_and_policies_do_not_mix_state():
-    with MmeVlaServer(delay=0.002) as one, MmeVlaServer(delay=0.002) as two:
-        url = f"mme-vla://{one.place},{two.place}?part=2"
+    with MmeVlaServer(delay=0.002) as server:
+        url = f"mme-vla://{server.place}?part=2"
         results = SPAWN.Queue()
-        players = [SPAWN.Process(target=play, args=(url, length, results)) for length in (3, 5, 8)]
+        players = [SPAWN.Process(target=play, args=(url, length, results)) for length in (3, 8)]
         for player in players:
             player.start()
-        found = [results.get(timeout=600) for _ in range(3 * 3 * 12)]
+        found = [results.get(timeout=600) for _ in range(2 * 3 * 12)]
         for player in players:
             player.join()
             assert player.exitcode == 0
-        assert one.connections + two.connections == 9
+        assert server.connections == 6
     for (frames, start, _, inferences), expected in found:
         assert [frames, start, inferences] == expected
 
 
 def test_a_large_demonstration_arrives():
-    frames = np.empty((1080, 256, 256, 3), np.uint8)
-    frames[:] = np.arange(1080, dtype=np.uint16).astype(np.uint8)[:, None, None, None]
-    felt = {"joint_positions": np.zeros((1080, 7), np.float32), "gripper": np.zeros((1080, 2))}
+    frames = np.empty((250, 256, 256, 3), np.uint8)
+    frames[:] = np.arange(250, dtype=np.uint16).astype(np.uint8)[:, None, None, None]
+    felt = {"joint_positions": np.zeros((250, 7), np.float32), "gripper": np.zeros((250, 2))}
     with MmeVlaServer(delay=0.01) as server:
         policy = make_policy(f"mme-vla://{server.place}?timeout=60", 0)
         policy.reset(INSTRUCTION, {"front_rgb": frames, **felt})
         rows = policy.act(moment(1, size=256, history=()))
         policy.close()
-        assert server.bytes == 1081 * 256 * 256 * 3
-        assert server.parts == [16] * 67 + [9]
-        assert rows[0, :2].tolist() == [1081, 1080]
+        assert server.bytes == 251 * 256 * 256 * 3
+        assert server.parts == [16] * 15 + [11]
+        assert rows[0, :2].tolist() == [251, 250]
         assert max(map(len, server.messages)) < 4 * 2**20
