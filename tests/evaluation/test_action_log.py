@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
@@ -34,6 +34,7 @@ def logs(draw: st.DrawFn) -> ActionLog:
     return ActionLog("joint_angle", rows, starts, end)
 
 
+@settings(max_examples=25)
 @given(log=logs())
 def test_what_is_written_is_read(log: ActionLog, tmp_path_factory: pytest.TempPathFactory) -> None:
     folder = tmp_path_factory.mktemp("run")
@@ -52,6 +53,7 @@ def a_log(rows: int = 4) -> ActionLog:
     return ActionLog("joint_angle", numbers, np.array([0], np.int32), np.zeros(3))
 
 
+@settings(max_examples=25)
 @given(log=logs(), other=logs())
 def test_different_content_has_different_digests(log: ActionLog, other: ActionLog) -> None:
     same = all(

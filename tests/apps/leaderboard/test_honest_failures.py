@@ -32,7 +32,7 @@ def test_runs_of_policies_that_fail_in_this_process_hold(tmp_path: Path) -> None
     assert {one.outcome for one in records.values()} == {"error", "failure"}
     assert records["Raises_act_1"].action_log is not None
     assert (records["Posing"].outcome, records["Posing"].steps) == ("error", 2)
-    found = verify_run(tmp_path, workers=2)
+    found = verify_run(tmp_path, workers=1)
     assert found.holds, found
     assert found.errors == sum(one.outcome == "error" for one in records.values())
 

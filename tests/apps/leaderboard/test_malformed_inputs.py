@@ -315,8 +315,7 @@ def test_hidden_files_and_pipes_are_not_packed(run: Path) -> None:
 
 
 UNREAD_PLANS: Mapping[str, Change] = {
-    "600,000 seeds in two settings": planned(policy_seeds=list(range(600_000))),
-    "600,000 episodes in two settings": planned(episodes=list(range(600_000))),
+    "1,200,000 jobs": planned(policy_seeds=list(range(12_000)), episodes=list(range(50))),
     "no seeds": planned(policy_seeds=[]),
     "policy that controls the terminal": planned(policies=["\x1b[31m"]),
     "task that controls the terminal": planned(tasks=["\u202eksat"]),
@@ -325,6 +324,11 @@ UNREAD_PLANS: Mapping[str, Change] = {
     "pipe": replaced(PLAN_FILE, os.mkfifo),
     "3 GB": replaced(PLAN_FILE, sparse(3 << 30)),
 }
+
+
+def test_a_plan_of_many_jobs_is_read(run: Path) -> None:
+    planned(policy_seeds=list(range(9_000)), episodes=list(range(50)))(run)
+    assert len(read_plans(run)) == 1
 
 
 @pytest.mark.parametrize("name", UNREAD_PLANS)

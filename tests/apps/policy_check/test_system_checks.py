@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 from expert_world import record
 from planning_fakes import fake_vlm
-from selection import slow_but
 from wire_servers import CHUNK, MmeVlaServer
 
 from roboirg.apps.policy_check.check_result import NOTE, PASS
@@ -34,7 +33,7 @@ class SystemServer(MmeVlaServer):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", slow_but(["GroundSG-QwenVL", "FrameS-Modul"], all_systems()))
+@pytest.mark.parametrize("name", all_systems())
 def test_nothing_is_found_in_a_system(name, monkeypatch):
     monkeypatch.setenv("GOOGLE_API_KEY", "secret")
     with SystemServer() as server, fake_vlm([REPLIES.get(name, "")]) as vlm:

@@ -43,7 +43,7 @@ def drawn(count, caption="done", style=STYLE):
     return figure
 
 
-@pytest.mark.parametrize("count", [1, 4, 6, 8, 12])
+@pytest.mark.parametrize("count", [1, 8])
 def test_every_picture_is_there_once_and_in_order_of_time(count):
     figure = drawn(count)
     values = [axes.images[0].get_array()[0, 0, 0] for axes in figure.axes]
@@ -55,10 +55,9 @@ def test_every_picture_is_there_once_and_in_order_of_time(count):
         assert places[4].y0 < places[3].y0
 
 
-@pytest.mark.parametrize("style", [STYLE, DARK_STYLE])
 @pytest.mark.parametrize("caption", ["done: pick", "done: pick up the container " * 30])
-def test_no_word_leaves_the_strip_and_none_is_drawn_over_another(style, caption):
-    figure = drawn(12, caption, style)
+def test_no_word_leaves_the_strip_and_none_is_drawn_over_another(caption):
+    figure = drawn(12, caption)
     boxes = [text.get_window_extent() for text in figure.texts]
     for number, box in enumerate(boxes):
         assert box.x0 >= 0
