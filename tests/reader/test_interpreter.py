@@ -11,7 +11,6 @@ from language_variants import first_episodes
 
 from roboirg import reader
 from roboirg.core.episode import COLORS, Goal, Point, Scene, SceneObject
-from roboirg.core.errors import UnknownNameError
 from roboirg.language import expressible, instruct
 from roboirg.language.settings import plain_settings, settings_of
 from roboirg.reader import interpret
@@ -65,21 +64,21 @@ WORDS = (
 )
 
 
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=80)
 @given(
+    st.sampled_from(tuple(EPISODES)),
     st.one_of(
         st.text(max_size=200),
         st.lists(st.sampled_from(WORDS.split(" ")), max_size=30).map(" ".join),
-    )
+    ),
 )
-def test_arbitrary_text_never_raises(text):
-    for task, (_, _, _, episode, *_) in EPISODES.items():
-        found = interpret(text, episode.scene, task)
-        assert set(found.goals) <= set(get_task(task).goals(episode.scene))
+def test_arbitrary_text_never_raises(task, text):
+    scene = EPISODES[task][3].scene
+    assert set(interpret(text, scene, task).goals) <= set(get_task(task).goals(scene))
 
 
 def test_endless_places_are_given_up():
-    text = "Take the cube " + "closest to the cube " * 5000 + "at the far left."
+    text = "Take the cube " + "closest to the cube " * 1000 + "at the far left."
     ((place, _),) = read_places(*split_sentences(text))
     depth = 0
     while isinstance(place, RelativePlace):
@@ -96,11 +95,6 @@ def test_no_command_licenses_no_goal(text):
         found = interpret(text, episode.scene, task)
         assert not found.goals
         assert "finds no command" in found.not_understood
-
-
-def test_unknown_task():
-    with pytest.raises(UnknownNameError):
-        interpret("Lift it.", PICK, "PickYtimes")
 
 
 SCENE = Scene(
@@ -140,15 +134,18 @@ def test_sentences_of_other_people(text, color, repeats):
     assert interpret(text, SCENE, "PickXtimes").goals == (Goal.of(color=color, repeats=repeats),)
 
 
-def test_what_is_left_open_by_commands_alone():
-    def count(text):
-        return len(interpret(text, SCENE, "PickXtimes").goals)
-
-    assert count("Take it and place it on the target that many times.") == 15
-    assert count("Take the cube there and place it on the target four times.") == 3
-    assert count("Take the red cube and place it on the target twice as many times as that.") == 2
-    assert count("Take the red cube and place it on the target one time fewer than that.") == 5
-    assert count("Take the red cube and place it on the target two more times than that.") == 3
+@pytest.mark.parametrize(
+    ("text", "count"),
+    [
+        ("Take it and place it on the target that many times.", 15),
+        ("Take the cube there and place it on the target four times.", 3),
+        ("Take the red cube and place it on the target twice as many times as that.", 2),
+        ("Take the red cube and place it on the target one time fewer than that.", 5),
+        ("Take the red cube and place it on the target two more times than that.", 3),
+    ],
+)
+def test_what_is_left_open_by_commands_alone(text, count):
+    assert len(interpret(text, SCENE, "PickXtimes").goals) == count
 
 
 def test_picks_tell_how_many_colors_a_goal_has():
@@ -181,7 +178,7 @@ def test_rivals_that_are_not_waved_aside_make_a_text_ambiguous():
 
 @pytest.mark.parametrize("task", every_task())
 def test_case_spaces_digits_and_spelling_do_not_matter(task):
-    for episode, setting in itertools.product(EPISODES[task], settings_of(get_task(task))):
+    for episode, setting in itertools.product(EPISODES[task][2:4], settings_of(get_task(task))):
         if setting not in expressible(episode):
             assert setting not in plain_settings()
             continue
@@ -191,7 +188,7 @@ def test_case_spaces_digits_and_spelling_do_not_matter(task):
             digits = digits.replace(f" {word}", f" {number}")
         for ordinal, word in (("2nd", "second"), ("3rd", "third"), ("4th", "fourth")):
             digits = digits.replace(f" {word}", f" {ordinal}")
-        british = text.replace("color", "color").replace("neighbor", "neighbor")
+        british = text.replace("color", "colour").replace("neighbor", "neighbour")
         short = british.replace("did not", "didn’t").replace("does not", "doesn't")
         for other in (text.upper(), text.replace(" ", "  \t"), digits, british, short, text + "\n"):
             assert interpret(other, episode.scene, task).goals == (episode.goal,), other

@@ -4,7 +4,7 @@ import re
 from pathlib import Path
 
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from language_variants import TASKS, first_episodes
 
@@ -204,6 +204,7 @@ WORDS = st.one_of(
 ).filter(lambda word: word in FILLERS or is_unknown(word))
 
 
+@settings(max_examples=50)
 @given(st.sampled_from(COMMANDS), WORDS, st.data())
 def test_a_word_more_is_harmless_or_named(case, word, data):
     task, episode, instruction = case
