@@ -172,12 +172,8 @@ def test_neither_excludes_an_introduced_pair(words, pair):
     def colors(text):
         return {goal.text("color") for goal in left_over(text, pick, "PickXtimes")}
 
-    assert colors(
-        "My hat is red and blue. Take the red cube and put it on the target where it was placed"
-    ) == {"green"}
-    assert colors(
-        "My hat is red and green. Take the red cube and put it on the target where it was placed"
-    ) == {"blue"}
+    assert colors(f"My hat is red and blue. {take}") == {"green"}
+    assert colors(f"My hat is red and green. {take}") == {"blue"}
     assert colors(take) == set(COLORS)  # the pair has to be introduced
     counted = f"Put two cubes {words.replace('is', 'are')} {pair} into the bin."
     assert left_over(f"My hat is red and blue. {counted}") == {filled(green=2)}
