@@ -18,7 +18,7 @@ from roboirg.apps.grounding.answer_scores import (
 )
 from roboirg.apps.grounding.score_report import confusion_tables, report_text
 from roboirg.apps.grounding.score_tables import breakdown_tables
-from roboirg.core.errors import InvalidValueError, UnknownNameError
+from roboirg.core.errors import InvalidValueError
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.evaluation.analysis.stats.chance import floor_level
 from roboirg.evaluation.grounding_items.answer_file import Answer, read_answers, write_answers
@@ -62,18 +62,13 @@ def media():
 
 
 @functools.cache
-def items(tasks=TASKS, episodes=12, every_variant=False):
+def items(tasks=TASKS, episodes=8):
     found = []
     for task in tasks:
         for index in range(episodes):
             episode = get_episode(task, "test", index)
-            wanted = wanted_options(
-                episode,
-                plain_settings(),
-                ("implicit",),
-                InstructionOptions(),
-                every_variant=every_variant,
-            )
+            asked = (plain_settings(), ("implicit",), InstructionOptions())
+            wanted = wanted_options(episode, *asked, every_variant=False)
             found += make_items(episode, media(), list(wanted))
     return found
 
@@ -103,18 +98,18 @@ def test_the_oracle_is_always_right(kind):
 
 @pytest.mark.parametrize("kind", ["slots", "choice"])
 def test_random_answers_are_at_chance(kind):
-    """Within two points, over ten thousand answers."""
+    """Within three points, over three thousand answers."""
     known = {item.id: item for item in items()}
-    seeds = range(math.ceil(10_000 / len(items())))
+    seeds = range(math.ceil(3_000 / len(items())))
     found = [
         (judge_reply(known[one.id], kind, one.reply).right, guess_chance(known[one.id], kind))
         for seed in seeds
         for one in floor_answers("chance", items(), seed)
         if one.kind == kind
     ]
-    assert len(found) >= 10_000
+    assert len(found) >= 3_000
     right, expected = np.mean(found, axis=0)
-    assert abs(right - expected) < 0.02
+    assert abs(right - expected) < 0.03
 
 
 def test_random_pixels_hit_as_often_as_masks_are_large():
@@ -204,27 +199,18 @@ def test_replies_that_point_nowhere_are_no_answer(reply):
     assert not verdict.right
 
 
-def test_masks_agree_with_the_quick_test_of_a_pixel():
-    item = item_of("PickXtimes")
-    mask = item.points[0].mask
-    rng = np.random.default_rng(0)
-    for x, y in rng.integers(0, 60, size=(200, 2)).tolist():
-        reply = json.dumps({"points": [{"x": x, "y": y}, {"x": 30, "y": 40}]})
-        assert judge_reply(item, "points", reply).parts["1"] == mask[y, x]
-
-
 def test_scores_are_what_plain_counts_give():
     """All explicit and no direct answer is right, half of the items have none."""
     given = [
         Answer(item.id, "slots", item.answer if item.setting == "explicit" else "{}")
         for item in items()
-        if item.episode < 6
+        if item.episode < 4
     ]
     score, rows = rows_of(given, "slots")
     explicit, direct = rows["explicit"], rows["direct"]
     assert (explicit.summary.rate, direct.summary.rate, direct.summary.gap.value) == (1, 0, -1)
-    assert direct.summary.counts.trials == 6 * len(TASKS)
-    p_value = 2 * 0.5 ** (6 * len(TASKS))
+    assert direct.summary.counts.trials == 4 * len(TASKS)
+    p_value = 2 * 0.5 ** (4 * len(TASKS))
     assert direct.summary.gap.p_value == pytest.approx(p_value)
     # Four settings are tested together; spatial has fewer tasks, so its p-value is larger.
     assert direct.summary.p_holm == pytest.approx(4 * p_value)
@@ -232,13 +218,13 @@ def test_scores_are_what_plain_counts_give():
     # Of three goals or letters, a rate of 0 is as far below chance as that allows.
     assert direct.corrected == pytest.approx(-direct.chance / (1 - direct.chance))
     assert score.unparsed == sum(item.setting != "explicit" for item in items()) / 2
-    assert score.missing == sum(item.episode >= 6 for item in items())
+    assert score.missing == sum(item.episode >= 4 for item in items())
 
 
 @pytest.mark.parametrize("rule", ["first-mention", "surface", "command"])
 def test_shortcuts_are_right_as_often_as_their_probability_says(rule):
     """The expected success of the listeners in `roboirg tables --floors`, or of a guess."""
-    dataset = items(episodes=50, tasks=("PickXtimes", "VideoPlaceButton"))
+    dataset = items(episodes=24, tasks=("PickXtimes", "VideoPlaceButton"))
     _, rows = rows_of(floor_answers(rule, dataset), "slots", dataset)
     for setting in ("direct", "reasoning", "contextual"):
         jobs = [
@@ -254,13 +240,14 @@ def test_shortcuts_are_right_as_often_as_their_probability_says(rule):
         ]
         row = rows[setting]
         expected = row.command_chance if rule == "command" else float(floor_level(rule, jobs))
-        assert float(row.summary.rate) == pytest.approx(expected, abs=0.12)
+        assert float(row.summary.rate) == pytest.approx(expected, abs=0.15)
     assert rule != "command" or rows["explicit"].summary.rate == 1
 
 
 def test_the_words_alone_are_learned_from_the_train_split():
     pytest.importorskip("sklearn")
-    dataset = items(tasks=("StopCube",), episodes=50)
+    every = items(tasks=("StopCube",), episodes=50)
+    dataset = [item for item in every if item.setting in ("explicit", "direct")]
     _, rows = rows_of(floor_answers("text-only", dataset), "slots", dataset)
     assert rows["explicit"].summary.rate > 0.9
     assert rows["direct"].summary.rate > rows["direct"].chance + 0.3
@@ -270,8 +257,6 @@ def test_floors_depend_on_items_alone():
     few = items()[:40]
     for name in ("chance", "command", "elimination"):
         assert set(floor_answers(name, few)) <= set(floor_answers(name, items()))
-    with pytest.raises(UnknownNameError, match="no floor 'luck'"):
-        list(floor_answers("luck", few))
 
 
 def test_confusions_and_distances_show_what_went_wrong():
@@ -307,9 +292,9 @@ def test_the_report_shows_what_was_meant_beside_what_was_understood(tmp_path):
     assert f"(set/{item.picture})" in text
 
 
-def dataset_in(folder):
+def dataset_in(folder, some=None):
     folder.mkdir()
-    (folder / ITEMS_FILE).write_bytes(encode_items(list(items())))
+    (folder / ITEMS_FILE).write_bytes(encode_items(some or list(items())))
     return folder
 
 
@@ -363,10 +348,11 @@ def run(*arguments):
 
 
 def test_the_command_scores_compares_and_reports(tmp_path):
-    data = dataset_in(tmp_path / "set")
+    some = [item for item in items() if item.episode < 2]
+    data = dataset_in(tmp_path / "set", some)
     good, bad = tmp_path / "good.jsonl", tmp_path / "bad.jsonl"
-    write_answers(good, (Answer(item.id, "slots", item.answer) for item in items()))
-    write_answers(bad, (Answer(item.id, "slots", "{}") for item in items()))
+    write_answers(good, (Answer(item.id, "slots", item.answer) for item in some))
+    write_answers(bad, (Answer(item.id, "slots", "{}") for item in some))
     done = run(good, bad, "--data", data, "--floor", "chance", "--write-floors", tmp_path / "f",
                "--report", tmp_path / "report.md")  # fmt: skip
     assert done.exit_code == 0, done.output
@@ -374,7 +360,7 @@ def test_the_command_scores_compares_and_reports(tmp_path):
     assert "good (slots) is better, +100.0 points" in done.output
     assert "replies without an answer" in done.output
     assert "Confusion of color" in (tmp_path / "report.md").read_text()
-    assert len(read_answers(tmp_path / "f" / "chance.jsonl", items())) == 3 * len(items())
+    assert len(read_answers(tmp_path / "f" / "chance.jsonl", items())) == 3 * len(some)
 
 
 @pytest.mark.parametrize(
@@ -394,7 +380,7 @@ def test_wrong_commands_are_one_sentence(tmp_path, arguments, words):
 
 def test_every_floor_answers_every_item():
     few = [item for item in items() if item.task == "StopCube" and item.episode < 2]
-    for name in FLOORS:
+    for name in set(FLOORS) - {"text-only"}:  # which learns, above
         found = list(floor_answers(name, few))
         assert {one.id for one in found} == {item.id for item in few}
         assert all(one.reply in LETTERS for one in found if one.kind == "choice")

@@ -11,9 +11,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
-from plan_files import plan_file
 from typer.testing import CliRunner
 
 from roboirg.apps.grounding.dataset_export import export_grounding
@@ -75,7 +74,7 @@ def items_of(task, index, *, forms=("implicit",), every_variant=False, split="te
 @pytest.mark.parametrize("task", BENCHMARK)
 def test_answers_are_what_the_words_mean_in_the_scene(task):
     schema = goal_schema(task)
-    for index in range(5):
+    for index in range(2):
         episode, items = items_of(task, index, forms=FORMS, every_variant=index == 0)
         for item in items:
             goals = interpret(item.text, episode.scene, task).goals
@@ -90,7 +89,7 @@ def test_answers_are_what_the_words_mean_in_the_scene(task):
 @pytest.mark.parametrize("task", BENCHMARK)
 def test_choices_are_goals_of_the_scene_in_other_words_and_one_is_right(task):
     schema = goal_schema(task)
-    for index in range(8):
+    for index in range(1, 5):
         episode, items = items_of(task, index)
         for item in items:
             assert 2 <= len(item.choices) == len(set(item.choices)) <= 4
@@ -103,7 +102,7 @@ def test_choices_are_goals_of_the_scene_in_other_words_and_one_is_right(task):
 
 
 def test_who_hears_the_command_alone_can_only_guess_among_the_choices():
-    for task, index in itertools.product(BENCHMARK, range(4)):
+    for task, index in itertools.product(BENCHMARK, range(1, 3)):
         episode, items = items_of(task, index)
         for item in (one for one in items if one.command_chance < 1):
             fitting = interpret(item.turns[-1], episode.scene, task).goals
@@ -125,8 +124,8 @@ def test_places_of_the_right_choice_are_balanced():
 def test_ids_are_unique_stable_and_the_same_whatever_the_answer():
     found = [
         item.id
-        for task, index in itertools.product(BENCHMARK, range(3))
-        for item in items_of(task, index, forms=FORMS, every_variant=True)[1]
+        for task in BENCHMARK
+        for item in items_of(task, 1, forms=FORMS, every_variant=True)[1]
     ]
     assert len(set(found)) == len(found)
     episode = get_episode("PickXtimes", "test", 3)
@@ -166,6 +165,7 @@ def test_options_that_a_setting_does_not_read_keep_their_defaults():
             assert value == getattr(InstructionOptions(), name) or name in reads
 
 
+@settings(max_examples=30)
 @given(st.data())
 def test_masks_survive_their_run_lengths(data):
     height, width = data.draw(st.integers(1, 9)), data.draw(st.integers(1, 9))
@@ -349,27 +349,13 @@ def test_pictures_are_stored_once_and_all_are_there(exported):
 
 
 @pytest.mark.sim
-def test_pandas_reads_the_tables(exported):
-    pandas = pytest.importorskip("pandas")
-    _, folder, facts = exported
-    items = read_items(folder)
-    table = pandas.read_parquet(folder / "data" / "test-00000-of-00001.parquet")
-    assert table["id"].tolist() == [item.id for item in items]
-    assert len(table) == facts.items
-    for item, picture, frames in zip(items, table["picture"], table["frames"], strict=True):
-        assert picture["bytes"] == (folder / item.picture).read_bytes()
-        assert [one["path"] for one in frames] == item.frames
-    lines = pandas.read_json(folder / "items.jsonl", lines=True)
-    assert lines["answer"].tolist() == table["answer"].tolist()
-
-
-@pytest.mark.sim
 def test_datasets_reads_the_tables(exported):
     datasets = pytest.importorskip("datasets")
     _, folder, facts = exported
     found = datasets.load_dataset(
         "parquet", data_files=str(folder / "data" / "*.parquet"), split="train"
     )
+    assert found["id"] == [item.id for item in read_items(folder)]
     assert len(found) == facts.items
     assert found[0]["picture"].size == (256, 256)
     assert found[-1]["frames"][0].size == (256, 256)
@@ -392,22 +378,10 @@ def test_the_tsv_names_earlier_items_in_place_of_their_pictures(exported):
         assert item.text in row["question"]
 
 
-@pytest.mark.parametrize(
-    ("options", "words"),
-    [
-        (["--tasks", "PickXtime"], "no task or suite 'PickXtime'|no task 'PickXtime'"),
-        (["--plan", plan_file(forms=["vague"])], "no form 'vague'"),
-        (["--tasks", "StopCube", "--settings", "spatial"], "None of these episodes"),
-    ],
-)
-def test_wrong_requests_are_one_sentence(tmp_path, options, words):
-    done = CliRunner().invoke(
-        app,
-        ["export", "grounding", "--out", str(tmp_path / "set"), *options],
-    )
-    assert done.exit_code != 0
-    with pytest.raises(InvalidValueError, match=words):
-        raise done.exception
+def test_a_set_of_no_episode_is_refused(tmp_path):
+    words = ["--tasks", "StopCube", "--settings", "spatial", "--out", str(tmp_path / "set")]
+    with pytest.raises(InvalidValueError, match="None of these episodes"):
+        CliRunner().invoke(app, ["export", "grounding", *words], catch_exceptions=False)
 
 
 def test_a_folder_of_something_else_is_not_touched(tmp_path):

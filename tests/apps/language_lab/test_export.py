@@ -12,7 +12,7 @@ from roboirg.core.errors import MissingDependencyError
 from roboirg.language import FORMS, plain_settings
 from roboirg.language.instruction_row import row
 from roboirg.language.variants import instructions
-from roboirg.tasks.splits.splits import get_episode, split_episodes
+from roboirg.tasks.splits.splits import get_episode
 
 LISTS = {
     "patterns": str,
@@ -26,8 +26,8 @@ LISTS = {
 
 @functools.cache
 def rows():
-    """Eight episodes of each task in all settings and forms."""
-    episodes = [get_episode(task, "test", index) for task in TASKS for index in range(8)]
+    """Four episodes of each task in all settings and forms."""
+    episodes = [get_episode(task, "test", index) for task in TASKS for index in range(4)]
     return tuple(row(*one) for one in instructions(episodes, plain_settings(), FORMS))
 
 
@@ -114,26 +114,9 @@ def test_parquet_has_its_types_whatever_is_in_it(settings):
     assert str(schema.field("episode").type) == "int64"
 
 
-def test_pandas_reads_it(tmp_path):
-    pandas = pytest.importorskip("pandas")
-    path = tmp_path / "instructions.jsonl"
-    path.write_bytes(instruction_export.encode(rows(), "jsonl"))
-    frame = pandas.read_json(path, lines=True)
-    assert list(frame.columns) == list(rows()[0])
-    assert (frame.groupby("task").size() > 0).all()
-    assert frame["text"].tolist() == [one["text"] for one in rows()]
-
-
 def test_without_pyarrow_one_sentence_says_what_to_do(monkeypatch):
     monkeypatch.setitem(__import__("sys").modules, "pyarrow", None)
     monkeypatch.setitem(__import__("sys").modules, "pyarrow.parquet", None)
     instruction_export.check_export_support("jsonl")
     with pytest.raises(MissingDependencyError, match=r"\[export\]"):
         instruction_export.check_export_support("parquet")
-
-
-def test_every_episode_is_there():
-    episodes = list(split_episodes(["StopCube"], ["test"]))
-    found = [row(*one) for one in instructions(episodes, plain_settings(), FORMS)]
-    assert len(found) == 50 * 4 * 2  # no spatial setting
-    assert [one["episode"] for one in found[::8]] == list(range(50))

@@ -152,16 +152,16 @@ def test_random_scenes_are_not_those_of_the_splits():
 
 
 def test_processes_find_what_one_finds():
-    work = batches(("StopCube", "VideoUnmask"), (), 4)
+    work = batches(("StopCube", "VideoUnmask"), (), 2)
     found = []
-    for workers in (0, 2):
+    for workers in (0, 1):
         total = ValidationResults()
         for _, evidence in parallel_map(validate_batch, work, workers):
             total.add(evidence)
         found.append(total)
     assert found[0] == found[1]
-    assert found[0].texts["VideoUnmask", "contextual"] == 4 * 16
-    assert found[0].texts["VideoUnmask", "direct-rival"] == 4 * 2
+    assert found[0].texts["VideoUnmask", "contextual"] == 2 * 16
+    assert found[0].texts["VideoUnmask", "direct-rival"] == 2 * 2
 
 
 def test_batches_cover_everything_once():
@@ -196,7 +196,7 @@ def printed(found: ValidationResults, width: int) -> str:
 def test_the_tables_are_whole_at_80_columns():
     found = ValidationResults()
     for task in all_tasks():
-        found.add(validate_batch(Batch(task, "test", 0, 4)))
+        found.add(validate_batch(Batch(task, "test", 3, 1)))
     text = printed(found, width=80)
     assert "…" not in text
     assert max(map(len, text.splitlines())) <= 80
