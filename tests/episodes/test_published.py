@@ -12,10 +12,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 import typer
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
+from selection import slow_but
 
-from roboirg.core.episode import DIFFICULTIES, SPLITS, Scene, SceneObject
+from roboirg.core.episode import SPLITS, Scene, SceneObject
 from roboirg.core.errors import InvalidValueError, RoboIRGError
 from roboirg.core.motions import Point, Swap
 from roboirg.main import app
@@ -75,20 +76,6 @@ def test_every_episode_is_there_but_those_that_robomme_cannot_build():
     assert published_episode("PutInBox", "test", 0) is None
 
 
-@pytest.mark.parametrize("task", all_tasks())
-def test_published_episodes_are_episodes_of_the_task(task):
-    for split in SPLITS:
-        for index in range(SIZES[split]):
-            found = published_episode(task, split, index)
-            if found is None:
-                continue
-            assert found.goal in get_task(task).goals(found.scene)
-            assert found.difficulty in DIFFICULTIES
-            assert get_task(task).stages(found.scene, found.goal)
-            names = [item.name for item in found.scene.objects]
-            assert len(set(names)) == len(names)
-
-
 @pytest.mark.parametrize("task", every_task())
 def test_scenes_survive_the_codec(task):
     for index in range(4):
@@ -103,6 +90,7 @@ def test_scenes_survive_the_codec(task):
 finite = st.floats(-10, 10, allow_nan=False)
 
 
+@settings(max_examples=30)
 @given(finite, finite, st.none() | st.floats(0.01, 1), st.none() | st.just("container_1"))
 def test_objects_survive_to_the_seventh_decimal(x, yaw, radius, inside):
     item = SceneObject("one", "cube", Point(x, 0.0, 0.02), yaw, radius=radius, inside=inside)
@@ -183,7 +171,7 @@ def test_objects_change_places_with_the_partners_that_robomme_saw(converter):
 
 
 @pytest.mark.sim
-@pytest.mark.parametrize("task", RECORDED)
+@pytest.mark.parametrize("task", slow_but(["VideoRepick"], RECORDED))
 def test_a_recording_replays_to_robomme_s_poses(task, converter):
     from roboirg.simulation.episode_session import EpisodeSession
     from roboirg.simulation.recording import Recording

@@ -1,7 +1,7 @@
 """Episodes that fail, one way each: what the hands do, by task and by what should be said of it.
 
-A case gets a stage on which nothing has been done yet and plays on it. It returns False where the
-episode does not offer what it needs (a second cube, say).
+A case gets a stage on which nothing has been done yet and plays on it, unless the episode does not
+offer what it needs (a second cube, say).
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from roboirg.core.conditions import Fact
 from roboirg.core.motions import Shuttle
 from roboirg.language import instruct, mirrored_objects
 
-Play = Callable[[Staged], bool | None]
+Play = Callable[[Staged], None]
 
 
 class Case(NamedTuple):
@@ -35,6 +35,16 @@ class Case(NamedTuple):
 
 
 CASES: list[Case] = []
+
+
+class NotOfferedError(Exception):
+    """The episode does not offer what a case needs."""
+
+
+def need(offered: object) -> None:
+    if not offered:
+        raise NotOfferedError
+
 
 PICKING = (
     "PickXtimes",
@@ -108,12 +118,10 @@ def stays_away_from_the_button(staged: Staged) -> None:
 
 
 @case("nothing_reached", *PICKING, early=False)
-def goes_to_another_cube_without_taking_it(staged: Staged) -> bool | None:
+def goes_to_another_cube_without_taking_it(staged: Staged) -> None:
     target = first_pick(staged)
-    if not others(staged, target):
-        return False
+    need(others(staged, target))
     staged.miss(others(staged, target)[0]).tick(50)
-    return None
 
 
 @case("missed_grasp", *MOVABLE, early=False)
@@ -141,11 +149,9 @@ def misses_one_and_goes_on(staged: Staged) -> None:
 
 
 @case("wrong_count", "PickXtimes", "BinFill", "VideoRepick")
-def misses_one_of_several_and_presses(staged: Staged) -> bool | None:
-    if kinds(staged).count("pick_cube") < 2:
-        return False
+def misses_one_of_several_and_presses(staged: Staged) -> None:
+    need(kinds(staged).count("pick_cube") >= 2)
     staged.miss(first_pick(staged)).tick(60).press()
-    return None
 
 
 @case("missed_grasp", "SwingXtimes")
@@ -181,11 +187,9 @@ def above_the_button_without_pressing(staged: Staged) -> None:
 
 
 @case("out_of_time", *UNMASK, early=False)
-def rests_a_moment_after_the_first_of_two(staged: Staged) -> bool | None:
-    if kinds(staged).count(PICK) < 2:
-        return False
+def rests_a_moment_after_the_first_of_two(staged: Staged) -> None:
+    need(kinds(staged).count(PICK) >= 2)
     staged.lift(first_pick(staged)).set(Fact("still", "robot")).tick(50)
-    return None
 
 
 @case("out_of_time", "StopCube", early=False)
@@ -241,23 +245,19 @@ def stops_beside_the_target(staged: Staged) -> None:
 
 
 @case("dropped", *UNMASK, early=False)
-def drops_a_container(staged: Staged) -> bool | None:
-    if kinds(staged).count("pick_container") < 2:
-        return False
+def drops_a_container(staged: Staged) -> None:
+    need(kinds(staged).count("pick_container") >= 2)
     target = first_pick(staged)
     grips = (Fact("lifted", target), Fact("held", target), Fact("reached", target))
     staged.lift(target).tick(5).set(off=grips).tick(50)
-    return None
 
 
 @case("misplaced", *UNMASK, early=False)
-def tips_a_container_over(staged: Staged) -> bool | None:
-    if kinds(staged).count(PICK) < 2:
-        return False
+def tips_a_container_over(staged: Staged) -> None:
+    need(kinds(staged).count(PICK) >= 2)
     target = first_pick(staged)
     staged.lift(target).set(off=(Fact("lifted", target),)).tick(3)
     staged.set(off=(Fact("held", target), Fact("reached", target))).tick(50)
-    return None
 
 
 @case("misplaced", "VideoRepick", early=False)
@@ -278,72 +278,58 @@ def drops_it_on_top_of_something(staged: Staged) -> None:
 
 
 @case("wrong_object", *PICKING)
-def picks_another_cube(staged: Staged) -> bool | None:
+def picks_another_cube(staged: Staged) -> None:
     target = first_pick(staged)
-    if not others(staged, target):
-        return False
+    need(others(staged, target))
     staged.tick(100).lift(others(staged, target)[-1])
-    return None
 
 
 @case("wrong_object", "VideoRepick", "PickXtimes")
-def picks_another_cube_the_last_time(staged: Staged) -> bool | None:
+def picks_another_cube_the_last_time(staged: Staged) -> None:
     target = staged.episode.stages[0].primitive.subject
-    if not others(staged, target):
-        return False
+    need(others(staged, target))
     until(staged, "press")
     staged.lift(others(staged, target)[0])
-    return None
 
 
 @case("wrong_object", *PICKING, early=False)
-def has_its_fingers_on_another_cube(staged: Staged) -> bool | None:
+def has_its_fingers_on_another_cube(staged: Staged) -> None:
     target = first_pick(staged)
-    if not others(staged, target):
-        return False
+    need(others(staged, target))
     staged.grasp(others(staged, target)[0]).tick(30)
-    return None
 
 
 @case("wrong_object", *PLACING, early=False)
-def takes_another_cube_in_the_end(staged: Staged) -> bool | None:
+def takes_another_cube_in_the_end(staged: Staged) -> None:
     stages = staged.episode.stages
     target, answer = stages[1].primitive[1:3]
-    if not others(staged, target):
-        return False
+    need(others(staged, target))
     other = others(staged, target)[0]
     staged.lift(target).put(target).lift(other).put(other, answer)
-    return None
 
 
 @case("wrong_object", *UNMASK)
-def lifts_another_container(staged: Staged) -> bool | None:
+def lifts_another_container(staged: Staged) -> None:
     wanted = [s.primitive.subject for s in staged.episode.stages if s.primitive.kind == PICK]
     target = first_pick(staged)
     rest = others(staged, target, *wanted)
-    if not rest:
-        return False
+    need(rest)
     staged.lift(rest[0])
-    return None
 
 
 @case("wrong_object", *UNMASK)
-def lifts_another_container_second(staged: Staged) -> bool | None:
-    if kinds(staged).count(PICK) < 2:
-        return False
+def lifts_another_container_second(staged: Staged) -> None:
+    need(kinds(staged).count(PICK) >= 2)
     first = staged.episode.stages[until(staged, PICK)].primitive.subject
     staged.play(staged.episode.stages[kinds(staged).index(PICK) : -1]).lift(first)
-    return None
 
 
 @case("wrong_object", *BUTTON_UNMASK, early=False)
-def lifts_another_container_and_forgets_the_button(staged: Staged) -> bool | None:
+def lifts_another_container_and_forgets_the_button(staged: Staged) -> None:
     wanted = [s.primitive.subject for s in staged.episode.stages if s.primitive.kind == PICK]
     rest = others(staged, wanted[0], *wanted)
-    if not rest:
-        return False
+    need(rest)
     staged.tick(40).lift(rest[0]).tick(40)
-    return None
 
 
 @case("wrong_object", "ButtonUnmaskSwap", early=False)
@@ -352,31 +338,24 @@ def presses_the_same_button_twice(staged: Staged) -> None:
 
 
 @case("wrong_object", "BinFill")
-def bins_a_color_that_was_not_named(staged: Staged) -> bool | None:
-    if not unwanted(staged):
-        return False
+def bins_a_color_that_was_not_named(staged: Staged) -> None:
+    need(unwanted(staged))
     wrong = unwanted(staged)[0]
     staged.lift(wrong).fill(wrong, "bin").play(staged.episode.stages[2:])
-    return None
 
 
 @case("wrong_object", "BinFill", early=False)
-def has_a_cube_of_another_color_in_the_hand(staged: Staged) -> bool | None:
-    if not unwanted(staged):
-        return False
+def has_a_cube_of_another_color_in_the_hand(staged: Staged) -> None:
+    need(unwanted(staged))
     staged.lift(unwanted(staged)[0]).tick(20)
-    return None
 
 
 @case("wrong_object", "BinFill", early=False)
-def bins_another_color_and_stops(staged: Staged) -> bool | None:
-    if not unwanted(staged):
-        return False
+def bins_another_color_and_stops(staged: Staged) -> None:
+    need(unwanted(staged))
     wrong = unwanted(staged)[0]
-    if len(staged.episode.stages) == 3:
-        return False  # the only one: the judge knows at once
+    need(len(staged.episode.stages) > 3)  # the only one: the judge knows at once
     staged.lift(wrong).fill(wrong, "bin").tick(300)
-    return None
 
 
 # The wrong number
@@ -388,35 +367,27 @@ def presses_at_once(staged: Staged) -> None:
 
 
 @case("wrong_count", "PickXtimes", "BinFill")
-def presses_before_the_last_one(staged: Staged) -> bool | None:
-    if len(staged.episode.stages) < 5:
-        return False
+def presses_before_the_last_one(staged: Staged) -> None:
+    need(len(staged.episode.stages) >= 5)
     staged.play(staged.episode.stages[:-3]).press()
-    return None
 
 
 @case("wrong_count", "VideoRepick")
-def presses_before_the_last_lift(staged: Staged) -> bool | None:
-    if len(staged.episode.stages) < 5:
-        return False
+def presses_before_the_last_lift(staged: Staged) -> None:
+    need(len(staged.episode.stages) >= 5)
     staged.play(staged.episode.stages[:-3]).tick(60).press()
-    return None
 
 
 @case("wrong_count", "PickByCount", early=False)
-def leaves_all_alone_too_early(staged: Staged) -> bool | None:
-    if len(staged.episode.stages) < 5:
-        return False
+def leaves_all_alone_too_early(staged: Staged) -> None:
+    need(len(staged.episode.stages) >= 5)
     staged.play(staged.episode.stages[:2]).tick(300)
-    return None
 
 
 @case("out_of_time", "PickByCount", early=False)
-def leaves_all_alone_for_a_moment(staged: Staged) -> bool | None:
-    if len(staged.episode.stages) < 5:
-        return False
+def leaves_all_alone_for_a_moment(staged: Staged) -> None:
+    need(len(staged.episode.stages) >= 5)
     staged.play(staged.episode.stages[:2]).tick(20)
-    return None
 
 
 @case("wrong_count", "PickByCount")
@@ -425,12 +396,10 @@ def once_too_often_before_the_end(staged: Staged) -> None:
 
 
 @case("wrong_count", "SwingXtimes")
-def one_swing_too_few(staged: Staged) -> bool | None:
+def one_swing_too_few(staged: Staged) -> None:
     stages = staged.episode.stages
-    if len(stages) < 7:
-        return False
+    need(len(stages) >= 7)
     staged.play((*stages[:-4], stages[-2])).press()
-    return None
 
 
 @case("wrong_count", "SwingXtimes")
@@ -452,55 +421,45 @@ def once_too_often(staged: Staged) -> None:
 
 
 @case("wrong_count", "BinFill")
-def one_cube_too_many(staged: Staged) -> bool | None:
+def one_cube_too_many(staged: Staged) -> None:
     used = [s.primitive.subject for s in staged.episode.stages]
     color = staged.episode.goal.texts("colors")[0]
     spare = [cube for cube in of_color(staged, color) if cube not in used]
-    if not spare:
-        return False
+    need(spare)
     until(staged, "press")
     staged.lift(spare[0]).fill(spare[0], "bin")
-    return None
 
 
 @case("wrong_count", "BinFill", early=False)
-def one_cube_too_many_in_the_hand(staged: Staged) -> bool | None:
+def one_cube_too_many_in_the_hand(staged: Staged) -> None:
     used = [s.primitive.subject for s in staged.episode.stages]
     color = staged.episode.goal.texts("colors")[0]
     spare = [cube for cube in of_color(staged, color) if cube not in used]
-    if not spare:
-        return False
+    need(spare)
     until(staged, "press")
     staged.lift(spare[0])
-    return None
 
 
 @case("wrong_count", *UNMASK, early=False)
-def rests_after_the_first_of_two(staged: Staged) -> bool | None:
-    if kinds(staged).count(PICK) < 2:
-        return False
+def rests_after_the_first_of_two(staged: Staged) -> None:
+    need(kinds(staged).count(PICK) >= 2)
     staged.lift(first_pick(staged)).set(Fact("still", "robot")).tick(150)
-    return None
 
 
 # The wrong order
 
 
 @case("wrong_order", *UNMASK)
-def lifts_the_second_first(staged: Staged) -> bool | None:
-    if kinds(staged).count(PICK) < 2:
-        return False
+def lifts_the_second_first(staged: Staged) -> None:
+    need(kinds(staged).count(PICK) >= 2)
     first_pick(staged)
     staged.lift(staged.episode.stages[-1].primitive.subject)
-    return None
 
 
 @case("wrong_order", *UNMASK)
-def lifts_the_second_before_the_first_is_down(staged: Staged) -> bool | None:
-    if kinds(staged).count(PICK) < 2:
-        return False
+def lifts_the_second_before_the_first_is_down(staged: Staged) -> None:
+    need(kinds(staged).count(PICK) >= 2)
     staged.lift(first_pick(staged)).lift(staged.episode.stages[-1].primitive.subject)
-    return None
 
 
 @case("wrong_order", *BUTTON_UNMASK, early=False)
@@ -594,22 +553,18 @@ def puts_it_into_the_other_box(staged: Staged) -> None:
 
 
 @case("nothing_reached", *BUTTON_UNMASK, early=False)
-def puts_another_container_back(staged: Staged) -> bool | None:
+def puts_another_container_back(staged: Staged) -> None:
     wanted = [s.primitive.subject for s in staged.episode.stages if s.primitive.kind == PICK]
     rest = others(staged, wanted[0], *wanted)
-    if not rest:
-        return False
+    need(rest)
     staged.tick(40).lift(rest[0]).tick(5).put(rest[0]).tick(50)
-    return None
 
 
 @case("out_of_time", "BinFill", early=False)
-def puts_another_color_back(staged: Staged) -> bool | None:
-    if not unwanted(staged):
-        return False
+def puts_another_color_back(staged: Staged) -> None:
+    need(unwanted(staged))
     wrong, right = unwanted(staged)[0], staged.episode.stages[0].primitive.subject
     staged.lift(wrong).put(wrong).lift(right).tick(50)
-    return None
 
 
 @case("out_of_time", *PLACING, "PickXtimes", early=False)
@@ -629,56 +584,46 @@ def exchange_sides(staged: Staged) -> dict[str, str]:
 
 
 @case("mirrored_pick", "PickXtimes", "SwingXtimes", "PickByCount", *UNMASK)
-def takes_the_object_on_the_other_side(staged: Staged) -> bool | None:
+def takes_the_object_on_the_other_side(staged: Staged) -> None:
     sides, target = exchange_sides(staged), first_pick(staged)
-    if target not in sides:
-        return False
+    need(target in sides)
     staged.lift(sides[target])
-    return None
 
 
 @case("mirrored_pick", *UNMASK)
-def lifts_the_container_on_the_other_side_second(staged: Staged) -> bool | None:
-    if kinds(staged).count(PICK) < 2:
-        return False
+def lifts_the_container_on_the_other_side_second(staged: Staged) -> None:
+    need(kinds(staged).count(PICK) >= 2)
     sides, index = exchange_sides(staged), until(staged, PICK, 2)
     target = staged.episode.stages[index].primitive.subject
-    if target not in sides:
-        return False
+    need(target in sides)
     staged.lift(sides[target])
-    return None
 
 
 @case("wrong_object", "VideoUnmaskSwap")
-def lifts_first_what_is_opposite_the_second(staged: Staged) -> bool | None:
+def lifts_first_what_is_opposite_the_second(staged: Staged) -> None:
     """Another object than the one opposite what is expected is any other one."""
     sides = exchange_sides(staged)
     wanted = [s.primitive.subject for s in staged.episode.stages if s.primitive.kind == PICK]
     wrong = sides.get(wanted[-1])
-    if wrong is None or sides.get(wanted[0], wrong) == wrong:
-        return False
+    need(wrong)
+    need(sides.get(wanted[0], wrong) != wrong)
     first_pick(staged)
     staged.lift(wrong)
-    return None
 
 
 @case("mirrored_pick", "PickXtimes", early=False)
-def holds_the_object_on_the_other_side(staged: Staged) -> bool | None:
+def holds_the_object_on_the_other_side(staged: Staged) -> None:
     sides, target = exchange_sides(staged), first_pick(staged)
-    if target not in sides:
-        return False
+    need(target in sides)
     staged.grasp(sides[target]).tick(30)
-    return None
 
 
 @case("mirrored_pick", "BinFill")
-def bins_the_color_on_the_other_side(staged: Staged) -> bool | None:
+def bins_the_color_on_the_other_side(staged: Staged) -> None:
     sides, target = exchange_sides(staged), first_pick(staged)
-    if target not in sides:
-        return False
+    need(target in sides)
     assert sides[target] in unwanted(staged)
     staged.lift(sides[target]).fill(sides[target], "bin").play(staged.episode.stages[2:])
-    return None
 
 
 @case("mirrored_pick", "PutInBox")
@@ -689,20 +634,16 @@ def puts_it_into_the_box_on_the_other_side(staged: Staged) -> None:
 
 
 @case("wrong_count", "PickXtimes")
-def a_misplaced_release_does_not_excuse_two_missing_ones(staged: Staged) -> bool | None:
+def a_misplaced_release_does_not_excuse_two_missing_ones(staged: Staged) -> None:
     stages = staged.episode.stages
-    if len(stages) < 7:
-        return False
+    need(len(stages) >= 7)
     target = first_pick(staged)
     staged.lift(target).drop(target).press()
-    return None
 
 
 @case("wrong_object", "BinFill")
-def the_other_color_came_before_the_misplaced_release(staged: Staged) -> bool | None:
+def the_other_color_came_before_the_misplaced_release(staged: Staged) -> None:
     stages = staged.episode.stages
-    if not unwanted(staged) or len(stages) < 7:
-        return False
+    need(unwanted(staged) and len(stages) >= 7)
     wrong, target = unwanted(staged)[0], stages[0].primitive.subject
     staged.lift(wrong).fill(wrong, "bin").lift(target).drop(target).press()
-    return None

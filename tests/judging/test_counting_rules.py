@@ -80,11 +80,6 @@ def test_bin_fill_punishes_a_press_before_the_last_drop():
         assert judge.cause.startswith("pressed the button; expected: pick up the")
 
 
-def test_bin_fill_punishes_a_press_while_a_cube_is_held():
-    judge = played(FILL, FILL_SCENE, [[picked("cube_red_0")], [picked("cube_red_0"), PRESSED]])
-    assert judge.status is Status.FAILURE
-
-
 @pytest.mark.parametrize(
     ("cubes", "cause"),
     [
@@ -184,18 +179,6 @@ def test_swing_punishes_a_visit_too_many_before_and_after_the_put_down(side):
         assert judge.cause.startswith("moved the cube over a target too often")
 
 
-def test_swing_punishes_left_first_at_the_last_visit():
-    wrong = [[HELD, LEFT], [HELD], [HELD, RIGHT], [HELD]]
-    assert swung(*TAKE, *wrong, *wrong).status is Status.ONGOING
-    assert swung(*TAKE, *wrong, *wrong, [HELD, LEFT]).status is Status.FAILURE
-
-
-def test_swing_punishes_a_visit_twice_in_a_row_once_the_count_is_exceeded():
-    again = [[HELD, RIGHT], [HELD], [HELD, RIGHT], [HELD], [HELD, LEFT], [HELD]]
-    assert swung(*TAKE, *again, [HELD, RIGHT], [HELD]).status is Status.ONGOING
-    assert swung(*TAKE, *again, [HELD, RIGHT], [HELD], [HELD, LEFT]).status is Status.FAILURE
-
-
 def test_swing_visits_of_other_cubes_do_not_count():
     other = [[HELD, Fact("over", "cube_blue", "target_right")], [HELD]] * 6
     steps = [*TAKE, *other, *SWUNG, *SWUNG, [LYING], [LYING, PRESSED]]
@@ -206,12 +189,6 @@ def test_swing_does_not_punish_dropping_on_the_way_nor_picking_after_the_put_dow
     dropped = [[LYING], [LYING], [HELD]]
     steps = [*TAKE, *SWUNG, *dropped, *SWUNG, [LYING], [HELD], [LYING], [LYING, PRESSED]]
     assert swung(*steps).status is Status.SUCCESS
-
-
-def test_swing_does_not_count_a_cube_that_stays_over_a_target_again():
-    steps = [*TAKE, *[[HELD, RIGHT]] * 50]
-    assert swung(*steps).index == 2
-    assert swung(*steps).status is Status.ONGOING
 
 
 def test_swing_with_another_cube_of_the_scene_follows_that_cube():
@@ -277,11 +254,7 @@ def test_stop_cube_punishes_a_press_off_the_target_at_once(pressed_at):
     assert judge.status is Status.FAILURE
     assert step == pressed_at
     assert judge.cause.startswith("pressed the button while the cube was off the target")
-
-
-def test_stop_cube_expects_to_wait_between_hovering_and_pressing():
-    judge, _ = stop(pressed_at=200)
-    assert judge.cause == "pressed the button while the cube was off the target; expected: wait"
+    assert judge.cause.endswith("; expected: wait") == (40 < pressed_at < 270)
 
 
 @pytest.mark.parametrize("pressed_at", [60, 180, 188])

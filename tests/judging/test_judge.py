@@ -126,26 +126,3 @@ def test_causes_call_things_by_what_they_are():
     )
     assert describe_object(empty, episode.scene) == "an empty container"
     assert describe_object("button", get_episode("PickXtimes", "test", 0).scene) == "the button"
-
-
-def test_pick_x_times_rules():
-    episode = get_episode("PickXtimes", "test", 2)
-    color, repeats = episode.goal.text("color"), episode.goal.number("repeats")
-    cube, target = f"cube_{color}", "target"
-    others = [c.name for c in episode.scene.of_kind("cube") if c.name != cube]
-    picked, placed = Fact("picked", cube), Fact("placed", cube, target)
-    pressed = Fact("pressed", "button")
-    cycle = [[picked], [], [placed]]
-
-    def verdict(*steps):
-        return judged(episode.stages, *steps).status
-
-    assert verdict(*cycle * repeats, [placed], [pressed, placed]) is Status.SUCCESS
-    assert verdict(*cycle * (repeats - 1), [pressed]) is Status.FAILURE
-    assert verdict(*cycle * repeats, [picked]) is Status.FAILURE
-    assert verdict([Fact("picked", others[0])]) is Status.FAILURE
-    assert verdict([Fact("placed", others[0], target)]) is Status.ONGOING
-    # Dropped beside the target and picked up again: the same repetition.
-    assert verdict([picked], [], [picked], [placed], *cycle * (repeats - 1), [pressed]) is (
-        Status.SUCCESS
-    )

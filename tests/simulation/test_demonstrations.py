@@ -1,8 +1,6 @@
 """Demonstrations: replays are exact, and the cache changes nothing."""
 
-import os
 import pickle
-import subprocess
 import sys
 import tempfile
 import weakref
@@ -332,41 +330,6 @@ def test_a_damaged_entry_is_made_anew(cache, caplog, kind):
         f"The cache entry {entry} is damaged and will be rebuilt."
     ]
     assert entry.stat().st_size == size
-
-
-FILLER = """
-import sys, zlib, roboirg
-print("ready", flush=True)
-sys.stdin.readline()
-for _ in range(3):
-    video = roboirg.make("VideoUnmask", episode=1, cameras=("front",)).reset()[1]["demonstration"]
-    print(*[zlib.crc32(video[key].tobytes()) for key in video], flush=True)
-"""
-
-
-@pytest.mark.slow
-def test_two_processes_may_fill_the_cache_at_once(cache):
-    processes = [
-        subprocess.Popen(
-            [sys.executable, "-c", FILLER],
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.PIPE,
-            text=True,
-            env={**os.environ, "ROBOIRG_CACHE": str(cache)},
-        )
-        for _ in range(2)
-    ]
-    for process in processes:
-        assert process.stdout.readline() == "ready\n"
-    for process in processes:
-        process.stdin.write("\n")
-        process.stdin.flush()
-    outputs = [process.communicate(timeout=600) for process in processes]
-    assert [errors for _, errors in outputs] == ["", ""]
-    assert len({line for lines, _ in outputs for line in lines.splitlines()}) == 1
-    for kind in ("actions", "frames"):
-        assert len(list(cache.glob(f"{kind}/*"))) == 1
 
 
 def test_keys_change_with_what_determines_a_demonstration(monkeypatch):

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 import sapien
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from roboirg.simulation.rendering.occlusion import unoccluded_triangles
@@ -69,6 +69,7 @@ def soups(draw):
     return np.concatenate([pixels / FOCAL_LENGTH * depths[..., None], depths[..., None]], axis=2)
 
 
+@settings(max_examples=40)
 @given(soups(), st.booleans(), st.integers(0, 99))
 def test_whatever_a_renderer_shows_is_kept(corners, both_sides, seed):
     shown = unoccluded_triangles(corners)

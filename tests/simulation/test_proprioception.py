@@ -35,17 +35,10 @@ def test_angles_are_those_of_scipy(quaternion):
     check_angles(quaternion)
 
 
-@pytest.mark.slow
-@settings(max_examples=2000)
-@given(quaternions)
-def test_very_many_angles_are_those_of_scipy(quaternion):
-    check_angles(quaternion)
-
-
 turned = st.floats(-50.0, 50.0) | st.integers(-40, 40).map(lambda number: number * np.pi / 4)
 
 
-@settings(max_examples=1000)
+@settings(max_examples=100)
 @given(turned, turned)
 def test_angles_without_turns_are_those_of_numpy(before, now):
     ours = np.float64(unwrap_angle(before, now))
@@ -56,6 +49,6 @@ def test_angles_without_turns_are_those_of_numpy(before, now):
 @pytest.mark.parametrize("around", [(0, 1, 0, 0), (1, 0, 1, 0), (1, 0, -1, 0), (0, 1, 0, -1)])
 def test_angles_near_where_they_jump(around, spread):
     rng = np.random.default_rng(0)
-    for offset in rng.normal(0.0, spread, (2000, 4)):
+    for offset in rng.normal(0.0, spread, (300, 4)):
         pose = sapien.Pose(q=np.array(around) + offset)
         assert euler_angles(pose).tobytes() == angles_by_scipy(pose).tobytes()

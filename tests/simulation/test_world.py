@@ -82,7 +82,7 @@ def test_a_released_motion_leaves_the_object_alone():
 def test_worlds_repeat_themselves_bit_for_bit(task):
     rng = np.random.default_rng(0)
     actions = physics_settings.HOME_ACTION + np.append(
-        rng.normal(0, 0.2, (60, 7)), np.zeros((60, 1)), 1
+        rng.normal(0, 0.2, (40, 7)), np.zeros((40, 1)), 1
     )
 
     def trace():

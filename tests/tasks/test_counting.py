@@ -26,7 +26,7 @@ from roboirg.tasks.shared.fixtures import (
     draw_bin,
 )
 
-SEEDS = 300
+SEEDS = 150
 TASKS = {module.TASK.name: module for module in (bin_fill, swing_x_times, stop_cube)}
 CUBES = {"easy": (4, 6), "medium": (8, 10), "hard": (10, 12)}
 GOAL_CUBES = {"easy": (1, 3), "medium": (2, 4), "hard": (3, 5)}
@@ -55,55 +55,10 @@ each_task = pytest.mark.parametrize("task", TASKS)
 
 @each_task
 @each_difficulty
-def test_few_seeds_are_rejected(task, difficulty):
-    assert len(scenes(task, difficulty)) >= 0.9 * SEEDS
-
-
-@each_task
-@each_difficulty
-def test_same_seed_same_scene_other_seed_other_scene(task, difficulty):
-    first, again, other = (
-        TASKS[task].sample(np.random.default_rng(seed), difficulty) for seed in (3, 3, 4)
-    )
-    assert first == again
-    assert hash(first) == hash(again)
-    assert first[0] != other[0]
-
-
-@each_task
-@each_difficulty
-def test_names_are_unique_and_numbers_are_plain(task, difficulty):
-    for scene, _ in scenes(task, difficulty):
-        names = [item.name for item in scene.objects]
-        assert len(set(names)) == len(names)
-        for item in scene.objects:
-            assert {type(value) for value in (*item.position, item.yaw)} == {float}
-            assert item.rgb is None or {type(value) for value in item.rgb} == {float}
-
-
-@each_task
-@each_difficulty
-def test_the_goal_is_one_of_the_scenes_goals_and_each_has_its_own_stages(task, difficulty):
-    for scene, goal in scenes(task, difficulty)[:20]:
-        goals = TASKS[task].goals(scene)
-        assert goal in goals
-        assert len({TASKS[task].stages(scene, other) for other in goals}) == len(goals)
-
-
-@each_task
-@each_difficulty
-def test_stages_name_things_of_the_scene_and_show_what_they_point_at(task, difficulty):
-    for scene, goal in scenes(task, difficulty)[:50]:
-        names = {item.name for item in scene.objects} | {"robot", None}
-        for stage in TASKS[task].stages(scene, goal):
-            assert {stage.primitive.subject, stage.primitive.place, stage.points_at} <= names
-            assert ("{at}" in stage.subgoal) == (stage.points_at is not None)
-
-
-@each_task
-@each_difficulty
-def test_buttons_stand_in_their_region(task, difficulty):
-    for scene, _ in scenes(task, difficulty):
+def test_few_seeds_are_rejected_and_buttons_stand_in_their_region(task, difficulty):
+    drawn = scenes(task, difficulty)
+    assert len(drawn) >= 0.9 * SEEDS
+    for scene, _ in drawn:
         (button,) = scene.of_kind("button")
         assert -0.25 <= button.position.x <= -0.15
         assert -0.2 <= button.position.y <= 0.2

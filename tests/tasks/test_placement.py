@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from roboirg.core.episode import Point, SceneObject
@@ -52,12 +52,14 @@ def contains(shape: Rectangle | Circle, points: np.ndarray, inside: float) -> bo
     return bool(within.any())
 
 
+@settings(max_examples=40)
 @given(footprints, footprints)
 def test_shapes_that_share_points_overlap(first, second):
     if contains(second, outline(first, 1e-6), 1e-6):
         assert overlap(first, second)
 
 
+@settings(max_examples=40)
 @given(footprints, footprints)
 def test_shapes_far_from_sharing_points_do_not_overlap(first, second):
     # The sampled points of the one are at most 1 cm apart, so growing both by that misses nothing.
@@ -66,11 +68,13 @@ def test_shapes_far_from_sharing_points_do_not_overlap(first, second):
         assert not overlap(first, second)
 
 
+@settings(max_examples=40)
 @given(footprints, footprints)
 def test_overlap_is_symmetric(first, second):
     assert overlap(first, second) == overlap(second, first)
 
 
+@settings(max_examples=40)
 @given(rectangles, st.floats(0.001, 0.05), coordinates, coordinates)
 def test_growing_brings_an_edge_nearer_by_as_much(rectangle, by, x, y):
     before, after = distance_to(rectangle, x, y), distance_to(rectangle.grown(by), x, y)
@@ -85,6 +89,7 @@ def test_touching_counts_as_overlap():
     assert not overlap(Rectangle(0, 0, 1, 1), Rectangle(2.001, 0, 1, 1))
 
 
+@settings(max_examples=40)
 @given(st.integers(0, 2**32), coordinates, coordinates, sizes, sizes)
 def test_regions_draw_inside_themselves(seed, x, y, half_x, half_y):
     inset = min(half_x, half_y) / 2
@@ -119,6 +124,7 @@ cubes = st.builds(
 )
 
 
+@settings(max_examples=40)
 @given(cubes, cubes)
 def test_cubes_never_overlap_although_some_count_as_lines(first, second):
     if not overlap(cube_footprint(second).grown(0.02), cube_obstacle(first)):

@@ -22,7 +22,6 @@ from roboirg.tasks.splits.fingerprint import plain
 from roboirg.tasks.splits.splits import SIZES, get_episode, make_episode
 
 TASKS = tuple(every_task())
-SETTINGS = {"explicit", "direct", "reasoning", "contextual", "spatial"}
 HEIGHTS = {
     "cube": (0.02,),
     "hidden_cube": (0.02 / 1.2,),
@@ -37,6 +36,23 @@ HEIGHTS = {
     "tape": (0.0175,),
 }
 """Of the origin of a thing that lies on the table, meters."""
+
+REGISTERED = [
+    (1, "PickXtimes", "counting", True),
+    (2, "StopCube", "counting", False),
+    (3, "SwingXtimes", "counting", True),
+    (4, "BinFill", "counting", True),
+    (5, "VideoUnmaskSwap", "permanence", True),
+    (6, "VideoUnmask", "permanence", True),
+    (7, "ButtonUnmaskSwap", "permanence", True),
+    (8, "ButtonUnmask", "permanence", True),
+    (9, "VideoRepick", "reference", False),
+    (10, "VideoPlaceButton", "reference", False),
+    (11, "VideoPlaceOrder", "reference", False),
+    (12, "PutInBox", "real", True),
+    (13, "PickByCount", "real", True),
+]
+"""Code, name, suite, and whether words for sides name its objects."""
 
 REACH = 0.85
 """How far from its base the robot is asked to handle anything, meters in the plane. Its own is
@@ -78,25 +94,24 @@ def random_episodes(task):
     return [episode for difficulty in DIFFICULTIES for episode in valid(task, difficulty, 60)]
 
 
-def test_registry_holds_each_task_once_and_in_the_order_of_codes():
-    codes = [task.code for task in every_task().values()]
-    assert codes == sorted(set(codes))
-    assert all(task.name == name for name, task in every_task().items())
-
-
-@each_task
-def test_settings_are_known_and_begin_with_explicit(task):
-    settings = plain_settings(get_task(task))
-    assert settings[0] == "explicit"
-    assert set(settings) <= SETTINGS
-    assert ("spatial" in settings) == get_task(task).spatial
+def test_the_registry_holds_each_task_once_in_the_order_of_its_code():
+    told = [(task.code, task.name, task.suite, task.spatial) for task in every_task().values()]
+    assert told == REGISTERED
+    assert tuple(every_task()) == tuple(name for _, name, *_ in told)
+    for name, task in every_task().items():
+        sides = ("spatial",) if task.spatial else ()
+        assert plain_settings(task)[:4] == ("explicit", "direct", "reasoning", "contextual"), name
+        assert plain_settings(task)[4:] == sides, name
 
 
 @each_task
 @pytest.mark.parametrize("difficulty", DIFFICULTIES)
 def test_same_seed_same_episode_other_seed_other_scene(task, difficulty):
     first, second = valid(task, difficulty, 2)
-    assert make_episode(task, first.seed, difficulty) == first
+    again = make_episode(task, first.seed, difficulty)
+    assert again == first
+    assert hash(again) == hash(first)
+    plain(again)  # raises at anything else
     assert first.scene != second.scene
 
 
@@ -164,12 +179,6 @@ def test_episodes_are_plain_data(task):
     for episode in episodes(task):
         plain(episode)  # raises at anything else
         hash(episode)
-    for difficulty in DIFFICULTIES:
-        for episode in valid(task, difficulty, 8):
-            plain(episode)
-            again = make_episode(task, episode.seed, difficulty)
-            assert again == episode
-            assert hash(again) == hash(episode)
 
 
 def solids(scene):
@@ -261,27 +270,3 @@ def test_pick_x_times_scenes_are_as_in_the_facts():
         assert len(episode.stages) == 2 * episode.goal.number("repeats") + 1
         assert not episode.demonstration
         assert not episode.scene.motions
-
-
-def test_video_unmask_scenes_are_as_in_the_facts():
-    for episode in random_episodes("VideoUnmask"):
-        containers = episode.scene.of_kind("container")
-        hidden = episode.scene.of_kind("hidden_cube")
-        colors = episode.goal.texts("colors")
-        allowed = {"easy": {3}, "medium": {4, 5}, "hard": set(range(4, 10))}
-        assert len(containers) in allowed[episode.difficulty]
-        assert sorted(str(cube.color) for cube in hidden) == ["blue", "green", "red"]
-        assert [cube.inside for cube in hidden] == ["container_0", "container_1", "container_2"]
-        assert colors == tuple(str(cube.color) for cube in hidden[: len(colors)])
-        assert len(colors) == (2 if episode.difficulty == "hard" else 1)
-        assert len(episode.stages) == 2 * len(colors) - 1
-        for container in containers:
-            assert abs(container.position.x) <= 0.1725
-            assert abs(container.position.y) <= 0.1725
-            assert np.sin(container.yaw) <= 0 <= np.cos(container.yaw)
-        for first, second in itertools.combinations(containers, 2):
-            gap = np.hypot(
-                first.position.x - second.position.x, first.position.y - second.position.y
-            )
-            assert gap >= 0.0275 + 0.04 + 0.03 + 0.04
-        assert set(episode.scene.motions) == {Away(one.name, 0, 32) for one in containers}
