@@ -83,7 +83,7 @@ def test_a_chunk_of_another_shape_is_refused_before_anything_moves():
     env = ActionChunks(roboirg.make("PickXtimes", cameras=(), actions="ee_pose"), 3)
     assert env.action_space.shape == (3, 7)
     env.reset()
-    for wrong in (np.zeros((2, 7)), np.zeros(7), np.full((3, 7), np.nan)):
+    for wrong in (np.zeros((2, 7)), np.zeros(7), np.full((3, 7), np.nan), "up"):
         with pytest.raises(InvalidActionError):
             env.step(wrong)
     assert env.unwrapped.executed_actions == 0

@@ -136,16 +136,11 @@ def loses_it_before_it_is_up(staged: Staged) -> None:
     staged.grasp(target).set(off=(Fact("held", target), Fact("reached", target))).tick(50)
 
 
-@case("missed_grasp", "PickXtimes", "VideoRepick")
+@case("missed_grasp", "PickXtimes", "VideoRepick", "BinFill")
 def misses_the_last_time_and_goes_on(staged: Staged) -> None:
     picks = [at for at, kind in enumerate(kinds(staged)) if kind == "pick_cube"]
     staged.play(staged.episode.stages[: picks[-1]]).tick(60)
     staged.miss(staged.episode.stages[picks[-1]].primitive.subject).press()
-
-
-@case("missed_grasp", "BinFill")
-def misses_one_and_goes_on(staged: Staged) -> None:
-    misses_the_last_time_and_goes_on(staged)
 
 
 @case("wrong_count", "PickXtimes", "BinFill", "VideoRepick")

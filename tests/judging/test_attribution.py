@@ -118,7 +118,7 @@ episodes = st.builds(get_episode, st.sampled_from(TASKS), st.just("test"), st.in
 
 
 @given(episodes, st.floats(0, 1, exclude_max=True))
-@settings(max_examples=40)
+@settings(max_examples=80)
 def test_right_acts_that_stop_early_fail_by_execution(episode: Episode, share: float) -> None:
     staged = Staged(episode).play(episode.stages)
     end = staged.turn + int(share * (staged.step - staged.turn))
@@ -132,7 +132,7 @@ def test_right_acts_that_stop_early_fail_by_execution(episode: Episode, share: f
 
 
 @given(episodes, st.data())
-@settings(max_examples=60)
+@settings(max_examples=120)
 def test_taking_one_thing_for_another_is_a_grounding_failure_or_none(
     episode: Episode, data: st.DataObject
 ) -> None:
@@ -171,7 +171,7 @@ def anything(episode: Episode) -> st.SearchStrategy[list[frozenset[Fact]]]:
 
 
 @given(episodes, st.data(), st.booleans())
-@settings(max_examples=60)
+@settings(max_examples=120)
 def test_whatever_happens_there_is_one_attribution_of_a_failure_and_none_else(
     episode: Episode, data: st.DataObject, timed_out: bool
 ) -> None:

@@ -20,7 +20,7 @@ def followed(course):
     return history
 
 
-@settings(max_examples=40)
+@settings(max_examples=60)
 @given(courses, bounds, st.none() | bounds)
 def test_counts_are_of_now(course, least, most):
     now = sum(fact in course[-1] for fact in (A, B))
@@ -28,7 +28,7 @@ def test_counts_are_of_now(course, least, most):
     assert followed(course).holds(FactCount((A, B), least, most)) == wanted
 
 
-@settings(max_examples=40)
+@settings(max_examples=60)
 @given(courses, st.integers(1, 4), st.none() | st.integers(0, 15))
 def test_beginnings_are_counted_as_they_happen(course, least, until):
     kept = [frozenset(), *(course if until is None else course[: until + 1])]
@@ -40,7 +40,7 @@ def test_beginnings_are_counted_as_they_happen(course, least, until):
     assert followed(course).holds(OccurrenceCount((A, C), least, until)) == (begun >= least)
 
 
-@settings(max_examples=40)
+@settings(max_examples=60)
 @given(courses)
 def test_a_fact_and_its_absence_exclude_each_other(course):
     history = followed(course)

@@ -184,22 +184,6 @@ def test_all_pictures_are_drawn_in_one_replay(drawn, monkeypatch):
     assert len(replays) == 2
 
 
-def test_every_nth_picture_or_none_if_that_is_wanted(drawn):
-    _, _, info = reset(cameras=("front",))
-    _, _, few = reset(cameras=("front",), demonstration_frames=7)
-    _, _, none = reset(cameras=("front",), demonstration_frames="none")
-    drawn.clear()
-    assert np.array_equal(few["demonstration"]["front_rgb"].shape, (10, 256, 256, 3))
-    assert len(drawn) == 10
-    assert np.array_equal(
-        few["demonstration"]["front_rgb"], info["demonstration"]["front_rgb"][::7]
-    )
-    assert set(none["demonstration"]) == {"joint_positions", "gripper", "end_effector"}
-    for info_ in (few, none):
-        assert len(info_["demonstration"]["gripper"]) == 66
-        assert len(info_["demonstration_subgoals"]) == 66
-
-
 def story(task=SHORT):
     """Everything that an environment and a run return."""
     options = {"cameras": ("front", "wrist"), "demonstration_frames": Viewer.demonstration_frames}

@@ -28,12 +28,6 @@ def rest(world: World, steps: int) -> World:
     return world
 
 
-def test_the_tool_is_at_its_home():
-    pose = rest(world_of("PickXtimes"), 5).robot.tool_pose
-    assert pose.p == pytest.approx([-0.0605, 0.0, 0.5211], abs=1e-4)
-    assert np.abs(pose.q) == pytest.approx([0, 1, 0, 0], abs=1e-4)
-
-
 def test_objects_rest_where_and_weigh_what_the_facts_say():
     world = rest(world_of("PickXtimes"), 40)
     cube, button = world.bodies["cube_red"], world.bodies["button"]

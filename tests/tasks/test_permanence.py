@@ -14,7 +14,7 @@ from roboirg.core.footprints import Rectangle, Region, distance_to
 from roboirg.core.motions import Away, Swap
 from roboirg.tasks import get_task
 from roboirg.tasks.shared import unmask, unmask_swap
-from roboirg.tasks.shared.layouts import FOUR, PATTERNS, layout_points
+from roboirg.tasks.shared.layouts import FOUR, LINE, PATTERNS, TRIANGLE, layout_points
 from roboirg.tasks.splits.splits import make_episode
 
 SEEDS = range(150)
@@ -336,3 +336,11 @@ def test_placement_ends_at_the_first_container_that_fits_nowhere():
     roomy = Region(0.5, 0.5, 0.1, 0.1)
     placed = unmask.draw_containers_in(np.random.default_rng(0), [tight, tight, roomy], 0.02)
     assert [one.name for one in placed] == ["container_0"]
+
+
+def test_the_patterns_are_those_of_the_facts():
+    assert {3: (TRIANGLE, LINE), 4: (FOUR,)} == PATTERNS
+    assert TRIANGLE[:2] == FOUR[:2]
+    assert FOUR == ((-0.05, -0.1), (-0.05, 0.1), (0.1, 0.1), (0.1, -0.1))
+    assert TRIANGLE[2] == (0.1, 0.0)
+    assert LINE == ((0.0, -0.15), (0.0, 0.15), (0.0, 0.0))

@@ -13,7 +13,6 @@ from roboirg.core.footprints import (
     Circle,
     Line,
     Rectangle,
-    Region,
     distance_to,
     overlap,
     place,
@@ -87,15 +86,6 @@ def test_touching_counts_as_overlap():
     assert overlap(Circle(0, 0, 1), Circle(2, 0, 1))
     assert overlap(Circle(0, 0, 1), Rectangle(2, 0, 1, 1))
     assert not overlap(Rectangle(0, 0, 1, 1), Rectangle(2.001, 0, 1, 1))
-
-
-@settings(max_examples=40)
-@given(st.integers(0, 2**32), coordinates, coordinates, sizes, sizes)
-def test_regions_draw_inside_themselves(seed, x, y, half_x, half_y):
-    inset = min(half_x, half_y) / 2
-    drawn = Region(x, y, half_x, half_y).draw(np.random.default_rng(seed), inset)
-    assert abs(drawn[0] - x) <= half_x - inset + 1e-12
-    assert abs(drawn[1] - y) <= half_y - inset + 1e-12
 
 
 def test_a_line_is_as_long_as_it_is_and_has_no_breadth():

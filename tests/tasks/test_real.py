@@ -153,12 +153,3 @@ def test_the_other_tape_is_not_to_be_picked():
     # Beside the target, and once more.
     beside = ([PICKED], [Fact("lying", "tape_gray")], *CYCLE, *waiting(WAIT_STEPS + 1))
     assert judged("PickByCount", goal, *beside).status is Status.SUCCESS
-
-
-def test_failures_are_named():
-    scene, _ = scenes("PickByCount")[0]
-    *_, leave = get_task("PickByCount").stages(scene, Goal.of(color="gray", repeats=1))
-    assert [rule.failure for rule in leave.forbids] == ["wrong_count", "wrong_object"]
-    scene, _ = scenes("PutInBox")[0]
-    for stage in get_task("PutInBox").stages(scene, Goal.of(color="green")):
-        assert [rule.failure for rule in stage.forbids] == ["wrong_place"]

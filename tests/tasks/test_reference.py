@@ -320,22 +320,6 @@ def test_place_order_draws_every_order(difficulty):
     assert set(discs) == {f"target_{n}" for n in range(4)}
 
 
-def test_place_order_goals():
-    for scene in scenes(VIDEO_PLACE_ORDER, "medium")[:20]:
-        visits = [fact.place for fact in scene.past if fact.kind == "placed"]
-        goals = VIDEO_PLACE_ORDER.goals(scene)
-        assert len(goals) == 3 * len(visits)
-        for goal in goals:
-            cube = f"cube_{goal.text('color')}"
-            answer = visits[goal.number("placement") - 1]
-            stages = VIDEO_PLACE_ORDER.stages(scene, goal)
-            assert shown(stages) == [("pick_cube", cube), ("place_on", cube, answer)]
-            assert [stage.subgoal for stage in stages] == [
-                "pick up the cube {at}",
-                "place the cube onto the correct target {at}",
-            ]
-
-
 @every_place_task
 def test_crowded_seeds_are_rejected(task):
     def rejected(seed):

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import synthetic_trajectories as synthetic
 
-from roboirg.apps.demonstrations.picture_coding import VideoEncoder, encode_depth, encode_png
+from roboirg.apps.demonstrations.picture_coding import VideoEncoder
 from roboirg.apps.demonstrations.trajectory import (
     drop_pictures,
     has_pictures,
@@ -66,29 +66,6 @@ def test_a_damaged_trajectory_is_named(tmp_path):
     path.write_bytes(b"no archive")
     with pytest.raises(InvalidValueError, match=r"one\.zip' cannot be read"):
         load_trajectory(path)
-
-
-def test_png_and_depth_are_lossless():
-    rng = np.random.default_rng(0)
-    noise = rng.integers(0, 256, (256, 256, 3), dtype=np.uint8)
-    far = rng.integers(0, 2**15, (256, 256, 1)).astype(np.int16)
-    file = io.BytesIO()
-    with zipfile.ZipFile(file, "w") as archive:
-        archive.writestr("front/000000.png", encode_png(noise))
-        archive.writestr("front_depth/000000.png", encode_depth(far))
-    with zipfile.ZipFile(file) as archive:
-        assert np.array_equal(read_picture(archive, "front", 0), noise)
-        assert np.array_equal(read_depth(archive, "front", 0), far)
-
-
-def test_a_lossless_video_holds_the_same_bits():
-    encoder = VideoEncoder("lossless-video")
-    pictures = [synthetic.picture("front", 7, row) for row in range(25)]
-    for one in pictures:
-        encoder.add(one)
-    for found, expected in zip(frames_of(encoder.finish()), pictures, strict=True):
-        assert np.array_equal(found, expected)
-    assert encoder.error["largest"] == 0
 
 
 def test_the_error_of_a_lossy_video_is_what_a_reader_sees():
