@@ -20,9 +20,7 @@ printf '%s\\n' "${COMPREPLY[@]}"
 @pytest.mark.parametrize(
     ("words", "wanted"),
     [
-        (["fetch"], ["fetch-models"]),
         (["ta"], ["tables", "tasks"]),
-        (["language", "val"], ["validate"]),
         (["run", "--retry"], ["--retry-errors"]),
     ],
 )

@@ -61,7 +61,7 @@ def test_an_utterance_is_heard_at_the_first_observation_after_it():
 def test_the_settings_with_several_utterances_read_the_delivery():
     several = set()
     for name in all_tasks():
-        for index in range(4):
+        for index in (0, 3):
             episode = get_episode(name, "test", index)
             for setting in language.expressible(episode):
                 if len(language.instruct(episode, setting).utterances) > 1:
@@ -138,16 +138,9 @@ def test_nothing_is_heard_after_the_end():
 
 
 @pytest.mark.sim
-@pytest.mark.parametrize(
-    ("task", "setting", "index"),
-    [
-        ("VideoUnmask", "contextual", 0),
-        ("PickXtimes", "direct", 0),
-        ("StopCube", "contextual", 3),  # the earliest press: step 60
-    ],
-)
-def test_the_listener_follows_what_it_was_told_in_turns(task, setting, index):
-    env = roboirg.make(task, setting=setting, episode=index, cameras=(), delivery="turns")
+def test_the_listener_hears_all_turns_before_the_earliest_press():
+    told = {"setting": "contextual", "delivery": "turns"}
+    env = roboirg.make("StopCube", episode=3, cameras=(), **told)  # press at step 60
     assert play(env, make_policy("listener", 0))["status"] == "success"
 
 

@@ -59,6 +59,7 @@ def test_the_version_is_said_once():
     project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
     assert project["version"] == roboirg.__version__
     assert f"## {roboirg.__version__}" in (ROOT / "CHANGELOG.md").read_text()
+    assert f"\nversion: {roboirg.__version__}\n" in (ROOT / "CITATION.cff").read_text()
 
 
 def test_readme_s_policy_is_a_policy_in_fifteen_lines():
@@ -84,10 +85,6 @@ def test_readme_s_environment_plays(capsys):
 def test_a_page_is_read_in_one_go(page):
     prose = re.sub(r"^ *```.*?^ *```", "", page.read_text(), flags=re.DOTALL | re.MULTILINE)
     assert page.name in GENERATED or len(prose.split()) <= MOST_WORDS
-
-
-def test_the_citation_has_the_version():
-    assert f"\nversion: {roboirg.__version__}\n" in (ROOT / "CITATION.cff").read_text()
 
 
 def row_of(name: str, page: str = README) -> str:

@@ -129,16 +129,17 @@ def test_the_administrator_is_told_every_command(apt_dir: Path) -> None:
     )
 
 
-def test_a_new_enough_mesa_needs_no_backports(apt_dir: Path) -> None:
-    fakes = "mesa_candidate() { echo 25.0.7-2; }; "
-    commands = bash(fakes + "administrator_commands ${VULKAN_PACKAGES[*]}", apt_dir).stdout
-    assert commands == "apt-get update\napt-get install mesa-vulkan-drivers libvulkan1 libegl1\n"
-
-
-def test_opencv_alone_needs_no_backports(apt_dir: Path) -> None:
-    fakes = "mesa_candidate() { echo 22.3.6-1; }; "
-    commands = bash(fakes + "administrator_commands ${OPENCV_PACKAGES[*]}", apt_dir).stdout
-    assert commands == "apt-get update\napt-get install libgl1 libglib2.0-0\n"
+@pytest.mark.parametrize(
+    ("mesa", "packages", "names"),
+    [
+        ("25.0.7-2", "VULKAN", "mesa-vulkan-drivers libvulkan1 libegl1"),
+        ("22.3.6-1", "OPENCV", "libgl1 libglib2.0-0"),  # which needs no newer Mesa
+    ],
+)
+def test_no_backports_are_asked_for_without_need(apt_dir: Path, mesa, packages, names) -> None:
+    code = f"mesa_candidate() {{ echo {mesa}; }}; "
+    code += f"administrator_commands ${{{packages}_PACKAGES[*]}}"
+    assert bash(code, apt_dir).stdout == f"apt-get update\napt-get install {names}\n"
 
 
 FAKES = """

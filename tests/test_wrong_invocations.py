@@ -91,12 +91,6 @@ def home(tmp_path_factory):
     return folder
 
 
-def test_all_commands_and_wrong_values_are_tried():
-    assert {case.values[0] for case in CASES} == set(all_commands())
-    tried = " ".join(case.id for case in CASES)
-    assert all(f"{option} {value}" in tried for option, value in NAMES.items())
-
-
 @pytest.mark.parametrize(("name", "words"), CASES)
 def test_a_wrong_invocation_is_one_sentence(name, words, home, monkeypatch, capsys):
     monkeypatch.chdir(home)

@@ -20,6 +20,8 @@ from roboirg.tasks.splits.splits import get_episode
         ("PickXtimes", 0, "reasoning", 1),
         ("PickXtimes", 0, "spatial", 1),
         ("StopCube", 0, "direct", 1),
+        ("VideoUnmask", 0, "direct", 1),
+        ("VideoUnmask", 3, "direct", 2),  # every value of a slot counts
     ],
 )
 def test_values_that_the_command_does_not_state_are_counted(
@@ -28,13 +30,6 @@ def test_values_that_the_command_does_not_state_are_counted(
     episode = get_episode(task, "test", index)
     assert instruct(episode, setting).metadata["hidden_slots"] == hidden
     assert instruct(episode, setting, "resolved").metadata["hidden_slots"] == 0
-
-
-def test_every_value_of_a_slot_counts() -> None:
-    for index in range(20):
-        episode = get_episode("VideoUnmask", "test", index)
-        colors = len(episode.goal.texts("colors"))
-        assert instruct(episode, "direct").metadata["hidden_slots"] == colors
 
 
 @pytest.mark.parametrize("pool", POOLS)

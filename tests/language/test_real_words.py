@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from language_variants import random_episodes
 
 from roboirg.core.episode import ALL_COLORS, Goal, Point, Scene, SceneObject
-from roboirg.language import expressible, instruct
+from roboirg.language import instruct
 from roboirg.language.landmarks import MARGIN, landmarks
 from roboirg.reader import interpret
 from roboirg.reader.places import DirectionalPlace, NamedPlace, read_places
@@ -123,17 +123,3 @@ def test_competing_remarks_name_colors_of_the_table_only(task):
         remarks = " ".join(one.text for one in said.utterances if one.stage == "distractor")
         named = set(ALL_COLORS) & set(remarks.replace(",", " ").split())
         assert named == colors - {episode.goal.text("color")}
-
-
-@pytest.mark.parametrize("task", ["PutInBox", "PickByCount"])
-def test_the_camera_frame_can_be_told_too(task):
-    for episode in random_episodes(task, 20):
-        assert "spatial" in expressible(episode, frame="camera")
-        robot = instruct(episode, "spatial").metadata["landmarks"]
-        camera = instruct(episode, "spatial", frame="camera").metadata["landmarks"]
-        sides = {(one.split()[-1], two.split()[-1]) for one, two in zip(robot, camera, strict=True)}
-        assert sides in ({("left", "right")}, {("right", "left")})
-        assert [one.rsplit(" ", 1)[0] for one in (*robot, *camera)] == [
-            "on your",
-            "on the camera's",
-        ]

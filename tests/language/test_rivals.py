@@ -185,24 +185,3 @@ def test_only_understanding_finds_the_value():
 )
 def test_other_remarks_single_nothing_out(said):
     assert read_selection(split_sentences(said)[0]) is None
-
-
-def test_both_orders_have_the_same_key_words():
-    """In each kind and pool *not* and *no* are as frequent with the meant value first as last."""
-    for kind, (first, last) in rival_templates.CHOICES.items():
-        for pool in POOLS:
-            words = [
-                Counter(
-                    word
-                    for text in side.of(pool)
-                    for word in re.findall(r"\w+", text.lower())
-                    if word in ("not", "no", "other")
-                )
-                for side in (first, last)
-            ]
-            assert words[0] == words[1], (kind, pool)
-    for pool in POOLS:
-        meant, aside = rival_templates.SINGLED.of(pool), rival_templates.SET_ASIDE.of(pool)
-        assert sum(bool(re.search(r"\b(not|cannot)\b", one, re.I)) for one in meant) == sum(
-            bool(re.search(r"\bnot\b", one, re.I)) for one in aside
-        )

@@ -23,13 +23,6 @@ def test_the_registry_yields_forty_variants():
     assert len(found) == 40
 
 
-def test_every_variant_has_a_resolved_counterpart():
-    for task, setting in variants.all_variants():
-        episode = get_episode(task, "test", 2)
-        told = {(one.setting, one.form) for one in variants.expressible_options(episode)}
-        assert {(setting, "implicit"), (setting, "resolved")} <= told
-
-
 def test_every_combination_of_options_is_there():
     for name, task in every_task().items():
         told = list(variants.expressible_options(get_episode(name, "test", 0)))

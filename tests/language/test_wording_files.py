@@ -134,15 +134,6 @@ def test_metadata_and_export_name_the_wording_and_the_command(tmp_path):
     assert (own.metadata["wordings"], own.metadata["command"]) == (None, "own")
 
 
-def test_a_goal_or_task_without_a_command_is_told(tmp_path):
-    identity = open_wordings(write(tmp_path))
-    blue = episode_with("VideoUnmask", colors=("blue",))
-    with pytest.raises(InvalidValueError, match=r"no command of VideoUnmask .* colors.0 blue\.$"):
-        instruct(blue, "direct", wordings=identity)
-    with pytest.raises(InvalidValueError, match=r"have no commands of StopCube\.$"):
-        instruct(episode_with("StopCube"), wordings=identity)
-
-
 @pytest.mark.parametrize(
     ("text", "complaint"),
     [
@@ -232,8 +223,6 @@ def test_a_bad_file_is_told_in_one_sentence(tmp_path, text, complaint):
 def test_a_file_that_cannot_be_read_is_told(tmp_path):
     with pytest.raises(InvalidValueError, match="cannot be read"):
         read_wordings(tmp_path / "missing.toml")
-    with pytest.raises(InvalidValueError, match="cannot be read"):
-        read_wordings(tmp_path)
     (tmp_path / "bytes.toml").write_bytes(b"\xff")
     with pytest.raises(InvalidValueError, match="cannot be read"):
         read_wordings(tmp_path / "bytes.toml")
