@@ -46,6 +46,22 @@ CHANGES = {
 """All that is changed in the package to add it: texts and what they become, by file."""
 
 
+PROGRAM = """
+import contextlib, io, json, sys
+import roboirg
+from roboirg.main import main
+
+told = []
+for words in json.loads(sys.argv[1]):
+    sys.argv = ["roboirg", *map(str, words)]
+    with contextlib.redirect_stdout(io.StringIO()) as out, contextlib.suppress(SystemExit):
+        main()
+    told.append(out.getvalue())
+env = roboirg.make("PickXtimes", setting="direct", greeting="hello", cameras=())
+print(json.dumps([*told, env.instruction.text]))
+"""
+
+
 @pytest.fixture
 def package(tmp_path: Path) -> Path:
     folder = tmp_path / "src" / "roboirg"
@@ -64,36 +80,29 @@ def package(tmp_path: Path) -> Path:
 def test_an_added_option_reaches_words_commands_plans_records_and_tables(
     package: Path, tmp_path: Path
 ) -> None:
-    def python(*words: object) -> str:
-        done = subprocess.run(
-            [sys.executable, *map(str, words)], capture_output=True, text=True, check=False,
-            cwd=tmp_path, env=os.environ | {"PYTHONPATH": str(package), "COLUMNS": "200"},
-        )  # fmt: skip
-        assert done.returncode == 0, done.stderr
-        return done.stdout
-
-    def command(*words: object) -> str:
-        return python("-m", "roboirg", *words)
-
     few = ("--tasks", "PickXtimes", "--settings", "explicit,direct")
-    shown = command("show", "PickXtimes", 0, "--words", "--greeting", "hello")
-    assert shown.count("Hello, robot.") == 1
     plan = plan_file(greeting="hello", max_steps=2, episodes=1)
-    assert "# hello: the robot is greeted; or none.\ngreeting: hello" in command(
-        "run", "--plan", plan, "--show-plan"
-    )
-    run = tmp_path / "run"
-    command("run", "--plan", plan, *few, "--policy", "random", "--workers", 0, "--out", run)
+    run, rows = tmp_path / "run", tmp_path / "rows.jsonl"
+    commands = [
+        ("show", "PickXtimes", 0, "--words", "--greeting", "hello"),
+        ("run", "--plan", plan, "--show-plan"),
+        ("run", "--plan", plan, *few, "--policy", "random", "--workers", 0, "--out", run),
+        ("tables", run),
+        ("export", "instructions", *few, "--plan", plan, "--out", rows),
+    ]
+    done = subprocess.run(
+        [sys.executable, "-c", PROGRAM, json.dumps(commands, default=str)],
+        capture_output=True, text=True, check=False, cwd=tmp_path,
+        env=os.environ | {"PYTHONPATH": str(package), "COLUMNS": "200"},
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    shown, planned, _, tables, _, made = json.loads(done.stdout)
+    assert shown.count("Hello, robot.") == 1
+    assert "# hello: the robot is greeted; or none.\ngreeting: hello" in planned
     records = [json.loads(line) for line in (run / "records.jsonl").read_text().splitlines()]
     said = {one["options"]["setting"]: one["options"]["greeting"] for one in records}
     assert said == {"direct": "hello", "explicit": "none"}
     assert records[0]["instruction"][0]["text"].startswith("Hello, robot.")
-    assert "direct (greeting hello)" in command("tables", run)
-    rows = tmp_path / "rows.jsonl"
-    command("export", "instructions", *few, "--plan", plan, "--out", rows)
+    assert "direct (greeting hello)" in tables
     assert "Hello, robot." in rows.read_text()
-    code = (
-        "import roboirg; env = roboirg.make('PickXtimes', setting='direct', greeting='hello', "
-        "cameras=()); print(env.instruction.text)"
-    )
-    assert python("-c", code).startswith("Hello, robot.")
+    assert made.startswith("Hello, robot.")

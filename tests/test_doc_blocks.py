@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import re
 import shlex
+import shutil
 import subprocess
 import sys
 import tomllib
@@ -86,12 +87,19 @@ def write_run(folder: Path, lost: int) -> None:
     write_plan(plan, folder)
 
 
+@pytest.fixture(scope="module")
+def runs(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("pages") / "runs"
+    for lost, name in enumerate(("first", "second", "a", "b")):
+        write_run(folder / name, lost)
+    return folder
+
+
 @pytest.fixture
-def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+def folder(runs: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     policy = next(one.text for one in blocks_of(ROOT / "README.md") if "class MyPolicy" in one.text)
     (tmp_path / "my_policy.py").write_text(policy)
-    for lost, name in enumerate(("first", "second", "a", "b")):
-        write_run(tmp_path / "runs" / name, lost)
+    shutil.copytree(runs, tmp_path / "runs")
     (tmp_path / "results").symlink_to(ROOT / "results")
     monkeypatch.chdir(tmp_path)
     monkeypatch.syspath_prepend(str(tmp_path))

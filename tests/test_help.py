@@ -60,11 +60,9 @@ def test_a_plan_explains_all_of_its_fields_and_is_read_back(tmp_path):
     for one in plan_options():
         assert one.help in " ".join(text.replace("\n# ", " ").split())
         assert f"\n{one.name}:" in text
-    for episodes in ((0, 1, 2, 7), (3,), (0,), (0, 2, 4)):
-        one = plan.model_copy(update={"episodes": episodes})
-        (tmp_path / "plan.yaml").write_text(plan_text(one))
-        fields = read_plan_file(str(tmp_path / "plan.yaml"))
-        assert make_plan(fields.pop("policies"), **fields) == one
+    (tmp_path / "plan.yaml").write_text(text)
+    fields = read_plan_file(str(tmp_path / "plan.yaml"))
+    assert make_plan(fields.pop("policies"), **fields) == plan
 
 
 def test_options_of_instructions_are_listed_once():

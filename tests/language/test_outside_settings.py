@@ -8,7 +8,6 @@ from pathlib import Path
 
 import pytest
 import seed_selection
-import write_language_card as card
 from rich.console import Console
 from seed_selection import EpisodeSlot, check_words
 
@@ -128,12 +127,6 @@ def test_a_new_setting_does_not_change_the_splits(register, monkeypatch):
     assert (rejection.reason, rejection.cause) == ("not expressible", f"dummy: {REASON}")
     strict = check_episode(EPISODE, must_be_expressible=True)
     assert [(one.rule, one.words) for one in strict.failures] == [("expressible", REASON)]
-
-
-def test_the_card_shows_the_first_example_that_can_be_expressed(register):
-    register(DUMMY)
-    assert card.example_episode("PickXtimes", "dummy").index == 2
-    assert card.example_episode("PickXtimes", "direct").index == direct.SETTING.example
 
 
 def test_statistics_figure_and_export_have_the_setting(register):

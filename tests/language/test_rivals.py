@@ -5,7 +5,6 @@ from __future__ import annotations
 import dataclasses
 import functools
 import itertools
-import re
 from collections import Counter
 from fractions import Fraction
 
@@ -38,11 +37,6 @@ def told(task, split="test", count=12):
     for episode in first_episodes(task, split, count):
         if find_refusal(episode, RIVAL) is None:
             yield episode, instruct_with(episode, RIVAL)
-
-
-def remark(instruction):
-    """The sentence that singles one value out."""
-    return re.split(r"(?<=[.?]) ", instruction.command)[0]
 
 
 @given(st.sampled_from(TASKS), st.integers(0, 10_000), st.sampled_from(POOLS))
@@ -131,21 +125,6 @@ def test_each_value_is_meant_equally_often():
     kinds = Counter(said.metadata["rival_reference"] for _, said in all_told())
     assert set(kinds) == {"alone", "set aside", *rival_templates.CHOICES}
     assert min(kinds.values()) > 0.08 * kinds.total()
-
-
-def test_no_pointer_with_any_key_words_tells_the_value():
-    """The first or last pointer, turned over by any of *other*, *not* and *no*: at chance."""
-    remarks = [
-        (re.findall("[a-z]+", remark(said).lower()), said.metadata["rival_position"] == "first")
-        for _, said in all_told()
-    ]
-    for place, count in itertools.product((0, -1), range(4)):
-        for words in itertools.combinations(("other", "not", "no"), count):
-            right = 0
-            for spoken, second in remarks:
-                pointers = [POINTERS[word] for word in spoken if word in POINTERS]
-                right += (pointers[place] != any(word in spoken for word in words)) == second
-            assert abs(right / len(remarks) - 0.5) < 0.05, (place, words)
 
 
 def test_no_rule_is_above_chance():

@@ -19,7 +19,7 @@ from roboirg.reader import interpret
 from roboirg.tasks import get_task
 from roboirg.tasks.splits.splits import SIZES, get_episode
 
-RANDOM_SCENES = 16
+RANDOM_SCENES = 8
 """For each task, beyond those of the test split."""
 
 

@@ -1,6 +1,5 @@
 """Pools of wordings: disjoint, large enough, chosen by the split or by an option."""
 
-import functools
 import itertools
 import re
 from collections import Counter
@@ -8,10 +7,8 @@ from dataclasses import replace
 
 import pytest
 from language_variants import TASKS, split_episodes
-from plan_files import plan_file
-from typer.testing import CliRunner
+from page_text import call, words
 
-from roboirg import main as cli
 from roboirg.apps.language_lab.validation.validation_run import Batch, validate_batch
 from roboirg.core.episode import SPLITS
 from roboirg.core.word_pools import POOLS, Pools, pool_of
@@ -109,32 +106,18 @@ def test_a_pool_may_be_chosen(setting, pool):
         ), said.command
 
 
-@functools.cache
-def implicit_texts(setting):
-    """The texts of the implicit form of every eleventh episode, by split."""
-    found = {split: set() for split in SPLITS}
+@pytest.mark.parametrize("setting", IMPLICIT)
+def test_no_text_of_the_test_split_is_in_training(setting):
+    texts = {split: set() for split in SPLITS}
     for task in TASKS:
         some = itertools.islice(split_episodes(task), 0, None, 11)
         for episode, said in instructions(some, [setting], ["implicit"]):
-            found[episode.split].add(said.text)
-    return found
-
-
-@pytest.mark.parametrize("setting", IMPLICIT)
-def test_no_text_of_the_test_split_is_in_training(setting):
-    texts = implicit_texts(setting)
+            texts[episode.split].add(said.text)
     assert len(texts["test"]) >= 4 * sum(
         setting in {one.name for one in all_settings().values() if one.applies_to(task)}
         for task in every_task().values()
     )
     assert not texts["test"] & (texts["train"] | texts["val"])
-
-
-@pytest.mark.parametrize("setting", IMPLICIT)
-def test_every_setting_begins_in_many_ways(setting):
-    texts = set().union(*implicit_texts(setting).values())
-    openings = {tuple(re.findall(r"[\w']+", text.lower())[:3]) for text in texts}
-    assert len(openings) >= 40
 
 
 @pytest.mark.parametrize("task", TASKS)
@@ -145,22 +128,11 @@ def test_every_split_is_valid_in_the_words_of_the_other_pool(task):
         assert found.texts[task, "direct"] == 2
 
 
-def call(*words):
-    result = CliRunner().invoke(cli.app, words, catch_exceptions=False)
-    assert result.exit_code == 0, result.output
-    return " ".join(result.output.split())
-
-
 @pytest.mark.parametrize("pool", POOLS)
 def test_the_commands_take_a_pool(pool, tmp_path):
     episode = get_episode("StopCube", "test", 0)
     expected = instruct(episode, wordings=pool).text
-    assert expected in call("show", "StopCube", "0", "--words", "--wordings", pool)
-    out = tmp_path / "rows.jsonl"
-    words = ("--tasks", "StopCube", "--settings", "explicit", "--split", "val")
-    plan = plan_file(wordings=pool, forms="implicit")
-    call("export", "instructions", "--out", str(out), *words, "--plan", plan)
-    assert len(out.read_text().splitlines()) == 50
+    assert expected in words(call("show", "StopCube", "0", "--words", "--wordings", pool))
     run = ("run", "--policy", "random", "--out", str(tmp_path / "run"), "--dry-run")
     assert "1 episode" in call(
         *run, "--tasks", "StopCube", "--settings", "direct", "--episodes", "1",

@@ -7,19 +7,12 @@ import re
 from pathlib import Path
 
 import pytest
+from page_text import call
 from plan_files import plan_file
 from typer.testing import CliRunner
 
 from roboirg import main as cli
 from roboirg.core.errors import InvalidValueError, RoboIRGError, UnknownNameError
-
-
-def call(*words: str | Path) -> str:
-    """What the command prints; its errors come as they are."""
-    result = CliRunner().invoke(cli.app, [str(word) for word in words], catch_exceptions=False)
-    assert result.exit_code == 0, result.output
-    return result.output
-
 
 RANDOM = ("--split", "none", "--seeds", "6")
 WORDINGS = """\

@@ -79,13 +79,6 @@ def test_goals_are_the_episodes():
         assert json.loads(one["goal"]) == expected
 
 
-def test_json_lines_are_the_rows():
-    data = instruction_export.encode(rows(), "jsonl")
-    assert data == instruction_export.encode(rows(), "jsonl")
-    lines = data.decode().splitlines()
-    assert [json.loads(line) for line in lines] == list(rows())
-
-
 def test_arrow_reads_json_lines_and_parquet_alike():
     pytest.importorskip("pyarrow")
     from pyarrow import json as arrow_json
