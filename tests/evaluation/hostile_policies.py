@@ -119,11 +119,6 @@ class Interrupter(Hostile):
         raise KeyboardInterrupt
 
 
-class Ender(Hostile):
-    def act(self, observation: Any) -> NoReturn:
-        raise GeneratorExit
-
-
 class Alarmer(Hostile):
     """An exception arrives from a signal."""
 
@@ -150,17 +145,7 @@ class Surrogate(Hostile):
 
 class SurrogateMetadata(Hostile):
     def reset(self, instruction: str, demonstration: Any) -> None:
-        self.metadata = {"text": "\ud800"}
-
-
-class SurrogateKey(Hostile):
-    def reset(self, instruction: str, demonstration: Any) -> None:
-        self.metadata = {"\ud800": 1}
-
-
-class SurrogateCost(Hostile):
-    def usage(self) -> dict[str, float]:
-        return {"\ud800": 1.0}
+        self.metadata = {"\ud800": "\ud800"}
 
 
 class Debtor(Hostile):
@@ -189,15 +174,6 @@ class Printer(Hostile):
 class Wordy(Hostile):
     def act(self, observation: Any) -> NoReturn:
         raise ValueError("x" * 100_000_000)
-
-
-class Missing(Hostile):
-    """Pretends that a package is missing, which would end the run."""
-
-    def act(self, observation: Any) -> NoReturn:
-        from roboirg.core.errors import MissingDependencyError
-
-        raise MissingDependencyError("Install nothing.")
 
 
 class Renderless(Hostile):
@@ -244,20 +220,8 @@ class ForgesKind(Forger):
     message: ClassVar = {"type": "outcome", "error": "infrastructure", "message": "x"}
 
 
-class ForgesSeconds(Forger):
-    message: ClassVar = {"type": "outcome", "seconds": float("nan")}
-
-
 class ForgesSize(Forger):
     message: ClassVar = {"type": "outcome", "rows": bytes(64), "size": 0}
-
-
-class ForgesWant(Forger):
-    message: ClassVar = {"type": "outcome", "want": ["front_rgb"]}
-
-
-class ForgesPrivilege(Forger):
-    message: ClassVar = {"type": "outcome", "needs": {}, "version": "1", "is_privileged": True}
 
 
 class ForgesVersion(Forger):
@@ -300,17 +264,11 @@ class GiantList(Announcer):
     data = (5).to_bytes(8, "big") + b"\xdf\xff\xff\xff\xff"
 
 
-class Deep210(Hostile):
-    levels = 210
-
+class Deep(Hostile):
     def reset(self, instruction: str, demonstration: Any) -> None:
         self.metadata = {}
-        for _ in range(self.levels):
+        for _ in range(300):
             self.metadata = {"deeper": self.metadata}
-
-
-class Deep300(Deep210):
-    levels = 300
 
 
 class Umlauts(Hostile):
@@ -325,16 +283,12 @@ class NamesServer(Hostile):
         self.metadata = {"server": "localhost:1", "version": "2"}
 
 
-class NamesTrial(Hostile):
-    def reset(self, instruction: str, demonstration: Any) -> None:
-        self.metadata = {"real_trial": {"robot": "panda"}}
-
-
 class Asker(Hostile):
-    """Asks for nothing, at the end too."""
+    """Asks for nothing, as often as it may, and at the end too."""
 
     def act(self, observation: Any) -> Any:
-        self.ask()
+        for _ in range(63):
+            self.ask()
         return super().act(observation)
 
     def close(self) -> None:
@@ -344,15 +298,6 @@ class Asker(Hostile):
         line = line_of(host_of(sys._getframe()))
         send(line, {"type": "question"})
         receive_call(line)
-
-
-class Inquirer(Asker):
-    """Asks as often as it may."""
-
-    def act(self, observation: Any) -> Any:
-        for _ in range(63):
-            self.ask()
-        return super().act(observation)
 
 
 class Pesterer(Asker):
@@ -429,10 +374,7 @@ FORGED = {
     "ForgesReply": "policy: the process sent no valid reply (Invalid value 'reply' - ",
     "ForgesLost": "policy: the process sent no valid reply (Object contains unknown field ",
     "ForgesKind": "policy: the process sent no valid reply (Invalid enum value 'infrastructure",
-    "ForgesSeconds": "policy: the process sent no valid reply (Object contains unknown field ",
     "ForgesSize": "policy: the process sent no valid reply (Expected `int` >= 1 - at ",
-    "ForgesWant": "policy: the process sent no valid reply (Object contains unknown field `want",
-    "ForgesPrivilege": "policy: the process sent no valid reply (Object contains unknown field ",
     "ForgesVersion": "policy: the process sent no valid reply (Expected `str` matching regex ",
     "ForgesTurn": "policy: the process sent no valid reply (a message that was not asked for)",
     "AnswersTwice": "policy: the process sent no valid reply (a message ",
@@ -440,10 +382,8 @@ FORGED = {
     "LyingArray": "policy: the process sent no valid reply (Expected `bytes`, got `ext` - at ",
     "GiantList": "policy: the process sent no valid reply (Input data was truncated)",
     "Pesterer": "policy: the process sent no valid reply (it asked for the video again and again)",
-    "Deep210": "policy: the policy's metadata are nested more than 16 deep; make them flat.",
-    "Deep300": "policy: the policy's metadata are nested more than 16 deep; make them flat.",
+    "Deep": "policy: the policy's metadata are nested more than 16 deep; make them flat.",
     "NamesServer": "policy: the policy's metadata have the key 'server', which is reserved; ",
-    "NamesTrial": "policy: the policy's metadata have the key 'real_trial', which is reserved; ",
     "Aborter": "policy: the process died of signal 6 in the policy's act()",
     "LateTurncoat": "policy: Policy 'hostile_policies:LateTurncoat' has attach(), with which",
     "Turncoat": "policy: Policy 'hostile_policies:Turncoat' has attach(), with which",
@@ -453,14 +393,11 @@ SPOILED = {
     "Closer": "policy: the process",
     "Babbler": "policy: the ",
     "Interrupter": "policy: KeyboardInterrupt",
-    "Ender": "policy: GeneratorExit",
     "Alarmer": "policy: SystemExit: alarm",
     "Unspeakable": "policy: BrokenError: its text cannot be read",
     "Surrogate": "policy: ValueError: ???",
     "SurrogateMetadata": "policy: the policy's metadata hold text with lone surrogates.",
-    "SurrogateKey": "policy: the policy's metadata hold text with lone surrogates.",
     "Wordy": "policy: ValueError: xxxx",
-    "Missing": "policy: Install nothing.",
     "Renderless": "policy: No device.",
 }
 """Those whose episodes end in an error, and how its cause begins."""
@@ -469,7 +406,6 @@ HARMLESS = (
     "Patcher",
     "Leaker",
     "Wanderer",
-    "SurrogateCost",
     "Printer",
     "Debtor",
     "WordlessTokenizer",

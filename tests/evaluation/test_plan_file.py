@@ -17,7 +17,6 @@ from roboirg.language.settings import all_settings
 from roboirg.tasks import all_tasks
 from roboirg.tasks.splits.splits import get_episode
 
-
 PINNED = ("challenge", "paper", "paper-context", "standard")
 """Named plans with a test of their own."""
 

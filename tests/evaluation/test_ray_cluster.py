@@ -144,11 +144,6 @@ def test_what_the_machines_do_not_have_is_told(tmp_path: Path) -> None:
         run_plan(PLAN, tmp_path, Homebound(), RayCluster(1))  # type: ignore[arg-type]
 
 
-def test_four_workers_give_the_same_records(tmp_path: Path, here: list[dict[str, object]]) -> None:
-    run_plan(PLAN, tmp_path, FakePlayer(tmp_path), LocalProcesses(4))
-    assert all_comparable(tmp_path) == here
-
-
 def test_a_cluster_that_is_not_there_is_one_sentence(tmp_path: Path) -> None:
     with pytest.raises(RoboIRGError, match=r"cluster '127\.0\.0\.1:1' cannot be joined") as caught:
         run_plan(PLAN, tmp_path, FakePlayer(tmp_path), RayCluster(address="127.0.0.1:1"))

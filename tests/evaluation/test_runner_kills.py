@@ -20,8 +20,8 @@ from roboirg.evaluation.records.store import RECORDS_FILE, read_records
 from roboirg.evaluation.run.executor import InProcess
 from roboirg.evaluation.run.runner import run_plan
 
-KILLS = int(os.environ.get("ROBOIRG_TEST_KILLS", "12"))
-EPISODES, SEEDS = 25, max(1, KILLS // 12)
+KILLS = int(os.environ.get("ROBOIRG_TEST_KILLS", "6"))
+EPISODES, SEEDS = 14, max(1, KILLS // 6)
 """Two records each; more than the kills let through, so that the run is always being killed."""
 
 

@@ -38,7 +38,7 @@ TIMEOUT_S = 20.0
 
 
 def plan_of_chaos(policy_process: str) -> Plan:
-    """Enough episodes for every misdeed to happen, and twice as many good ones."""
+    """Enough episodes for every misdeed to happen, and good ones between them."""
     plan = Plan(
         policies=(chaos_policy.SPEC,),
         tasks=("PickXtimes",),
@@ -53,7 +53,7 @@ def plan_of_chaos(policy_process: str) -> Plan:
     jobs, chosen, met = plan.jobs(), [], Counter[str | None]()
     for job in jobs:
         misdeed = load_policy(PreparedJob(job)).misdeed  # type: ignore[attr-defined]
-        if met[misdeed] < (1 if misdeed else 2 * len(chaos_policy.KINDS)):
+        if met[misdeed] < (1 if misdeed else len(chaos_policy.KINDS) // 2):
             met[misdeed] += 1
             chosen.append(job)
     assert set(met) == {None, *chaos_policy.KINDS}

@@ -215,7 +215,7 @@ class Child:
         return self.main.returncode
 
 
-@pytest.mark.parametrize("kills", [4, pytest.param(50, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("kills", [4, pytest.param(24, marks=pytest.mark.slow)])
 def test_no_answered_call_is_made_again_after_a_kill(tmp_path: Path, kills: int) -> None:
     """Each episode is killed twice after a random number of replies, and then finished."""
     rng = random.Random(0)

@@ -212,7 +212,7 @@ def test_forty_pixels_off_is_another_thing_or_none(task):
     ],
 )  # fmt: skip
 def test_the_record_says_how_a_planner_failed(fault, named):
-    records = (planner_faults.record_of(fault, index) for index in range(4))
+    records = (planner_faults.record_of(fault, index) for index in range(3))
     found = [planner_failure(record) for record in records if record is not None]
     assert found
     assert set(found) == {named}

@@ -116,6 +116,11 @@ class Priceless(Sound):
         return {"calls": None}
 
 
+class Unspeakable(Sound):
+    def usage(self):
+        return {"\ud800": 1.0}
+
+
 class Reckless(Sound):
     def act(self, observation):
         return np.full((4, 8), 9.0)
@@ -162,6 +167,7 @@ def test_a_sound_policy_passes_everything():
         (Growing, "deterministic", "the number of actions"),
         (Videophobe, "acts with a video", "no films, please"),
         (Unwritable, "reports", "the policy's metadata: 'rate' is nan; it must be a text"),
+        (Unspeakable, "reports", "usage() has 1 entries; it may have at most"),
         (Priceless, "reports", "usage() has None as 'calls'; it must be a number."),
     ],
 )
