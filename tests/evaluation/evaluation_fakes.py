@@ -14,9 +14,7 @@ import msgspec
 from made_records import make_record
 
 from roboirg.core.errors import RenderDeviceError
-from roboirg.core.waiting import waiting
 from roboirg.evaluation.plan.plan import Plan
-from roboirg.evaluation.play.watchdog import watched
 from roboirg.evaluation.records.record import NON_DETERMINISTIC_FIELDS, EventRecord, Job, Record
 from roboirg.evaluation.run.executor import LocalProcesses
 from roboirg.evaluation.run.runner import run_plan
@@ -88,31 +86,6 @@ class FakePlayer:
         video.parent.mkdir(exist_ok=True)
         video.write_text(job.slug)
         return msgspec.structs.replace(record, video=f"videos/{video.name}")
-
-
-@dataclass(frozen=True)
-class WaitingPlay:
-    """Plays nothing: one episode waits for its turn, the others for a reply that never comes.
-
-    Attributes:
-        queued_episode: the one that waits for its turn.
-        queue_s: for how long.
-        limit_s: of the policy's call.
-    """
-
-    queued_episode: int
-    queue_s: float
-    limit_s: float
-
-    def __call__(self, job: Job) -> Record:
-        if job.episode == self.queued_episode:
-            turn = waiting("a free server", is_queue=True)
-            with watched("policy's reset()", self.limit_s), turn:
-                time.sleep(self.queue_s)
-            return FakePlay()(job)
-        with watched("policy's act()", self.limit_s), waiting("the reply of openpi://there:8000"):
-            time.sleep(3600)
-        raise AssertionError("it was not killed")
 
 
 def fake_record(job: Job, **fields: object) -> Record:

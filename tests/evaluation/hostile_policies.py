@@ -4,12 +4,10 @@ from __future__ import annotations
 
 import contextlib
 import gc
-import json
 import os
 import signal
 import socket
 import sys
-import tempfile
 import threading
 import time
 from pathlib import Path
@@ -18,7 +16,6 @@ from typing import Any, ClassVar, NoReturn
 import numpy as np
 from msgspec.msgpack import Ext, encode
 
-from roboirg.evaluation.hosting import host_process
 from roboirg.evaluation.hosting.messages import receive_call, send
 
 NEEDLE = "9035768"
@@ -119,16 +116,6 @@ class Interrupter(Hostile):
         raise KeyboardInterrupt
 
 
-class Alarmer(Hostile):
-    """An exception arrives from a signal."""
-
-    def act(self, observation: Any) -> Any:
-        signal.signal(signal.SIGALRM, lambda *_: sys.exit("alarm"))
-        signal.setitimer(signal.ITIMER_REAL, 0.05)
-        time.sleep(5)
-        return super().act(observation)
-
-
 class Unspeakable(Hostile):
     def act(self, observation: Any) -> NoReturn:
         class BrokenError(Exception):
@@ -151,17 +138,6 @@ class SurrogateMetadata(Hostile):
 class Debtor(Hostile):
     def usage(self) -> dict[str, float]:
         return {"cost_usd": -1e300, "calls": 1e308, "input_tokens": 5.0}
-
-
-class WordlessTokenizer(Hostile):
-    """Names a tokenizer that knows no word, not even that for unknown ones."""
-
-    prompt_tokens = 5
-
-    def __init__(self, seed: int = 0) -> None:
-        self.tokenizer = str(Path(tempfile.mkdtemp(), "tokenizer.json"))
-        model = {"type": "WordLevel", "vocab": {"a": 0}, "unk_token": "[U]"}
-        Path(self.tokenizer).write_text(json.dumps({"version": "1.0", "model": model}))
 
 
 class Printer(Hostile):
@@ -258,12 +234,6 @@ class Announcer(Hostile):
         time.sleep(3600)
 
 
-class GiantList(Announcer):
-    """Five bytes that stand for four billion fields."""
-
-    data = (5).to_bytes(8, "big") + b"\xdf\xff\xff\xff\xff"
-
-
 class Deep(Hostile):
     def reset(self, instruction: str, demonstration: Any) -> None:
         self.metadata = {}
@@ -339,23 +309,6 @@ class Aborter(Forker):
         os.abort()
 
 
-class Quitter(Hostile):
-    """Ends its process between two calls, so that its first episode is played again."""
-
-    def act(self, observation: Any) -> Any:
-        note = Path(os.environ["HOSTILE_NOTES"], "quit")
-        if not note.exists():
-            note.touch()
-            reply = host_process.send
-
-            def reply_and_quit(*arguments: Any) -> None:
-                reply(*arguments)
-                os._exit(3)
-
-            host_process.send = reply_and_quit
-        return -np.ones((12, 8))
-
-
 class Turncoat(Hostile):
     """Becomes privileged where only its own process sees it."""
 
@@ -380,7 +333,6 @@ FORGED = {
     "AnswersTwice": "policy: the process sent no valid reply (a message ",
     "Announcer": "policy: the process sent no valid reply (a message of 4,611,686,018,",
     "LyingArray": "policy: the process sent no valid reply (Expected `bytes`, got `ext` - at ",
-    "GiantList": "policy: the process sent no valid reply (Input data was truncated)",
     "Pesterer": "policy: the process sent no valid reply (it asked for the video again and again)",
     "Deep": "policy: the policy's metadata are nested more than 16 deep; make them flat.",
     "NamesServer": "policy: the policy's metadata have the key 'server', which is reserved; ",
@@ -393,7 +345,6 @@ SPOILED = {
     "Closer": "policy: the process",
     "Babbler": "policy: the ",
     "Interrupter": "policy: KeyboardInterrupt",
-    "Alarmer": "policy: SystemExit: alarm",
     "Unspeakable": "policy: BrokenError: its text cannot be read",
     "Surrogate": "policy: ValueError: ???",
     "SurrogateMetadata": "policy: the policy's metadata hold text with lone surrogates.",
@@ -408,7 +359,6 @@ HARMLESS = (
     "Wanderer",
     "Printer",
     "Debtor",
-    "WordlessTokenizer",
 )
 """Those that fail like any policy that does not do the task."""
 

@@ -69,16 +69,6 @@ def test_different_content_has_different_digests(log: ActionLog, other: ActionLo
         assert log.digest != other.digest
 
 
-def test_float32_actions_take_half_the_space(tmp_path: Path) -> None:
-    rng = np.random.default_rng(0)
-    exact = rng.normal(size=(500, 8))
-    sizes = []
-    for rows in (exact, exact.astype(np.float32).astype(np.float64)):
-        log = ActionLog("joint_angle", rows, np.array([0], np.int32), np.zeros(3))
-        sizes.append(action_path(tmp_path, write_actions(log, tmp_path)).stat().st_size)
-    assert sizes[1] < 0.55 * sizes[0] < 20_000
-
-
 def test_a_file_in_place_of_the_folder_is_one_sentence(tmp_path: Path) -> None:
     (tmp_path / "actions").touch()
     with pytest.raises(InvalidValueError, match=r"Cannot write .*\.npz: Not a directory\."):

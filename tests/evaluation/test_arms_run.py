@@ -14,9 +14,8 @@ from roboirg.evaluation.plan.plan import Plan
 from roboirg.evaluation.plan.plan_file import read_plan_file
 from roboirg.evaluation.plan.plan_maker import make_plan
 from roboirg.evaluation.plan.stored_plans import read_plan, write_plan
-from roboirg.evaluation.records.merging import merge_runs
 from roboirg.evaluation.records.record_codec import identity_key
-from roboirg.evaluation.records.store import RECORDS_FILE, RecordStore, read_records
+from roboirg.evaluation.records.store import RECORDS_FILE, read_records
 from roboirg.evaluation.run.executor import InProcess
 from roboirg.evaluation.run.runner import run_plan
 from roboirg.main import app
@@ -82,19 +81,6 @@ def test_a_run_resumes_with_more_arms(tmp_path: Path) -> None:
     }
     play(plan_of(), tmp_path)
     assert (tmp_path / RECORDS_FILE).read_bytes() == grown
-
-
-def test_halves_of_a_run_with_arms_merge(tmp_path: Path) -> None:
-    whole = play(plan_of(), tmp_path / "whole")
-    records = read_records(whole)
-    parts = [tmp_path / "a", tmp_path / "b"]
-    for folder, some in zip(parts, (records[:9], records[7:]), strict=True):
-        with RecordStore(folder) as store:
-            for record in some:
-                store.append(record)
-    merged = merge_runs(parts, tmp_path / "out")
-    assert (merged.duplicates, merged.conflicts) == (2, ())
-    assert read_records(tmp_path / "out") == records
 
 
 @pytest.mark.sim

@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import pytest
 
 from roboirg.core.errors import InvalidValueError, UnknownNameError
@@ -58,15 +60,20 @@ def test_difficulties_select_the_episodes_that_have_them_in_every_task() -> None
         parse_episodes("hard", "random", tasks)
 
 
-def test_sentences_about_numbers_say_what_would_be_right() -> None:
-    with pytest.raises(InvalidValueError, match=r"for episode 0 alone write '0,'\.$"):
-        parse_episodes("0", "test", ())
-    with pytest.raises(InvalidValueError, match="split 'train' has episodes 0 to 99"):
-        parse_episodes("0-999999999", "train", ())
-    with pytest.raises(InvalidValueError, match="1,5; 1,2,5; 1,2,3,5; 1,2,3,4,5"):
-        parse_stages("5-1")
-    with pytest.raises(InvalidValueError, match="1,000,000,000 numbers; at most 10,000"):
-        parse_numbers("policy seed", "0-999999999")
+@pytest.mark.parametrize(
+    ("parse", "given", "words"),
+    [
+        (parse_episodes, ("0", "test", ()), r"for episode 0 alone write '0,'\.$"),
+        (parse_episodes, ("0-999999999", "train", ()), "split 'train' has episodes 0 to 99"),
+        (parse_stages, ("5-1",), "1,5; 1,2,5; 1,2,3,5; 1,2,3,4,5"),
+        (parse_numbers, ("policy seed", "0-999999999"), "1,000,000,000 numbers; at most 10,000"),
+    ],
+)
+def test_sentences_about_numbers_say_what_would_be_right(
+    parse: Callable[..., object], given: tuple[object, ...], words: str
+) -> None:
+    with pytest.raises(InvalidValueError, match=words):
+        parse(*given)
 
 
 @pytest.mark.parametrize("text", ["all", "ALL", "all,explicit", "direct, All"])

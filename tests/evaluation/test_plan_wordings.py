@@ -2,24 +2,18 @@
 
 from __future__ import annotations
 
-import os
-import subprocess
-import sys
 from pathlib import Path
 
-import msgspec
 import pytest
 from msgspec.structs import replace
 
-from roboirg.core.errors import InvalidValueError, UnknownNameError
+from roboirg.core.errors import InvalidValueError
 from roboirg.evaluation.plan.plan import Plan
 from roboirg.evaluation.plan.plan_file import read_plan_file
 from roboirg.evaluation.plan.plan_maker import make_plan
 from roboirg.evaluation.plan.stored_plans import read_plan, write_plan
 from roboirg.evaluation.play.job_instruction import instruct_job
-from roboirg.evaluation.records.record import Job
 from roboirg.evaluation.records.record_codec import identity_key
-from roboirg.evaluation.records.store import read_records
 from roboirg.language.wordings import wording_store
 
 FILE = """\
@@ -101,21 +95,24 @@ def test_a_job_opens_its_file_and_checks_it(
         instruct_job(job)
 
 
-def test_what_the_wordings_lack_stops_a_plan(wording_file: Path) -> None:
-    with pytest.raises(InvalidValueError, match=r"have no commands of StopCube\.$"):
-        a_plan(wording_file, tasks="StopCube")
-    wording_file.write_text(FILE.replace("1 = ", "6 = "))
-    with pytest.raises(InvalidValueError, match="have no command of PickXtimes for the goal"):
-        a_plan(wording_file, episodes="20")
+@pytest.mark.parametrize(
+    ("content", "options", "words"),
+    [
+        (FILE, {"tasks": "StopCube"}, r"have no commands of StopCube\.$"),
+        (FILE.replace("1 = ", "6 = "), {"episodes": "20"},
+         "have no command of PickXtimes for the goal"),
+        ("name = 3", {}, r"^The wording file '.*test.toml' has the name 3;"),
+        ("name = 'a'\n[PickXtime]", {}, r"^There is no task \(in the wording file '"),
+    ],
+)  # fmt: skip
+def test_what_the_wordings_lack_stops_a_plan(
+    wording_file: Path, content: str, options: dict[str, str], words: str
+) -> None:
+    wording_file.write_text(content)
+    with pytest.raises(InvalidValueError, match=words):
+        a_plan(wording_file, **options)
     with pytest.raises(InvalidValueError, match=r"^The wording file '.*missing.toml' cannot be "):
-        a_plan(wording_file.with_name("missing.toml"))
-    wording_file.write_text("name = 3")
-    with pytest.raises(InvalidValueError) as caught:
-        a_plan(wording_file)
-    assert str(caught.value).startswith(f"The wording file {str(wording_file)!r} has the name 3;")
-    wording_file.write_text("name = 'a'\n[PickXtime]")
-    with pytest.raises(UnknownNameError, match=r"^There is no task \(in the wording file '"):
-        a_plan(wording_file)
+        a_plan(wording_file.with_name("missing.toml"), **options)
 
 
 @pytest.mark.usefixtures("forgetful")
@@ -125,41 +122,3 @@ def test_a_job_in_our_own_words_opens_no_file(wording_file: Path) -> None:
     assert own.metadata["wordings"] is None
     missing = replace(job, wordings_file="missing.toml")
     assert instruct_job(missing) == own
-
-
-@pytest.mark.slow
-@pytest.mark.sim
-def test_two_workers_play_in_the_words_of_a_file(wording_file: Path, tmp_path: Path) -> None:
-    out = tmp_path / "out"
-
-    def play(*words: str) -> subprocess.CompletedProcess[str]:
-        command = [
-            *(sys.executable, "-m", "roboirg", "run", "--policy", "random", "--out", str(out)),
-            *("--tasks", "PickXtimes", "--episodes", "2", "--max-steps", "3", "--workers", "2"),
-        ]
-        return subprocess.run(
-            [*command, *words], cwd=tmp_path, env=os.environ, capture_output=True, text=True,
-            check=False,
-        )  # fmt: skip
-
-    said = play("--plan", "robomme", "--wordings", "test.toml", "--policy-seeds", "0")
-    assert said.returncode == 0, said.stderr
-    records = list(read_records(out))
-    assert len(records) == 2
-    for record in records:
-        assert record.options.wordings is not None
-        assert record.options.wordings.startswith("test@")
-        assert record.instruction[0].text == record.command
-        assert record.command.startswith("pick up the ")
-        assert record.metadata["wordings"] == record.options.wordings
-    # The same episodes in our own words are played beside them, and none twice.
-    said = play("--settings", "explicit")
-    assert said.returncode == 0, said.stderr
-    assert [record.options.wordings is None for record in read_records(out)] == [
-        False,
-        False,
-        True,
-        True,
-    ]
-    assert "2 already" in play("--settings", "explicit", "--dry-run").stdout.replace(",", "")
-    assert isinstance(msgspec.json.decode(msgspec.json.encode(records[0].identity), type=Job), Job)

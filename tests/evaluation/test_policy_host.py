@@ -220,7 +220,7 @@ def alone(tmp_path_factory: pytest.TempPathFactory) -> dict[Job, dict[str, Any]]
     return play(plan, tmp_path_factory.mktemp("alone"), InProcess())
 
 
-@pytest.mark.parametrize(("workers", "batch"), slow_but([(2, 3)], [(2, 3), (0, 16), (16, 16)]))
+@pytest.mark.parametrize(("workers", "batch"), slow_but([(2, 3)], [(2, 3), (0, 16), (5, 16)]))
 def test_records_do_not_depend_on_workers_or_batches(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, alone: Any, workers: int, batch: int
 ) -> None:

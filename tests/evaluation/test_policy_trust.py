@@ -51,6 +51,8 @@ def play(
 ) -> dict[str, list[Record]]:
     """Play some episodes of each policy, and of an honest one between and after them."""
     specs = [spec for name in names for spec in (hostile_policies.SPEC(name), f"{name}+1={HONEST}")]
+    if episodes == 1:  # what is left behind, not what comes after
+        specs = specs[::2]
     plan = changed(paper_plan("Dice", episodes), policies=specs, tries=1, **options)
     folder.mkdir()
     run_plan(plan, folder, paper_runner(plan, folder), LocalProcesses(1))
@@ -85,8 +87,6 @@ def test_what_a_policy_breaks_is_its_own(
         assert record.policy_metadata == {"world": False, "job": False, "goal": False}
     for record in found[hostile_policies.SPEC("Debtor")]:
         assert record.usage == {"input_tokens": 5.0}
-    for record in found[hostile_policies.SPEC("WordlessTokenizer")]:
-        assert (record.prompt, record.prompt_verdict) == (None, "unknown")
     beside = hostile_policies.Searcher()
     job, *_ = jobs = plan.jobs()  # alive while it searches
     world = PaperWorld(job)
@@ -126,14 +126,6 @@ def test_what_is_forged_is_an_error_of_its_own_episode_and_nothing_started_survi
     while any(is_alive(int(path.name)) for path in notes.iterdir()):
         assert time.monotonic() < until
         time.sleep(0.1)
-
-
-@pytest.mark.slow
-def test_what_is_played_again_is_counted(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("HOSTILE_NOTES", str(tmp_path))
-    plan = paper_plan(hostile_policies.SPEC("Quitter"), 1)
-    (record,) = InProcess().run(deque(plan.jobs()), paper_runner(plan, tmp_path, seconds=1.5))
-    assert (record.outcome, record.attempt) == ("failure", 2)
 
 
 def test_honest_policies_play_alike_beside_a_cheat_in_a_long_folder_with_few_descriptors(

@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import io
-import subprocess
-import sys
 from collections import Counter
 from pathlib import Path
 
@@ -13,14 +10,10 @@ import pytest
 from flat_jobs import job_of
 from made_records import make_record
 from plan_files import plan_file
-from rich.console import Console
 from typer.testing import CliRunner
 
 from roboirg import main
 from roboirg.core.errors import InvalidValueError
-from roboirg.evaluation.analysis.results.frame import make_frame
-from roboirg.evaluation.analysis.stats.heard_rates import count_heard
-from roboirg.evaluation.analysis.tables.run_tables import make_run_tables, print_run_tables
 from roboirg.evaluation.plan.plan_file import read_plan_file
 from roboirg.evaluation.plan.plan_maker import make_plan
 from roboirg.evaluation.play.episode_record import audit_record, utterances_at
@@ -36,7 +29,6 @@ from roboirg.evaluation.play.prompt_shares import (
 from roboirg.evaluation.play.rollout import EpisodeRunner
 from roboirg.evaluation.records.record import IDENTITY, Job, Record
 from roboirg.evaluation.records.record_codec import encode, read_record
-from roboirg.evaluation.records.store import read_records
 from roboirg.policies.by_name.finding import read_policy
 from roboirg.policies.planners.systems import all_systems
 from roboirg.policies.prompt_length.prompt_audit import PromptLimit, most_tokens
@@ -184,115 +176,3 @@ def test_the_dry_run_prints_the_shares(tmp_path: Path) -> None:
     assert "system:pi0.5" in row
     assert "100 %" in row
     assert "No limit declared (prompt_tokens=N), so cuts are unknown: far." in said.output
-
-
-SERVED = '''
-import json, sys
-import numpy as np
-
-class Served:
-    """Writes down what its model reads: the first words, as many as the server's tokens."""
-
-    limit = None
-
-    def reset(self, instruction, demonstration):
-        self.read = " ".join(instruction.split()[: self.limit])
-
-    def act(self, observation):
-        with open(f"read-{self.limit}.txt", "a") as file:
-            file.write(self.read + "\\n")
-        return np.append(observation["joint_positions"], 1.0)[None]
-
-class Cutting(Served):
-    limit = 64
-'''
-
-
-@pytest.mark.slow
-@pytest.mark.sim
-def test_a_server_that_cuts_is_told_from_one_that_hears_everything_and_fails(
-    tmp_path: Path,
-) -> None:
-    (tmp_path / "served.py").write_text(SERVED)
-    servers, specs = [], []
-    try:
-        for name, limit in (("Served", 1000), ("Cutting", 64)):
-            words = ("serve", f"served:{name}", "--protocol", "openpi", "--port", "0")
-            server = subprocess.Popen(
-                [sys.executable, "-u", "-m", "roboirg", *words],
-                cwd=tmp_path,
-                stdout=subprocess.PIPE,
-                text=True,
-            )
-            servers.append(server)
-            assert server.stdout is not None
-            address = server.stdout.readline().split(" at ")[1].split(";")[0]
-            specs += ["--policy", f"{name}={address}?prompt_tokens={limit}"]
-        words = ("--tasks", "PickXtimes", "--settings", "explicit,contextual", "--episodes", "1")
-        words += ("--plan", plan_file(distractors=16), "--max-steps", "2", "--workers", "1")
-        said = subprocess.run(
-            [sys.executable, "-m", "roboirg", "run", *specs, *words, "--out", "out"],
-            cwd=tmp_path, capture_output=True, text=True, check=False,
-        )  # fmt: skip
-    finally:
-        for server in servers:
-            server.terminate()
-            server.wait()
-    assert said.returncode == 0, said.stderr
-    assert "Cutting reads 64 tokens of a prompt" in said.stderr
-    assert "Served reads" not in said.stderr
-    records = {(one.policy, one.setting): one for one in read_records(tmp_path / "out")}
-    # The verdicts of the judge are the same; what was heard is not.
-    assert {one.outcome for one in records.values()} == {"failure"}
-    assert {key: one.prompt_verdict for key, one in records.items()} == {
-        ("Served", "explicit"): "heard",
-        ("Served", "contextual"): "heard",
-        ("Cutting", "explicit"): "heard",
-        ("Cutting", "contextual"): "cut",
-    }
-    instruction = " ".join(one.text for one in records["Cutting", "contextual"].instruction)
-    assert instruction in (tmp_path / "read-None.txt").read_text()
-    assert instruction not in (tmp_path / "read-64.txt").read_text()
-    console = Console(file=io.StringIO(), width=200)
-    frame = make_frame([("", list(records.values()))])
-    print_run_tables(make_run_tables(frame), console)
-    printed = console.file.getvalue()  # type: ignore[attr-defined]
-    assert "Cutting did not read every instruction to its end" in printed
-    assert "100 % cut, success 0 % of 1, none heard whole" in printed
-    assert "Served did not" not in printed
-    counts = count_heard(frame, ("policy",))
-    assert {policy: one["cut"] for (_, policy), one in counts.items() if one["cut"]} == {
-        "Cutting": 1
-    }
-
-
-@pytest.mark.slow
-def test_a_policy_of_ones_own_declares_its_limit_from_a_process_of_its_own(tmp_path: Path) -> None:
-    (tmp_path / "mine.py").write_text(
-        "import os\n"
-        "print('imported by', os.getpid())\n"
-        "class Mine:\n"
-        "    prompt_tokens = 64\n"
-        "    def reset(self, instruction, demonstration): raise AssertionError('played')\n"
-        "    def act(self, observation): raise AssertionError('played')\n"
-    )
-    words = ["--policy", "mine:Mine", "--tasks", "PickXtimes", "--settings", "contextual"]
-    words += ["--episodes", "1", "--plan", plan_file(distractors=16, long_prompts="refuse")]
-
-    def run(*more: str) -> subprocess.CompletedProcess[str]:
-        return subprocess.run(
-            [sys.executable, "-m", "roboirg", "run", *words, "--out", "out", *more],
-            cwd=tmp_path, capture_output=True, text=True, check=False,
-        )  # fmt: skip
-
-    said = run("--dry-run")
-    assert said.returncode == 0, said.stderr
-    assert any("64 tokens" in line and "100 %" in line for line in said.stdout.splitlines())
-    assert "imported by" not in said.stdout
-    said = run("--workers", "1")
-    assert said.returncode == 2
-    assert "mine:Mine reads 64 tokens of a prompt" in said.stderr
-    (record,) = read_records(tmp_path / "out")
-    assert (record.outcome, record.error, record.prompt_verdict) == ("error", "prompt", "cut")
-    assert record.prompt is not None
-    assert record.prompt.limit == 64

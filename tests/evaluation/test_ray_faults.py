@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import signal
 import subprocess
-import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
@@ -210,33 +209,3 @@ def test_the_loss_of_the_head_is_one_sentence(
     with pytest.raises(RoboIRGError, match=r"head of the Ray cluster .* same command again"):
         run_plan(PLAN, tmp_path, play, RayCluster(address=cluster.address))
     assert 4 <= lines(tmp_path) == len(list(read_records(tmp_path)))
-
-
-COMMAND = """
-import sys
-from pathlib import Path
-from evaluation_fakes import FakePlayer, small_plan
-from roboirg.evaluation.run.ray_cluster import RayCluster
-from roboirg.evaluation.episode_errors import Terminated
-from roboirg.evaluation.run.runner import run_plan
-folder = Path(sys.argv[1])
-try:
-    play = FakePlayer(folder, gate=folder / "gate", closed=2)
-    run_plan(small_plan(8), folder, play, RayCluster(address=sys.argv[2]))
-except Terminated:
-    sys.exit(143)
-"""
-
-
-def test_sigterm_ends_a_run_as_it_does_locally(cluster: Any, tmp_path: Path) -> None:
-    here = Path(ray_fakes.__file__).parent
-    command = subprocess.Popen(
-        [sys.executable, "-c", COMMAND, str(tmp_path), cluster.address],
-        env=os.environ | {"PYTHONPATH": str(here)},
-        stderr=subprocess.PIPE,
-    )
-    after(tmp_path, 3, command.terminate)
-    _, errors = command.communicate()
-    assert command.returncode == 143, errors.decode()
-    assert b"Traceback" not in errors
-    assert 3 <= lines(tmp_path) < len(PLAN.jobs())

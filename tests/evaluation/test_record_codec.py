@@ -2,19 +2,16 @@
 
 from __future__ import annotations
 
-import subprocess
-import sys
 from pathlib import Path
 
 import msgspec
-import pytest
 from evaluation_fakes import FakePlay, small_plan
 from msgspec.structs import replace
 
 from roboirg.core.environment_options import EnvironmentOptions
 from roboirg.core.policy_ref import unknown_policy
 from roboirg.evaluation.records.record import Job, Summary
-from roboirg.evaluation.records.record_codec import encode, identity_key
+from roboirg.evaluation.records.record_codec import identity_key
 from roboirg.evaluation.records.store import (
     RECORDS_FILE,
     RecordStore,
@@ -60,34 +57,3 @@ def test_the_index_knows_a_job_by_all_its_fields() -> None:
         other = replace(job, environment=EnvironmentOptions(**{name: value}))
         assert identity_key(other) != identity_key(job)
     assert identity_key(replace(job, ref=unknown_policy("openpi://elsewhere"))) == identity_key(job)
-
-
-MANY = 40_000
-
-
-@pytest.mark.slow
-def test_very_many_records_need_little_memory(tmp_path: Path) -> None:
-    (record,) = [FakePlay()(small_plan(1).jobs()[0])]
-    # Long ones: what an episode of BinFill has in events.
-    record = replace(record, events=record.events * 40)
-    line = encode(record)
-    seed = b'"policy_seed":0'
-    assert line.count(seed) == 1
-    with (tmp_path / RECORDS_FILE).open("wb") as file:
-        for number in range(MANY):
-            file.write(line.replace(seed, b'"policy_seed":%d' % number) + b"\n")
-    code = (
-        "import pathlib, sys\n"
-        "from roboirg.evaluation.records.store import RecordStore\n"
-        "with RecordStore(pathlib.Path(sys.argv[1])) as store:\n"
-        "    count = len(store.stored)\n"
-        # Not what `resource` tells, which may be the parent's from before the fork.
-        "status = pathlib.Path('/proc/self/status').read_text().split()\n"
-        "print(count, status[status.index('VmHWM:') + 1])\n"
-    )
-    done = subprocess.run(
-        [sys.executable, "-c", code, str(tmp_path)], capture_output=True, text=True, check=True
-    )
-    count, kilobytes = map(int, done.stdout.split())
-    assert count == MANY
-    assert kilobytes < 300_000

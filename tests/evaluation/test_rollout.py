@@ -10,7 +10,6 @@ from typing import Any
 import msgspec
 import numpy as np
 import pytest
-from evaluation_fakes import comparable
 from made_records import make_record
 from msgspec.structs import replace
 
@@ -30,7 +29,6 @@ from roboirg.evaluation.play.video_writer import VideoWriter
 from roboirg.evaluation.records.record import EventRecord, Job, Record
 from roboirg.evaluation.records.record_codec import encode, read_record
 from roboirg.policies.by_name.finding import read_policy
-from roboirg.tasks.splits import splits
 
 JOB = Job(
     policy="random",
@@ -153,10 +151,6 @@ def test_a_record_holds_what_the_job_prescribes_instead_of_the_policy(
     job = replace(JOB, environment=EnvironmentOptions(demonstration_frames=4))
     needs = stage(PaperWorld(), PaperPolicy(), job).needs
     assert (needs["demonstration_frames"], needs["cameras"]) == (4, [])
-
-
-def test_one_row_is_a_chunk_of_one(stage: Callable[..., Record]) -> None:
-    assert stage(PaperWorld(2), PaperPolicy(np.zeros(8))).steps == 2
 
 
 def test_an_insider_is_attached_before_reset(stage: Callable[..., Record]) -> None:
@@ -336,27 +330,6 @@ def test_a_video_that_cannot_be_written_does_not_change_the_verdict(
     assert {path.suffix for path in tmp_path.rglob("*") if path.is_file()} == {".npz"}
 
 
-def test_a_video_folder_that_is_a_file_does_not_change_the_verdict(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
-) -> None:
-    (tmp_path / "videos").touch()
-    monkeypatch.setattr(rollout, "make_env", lambda _job, _needs: PaperWorld(5))
-    monkeypatch.setattr(rollout, "load_policy", lambda _job: PaperPolicy())
-    record = EpisodeRunner(tmp_path, "all")(JOB)
-    assert (record.outcome, record.video) == ("success", None)
-    assert "FileExistsError" in str(record.video_error)
-    assert "video_error" not in comparable(record)
-
-
-def test_wrong_cameras_of_an_object_are_the_policys_fault(
-    stage: Callable[..., Record],
-) -> None:
-    policy = PaperPolicy()
-    policy.cameras = "front"  # type: ignore[assignment]
-    course = stage(PaperWorld(), policy)
-    assert course.cause == "policy: cameras is the text 'front'; write ('front',)."
-
-
 def test_a_record_says_what_is_in_the_words_and_who_cheats() -> None:
     job = replace(JOB.with_options(setting="reasoning"), policy="oracle", ref=read_policy("oracle"))
     record = make_record(job, "success")
@@ -365,12 +338,6 @@ def test_a_record_says_what_is_in_the_words_and_who_cheats() -> None:
     assert record.privileged
     assert not make_record(JOB).privileged
     assert read_record(encode(record), Path(), 1) == record
-
-
-def test_a_record_has_the_words_that_were_spoken() -> None:
-    # An episode that did not begin has the words that it would have had.
-    record = make_record(JOB)
-    assert record.instruction[-1].text == instruct_job(JOB).utterances[-1].text != record.command
 
 
 @pytest.mark.parametrize(
@@ -432,24 +399,6 @@ class Hearing(PaperPolicy):
 
 
 TURNS = JOB.with_options(setting="contextual", delivery="turns")
-
-
-def test_the_episode_of_a_job_is_looked_up_once(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
-) -> None:
-    found: list[tuple[object, ...]] = []
-
-    def look_up(*name: object) -> Any:
-        found.append(name)
-        return kept(*name)
-
-    world, kept = PaperWorld(), splits._episode
-    monkeypatch.setattr(splits, "_episode", look_up)  # below all names that it is imported by
-    for name, made in {"make_env": world, "load_policy": PaperPolicy()}.items():
-        # Both read the episode, as the functions that they replace do.
-        monkeypatch.setattr(rollout, name, lambda one, *_, made=made: one.episode and made)
-    assert EpisodeRunner(tmp_path)(JOB).outcome == "success"
-    assert found == [("PickXtimes", "test", 2)]
 
 
 @pytest.mark.parametrize("policy_class", [PaperPolicy, Hearing])

@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
-import time
 from pathlib import Path
 
 import pytest
@@ -15,7 +14,7 @@ from typer.testing import CliRunner
 
 from roboirg.evaluation.plan.stored_plans import read_plan
 from roboirg.evaluation.records.episode_log import log_path
-from roboirg.evaluation.records.store import RECORDS_FILE, read_records
+from roboirg.evaluation.records.store import read_records
 from roboirg.main import app
 
 pytestmark = pytest.mark.sim
@@ -86,12 +85,6 @@ def test_missing_vulkan_loses_no_record_and_no_video(
     assert read_plan(tmp_path / "o") is not None
 
 
-SMALL_RUN = (
-    "run", "--policy", "forgetful", "--policy", "listener", "--tasks", "VideoUnmask",
-    "--settings", "direct", "--episodes", "2",
-)  # fmt: skip
-
-
 def all_comparable(folder: Path) -> list[dict[str, object]]:
     records = sorted(read_records(folder), key=lambda record: record.slug)
     return [comparable(record) for record in records]
@@ -115,34 +108,3 @@ def test_equal_commands_give_equal_records(tmp_path: Path) -> None:
         assert record.end_state
         assert record.demonstration_steps > 0
         assert all(event.step <= record.steps for event in record.events)
-
-
-def kill_in_the_middle(folder: Path, *words: str) -> None:
-    """Begin the small run and SIGKILL it when one of its four records are there."""
-    child = subprocess.Popen([sys.executable, "-m", "roboirg", *words], stdout=subprocess.DEVNULL)
-    path, deadline = folder / RECORDS_FILE, time.monotonic() + 300
-    while not path.exists() or path.read_bytes().count(b"\n") < 1:
-        assert child.poll() is None
-        assert time.monotonic() < deadline
-        time.sleep(0.02)
-    child.kill()
-    child.wait()
-
-
-@pytest.mark.usefixtures("without_cache")
-@pytest.mark.slow
-def test_workers_and_kills_leave_no_trace_in_the_records(tmp_path: Path) -> None:
-    folders = [tmp_path / name for name in ("one", "killed")]
-    words = [
-        (*SMALL_RUN, "--workers", str(number), "--out", str(folder))
-        for number, folder in enumerate(folders, start=1)
-    ]
-    kill_in_the_middle(folders[1], *words[1])
-    assert 1 <= len(read_records(folders[1])) <= 4  # a busy machine may be done before the kill
-    for run in words:
-        said = command(*run, cwd=tmp_path)
-        assert said.returncode == 0, said.stderr
-    one, killed = map(all_comparable, folders)
-    assert len(one) == 4
-    assert {record["outcome"] for record in one} == {"success", "failure"}
-    assert killed == one

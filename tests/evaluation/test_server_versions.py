@@ -7,12 +7,10 @@ from pathlib import Path
 from unittest import mock
 
 import pytest
-from evaluation_fakes import FakePlay
 from made_records import make_record
 from wire_servers import ChallengeServer
 
 from roboirg.evaluation.analysis.results.frame import make_frame
-from roboirg.evaluation.analysis.results.policy_run import Versions
 from roboirg.evaluation.analysis.stats.cells import cells_of
 from roboirg.evaluation.plan.plan import Plan
 from roboirg.evaluation.plan.plan_maker import make_plan
@@ -81,14 +79,6 @@ def test_errors_before_the_server_told_its_version_do_not_count(tmp_path: Path) 
     assert (len(cell.verdicts), cell.errors) == (1, 2)
 
 
-def test_a_folder_of_errors_takes_any_version(tmp_path: Path) -> None:
-    plan = plan_of(2, tries=1)
-    run_plan(plan, tmp_path, Told("refused", "refused"), InProcess())
-    assert versions(tmp_path) == [None, None]
-    run_plan(plan, tmp_path, Told("b", "b"), InProcess())
-    assert versions(tmp_path) == ["b", "b"]
-
-
 def test_runs_of_two_versions_are_neither_merged_nor_averaged(tmp_path: Path) -> None:
     first, second = plan_of(2).jobs()
     for name, job in (("a", first), ("b", second)):
@@ -101,13 +91,6 @@ def test_runs_of_two_versions_are_neither_merged_nor_averaged(tmp_path: Path) ->
     results = [(folder.name, read_results(folder)) for folder in runs]
     found = make_frame(results).names.values()
     assert {label.partition(" (server")[2] for label in found} == {" a)", " b)"}
-
-
-def test_policies_of_this_process_have_no_server_version(tmp_path: Path) -> None:
-    run_plan(plan_of(1), tmp_path, FakePlay(), InProcess())
-    assert versions(tmp_path) == [None]
-    (record,) = read_records(tmp_path)
-    assert Versions.of(record).policy == record.policy_version
 
 
 class Guide:

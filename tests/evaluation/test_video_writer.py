@@ -52,36 +52,6 @@ def test_a_video_thrown_away_leaves_nothing(tmp_path: Path) -> None:
     assert list(tmp_path.iterdir()) == []
 
 
-class Broken:
-    def close(self) -> None:
-        raise OSError("disk full")
-
-
-def test_throwing_away_never_raises(tmp_path: Path) -> None:
-    video = VideoWriter(tmp_path / "x.mp4")
-    video._output = Broken(), None  # type: ignore[assignment]
-    video.partial.mkdir()  # cannot be unlinked
-    video.discard()
-    assert video._output is None
-    assert not video.finish()
-
-
-def test_only_the_demonstration_has_a_border() -> None:
-    pictures = [Grey().picture("front"), Grey().picture("wrist")]
-    assert tuple(compose_frame(pictures, is_demonstration=True)[0, 0]) == DEMONSTRATION_COLOR
-    assert tuple(compose_frame(pictures, is_demonstration=False)[0, 0]) == (90, 90, 90)
-
-
-def test_a_black_line_parts_the_pictures() -> None:
-    frame = compose_frame(
-        [Grey().picture("front"), Grey().picture("wrist")], is_demonstration=False
-    )
-    assert frame.shape == (256, 512 + GAP, 3)
-    assert not frame[:, 256 : 256 + GAP].any()
-    assert frame[:, :256].min() == frame[:, :256].max() == 90
-    assert frame[:, 256 + GAP :].min() == 200
-
-
 def test_a_caption_that_grows_has_room_for_all_of_it(tmp_path: Path) -> None:
     video = VideoWriter(tmp_path / "x.mp4")
     first, longest = "This one is red.", "This one is red. " * 20

@@ -12,7 +12,7 @@ from wire_episode import moment
 
 from roboirg.main import app
 from roboirg.policies import policy_server
-from roboirg.policies.policy_server import PolicyServer, open_server
+from roboirg.policies.policy_server import PolicyServer
 from roboirg.policies.remote.message_codec import pack
 from roboirg.policies.remote.protocols import protocols_by_scheme
 from roboirg.policies.remote.websocket_server import ServerOptions
@@ -84,13 +84,6 @@ def test_a_server_that_stops_by_itself_is_an_error(monkeypatch):
     result = CliRunner().invoke(app, ["serve", "random"])
     assert result.exit_code != 0
     assert "openpi://here:1 has stopped by itself" in str(result.exception)
-
-
-def test_a_server_can_be_stopped_before_it_has_started():
-    server = open_server("random", "openpi").listening
-    server.shutdown()
-    server.serve_forever()
-    server.shutdown()
 
 
 def test_a_key_is_not_shown():

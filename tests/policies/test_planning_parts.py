@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from planning_fakes import decoded
 
 from roboirg.core.environment_options import DemonstrationFrames
 from roboirg.core.errors import InvalidValueError
@@ -17,7 +16,7 @@ from roboirg.core.policy_needs import (
     merge_observe_every,
 )
 from roboirg.core.subgoal_text import MOST_SUBGOAL_LETTERS, split_point
-from roboirg.policies.planners.model_planners import MAX_GAP, merge_keyframes
+from roboirg.policies.planners.model_planners import merge_keyframes
 from roboirg.policies.planners.observation_merging import (
     DemonstrationSubset,
     select_history,
@@ -32,7 +31,7 @@ from roboirg.policies.vlm.prompt_files import load_prompts
 from roboirg.tasks import every_task
 from roboirg.tasks.splits.splits import get_episode
 from roboirg.util.json_reply import UnparsableReplyError, json_object, text_of
-from roboirg.util.media import Clip, Picture, encode_mp4, encode_png, sample_evenly
+from roboirg.util.media import sample_evenly
 
 thousandths = st.integers(0, 1000)
 PROMPTS = ("listener", "qwen", "gemini", "memer", "subgoals")
@@ -87,23 +86,6 @@ def test_merged_key_frames(steps, near):
     assert len(kept) == (breaks + 1 if ordered else 0)
 
 
-@pytest.mark.parametrize(
-    ("steps", "kept"),
-    [
-        ([], ()),
-        ([4], (4,)),
-        ([2, 10], (10,)),
-        ([2, 11], (2, 11)),
-        ([0, 8, 16], (8,)),
-        ([0, 8, 16, 24], (16,)),
-        ([30, 0, 2, 32, 4], (2, 32)),
-    ],
-)
-def test_examples_of_merging(steps, kept):
-    assert MAX_GAP == 8
-    assert merge_keyframes(steps) == kept
-
-
 def test_every_subgoal_of_every_task_has_a_form_that_planners_know():
     forms = load_prompts("subgoals").lines("forms")
     patterns = [_pattern(form) for form in forms]
@@ -150,21 +132,6 @@ def test_chosen_frames_are_spread_evenly(length, most):
         assert not len(gaps) or gaps.max() - gaps.min() <= 1
     clip = summary_clip(frames, most, length)
     assert len(kept) / clip.rate == Fraction(length, 30)
-
-
-def test_a_picture_and_a_clip_become_files():
-    rng = np.random.default_rng(1)
-    pixels = rng.integers(0, 256, (256, 256, 3), np.uint8)
-    frames, _ = decoded(encode_png(Picture(pixels)))
-    assert np.array_equal(frames[0], pixels)
-    shades = np.arange(0, 250, 10, dtype=np.uint8)[:, None, None, None]
-    shown = np.broadcast_to(shades, (25, 256, 256, 3))
-    content = encode_mp4(Clip(shown))
-    frames, rate = decoded(content)
-    assert rate == 30
-    assert frames.shape == shown.shape
-    assert np.abs(frames.astype(int) - shown).max() < 4
-    assert encode_mp4(Clip(shown)) == content
 
 
 @pytest.mark.parametrize("text", ["", "none", "[1]", "{", "{]}", '{"a": {"b": }'])

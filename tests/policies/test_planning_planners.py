@@ -25,7 +25,6 @@ from roboirg.policies.hands.scripted_hands import ScriptedHands
 from roboirg.policies.planners import make_planner as make_by_kind
 from roboirg.policies.planners.hierarchical_policy import HierarchicalPolicy
 from roboirg.policies.planners.oracle_planner import OraclePlanner
-from roboirg.policies.planners.planner import SubgoalOptions
 from roboirg.policies.vlm.models import ModelOptions
 
 CHUNK = 16
@@ -188,13 +187,6 @@ def test_a_hold_ends_when_another_subgoal_is_due():
         assert told == [answers[0]] * 7 + [answers[1]] * 9 + [answers[2]] * 3
 
 
-def test_gemini_asks_once_in_a_period_whatever_the_chunks():
-    with fake_vlm(["x"]) as server:
-        answer = ANSWERS["gemini"]
-        assert asked_at(server, "gemini", answer, 220, chunk=10) == [0, 100, 150, 200]
-        assert asked_at(server, "gemini", answer, 220, chunk=50) == [0, 100, 150, 200]
-
-
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_useless_reply_leaves_the_last_subgoal(kind):
     with fake_vlm(["{}", "{}", ANSWERS[kind], "{}"]) as server:
@@ -341,40 +333,6 @@ def test_together_they_are_a_policy_and_costs_add_up(monkeypatch):
         assert KEY not in told
         assert KEY in json.dumps(server.headers)
         policy.close()
-
-
-def test_who_cannot_follow_cannot_be_led():
-    class Headstrong:
-        def reset(self, instruction, demonstration): ...
-        def act(self, observation): ...
-
-    with pytest.raises(InvalidValueError, match=r"Headstrong has no method follow"):
-        HierarchicalPolicy(OraclePlanner(), Headstrong())
-
-
-class Wishful(Follower):
-    cameras = ("wrist",)
-    actions = "waypoint"
-    demonstration_frames = 6
-
-
-def test_requirements_of_both_are_met():
-    with fake_vlm(["x"]) as server:
-        together = HierarchicalPolicy(make_planner("gemini", server, observe_every=4), Wishful())
-        assert together.cameras == ("front", "wrist")
-        assert together.actions == "waypoint"
-        assert together.demonstration_frames == 2
-        assert together.observe_every == 4
-        assert together.grounded is False
-        # Only the history tells how many control steps a waypoint takes.
-        assert HierarchicalPolicy(make_planner("qwen", server), Wishful()).observe_every == 1
-        assert HierarchicalPolicy(OraclePlanner(), Follower()).grounded is True
-        assert (
-            HierarchicalPolicy(
-                OraclePlanner(SubgoalOptions(subgoals="simple")), Follower()
-            ).grounded
-            is False
-        )
 
 
 def test_the_oracle_needs_an_environment_that_names_pixels():

@@ -47,17 +47,19 @@ def test_every_need_is_read_and_survives_a_message():
     assert PolicyNeeds.of(copy) == PolicyNeeds()
 
 
-def test_a_message_is_checked_like_a_policy():
-    with pytest.raises(UnknownNameError, match="no camera 'back'"):
-        PolicyNeeds(cameras=["back"])
-    with pytest.raises(InvalidValueError, match="depth is True, but cameras is"):
-        PolicyNeeds(cameras=(), depth=True)
-    with pytest.raises(InvalidValueError, match="prompt_tokens is 0; it must be a number from 1"):
-        PolicyNeeds(prompt_tokens=0)
-    with pytest.raises(InvalidValueError, match="prompt_added is None"):
-        PolicyNeeds(prompt_added=None)
-    with pytest.raises(TypeError, match="touch"):
-        PolicyNeeds(touch=True)
+@pytest.mark.parametrize(
+    ("needs", "error", "words"),
+    [
+        ({"cameras": ["back"]}, UnknownNameError, "no camera 'back'"),
+        ({"cameras": (), "depth": True}, InvalidValueError, "depth is True, but cameras is"),
+        ({"prompt_tokens": 0}, InvalidValueError, "prompt_tokens is 0; it must be a number from 1"),
+        ({"prompt_added": None}, InvalidValueError, "prompt_added is None"),
+        ({"touch": True}, TypeError, "touch"),
+    ],
+)
+def test_a_message_is_checked_like_a_policy(needs, error, words):
+    with pytest.raises(error, match=words):
+        PolicyNeeds(**needs)
 
 
 def test_properties_count_for_objects_only():

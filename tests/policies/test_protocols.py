@@ -11,17 +11,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 from wire_episode import INSTRUCTION, moment
-from wire_servers import ChallengeServer, unpack
 
-import roboirg
 from roboirg.apps.policy_check.policy_check import check_policy
-from roboirg.core.environment_options import EnvironmentOptions
 from roboirg.core.errors import UnknownNameError
-from roboirg.core.instruction_options import InstructionOptions
-from roboirg.evaluation.play.job_instruction import PreparedJob
-from roboirg.evaluation.play.policy_environment import job_needs, make_env
-from roboirg.evaluation.records.record import Job
-from roboirg.policies import make_policy, play
+from roboirg.policies import make_policy
 from roboirg.policies.by_name.policy_classes import url_classes
 from roboirg.policies.policy_server import open_server
 from roboirg.policies.remote.endpoints import RemoteOptions
@@ -87,54 +80,6 @@ def test_the_recipe_serves_and_plays_over_loopback():
         for _ in range(3):
             assert np.array_equal(client.act(moment(0)), here.act(moment(0)))
         client.close()
-
-
-@pytest.mark.sim
-@pytest.mark.usefixtures("_tiny_package")
-def test_the_recipe_plays_an_episode():
-    with served("random", "tiny") as url:
-        client = make_policy(url, 0)
-        env = roboirg.make(
-            "PickXtimes", cameras=client.cameras, demonstration_frames="none", max_steps=20
-        )
-        assert play(env, client)["status"] == "timeout"
-        client.close()
-
-
-@pytest.mark.sim
-def test_a_challenge_server_is_shown_what_the_options_ask_for():
-    with ChallengeServer() as server:
-        client = make_policy(f"challenge://{server.place}?depth=yes&calibration=yes", 0)
-        job = Job(
-            policy="it",
-            task="VideoUnmask",
-            split="test",
-            episode=0,
-            environment=EnvironmentOptions(max_steps=4),
-            options=InstructionOptions("direct"),
-        )
-        env = make_env(PreparedJob(job), job_needs(client, job))
-        info = play(env, client)
-        client.close()
-        _, first, later = map(unpack, server.messages)
-    assert info["status"] == "timeout"
-    shapes = {
-        "depth_list": ((256, 256, 1), "<i2"),
-        "camera_extrinsic_list": ((3, 4), "<f4"),
-        "rgb_list": ((256, 256, 3), "|u1"),
-    }
-    for message in (first, later):
-        for camera in ("front", "wrist"):
-            for name, expected in shapes.items():
-                column = message[f"{camera}_{name}"]
-                assert {(one.shape, one.dtype.str) for one in column} == {expected}
-                assert len(column) == len(message["joint_state_list"])
-            assert message[f"{camera}_camera_intrinsic"][0].tolist() == [128, 0, 128]
-    assert (first["is_first_step"], later["is_first_step"]) == (True, False)
-    assert len(first["front_depth_list"]) > 1
-    assert len(later["front_depth_list"]) == 3
-    # The camera on the table is 1 m away; nothing that it sees is nearer than the robot's hand.
-    assert 300 < np.median(first["front_depth_list"][0]) < 2000
 
 
 def test_the_page_lists_every_scheme():

@@ -11,7 +11,7 @@ from wire_episode import INSTRUCTION, moment, video
 from wire_servers import ChallengeServer, MmeVlaServer, WireServer, unpack
 
 from roboirg.core.errors import InvalidValueError
-from roboirg.policies import Policy, make_policy
+from roboirg.policies import make_policy
 from roboirg.policies.contract.base import SubgoalFollower
 
 CAPTURES = Path(__file__).with_name("captures")
@@ -75,27 +75,6 @@ def test_challenge_sends_depth_and_matrices_on_request():
         assert (policy.act({**latest, "history": (later, latest)}) == 6).all()
         policy.close()
         assert server.messages == captured("challenge-sensors")
-    first = unpack(server.messages[1])
-    assert [(one.shape, one.dtype) for one in first["front_depth_list"]] == [((8, 8, 1), "<i2")] * 4
-    matrices = first["wrist_camera_extrinsic_list"]
-    assert [(one.shape, one.dtype) for one in matrices] == [((3, 4), "<f4")] * 4
-    assert (first["wrist_camera_intrinsic"].shape) == (3, 3)  # one, not a list
-
-
-@pytest.mark.parametrize(
-    ("option", "kind", "others"), [("depth", "depth", "camera"), ("calibration", "camera", "depth")]
-)
-def test_depth_and_matrices_are_asked_for_one_by_one(option, kind, others):
-    with ChallengeServer() as server:
-        policy = make_policy(f"challenge://{server.place}?{option}=yes", 0)
-        policy.reset(INSTRUCTION, video(0))
-        policy.act(moment(0, history=(), sensors=True))
-        policy.close()
-        names = unpack(server.messages[-1])
-    assert any(f"_{kind}_" in name for name in names)
-    assert not any(f"_{others}_" in name for name in names)
-    with pytest.raises(InvalidValueError, match=f"option {option} is 'maybe'"):
-        make_policy(f"challenge://{server.place}?{option}=maybe", 0)
 
 
 def test_without_history_mme_vla_is_sent_no_frames():
@@ -157,20 +136,6 @@ def test_a_history_longer_than_a_part_is_sent_in_parts():
         assert server.parts == [1, 4, 4, 1]
 
 
-def test_the_video_is_read_only_if_it_is_sent():
-    class Unread(dict):
-        def __getitem__(self, field):
-            assert not field.endswith("wrist_rgb"), "the wrist's video is not sent"
-            return super().__getitem__(field)
-
-    with MmeVlaServer() as server:
-        policy = make_policy(f"mme-vla://{server.place}", 0)
-        policy.reset(INSTRUCTION, Unread(video(2)))
-        policy.act(moment(2, history=()))
-        policy.close()
-        assert server.frames == 3
-
-
 def test_keys_and_cameras_of_an_openpi_checkpoint_can_be_named():
     with WireServer() as server:
         policy = make_policy(
@@ -202,40 +167,3 @@ def test_what_is_no_server_is_refused(place):
         make_policy(f"openpi://{place}", 0)
     with pytest.raises(InvalidValueError, match="cannot hold a key or password"):
         make_policy("openpi://me:secret@host:1", 0)
-
-
-def test_actions_may_be_poses():
-    class Poses(WireServer):
-        def answer(self, message):
-            return {"actions": np.ones((2, 7), np.float32)}
-
-    with Poses() as server:
-        policy = make_policy(f"openpi://{server.place}?actions=ee_pose", 0)
-        assert isinstance(policy, Policy)
-        assert policy.actions == "ee_pose"
-        policy.reset(INSTRUCTION, {})
-        rows = policy.act(moment(0))
-        assert (rows.shape, rows.dtype) == ((2, 7), np.float64)
-        rows[0] = 0  # a copy: what is received is read-only
-        policy.close()
-
-
-@pytest.mark.parametrize(
-    ("scheme", "server_class", "field"),
-    [
-        ("openpi", WireServer, "prompt"),
-        ("mme-vla", MmeVlaServer, "prompt"),
-        ("challenge", ChallengeServer, "task_goal"),
-    ],
-)
-def test_every_request_carries_what_was_said_last(scheme, server_class, field):
-    said = ["this one is red.", "take it."]
-    with server_class() as server:
-        policy = make_policy(f"{scheme}://{server.place}", 0)
-        policy.reset(said[0], video(3))
-        for seen, text in zip((NOW, LATEST), said, strict=True):
-            policy.act({**seen, "instruction": text})
-        policy.close()
-    messages = [unpack(body) for body in server.messages]
-    sent = [message[field] for message in messages if field in message]
-    assert sent == ([[text] for text in said] if field == "task_goal" else said)

@@ -5,10 +5,9 @@ import os
 import signal
 import time
 
-import numpy as np
 import pytest
 from wire_episode import INSTRUCTION, moment, video
-from wire_servers import MmeVlaServer, WireServer
+from wire_servers import MmeVlaServer
 
 from roboirg.core import waiting
 from roboirg.core.errors import PolicyConnectionError, PolicyTimeoutError
@@ -94,16 +93,6 @@ def test_a_thread_does_not_wait_for_itself():
         first.close()
 
 
-def test_stateless_servers_are_shared():
-    with WireServer() as server:
-        policies = [make_policy(f"openpi://{server.place}", 0) for _ in range(3)]
-        for policy in policies:
-            policy.reset(INSTRUCTION, {})
-        for policy in policies:
-            assert len(policy.act(moment(0))) == 20
-            policy.close()
-
-
 def play(url, length, results, steps=12):
     """An episode whose every answer has to be that of a server that saw nothing else."""
     policy = make_policy(url, 0)
@@ -130,18 +119,3 @@ def test_processes_and_policies_do_not_mix_state():
         assert server.connections == 6
     for (frames, start, _, inferences), expected in found:
         assert [frames, start, inferences] == expected
-
-
-def test_a_large_demonstration_arrives():
-    frames = np.empty((250, 256, 256, 3), np.uint8)
-    frames[:] = np.arange(250, dtype=np.uint16).astype(np.uint8)[:, None, None, None]
-    felt = {"joint_positions": np.zeros((250, 7), np.float32), "gripper": np.zeros((250, 2))}
-    with MmeVlaServer(delay=0.01) as server:
-        policy = make_policy(f"mme-vla://{server.place}?timeout=60", 0)
-        policy.reset(INSTRUCTION, {"front_rgb": frames, **felt})
-        rows = policy.act(moment(1, size=256, history=()))
-        policy.close()
-        assert server.bytes == 251 * 256 * 256 * 3
-        assert server.parts == [16] * 15 + [11]
-        assert rows[0, :2].tolist() == [251, 250]
-        assert max(map(len, server.messages)) < 4 * 2**20

@@ -1,5 +1,8 @@
 """vla-eval's model servers: what they are shown, what they answer, and what goes wrong."""
 
+import hashlib
+import json
+import re
 import time
 
 import numpy as np
@@ -7,9 +10,8 @@ import pytest
 from wire_episode import INSTRUCTION, moment, video
 from wire_servers import VlaEvalServer
 
-import roboirg
 from roboirg.core.errors import InvalidValueError, PolicyReplyError
-from roboirg.policies import make_policy, play
+from roboirg.policies import make_policy
 from roboirg.policies.contract.policy_calls import server_version
 
 
@@ -27,7 +29,12 @@ def wait_for_messages(server, count):
         time.sleep(0.01)
 
 
-def test_an_episode_is_what_the_harness_would_send():
+def described(array):
+    """Kind and content of what was sent."""
+    return f"{array.dtype} {array.shape} {hashlib.sha256(array.tobytes()).hexdigest()[:8]}"
+
+
+def test_an_episode_is_what_the_harness_would_send(snapshot):
     with VlaEvalServer() as server:
         client = client_of(server)
         client.reset(INSTRUCTION, video(3))
@@ -37,29 +44,8 @@ def test_an_episode_is_what_the_harness_would_send():
     assert client.metadata["model_server"] == "Test"
     assert server_version(client.metadata) == "Test, vla-eval 0.8.0"
     assert [one.tolist() for one in rows] == [[[1.0] * 8], [[2.0] * 8]]
-    assert kinds(server) == [
-        "hello", "episode_start", "observation", "observation", "episode_end"
-    ]  # fmt: skip
-    (_, hello), (_, start), (_, first), (_, later), (_, end) = server.payloads
-    assert hello["protocol_version"] == 1
-    assert set(start) == {"task"}
-    assert isinstance(start["task"]["name"], str)
-    assert end == {}
-    assert list(first) == [
-        "images", "task_description", "states", "video_history", "wrist_video_history",
-        "episode_restart",
-    ]  # fmt: skip
-    assert list(later) == ["images", "task_description", "states"]
-    for shown, given in ((first, moment(3)), (later, moment(4))):
-        assert list(shown["images"]) == ["agentview", "wrist"]
-        assert np.array_equal(shown["images"]["agentview"], given["front_rgb"])
-        assert np.array_equal(shown["images"]["wrist"], given["wrist_rgb"])
-        assert shown["task_description"] == INSTRUCTION
-        assert shown["states"].dtype == np.float32
-        assert shown["states"].tolist() == [*given["joint_positions"], given["gripper"][0]]
-    assert np.array_equal(first["video_history"], video(3)["front_rgb"])
-    assert np.array_equal(first["wrist_video_history"], video(3)["wrist_rgb"])
-    assert first["episode_restart"] is True
+    sent = json.dumps(server.payloads, indent=1, default=described)
+    assert re.sub(r"roboirg [\d.]+", "roboirg", sent) == snapshot
 
 
 def test_a_task_without_a_video_has_no_history_and_subgoals_are_passed_on():
@@ -174,16 +160,3 @@ def test_errors_of_the_server_are_named_also_when_an_episode_cannot_begin():
         with pytest.raises(PolicyReplyError, match="replied with an error: cannot start"):
             client.act(moment(0))
         client.close()
-
-
-@pytest.mark.sim
-def test_a_server_plays_an_episode():
-    with VlaEvalServer() as server:
-        client = client_of(server)
-        env = roboirg.make("VideoUnmask", max_steps=3, cameras=client.cameras)
-        info = play(env, client)
-        client.close()
-    assert (info["status"], info["steps"]) == ("timeout", 3)
-    shown = [payload for kind, payload in server.payloads if kind == "observation"]
-    assert len(shown) == 3
-    assert shown[0]["video_history"][0].shape == (256, 256, 3)

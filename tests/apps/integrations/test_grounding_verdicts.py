@@ -1,4 +1,4 @@
-"""The listener, Inspect and our scores give the same verdict on the same five hundred answers."""
+"""The listener, Inspect and our scores give the same verdict on the same two hundred answers."""
 
 import functools
 import itertools
@@ -21,12 +21,12 @@ from roboirg.tasks import all_tasks
 from roboirg.tasks.splits.splits import get_episode
 from roboirg.util.media import Picture, encode_png
 
-NUMBER = 500
+NUMBER = 200
 PICTURE = encode_png(Picture(np.zeros((256, 256, 3), np.uint8)))
 
 
 @functools.cache
-def items():
+def items(count=NUMBER):
     point = PointTarget(
         kind="cube", picture="first", x=0, y=0, size=(256, 256), counts=[0, 1, 256**2 - 1]
     )
@@ -39,7 +39,9 @@ def items():
             episode, plain_settings(), ("implicit",), InstructionOptions(), every_variant=False
         )
         found += make_items(episode, media, list(options))
-    return found[:NUMBER]
+        if len(found) >= count:
+            break
+    return found[:count]
 
 
 @functools.cache
@@ -84,7 +86,7 @@ def listener_verdict(policy, item):
 @pytest.mark.slow
 def test_the_listener_and_our_scores_agree():
     assert len(items()) == NUMBER
-    assert 100 < sum(own_verdicts().values()) < 400
+    assert 40 < sum(own_verdicts().values()) < 160
     with fake_vlm(["{}"]) as server:
         policy = make_listener(server)
         for item in items():
@@ -93,7 +95,7 @@ def test_the_listener_and_our_scores_agree():
 
 
 def test_the_listener_is_asked_what_the_dataset_asks():
-    item = next(one for one in items() if one.setting == "direct")
+    item = next(one for one in items(5) if one.setting == "direct")
     with fake_vlm([item.answer]) as server:
         policy = make_listener(server)
         assert listener_verdict(policy, item)

@@ -1,10 +1,5 @@
 """The task in the real Inspect: `make integrations` runs this in its environment."""
 
-import os
-import subprocess
-import sys
-from pathlib import Path
-
 import pytest
 
 pytest.importorskip("inspect_ai", reason="Inspect is not installed here; run `make integrations`")
@@ -19,7 +14,6 @@ from replay_table import (
     PER_TASK,
     PLAYED,
     SETTING,
-    TASKS,
     cases,
     own_outcomes,
 )
@@ -98,35 +92,3 @@ def test_the_page_s_commands_have_the_outcomes_of_our_runner(model, ours, tmp_pa
 
 def test_the_page_names_the_version_that_is_played():
     check_versions("Inspect")
-
-
-def test_the_entry_point_plays_several_tasks_by_inspect_s_command(tmp_path):
-    command = [
-        str(Path(sys.executable).with_name("inspect")), "eval", "roboirg/listener",
-        "--model", "mockllm/model", "--display", "plain", "--log-dir", str(tmp_path),
-        "-T", f"tasks={','.join(TASKS[::3])}", "-T", "episodes=1", "-T", "max_steps=20",
-    ]  # fmt: skip
-    # Inspect's mock model counts tokens with a tokenizer that it downloads; here it counts letters.
-    counter = tmp_path / "offline" / "tiktoken.py"
-    counter.parent.mkdir()
-    counter.write_text(
-        "class Letters:\n"
-        "    def encode(self, text, **_):\n"
-        "        return list(text)\n"
-        "def get_encoding(_):\n"
-        "    return Letters()\n"
-    )
-    environment = {**os.environ, "PYTHONPATH": str(counter.parent)}
-    done = subprocess.run(
-        command, capture_output=True, text=True, check=False, cwd=tmp_path, env=environment
-    )
-    assert done.returncode == 0, done.stdout[-2000:] + done.stderr[-2000:]
-    (path,) = tmp_path.glob("*.eval")
-    samples = read_eval_log(str(path)).samples
-    names = [f"{one}-contextual-000" for one in TASKS[::3]]
-    assert sorted(one.id for one in samples) == sorted(names)
-    for sample in samples:
-        (score,) = sample.scores.values()
-        assert score.value == 0
-        assert score.explanation == "not done after 20 steps"
-        assert score.metadata["record"]["usage"]["unparsed"] == 1

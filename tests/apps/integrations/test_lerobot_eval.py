@@ -104,21 +104,6 @@ def test_the_video_is_a_key_on_request():
     env.close()
 
 
-def test_an_ended_sub_environment_stays_as_it_is_until_a_new_rollout():
-    env = make_batch(1, episode_length=1, cameras="front", meshes=MESHES)
-    env.reset(seed=[1003], options={"lerobot_new_rollout": True})
-    action = np.zeros((1, 8), np.float32)
-    last, *_, truncated, _ = env.step(action)
-    assert truncated.all()
-    again, *_ = env.step(action)  # Gymnasium resets here
-    assert np.array_equal(again["pixels"]["front"], last["pixels"]["front"])
-    env.reset(seed=[1004], options={"lerobot_new_rollout": True})
-    assert env.call("_max_episode_steps") == (1,)
-    other, *_ = env.step(action)
-    assert not np.array_equal(other["pixels"]["front"], last["pixels"]["front"])
-    env.close()
-
-
 def test_what_reaches_a_policy_tells_neither_goal_nor_setting_nor_seed():
     env = make_batch(1, cameras="front", meshes=MESHES)
     observation, info = env.reset(seed=[1002])

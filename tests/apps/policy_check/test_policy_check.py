@@ -60,11 +60,6 @@ class NotFinite(Sound):
         return np.full((3, 8), np.nan)
 
 
-class Textual(Sound):
-    def act(self, observation):
-        return "left"
-
-
 class Raising(Sound):
     def act(self, observation):
         return observation["depth"]
@@ -160,7 +155,6 @@ def test_a_sound_policy_passes_everything():
     [
         (Shapeless, "acts without a video", "got shape (3, 7)"),
         (NotFinite, "acts without a video", "finite number"),
-        (Textual, "acts without a video", "got str"),
         (Raising, "acts without a video", "act(): KeyError: 'depth'"),
         (Elephant, "reset forgets", "differs by up to 0.3"),
         (Dice, "deterministic", "Two equal episodes differ by up to"),

@@ -37,16 +37,14 @@ def test_a_score_is_a_record_like_any_other(small):
         "action": "score", "operator": "ann", "note": "shaky", "trial": first.name,
         "plan": plan.fingerprint,
     }  # fmt: skip
-    record = found[second.identity]
-    assert (record.outcome, record.attribution.failure) == ("failure", "wrong_place")
-    assert (record.attribution.kind, record.attribution.step) == ("grounding", None)
-    assert record.cause == record.attribution.sentence
-    record = found[third.identity]
-    assert (record.attribution.kind, record.attribution.failure) == ("execution", "dropped")
-    assert "slipped" in record.cause
-    assert record.plan == plan.fingerprint
+    wrong, dropped = found[second.identity], found[third.identity]
+    assert (wrong.outcome, wrong.cause) == ("failure", wrong.attribution.sentence)
+    kinds = [(one.attribution.kind, one.attribution.failure) for one in (wrong, dropped)]
+    assert kinds == [("grounding", "wrong_place"), ("execution", "dropped")]
+    assert "slipped" in dropped.cause
+    assert dropped.plan == plan.fingerprint
     # All that reads records reads these.
-    assert read_record(encode(record), Path(), 1) == record
+    assert read_record(encode(dropped), Path(), 1) == dropped
     table = make_table("real", RunData(make_frame([("run", read_results(folder))])))
     assert {row.name for row in table.rows} == {f"{name}, on a robot" for name in plan.policies}
     assert "slipped" in render(read_records(folder))
