@@ -72,11 +72,6 @@ def published_like() -> Callable[..., list[Summary]]:
     return like_published
 
 
-@pytest.fixture(scope="session")
-def cell_of() -> Callable[..., Iterable[Summary]]:
-    return with_rate
-
-
 @pytest.fixture(scope="module")
 def patient_sockets(wait_s: float) -> Iterator[None]:
     before = socket.getdefaulttimeout()

@@ -3,15 +3,11 @@
 from __future__ import annotations
 
 from roboirg.core.instruction_options import InstructionOptions
-from roboirg.evaluation.analysis.results.frame import make_frame
 from roboirg.evaluation.analysis.results.option_labels import (
     has_default_options,
     options_label,
     options_sort_key,
 )
-from roboirg.evaluation.analysis.stats.chance import CHANCE
-from roboirg.evaluation.analysis.stats.run_data import RunData
-from roboirg.evaluation.analysis.tables.paper_tables import make_table
 from roboirg.language.settings import plain_settings, setting_names
 
 
@@ -34,12 +30,3 @@ def test_settings_have_the_order_of_the_language_and_unknown_ones_are_last() -> 
     assert {one.form for one in ordered[::2]} == {"implicit"}
     shown = dict.fromkeys(one.setting for one in ordered if has_default_options(one))
     assert list(shown) == [*plain_settings(), "alpha", "zeta"]
-
-
-def test_a_setting_that_is_not_installed_has_rows_too(result) -> None:
-    results = [result(setting=name) for name in ("retired", "direct", "explicit")]
-    table = make_table("main", RunData(make_frame([("run", results)])), floors=(CHANCE,))
-    ours = [row.group for row in table.rows if row.source == "ours"]
-    assert ours == ["explicit", "direct", "retired"]
-    (row,) = [row for row in table.rows if (row.group, row.source) == ("retired", "ours")]
-    assert [entry.text for entry in row.entries if entry.text][:1] == ["100.00"]

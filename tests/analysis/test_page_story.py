@@ -8,7 +8,6 @@ from pathlib import Path
 import pytest
 
 from roboirg.core.instruction_options import InstructionOptions
-from roboirg.evaluation.analysis.figures import write_figures
 from roboirg.evaluation.analysis.page.report import write_report
 from roboirg.evaluation.analysis.results.frame import make_frame
 from roboirg.evaluation.analysis.stats.chance import CHANCE, floor_level
@@ -28,7 +27,7 @@ PLAN = make_plan(
     ("listener", "forgetful"),
     tasks="SwingXtimes,ButtonUnmask,VideoRepick",
     forms="implicit,resolved",
-    episodes="2",
+    episodes="1",
 )
 """A task of each suite, in all settings and forms."""
 MOST_DEVIATIONS = 4
@@ -67,14 +66,11 @@ def test_elsewhere_it_guesses_and_every_miss_is_one_of_grounding(run: Path) -> N
     assert kinds == {None, "grounding"}
 
 
-def test_the_whole_report_follows(run: Path, tmp_path: Path) -> None:
+def test_numbers_and_page_follow(run: Path) -> None:
     content = RunData(make_frame([("story", read_records(run))], PLAN.jobs()))
     _, forgetful = content.frame.names
     direct = content.summaries[forgetful, ALL_TASKS, InstructionOptions("direct")]
     assert direct.second_gap is not None
     assert direct.second_gap.value < -0.3
     assert direct.second_gap.overlap.only_first == direct.second_gap.overlap.neither == 0
-    paths = write_figures(content, tmp_path)
-    names = {path.stem.removesuffix("-dark") for path in paths}
-    assert names == {"gaps", "forms", "failures"}
     assert "ended in an error (" not in write_report(Source(run)).read_text()

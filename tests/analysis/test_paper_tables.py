@@ -161,12 +161,6 @@ def test_csv_has_every_entry_with_its_counts(result) -> None:
     }  # fmt: skip
 
 
-def test_markdown_is_rectangular_whatever_the_names(result) -> None:
-    table = table_of("main", whole(result, "my_pkg:Net & 50% #1|{x}\\*"), published=True)
-    lines = [one for one in get_format("markdown").draw(table).splitlines() if one[:1] == "|"]
-    assert {line.replace("\\|", "").count("|") for line in lines} == {len(table.columns) + 3}
-
-
 def test_tasks_outside_the_paper_have_a_table_of_their_own(result) -> None:
     outside = [
         result(setting=setting, policy="a", task="Outside") for setting in ("explicit", "direct")

@@ -105,11 +105,8 @@ def test_every_change_is_that_of_the_published_rates(made: Table) -> None:
 
 
 def test_published_averages_are_means_of_the_printed_rates() -> None:
-    """And which ones would differ if the unrounded rates were averaged.
-
-    All rates are multiples of 1/150 (real world: 1/10), rounded half up: none needs an exception.
-    """
-    differing, count = [], 0
+    """All rates are multiples of 1/150 (real world: 1/10), rounded half up, without exception."""
+    count = 0
     for table in RATE_TABLES:
         trials = TRIALS[table][0] * TRIALS[table][1]
         for row in published_rows(table):
@@ -118,13 +115,7 @@ def test_published_averages_are_means_of_the_printed_rates() -> None:
             exact = [Fraction(round(Fraction(rate) * trials / 100), trials) for rate in rates]
             assert [percent(one) for one in exact] == rates
             count += len(rates)
-            if percent(sum(exact, Fraction(0)) / len(exact)) != row.average:
-                differing.append((table, str(row.average)))
     assert count == 255 + 30 + 36 + 20
-    assert differing == [
-        *(("planner", rate) for rate in ("49.55", "15.55", "51.34")),
-        *(("context", rate) for rate in ("26.45", "43.55", "34.66")),
-    ]
 
 
 def test_the_coverage_of_this_benchmark_is_read_off_its_tasks() -> None:
@@ -152,30 +143,8 @@ def test_published_tables_fit_this_benchmark() -> None:
         published_rows("mian")
 
 
-def test_the_stored_notes_are_true_of_the_files() -> None:
-    """Computed anew from the files: no code of the package."""
-    main, context = (
-        {
-            (*place(line), line["task"]): float(line["success_rate_percent"])
-            for line in printed(table)
-            if line["success_rate_percent"]
-        }
-        for table in ("main", "context")
-    )
-    drops = []
-    for model in dict.fromkeys(name for _, name, _ in main):
-        here = main["spatial", model, "Avg"]
-        tasks = [one for group, name, one in main if (group, name) == ("spatial", model)][:-1]
-        same = round(sum(main["explicit", model, task] for task in tasks) / len(tasks) + 1e-9, 2)
-        drops.append(f"{model} {main['explicit', model, 'Avg'] - here:.2f} and {same - here:.2f}")
-    assert f" as in this table: {', '.join(drops)}." in NOTES["main"][1]
-    gaps = [
-        abs(rate - main["direct", model, task])
-        for (model, stages, task), rate in context.items()
-        if stages == "1,5" and task != "Avg"
-    ]
-    words = f" in {sum(gap > 0 for gap in gaps)} of {len(gaps)} cells, by up to {max(gaps):.2f} "
-    assert words in NOTES["context"][1]
+def test_the_stored_notes_have_intervals_of_their_trials_and_stand_below_the_tables() -> None:
+    """Computed anew: no code of the package."""
     for table, (first, *_) in NOTES.items():
         episodes, seeds = TRIALS[table]
         trials = episodes * seeds

@@ -10,7 +10,6 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from flat_jobs import with_version
 from msgspec.structs import replace
 from page_text import PLAN, broken, played, render, store
 
@@ -61,9 +60,6 @@ def film(folder: Path, name: str = "x") -> str:
 
 def test_nothing_comes_from_outside_and_no_words_end_a_script() -> None:
     text = render(records(), PICKS)
-    links = re.findall(r'(?:src|href|poster)="([^"]*)"', text)
-    assert links
-    assert all(link.startswith(("#", "data:")) for link in links)
     assert not re.search(r"https?:|@import|url\(", text)
     assert "default-src 'none'" in text
     assert "</script><b>" not in text
@@ -118,22 +114,11 @@ def test_what_is_amiss_is_said_first() -> None:
     assert sum(cell.get("missing", 0) for cell in cells) == 5
     assert Page(render(found[:-1])).notes == ""
     lost = [replace(one, outcome="failure") for one in found if one.policy == "listener"]
-    page = Page(render(lost))
-    assert "Only one policy" in page.notes
-    note = page.cell("listener (privileged), PickXtimes, direct")
-    assert "no success either, so the gap says nothing" in note
+    assert "Only one policy" in Page(render(lost)).notes
 
 
-def test_versions_and_words_that_differ_stand_apart_and_are_named() -> None:
-    first, second = [one for one in records() if one.setting == "direct"][:2]
-    page = Page(render([first, replace(second, language_version="9.9")]))
-    assert "Mixed versions of the language" in page.notes
-    assert len(page.data["matrix"]["policies"]) == 2
-    (comparison,) = page.data["comparisons"]
-    assert "cannot be compared" in comparison["sentences"][0]
-    again = Page(render([first, with_version(second, "2")]))
-    assert ": 2, built-in. They are kept apart" in again.notes
-
+def test_words_that_differ_stand_apart_and_are_named() -> None:
+    first = next(one for one in records() if one.setting == "direct")
     page = Page(render([first, first.with_options(wordings="mine@1a")]))
     assert "Mixed words: our own words, the words of mine@1a." in page.notes
     assert "our own words, the words of mine@1a" in page.text.split("Mixed words")[0]

@@ -12,9 +12,7 @@ from roboirg.evaluation.analysis.results.frame import make_frame
 from roboirg.evaluation.analysis.stats.cells import cells_of
 from roboirg.evaluation.plan.sources import Source
 from roboirg.evaluation.plan.stored_plans import read_plan
-from roboirg.evaluation.records.merging import merge_runs
-from roboirg.evaluation.records.record_codec import identity_key
-from roboirg.evaluation.records.store import RECORDS_FILE, read_records, read_results
+from roboirg.evaluation.records.store import read_records, read_results
 
 pytest.importorskip("jinja2")
 
@@ -26,18 +24,6 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("large") / "run"
     write_synthetic_run(folder, COUNT)
     return folder
-
-
-def test_its_records_are_those_of_its_plan(run: Path, tmp_path: Path) -> None:
-    records, plan = read_records(run), read_plan(run)
-    assert plan is not None
-    assert [identity_key(one) for one in records] == [
-        identity_key(job) for job in plan.jobs()[:COUNT]
-    ]
-    assert {one.outcome for one in records} == {"success", "failure", "error"}
-    assert len({one.events for one in records}) > COUNT / 2
-    write_synthetic_run(tmp_path, COUNT)
-    assert (tmp_path / RECORDS_FILE).read_bytes() == (run / RECORDS_FILE).read_bytes()
 
 
 def test_parts_of_records_give_the_cells_of_whole_records(run: Path) -> None:
@@ -55,13 +41,3 @@ def test_a_page_reads_one_record_after_the_other(run: Path) -> None:
     page = make_view(Source(run), lambda done, total: told.append((done, total)))
     assert page.count('"turns":') == COUNT
     assert told == [(done, COUNT) for done in range(1, COUNT + 1)]
-
-
-def test_merging_copies_lines(run: Path, tmp_path: Path) -> None:
-    lines = (run / RECORDS_FILE).read_bytes().splitlines(keepends=True)
-    for name, part in (("a", lines[:70]), ("b", lines[40:])):
-        (tmp_path / name).mkdir()
-        (tmp_path / name / RECORDS_FILE).write_bytes(b"".join(part))
-    merged = merge_runs([tmp_path / "a", tmp_path / "b"], tmp_path / "out")
-    assert (merged.added, merged.duplicates, merged.conflicts) == (COUNT, 30, ())
-    assert (tmp_path / "out" / RECORDS_FILE).read_bytes() == b"".join(lines)

@@ -10,7 +10,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from language_variants import PAIRS, TASKS, first_episodes
 from plan_files import plan_file
-from selection import slow_but
 from typer.testing import CliRunner
 
 from roboirg.core.episode import values_in
@@ -115,52 +114,73 @@ def test_values_by_hand(slot):
         assert (rule, text, places(rule, text, *slot)) == (rule, text, (found,))
 
 
-def test_several_values_by_hand():
-    two = "I like the red cube and the blue cube. Lift the container over the former, then the "
-    two += "container over the latter."
-    assert places("first-mention", two, "VideoUnmask", "colors") == (("red",), ("blue",))
-    assert places("elimination", two, "VideoUnmask", "colors") == (("green",), COLORS)
-    pair = f"My kitchen is painted red and blue. {CHOSEN} {PICKS}"
-    assert places("surface", pair, "VideoUnmask", "colors") == (("green",), ("red",))
-    assert places("last-mention", pair, "VideoUnmask", "colors") == (("blue",), ("blue",))
-    amounts = "She asked for two red cubes and one blue cube. Put exactly those into the bin, the "
-    amounts += "former and the latter."
-    assert guess_goal("first-mention", amounts, "BinFill") == {
-        "colors": (("red",), ("blue",)),
-        "counts": ((2,), (1,)),
+TWO = (
+    "I like the red cube and the blue cube. Lift the container over the former, then the container "
+    "over the latter."
+)
+AMOUNTS = (
+    "She asked for two red cubes and one blue cube. Put exactly those into the bin, the former and "
+    "the latter."
+)
+TWO_AND_ONE = {"colors": (("red",), ("blue",)), "counts": ((2,), (1,))}
+PAIR = f"My kitchen is painted red and blue. {CHOSEN} {PICKS}"
+MOMENTS = (
+    "Of the two moments right before and right after the press, he prefers the one right {} it. "
+    "Take the red cube and put it at the other of the two moments, not that one."
+)
+EITHER = (
+    "I liked the placement right {} the press. Put the red cube on the target of the placement "
+    "just before or after that one."
+)
+
+
+@pytest.mark.parametrize(
+    ("rule", "text", "task", "found"),
+    [
+        ("first-mention", TWO, "VideoUnmask", {"colors": (("red",), ("blue",))}),
+        ("elimination", TWO, "VideoUnmask", {"colors": (("green",), COLORS)}),
+        ("surface", PAIR, "VideoUnmask", {"colors": (("green",), ("red",))}),
+        ("last-mention", PAIR, "VideoUnmask", {"colors": (("blue",), ("blue",))}),
+        (
+            "first-mention",
+            AMOUNTS,
+            "BinFill",
+            TWO_AND_ONE,
+        ),
+        (
+            "first-mention",
+            "She wants two of the red and one of the blue cubes. Put exactly those into the bin.",
+            "BinFill",
+            TWO_AND_ONE,
+        ),
+        (
+            "surface",
+            "I own two red, six blue and four green cubes. Put half as many of each into the bin.",
+            "BinFill",
+            {"colors": (("red",), ("blue",), ("green",)), "counts": ((1,), (3,), (2,))},
+        ),
+        (
+            "surface",
+            "Look left and right. Lift the container at the former place, then at the latter.",
+            "VideoUnmask",
+            {"colors": (COLORS, COLORS)},
+        ),
+    ],
+)
+def test_several_values_by_hand(rule, text, task, found):
+    assert guess_goal(rule, text, task) == found
+
+
+@pytest.mark.parametrize(("named", "other"), [("before", "after"), ("after", "before")])
+def test_two_moments_and_either_moment_by_hand(named, other):
+    expected = {
+        MOMENTS: {"surface": other, "last-mention": named, "first-mention": "before"},
+        EITHER: {"surface": other, "elimination": other, "first-mention": named},
     }
-    amounts = "She wants two of the red and one of the blue cubes. Put exactly those into the bin."
-    assert guess_goal("first-mention", amounts, "BinFill") == {
-        "colors": (("red",), ("blue",)),
-        "counts": ((2,), (1,)),
-    }
-    halves = "I own two red, six blue and four green cubes. Put half as many of each into the bin."
-    assert guess_goal("surface", halves, "BinFill") == {
-        "colors": (("red",), ("blue",), ("green",)),
-        "counts": ((1,), (3,), (2,)),
-    }
-    places_ = "Look left and right. Lift the container at the former place, then at the latter."
-    assert places("surface", places_, "VideoUnmask", "colors") == (COLORS, COLORS)
-
-
-def test_two_moments_by_hand():
-    both = "Of the two moments right before and right after the press, he prefers the one right "
-    rest = "it. Take the red cube and put it at the other of the two moments, not that one."
-    for named, other in (("before", "after"), ("after", "before")):
-        text = both + f"{named} {rest}"
-        assert places("surface", text, "VideoPlaceButton", "relation") == ((other,),)
-        assert places("last-mention", text, "VideoPlaceButton", "relation") == ((named,),)
-        assert places("first-mention", text, "VideoPlaceButton", "relation") == (("before",),)
-
-
-def test_before_or_after_names_no_moment():
-    text = "I liked the placement right {} the press. Put the red cube on the target of the "
-    text += "placement just before or after that one."
-    for named, other in (("before", "after"), ("after", "before")):
-        said = text.format(named)
-        assert places("surface", said, "VideoPlaceButton", "relation") == ((other,),)
-        assert places("elimination", said, "VideoPlaceButton", "relation") == ((other,),)
-        assert places("first-mention", said, "VideoPlaceButton", "relation") == ((named,),)
+    for text, by_rule in expected.items():
+        for rule, moment in by_rule.items():
+            said = text.format(named)
+            assert places(rule, said, "VideoPlaceButton", "relation") == ((moment,),), (rule, said)
 
 
 def test_amounts_in_another_order_are_the_same_goal():
@@ -220,10 +240,9 @@ def test_vocabularies_hold_every_goal_of_the_test_split():
                 assert len(values_in(content)) <= vocabulary[slot].longest
 
 
-@pytest.mark.parametrize("episodes", slow_but([2], [2, 8]))
 @pytest.mark.parametrize(("task", "setting"), PAIRS)
-def test_shares_of_every_setting(task, setting, episodes):
-    for episode in first_episodes(task, "test", episodes):
+def test_shares_of_every_setting(task, setting):
+    for episode in first_episodes(task, "test", 2):
         for options in expressible_options(episode):
             if options.setting != setting:
                 continue

@@ -98,26 +98,22 @@ def test_the_page_has_why_stop_cube_fails():
     assert words in page
 
 
-def test_the_page_has_what_policies_of_one_task_solve():
-    with opened_run(PICKXTIMES) as run:
-        results = read_results(run)
-    names = sorted({one.policy for one in results})
-    solved = [[one.outcome == "success" for one in results if one.policy == name] for name in names]
-    first, second, third = map(sum, solved)
+def test_the_page_has_what_policies_of_one_task_and_act_solve():
+    won = {}
+    for pack in (PICKXTIMES, ACT):
+        with opened_run(pack) as run:
+            for one in read_results(run):
+                won.setdefault(one.policy, []).append(one.outcome == "success")
+    act, act20 = (won.pop(row) for row in ROWS)
+    solved = [won[name] for name in sorted(won)]
     rate = trained_rate([np.array(solved, float)])
-    page = words_of(tables.PAGE)
     mean, low, high = (round(100 * one) for one in (rate.rate, *rate.interval))
-    assert f"{first}, {second} and {third}, **{mean} % on average** ({low} to {high} %" in page
-
-
-def test_the_page_has_what_act_solves():
-    with opened_run(ACT) as run:
-        results = read_results(run)
-    won = {row: [one.outcome == "success" for one in results if one.policy == row] for row in ROWS}
+    each = "{}, {} and {}".format(*map(sum, solved))
     page = words_of(tables.PAGE)
-    assert f"It solves **{sum(won['act'])} of {len(won['act'])}**" in page
+    assert f"{each}, **{mean} % on average** ({low} to {high} %" in page
+    assert f"It solves **{sum(act)} of {len(act)}**" in page
     assert "also none if 20" in page
-    assert (sum(won["act20"]), len(won["act20"])) == (0, 50)
+    assert (sum(act20), len(act20)) == (0, 50)
 
 
 def test_trainings_count_alike_however_many_there_are():
@@ -130,4 +126,4 @@ def test_trainings_count_alike_however_many_there_are():
 @pytest.mark.slow
 @pytest.mark.parametrize("pack", [tables.PACK, ACT, PICKXTIMES], ids=lambda pack: pack.name)
 def test_packs_hold_when_some_of_their_episodes_are_played_again(pack):
-    assert_holds_here(pack, sample=0.005)
+    assert_holds_here(pack, sample=0.002)

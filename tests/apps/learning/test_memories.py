@@ -20,14 +20,12 @@ from roboirg.apps.learning.policy.frame_memory import even_frames  # noqa: E402
 from roboirg.apps.learning.policy.memories import Carried  # noqa: E402
 from roboirg.apps.learning.policy.policy_plan import (  # noqa: E402
     HANDS,
-    MEMORY_NAMES,
     PLANNERS,
 )
 
 CLASSES, PARTS, THINGS, LOOKS = 3, 4, 5, 12
 AT_THINGS = (True, False, True)
 MEMORIES = sorted(set(body_net.MEMORIES) - {HANDS, *PLANNERS})
-REMEMBERS = sorted(set(MEMORIES) - {"none"})
 
 
 def batch_of(seed, decisions=(3, 7)):
@@ -99,20 +97,10 @@ def test_what_is_carried_gives_what_all_looks_give(memory):
 
 
 @pytest.mark.parametrize("memory", sorted(MEMORIES))
-def test_the_present_counts(memory):
-    body, batch = body_of(memory), batch_of(1)
-    assert not same(body(batch), body(changed(batch, slice(7, 8))))
-
-
-def test_without_memory_the_past_does_not_count():
-    body, batch = body_of("none"), batch_of(1, (7,))
-    assert same(body(batch), body(changed(batch, slice(0, 7))))
-
-
-@pytest.mark.parametrize("memory", REMEMBERS)
-def test_with_memory_the_past_counts(memory):
+def test_the_present_counts_and_with_memory_the_past(memory):
     body, batch = body_of(memory), batch_of(1, (7,))
-    assert not same(body(batch), body(changed(batch, slice(0, 7))))
+    assert not same(body(batch), body(changed(batch, slice(7, 8))))
+    assert same(body(batch), body(changed(batch, slice(0, 7)))) == (memory == "none")
 
 
 @pytest.mark.parametrize("memory", sorted(MEMORIES))
@@ -149,10 +137,6 @@ def test_only_memory_chooses_what_is_out_of_sight(memory):
     assert can == (memory == "recurrent")
 
 
-def test_every_memory_can_be_named():
-    assert set(body_net.MEMORIES) == {HANDS, *MEMORY_NAMES}
-
-
 def fast_numbers(seed, tokens=3, size=2):
     torch.manual_seed(seed)
     fast = Fast(torch.randn(1, 1, size, size), torch.randn(1, 1, 1, size))
@@ -161,25 +145,15 @@ def fast_numbers(seed, tokens=3, size=2):
     return fast, norm, keys, values, torch.rand(1, 1, tokens, 1) * 0.1
 
 
-def test_one_step_of_fast_weights_is_that_by_hand():
-    """With W = 1, b = 0 and one token k = (3, 4), v = (1, 1): z = k and rms(z) = sqrt(12.5)."""
-    fast = Fast(torch.eye(2)[None, None], torch.zeros(1, 1, 1, 2))
+def test_fast_weights_are_read_as_by_hand():
+    """With W = 2, b = (0, 1) and k = (3, 4): z = (6, 9) and rms(z) = sqrt(58.5)."""
+    fast = Fast(2 * torch.eye(2)[None, None], torch.tensor([[[[0.0, 1.0]]]]))
     norm = FastNorm(torch.zeros(1, 1, 2), torch.zeros(1, 1, 2))
-    key, value = torch.tensor([[[[3.0, 4.0]]]]), torch.tensor([[[[1.0, 1.0]]]])
-    after = fast.after(key, value, torch.full((1, 1, 1, 1), 0.1), norm)
-    rms = 12.5**0.5
-    error = 3 / rms + 2, 4 / rms + 3  # n(z) - (v - k)
-    along = (error[0] * 3 + error[1] * 4) / 2 / 12.5
-    change = [0.1 * (error[0] - 3 * along) / rms, 0.1 * (error[1] - 4 * along) / rms]
-    assert torch.allclose(after.biases.flatten(), -torch.tensor(change), atol=1e-6)
-    wanted = torch.eye(2) - torch.outer(torch.tensor([3.0, 4.0]), torch.tensor(change))
-    assert torch.allclose(after.weights[0, 0], wanted, atol=1e-6)
-    read = after.read(key, norm)
-    z = torch.tensor([3.0, 4.0]) @ wanted - torch.tensor(change)
-    assert torch.allclose(read.flatten(), z / z.square().mean().sqrt() + key.flatten(), atol=1e-5)
+    read = fast.read(torch.tensor([[[[3.0, 4.0]]]]), norm).flatten()
+    assert torch.allclose(read, torch.tensor([6.0, 9.0]) / 58.5**0.5 + torch.tensor([3.0, 4.0]))
 
 
-@pytest.mark.parametrize("seed", range(5))
+@pytest.mark.parametrize("seed", range(2))
 def test_a_step_goes_down_the_gradient_of_the_inner_loss(seed):
     fast, norm, keys, values, rates = fast_numbers(seed)
     weights, biases = (one.clone().requires_grad_() for one in fast)

@@ -1,7 +1,5 @@
 """Subgoals as numbers, what a planner keeps, and hands that follow any planner."""
 
-import threading
-
 import numpy as np
 import pytest
 
@@ -27,7 +25,6 @@ from roboirg.apps.learning.policy.subgoals import (
     subgoals_due,
 )
 from roboirg.core.subgoal_text import split_point
-from roboirg.simulation.physics_settings import HOME
 from roboirg.tasks import all_tasks
 from roboirg.tasks.splits.splits import get_episode
 
@@ -57,9 +54,6 @@ def test_a_point_means_the_place_that_it_was_taken_from():
     assert found[-3] == 1
     assert np.allclose(found[-2:], place[:2], atol=0.004)
     assert asked_numbers("pick up the red cube", SIGHT)[-3] == 0
-
-
-def test_words_of_no_known_form_ask_for_nothing():
     assert asked_numbers("make me a sandwich", SIGHT) is None
 
 
@@ -241,39 +235,6 @@ def test_a_learned_planner_leads_the_scripted_hands_and_others_lead_learned_ones
         make_policy(f"{scripted}&actions=joint_angle", 0)
     with pytest.raises(InvalidValueError, match="when-done"):
         make_policy(f"planner:stateless?model=none&hands={own}", 0)
-
-
-@pytest.mark.sim
-@pytest.mark.parametrize("protocol", ["openpi", "mme-vla"])
-def test_behind_a_server_hands_do_in_joint_angles_what_they_do_here(saved, protocol):
-    pytest.importorskip("websockets")
-    from roboirg.policies.by_name.finding import make_policy
-    from roboirg.policies.policy_server import open_server
-
-    spec = f"trained:{saved}?actions=joint_angle"
-    seen = {**observation_of(), "joint_positions": HOME.astype(np.float32), "history": ()}
-    seen |= {"gripper": np.full(2, 0.04, np.float32), "instruction": "pick the cube"}
-    seen["wrist_rgb"] = seen["front_rgb"]
-    server = open_server(spec, protocol)
-    thread = threading.Thread(target=server.listening.serve_forever)
-    thread.start()
-    try:
-        here, there = make_policy(spec, 0), make_policy(server.url, 0)
-        rows = []
-        for policy in (here, there):
-            policy.reset("pick the cube", NO_VIDEO | {"gripper": np.zeros((0, 2))})
-            for subgoal in (None, "press the button at <100, 90>"):
-                if subgoal and protocol == "mme-vla":
-                    policy.follow(subgoal)
-                rows += [policy.act(seen) for _ in range(4)]
-        there.close()
-    finally:
-        server.listening.shutdown()
-        thread.join()
-    for one, other in zip(rows[: len(rows) // 2], rows[len(rows) // 2 :], strict=True):
-        assert one.shape[1] == 8
-        assert np.allclose(one, other, atol=1e-6)
-    assert protocol != "mme-vla" or here.subgoal == "press the button at <100, 90>"
 
 
 @pytest.mark.sim
