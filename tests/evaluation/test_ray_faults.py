@@ -10,6 +10,7 @@ import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
+from unittest import mock
 
 import pytest
 import ray_fakes
@@ -29,16 +30,6 @@ pytestmark = pytest.mark.slow
 ray = pytest.importorskip("ray")
 
 PLAN = changed(small_plan(8), tries=3)
-
-
-class Warnings(Reporter):
-    """Keeps what the user would read."""
-
-    def __init__(self) -> None:
-        self.texts: list[str] = []
-
-    def warn(self, text: str) -> None:
-        self.texts.append(text)
 
 
 @pytest.fixture
@@ -92,13 +83,13 @@ FAULTS = (
 def test_a_bad_machine_is_left_out_and_named_once(cluster: Any, tmp_path: Path) -> None:
     cluster.add_node(num_cpus=1, env_vars={BAD_MACHINE: "1"})
     for number, (play, policy, fault) in enumerate(FAULTS):
-        warnings, folder = Warnings(), tmp_path / str(number)
+        warnings, folder = mock.Mock(spec=Reporter), tmp_path / str(number)
         plan = changed(small_plan(8, (policy,)), tries=3)
         executor = RayCluster(address=cluster.address)
         summary = run_plan(plan, folder, play(folder, 0.3), executor, reporter=warnings)
         assert (summary.errors, summary.missing) == ((), 0)
         assert lines(folder) == len(plan.jobs())  # nothing that it played was stored
-        (named,) = [text for text in warnings.texts if "left out" in text]
+        (named,) = [text for ((text,), _) in warnings.warn.call_args_list if "left out" in text]
         assert fault.rstrip(".") in named
 
 
@@ -143,7 +134,7 @@ def test_a_machine_that_joins_is_used_and_a_head_without_cpus_is_not(
     from ray.cluster_utils import Cluster
 
     nodes = Cluster(initialize_head=True, head_node_args={"num_cpus": 0})
-    warnings = Warnings()
+    warnings = mock.Mock(spec=Reporter)
     monkeypatch.setattr(ray_pool, "WAIT_S", 2.0)
     play, executor = FakePlayer(tmp_path), RayCluster(address=nodes.address)
     run = threading.Thread(
@@ -151,14 +142,14 @@ def test_a_machine_that_joins_is_used_and_a_head_without_cpus_is_not(
     )
     try:
         run.start()
-        while not warnings.texts and run.is_alive():
+        while not warnings.warn.called and run.is_alive():
             time.sleep(0.1)
         nodes.add_node(num_cpus=1)
         run.join()
     finally:
         ray.shutdown()
         nodes.shutdown()
-    assert "Waiting for a free CPU" in warnings.texts[0]
+    assert "Waiting for a free CPU" in warnings.warn.call_args_list[0].args[0]
     assert lines(tmp_path) == len(PLAN.jobs())
 
 

@@ -3,7 +3,6 @@
 import re
 import subprocess
 import sys
-from pathlib import Path
 from urllib.parse import urlencode
 
 import pytest
@@ -76,14 +75,6 @@ def test_what_a_policy_needs_is_known_from_its_name(spec):
     assert known.needs == PolicyNeeds.of(policy)
     assert known.is_privileged == hasattr(policy, "attach")
     assert known.version == policy.version != "unknown"
-
-
-def test_the_page_s_code_runs():
-    page = (Path(__file__).parents[2] / "docs" / "planners.md").read_text()
-    (block,) = re.findall(r"(?<!-->\n\n)```python\n(.*?)```", page, flags=re.DOTALL)
-    names: dict = {}
-    exec(block, names)  # noqa: S102 - it is our own page
-    assert isinstance(names["mine"], PrivilegedPolicy)
 
 
 @pytest.mark.parametrize(

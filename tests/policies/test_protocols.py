@@ -4,12 +4,12 @@ import re
 import subprocess
 import sys
 import threading
-import tomllib
 from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
 import pytest
+from doc_recipe import install
 from wire_episode import INSTRUCTION, moment
 
 from roboirg.apps.policy_check.policy_check import check_policy
@@ -21,7 +21,6 @@ from roboirg.policies.remote.endpoints import RemoteOptions
 from roboirg.policies.remote.protocols import protocols_by_scheme
 
 PAGE = (Path(__file__).parents[2] / "docs" / "servers.md").read_text()
-RECIPE = (Path(__file__).parents[2] / "docs" / "add-protocol.md").read_text()
 
 
 @contextmanager
@@ -44,25 +43,10 @@ def _fresh_registry():
     protocols_by_scheme.cache_clear()
 
 
-def fenced(language, word):
-    blocks = re.findall(rf"```{language}\n(.*?)```", RECIPE, flags=re.DOTALL)
-    return next(block for block in blocks if word in block)
-
-
 @pytest.fixture
 def _tiny_package(tmp_path, monkeypatch, _fresh_registry):
     """The recipe of the docs page, installed as a package of its own."""
-    (tmp_path / "tiny_protocol.py").write_text(fenced("python", "TinyPolicy"))
-    entries = tomllib.loads(fenced("toml", "roboirg.protocols"))["project"]["entry-points"]
-    info = tmp_path / "tiny-1.0.dist-info"
-    info.mkdir()
-    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: tiny\nVersion: 1.0\n")
-    (info / "entry_points.txt").write_text(
-        "".join(
-            f"[{group}]\n" + "".join(f"{name} = {value}\n" for name, value in group_entries.items())
-            for group, group_entries in entries.items()
-        )
-    )
+    install(tmp_path, "tiny_protocol", "TinyPolicy", "roboirg.protocols")
     monkeypatch.syspath_prepend(tmp_path)
     yield
     sys.modules.pop("tiny_protocol", None)

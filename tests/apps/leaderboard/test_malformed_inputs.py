@@ -228,16 +228,6 @@ def test_damaged_lines_are_skipped(name: str, run: Path) -> None:
     assert len(read_records(run)) == 1
 
 
-@pytest.mark.parametrize("tail", [b"[" * 200_000, b"9" * 5_000, b"\xed\xa0\x80", b"\0" * 1_000])
-def test_a_torn_line_of_any_bytes_is_left_out(tail: bytes, run: Path) -> None:
-    with (run / RECORDS_FILE).open("ab") as file:
-        file.write(tail)
-    assert len(read_records(run)) == 2
-    with RecordStore(run) as store:
-        assert store.torn == tail
-    assert (run / RECORDS_FILE).read_bytes().endswith(b"}\n")
-
-
 def _slug(run: Path) -> str:
     return Path(line_of(run)["video"]).stem
 
