@@ -145,18 +145,6 @@ def test_the_listener_hears_all_turns_before_the_earliest_press():
 
 
 @pytest.mark.sim
-def test_the_oracle_does_not_wait_for_words():
-    steps = [
-        play(
-            roboirg.make("VideoUnmask", setting="direct", cameras=(), delivery=delivery),
-            make_policy("oracle", 0),
-        )["steps"]
-        for delivery in DELIVERIES
-    ]
-    assert steps[0] == steps[1]
-
-
-@pytest.mark.sim
 def test_a_run_in_turns_has_records_and_videos_of_them(tmp_path):
     words = ["--policy", "listener", "--tasks", "VideoUnmask", "--settings", "explicit,direct"]
     words += ["--plan", plan_file(delivery="turns", episodes=1, video="all"), "--workers", "0"]

@@ -58,11 +58,6 @@ def test_invalid_options_are_refused(options):
         instruct(EPISODE, "contextual", **options)
 
 
-def test_lists_of_stages_are_fine():
-    said = instruct(EPISODE, "contextual", stages=[1, 2, 5])
-    assert [one.stage for one in said.utterances] == ["introduction", "reinforcement", "command"]
-
-
 def test_explicit_is_its_own_resolved_form():
     implicit, resolved = instruct(EPISODE), instruct(EPISODE, "explicit", "resolved")
     assert (implicit.text, implicit.form, resolved.form) == (resolved.text, "implicit", "resolved")

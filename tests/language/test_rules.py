@@ -43,7 +43,7 @@ def words_of(text):
     return re.findall(r"[a-z0-9]+", text.lower())
 
 
-@pytest.mark.parametrize("every", slow_but([31], [31, 2]))
+@pytest.mark.parametrize("every", slow_but([31], [31, 3]))
 @pytest.mark.parametrize("task", TASKS)
 def test_every_text_of_the_splits(task, every):
     """English, mentions and their referents, in every setting, form and option."""

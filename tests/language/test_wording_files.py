@@ -115,7 +115,7 @@ def test_the_example_in_the_docs_is_read_and_valid():
     (example,) = re.findall(r'```toml\n(name = "workshop".*?)```', page, re.DOTALL)
     identity = register_wordings(parse_wordings(example, "example"))
     for task in ("PickXtimes", "VideoUnmask"):
-        for episode in train_episodes(task, 0, 12):
+        for episode in train_episodes(task, 0, 3):
             assert not check_episode(episode, wordings=identity).failures
 
 
@@ -248,23 +248,6 @@ def test_a_changed_file_is_other_wordings(tmp_path):
     with pytest.raises(InvalidValueError, match="are not open"):
         instruct_with(episode_with("PickXtimes"), InstructionOptions(wordings=gone))
     assert open_wordings(None) is None
-
-
-def test_a_count_and_a_cube_may_be_one_phrase():
-    identity = opened(
-        """
-        [BinFill.phrases]
-        cubes = { "2 red" = "2 red cubes", "1 red" = "1 red cube" }
-        [[BinFill.commands]]
-        text = "put {cubes.0} into the bin, then press the button"
-        """
-    )
-    episode = replace(episode_with("BinFill"), goal=Goal.of(colors=("red",), counts=(2,)))
-    explicit = instruct(episode, wordings=identity)
-    assert explicit.text == "put 2 red cubes into the bin, then press the button"
-    assert [explicit.span(one) for one in explicit.mentions] == ["2 red cubes"]
-    for form in FORMS:
-        assert instruct(episode, "direct", form, wordings=identity).metadata["command"] != "own"
 
 
 OWN_SENTENCES = """

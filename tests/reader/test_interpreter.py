@@ -133,23 +133,22 @@ def test_picks_tell_how_many_colors_a_goal_has():
     assert len(two) == 6
 
 
-def test_waved_aside_values_do_not_count():
-    lift = "Lift the container that hides it."
-    text = f"Blue is nice. My neighbor prefers red, but that does not matter here. {lift}"
-    assert interpret(text, UNMASK, "VideoUnmask").goals == (Goal.of(colors=("blue",)),)
+TAKE = "Take it and place it on the target that many times."
+BLUE = "Blue is nice. My neighbor prefers red, but that does not matter here."
 
 
-def test_rivals_that_are_not_waved_aside_make_a_text_ambiguous():
-    take = "Take it and place it on the target that many times."
-    goals = interpret(f"I like red. I also like blue. Three! {take}", SCENE, "PickXtimes").goals
-    assert {goal.text("color") for goal in goals} == {"red", "blue"}
-    goals = interpret(
-        f"Five. I like red. My cat has four kittens. {take}", SCENE, "PickXtimes"
-    ).goals
-    assert {goal.number("repeats") for goal in goals} == {4, 5}
-    text = "Look at the cube at the far left. I see the cube closest to you. Take the cube there."
-    goals = interpret(text, SCENE, "PickXtimes").goals
-    assert {goal.text("color") for goal in goals} == {"red", "green"}
+@pytest.mark.parametrize(
+    ("text", "slot", "values"),
+    [
+        (f"{BLUE} {TAKE}", "color", {"blue"}),  # what is waved aside does not count
+        (f"I like red. I also like blue. Three! {TAKE}", "color", {"red", "blue"}),
+        (f"Five. I like red. My cat has four kittens. {TAKE}", "repeats", {4, 5}),
+        ("Look at the cube at the far left. I see the cube closest to you. Take the cube there.",
+         "color", {"red", "green"}),
+    ],
+)  # fmt: skip
+def test_rivals_that_are_not_waved_aside_make_a_text_ambiguous(text, slot, values):
+    assert {goal[slot] for goal in interpret(text, SCENE, "PickXtimes").goals} == values
 
 
 @pytest.mark.parametrize("task", every_task())

@@ -167,21 +167,18 @@ def test_the_page_teaches_a_new_verb():
          "no goal of the task has the amounts that the command names"),
         ("Take the yellow cube and put it on the target once.", PICK, "PickXtimes",
          "there is nothing yellow in the scene"),
+        (f"{TAKE}. No, the blue one.", PICK, "PickXtimes",
+         'does not read what follows the command: "no , the blue one"'),
+        (f"{TAKE}. 3 times.", PICK, "PickXtimes",
+         'does not read what follows the command: "3 times"'),
     ],
 )  # fmt: skip
-def test_values_that_no_goal_has_are_named(text, scene, task, complaint):
+def test_values_of_no_goal_and_words_behind_the_command_are_named(
+    text, scene, task, complaint
+):
     found = interpret(text, scene, task)
     assert not found.goals
     assert complaint in found.not_understood
-
-
-@pytest.mark.parametrize(
-    ("after", "words"), [("No, the blue one.", "no , the blue one"), ("3 times.", "3 times")]
-)
-def test_what_follows_the_command_is_not_ignored(after, words):
-    found = interpret(f"{TAKE}. {after}", PICK, "PickXtimes")
-    assert not found.goals
-    assert f'does not read what follows the command: "{words}"' in found.not_understood
 
 
 COMMANDS = [

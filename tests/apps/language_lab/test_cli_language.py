@@ -112,12 +112,3 @@ def test_stats_of_all_splits_need_no_figure():
     printed = call("language", "stats", "--split", "all", "--tasks", "StopCube")
     assert "Relations" in printed
     assert "Landmark" not in printed
-
-
-@pytest.mark.usefixtures("in_this_process")
-def test_validate_prints_what_was_read_and_the_exceptions():
-    words = ("--tasks", "PickXtimes", "--split", "none", "--seeds", "4")
-    printed = call("language", "validate", *words)
-    assert "Texts read back" in printed
-    assert "2 of 2" in printed  # easy, spatial
-    assert "0 of 1" in printed
