@@ -44,28 +44,18 @@ def test_what_was_not_used_for_longest_goes_first(tmp_path):
     assert entries(tmp_path) == ["e5"]
 
 
-def truncate(path):
-    path.write_bytes(path.read_bytes()[:-1])
+DAMAGE = {
+    "truncated": lambda path: path.write_bytes(path.read_bytes()[:-1]),
+    "empty": lambda path: path.write_bytes(b""),
+    "a bit": lambda path: path.write_bytes(path.read_bytes().replace(b"forty-t", b"forty-u")),
+    "another entry": lambda path: path.with_name("b2").replace(path),
+}
 
 
-def empty(path):
-    path.write_bytes(b"")
-
-
-def flip(path):
-    raw = bytearray(path.read_bytes())
-    raw[-7] ^= 1
-    path.write_bytes(raw)
-
-
-def exchange(path):
-    Cache(path.parent, 1000).write("other", b"something else")
-    (path.parent / "other").replace(path)
-
-
-@pytest.mark.parametrize("harm", [truncate, empty, flip, exchange])
+@pytest.mark.parametrize("harm", DAMAGE.values(), ids=DAMAGE)
 def test_damage_is_logged_once_and_repaired(tmp_path, caplog, harm):
     cache = Cache(tmp_path, 1000)
+    cache.write("b2", b"something else")
     cache.write("a1", b"forty-two")
     harm(tmp_path / "a1")
     assert cache.read("a1") is None

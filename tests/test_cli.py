@@ -11,6 +11,7 @@ import time
 from collections.abc import Mapping
 from importlib.metadata import version
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -32,16 +33,11 @@ from roboirg.util.console_width import progress_console
 RUN = ("run", "--policy", "random", "--tasks", "PickXtimes")
 
 
-class Said:
-    def __init__(self, code: int, out: str, err: str) -> None:
-        self.code, self.out, self.err = code, out, err
-
-
 @pytest.fixture
 def roboirg(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]):
     """The command, in this process."""
 
-    def call(*words: str | Path) -> Said:
+    def call(*words: str | Path) -> SimpleNamespace:
         monkeypatch.setattr(sys, "argv", ["roboirg", *map(str, words)])
         try:
             cli.main()
@@ -49,7 +45,7 @@ def roboirg(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str])
         except SystemExit as left:
             code = left.code if isinstance(left.code, int) else 0
         told = capsys.readouterr()
-        return Said(code, told.out, told.err)
+        return SimpleNamespace(code=code, out=told.out, err=told.err)
 
     return call
 

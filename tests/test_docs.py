@@ -134,7 +134,6 @@ def test_readme_s_results_are_those_of_their_pages():
 @pytest.mark.parametrize(
     ("row", "floor", "setting"),
     [
-        ("surface rule", "surface", "direct"),
         ("surface rule", "surface", "reasoning"),
         ("`forgetful` h", "chance", "contextual"),
     ],

@@ -4,6 +4,7 @@ import json
 import sys
 from importlib import metadata
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
@@ -12,15 +13,6 @@ from roboirg.core.errors import MissingDependencyError
 from roboirg.core.extras import extra_needed, install_command
 
 ROOT = Path(__file__).parents[1]
-
-
-class Installed:
-    def __init__(self, noted):
-        self._noted = noted
-
-    def read_text(self, name):
-        assert name == "direct_url.json"
-        return self._noted and json.dumps(self._noted)
 
 
 def test_from_a_checkout_it_names_the_folder(monkeypatch, tmp_path):
@@ -45,8 +37,10 @@ def test_from_a_checkout_it_names_the_folder(monkeypatch, tmp_path):
     ],
 )
 def test_elsewhere_it_names_what_pip_installed_from(monkeypatch, tmp_path, noted, wanted):
+    kept = {"direct_url.json": noted and json.dumps(noted)}
+    installed = SimpleNamespace(read_text=kept.__getitem__)
     monkeypatch.setattr(extras, "_CHECKOUT", tmp_path)
-    monkeypatch.setattr(metadata, "distribution", lambda name: Installed(noted))
+    monkeypatch.setattr(metadata, "distribution", lambda name: installed)
     assert install_command("vlm").endswith(f"install {wanted}")
 
 

@@ -1,6 +1,7 @@
 """Structure and names of the package, read from its source."""
 
 import ast
+import gc
 import itertools
 import re
 import subprocess
@@ -23,6 +24,14 @@ CEILINGS = ROOT / "tests" / "ceilings.toml"
 PAGE_CODE, DATA = (".js", ".css", ".j2", ".html"), (".toml", ".yaml", ".yml")
 
 
+@pytest.fixture(autouse=True, scope="module")
+def collector_at_rest():
+    """Syntax trees are many objects, and the collector would walk through them again and again."""
+    gc.disable()
+    yield
+    gc.enable()
+
+
 def check_empty(found):
     """Fail with a line for each entry."""
     if found:
@@ -39,7 +48,7 @@ def is_counted(node):
 def size_of(paths):
     """Return the statements and the nodes of some files."""
     statements = nodes = 0
-    for path in paths:  # parsed anew: the collector would walk through what is kept
+    for path in paths:  # parsed anew: trees of all tests would fill the memory
         for node in ast.walk(ast.parse(path.read_text("utf-8"))):
             nodes += 1
             statements += is_counted(node)

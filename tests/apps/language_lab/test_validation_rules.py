@@ -4,7 +4,7 @@ import dataclasses
 import io
 
 import pytest
-from language_variants import SPATIAL_TASKS, without_landmark
+from language_variants import without_landmark
 from rich.console import Console
 
 from roboirg.apps.language_lab.validation import episode_checks
@@ -50,13 +50,9 @@ def another_goal():
 def test_another_goal_is_not_read_back():
     said = instruct(EPISODE, "direct")
     assert not list(misread("read back", said.text, EPISODE, read))
+    assert list(misread("read back", "I like it. Hello there.", EPISODE, read))
     other = dataclasses.replace(EPISODE, goal=another_goal())
     assert list(misread("read back", said.text, other, read)) == [("read back", said.text)]
-
-
-def test_what_is_not_understood_is_not_read_back():
-    said = commanding(instruct(EPISODE, "direct"), "Hello there.")
-    assert list(misread("read back", said.text, EPISODE, read))
 
 
 def test_an_implicit_command_is_not_self_contained():
@@ -81,14 +77,10 @@ def test_a_command_that_says_all_leaks(setting):
     assert not list(leaking(said, EPISODE))
     ((rule, words),) = leaking(commanding(said, instruct(EPISODE).command), EPISODE)
     assert rule == "no leak"
+    if setting == "spatial":
+        placed = instruct(EPISODE, setting, "resolved").command
+        assert list(leaking(commanding(said, placed), EPISODE))
     assert " in: " in words
-
-
-def test_a_landmark_in_the_command_leaks():
-    said = instruct(EPISODE, "spatial")
-    assert list(
-        leaking(commanding(said, instruct(EPISODE, "spatial", "resolved").command), EPISODE)
-    )
 
 
 @pytest.mark.parametrize(
@@ -174,18 +166,6 @@ def test_batches_cover_everything_once():
             batches(("PickXtimes",), (), seeds)
 
 
-def test_the_tables_count_what_failed():
-    found = ValidationResults()
-    for task in SPATIAL_TASKS[:2]:
-        found.add(check_episode(get_episode(task, "test", 0)))
-    found.failures.append(
-        RuleViolation("no leak", "PickXtimes", "direct", "PickXtimes/test/0", 1, "one")
-    )
-    text = printed(found, width=150)
-    assert "2 (1 broken)" in text
-    assert "1 of 1" in text
-
-
 def printed(found: ValidationResults, width: int) -> str:
     console = Console(width=width, file=io.StringIO())
     for table in validation_tables(found):
@@ -202,3 +182,7 @@ def test_the_tables_are_whole_at_80_columns():
     assert max(map(len, text.splitlines())) <= 80
     for word in (*all_tasks(), *plain_settings(), "harder", "direct-rival"):
         assert word in text, word  # nothing is folded
+    found.failures.append(
+        RuleViolation("no leak", "PickXtimes", "direct", "PickXtimes/test/3", 1, "one")
+    )
+    assert "(1 broken)" in printed(found, width=150)
