@@ -220,7 +220,7 @@ def alone(tmp_path_factory: pytest.TempPathFactory) -> dict[Job, dict[str, Any]]
     return play(plan, tmp_path_factory.mktemp("alone"), InProcess())
 
 
-@pytest.mark.parametrize(("workers", "batch"), slow_but([(2, 3)], [(2, 3), (0, 16), (5, 16)]))
+@pytest.mark.parametrize(("workers", "batch"), slow_but([(3, 3)], [(3, 3), (0, 16), (5, 16)]))
 def test_records_do_not_depend_on_workers_or_batches(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, alone: Any, workers: int, batch: int
 ) -> None:
@@ -236,8 +236,8 @@ def test_records_do_not_depend_on_workers_or_batches(
     sizes = [int(line) for line in (tmp_path / "sizes").read_text().split()]
     assert sum(sizes) == 8 * hosting_fakes.LENGTH / 4
     assert max(sizes) <= min(batch, max(workers, 1))
-    if workers == 2:  # episodes that wait are asked about together
-        assert max(sizes) == 2
+    if workers > 2:  # of three, two wait while one is asked about
+        assert max(sizes) > 1
     # One object, however many worlds there are.
     records = read_records(tmp_path / "run")
     made = {one.policy_metadata["made"] for one in records if "Batched" in one.policy}

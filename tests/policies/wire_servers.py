@@ -140,7 +140,6 @@ class MmeVlaServer(WireServer):
         self.delay = delay
         self.forget()
         self.parts, self.prompts, self.subgoals = [], [], []
-        self.bytes = 0
 
     def forget(self):
         self.frames, self.start, self.newest, self.inferences = 0, 0, None, 0
@@ -168,7 +167,6 @@ class MmeVlaServer(WireServer):
             self.start = message["exec_start_idx"]
         self.newest = images[-1, 0]
         self.parts.append(len(images))
-        self.bytes += images.nbytes
         return {"add_buffer_finished": True, "add_buffer_time_ms": 0.1}
 
     def infer(self, message):
