@@ -12,6 +12,7 @@ import pytest
 from selection import slow_but
 
 import roboirg
+from roboirg.core.environment_options import EnvironmentOptions
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.evaluation.play.rollout import EpisodeRunner
 from roboirg.evaluation.records.record import Job
@@ -195,6 +196,7 @@ def story(task=SHORT):
         split="test",
         episode=1,
         options=InstructionOptions("direct"),
+        environment=EnvironmentOptions(max_steps=80),
     )
     with tempfile.TemporaryDirectory() as folder:
         record = msgspec.structs.asdict(EpisodeRunner(Path(folder))(job))
