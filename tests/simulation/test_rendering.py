@@ -33,7 +33,7 @@ CULLING_ALONE = RenderSettings(slim_shader=False, meshes="stock")
 MANY_FRAMES = bool(os.environ.get("ROBOIRG_TEST_MANY_FRAMES"))
 """Whether to compare at least 500 frames of oracle's runs over all tasks, not a sample."""
 RUNS = [(name, 2) for name in all_tasks()] if MANY_FRAMES else [("VideoPlaceButton", 2)]
-FRAMES = 50 if MANY_FRAMES else 8
+FRAMES = 50 if MANY_FRAMES else 12
 """Of each run."""
 
 FAITHFUL_SHARE = 1e-5
