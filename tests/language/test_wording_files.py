@@ -250,6 +250,23 @@ def test_a_changed_file_is_other_wordings(tmp_path):
     assert open_wordings(None) is None
 
 
+def test_a_count_and_a_cube_may_be_one_phrase():
+    identity = opened(
+        """
+        [BinFill.phrases]
+        cubes = { "2 red" = "2 red cubes", "1 red" = "1 red cube" }
+        [[BinFill.commands]]
+        text = "put {cubes.0} into the bin, then press the button"
+        """
+    )
+    episode = replace(episode_with("BinFill"), goal=Goal.of(colors=("red",), counts=(2,)))
+    explicit = instruct(episode, wordings=identity)
+    assert explicit.text == "put 2 red cubes into the bin, then press the button"
+    assert [explicit.span(one) for one in explicit.mentions] == ["2 red cubes"]
+    for form in FORMS:
+        assert instruct(episode, "direct", form, wordings=identity).metadata["command"] != "own"
+
+
 OWN_SENTENCES = """
 [PickXtimes.phrases]
 color = { red = "the red cube", green = "the green cube", blue = "the blue cube" }
