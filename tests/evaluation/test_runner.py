@@ -80,13 +80,6 @@ def uninterrupted(tmp_path_factory: pytest.TempPathFactory) -> list[dict[str, ob
     return all_comparable(read_records(folder))
 
 
-def test_two_workers_give_the_same_records(
-    tmp_path: Path, uninterrupted: list[dict[str, object]]
-) -> None:
-    run_plan(small_plan(8), tmp_path, FakePlay(), LocalProcesses(2))
-    assert all_comparable(read_records(tmp_path)) == uninterrupted
-
-
 def test_after_sigkill_the_workers_are_gone_and_the_same_command_goes_on(
     tmp_path: Path, uninterrupted: list[dict[str, object]]
 ) -> None:

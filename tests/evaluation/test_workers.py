@@ -24,7 +24,7 @@ from roboirg.evaluation.play import watchdog
 from roboirg.evaluation.play.call_guard import CallGuard, attribute_errors
 from roboirg.evaluation.records.record import Job, Record
 from roboirg.evaluation.records.store import read_records
-from roboirg.evaluation.run.executor import LocalProcesses, take_job
+from roboirg.evaluation.run.executor import InProcess, LocalProcesses, take_job
 from roboirg.evaluation.run.runner import UNREACHABLE_AFTER, run_plan
 from roboirg.evaluation.run.workers import Worker
 
@@ -155,7 +155,7 @@ class Unreachable:
 
 def test_a_policy_that_cannot_be_reached_is_left_and_the_others_go_on(tmp_path: Path) -> None:
     plan = small_plan(15, ("random", "oracle"))
-    summary = run_plan(plan, tmp_path, Unreachable("random"), LocalProcesses(1))
+    summary = run_plan(plan, tmp_path, Unreachable("random"), InProcess())
     assert summary.unreachable == ("random",)
     played = len(summary.errors)
     assert UNREACHABLE_AFTER <= played <= UNREACHABLE_AFTER + 1  # one was under way

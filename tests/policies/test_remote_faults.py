@@ -62,8 +62,11 @@ def before_inference(protocol):
     return {"openpi": 0, "mme-vla": 2}.get(protocol, 1)
 
 
-@pytest.mark.parametrize("protocol", PROTOCOLS)
-@pytest.mark.parametrize(("reply", "words"), MALFORMED)
+@pytest.mark.parametrize(
+    ("protocol", "reply", "words"),
+    [("openpi", *one) for one in MALFORMED]
+    + [(protocol, *one) for protocol in ("mme-vla", "challenge") for one in MALFORMED[::4]],
+)
 def test_a_malformed_reply_is_reported_and_the_next_episode_works(protocol, reply, words):
     faults = [None] * before_inference(protocol) + [reply]
     with PROTOCOLS[protocol](faults=faults) as server:
