@@ -8,7 +8,6 @@ import pytest
 from msgspec.structs import replace
 
 from roboirg.core.episode import ENVIRONMENT_VERSION
-from roboirg.core.instruction_options import InstructionOptions
 from roboirg.core.policy_ref import unknown_policy
 from roboirg.evaluation.analysis.comparability import IMPLICIT, REAL, differences_of
 from roboirg.evaluation.analysis.published import MAX_STEPS
@@ -136,9 +135,3 @@ def test_the_table_of_a_run_marks_its_explicit_column(result, fields, signs, not
     assert [str(row.entries[0]) for row in table.rows[:2]] == list(signs)
     assert not any(row.entries[1].signs for row in table.rows)
     assert f"≠ not comparable with the published rate: {note}" in table.notes
-
-
-def test_imported_words_have_the_columns_of_our_own(result) -> None:
-    """The wording file is a condition; it is no option that would hide a result from a table."""
-    frame = make_frame([("run", play(result, settings=("explicit", "direct")))])
-    assert set(frame["options"]) == {InstructionOptions("explicit"), InstructionOptions("direct")}

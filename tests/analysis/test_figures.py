@@ -227,17 +227,6 @@ def test_no_text_leaves_the_figure_or_lies_on_another(
         assert min(across, down) <= 1, (one, other)
 
 
-def test_incomplete_policies_are_labeled_so() -> None:
-    lost = ("forgetful", InstructionOptions(), 0)
-    played = [one for one in results() if (one.policy, one.column, one.episode) != lost]
-    short = draw("gaps", content(played, planned=PLAN.jobs()))
-    labels = [words(label) for label in short.axes[0].get_yticklabels()]
-    assert labels == [
-        "listener (privileged), n = 3",
-        "forgetful (privileged) (incomplete), n = 2 to 3",
-    ]
-
-
 @pytest.mark.parametrize("kept", ["explicit", "direct"])
 def test_rates_without_another_setting_stand_alone(kept: str) -> None:
     found = content([one for one in results() if one.setting == kept and one.form == "implicit"])

@@ -67,25 +67,6 @@ def test_a_pack_has_the_results_of_its_folder(run: Path, tmp_path: Path) -> None
     pd.testing.assert_frame_equal(roboirg.results(f"{pack}:oracle"), whole)
 
 
-@pytest.mark.parametrize(
-    ("changes", "label"),
-    [
-        ({"language_version": "2"}, "listener, language 2"),
-        ({"environment_version": 2}, "listener, environment 2"),
-        ({"policy_version": "b"}, "listener, policy b"),
-        ({"max_steps": 100}, "listener, max steps 100"),
-        ({"meshes": "light"}, "listener, meshes light"),
-        ({"split": "val"}, "listener, split val"),
-    ],
-)
-def test_what_is_not_alike_is_not_averaged(result, changes, label) -> None:
-    frame = make_frame([("run", [result("success", 0), result("failure", 1, **changes)])])
-    assert {frame.names[key.policy_run]: cell.rate for key, cell in cells_of(frame).items()} == {
-        next(one for one in frame.names.values() if one != label): 1,
-        label: 0,
-    }
-
-
 def test_policies_of_their_own_versions_are_called_by_their_names(result) -> None:
     both = [result(policy=name, policy_version=name) for name in "ba"]
     assert list(make_frame([("run", both)]).names.values()) == ["a", "b"]

@@ -11,6 +11,7 @@ from collections.abc import Iterator
 from contextlib import ExitStack
 from pathlib import Path
 from time import monotonic
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -47,24 +48,13 @@ def records() -> tuple[Record, ...]:
     return (*filmed, broken(last))
 
 
-class Blank:
-    """A world that gets brighter."""
-
-    def __init__(self) -> None:
-        self.taken = 0
-
-    def picture(self, camera: str) -> np.ndarray:
-        self.taken += 1
-        return np.full((256, 256, 3), self.taken % 256, np.uint8)
-
-
 @pytest.fixture(scope="module")
 def run(tmp_path_factory: pytest.TempPathFactory) -> Source:
     """A run with records and one real film: 100 steps, every 8th of them, and the end."""
     folder = tmp_path_factory.mktemp("run")
     film = VideoWriter(folder / FILM)
     film.caption = "Do it."
-    world = Blank()
+    world = SimpleNamespace(picture=lambda _camera: np.full((256, 256, 3), 99, np.uint8))
     for step in range(0, 101, 8):
         film.add_frame(world, is_demonstration=step < 20)  # type: ignore[arg-type]
     assert film.finish()

@@ -38,11 +38,6 @@ class Page:
     def string(self, place: int) -> str:
         return str(self.data["strings"][place])
 
-    def cell(self, words: str) -> str:
-        """What the cell with such a place says, among everything."""
-        cells = self.data["matrix"]["levels"][0]["cells"]
-        return next("; ".join(c["note"]) for c in cells if words in c["note"][0])
-
 
 def records() -> list[Record]:
     """The last is an error."""
@@ -107,9 +102,6 @@ def test_what_is_amiss_is_said_first() -> None:
     page = Page(render([*found[:-6], found[-1]], PICKS))
     assert f"Incomplete: 5 of {len(found)} planned" in page.notes
     assert f"1 of {len(found) - 5} episodes ended in an error (1 policy)" in page.notes
-    assert "still to be played" in page.cell(
-        f"forgetful (privileged), PickXtimes, {found[-2].setting}"
-    )
     cells = page.data["matrix"]["levels"][0]["cells"]
     assert sum(cell.get("missing", 0) for cell in cells) == 5
     assert Page(render(found[:-1])).notes == ""

@@ -111,7 +111,6 @@ def test_mixed_render_devices_are_named(run: Path, tmp_path: Path) -> None:
     merged = tmp_path / "merged"
     for words in (
         ("records", "merge", *runs, "--out", merged),
-        ("tables", merged),
         ("tables", *runs),
         ("compare", *runs),
         ("report", merged),

@@ -90,13 +90,6 @@ def test_without_a_cue_learners_are_at_chance():
     assert max(found["scene-only"], found["majority"]) < 0.5
 
 
-def test_shuffled_labels_teach_nothing():
-    rng = np.random.default_rng(1)
-    colors = iter(rng.choice(COLORS, size=1000).tolist())
-    found = shares(lambda rng: (by_word(rng)[0], next(colors)))
-    assert max(found.values()) < 0.5
-
-
 def test_a_cue_of_the_scene_is_found_without_words():
     """In the video, the robot moves the cube that the goal asks for."""
     tasks = ((1000, 100), (5000, 40), (9000, 80))

@@ -286,24 +286,6 @@ def test_only_slots_that_a_text_touches_count():
     assert counted_slots((episode, instruct(episode))) == ()
 
 
-def test_the_table_of_the_documentation():
-    """One rule solves direct, contextual and most of reasoning; none solves spatial."""
-    rows = {row.group: row.shares for row in shortcut_rows(
-        ("PickXtimes", "VideoUnmask"), ("test",), ("direct", "reasoning", "contextual", "spatial"),
-        InstructionOptions(distractor="competing"),
-    )}  # fmt: skip
-    assert list(rows) == [("direct",), ("reasoning",), ("contextual",), ("spatial",)]
-    for setting in ("direct", "contextual"):
-        assert rows[setting,]["surface"] == (1, 1)
-        assert rows[setting,]["first-mention"].goals < 0.9
-    assert rows["contextual",]["last-mention"].goals == 0
-    assert 0.9 < rows["reasoning",]["surface"].goals < 1
-    assert rows["reasoning",]["first-mention"].goals < 0.5
-    for rule in SURFACE_RULES:
-        assert rows["spatial",][rule].slots == pytest.approx(1 / 3, abs=0.02)
-        assert rows["spatial",][rule].goals < rows["spatial",][CHANCE].goals
-
-
 def test_a_place_tells_no_color_but_that_of_another_cube():
     named = 0
     for episode in first_episodes("PickXtimes", "test", 50):
