@@ -298,6 +298,15 @@ def test_as_few_colors_are_excluded_as_leave_one():
     assert set(found) == {1, 2, 3}
 
 
+def test_goals_of_both_of_two_colors_exclude_none():
+    for index in range(60):
+        episode = get_episode("BinFill", "random", index)
+        colors = {cube.color for cube in episode.scene.of_kind("cube")}
+        if len(colors) == 2 == len(episode.goal.texts("colors")):
+            names = [name for name, _ in reasoning.possible_patterns(request_of(episode))]
+            assert names == ["number deduction"]
+
+
 def test_of_two_placements_none_is_told_by_its_direction():
     assert [step.name for step in sequence.steps(1, 2, (1, 2))] == ["neighbor"]
     assert [step.name for step in sequence.steps(2, 2, (1, 2))] == ["neighbor"]
