@@ -16,9 +16,9 @@ from pathlib import Path
 from typing import Literal, NamedTuple
 from xml.etree import ElementTree as ET
 
-By = Literal["folder", "file", "function", "item", "marker"]
-GROUPS: tuple[By, ...] = ("folder", "file", "function", "item", "marker")
-DEFAULT_TOP = 30
+By = Literal["folder", "file", "function", "item"]
+GROUPS: tuple[By, ...] = ("folder", "file", "function", "item")
+PROCESSOR = "./properties/property[@name='processor']"
 
 
 class TimedTest(NamedTuple):
@@ -27,14 +27,12 @@ class TimedTest(NamedTuple):
     Attributes:
         file: the file in which it stands, without suffix, such as ``tests/judging/test_judge``.
         name: its name with its parameters.
-        markers: names of its markers, separated by spaces.
         processor_s: the processor time that it took.
         seconds: how long it took.
     """
 
     file: str
     name: str
-    markers: str
     processor_s: float
     seconds: float
 
@@ -46,28 +44,21 @@ class TimedTest(NamedTuple):
             "file": self.file,
             "function": f"{self.file}::{function}",
             "item": f"{self.file}::{self.name}",
-            "marker": self.markers or "(none)",
         }
         return groups[by]
 
 
 def read_report(path: Path) -> list[TimedTest]:
     """Return the tests of a JUnit XML that pytest has written."""
-    tests = []
-    for case in ET.parse(path).iterfind(".//testcase"):  # noqa: S314 - our own
-        noted = {
-            one.get("name"): one.get("value", "") for one in case.iterfind("./properties/property")
-        }
-        tests.append(
-            TimedTest(
-                case.get("classname", "").replace(".", "/"),
-                case.get("name", ""),
-                noted.get("markers", ""),
-                float(noted.get("processor", "0")),
-                float(case.get("time", "0")),
-            )
+    return [
+        TimedTest(
+            case.get("classname", "").replace(".", "/"),
+            case.get("name", ""),
+            float(next((one.get("value", "") for one in case.iterfind(PROCESSOR)), "0")),
+            float(case.get("time", "0")),
         )
-    return tests
+        for case in ET.parse(path).iterfind(".//testcase")  # noqa: S314 - our own
+    ]
 
 
 def table(tests: list[TimedTest], by: By, top: int) -> str:
@@ -97,7 +88,7 @@ def main() -> None:
     parser.add_argument("reports", type=Path, nargs="+", metavar="XML")
     parser.add_argument("--by", choices=GROUPS, default="file", help="default: %(default)s")
     parser.add_argument(
-        "--top", type=int, default=DEFAULT_TOP, help="the number of groups; default: %(default)s"
+        "--top", type=int, default=30, help="the number of groups; default: %(default)s"
     )
     options = parser.parse_args()
     tests = [test for path in options.reports for test in read_report(path)]

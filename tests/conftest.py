@@ -18,6 +18,7 @@ from typing import Any
 
 import pytest
 from hypothesis import HealthCheck, settings
+from hypothesis.internal.conjecture import providers
 
 # Examples are derived from the test, not from the clock: CI finds what a laptop finds.
 settings.register_profile(
@@ -30,8 +31,14 @@ settings.load_profile("roboirg")
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 sys.dont_write_bytecode = False
 
-# One thread draws, as in the worker processes of a run: several workers test side by side.
-os.environ.setdefault("LP_NUM_THREADS", "1")
+# One thread draws and calculates, as in the worker processes of a run: several workers test side
+# by side, and threads that wait for each other take more time than they save.
+for name in ("LP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS"):
+    os.environ.setdefault(name, "1")
+
+# Hypothesis draws from the constants of all modules that are loaded: reading those takes seconds,
+# and the examples would depend on the tests before.
+providers._get_local_constants = providers.Constants
 
 # A shell starts background jobs with SIGINT ignored, which programs under test would inherit.
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
@@ -47,9 +54,6 @@ def _entry_points_on(path: tuple[str, ...], **wanted: str) -> importlib.metadata
 
 # A look at every installed package takes 10 ms, and each name that no policy has causes one.
 importlib.metadata.entry_points = lambda **wanted: _entry_points_on(tuple(sys.path), **wanted)
-
-MARKERS = ("slow", "sim", "browser")
-"""Those by which scripts/test_costs.py groups tests."""
 
 _BEGAN = pytest.StashKey[float]()
 
@@ -73,15 +77,12 @@ def pytest_configure(config: pytest.Config) -> None:
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Note the markers of each test in the JUnit XML; bring files with slow tests to the front.
+    """Bring files with slow tests to the front.
 
-    These take the longest. One that began last would leave all workers but its own without work.
+    They take the longest. One that began last would leave all workers but its own without work.
     """
     slow = {item.path for item in items if item.get_closest_marker("slow")}
     items.sort(key=lambda item: item.path not in slow)
-    for item in items:
-        found = [name for name in MARKERS if item.get_closest_marker(name) is not None]
-        item.user_properties.append(("markers", " ".join(found)))
 
 
 def _processor_s() -> float:

@@ -173,9 +173,7 @@ def test_the_page_teaches_a_new_verb():
          'does not read what follows the command: "3 times"'),
     ],
 )  # fmt: skip
-def test_values_of_no_goal_and_words_behind_the_command_are_named(
-    text, scene, task, complaint
-):
+def test_values_of_no_goal_and_words_behind_the_command_are_named(text, scene, task, complaint):
     found = interpret(text, scene, task)
     assert not found.goals
     assert complaint in found.not_understood

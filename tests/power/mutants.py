@@ -1,0 +1,200 @@
+"""What the tests find: stored faults, each put into a copy of the code that they were made from.
+
+    python tests/power/mutants.py FOLDER [--rooms ROOM ...] [--all] [--workers 2]
+
+Cosmic Ray 8.7 made the faults of mutants.csv from the code of COMMIT; of each room as many places
+as it has here were drawn with seed 69, and one fault of each place. A fault is tried with the test
+that found it last, then with the tests of its room; with --all, those that none found are tried,
+too. FOLDER gets the copies and results.csv, with which a second call goes on; at the end stands a
+table, and each fault that is found no longer.
+"""
+
+from __future__ import annotations
+
+import argparse
+import csv
+import os
+import re
+import shutil
+import subprocess
+import sys
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
+from pathlib import Path
+from queue import SimpleQueue
+from typing import NamedTuple
+
+COMMIT = "90940fc1"
+ROOT = Path(__file__).parents[2]
+STORED = Path(__file__).with_name("mutants.csv")
+TESTS = {
+    "judging": ("tests/judging", "tests/tasks"),
+    "tasks": ("tests/tasks", "tests/judging", "tests/language"),
+    "stats": ("tests/analysis", "tests/scripts"),
+    "store": ("tests/evaluation",),
+    "plan": ("tests/evaluation", "tests/test_wrong_invocations.py"),
+    "language": ("tests/language", "tests/apps/language_lab"),
+    "landmarks": ("tests/language",),
+    "reader": ("tests/reader", "tests/language", "tests/policies"),
+    "delivery": ("tests/test_delivery.py", "tests/language"),
+}
+"""Where the tests of each room are."""
+LIMIT_S = 1200.0
+"""A fault that keeps the tests busy for so long counts as found."""
+NOTHING_RUN = (4, 5)
+"""What pytest returns for a test that no longer exists, and where none is left."""
+FAILED = re.compile(r"^(?:FAILED|ERROR) (.+?)(?: - .*)?$", re.MULTILINE)
+
+
+class Mutant(NamedTuple):
+    """One fault.
+
+    Attributes:
+        number: its name.
+        room: the part of the code in which it lies.
+        module: its file, from ``src/roboirg`` on.
+        line: the first line that it changes.
+        was: the lines as they are.
+        now: the lines with the fault.
+        operator: what Cosmic Ray calls the change.
+        found_by: the test that found it; empty where none did.
+        equivalent: why no test can find it; empty if one could.
+    """
+
+    number: str
+    room: str
+    module: str
+    line: str
+    was: str
+    now: str
+    operator: str
+    found_by: str
+    equivalent: str
+
+    @contextmanager
+    def put_into(self, tree: Path) -> Iterator[None]:
+        """Change the file in a copy of the repository, and change it back."""
+        path = tree / "src/roboirg" / self.module
+        text = path.read_text("utf-8")
+        lines, first = text.splitlines(), int(self.line) - 1
+        until = first + len(self.was.splitlines())
+        if lines[first:until] != self.was.splitlines():
+            raise SystemExit(f"mutant {self.number} does not fit {path}")
+        try:
+            self._write(path, "\n".join([*lines[:first], self.now, *lines[until:]]) + "\n")
+            yield
+        finally:
+            self._write(path, text)
+
+    @staticmethod
+    def _write(path: Path, text: str) -> None:
+        """Leave no compiled module, which Python would take for a file of equal size and second."""
+        shutil.rmtree(path.parent / "__pycache__", ignore_errors=True)
+        path.write_text(text, encoding="utf-8")
+
+
+def first_failure(tree: Path, *tests: str) -> str:
+    """Return the first test that fails in a copy of the repository, or an empty text."""
+    command = [sys.executable, "-m", "pytest", "-x", "-q", "-p", "no:cacheprovider", *tests]
+    environment = {**os.environ, "PYTHONPATH": str(tree / "src")}
+    try:
+        done = subprocess.run(
+            [*command, "-m", "not slow"],
+            cwd=tree,
+            env=environment,
+            capture_output=True,
+            text=True,
+            check=False,
+            timeout=LIMIT_S,
+        )
+    except subprocess.TimeoutExpired:
+        return "timeout"
+    if done.returncode in (0, *NOTHING_RUN):
+        return ""
+    found = FAILED.search(done.stdout)
+    return found[1] if found else "collection"
+
+
+def found_by(mutant: Mutant, tree: Path) -> str:
+    """Return a test that finds a fault, or an empty text."""
+    with mutant.put_into(tree):
+        again = "::" in mutant.found_by and first_failure(tree, mutant.found_by)
+        return again or first_failure(tree, *TESTS[mutant.room])
+
+
+def copy(tree: Path) -> Path:
+    """Copy the working tree, with the source of COMMIT."""
+    if not tree.exists():
+        listed = ("git", "ls-files", "-z", "--cached", "--others", "--exclude-standard")
+        names = subprocess.check_output(listed, cwd=ROOT, text=True).split("\0")
+        for name in filter(lambda name: name and not name.startswith("src/"), names):
+            (tree / name).parent.mkdir(parents=True, exist_ok=True)
+            shutil.copy(ROOT / name, tree / name)
+        source = subprocess.Popen(
+            ("git", "archive", COMMIT, "src"), cwd=ROOT, stdout=subprocess.PIPE
+        )
+        subprocess.run(("tar", "x", "-C", str(tree)), stdin=source.stdout, check=True)
+    return tree
+
+
+def read(path: Path) -> list[list[str]]:
+    """Return the rows of a CSV file, without its header."""
+    with path.open(encoding="utf-8", newline="") as file:
+        return list(csv.reader(file))[1:]
+
+
+def table(mutants: list[Mutant], results: dict[str, str]) -> str:
+    """Return a line for each room, and one for each fault that is found no longer."""
+    lines = ["room       faults  equivalent  found before  found now"]
+    for room in (*TESTS, "all"):
+        ours = [one for one in mutants if one.number in results and room in (one.room, "all")]
+        same = sum(bool(one.equivalent) for one in ours)
+        before = sum(bool(one.found_by) for one in ours)
+        now = sum(bool(results[one.number]) for one in ours)
+        lines.append(f"{room:9} {len(ours):7} {same:11} {before:13} {now:10}")
+    lines += [
+        f"lost: {one.number} {one.module}:{one.line} {one.now.strip()}"
+        for one in mutants
+        if one.found_by and results.get(one.number) == ""
+    ]
+    return "\n".join(lines)
+
+
+def main() -> None:
+    """Try the faults that no earlier call has tried."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("folder", type=Path)
+    parser.add_argument("--rooms", nargs="+", choices=TESTS, default=list(TESTS))
+    parser.add_argument("--all", action="store_true")
+    parser.add_argument("--workers", type=int, default=2)
+    options = parser.parse_args()
+    mutants = [Mutant(*row) for row in read(STORED)]
+    trees: SimpleQueue[Path] = SimpleQueue()
+    for number in range(options.workers):
+        trees.put(copy(options.folder.absolute() / f"copy-{number}"))
+    stored = options.folder / "results.csv"
+    if not stored.exists():
+        stored.write_text("number,found_by\n", encoding="utf-8")
+    results = dict(read(stored))
+
+    def attempt(mutant: Mutant) -> None:
+        tree = trees.get()
+        results[mutant.number] = found_by(mutant, tree)
+        trees.put(tree)
+        with stored.open("a", encoding="utf-8", newline="") as file:
+            csv.writer(file).writerow((mutant.number, results[mutant.number]))
+
+    left = [
+        one
+        for one in mutants
+        if one.room in options.rooms and one.number not in results and (one.found_by or options.all)
+    ]
+    with ThreadPoolExecutor(options.workers) as pool:
+        for _ in pool.map(attempt, left):
+            pass
+    sys.stdout.write(table(mutants, results) + "\n")
+
+
+if __name__ == "__main__":
+    main()
