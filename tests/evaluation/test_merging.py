@@ -13,6 +13,7 @@ from roboirg.evaluation.records.episode_log import EpisodeLog, log_path
 from roboirg.evaluation.records.merging import merge_runs
 from roboirg.evaluation.records.record import Record
 from roboirg.evaluation.records.record_codec import StoreError, identity_key
+from roboirg.evaluation.records.run_files import PLAN_FILE, earlier_plans
 from roboirg.evaluation.records.store import RecordStore, read_records
 from roboirg.evaluation.run.executor import InProcess
 from roboirg.evaluation.run.runner import run_plan
@@ -39,6 +40,9 @@ def test_two_halves_make_the_whole(tmp_path: Path) -> None:
     assert read_records(tmp_path / "out") == records
     again = merge_runs(parts, tmp_path / "out")
     assert (again.added, again.duplicates) == (0, 10)
+    merge_runs([*parts, whole], tmp_path / "out")
+    (plan,) = earlier_plans(tmp_path / "out")  # or nobody could count what is missing
+    assert plan.read_bytes() == (whole / PLAN_FILE).read_bytes()
 
 
 def test_a_verdict_beats_an_error_and_the_first_verdict_a_later_one(tmp_path: Path) -> None:

@@ -136,6 +136,7 @@ def test_harder_settings_are_played_only_where_they_are_named() -> None:
 
 
 def test_every_setting_is_the_harder_ones_too() -> None:
+    assert make_plan(["random"], settings="all,direct-rival").settings == ("all", "direct-rival")
     for text in ("every", "direct, Every", "all,every"):
         plan = make_plan(["random"], tasks="StopCube,BinFill", settings=text, episodes="0-3")
         assert plan.settings == ("every",)

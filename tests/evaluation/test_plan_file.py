@@ -11,6 +11,7 @@ from roboirg.core.errors import InvalidValueError, UnknownNameError
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.evaluation.plan.plan_file import named_plans, read_plan_file
 from roboirg.evaluation.plan.plan_maker import make_plan
+from roboirg.evaluation.plan.plan_sections import WorkerNeeds
 from roboirg.evaluation.plan.stored_plans import write_plan
 from roboirg.language import STAGE_SETS, expressible
 from roboirg.language.settings import all_settings
@@ -115,7 +116,8 @@ def test_values_are_those_that_would_be_typed(
         ("- oracle", r"is of type list; it must be a mapping"),
         ("", r"is of type NoneType"),
         ("tasks: [", r"is not valid YAML"),
-        ("tasks: all\ntasks: real", r"line 2 has the key 'tasks' again"),
+        ("settings: &same direct\nforms: *same", r"line 2 has an alias"),
+        ("tasks: all\ntasks:\n  - real", r"line 2 has the key 'tasks' again"),
     ],
 )
 def test_what_is_no_plan_is_one_sentence(tmp_path: Path, text: str, sentence: str) -> None:
@@ -153,3 +155,10 @@ def test_a_plan_and_its_files_are_the_same_plan(tmp_path: Path, options: dict[st
         again = make_plan(found.pop("policies"), **found)
         assert again == plan
         assert again.fingerprint == plan.fingerprint
+
+
+def test_workers_are_placed_only_where_their_labels_are() -> None:
+    needs = WorkerNeeds(memory_gb=2.0, labels={"rack": "b"})
+    machine = {"Labels": {"rack": "b"}, "Resources": {"CPU": 9.0, "memory": 5e9}}
+    assert needs.slots(machine) == 2
+    assert needs.slots({**machine, "Labels": {"rack": "a"}}) == 0

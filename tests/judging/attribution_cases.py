@@ -178,7 +178,7 @@ def with_the_cube_in_the_hand(staged: Staged) -> None:
 
 @case("out_of_time", "ButtonUnmask", early=False)
 def above_the_button_without_pressing(staged: Staged) -> None:
-    staged.hover().tick(50)
+    staged.hover().set(off=(Fact("hovering", "robot", "button"),)).tick(50)
 
 
 @case("out_of_time", *UNMASK, early=False)

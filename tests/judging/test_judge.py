@@ -58,7 +58,8 @@ def test_what_ends_a_stage_is_not_held_against_the_next_in_the_same_step():
 
 def test_verdicts_are_final():
     judge = judged([stage(A, BAD)], [BAD], [A])
-    assert judge.status is Status.FAILURE
+    judge.fail("too late")
+    assert (judge.status, judge.cause) == (Status.FAILURE, "pressed button; expected: do it")
     judge = judged([stage(A, BAD)], [A], [BAD])
     assert judge.status is Status.SUCCESS
 

@@ -7,8 +7,8 @@ import pytest
 
 from roboirg.core.conditions import facts_of
 from roboirg.core.episode import Episode
-from roboirg.judging import Event, Judge
-from roboirg.judging.episode_replay import completed_stages, facts_by_step, rejudge
+from roboirg.judging import Event, Judge, Status
+from roboirg.judging.episode_replay import completed_stages, decide, facts_by_step, rejudge
 from roboirg.tasks import all_tasks
 from roboirg.tasks.splits.splits import get_episode
 
@@ -44,12 +44,15 @@ def test_judging_again_agrees_with_an_evaluation_of_every_step(task: str) -> Non
     for index in range(EPISODES):
         episode = get_episode(task, "test", index)
         events = random_events(episode, rng)
-        last = events[-1].step + 20
+        # StopCube's stages end by the time, without any event.
+        last = events[-1].step + (700 if task == "StopCube" else 20)
         judge = Judge((*episode.demonstration, *episode.stages), episode.scene)
-        expected = []
+        expected, decided = [], None
         for step, facts in enumerate(facts_by_step(events, last)):
             expected.append(judge.index - len(episode.demonstration))
             judge.update(step, facts)
+            if decided is None and judge.status is not Status.ONGOING:
+                decided = step
         replay = rejudge(episode, events, 0, last)
         assert replay.expected_stages == tuple(expected)
         found = replay.judge
@@ -57,6 +60,7 @@ def test_judging_again_agrees_with_an_evaluation_of_every_step(task: str) -> Non
         assert found.violation == judge.violation
         done = dict(replay.completions())
         assert completed_stages(episode, events, last) == done
+        assert decide(episode, events, last).step == (last if decided is None else decided)
         ends.add(judge.index)
     # Not all of them stand still at the first stage.
     assert max(ends) > 0

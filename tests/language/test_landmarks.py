@@ -197,6 +197,16 @@ def test_things_in_the_middle_of_a_row_are_told_by_a_higher_rank():
     assert {every[words].landmark.kind for words in by_rank} == {LandmarkClass.FOURTH_RANK}
 
 
+@pytest.mark.parametrize("count", [3, 4, 6])
+def test_a_place_has_these_words_and_no_others(count, snapshot):
+    """A rank too many or too few, or a class left out, shows in no text as long as others do."""
+    places = [(-0.15, 0.02), (0.12, -0.14), (0.04, 0.16), (-0.05, -0.09), (0.16, 0.07), (0.0, 0.0)]
+    thing = "container" if count > len(COLORS) else "cube"
+    scene = with_button(places[:count], (-0.2, 0)) if thing == "container" else cubes(places)
+    found = [(one.landmark, one.select()) for one in selectors(scene, thing, "robot")]
+    assert [f"{mark.level} {mark.phrase}: {item.name}" for mark, item in found if item] == snapshot
+
+
 def test_a_thing_is_told_among_a_few_that_stand_apart():
     # Two far ones and three near ones, in rows.
     scene = containers([(0.1, 0.1), (0.12, -0.1), (-0.1, 0.11), (-0.11, -0.09), (-0.12, 0.0)])

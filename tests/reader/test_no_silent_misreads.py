@@ -97,6 +97,8 @@ def test_is_understood(task, text, goal):
         ("PickXtimes", "Tom took the red cube. Take another cube.", "another cube"),
         ("PickXtimes", "Tom took the red cube. Take anything but that one.", "anything but that"),
         ("StopCube", "Stop the cube on the target.", "visit open: it can be 2 or 3 or 4 or 5"),
+        ("StopCube", "I wait for the third visit. Press just before or after that.",
+         "visit open: it can be 2 or 4"),
     ],
 )  # fmt: skip
 def test_is_named(task, text, named):

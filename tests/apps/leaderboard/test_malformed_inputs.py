@@ -455,6 +455,15 @@ def _with(name: str) -> Callable[[bytes], bytes]:
     return _repacked(lambda members: members.update({name: b"evil"}))
 
 
+def _swollen(good: bytes) -> bytes:
+    """Let the archive say of all files but the manifest that they have 4 GiB."""
+    content = bytearray(good)
+    for found in re.finditer(rb"PK\x01\x02", good):
+        if not good.startswith(MANIFEST.encode(), found.start() + 46):
+            struct.pack_into("<I", content, found.start() + 24, (4 << 30) - 2)
+    return bytes(content)
+
+
 PACKS: Mapping[str, tuple[Callable[[bytes], bytes], str]] = {
     "absolute path": (_with("/var/evil"), "not belong to a run"),
     "path that leaves": (_with("actions/../../evil"), "not belong to a run"),
@@ -466,6 +475,7 @@ PACKS: Mapping[str, tuple[Callable[[bytes], bytes], str]] = {
     "encrypted": (ENCRYPTED, "not a packed run"),
     "unknown compression": (UNKNOWN_METHOD, "not a packed run"),
     "cut short": (lambda good: good[:-100], "not a packed run"),
+    "says it is huge": (_swollen, "unpacks to more than 20 GiB"),
     "records of 70 MB of blanks": (
         _repacked(lambda all_: all_.update({RECORDS_FILE: b" " * 70_000_000})),
         "more than",

@@ -1,0 +1,59 @@
+"""How a planner failed, told from its record alone; tests/policies plays such episodes."""
+
+from __future__ import annotations
+
+import pytest
+from made_records import make_record
+from msgspec.structs import replace
+
+from roboirg.core.instruction_options import InstructionOptions
+from roboirg.core.subgoal_text import UNKNOWN_WORDS
+from roboirg.evaluation.analysis.stats.planner_failures import IDLE_STEPS, planner_failure
+from roboirg.evaluation.records.record import Attribution, Job, Record, SubgoalRecord
+
+WRONG = Attribution(kind="grounding", failure="wrong_object", sentence="It took another one.")
+
+
+@pytest.fixture(scope="module")
+def failed() -> Record:
+    options = InstructionOptions("explicit")
+    job = Job(policy="random", task="PickXtimes", split="test", episode=0, options=options)
+    record = make_record(job, "failure", "no")
+    return replace(record, policy_metadata={"planner": "made up"}, attribution=None)
+
+
+@pytest.mark.parametrize(
+    ("verdict", "attribution", "named"),
+    [
+        ("right", WRONG, "wrong thing"),
+        ("wrong_count", None, "wrong count"),
+        ("right", None, "hands"),
+    ],
+)
+def test_the_act_that_ended_the_episode_names_the_failure(
+    failed: Record, verdict: str, attribution: Attribution | None, named: str
+) -> None:
+    said = SubgoalRecord(step=5, text="pick up the cube", verdict=verdict)
+    record = replace(failed, steps=9, subgoals=(said,), attribution=attribution)
+    assert planner_failure(record) == named
+
+
+@pytest.mark.parametrize(
+    ("ended", "why", "ago", "named"),
+    [
+        ("refused", UNKNOWN_WORDS, 9, "unreadable"),
+        ("refused", "it fits two things", 9, "refused"),
+        ("done", None, 9, "went on too long"),
+        ("done", None, IDLE_STEPS + 1, "stopped early"),
+        ("failed", None, 9, "hands"),
+    ],
+)
+def test_the_last_subgoal_names_it_when_time_is_up(
+    failed: Record, ended: str, why: str | None, ago: int, named: str
+) -> None:
+    steps = failed.environment.max_steps
+    said = SubgoalRecord(
+        step=steps - ago, text="pick up the cube", verdict="right", ended=ended, why=why
+    )
+    record = replace(failed, steps=steps, subgoals=(said,), attribution=WRONG)
+    assert planner_failure(record) == named
