@@ -398,6 +398,13 @@ def one_swing_too_few(staged: Staged) -> None:
 
 
 @case("wrong_count", "SwingXtimes")
+def drops_it_before_the_last_swing_and_presses(staged: Staged) -> None:
+    last = max(at for at, kind in enumerate(kinds(staged)) if kind == "move_over")
+    staged.play(staged.episode.stages[:last])
+    staged.drop(staged.episode.stages[0].primitive.subject).press()
+
+
+@case("wrong_count", "SwingXtimes")
 def one_swing_too_many(staged: Staged) -> None:
     stages = staged.episode.stages
     staged.play((*stages[:3], *stages[1:-2]))

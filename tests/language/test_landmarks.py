@@ -240,6 +240,8 @@ def test_sides_of_the_camera_are_those_of_its_picture():
     assert phrases(scene, "container_1") >= {"farthest to your left"}
     assert phrases(scene, "container_0", frame="camera") >= {"farthest to the camera's right"}
     assert "farthest to the camera's right" not in phrases(scene, "container_1", frame="camera")
+    for one in landmarks(scene, "container", scene["container_0"], "camera"):
+        check_reader(scene, "container", one, scene["container_0"], "camera")
 
 
 def test_a_corner_is_used_only_if_it_does_not_matter_which_one_is_meant():

@@ -10,6 +10,7 @@ from language_variants import random_episodes
 from roboirg.core.episode import ALL_COLORS, Goal, Point, Scene, SceneObject
 from roboirg.language import instruct
 from roboirg.language.landmarks import MARGIN, landmarks
+from roboirg.language.phrases import anaphor, plain, swap_particles
 from roboirg.reader import interpret
 from roboirg.reader.places import DirectionalPlace, NamedPlace, read_places
 from roboirg.reader.tokens import split_sentences
@@ -100,3 +101,8 @@ def test_competing_remarks_name_colors_of_the_table_only(task):
         remarks = " ".join(one.text for one in said.utterances if one.stage == "distractor")
         named = set(ALL_COLORS) & set(remarks.replace(",", " ").split())
         assert named == colors - {episode.goal.text("color")}
+
+
+def test_a_pronoun_stands_between_a_verb_and_its_particle() -> None:
+    said = swap_particles((*plain("Pick up "), *anaphor("it", "it", "color", "green")))
+    assert "".join(piece.text for piece in said) == "Pick it up"
