@@ -4,8 +4,8 @@
 
 Cosmic Ray 8.7 made the faults of mutants.csv from the code of COMMIT; of each room as many places
 as it has here were drawn with seed 69, and one fault of each place. A fault is tried with the test
-that found it last, then with the tests of its room; with --all, those that none found are tried,
-too. FOLDER gets the copies and results.csv, with which a second call goes on; at the end stands a
+that found it last, with its file, then with the tests of its room; with --all, those that none
+found are tried, too. FOLDER gets the copies and results.csv, with which a second call goes on; at the end stands a
 table, and each fault that is found no longer.
 """
 
@@ -119,8 +119,11 @@ def first_failure(tree: Path, *tests: str) -> str:
 def found_by(mutant: Mutant, tree: Path) -> str:
     """Return a test that finds a fault, or an empty text."""
     with mutant.put_into(tree):
-        again = "::" in mutant.found_by and first_failure(tree, mutant.found_by)
-        return again or first_failure(tree, *TESTS[mutant.room])
+        file = mutant.found_by.partition("::")[0]
+        tries = [(mutant.found_by,), (file,)] if (tree / file).is_file() else []
+        return next(
+            filter(None, (first_failure(tree, *one) for one in (*tries, TESTS[mutant.room]))), ""
+        )
 
 
 def copy(tree: Path) -> Path:
