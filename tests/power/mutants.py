@@ -5,8 +5,8 @@
 Cosmic Ray 8.7 made the faults of mutants.csv from the code of COMMIT; of each room as many places
 as it has here were drawn with seed 69, and one fault of each place. A fault is tried with the test
 that found it last, with its file, then with the tests of its room; with --all, those that none
-found are tried, too. FOLDER gets the copies and results.csv, with which a second call goes on; at the end stands a
-table, and each fault that is found no longer.
+found are tried, too. FOLDER gets the copies and results.csv, with which a second call goes on; at
+the end stands a table, and each fault that is found no longer.
 """
 
 from __future__ import annotations
