@@ -214,6 +214,13 @@ def test_an_event_at_step_10_to_25_is_refused(run: Path) -> None:
         assert "$.events[0].step" in refusal(reader, run)
 
 
+def test_a_field_that_no_version_has_is_refused(run: Path) -> None:
+    for fields in ({"mentions": [{"luck": 1}]}, {"mentions": [], "luck": 1}):
+        record(**fields)(run)
+        for reader in (read_records, merge):
+            assert "unknown field `luck`" in refusal(reader, run)
+
+
 DAMAGED_LINES: Mapping[str, Change] = {
     "bytes that are no UTF-8": raw(b'"policy":"random"', b'"policy":"\xff\xfe"'),
     "overlong UTF-8": raw(b'"video":"videos/', b'"video":"videos/\xc0\xae\xc0\xae/'),
