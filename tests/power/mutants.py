@@ -16,11 +16,13 @@ import csv
 import os
 import re
 import shutil
+import signal
 import subprocess
 import sys
+import tempfile
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from queue import SimpleQueue
 from typing import NamedTuple
@@ -40,7 +42,7 @@ TESTS = {
     "delivery": ("tests/test_delivery.py", "tests/language"),
 }
 """Where the tests of each room are."""
-LIMIT_S = 1200.0
+LIMIT_S = 240.0
 """A fault that keeps the tests busy for so long counts as found."""
 NOTHING_RUN = (4, 5)
 """What pytest returns for a test that no longer exists, and where none is left."""
@@ -96,23 +98,28 @@ class Mutant(NamedTuple):
 
 def first_failure(tree: Path, *tests: str) -> str:
     """Return the first test that fails in a copy of the repository, or an empty text."""
-    command = [sys.executable, "-m", "pytest", "-x", "-q", "-p", "no:cacheprovider", *tests]
-    environment = {**os.environ, "PYTHONPATH": str(tree / "src")}
-    try:
-        done = subprocess.run(
-            [*command, "-m", "not slow"],
+    options = ("-x", "-q", "-p", "no:cacheprovider", "--timeout", "100", "-m", "not slow")
+    with tempfile.TemporaryFile("w+") as printed:
+        process = subprocess.Popen(
+            [sys.executable, "-m", "pytest", *options, *tests],
             cwd=tree,
-            env=environment,
-            capture_output=True,
-            text=True,
-            check=False,
-            timeout=LIMIT_S,
+            env={**os.environ, "PYTHONPATH": str(tree / "src")},
+            stdout=printed,
+            stderr=subprocess.STDOUT,
+            start_new_session=True,
         )
-    except subprocess.TimeoutExpired:
-        return "timeout"
-    if done.returncode in (0, *NOTHING_RUN):
-        return ""
-    found = FAILED.search(done.stdout)
+        try:
+            code = process.wait(LIMIT_S)
+        except subprocess.TimeoutExpired:
+            return "timeout"
+        finally:
+            with suppress(ProcessLookupError):
+                os.killpg(process.pid, signal.SIGKILL)
+            process.wait()
+        if code in (0, *NOTHING_RUN):
+            return ""
+        printed.seek(0)
+        found = FAILED.search(printed.read())
     return found[1] if found else "collection"
 
 
