@@ -102,6 +102,8 @@ def test_is_understood(task, text, goal):
         ("VideoUnmask", "Lift blue second, red.", '"second"'),
         ("StopCube", "I wait for the third visit. Press just before or after that.",
          "visit open: it can be 2 or 4"),
+        ("StopCube", "Press the button at the fourth visit. Press it at the second visit.",
+         "which position is meant, 2 or 4"),
     ],
 )  # fmt: skip
 def test_is_named(task, text, named):

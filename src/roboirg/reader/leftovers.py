@@ -67,8 +67,8 @@ def _complaints(command: Command, slots: Collection[str]) -> Iterator[str]:
             named = " and ".join(text[one.start : one.end] for one in mentions)
             yield f'does not know which number of times is meant, "{named}"'
     if not {"visit", "placement"}.isdisjoint(slots):
-        if len(set(named_positions(text))) > 1:
-            yield f"does not know which of the positions {set(named_positions(text))} is meant"
+        if len(positions := sorted(set(named_positions(text)))) > 1:
+            yield f"does not know which position is meant, {' or '.join(map(str, positions))}"
     elif "relation" not in slots:
         parts = (*command.handled, *command.added, *command.entered)
         used = {color for words in parts for color in colors_in(words)}
