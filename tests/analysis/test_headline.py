@@ -116,8 +116,9 @@ def test_it_stands_next_to_every_table_or_why_there_is_none(result, two_settings
     (run_table,) = make_run_tables(frame)
     assert note in make_table("main", RunData(frame)).notes
     assert note in run_table.notes
-    error = result("error", 20, options=InstructionOptions("spatial"))
-    assert notes_of([*enough(result), error])[0].endswith("20 episodes, incomplete.")
+    for setting in ("spatial", "explicit"):
+        error = result("error", 20, options=InstructionOptions(setting))
+        assert notes_of([*enough(result), error])[0].endswith("20 episodes, incomplete.")
     for results, reason in (
         (by_hand(result), "6 episodes cannot give it an interval; play more."),
         (

@@ -160,9 +160,10 @@ def test_videos_are_in_the_page_or_next_to_it(
 def test_two_runs_are_held_against_each_other(tmp_path: Path) -> None:
     theirs = tmp_path / "our theirs"
     found = records()
+    again = replace(found[0], policy_seed=7)  # a pair of its own
     runs = (
-        store(tmp_path / "ours", found, PICKS),
-        store(theirs, [replace(found[0], video=film(theirs)), *found[1:-4]], PICKS),
+        store(tmp_path / "ours", [*found, again], PICKS),
+        store(theirs, [replace(found[0], video=film(theirs)), *found[1:-4], again], PICKS),
     )
     with EpisodeLog(log_path(theirs, found[0].slug)) as log:
         os.write(log.descriptor, b"words")
@@ -179,7 +180,7 @@ def test_two_runs_are_held_against_each_other(tmp_path: Path) -> None:
     assert link == f"../our%20theirs/{log_path(Path(), found[0].slug)}"
     pairs = page.data["columns"]["pair"]
     # Both policies of both runs, but for the last four.
-    assert sorted(map(pairs.count, set(pairs))) == [3] * 4 + [4] * (len(found) // 2 - 4)
+    assert sorted(map(pairs.count, set(pairs))) == [2] + [3] * 4 + [4] * (len(found) // 2 - 4)
     assert "Incomplete: 4 of" in page.notes
     words = next(one for one in page.data["comparisons"] if (one["left"], one["right"]) == (0, 2))
     assert "listener, ours (privileged) against listener, our theirs" in words["sentences"][0]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes
+import itertools
 import os
 import re
 import signal
@@ -161,6 +162,17 @@ def test_a_policy_that_cannot_be_reached_is_left_and_the_others_go_on(tmp_path: 
     assert UNREACHABLE_AFTER <= played <= UNREACHABLE_AFTER + 1  # one was under way
     assert summary.missing == 30 - played
     assert sum(record.policy == "oracle" for record in read_records(tmp_path)) == 30
+
+
+def test_connection_errors_that_are_not_in_a_row_leave_no_policy(tmp_path: Path) -> None:
+    """A server that drops every other connection is slow, not gone."""
+    turns = itertools.cycle((Unreachable("random"), FakePlay()))
+
+    def play(job: Job) -> Record:
+        return next(turns)(job)
+
+    summary = run_plan(small_plan(UNREACHABLE_AFTER), tmp_path, play, InProcess())
+    assert (summary.unreachable, summary.missing) == ((), 0)
 
 
 def hand_out(jobs: deque[Job], workers: int) -> list[Job]:

@@ -601,6 +601,17 @@ def lifts_the_container_on_the_other_side_second(staged: Staged) -> None:
     staged.lift(sides[target])
 
 
+@case("mirrored_pick", "VideoUnmaskSwap")
+def lifts_second_what_is_opposite_the_second_alone(staged: Staged) -> None:
+    need(kinds(staged).count(PICK) >= 2)
+    sides, index = exchange_sides(staged), until(staged, PICK, 2)
+    wanted = [s.primitive.subject for s in staged.episode.stages if s.primitive.kind == PICK]
+    wrong = sides.get(staged.episode.stages[index].primitive.subject)
+    need(wrong)
+    need(sides.get(wanted[0], wrong) != wrong)
+    staged.lift(wrong)
+
+
 @case("wrong_object", "VideoUnmaskSwap")
 def lifts_first_what_is_opposite_the_second(staged: Staged) -> None:
     """Another object than the one opposite what is expected is any other one."""

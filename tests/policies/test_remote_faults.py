@@ -159,6 +159,20 @@ def test_a_server_that_stalls_while_it_is_sent_to():
         over.set()
 
 
+def test_a_server_that_never_speaks_is_given_up_after_the_time_to_connect():
+    over = threading.Event()
+
+    def say_nothing(peer):
+        shake_hands(peer)
+        over.wait(600)
+
+    with answering(say_nothing) as place:
+        policy = make_policy(f"openpi://{place}?connect=2&timeout=9", 0)
+        with pytest.raises(PolicyTimeoutError, match=r"did not send its metadata within 2 s"):
+            policy.reset(INSTRUCTION, {})
+        over.set()
+
+
 def test_a_surplus_reply_is_not_taken_for_the_next():
     said_twice = threading.Event()
 

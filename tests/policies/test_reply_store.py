@@ -13,6 +13,7 @@ from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
 from string import Template
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -20,7 +21,7 @@ from planning_fakes import TOKENS, Garbage, Status, fake_vlm, model_options, wor
 
 from roboirg.core.errors import BudgetError, ModelBusyError, PolicyReplyError
 from roboirg.policies.vlm.model_content import ChatTurn
-from roboirg.policies.vlm.models import ModelQuery
+from roboirg.policies.vlm.models import ModelQuery, reply_store
 from roboirg.policies.vlm.models.http_model import retry_after_s
 from roboirg.policies.vlm.models.reply_store import REPLIES_FILE, ReplySettings, use_replies
 from roboirg.policies.vlm.vlm_query import VLMQuery
@@ -239,6 +240,19 @@ def test_no_answered_call_is_made_again_after_a_kill(tmp_path: Path, kills: int)
         assert {name: found[name] for name in answered} == answered
         # What was under way when a process was killed may have been asked again, once for a kill.
         assert sum(found.values()) <= CALLS * (kills // 2) + kills
+
+
+def test_who_asks_at_the_same_moment_waits_for_all_before(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    waits: list[float] = []
+    clock = SimpleNamespace(time=lambda: 5.0, sleep=waits.append)
+    monkeypatch.setattr(reply_store, "time", clock)
+    store = reply_store.ReplyStore(ReplySettings(tmp_path), "episode")
+    for _ in range(3):
+        store.wait_for_turn("service", 60.0)
+    store.close()
+    assert waits == [1.0, 2.0]
 
 
 def test_processes_keep_one_limit_together(tmp_path: Path) -> None:

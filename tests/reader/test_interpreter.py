@@ -101,6 +101,8 @@ SCENE = Scene(
          "red", 4),
         ("My number is 2. Take the red cube, put it on the target twice as many times as that.",
          "red", 4),
+        ("My number is two. Take the red cube and put it on the target one time above that.",
+         "red", 3),
         ("Take the cube farthest from the button and put it on the target five times.", "blue", 5),
         ("Take the cube second from the right and put it on the target five times.", "blue", 5),
         ("I like green. Ignore the red thing. Pick it up and put it on the disc once.", "green", 1),

@@ -54,13 +54,13 @@ def test_undo_brings_back_what_was_before(small):
     plan, folder = small
     first, second, *_ = plan.trials
     trial_log = read(plan, folder)
-    trial_log.score(second, "dropped", operator="ann")
     trial_log.score(first, "success", operator="ann")
+    trial_log.score(second, "dropped", operator="ann")
     trial_log.score(first, "misplaced", operator="ann")
     steps = [
         (first.name, "scored", "success"),
-        (first.name, "open", "error"),
         (second.name, "open", "error"),
+        (first.name, "open", "error"),
     ]
     for name, state, outcome in steps:
         assert read(plan, folder).undo(operator="bob") == name
