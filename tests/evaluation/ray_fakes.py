@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 from evaluation_fakes import FakePlayer
 
@@ -26,15 +27,15 @@ class WithoutVulkan(FakePlayer):
 class WithoutModule(FakePlayer):
     """Cannot be loaded on the bad machine."""
 
-    def __reduce__(self) -> tuple[Callable[..., WithoutModule], tuple[Path, float]]:
-        return load, (self.folder, self.seconds)
+    def __reduce__(self) -> tuple[Callable[..., WithoutModule], tuple[object, ...]]:
+        return load, (self.folder, self.seconds, self.fatal, self.gate, self.closed)
 
 
-def load(folder: Path, seconds: float) -> WithoutModule:
+def load(*fields: Any) -> WithoutModule:
     """Load what plays."""
     if os.environ.get(BAD_MACHINE):
         raise ModuleNotFoundError("No module named 'needed_here'")
-    return WithoutModule(folder, seconds)
+    return WithoutModule(*fields)
 
 
 class NotingPlace(FakePlayer):

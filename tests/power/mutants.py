@@ -1,12 +1,13 @@
-"""What the tests find: stored faults, each put into a copy of the code that they were made from.
+"""What the tests find: stored faults, put into a copy of the code one at a time.
 
     python tests/power/mutants.py FOLDER [--rooms ROOM ...] [--all] [--workers 2]
 
-Cosmic Ray 8.7 made the faults of mutants.csv from the code of COMMIT; of each room as many places
-as it has here were drawn with seed 69, and one fault of each place. A fault is tried with the test
-that found it last, with its file, then with the tests of its room; with --all, those that none
-found are tried, too. FOLDER gets the copies and results.csv, with which a second call goes on; at
-the end stands a table, and each fault that is found no longer.
+Cosmic Ray 8.7 made the faults of mutants.csv from the code of November 2026; of each room as many
+places as it has here were drawn with seed 69, and one fault of each place. A fault is tried with
+the test that found it last, with its file, then with the tests of its room; with --all, those that
+none found are tried, too. FOLDER gets copies of the working tree and results.csv, with which a
+second call goes on; at the end stands a table, and each fault that is found no longer, or whose
+lines the code no longer has.
 """
 
 from __future__ import annotations
@@ -27,7 +28,6 @@ from pathlib import Path
 from queue import SimpleQueue
 from typing import NamedTuple
 
-COMMIT = "90940fc1"
 ROOT = Path(__file__).parents[2]
 STORED = Path(__file__).with_name("mutants.csv")
 TESTS = {
@@ -44,6 +44,8 @@ TESTS = {
 """Where the tests of each room are."""
 LIMIT_S = 240.0
 """A fault that keeps the tests busy for so long counts as found."""
+GONE = "gone"
+"""The result of a fault whose lines are not in the code."""
 NOTHING_RUN = (4, 5)
 """What pytest returns for a test that no longer exists, and where none is left."""
 FAILED = re.compile(r"^(?:FAILED|ERROR) (.+?)(?: - .*)?$", re.MULTILINE)
@@ -56,7 +58,7 @@ class Mutant(NamedTuple):
         number: its name.
         room: the part of the code in which it lies.
         module: its file, from ``src/roboirg`` on.
-        line: the first line that it changes.
+        line: where its lines stood.
         was: the lines as they are.
         now: the lines with the fault.
         operator: what Cosmic Ray calls the change.
@@ -75,17 +77,23 @@ class Mutant(NamedTuple):
     equivalent: str
 
     @contextmanager
-    def put_into(self, tree: Path) -> Iterator[None]:
-        """Change the file in a copy of the repository, and change it back."""
+    def put_into(self, tree: Path) -> Iterator[bool]:
+        """Change the file in a copy of the repository, and change it back.
+
+        Yields:
+            Whether the code still has its lines; if not, nothing is changed.
+        """
         path = tree / "src/roboirg" / self.module
-        text = path.read_text("utf-8")
-        lines, first = text.splitlines(), int(self.line) - 1
-        until = first + len(self.was.splitlines())
-        if lines[first:until] != self.was.splitlines():
-            raise SystemExit(f"mutant {self.number} does not fit {path}")
+        text = path.read_text("utf-8") if path.exists() else ""
+        lines, was = text.splitlines(), self.was.splitlines() or [""]
+        places = [at for at in range(len(lines)) if lines[at : at + len(was)] == was]
+        if not places:
+            yield False
+            return
+        at = min(places, key=lambda place: abs(place + 1 - int(self.line)))
         try:
-            self._write(path, "\n".join([*lines[:first], self.now, *lines[until:]]) + "\n")
-            yield
+            self._write(path, "\n".join([*lines[:at], self.now, *lines[at + len(was) :]]) + "\n")
+            yield True
         finally:
             self._write(path, text)
 
@@ -125,7 +133,9 @@ def first_failure(tree: Path, *tests: str) -> str:
 
 def found_by(mutant: Mutant, tree: Path) -> str:
     """Return a test that finds a fault, or an empty text."""
-    with mutant.put_into(tree):
+    with mutant.put_into(tree) as fits:
+        if not fits:
+            return GONE
         file = mutant.found_by.partition("::")[0]
         tries = [(mutant.found_by,), (file,)] if (tree / file).is_file() else []
         return next(
@@ -134,17 +144,13 @@ def found_by(mutant: Mutant, tree: Path) -> str:
 
 
 def copy(tree: Path) -> Path:
-    """Copy the working tree, with the source of COMMIT."""
+    """Copy the working tree."""
     if not tree.exists():
         listed = ("git", "ls-files", "-z", "--cached", "--others", "--exclude-standard")
         names = subprocess.check_output(listed, cwd=ROOT, text=True).split("\0")
-        for name in filter(lambda name: name and not name.startswith("src/"), names):
+        for name in filter(lambda name: (ROOT / name).is_file(), names):
             (tree / name).parent.mkdir(parents=True, exist_ok=True)
             shutil.copy(ROOT / name, tree / name)
-        source = subprocess.Popen(
-            ("git", "archive", COMMIT, "src"), cwd=ROOT, stdout=subprocess.PIPE
-        )
-        subprocess.run(("tar", "x", "-C", str(tree)), stdin=source.stdout, check=True)
     return tree
 
 
@@ -161,12 +167,12 @@ def table(mutants: list[Mutant], results: dict[str, str]) -> str:
         ours = [one for one in mutants if one.number in results and room in (one.room, "all")]
         same = sum(bool(one.equivalent) for one in ours)
         before = sum(bool(one.found_by) for one in ours)
-        now = sum(bool(results[one.number]) for one in ours)
+        now = sum(results[one.number] not in ("", GONE) for one in ours)
         lines.append(f"{room:9} {len(ours):7} {same:11} {before:13} {now:10}")
     lines += [
-        f"lost: {one.number} {one.module}:{one.line} {one.now.strip()}"
+        f"{results[one.number] or 'lost'}: {one.number} {one.module}:{one.line} {one.now.strip()}"
         for one in mutants
-        if one.found_by and results.get(one.number) == ""
+        if one.found_by and results.get(one.number) in ("", GONE)
     ]
     return "\n".join(lines)
 

@@ -102,8 +102,8 @@ def test_is_understood(task, text, goal):
         ("VideoUnmask", "Lift blue second, red.", '"second"'),
         ("StopCube", "I wait for the third visit. Press just before or after that.",
          "visit open: it can be 2 or 4"),
-        ("BinFill", "Put one red cube and the cube nearest to the one closest to you into the bin, "
-         "then press the button.", "there is nothing red"),
+        ("BinFill", "Put one red cube and the cube nearest to the one closest to you in the bin.",
+         "there is nothing red"),
         ("StopCube", "Press the button at the fourth visit. Press it at the second visit.",
          "which position is meant, 2 or 4"),
     ],
