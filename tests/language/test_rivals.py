@@ -29,7 +29,6 @@ from roboirg.tasks import all_tasks, get_task
 from roboirg.tasks.splits.splits import get_episode
 
 RIVAL = InstructionOptions("direct-rival")
-POINTERS = {"former": 0, "first": 0, "latter": 1, "second": 1, "last": 1}
 
 
 def told(task, split="test", count=12):

@@ -27,9 +27,7 @@ from roboirg.policies.prompt_length.tokenizer_file import prompt_limit, read_tok
 
 WORDS = ["Put", "the", "red", "cube", "into", "bin.", "Remember:", "green_one", "Zürich", "quokka"]
 TEXTS = st.lists(st.sampled_from(WORDS), min_size=1, max_size=30).map(" ".join)
-ANY_TEXTS = st.text(st.characters(exclude_categories=("Cs",)), max_size=60)
 LIMITS = st.integers(1, 80)
-ORDER = ("cut", "unknown", "heard")
 
 
 def prompt_limit_of(spec):

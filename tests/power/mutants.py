@@ -34,7 +34,7 @@ TESTS = {
     "judging": ("tests/judging", "tests/tasks"),
     "tasks": ("tests/tasks", "tests/judging", "tests/language"),
     "stats": ("tests/analysis", "tests/scripts"),
-    "store": ("tests/evaluation",),
+    "store": ("tests/evaluation", "tests/apps/leaderboard"),
     "plan": ("tests/evaluation", "tests/test_wrong_invocations.py"),
     "language": ("tests/language", "tests/apps/language_lab"),
     "landmarks": ("tests/language",),
@@ -196,15 +196,19 @@ def main() -> None:
 
     def attempt(mutant: Mutant) -> None:
         tree = trees.get()
-        results[mutant.number] = found_by(mutant, tree)
-        trees.put(tree)
+        try:
+            results[mutant.number] = found_by(mutant, tree)
+        finally:  # or the other workers would wait for it
+            trees.put(tree)
         with stored.open("a", encoding="utf-8", newline="") as file:
             csv.writer(file).writerow((mutant.number, results[mutant.number]))
 
     left = [
         one
         for one in mutants
-        if one.room in options.rooms and one.number not in results and (one.found_by or options.all)
+        if one.room in options.rooms
+        and one.number not in results
+        and (one.found_by or (options.all and not one.equivalent))
     ]
     with ThreadPoolExecutor(options.workers) as pool:
         for _ in pool.map(attempt, left):

@@ -60,10 +60,6 @@ def _exit(self):
     raise SystemExit(3)
 
 
-def _interrupt(self):
-    raise KeyboardInterrupt
-
-
 def _nan(self):
     return np.full(8, np.nan)
 

@@ -82,11 +82,6 @@ def _swap_files(lines: Lines, folder: Path, rng: random.Random) -> Lines:
     return lines
 
 
-def _leave_out(lines: Lines, _folder: Path, rng: random.Random) -> Lines:
-    lines.remove(rng.choice(lines))
-    return lines
-
-
 LATE = "timeout: the policy took more than 600 s"
 
 FORGERIES: dict[str, tuple[Forgery, str]] = {
