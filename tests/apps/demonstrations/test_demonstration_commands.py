@@ -40,7 +40,7 @@ def roboirg(monkeypatch, capsys):
     [
         ({}, "2 trajectories, 4 episodes, about 2,032 frames and 209 MB"),
         (
-            {"video": "prefix", "variations": 3, "outcomes": "all", "extra_actions": ["delta"]},
+            {"variations": 3, "disturbed": True, "outcomes": "all"},
             "6 trajectories, 12 episodes, about",
         ),
         ({"cameras": ["front"], "size": 96}, "2,032 frames and 14.9 MB"),

@@ -132,7 +132,7 @@ def test_failures_are_exported_only_on_request(export):
 
 
 def test_variations_are_trajectories_of_their_own(export):
-    found = list(read_dataset(export(tasks=("PickXtimes",), variations=3)))
+    found = list(read_dataset(export(tasks=("PickXtimes",), variations=3, disturbed=True)))
     assert [(one.name, len(one.actions)) for one in found] == [
         (f"PickXtimes/train/{episode}/{variation}", synthetic_trajectories.STEPS + variation)
         for episode in (0, 2)
@@ -187,7 +187,7 @@ def test_other_options_and_folders_are_refused(tmp_path, export, make_plan, monk
     ("changes", "message"),
     [
         ({"variations": 0}, "variations is 0; it must be at least 1"),
-        ({"variations": 2, "policy": "random"}, "only the oracle varies, and the policy is 'ran"),
+        ({"variations": 2}, "variations is 2, but only disturbed demonstrations vary"),
         ({"language_columns": True, "format": "lerobot-v2.1"}, "Language columns belong to"),
         ({"format": "robomme-hdf5", "pictures": "lossy-video"}, "holds lossless pictures"),
         ({"size": 8}, "size is 8; it must be an even number from 16"),
@@ -196,7 +196,7 @@ def test_other_options_and_folders_are_refused(tmp_path, export, make_plan, monk
         ({"disturbed": True, "format": "robomme-hdf5"}, "no place for one that was not executed"),
         *(
             ({"actions": "waypoint", **other}, "actions is 'waypoint': such frames have the")
-            for other in ({"format": "lerobot-v2.1"}, {"video": "prefix"}, {"variations": 2})
+            for other in ({"format": "lerobot-v2.1"}, {"video": "prefix"})
         ),
         *(
             ({"cameras": ("front",), **other}, r"cameras is front and size 256; .* both cam")

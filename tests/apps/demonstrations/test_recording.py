@@ -9,14 +9,10 @@ from pyarrow import parquet
 from roboirg.apps.demonstrations import export_run
 from roboirg.apps.demonstrations.dataset_reading import read_dataset
 from roboirg.apps.demonstrations.dataset_replay import replay
-from roboirg.apps.demonstrations.export_plan import RecordingJob
-from roboirg.apps.demonstrations.policy_choice import find_variation
 from roboirg.apps.demonstrations.trajectory import load_trajectory, read_depth, read_picture
 from roboirg.apps.demonstrations.trajectory_recorder import RecordingSpec, record_trajectory
 from roboirg.core.errors import MotionPlanningError
 from roboirg.envs.factory import make
-from roboirg.policies import play
-from roboirg.policies.builtin.oracle_policy import VariedOraclePolicy
 from roboirg.simulation.physics_settings import HOME_ACTION
 from roboirg.tasks.splits.splits import get_episode
 
@@ -96,17 +92,3 @@ def test_a_disturbed_expert_is_labeled_by_what_it_meant_and_replays_exactly(
         changed = replay(recorded)
         assert not changed.agrees
         assert changed.largest > 0.01
-
-
-@pytest.mark.slow
-def test_variations_differ_and_succeed():
-    episode = get_episode("PickXtimes", "train", 0)
-    steps = []
-    for variation in (1, 2):
-        job = RecordingJob("PickXtimes", "train", 0, variation, "oracle", None, RecordingSpec())
-        seed = find_variation(job)
-        env = make(episode, cameras=())
-        info = play(env, VariedOraclePolicy(seed))
-        assert info["status"] == "success"
-        steps.append(info["steps"])
-    assert len(set(steps)) == 2

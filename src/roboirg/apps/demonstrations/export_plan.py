@@ -56,7 +56,7 @@ class ExportPlan:
         video: frames of the video: left out, before the policy's frames, or a dataset apart.
         names: of the features: LeRobot's or openpi's.
         extra_actions: further descriptions of each action.
-        variations: trajectories per episode; all but the first vary.
+        variations: disturbed trajectories per episode.
         policy: who moves the robot.
         outcomes: whether failures are exported too.
         language_columns: whether the dataset has LeRobot's language columns.
@@ -103,10 +103,10 @@ class ExportPlan:
             known_name(kind, value, known)
         if self.variations < 1:
             raise InvalidValueError(f"variations is {self.variations}; it must be at least 1.")
-        if self.variations > 1 and self.policy != ORACLE:
+        if self.variations > 1 and not self.disturbed:
             raise InvalidValueError(
-                f"variations is {self.variations}, but only the oracle varies, and the policy is "
-                f"{self.policy!r}."
+                f"variations is {self.variations}, but only disturbed demonstrations vary; ask for "
+                "`disturbed: true`."
             )
         if self.language_columns and self.format != "lerobot-v3":
             raise InvalidValueError(
@@ -126,12 +126,10 @@ class ExportPlan:
                 "its action, so it has no place for one that was not executed."
             )
         form = (self.format, self.names, self.video, self.extra_actions)
-        fits = form == ("lerobot-v3", "lerobot", "none", ())
-        fits &= self.disturbed or self.variations == 1
-        if self.actions == "waypoint" and not fits:
+        if self.actions == "waypoint" and form != ("lerobot-v3", "lerobot", "none", ()):
             raise InvalidValueError(
                 "actions is 'waypoint': such frames have the format 'lerobot-v3', `names: lerobot`,"
-                " `video: none`, no extra_actions, and variations only with `disturbed: true`."
+                " `video: none` and no extra_actions."
             )
 
     def _check_pictures(self) -> None:
@@ -158,10 +156,6 @@ class ExportPlan:
             raise InvalidValueError(
                 "The format 'robomme-hdf5' has the video's frames before the policy's: ask for "
                 "`video: prefix`, or none."
-            )
-        if self.variations > 1:
-            raise InvalidValueError(
-                f"The format 'robomme-hdf5' has one trajectory per episode, not {self.variations}."
             )
 
     @property

@@ -18,6 +18,7 @@ from typing import NamedTuple
 from roboirg.apps.demonstrations import data_card
 from roboirg.apps.demonstrations.dataset_part import DatasetPart, DatasetWriter, RecordedTexts
 from roboirg.apps.demonstrations.export_plan import (
+    ORACLE,
     ExportPlan,
     FormatName,
     RecordingJob,
@@ -25,7 +26,6 @@ from roboirg.apps.demonstrations.export_plan import (
 )
 from roboirg.apps.demonstrations.formats import lerobot_v3, lerobot_v21, robomme_hdf5
 from roboirg.apps.demonstrations.formats.robomme_hdf5 import check_hdf5_support
-from roboirg.apps.demonstrations.policy_choice import choose_policy
 from roboirg.apps.demonstrations.trajectory import (
     TrajectoryFacts,
     drop_pictures,
@@ -36,6 +36,12 @@ from roboirg.apps.demonstrations.trajectory_recorder import record_trajectory
 from roboirg.core.episode import ENVIRONMENT_VERSION
 from roboirg.core.errors import InvalidValueError
 from roboirg.core.version import __version__
+from roboirg.policies import Policy, make_policy
+from roboirg.policies.builtin.waypoint_expert import (
+    Disturbance,
+    JointWaypointExpert,
+    WaypointExpert,
+)
 from roboirg.util.atomic_write import locked, write_atomically
 from roboirg.util.parallel_map import parallel_map
 from roboirg.util.parquet_support import check_parquet_support
@@ -188,6 +194,16 @@ def _record_job(folder: Path, job: RecordingJob, *, only_successes: bool) -> Non
         variation=job.variation,
         only_successes=only_successes,
     )
+
+
+def choose_policy(job: RecordingJob) -> Policy:
+    """Return the policy of a trajectory."""
+    disturbance = Disturbance() if job.spec.disturbed else None
+    if job.policy == ORACLE and job.spec.actions == WaypointExpert.actions:
+        return WaypointExpert(job.variation, disturbance)
+    if disturbance is not None:
+        return JointWaypointExpert(job.variation, disturbance)
+    return make_policy(job.policy, 0)
 
 
 def _is_usable(

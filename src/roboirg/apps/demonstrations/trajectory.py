@@ -44,7 +44,7 @@ class TrajectoryFacts:
         episode: position in the split.
         seed: of the scene.
         difficulty: of the scene.
-        variation: 0 is the oracle's own way, others differ from it by their seeds.
+        variation: seed of the disturbances.
         policy: who moved the robot.
         status: success, failure or timeout.
         cause: why it is no success; empty for a success.

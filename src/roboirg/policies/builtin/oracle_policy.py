@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, ClassVar
 
-import numpy as np
-
 from roboirg.core.episode import Goal
 from roboirg.policies.builtin.scripted import WORDLESS, ScriptedPolicy
 from roboirg.tasks import get_task
@@ -14,7 +12,6 @@ from roboirg.tasks.splits.splits import get_episode, split_size
 
 if TYPE_CHECKING:
     from roboirg.envs.environment import RoboIRGEnv
-    from roboirg.simulation.expert.primitives import MotionPrimitives
 
 
 class OraclePolicy(ScriptedPolicy):
@@ -26,20 +23,6 @@ class OraclePolicy(ScriptedPolicy):
     def decide(self, env: RoboIRGEnv, instruction: str) -> Goal | None:  # noqa: ARG002
         """Return the episode's goal; the instruction is ignored."""
         return env.episode.goal
-
-
-class VariedOraclePolicy(OraclePolicy):
-    """Executes the true goal with other grasps and speeds, detours, and recoveries from a miss.
-
-    The seed determines all of it; 0 is no exception.
-    """
-
-    def make_primitives(self, env: RoboIRGEnv) -> MotionPrimitives:
-        """Return the expert that executes the stages, with its variation drawn."""
-        from roboirg.simulation.expert.varied_primitives import MotionVariation, VariedPrimitives
-
-        rng = np.random.default_rng((env.episode.seed, self.seed))
-        return VariedPrimitives(env.session.world, MotionVariation.draw(rng), rng)
 
 
 class HabitPolicy(OraclePolicy):
