@@ -49,7 +49,7 @@ def exported_step(workload: Workload, coding: PictureCoding) -> float:
             start = time.perf_counter()
             session.step(action)
             pictures = cameras.pictures(CAMERAS)
-            tracks.add({f"{one}_rgb": pictures[one] for one in CAMERAS}, is_video=False)
+            tracks.add({f"{one}_rgb": pictures[one] for one in CAMERAS})
             durations.append(time.perf_counter() - start)
         tracks.finish()
     return statistics.median(durations)

@@ -14,7 +14,7 @@ PLAN = ExportPlan(
     split="train",
     episodes=(0, 1, 2, 3),
     settings=("explicit", "direct"),
-    video="sidecar",
+    video=True,
 )
 
 

@@ -71,7 +71,8 @@ def _recorded(episode, spec, only_successes, policy_name="oracle", variation=0):
         for row in range(rows):
             seen = {f"{one}_rgb": picture(one, episode.seed, row) for one in CAMERAS}
             seen |= {f"{one}_depth": depth(episode.seed, row) for one in CAMERAS}
-            tracks.add(seen, is_video=row < video_length)
+            tracks.add(seen)
+        tracks.finish()
         facts = TrajectoryFacts(
             task=episode.task,
             split=episode.split,
@@ -90,7 +91,6 @@ def _recorded(episode, spec, only_successes, policy_name="oracle", variation=0):
             depth=spec.depth,
             actions=spec.actions,
             disturbed=spec.disturbed,
-            picture_error=tracks.finish(),
         )
         arrays = arrays_of(
             episode, rows, video_length, has_depth=spec.depth, disturbed=spec.disturbed

@@ -38,19 +38,16 @@ def roboirg(monkeypatch, capsys):
 @pytest.mark.parametrize(
     ("choices", "size"),
     [
-        ({}, "2 trajectories, 4 episodes, about 2,032 frames and 209 MB"),
-        (
-            {"variations": 3, "disturbed": True, "outcomes": "all"},
-            "6 trajectories, 12 episodes, about",
-        ),
-        ({"cameras": ["front"], "size": 96}, "2,032 frames and 14.9 MB"),
+        ({}, "2 trajectories, 4 episodes\n"),
+        ({"variations": 3, "disturbed": True}, "6 trajectories, 12 episodes\n"),
+        ({"policy": "random"}, "4 trajectories, 4 episodes\n"),
     ],
 )
 def test_a_dry_run_says_how_big_it_gets_and_writes_nothing(roboirg, tmp_path, choices, size):
     words = ("export", "demonstrations", *FEW, *within(**choices), "--dry-run", "--out")
     code, out, err = roboirg(*words, tmp_path / "data")
     assert (code, out) == (0, "")
-    assert size in err
+    assert err == size
     assert not (tmp_path / "data").exists()
 
 
@@ -99,11 +96,9 @@ def test_recordings_speak_the_words_for_training(roboirg, tmp_path, synthetic, m
         (within(cameras="front"), "demonstrations.cameras is 'front'; "),
         (("--format", "lerobot-v2"), "There is no format 'lerobot-v2'; known: lerobot-v3,"),
         (("--pictures", "jpeg"), "There is no way to store pictures 'jpeg'"),
-        (within(video="first"), "demonstrations.video is 'first'; it must be 'none', 'pref"),
+        (within(video="first"), "demonstrations.video is 'first'; it must be a bool"),
         (("--split", "random", "--episodes", "all"), "say how many with --episodes"),
         (("--episodes", "101"), "There is no episode 100"),
-        (within(extra_actions=["tool"]), "demonstrations.extra_actions is ['tool']; it must"),
-        (within(names="mine"), "names is 'mine'; it must"),
         (within(outcomes="some"), "outcomes is 'some'; it must"),
         (within(policy="oracel"), "Did you mean 'oracle'?"),
         (
@@ -131,39 +126,13 @@ def test_a_replay_prints_what_deviates(roboirg, export, monkeypatch):
     def replay(recorded):
         final = 0.0 if recorded.index == 0 else 0.5
         status = "success" if recorded.index == 0 else "failure"
-        return ReplayResult(recorded.name, recorded.task, status, "success", 3, 6, final, final)
+        return ReplayResult(recorded.name, status, "success", 3, 6, final, final)
 
     monkeypatch.setattr(dataset_replay, "replay", replay)
     code, out, _ = roboirg("replay", root)
     assert code == 2
     assert "PickXtimes/train/2/0: failure after 3 of 6 steps (recorded: success)" in out
     assert "2 trajectories: 1 with the same verdict, 1 also with a final state" in out
-
-
-@pytest.mark.usefixtures("in_this_process")
-def test_a_stopped_replay_goes_on_where_it_was(roboirg, export, monkeypatch, tmp_path):
-    root, log = export(tasks=("PickXtimes",), episodes=(0, 2)), tmp_path / "replay.jsonl"
-    played = []
-
-    def replay(recorded):
-        played.append(recorded.index)
-        return ReplayResult(recorded.name, recorded.task, "success", "success", 6, 6, 0.0, 0.0)
-
-    monkeypatch.setattr(dataset_replay, "replay", replay)
-    whole = roboirg("replay", root, "--log", log)
-    lines = log.read_text()
-    log.write_text(lines[:-9])  # stopped in the middle of a line
-    assert roboirg("replay", root, "--log", log) == whole
-    assert log.read_text() == lines
-    assert played == [0, 2, 2]
-    log.write_text(lines.replace("/2/", "/3/"))
-    code, _, err = roboirg("replay", root, "--log", log)
-    assert code == 2
-    assert "has 'PickXtimes/train/3/0'" in err
-    log.write_text("{}\n")
-    code, _, err = roboirg("replay", root, "--log", log)
-    assert code == 2
-    assert "is no log of `roboirg replay`" in err
 
 
 def test_a_folder_without_a_data_set_cannot_be_replayed(roboirg, tmp_path):

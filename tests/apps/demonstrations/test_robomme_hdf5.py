@@ -62,7 +62,7 @@ def read_like_mme_vla(path):
 
 
 def test_time_steps_have_robommes_fields_and_a_builder_reads_what_was_recorded(export):
-    root = export(format="robomme-hdf5", video="prefix", settings=("explicit",))
+    root = export(format="robomme-hdf5", video=True, settings=("explicit",))
     with h5py.File(root / "record_dataset_VideoUnmask.h5", "r") as file:
         assert sorted(file) == ["episode_0", "episode_2"]
         for step in file["episode_0"]:
@@ -103,7 +103,7 @@ def test_time_steps_have_robommes_fields_and_a_builder_reads_what_was_recorded(e
 
 
 def test_several_settings_share_their_time_steps_and_actions_are_found_by_seed(export):
-    root = export(format="robomme-hdf5", video="prefix")
+    root = export(format="robomme-hdf5", video=True)
     goals = []
     for folder in ("explicit-implicit", "direct-implicit"):
         path = root / folder / "record_dataset_PickXtimes.h5"

@@ -15,7 +15,6 @@ from roboirg.cli.options import (
     Split,
     Tasks,
     Workers,
-    check_output_file,
 )
 from roboirg.core.plain_text import counted
 
@@ -24,8 +23,7 @@ if TYPE_CHECKING:
 
 
 OWN_OPTIONS = (
-    "cameras", "size", "video", "names", "extra_actions", "variations", "policy", "outcomes",
-    "language_columns", "actions", "disturbed",
+    "cameras", "size", "video", "variations", "policy", "outcomes", "actions", "disturbed",
 )  # fmt: skip
 """What is rare in an export: keys of a plan's section ``demonstrations``."""
 _TEST_WORDS = (
@@ -56,40 +54,31 @@ def export_demonstrations(
     ] = None,
     workers: Workers = None,
     dry_run: Annotated[
-        bool, typer.Option("--dry-run", help="Estimate the size and record nothing.")
+        bool, typer.Option("--dry-run", help="Count trajectories and episodes, and record nothing.")
     ] = False,
 ) -> None:
     """Export demonstrations for training, recorded once per episode, in the words of every setting.
 
-    A plan may have, under `demonstrations`: cameras, size, video, names, extra_actions, variations,
-    policy, outcomes, language_columns, actions, disturbed. Words are those for training unless it
-    has `wordings: test`.
+    A plan may have, under `demonstrations`: cameras, size, video, variations, policy, outcomes,
+    actions, disturbed. Words are those for training unless it has `wordings: test`.
 
     Example: roboirg export demonstrations --tasks PickXtimes --out data
     """
     from roboirg.apps.demonstrations.export_plan import ExportPlan, training_words
-    from roboirg.apps.demonstrations.export_run import run_export
-    from roboirg.apps.demonstrations.size_estimate import size_text
     from roboirg.cli.names import known_settings, known_tasks
-    from roboirg.cli.progress_bar import progress_bars
     from roboirg.evaluation.plan.option_parsing import parse_episodes
     from roboirg.policies import find_policy
-    from roboirg.util.processor import worker_count
 
     words = PlanWords(context, plan, "demonstrations", OWN_OPTIONS)
-    chosen = words.choices(ExportPlan)
+    chosen = {"video": format == "robomme-hdf5", **words.choices(ExportPlan)}
     find_policy(chosen.get("policy", ExportPlan.policy))
-    chosen.setdefault("video", "prefix" if format == "robomme-hdf5" else "none")
-    # Pictures in the tables of this format are read by openpi alone.
-    openpi = (format, pictures) == ("lerobot-v2.1", "png")
-    chosen.setdefault("names", "openpi" if openpi else "lerobot")
     split = words.given("split", split)
     # `validated` checks the names that are cast.
-    names_of_tasks = known_tasks(words.given("tasks", tasks))
+    names = known_tasks(words.given("tasks", tasks))
     made = ExportPlan(
-        tasks=names_of_tasks,
+        tasks=names,
         split=split,
-        episodes=parse_episodes(words.given("episodes", episodes), split, names_of_tasks),
+        episodes=parse_episodes(words.given("episodes", episodes), split, names),
         settings=known_settings(words.given("settings", settings)),
         forms=words.forms(),
         options=training_words(split, words.options()),
@@ -97,34 +86,40 @@ def export_demonstrations(
         pictures=cast("Any", pictures),
         **chosen,
     ).validated()
-    if made.options.wordings == "test":
+    _print_size(made)
+    if not dry_run:
+        _export(made, out, workers, trajectories)
+
+
+def _print_size(plan: ExportPlan) -> None:
+    from roboirg.apps.demonstrations.export_plan import recording_jobs
+
+    if plan.options.wordings == "test":
         typer.echo(_TEST_WORDS, err=True)
-    _print_estimate(made)
-    if dry_run:
-        return
-    count = worker_count(workers)
+    jobs = recording_jobs(plan)
+    episodes = sum(len(said) for _, said in jobs)
+    recorded = counted(len(jobs), "trajectory", "trajectories")
+    typer.echo(f"{recorded}, {counted(episodes, 'episode')}", err=True)
+
+
+def _export(plan: ExportPlan, out: Path, workers: int | None, trajectories: Path | None) -> None:
+    """Run an export with its progress; print what came of it."""
+    from rich.filesize import decimal
+
+    from roboirg.apps.demonstrations.export_run import run_export
+    from roboirg.cli.progress_bar import progress_bars
+    from roboirg.util.processor import worker_count
+
     with progress_bars() as show:
 
         def report(work: str, done: int, total: int, size: int) -> None:
-            show(work, done, total, size_text(size) if size else "")
+            show(work, done, total, decimal(size) if size else "")
 
-        summary = run_export(made, out, count, report, trajectories)
+        summary = run_export(plan, out, worker_count(workers), report, trajectories)
     ends = ", ".join(f"{number} {status}" for status, number in summary.statuses.items())
     typer.echo(
-        f"{counted(summary.episodes, 'episode')}, {size_text(summary.size)}: {out} "
+        f"{counted(summary.episodes, 'episode')}, {decimal(summary.size)}: {out} "
         f"(trajectories: {ends})"
-    )
-
-
-def _print_estimate(plan: ExportPlan) -> None:
-    from roboirg.apps.demonstrations.size_estimate import estimate_size, size_text
-
-    estimate = estimate_size(plan)
-    typer.echo(
-        f"{counted(estimate.trajectories, 'trajectory', 'trajectories')}, "
-        f"{counted(estimate.episodes, 'episode')}, about {estimate.frames:,} frames and "
-        f"{size_text(estimate.size)}",
-        err=True,
     )
 
 
@@ -133,10 +128,6 @@ def replay(
         Path,
         typer.Argument(help="Folder of an export, or of RoboMME's HDF5 files, or such a file."),
     ],
-    log: Annotated[
-        Path | None,
-        typer.Option(help="File with a line for each result; what is in it is not replayed again."),
-    ] = None,
 ) -> None:
     """Execute the actions of a dataset in the simulator, and compare states and verdicts.
 
@@ -147,10 +138,8 @@ def replay(
     from roboirg.apps.demonstrations.dataset_replay import TOLERANCE, replay_dataset
     from roboirg.util.processor import worker_count
 
-    if log is not None:
-        check_output_file(log)
     count, largest = Counter[str](), 0.0
-    for one in replay_dataset(dataset, worker_count(), log):
+    for one in replay_dataset(dataset, worker_count()):
         count["trajectories"] += 1
         count["same verdict"] += one.status == one.recorded_status
         count["agree"] += one.agrees

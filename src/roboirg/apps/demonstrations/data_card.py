@@ -6,9 +6,6 @@ from collections import Counter
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
-import numpy as np
-from numpy.typing import NDArray
-
 from roboirg.apps.demonstrations.dataset_part import DatasetPart
 from roboirg.apps.demonstrations.export_plan import ExportPlan
 from roboirg.apps.demonstrations.formats.training_lines import training_text
@@ -20,9 +17,11 @@ from roboirg.core.word_pools import pool_of
 from roboirg.language import LANGUAGE_VERSION
 from roboirg.util.media import CONTROL_RATE
 
-_BAR = 40
-_BINS = 12
-
+_STORED = {
+    "png": "without loss, as PNG",
+    "lossless-video": "without loss, as H.264 in RGB",
+    "lossy-video": f"with loss: H.264, yuv420p, constant rate factor {LOSSY_QUALITY}",
+}
 _MEANINGS = {
     "joint_angle": "absolute joint targets (rad) and the gripper, +1 open to -1 closed",
     "waypoint": "the tool's x, y, z (m), roll, pitch, yaw (rad, extrinsic x-y-z, unwrapped) in the "
@@ -42,7 +41,6 @@ def card_text(
         root: folder of the dataset.
     """
     lengths = list(_lengths(parts))
-    rows = np.repeat([length for length, *_ in lengths], [count for *_, count in lengths])
     lines = [
         "---",
         "license: apache-2.0",
@@ -54,17 +52,11 @@ def card_text(
         "",
         _head_line(plan),
         "",
-        *_count_lines(plan, lengths, rows, facts),
-        "",
-        "## Lengths",
-        "",
-        "```",
-        *_histogram(rows),
-        "```",
+        *_count_lines(plan, lengths, facts),
         "",
         "## Content",
         "",
-        *_content_lines(plan, facts),
+        *_content_lines(plan),
         "",
         "## Training",
         "",
@@ -90,22 +82,22 @@ def _lengths(parts: Sequence[DatasetPart]) -> Iterator[tuple[int, str, int]]:
     for part in parts:
         for episode in part.episodes:
             facts = load_facts(episode.path)
-            yield len(part.columns.rows(facts)), facts.task, len(episode.texts)
+            yield facts.frames, facts.task, len(episode.texts)
 
 
 def _count_lines(
     plan: ExportPlan,
     lengths: Sequence[tuple[int, str, int]],
-    rows: NDArray[np.int64],
     facts: Sequence[TrajectoryFacts],
 ) -> Iterator[str]:
-    yield "| task | trajectories | episodes | frames |"
-    yield "| --- | --- | --- | --- |"
-    for task in dict.fromkeys(task for _, task, _ in lengths):
-        own = [(length, count) for length, name, count in lengths if name == task]
+    yield "| task | trajectories | their frames | episodes | frames |"
+    yield "| --- | --- | --- | --- | --- |"
+    tasks = dict.fromkeys(task for _, task, _ in lengths)
+    for label, names in (*((task, {task}) for task in tasks), ("all", tasks)):
+        own = [(length, count) for length, name, count in lengths if name in names]
+        shortest, longest = min(own)[0], max(own)[0]
         episodes, frames = sum(count for _, count in own), sum(a * b for a, b in own)
-        yield f"| {task} | {len(own)} | {episodes} | {frames} |"
-    yield f"| all | {len(lengths)} | {len(rows)} | {int(rows.sum())} |"
+        yield f"| {label} | {len(own)} | {shortest} to {longest} | {episodes} | {frames} |"
     yield ""
     words = ", ".join(plan.settings)
     yield (
@@ -117,59 +109,18 @@ def _count_lines(
     yield f"Trajectories by outcome: {', '.join(f'{n} {status}' for status, n in ends.items())}."
 
 
-def _histogram(rows: NDArray[np.int64]) -> Iterator[str]:
-    if rows.min() == rows.max():
-        yield f"Each has {rows[0]} frames."
-        return
-    counts, edges = np.histogram(rows, bins=_BINS)
-    for count, low, high in zip(counts, edges, edges[1:], strict=False):
-        bar = "#" * round(_BAR * count / counts.max())
-        yield f"{low:7.0f} to {high:5.0f} frames {count:6d} {bar}".rstrip()
-
-
-def _content_lines(plan: ExportPlan, facts: Sequence[TrajectoryFacts]) -> Iterator[str]:
+def _content_lines(plan: ExportPlan) -> Iterator[str]:
     yield "State: seven joint angles (rad) and the first finger (m)."
     origin = "exactly what was executed"
     if plan.disturbed:
         origin = "what the **disturbed** expert should have done; `executed_action` is what it did"
     yield f"Action: {_MEANINGS[plan.actions]}; {origin}."
-    if plan.video == "prefix":
+    if plan.video:
         yield "Frames of the video come before the policy's, with `is_video_demo`."
-    elif plan.video == "sidecar":
-        yield "Frames of the videos are in the dataset `demonstration_videos` next to this one."
     else:
         yield "Frames of the videos are left out."
     if plan.pictures == "none":
         yield "There are no pictures."
         return
     yield f"Cameras: {', '.join(plan.cameras)}; {plan.size} × {plan.size} pixels."
-    if plan.pictures == "png":
-        yield "Pictures are stored without loss, as PNG."
-    elif plan.pictures == "lossless-video":
-        yield "Pictures are stored without loss, as H.264 in RGB; every one was compared."
-    else:
-        yield from _error_lines(facts)
-
-
-def _error_lines(facts: Sequence[TrajectoryFacts]) -> Iterator[str]:
-    yield (
-        f"Pictures are lossy: H.264, yuv420p, constant rate factor {LOSSY_QUALITY}. Measured on "
-        "every frame, of 255:"
-    )
-    for camera in ("front", "wrist"):
-        errors = [
-            (one.rows, error)
-            for one in facts
-            for name, error in one.picture_error.items()
-            if name.startswith(camera)
-        ]
-        if not errors:
-            continue
-        weights = [rows for rows, _ in errors]
-        mean = np.average([error["mean"] for _, error in errors], weights=weights)
-        largest = max(error["largest"] for _, error in errors)
-        worst = min(error["psnr"] for _, error in errors)
-        yield (
-            f"- {camera}: mean error {mean:.2f}, largest {largest:.0f}, lowest PSNR of a "
-            f"trajectory {worst:.1f} dB"
-        )
+    yield f"Pictures are stored {_STORED[plan.pictures]}."

@@ -63,10 +63,8 @@ class DatasetWriter(Protocol):
         plan: ExportPlan,
         root: Path,
         recorded: Sequence[RecordedTexts],
-        *,
-        is_video: bool = False,
     ) -> list[DatasetPart]:
-        """Return the parts of the dataset, or of the videos' frames, in order."""
+        """Return the parts of the dataset in order."""
 
     def write_part(self, part: DatasetPart) -> None:
         """Write the frames of a part; runs in a worker process."""
@@ -82,13 +80,13 @@ class RecordedTexts(NamedTuple):
     texts: tuple[TaskText, ...]
 
 
-def place_texts(columns: FrameColumns, recorded: Sequence[RecordedTexts]) -> list[RecordedEpisode]:
+def place_texts(recorded: Sequence[RecordedTexts]) -> list[RecordedEpisode]:
     """Give every instruction its place; trajectories without frames are left out."""
     texts: dict[str, int] = {}
     episode_index = first_index = 0
     placed = []
     for path, said in recorded:
-        length = len(columns.rows(load_facts(path)))
+        length = load_facts(path).frames
         if not length:
             continue
         own = []
@@ -120,14 +118,14 @@ def read_episodes(
             yield part, episode, load_trajectory(episode.path)
 
 
-def episode_row(trajectory: Trajectory, placed: PlacedText, length: int) -> dict[str, Any]:
+def episode_row(trajectory: Trajectory, placed: PlacedText) -> dict[str, Any]:
     """Return the row of an episode in the table of facts next to the dataset."""
     facts = trajectory.facts
     words = placed.words
     return {
         "episode_index": placed.episode_index,
         "from_index": placed.first_index,
-        "length": length,
+        "length": facts.frames,
         "video_length": facts.video_length,
         "steps": facts.steps,
         "status": facts.status,

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import functools
-import json
 from collections.abc import Iterator
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -29,7 +28,6 @@ class ReplayResult:
 
     Attributes:
         name: of the trajectory.
-        task: name of the task.
         status: how the replay ended.
         recorded_status: how the trajectory ended.
         steps: executed actions.
@@ -39,7 +37,6 @@ class ReplayResult:
     """
 
     name: str
-    task: str
     status: str
     recorded_status: str
     steps: int
@@ -53,46 +50,19 @@ class ReplayResult:
         return self.status == self.recorded_status and self.final <= TOLERANCE
 
 
-def replay_dataset(path: Path, workers: int, log: Path | None = None) -> Iterator[ReplayResult]:
+def replay_dataset(path: Path, workers: int) -> Iterator[ReplayResult]:
     """Replay every trajectory of a dataset, and yield the results as they come.
 
     Args:
         path: see `read_dataset`.
         workers: processes; 0 uses this one.
-        log: gets a line for each result; what is in it already is not replayed again.
 
     Raises:
-        InvalidValueError: the path holds no dataset, or one of episodes that do not exist here;
-            or the log is of another dataset, or no log.
+        InvalidValueError: the path holds no dataset, or one of episodes that do not exist here.
         MissingDependencyError: a package is not installed.
     """
-    trajectories = list(read_dataset(path))
-    known = {} if log is None else _read_log(log)
-    strange = known.keys() - {one.name for one in trajectories}
-    if strange:
-        raise InvalidValueError(f"{log} has {min(strange)!r}, which {path} does not have.")
-    yield from known.values()
-    missing = [one for one in trajectories if one.name not in known]
-    for _, result in parallel_map(replay, missing, workers):
-        if log is not None:
-            with log.open("a", encoding="utf-8") as file:
-                file.write(json.dumps(asdict(result)) + "\n")
+    for _, result in parallel_map(replay, list(read_dataset(path)), workers):
         yield result
-
-
-def _read_log(path: Path) -> dict[str, ReplayResult]:
-    """Return the results of a log by name; a last line that was cut off is removed."""
-    if not path.exists():
-        return {}
-    content = path.read_text(encoding="utf-8")
-    whole, _, rest = content.rpartition("\n")
-    if rest:
-        path.write_text(f"{whole}\n" if whole else "", encoding="utf-8")
-    try:
-        results = [ReplayResult(**json.loads(line)) for line in whole.splitlines()]
-    except (TypeError, json.JSONDecodeError) as error:
-        raise InvalidValueError(f"{path} is no log of `roboirg replay`: {error}.") from error
-    return {one.name: one for one in results}
 
 
 def replay(recorded: ReplayableTrajectory) -> ReplayResult:
@@ -115,7 +85,6 @@ def replay(recorded: ReplayableTrajectory) -> ReplayResult:
         env.close()
     return ReplayResult(
         recorded.name,
-        recorded.task,
         status,
         recorded.status,
         steps,

@@ -18,7 +18,7 @@ from roboirg.core.errors import InvalidValueError
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.core.observations import CAMERAS, check_cameras
 from roboirg.core.word_pools import pool_of
-from roboirg.language import FORMS, LANGUAGE_VERSION
+from roboirg.language import LANGUAGE_VERSION
 from roboirg.language.generator import instruct_with
 from roboirg.language.instruction_row import row
 from roboirg.language.settings import all_settings
@@ -28,9 +28,6 @@ from roboirg.util.media import PICTURE_SIZE
 from roboirg.util.short_hash import short_hash
 
 FormatName = Literal["lerobot-v3", "lerobot-v2.1", "robomme-hdf5"]
-VideoTreatment = Literal["none", "prefix", "sidecar"]
-KeyNames = Literal["lerobot", "openpi"]
-ExtraAction = Literal["delta", "pose"]
 Outcomes = Literal["successes", "all"]
 
 ORACLE = "oracle"
@@ -53,13 +50,10 @@ class ExportPlan:
         pictures: how they are stored.
         cameras: whose pictures are stored.
         size: width and height of the pictures, pixels.
-        video: frames of the video: left out, before the policy's frames, or a dataset apart.
-        names: of the features: LeRobot's or openpi's.
-        extra_actions: further descriptions of each action.
+        video: whether the frames of the video come before the policy's.
         variations: disturbed trajectories per episode.
         policy: who moves the robot.
         outcomes: whether failures are exported too.
-        language_columns: whether the dataset has LeRobot's language columns.
         actions: the action space, and what a frame is: a control step, or a waypoint.
         disturbed: whether the oracle is disturbed on its way.
     """
@@ -74,13 +68,10 @@ class ExportPlan:
     pictures: PictureCoding = "png"
     cameras: tuple[str, ...] = CAMERAS
     size: int = PICTURE_SIZE
-    video: VideoTreatment = "none"
-    names: KeyNames = "lerobot"
-    extra_actions: tuple[ExtraAction, ...] = ()
+    video: bool = False
     variations: int = 1
     policy: str = ORACLE
     outcomes: Outcomes = "successes"
-    language_columns: bool = False
     actions: Literal["joint_angle", "waypoint"] = "joint_angle"
     disturbed: bool = False
 
@@ -91,16 +82,8 @@ class ExportPlan:
             UnknownNameError: a name does not exist.
             InvalidValueError: a value or a combination is not possible.
         """
-        for kind, value, known in (
-            ("format", self.format, get_args(FormatName)),
-            ("way to store pictures", self.pictures, get_args(PictureCoding)),
-            ("way to treat the video", self.video, get_args(VideoTreatment)),
-            ("set of names", self.names, get_args(KeyNames)),
-            ("choice of outcomes", self.outcomes, get_args(Outcomes)),
-            *(("form", form, FORMS) for form in self.forms),
-            *(("description of actions", one, get_args(ExtraAction)) for one in self.extra_actions),
-        ):
-            known_name(kind, value, known)
+        known_name("format", self.format, get_args(FormatName))
+        known_name("way to store pictures", self.pictures, get_args(PictureCoding))
         if self.variations < 1:
             raise InvalidValueError(f"variations is {self.variations}; it must be at least 1.")
         if self.variations > 1 and not self.disturbed:
@@ -108,14 +91,8 @@ class ExportPlan:
                 f"variations is {self.variations}, but only disturbed demonstrations vary; ask for "
                 "`disturbed: true`."
             )
-        if self.language_columns and self.format != "lerobot-v3":
-            raise InvalidValueError(
-                f"Language columns belong to the format 'lerobot-v3'; this is {self.format!r}."
-            )
         self._check_disturbed()
         self._check_pictures()
-        if self.format == "robomme-hdf5":
-            self._check_hdf5()
         return self
 
     def _check_disturbed(self) -> None:
@@ -125,11 +102,10 @@ class ExportPlan:
                 "only the oracle is disturbed, and a time step of 'robomme-hdf5' is the result of "
                 "its action, so it has no place for one that was not executed."
             )
-        form = (self.format, self.names, self.video, self.extra_actions)
-        if self.actions == "waypoint" and form != ("lerobot-v3", "lerobot", "none", ()):
+        if self.actions == "waypoint" and (self.format != "lerobot-v3" or self.video):
             raise InvalidValueError(
-                "actions is 'waypoint': such frames have the format 'lerobot-v3', `names: lerobot`,"
-                " `video: none` and no extra_actions."
+                "actions is 'waypoint': such frames have the format 'lerobot-v3', and none is of "
+                "the video."
             )
 
     def _check_pictures(self) -> None:
@@ -141,31 +117,28 @@ class ExportPlan:
                 f"size is {self.size}; it must be an even number from {SMALLEST} to {PICTURE_SIZE}."
             )
         is_whole = (set(self.cameras), self.size) == (set(CAMERAS), PICTURE_SIZE)
-        if not is_whole and (self.format == "robomme-hdf5" or self.names == "openpi"):
+        if not is_whole and (self.format == "robomme-hdf5" or self.is_for_openpi):
             raise InvalidValueError(
                 f"cameras is {', '.join(self.cameras)} and size {self.size}; RoboMME's format and "
-                f"openpi's names have both cameras in {PICTURE_SIZE} pixels."
+                f"openpi have both cameras in {PICTURE_SIZE} pixels."
             )
-
-    def _check_hdf5(self) -> None:
-        if self.pictures != "png":
+        if self.format == "robomme-hdf5" and self.pictures != "png":
             raise InvalidValueError(
                 f"The format 'robomme-hdf5' holds lossless pictures; it has no {self.pictures!r}."
             )
-        if self.video == "sidecar":
-            raise InvalidValueError(
-                "The format 'robomme-hdf5' has the video's frames before the policy's: ask for "
-                "`video: prefix`, or none."
-            )
+
+    @property
+    def is_for_openpi(self) -> bool:
+        """Whether the features have openpi's names: it alone reads tables of this format."""
+        return (self.format, self.pictures) == ("lerobot-v2.1", "png")
 
     @property
     def recording(self) -> RecordingSpec:
         """What the trajectories must hold."""
-        is_video_apart = self.video == "sidecar" and self.pictures != "png"
         has_depth = self.format == "robomme-hdf5"
         return RecordingSpec(
-            self.pictures, self.video != "none", is_video_apart, has_depth, self.cameras, self.size,
-            self.actions, self.disturbed,
+            self.pictures, self.video, has_depth, self.cameras, self.size, self.actions,
+            self.disturbed,
         )  # fmt: skip
 
     def fingerprint(self) -> str:
@@ -220,8 +193,7 @@ class RecordingJob(NamedTuple):
         if self.options is not None:
             said = f"-{short_hash(self.policy)}-{self.options.setting}-{self.options.form}"
         spec: list[str] = [self.spec.coding]
-        spec += ["video"] * self.spec.video + ["apart"] * self.spec.is_video_apart
-        spec += ["depth"] * self.spec.depth
+        spec += ["video"] * self.spec.video + ["depth"] * self.spec.depth
         spec += self.spec.cameras * (self.spec.cameras != CAMERAS)
         spec += [str(self.spec.size)] * (self.spec.size != PICTURE_SIZE)
         spec += [self.spec.actions] * (self.spec.actions != ExportPlan.actions)

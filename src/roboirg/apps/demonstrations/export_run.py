@@ -47,8 +47,6 @@ from roboirg.util.parallel_map import parallel_map
 from roboirg.util.parquet_support import check_parquet_support
 
 WORK_FOLDER = ".export"
-VIDEO_DATASET = "demonstration_videos"
-"""Folder of the dataset of the videos' frames."""
 EXPORT_FILE = "meta/export.json"
 """What was exported, with its fingerprint; written when everything else is complete."""
 
@@ -124,11 +122,11 @@ def run_export(
             raise InvalidValueError(
                 f"None of the {len(jobs)} trajectories is a success; ask for `outcomes: all`."
             )
-        datasets = _datasets(plan, out, kept)
-        every = [part for parts in datasets for part in parts]
-        _write_parts(every, parts_folder, workers, report, keep=trajectories is not None)
-        episodes = _finish(plan, out, datasets, facts)
+        parts = WRITERS[plan.format].make_parts(plan, out, kept)
+        _write_parts(parts, parts_folder, workers, report, keep=trajectories is not None)
+        _finish(plan, out, parts, facts)
     statuses = Counter(one.status for one in facts)
+    episodes = sum(len(one.texts) for part in parts for one in part.episodes)
     return ExportSummary(len(missing), statuses, episodes, folder_size(out))
 
 
@@ -233,18 +231,6 @@ def _is_wanted(plan: ExportPlan, facts: TrajectoryFacts) -> bool:
     return plan.outcomes == "all" or facts.status == "success"
 
 
-def _datasets(
-    plan: ExportPlan, out: Path, kept: Sequence[RecordedTexts]
-) -> list[list[DatasetPart]]:
-    """Return the parts of each dataset of an export: of the videos' frames, then the main one."""
-    make = WRITERS[plan.format].make_parts
-    found = []
-    if plan.video == "sidecar":
-        found.append(make(plan, out / VIDEO_DATASET, kept, is_video=True))
-    found.append(make(plan, out, kept))
-    return [parts for parts in found if parts]
-
-
 def _write_parts(
     parts: Sequence[DatasetPart], folder: Path, workers: int, report: Report, *, keep: bool
 ) -> None:
@@ -253,21 +239,17 @@ def _write_parts(
     missing = [part for part in parts if not _mark(folder, part).exists()]
     done = len(parts) - len(missing)
     report("write", done, len(parts), 0)
-    uses = Counter(one.path for part in missing for one in part.episodes)
     for part, _ in parallel_map(_write_part, missing, workers):
         write_atomically(_mark(folder, part), "")
         done += 1
         report("write", done, len(parts), 0)
         for one in () if keep else part.episodes:
-            uses[one.path] -= 1
-            if not uses[one.path]:
-                drop_pictures(one.path)
+            drop_pictures(one.path)
 
 
 def _mark(folder: Path, part: DatasetPart) -> Path:
     """Return the file whose existence says that a part is complete."""
-    kind = "video" if part.columns.is_video_part else "main"
-    return folder / f"{kind}-{part.number:06d}"
+    return folder / f"{part.number:06d}"
 
 
 def _write_part(part: DatasetPart) -> None:
@@ -275,19 +257,13 @@ def _write_part(part: DatasetPart) -> None:
 
 
 def _finish(
-    plan: ExportPlan,
-    out: Path,
-    datasets: Sequence[Sequence[DatasetPart]],
-    facts: Sequence[TrajectoryFacts],
-) -> int:
-    """Write what describes the datasets, the main one last. Returns its number of episodes."""
-    for parts in datasets:
-        root = parts[0].root
-        write_atomically(root / "README.md", data_card.card_text(plan, parts, facts, root))
-        WRITERS[plan.format].finish(root, parts)
+    plan: ExportPlan, out: Path, parts: Sequence[DatasetPart], facts: Sequence[TrajectoryFacts]
+) -> None:
+    """Write what describes the dataset."""
+    write_atomically(out / "README.md", data_card.card_text(plan, parts, facts, out))
+    WRITERS[plan.format].finish(out, parts)
     content = {"fingerprint": plan.fingerprint(), "roboirg": __version__, "format": plan.format}
     write_atomically(out / EXPORT_FILE, json.dumps(content, indent=2) + "\n")
-    return sum(len(one.texts) for part in datasets[-1] for one in part.episodes)
 
 
 def folder_size(folder: Path) -> int:

@@ -13,26 +13,18 @@ from numpy.typing import NDArray
 from roboirg.apps.demonstrations.export_plan import ExportPlan, TaskText
 from roboirg.apps.demonstrations.feature_stats import FeatureStats, picture_stats, vector_stats
 from roboirg.apps.demonstrations.picture_coding import STORED_FORMATS
-from roboirg.apps.demonstrations.trajectory import Trajectory, TrajectoryFacts, picture_name
-from roboirg.apps.demonstrations.trajectory_recorder import video_name
+from roboirg.apps.demonstrations.trajectory import Trajectory, picture_name
 from roboirg.util.media import CONTROL_RATE
 
 JOINTS = [f"joint_{number}" for number in range(1, 8)]
 _POSE = ["x", "y", "z", "roll", "pitch", "yaw", "gripper"]
-_KEYS: Mapping[str, Mapping[str, str]] = {
-    "lerobot": {
-        "front": "observation.images.front",
-        "wrist": "observation.images.wrist",
-        "state": "observation.state",
-        "action": "action",
-    },
-    "openpi": {
-        "front": "image",
-        "wrist": "wrist_image",
-        "state": "state",
-        "action": "actions",
-    },
+_KEYS = {
+    "front": "observation.images.front",
+    "wrist": "observation.images.wrist",
+    "state": "observation.state",
+    "action": "action",
 }
+_OPENPI_KEYS = {"front": "image", "wrist": "wrist_image", "state": "state", "action": "actions"}
 
 EXECUTED = "executed_action"
 """Column of what was executed where that is not the action to learn."""
@@ -60,16 +52,14 @@ class FrameColumns:
 
     Args:
         plan: what is exported.
-        is_video_part: whether this is the dataset of the videos' frames, and not the main one.
     """
 
     plan: ExportPlan
-    is_video_part: bool = False
 
     @property
     def keys(self) -> Mapping[str, str]:
         """Names of the columns of ``front``, ``wrist``, ``state`` and ``action``."""
-        return _KEYS[self.plan.names]
+        return _OPENPI_KEYS if self.plan.is_for_openpi else _KEYS
 
     @property
     def has_videos(self) -> bool:
@@ -81,19 +71,6 @@ class FrameColumns:
         """Cameras whose pictures are stored."""
         return () if self.plan.pictures == "none" else self.plan.cameras
 
-    def rows(self, facts: TrajectoryFacts) -> range:
-        """Return the rows of a trajectory that are frames; the next row has a frame's action."""
-        if self.is_video_part:
-            return range(facts.video_length)
-        first = 0 if self.plan.video == "prefix" else facts.video_length
-        return range(first, facts.video_length + facts.steps)
-
-    def video(self, camera: str) -> str:
-        """Return the name of a camera's video in a trajectory's file."""
-        if self.plan.video != "sidecar":
-            return video_name(camera)
-        return video_name(camera, "demonstration" if self.is_video_part else "policy")
-
     def features(self) -> dict[str, dict[str, Any]]:
         """Return what ``info.json`` says of each column."""
         found = {self.keys[camera]: self._picture_feature() for camera in self.cameras}
@@ -102,10 +79,7 @@ class FrameColumns:
         found[self.keys["action"]] = _feature("float32", names)
         if self.plan.disturbed:
             found[EXECUTED] = _feature("float32", names)
-        if "delta" in self.plan.extra_actions:
-            found["delta_action"] = _feature("float32", [*JOINTS, "gripper"])
-        if "pose" in self.plan.extra_actions:
-            found["pose_action"] = _feature("float32", _POSE)
+        found["pose_action"] = _feature("float32", _POSE)
         found["next.reward"] = _feature("float32", ["reward"])
         found["next.done"] = _feature("bool", ["done"])
         found["next.success"] = _feature("bool", ["success"])
@@ -116,6 +90,10 @@ class FrameColumns:
         for name in ("frame_index", "episode_index", "index", "task_index"):
             found[name] = _feature("int64", [name])
         return found
+
+    def table_features(self) -> dict[str, dict[str, Any]]:
+        """Return the features that are columns of the tables: all but videos."""
+        return {name: one for name, one in self.features().items() if one["dtype"] != "video"}
 
     def _picture_feature(self) -> dict[str, Any]:
         feature: dict[str, Any] = {
@@ -139,31 +117,27 @@ class FrameColumns:
 
     def numbers(self, trajectory: Trajectory) -> dict[str, NDArray[Any]]:
         """Return the columns of numbers that do not depend on the instruction, (frames, size)."""
-        facts, rows = trajectory.facts, np.array(self.rows(trajectory.facts), dtype=np.int64)
-        actions = trajectory.targets[rows + 1].astype(np.float32)
+        facts = trajectory.facts
+        frames = np.arange(facts.frames, dtype=np.int64)
         columns: dict[str, NDArray[Any]] = {
-            self.keys["state"]: trajectory.state[rows],
-            self.keys["action"]: actions,
+            self.keys["state"]: trajectory.state[:-1],
+            self.keys["action"]: trajectory.targets[1:].astype(np.float32),
+            "pose_action": trajectory.pose_actions[1:].astype(np.float32),
         }
         if self.plan.disturbed:
-            columns[EXECUTED] = trajectory.actions[rows + 1].astype(np.float32)
-        if "delta" in self.plan.extra_actions:
-            moved = actions[:, :7] - trajectory.joint_positions[rows]
-            columns["delta_action"] = np.column_stack([moved, actions[:, 7]])
-        if "pose" in self.plan.extra_actions:
-            columns["pose_action"] = trajectory.pose_actions[rows + 1].astype(np.float32)
-        is_last = rows == facts.video_length + facts.steps - 1
+            columns[EXECUTED] = trajectory.actions[1:].astype(np.float32)
+        is_last = frames == facts.frames - 1
         is_success = is_last & (facts.status == "success")
         columns["next.reward"] = is_success.astype(np.float32)[:, None]
         columns["next.done"] = is_last[:, None]
         columns["next.success"] = is_success[:, None]
-        columns["is_video_demo"] = (rows < facts.video_length)[:, None]
-        frames = np.arange(len(rows), dtype=np.int64)
+        columns["is_video_demo"] = (frames < facts.video_length)[:, None]
         columns["timestamp"] = (frames / CONTROL_RATE).astype(np.float32)[:, None]
         columns["frame_index"] = frames[:, None]
         return columns
 
-    def indices(self, placed: PlacedText, length: int) -> dict[str, NDArray[np.int64]]:
+    @staticmethod
+    def indices(placed: PlacedText, length: int) -> dict[str, NDArray[np.int64]]:
         """Return the columns of indices of one instruction, (frames, 1)."""
         return {
             "episode_index": np.full((length, 1), placed.episode_index, dtype=np.int64),
@@ -173,16 +147,14 @@ class FrameColumns:
 
     def texts(self, trajectory: Trajectory) -> dict[str, list[str]]:
         """Return the columns of texts: what the robot does in the frame's action."""
-        rows = self.rows(trajectory.facts)
-        chosen = slice(rows.start + 1, rows.stop + 1)
         return {
-            "subgoal": trajectory.subgoals[chosen].tolist(),
-            "grounded_subgoal": trajectory.grounded_subgoals[chosen].tolist(),
+            "subgoal": trajectory.subgoals[1:].tolist(),
+            "grounded_subgoal": trajectory.grounded_subgoals[1:].tolist(),
         }
 
     def pictures(self, trajectory: Trajectory) -> dict[str, list[bytes]]:
         """Return the columns of PNGs."""
-        rows = self.rows(trajectory.facts)
+        rows = range(trajectory.facts.frames)
         with zipfile.ZipFile(trajectory.path) as archive:
             return {
                 self.keys[camera]: [archive.read(picture_name(camera, row)) for row in rows]
@@ -191,14 +163,7 @@ class FrameColumns:
 
     def picture_counts(self, trajectory: Trajectory) -> dict[str, NDArray[np.int64]]:
         """Return how often each value occurs in the frames of each camera's column."""
-        if self.is_video_part:
-            parts = slice(0, 1)
-        else:
-            parts = slice(0, 2) if self.plan.video == "prefix" else slice(1, 2)
-        return {
-            self.keys[camera]: trajectory.histograms[camera][parts].sum(axis=0)
-            for camera in self.cameras
-        }
+        return {self.keys[camera]: trajectory.histograms[camera] for camera in self.cameras}
 
     def stats(
         self,

@@ -42,11 +42,11 @@ def text_column(texts: Sequence[str]) -> Any:  # noqa: ANN401
 
 def write_frames(
     path: Path,
-    order: Sequence[str],
+    features: Mapping[str, Mapping[str, Any]],
     shared: Mapping[str, Any],
     own: Sequence[Mapping[str, Any]],
-    pictures: Sequence[str],
-    features: Mapping[str, Mapping[str, Any]] | None = None,
+    *,
+    is_described: bool = False,
 ) -> None:
     """Write the frames of one trajectory, once for each of its instructions.
 
@@ -54,36 +54,37 @@ def write_frames(
 
     Args:
         path: file to write.
-        order: names of the columns.
+        features: the columns in order, with what ``info.json`` says of them.
         shared: columns that are the same for every instruction.
         own: for each instruction its other columns.
-        pictures: names of the columns that hold pictures.
-        features: types of the columns, for readers that take them from the file.
+        is_described: whether the file holds the types of the columns, for readers that take them
+            from it.
     """
     import pyarrow as pa
     from pyarrow import parquet
 
-    tables = [pa.table({name: {**shared, **one}[name] for name in order}) for one in own]
+    tables = [pa.table({name: {**shared, **one}[name] for name in features}) for one in own]
     table = pa.concat_tables(tables)
-    if features is not None:
-        types = {name: _hugging_face_type(features[name]) for name in order}
+    if is_described:
+        types = {name: _hugging_face_type(one) for name, one in features.items()}
         described = json.dumps({"info": {"features": types}})
         table = table.replace_schema_metadata({"huggingface": described})
+    pictures = [name for name, one in features.items() if one["dtype"] == "image"]
     repeated = [f"{name}.bytes" for name in pictures] if len(own) > 1 else []
-    texts = [name for name in order if pa.types.is_string(table.schema.field(name).type)]
+    texts = [name for name, one in features.items() if one["dtype"] == "string"]
     with replacing(path) as part:
         parquet.write_table(
             table,
             part,
             compression={
-                **dict.fromkeys(order, "snappy"),
+                **dict.fromkeys(features, "snappy"),
                 **{f"{name}.bytes": "none" for name in pictures},
                 **{f"{name}.path": "snappy" for name in pictures},
             },
             use_dictionary=[*repeated, *texts],
             dictionary_pagesize_limit=_DICTIONARY_LIMIT,
             row_group_size=max(len(table), 1),
-            write_statistics=[name for name in order if name not in pictures],
+            write_statistics=[name for name in features if name not in pictures],
         )
 
 

@@ -1,10 +1,8 @@
-"""Encode pictures: PNG, or H.264 without loss or with a loss that is measured."""
+"""Encode pictures: PNG, or H.264 with or without loss."""
 
 from __future__ import annotations
 
 import io
-import math
-from collections import deque
 from fractions import Fraction
 from typing import Any, Literal
 
@@ -12,7 +10,6 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from roboirg.core.errors import RoboIRGError
 from roboirg.util.media import CONTROL_RATE, Pixels
 
 PictureCoding = Literal["png", "lossless-video", "lossy-video", "none"]
@@ -34,7 +31,6 @@ _CODECS: dict[str, tuple[str, str, dict[str, str]]] = {
 }
 STORED_FORMATS = {"lossless-video": "gbrp", "lossy-video": "yuv420p"}
 """The pixel format that a stored video has."""
-_MAX_VALUE = 255.0
 
 
 def encode_png(picture: Pixels) -> bytes:
@@ -53,100 +49,37 @@ def _png(image: NDArray[Any]) -> bytes:
 
 
 class VideoEncoder:
-    """Encodes one video in memory, and decodes every picture again to measure the loss.
+    """Encodes one video in memory.
 
     Args:
         coding: ``lossless-video`` or ``lossy-video``.
+        size: width and height of the pictures, pixels; an even number.
     """
 
-    def __init__(self, coding: PictureCoding) -> None:
+    def __init__(self, coding: PictureCoding, size: int) -> None:
         import av
 
         codec, pixels, quality = _CODECS[coding]
-        self._coding, self._file = coding, io.BytesIO()
+        self._file = io.BytesIO()
         self._container = av.open(self._file, "w", format="mp4")
         stream: Any = self._container.add_stream(codec, rate=Fraction(CONTROL_RATE))
-        stream.pix_fmt = pixels
+        stream.pix_fmt, stream.width, stream.height = pixels, size, size
         stream.options = {**quality, "preset": "veryfast", "g": str(KEY_FRAMES), "bf": "0"}
         stream.codec_context.thread_count = 1
         self._stream = stream
-        self._decoder: Any = None
-        self._waiting: deque[Pixels] = deque()
-        self._loss = _PictureLoss()
 
     def add(self, picture: Pixels) -> None:
-        """Encode a picture, RGB (height, width, 3); all have the same, even size."""
+        """Encode a picture, RGB (size, size, 3)."""
         import av
 
-        if self._decoder is None:
-            self._stream.height, self._stream.width = picture.shape[:2]
-        self._waiting.append(picture)
         frame = av.VideoFrame.from_ndarray(picture, format="rgb24")
-        self._take(self._stream.encode(frame))
+        self._container.mux(self._stream.encode(frame))
 
     def finish(self) -> bytes:
-        """Return the video as MP4.
-
-        Raises:
-            RoboIRGError: a lossless video does not decode to the same pictures.
-        """
-        self._take(self._stream.encode(None))
-        self._compare(self._decoder.decode(None))
+        """Return the video as MP4."""
+        self._container.mux(self._stream.encode(None))
         self._container.close()
-        if self._waiting or (self._coding == "lossless-video" and self._loss.largest):
-            raise RoboIRGError(
-                "The lossless video does not decode to the same pictures; this build of FFmpeg "
-                "cannot be used for it. Ask for --pictures png."
-            )
         return self._file.getvalue()
-
-    @property
-    def error(self) -> dict[str, float]:
-        """The loss so far: mean absolute and largest error (of 255), and PSNR (dB)."""
-        return self._loss.as_dict()
-
-    def _take(self, packets: list[Any]) -> None:
-        """Store packets, and compare the pictures that they decode to with the originals."""
-        import av
-
-        if self._decoder is None:
-            self._decoder = av.CodecContext.create("h264", "r")
-            self._decoder.extradata = self._stream.codec_context.extradata
-        for packet in packets:
-            self._compare(self._decoder.decode(packet))
-            self._container.mux(packet)
-
-    def _compare(self, frames: list[Any]) -> None:
-        for frame in frames:
-            self._loss.add(self._waiting.popleft(), frame.to_ndarray(format="rgb24"))
-
-
-class _PictureLoss:
-    """Sums up the errors of decoded pictures.
-
-    Attributes:
-        largest: error so far, of 255.
-    """
-
-    def __init__(self) -> None:
-        self.largest = 0
-        self._absolute = self._squared = self._count = 0
-
-    def add(self, original: Pixels, decoded: Pixels) -> None:
-        difference = np.abs(original.astype(np.int32) - decoded)
-        self.largest = max(self.largest, int(difference.max()))
-        self._absolute += int(difference.sum())
-        self._squared += int((difference * difference).sum())
-        self._count += difference.size
-
-    def as_dict(self) -> dict[str, float]:
-        mean_square = self._squared / max(self._count, 1)
-        psnr = 10.0 * math.log10(_MAX_VALUE**2 / mean_square) if mean_square else math.inf
-        return {
-            "mean": self._absolute / max(self._count, 1),
-            "largest": float(self.largest),
-            "psnr": psnr,
-        }
 
 
 def count_values(picture: Pixels) -> NDArray[np.int64]:

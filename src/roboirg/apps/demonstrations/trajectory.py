@@ -11,7 +11,7 @@ import io
 import json
 import zipfile
 from collections.abc import Iterator, Mapping
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
@@ -26,7 +26,7 @@ from roboirg.core.observations import CAMERAS
 from roboirg.util.atomic_write import replacing
 from roboirg.util.media import decode_png
 
-TRAJECTORY_VERSION = 1
+TRAJECTORY_VERSION = 2
 """Increases with any change of what a file holds."""
 SUFFIX = ".zip"
 
@@ -56,8 +56,6 @@ class TrajectoryFacts:
         depth: whether depth and calibration are stored.
         actions: name of the action space.
         disturbed: whether the actions that were executed are not those to learn from.
-        picture_error: of a lossy video, for each camera the mean absolute error, the largest error
-            (both of 255) and the PSNR (dB), over all of its frames; empty if lossless.
         version: of the file.
     """
 
@@ -78,13 +76,15 @@ class TrajectoryFacts:
     depth: bool
     actions: str = JOINT_ANGLE.name
     disturbed: bool = False
-    picture_error: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
     version: int = TRAJECTORY_VERSION
 
     @property
-    def rows(self) -> int:
-        """Number of observations: of the video, the policy's first, and one after each step."""
-        return self.video_length + 1 + self.steps
+    def frames(self) -> int:
+        """Number of observations that an action follows: all rows of the trajectory but the last.
+
+        The action of frame r is that of row r + 1.
+        """
+        return self.video_length + self.steps
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,9 +110,8 @@ class Trajectory:
         online_subgoals: (rows,) texts: what had to happen next, by the judge.
         grounded_subgoals: as `subgoals`, with the pixel of the object.
         grounded_online_subgoals: as `online_subgoals`, with the pixel of the object.
-        histograms: for each camera (2, 3, 256) int64: how often each value of red, green and blue
-            occurs in the video, and in the policy's rows without the last, after which no action
-            follows.
+        histograms: for each camera (3, 256) int64: how often each value of red, green and blue
+            occurs in the frames.
         calibration: ``front_extrinsic`` (rows, 3, 4), ``front_intrinsic`` (3, 3) and the same for
             the wrist, float32; empty without depth.
         labels: of a disturbed trajectory, what the undisturbed expert would have done, as
@@ -213,6 +212,11 @@ def write_arrays(
 def picture_name(track: str, row: int) -> str:
     """Return the name of one PNG of a track: a camera, or ``CAMERA_depth``."""
     return f"{track}/{row:06d}.png"
+
+
+def video_name(camera: str) -> str:
+    """Return the name of a camera's video in a trajectory's file."""
+    return f"{camera}.mp4"
 
 
 def read_picture(archive: zipfile.ZipFile, camera: str, row: int) -> NDArray[np.uint8]:

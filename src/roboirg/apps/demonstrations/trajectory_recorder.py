@@ -21,6 +21,7 @@ from roboirg.apps.demonstrations.picture_coding import (
 from roboirg.apps.demonstrations.trajectory import (
     TrajectoryFacts,
     picture_name,
+    video_name,
     write_arrays,
 )
 from roboirg.core.actions import (
@@ -41,7 +42,7 @@ from roboirg.envs.factory import make
 from roboirg.policies.contract.base import Policy
 from roboirg.policies.contract.play import EpisodeLoop
 from roboirg.util.atomic_write import replacing
-from roboirg.util.media import PICTURE_SIZE, scaled_square
+from roboirg.util.media import PICTURE_SIZE, Pixels, scaled_square
 
 if TYPE_CHECKING:
     from roboirg.envs.environment import RoboIRGEnv
@@ -55,7 +56,6 @@ class RecordingSpec(NamedTuple):
     Attributes:
         coding: how pictures are stored; with ``none`` nothing is drawn, and no subgoal has a pixel.
         video: whether the pictures of the video are stored.
-        is_video_apart: whether a stored MP4 holds the video and the policy's part in two files.
         depth: whether depth and calibration are stored.
         cameras: whose pictures are stored.
         size: width and height of the pictures, pixels.
@@ -65,7 +65,6 @@ class RecordingSpec(NamedTuple):
 
     coding: PictureCoding = "png"
     video: bool = False
-    is_video_apart: bool = False
     depth: bool = False
     cameras: tuple[str, ...] = CAMERAS
     size: int = PICTURE_SIZE
@@ -90,60 +89,38 @@ class PictureTracks:
     def __init__(self, archive: zipfile.ZipFile, spec: RecordingSpec) -> None:
         self._archive, self._spec = archive, spec
         self._rows = 0
-        self._encoders: dict[tuple[str, str], VideoEncoder] = {}
-        self.histograms = {camera: np.zeros((2, 3, 256), np.int64) for camera in spec.cameras}
-        self._uncounted: tuple[Mapping[str, Any], int] | None = None
+        has_videos = spec.coding not in ("png", "none")
+        self._encoders = {
+            camera: VideoEncoder(spec.coding, spec.size) for camera in spec.cameras if has_videos
+        }
+        self.histograms = {camera: np.zeros((3, 256), np.int64) for camera in spec.cameras}
+        self._uncounted: Mapping[str, Pixels] = {}
 
-    def add(self, pictures: Mapping[str, Any], *, is_video: bool) -> None:
+    def add(self, pictures: Mapping[str, Any]) -> None:
         """Add the pictures of a row: ``front_rgb`` and so on."""
         if self._spec.coding == "none":
             return
-        small = {
+        # The last row of all is never counted: no action follows it, so datasets leave it out.
+        for camera, picture in self._uncounted.items():
+            self.histograms[camera] += count_values(picture)
+        self._uncounted = {
             camera: scaled_square(pictures[f"{camera}_rgb"], self._spec.size)
             for camera in self._spec.cameras
         }
-        self._count_last()
-        self._uncounted = small, int(not is_video)
-        part = ""
-        if self._spec.is_video_apart:
-            part = "demonstration" if is_video else "policy"
-        for camera, picture in small.items():
-            if self._spec.coding == "png":
-                self._archive.writestr(picture_name(camera, self._rows), encode_png(picture))
+        for camera, picture in self._uncounted.items():
+            if camera in self._encoders:
+                self._encoders[camera].add(picture)
             else:
-                key = camera, part
-                if key not in self._encoders:
-                    self._encoders[key] = VideoEncoder(self._spec.coding)
-                self._encoders[key].add(picture)
+                self._archive.writestr(picture_name(camera, self._rows), encode_png(picture))
             if self._spec.depth:
                 name = picture_name(f"{camera}_depth", self._rows)
                 self._archive.writestr(name, encode_depth(pictures[f"{camera}_depth"]))
         self._rows += 1
 
-    def _count_last(self) -> None:
-        """Count the values of the row before.
-
-        The last row of all is never counted: no action follows it, so datasets leave it out.
-        """
-        if self._uncounted is not None:
-            pictures, part = self._uncounted
-            for camera, picture in pictures.items():
-                self.histograms[camera][part] += count_values(picture)
-
-    def finish(self) -> dict[str, dict[str, float]]:
-        """Store the videos; returns the errors of lossy ones by name."""
-        errors = {}
-        for (camera, part), encoder in self._encoders.items():
-            name = video_name(camera, part)
-            self._archive.writestr(name, encoder.finish())
-            if self._spec.coding == "lossy-video":
-                errors[name] = encoder.error
-        return errors
-
-
-def video_name(camera: str, part: str = "") -> str:
-    """Return the name of a camera's video: of all rows, or of ``demonstration`` or ``policy``."""
-    return f"{camera}_{part}.mp4" if part else f"{camera}.mp4"
+    def finish(self) -> None:
+        """Store the videos."""
+        for camera, encoder in self._encoders.items():
+            self._archive.writestr(video_name(camera), encoder.finish())
 
 
 def record_trajectory(
@@ -231,6 +208,7 @@ class _Recorder(EpisodeLoop):
             cause = str(self.take_turns(observation, info)["cause"] or "")
         except _GivenUpError as error:
             cause = str(error)
+        self._tracks.finish()
         facts = self._facts(policy_name, variation, info, cause)
         write_arrays(self._archive, facts, self._arrays(info))
         return facts
@@ -250,7 +228,7 @@ class _Recorder(EpisodeLoop):
         }
         if self._spec.depth:
             pictures |= {f"{name}_depth": cameras.depth(name) for name in CAMERAS}
-        self._tracks.add(pictures, is_video=True)
+        self._tracks.add(pictures)
 
     def begin(self) -> tuple[dict[str, Any], dict[str, Any]]:
         """Start the episode; store the policy's first observation, after a step at home."""
@@ -303,7 +281,7 @@ class _Recorder(EpisodeLoop):
         online: str,
     ) -> None:
         rows = self._rows
-        self._tracks.add(observation, is_video=False)
+        self._tracks.add(observation)
         pictures = ("_rgb", "_depth")
         kept = {key: value for key, value in observation.items() if not key.endswith(pictures)}
         rows.observations.append(kept)
@@ -334,7 +312,6 @@ class _Recorder(EpisodeLoop):
             depth=self._spec.depth,
             actions=self._spec.actions,
             disturbed=self._spec.disturbed,
-            picture_error=self._tracks.finish(),
         )
 
     def _arrays(self, info: Mapping[str, Any]) -> dict[str, NDArray[Any]]:

@@ -18,9 +18,8 @@ from roboirg.apps.demonstrations.dataset_part import (
 )
 from roboirg.apps.demonstrations.formats.lerobot_v3 import (
     INFO,
-    ROBOT,
     StatsCollector,
-    count_frames,
+    common_info,
     frame_columns,
     make_parts,
     own_columns,
@@ -31,7 +30,6 @@ from roboirg.apps.demonstrations.frame_columns import FrameColumns
 from roboirg.apps.demonstrations.parquet_tables import write_frames, write_rows
 from roboirg.apps.demonstrations.trajectory import load_trajectory
 from roboirg.util.atomic_write import write_atomically
-from roboirg.util.media import CONTROL_RATE
 
 __all__ = ["finish", "make_parts", "write_part"]
 
@@ -45,15 +43,12 @@ def write_part(part: DatasetPart) -> None:
     (episode,), columns = part.episodes, part.columns
     trajectory = load_trajectory(episode.path)
     shared = frame_columns(columns, trajectory)
-    length = len(columns.rows(trajectory.facts))
-    pictures = [] if columns.has_videos else [columns.keys[one] for one in columns.cameras]
     for placed in episode.texts:
         if columns.has_videos:
             write_videos(part, partial(_VIDEO.format, **_place(placed.episode_index)))
-        own = own_columns(columns, trajectory, placed, length)
-        order = [name for name in columns.features() if name in shared or name in own]
+        own = own_columns(placed, trajectory.facts.frames)
         path = part.root / _DATA.format(**_place(placed.episode_index))
-        write_frames(path, order, shared, [own], pictures, columns.features())
+        write_frames(path, columns.table_features(), shared, [own], is_described=True)
 
 
 def _place(episode_index: int) -> dict[str, int]:
@@ -66,14 +61,12 @@ def finish(root: Path, parts: Sequence[DatasetPart]) -> None:
     collector = StatsCollector(columns)
     episodes, stats, facts = [], [], []
     for _, episode, trajectory in read_episodes(parts):
-        length = len(columns.rows(trajectory.facts))
         for placed in episode.texts:
-            index = placed.episode_index
-            tasks = [placed.words.text]
-            episodes.append({"episode_index": index, "tasks": tasks, "length": length})
-            own = collector.add(trajectory, placed)
-            stats.append({"episode_index": index, "stats": own})
-            facts.append(episode_row(trajectory, placed, length))
+            name = {"episode_index": placed.episode_index}
+            length = trajectory.facts.frames
+            episodes.append({**name, "tasks": [placed.words.text], "length": length})
+            stats.append({**name, "stats": collector.add(trajectory, placed)})
+            facts.append(episode_row(trajectory, placed))
     texts = all_texts(parts)
     tasks_lines = [{"task_index": index, "task": text} for index, text in enumerate(texts)]
     write_rows(root / EPISODE_TABLE, facts)
@@ -82,7 +75,16 @@ def finish(root: Path, parts: Sequence[DatasetPart]) -> None:
     _write_lines(root / "meta/tasks.jsonl", tasks_lines)
     write_json(root / "meta/stats.json", collector.result())
     write_json(root / "meta/modality.json", modality(columns))
-    write_json(root / INFO, _info(columns, parts, len(texts)))
+    info = common_info(parts, texts)
+    count, videos = info["total_episodes"], len(columns.cameras) * columns.has_videos
+    more = {
+        "codebase_version": "v2.1",
+        "total_videos": count * videos,
+        "total_chunks": (count - 1) // CHUNK_SIZE + 1,
+        "data_path": _DATA,
+        "video_path": _VIDEO if columns.has_videos else None,
+    }
+    write_json(root / INFO, info | more)
 
 
 def modality(columns: FrameColumns) -> dict[str, Any]:
@@ -99,25 +101,6 @@ def modality(columns: FrameColumns) -> dict[str, Any]:
         },
         "video": {camera: {"original_key": columns.keys[camera]} for camera in columns.cameras},
         "annotation": {"human.task_description": {"original_key": "task_index"}},
-    }
-
-
-def _info(columns: FrameColumns, parts: Sequence[DatasetPart], texts: int) -> dict[str, Any]:
-    count, frames = count_frames(columns, parts[-1].episodes[-1])
-    return {
-        "codebase_version": "v2.1",
-        "robot_type": ROBOT,
-        "total_episodes": count,
-        "total_frames": frames,
-        "total_tasks": texts,
-        "total_videos": count * len(columns.cameras) if columns.has_videos else 0,
-        "total_chunks": (count - 1) // CHUNK_SIZE + 1,
-        "chunks_size": CHUNK_SIZE,
-        "fps": CONTROL_RATE,
-        "splits": {"train": f"0:{count}"},
-        "data_path": _DATA,
-        "video_path": _VIDEO if columns.has_videos else None,
-        "features": columns.features(),
     }
 
 

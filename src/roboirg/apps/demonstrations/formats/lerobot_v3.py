@@ -13,12 +13,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from roboirg.apps.demonstrations import language_columns
 from roboirg.apps.demonstrations.dataset_part import (
     CHUNK_SIZE,
     EPISODE_TABLE,
     DatasetPart,
-    RecordedEpisode,
     RecordedTexts,
     all_texts,
     episode_row,
@@ -35,24 +33,28 @@ from roboirg.apps.demonstrations.parquet_tables import (
     write_frames,
     write_rows,
 )
-from roboirg.apps.demonstrations.trajectory import Trajectory, load_trajectory
+from roboirg.apps.demonstrations.trajectory import (
+    Trajectory,
+    load_facts,
+    load_trajectory,
+    video_name,
+)
 from roboirg.util.atomic_write import replacing, write_atomically
 from roboirg.util.media import CONTROL_RATE
 
 INFO = "meta/info.json"
-ROBOT = "panda"
 _DATA = "data/chunk-{chunk_index:03d}/file-{file_index:03d}.parquet"
 _VIDEO = "videos/{video_key}/chunk-{chunk_index:03d}/file-{file_index:03d}.mp4"
 
 
 def make_parts(
-    plan: ExportPlan, root: Path, recorded: Sequence[RecordedTexts], *, is_video: bool = False
+    plan: ExportPlan, root: Path, recorded: Sequence[RecordedTexts]
 ) -> list[DatasetPart]:
     """Return a part for each trajectory."""
-    columns = FrameColumns(plan, is_video)
+    columns = FrameColumns(plan)
     return [
         DatasetPart(number, root, columns, (episode,))
-        for number, episode in enumerate(place_texts(columns, recorded))
+        for number, episode in enumerate(place_texts(recorded))
     ]
 
 
@@ -64,12 +66,9 @@ def write_part(part: DatasetPart) -> None:
     if columns.has_videos:
         write_videos(part, partial(_VIDEO.format, chunk_index=chunk, file_index=file))
     shared = frame_columns(columns, trajectory)
-    length = len(columns.rows(trajectory.facts))
-    own = [own_columns(columns, trajectory, placed, length) for placed in episode.texts]
-    pictures = [] if columns.has_videos else [columns.keys[one] for one in columns.cameras]
-    order = [name for name in info_features(columns) if name in shared or name in own[0]]
+    own = [own_columns(placed, trajectory.facts.frames) for placed in episode.texts]
     path = part.root / _DATA.format(chunk_index=chunk, file_index=file)
-    write_frames(path, order, shared, own, pictures)
+    write_frames(path, columns.table_features(), shared, own)
 
 
 def write_videos(part: DatasetPart, name_of: Callable[..., str]) -> None:
@@ -77,7 +76,7 @@ def write_videos(part: DatasetPart, name_of: Callable[..., str]) -> None:
     with zipfile.ZipFile(part.episodes[0].path) as archive:
         for camera in part.columns.cameras:
             path = part.root / name_of(video_key=part.columns.keys[camera])
-            write_atomically(path, archive.read(part.columns.video(camera)))
+            write_atomically(path, archive.read(video_name(camera)))
 
 
 def frame_columns(columns: FrameColumns, trajectory: Trajectory) -> dict[str, Any]:
@@ -90,23 +89,10 @@ def frame_columns(columns: FrameColumns, trajectory: Trajectory) -> dict[str, An
     return found
 
 
-def own_columns(
-    columns: FrameColumns, trajectory: Trajectory, placed: PlacedText, length: int
-) -> dict[str, Any]:
+def own_columns(placed: PlacedText, length: int) -> dict[str, Any]:
     """Return the columns that differ between the instructions of a trajectory."""
-    found = columns.indices(placed, length)
-    own = {name: number_column(one) for name, one in found.items()}
-    if columns.plan.language_columns:
-        own |= language_columns.language_arrays(columns, trajectory, placed)
-    return own
-
-
-def info_features(columns: FrameColumns) -> dict[str, dict[str, Any]]:
-    """Return the features of a dataset of version 3."""
-    found = columns.features()
-    if columns.plan.language_columns:
-        found |= language_columns.LANGUAGE_FEATURES
-    return found
+    found = FrameColumns.indices(placed, length)
+    return {name: number_column(one) for name, one in found.items()}
 
 
 def finish(root: Path, parts: Sequence[DatasetPart]) -> None:
@@ -116,16 +102,22 @@ def finish(root: Path, parts: Sequence[DatasetPart]) -> None:
     episodes, facts = [], []
     for part, episode, trajectory in read_episodes(parts):
         for placed in episode.texts:
-            own = stats.add(trajectory, placed)
-            length = len(columns.rows(trajectory.facts))
-            episodes.append(_episode_entry(part, placed, length) | _flat(own))
-            facts.append(episode_row(trajectory, placed, length))
+            entry = _episode_entry(part, placed, trajectory.facts.frames)
+            episodes.append(entry | _flat(stats.add(trajectory, placed)))
+            facts.append(episode_row(trajectory, placed))
     texts = all_texts(parts)
     write_rows(root / "meta/episodes/chunk-000/file-000.parquet", episodes)
     _write_tasks(root / "meta/tasks.parquet", texts)
     write_rows(root / EPISODE_TABLE, facts)
     write_json(root / "meta/stats.json", stats.result())
-    write_json(root / INFO, _info(columns, parts, texts))
+    info = common_info(parts, texts) | {
+        "codebase_version": "v3.0",
+        "data_files_size_in_mb": 100,
+        "video_files_size_in_mb": 200,
+        "data_path": _DATA,
+        "video_path": _VIDEO if columns.has_videos else None,
+    }
+    write_json(root / INFO, info)
 
 
 class StatsCollector:
@@ -225,33 +217,21 @@ def _write_tasks(path: Path, texts: Sequence[str]) -> None:
         parquet.write_table(table, part)
 
 
-def _info(
-    columns: FrameColumns, parts: Sequence[DatasetPart], texts: Sequence[str]
-) -> dict[str, Any]:
+def common_info(parts: Sequence[DatasetPart], texts: Sequence[str]) -> dict[str, Any]:
+    """Return what ``info.json`` says in both versions of the format."""
     last = parts[-1].episodes[-1]
-    count, frames = count_frames(columns, last)
+    placed = last.texts[-1]
+    count = placed.episode_index + 1
     return {
-        "codebase_version": "v3.0",
-        "robot_type": ROBOT,
+        "robot_type": "panda",
         "total_episodes": count,
-        "total_frames": frames,
+        "total_frames": placed.first_index + load_facts(last.path).frames,
         "total_tasks": len(texts),
         "chunks_size": CHUNK_SIZE,
-        "data_files_size_in_mb": 100,
-        "video_files_size_in_mb": 200,
         "fps": CONTROL_RATE,
         "splits": {"train": f"0:{count}"},
-        "data_path": _DATA,
-        "video_path": _VIDEO if columns.has_videos else None,
-        "features": info_features(columns),
+        "features": parts[0].columns.features(),
     }
-
-
-def count_frames(columns: FrameColumns, last: RecordedEpisode) -> tuple[int, int]:
-    """Return the numbers of episodes and frames of a dataset, given what comes last in it."""
-    placed = last.texts[-1]
-    length = len(columns.rows(load_trajectory(last.path).facts))
-    return placed.episode_index + 1, placed.first_index + length
 
 
 def write_json(path: Path, content: object) -> None:

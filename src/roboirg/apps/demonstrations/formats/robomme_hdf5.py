@@ -55,11 +55,11 @@ def words_of(words: TaskText) -> str:
 
 
 def make_parts(
-    plan: ExportPlan, root: Path, recorded: Sequence[RecordedTexts], *, is_video: bool = False
+    plan: ExportPlan, root: Path, recorded: Sequence[RecordedTexts]
 ) -> list[DatasetPart]:
     """Return a part for each task."""
-    columns, tasks = FrameColumns(plan, is_video), dict[str, list[RecordedEpisode]]()
-    for one in place_texts(columns, recorded):
+    columns, tasks = FrameColumns(plan), dict[str, list[RecordedEpisode]]()
+    for one in place_texts(recorded):
         tasks.setdefault(_task(one), []).append(one)
     return [
         DatasetPart(number, root, columns, tuple(episodes))
@@ -115,7 +115,7 @@ def _link_episode(file: Any, episode: RecordedEpisode, folder: str, home: str) -
 def time_steps(trajectory: Trajectory) -> list[int]:
     """Return the rows that are time steps: all but the policy's first observation."""
     facts = trajectory.facts
-    return [row for row in range(facts.rows) if row != facts.video_length]
+    return [row for row in range(facts.frames + 1) if row != facts.video_length]
 
 
 def _write_setup(group: Any, trajectory: Trajectory, placed: PlacedText) -> None:  # noqa: ANN401
@@ -173,8 +173,9 @@ def _is_boundary(trajectory: Trajectory, row: int) -> bool:
 
 def finish(root: Path, parts: Sequence[DatasetPart]) -> None:
     """Write the table of facts."""
-    rows = []
-    for part, episode, trajectory in read_episodes(parts):
-        length = len(part.columns.rows(trajectory.facts))
-        rows += [episode_row(trajectory, placed, length) for placed in episode.texts]
+    rows = [
+        episode_row(trajectory, placed)
+        for _, episode, trajectory in read_episodes(parts)
+        for placed in episode.texts
+    ]
     write_rows(root / EPISODE_TABLE, rows)

@@ -5,7 +5,6 @@ from __future__ import annotations
 from pathlib import Path
 
 from roboirg.apps.demonstrations.export_plan import ExportPlan
-from roboirg.core.observations import CAMERAS
 
 _LEROBOT = """\
 ```sh
@@ -131,21 +130,9 @@ def training_text(plan: ExportPlan, root: Path) -> str:
     if plan.format == "robomme-hdf5":
         return _MME_VLA.format(root=place)
     if plan.format == "lerobot-v2.1":
-        if set(plan.cameras) < set(CAMERAS):
+        if not plan.is_for_openpi:
             return _GROOT
-        keys = FrameColumns(plan).keys
-        return _OPENPI.format(parent=place.parent, **keys) + _GROOT
+        return _OPENPI.format(parent=place.parent, **FrameColumns(plan).keys) + _GROOT
     backend = _PYAV if FrameColumns(plan).has_videos else ""
     after = _WAYPOINTS if plan.actions == "waypoint" else _LEROBOT_RUN.format(task=plan.tasks[0])
-    text = _LEROBOT.format(root=place, after=after, backend=backend)
-    if plan.names == "openpi":
-        keys = FrameColumns(plan).keys
-        renamed = {
-            keys["front"]: "observation.images.front",
-            keys["wrist"]: "observation.images.wrist",
-            keys["state"]: "observation.state",
-            keys["action"]: "action",
-        }
-        pairs = ", ".join(f'"{old}": "{new}"' for old, new in renamed.items())
-        text += f"\nAdd `--rename_map='{{{pairs}}}'` to the first line.\n"
-    return text
+    return _LEROBOT.format(root=place, after=after, backend=backend)
