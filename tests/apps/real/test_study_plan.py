@@ -2,8 +2,9 @@
 
 import csv
 import io
-import math
 from collections import Counter
+from dataclasses import replace
+from html import escape
 from itertools import groupby
 
 import msgspec
@@ -13,8 +14,8 @@ from hypothesis import strategies as st
 
 from roboirg import language
 from roboirg.apps.real.pages.arrangement_svg import draw_svg
-from roboirg.apps.real.pages.trial_sheet import write_sheet
-from roboirg.apps.real.study.arrangement_shapes import Shape, scene_shapes, square_corners
+from roboirg.apps.real.pages.trial_sheet import sheet_text
+from roboirg.apps.real.study.arrangement_shapes import scene_shapes
 from roboirg.apps.real.study.counterbalancing import (
     Arrangement,
     counterbalanced_order,
@@ -23,8 +24,10 @@ from roboirg.apps.real.study.counterbalancing import (
 from roboirg.apps.real.study.failure_choices import failure_choices
 from roboirg.apps.real.study.study_csv import demonstrations_csv, trials_csv
 from roboirg.apps.real.study.study_plan import StudyPlan, make_study, read_study, write_study
+from roboirg.apps.real.study.trial_text import spoken_turns
 from roboirg.core.errors import InvalidValueError
 from roboirg.language.settings import plain_settings
+from roboirg.tasks.splits.splits import get_episode
 
 TASKS = ("PutInBox", "PickByCount")
 SETTINGS = plain_settings()
@@ -221,24 +224,25 @@ def test_drawings_have_the_robot_s_left_on_the_left():
             assert float(picture[:at].rsplit('x="', 1)[1].split('"')[0]) >= x
 
 
-@given(st.floats(-3.0, 3.0), st.floats(0.01, 0.2))
-def test_squares_are_turned_counter_clockwise(yaw, half):
-    shape = Shape("square", 0.6, -0.1, yaw, half, 0.0, "#000000", "box")
-    found = square_corners(shape, half)
-    for number, (x, y) in enumerate(found):
-        assert math.hypot(x - 0.6, y + 0.1) == pytest.approx(half * math.sqrt(2.0))
-        turned = math.atan2(y + 0.1, x - 0.6) - (math.pi / 4 - number * math.pi / 2 + yaw)
-        assert math.cos(turned) == pytest.approx(1.0)
+def test_a_turned_box_is_drawn_counter_clockwise():
+    scene = get_episode("PutInBox", "val", 0).scene
+    (box, *_) = (one for one in scene.objects if one.kind == "box")
+    turned = replace(box, yaw=0.5)
+    picture = draw_svg(replace(scene, objects=(turned,)))
+    x, y = 1000 * (0.3 - box.position.y), 1000 * (0.85 - (box.position.x + 0.615))
+    assert f"translate({x:.1f} {y:.1f}) rotate(-28.6)" in picture
 
 
-def test_the_sheet_is_the_same_for_the_same_plan(tmp_path):
+def test_the_sheet_has_each_trial_and_demonstration_with_what_is_said():
     plan = make_study(("a",), tasks=TASKS, trials=1, demonstrations=4)
-    assert write_sheet(plan, tmp_path / "a.pdf") == 2 + 2
-    write_sheet(plan, tmp_path / "b.pdf")
-    assert (tmp_path / "a.pdf").read_bytes() == (tmp_path / "b.pdf").read_bytes()
-    assert (tmp_path / "a.pdf").read_bytes().startswith(b"%PDF")
-    # Nothing half-written is left.
-    assert not list(tmp_path.glob(".*"))
+    page = sheet_text(plan)
+    assert page.count("<section>") == 2 + 1
+    assert page.count("<svg") == 2 + 2 * 4
+    for number, trial in enumerate(plan.trials, 1):
+        _, _, shown = page.partition(f"{number}. {trial.name}<")
+        said = shown.partition("☐")[0]
+        assert all(escape(turn) in said for turn in spoken_turns(trial))
+    assert all(f">{one.name}<" in page for one in plan.demonstrations)
 
 
 @pytest.mark.parametrize(

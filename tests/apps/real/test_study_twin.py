@@ -20,7 +20,7 @@ def test_run_plays_the_trials_of_a_study(tmp_path):
     said = ("--settings", "reasoning", "--trials", 1, "--demonstrations", 2)
     printed = call("real", "plan", "--policy", "mine=listener", *said, "--out", study)
     assert {path.name for path in study.iterdir()} == {
-        "plan.json", "trials.csv", "demonstrations.csv", "sheet.pdf",
+        "plan.json", "trials.csv", "demonstrations.csv", "sheet.html",
         "twin-PutInBox.yaml", "twin-PickByCount.yaml",
     }  # fmt: skip
     assert str(study / "twin-PickByCount.yaml") in printed

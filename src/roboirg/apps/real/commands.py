@@ -62,10 +62,9 @@ def plan(
 
 def _write(made: StudyPlan, folder: Path) -> None:
     """Write the files of a plan and print their names."""
-    from roboirg.apps.real.pages.trial_sheet import SHEET_FILE, write_sheet
+    from roboirg.apps.real.pages.trial_sheet import SHEET_FILE, sheet_text
     from roboirg.apps.real.study import study_csv
     from roboirg.apps.real.study.study_plan import write_study
-    from roboirg.core.errors import MissingDependencyError
     from roboirg.evaluation.plan.plan_file import plan_text
     from roboirg.util.atomic_write import write_atomically
 
@@ -74,21 +73,13 @@ def _write(made: StudyPlan, folder: Path) -> None:
         (study_csv.TRIALS_FILE, study_csv.trials_csv(made)),
         (study_csv.DEMONSTRATIONS_FILE, study_csv.demonstrations_csv(made)),
         *((f"twin-{task}.yaml", plan_text(twin)) for task, twin in made.twin_plans.items()),
+        (SHEET_FILE, sheet_text(made)),
     ):
         if text:
             write_atomically(folder / name, text)
             typer.echo(folder / name)
-    try:
-        count = write_sheet(made, folder / SHEET_FILE)
-        typer.echo(f"{folder / SHEET_FILE} ({counted(count, 'page')})")
-    except MissingDependencyError as error:
-        typer.echo(f"roboirg: no sheet to print: {error}", err=True)
-    typer.echo(_size(made))
-
-
-def _size(made: StudyPlan) -> str:
     blocks = made.trials[-1].block
-    return (
+    typer.echo(
         f"{counted(len(made.trials), 'trial')} in {counted(blocks, 'block')}, "
         f"{counted(len(made.demonstrations), 'demonstration')}, plan {made.fingerprint}"
     )

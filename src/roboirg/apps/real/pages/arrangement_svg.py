@@ -1,4 +1,4 @@
-"""Draw an arrangement as SVG, for the operator's page."""
+"""Draw an arrangement as SVG, for the operator's page and the sheet."""
 
 from __future__ import annotations
 
@@ -6,22 +6,23 @@ import math
 from html import escape
 
 from roboirg.apps.real.study.arrangement_shapes import (
-    FARTHEST,
-    HALF_WIDTH,
-    INK,
-    NEAREST,
     Shape,
     describe_position,
     scene_shapes,
-    square_corners,
 )
 from roboirg.core.episode import Scene
 
+NEAREST, FARTHEST = 0.35, 0.85
+"""Extent of the picture along x, m."""
+HALF_WIDTH = 0.3
+"""Half the extent of the picture along y, m."""
 SCALE = 1000.0
 """Units of the picture per meter."""
 FONT_SIZE = 26.0
 ROBOT_ROW = 60.0
 """Height below the table for the robot."""
+INK = "#222222"
+_ELEMENTS = {"square": "rect", "ring": "circle", "disc": "circle"}
 INTRODUCTION = "The table from above, the robot at the bottom."
 
 
@@ -33,8 +34,8 @@ def draw_svg(scene: Scene) -> str:
     middle, bottom = width / 2, height - 12
     parts = [
         f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {width:g} {height:g}"',
-        'role="img" aria-labelledby="drawing">',
-        f'<title id="drawing">{INTRODUCTION} {escape(description)}.</title>',
+        'role="img">',
+        f"<title>{INTRODUCTION} {escape(description)}.</title>",
         f'<rect width="{width:g}" height="{height - ROBOT_ROW:g}" fill="#f4f1ea" stroke="{INK}"/>',
         *(_draw(shape) for shape in shapes),
         *(_label(shape) for shape in shapes),
@@ -52,24 +53,17 @@ def _to_svg(x: float, y: float) -> tuple[float, float]:
 
 
 def _draw(shape: Shape) -> str:
-    if shape.form == "square":
-        outer, inner = (
-            " ".join("{:.1f},{:.1f}".format(*_to_svg(*one)) for one in square_corners(shape, half))
-            for half in (shape.half, shape.hole)
-        )
-        return (
-            f'<polygon points="{outer}" fill="{shape.fill}" stroke="{INK}"/>'
-            f'<polygon points="{inner}" fill="#ffffff" fill-opacity="0.75" stroke="{INK}"/>'
-        )
     x, y = _to_svg(shape.x, shape.y)
-    svg = (
-        f'<circle cx="{x:.1f}" cy="{y:.1f}" r="{shape.half * SCALE:.1f}" fill="{shape.fill}" '
-        f'stroke="{INK}"/>'
-    )
-    if shape.hole:
-        hole = shape.hole * SCALE
-        svg += f'<circle cx="{x:.1f}" cy="{y:.1f}" r="{hole:.1f}" fill="#fff" stroke="{INK}"/>'
-    return svg
+    drawn = ""
+    for half, fill in ((shape.half, shape.fill), (shape.hole, "#ffffffc0")):
+        side = half * SCALE
+        size = f'r="{side:.1f}"'
+        if shape.form == "square":
+            size = f'x="{-side:.1f}" y="{-side:.1f}" width="{2 * side:.1f}" height="{2 * side:.1f}"'
+        drawn += f'<{_ELEMENTS[shape.form]} {size} fill="{fill}"/>'
+    # Counter-clockwise seen from above, and so is the picture.
+    turn = f"translate({x:.1f} {y:.1f}) rotate({-math.degrees(shape.yaw):.1f})"
+    return f'<g transform="{turn}" stroke="{INK}">{drawn}</g>'
 
 
 def _label(shape: Shape) -> str:

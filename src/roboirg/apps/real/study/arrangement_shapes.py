@@ -6,20 +6,13 @@ left and right are as seen from the robot.
 
 from __future__ import annotations
 
-import math
 from typing import Literal, NamedTuple
 
 from roboirg.core import object_sizes
 from roboirg.core.episode import ROBOT_BASE, Scene, SceneObject
 
-NEAREST, FARTHEST = 0.35, 0.85
-"""Extent of drawings along x, m."""
-HALF_WIDTH = 0.3
-"""Half the extent of drawings along y, m."""
-
 FILLS = {"green": "#3a9d5d", "purple": "#8a5fb5", "yellow": "#f2c230", "gray": "#8c8c8c"}
 TARGET_FILL = "#d9482b"
-INK = "#222222"
 
 
 class Shape(NamedTuple):
@@ -49,23 +42,6 @@ class Shape(NamedTuple):
 def scene_shapes(scene: Scene) -> tuple[Shape, ...]:
     """Return a shape for each object on the table."""
     return tuple(_shape(item) for item in scene.objects)
-
-
-def square_corners(shape: Shape, half: float) -> tuple[tuple[float, float], ...]:
-    """Return the corners (x, y) of a square centered on a shape, robot base frame, m.
-
-    Args:
-        shape: gives the center and yaw.
-        half: half the side of the square, m.
-    """
-    cosine, sine = math.cos(shape.yaw), math.sin(shape.yaw)
-    return tuple(
-        (
-            shape.x + half * (cosine * first - sine * second),
-            shape.y + half * (sine * first + cosine * second),
-        )
-        for first, second in ((1, 1), (1, -1), (-1, -1), (-1, 1))
-    )
 
 
 def describe_position(shape: Shape) -> str:
