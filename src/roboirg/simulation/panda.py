@@ -84,7 +84,7 @@ class Panda:
     def _add_meshes(self, visuals: Mapping[str, Sequence[Any]], rendering: RenderSettings) -> None:
         for name, records in visuals.items():
             if name == BASE_LINK and rendering.culling:
-                # The base never moves; the front camera draws only the part it can see.
+                # The base never moves; the front camera draws only what reaches a pixel.
                 others = [camera for camera in CAMERAS if camera != FRONT]
                 self._add_body(name, records, rendering, (FRONT,), sapien.Pose(ROBOT_BASE))
                 self._add_body(name, records, rendering, others)
@@ -106,8 +106,8 @@ class Panda:
             records: SAPIEN's visual records of the link's meshes.
             rendering: how pictures are drawn.
             cameras: cameras that draw the body.
-            fixed_at: fixed pose of the link in the world frame; keeps only the part that the front
-                camera sees there.
+            fixed_at: fixed pose of the link in the world frame; keeps only what reaches a
+                pixel of the front camera there.
         """
         component, hulls = sapien.render.RenderBodyComponent(), []
         for record in records:

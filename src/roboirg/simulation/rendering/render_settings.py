@@ -17,7 +17,7 @@ class RenderSettings:
 
     Attributes:
         culling: each camera draws only the bodies that reach into its view, of the robot's base
-            only the visible part, and only if one of them has moved; changes no pixel.
+            only what reaches a pixel, and only if one of them has moved; changes no pixel.
         slim_shader: skip parts of SAPIEN's shader that contribute nothing; some pixels change by
             one level.
         meshes: ``stock`` as installed; ``faithful`` without triangles that are never visible;

@@ -20,7 +20,6 @@ from numpy.typing import NDArray
 from roboirg.core.extras import extra_needed
 from roboirg.simulation.rendering import camera_mesh, shaders
 from roboirg.simulation.rendering.mesh_cache import Arrays, cached_arrays, source_code
-from roboirg.simulation.rendering.occlusion import unoccluded_triangles
 from roboirg.simulation.rendering.render_settings import RenderSettings
 from roboirg.simulation.rendering.triangles import (
     IndexedTriangles,
@@ -28,7 +27,7 @@ from roboirg.simulation.rendering.triangles import (
     duplicate_vertices,
     index_triangles,
 )
-from roboirg.simulation.rendering.viewpoint import to_front_camera
+from roboirg.simulation.rendering.viewpoint import reach_pixels, to_front_camera
 
 FINGER = "finger.glb"
 """Never simplified, because the wrist camera sees it from very near."""
@@ -97,8 +96,8 @@ def link_shapes(
         path: the installed mesh.
         material: material for files without one.
         rendering: faithful or light.
-        fixed_at: fixed pose of the mesh in the world frame; keeps only the part that the front
-            camera sees there.
+        fixed_at: fixed pose of the mesh in the world frame; keeps only what reaches a
+            pixel of the front camera there.
     """
     material_key = None if material is None else _MaterialKey.from_sapien(material)
     pose_key = None
@@ -186,7 +185,7 @@ def _mesh_arrays(path: Path, rendering: RenderSettings) -> Arrays:
 
 
 def _front_mesh_arrays(path: Path, rendering: RenderSettings, fixed_at: _PoseKey) -> Arrays:
-    """Return the fields of `IndexedTriangles` of each part, only what the front camera can see.
+    """Return the fields of `IndexedTriangles` of each part that reach a pixel of the front camera.
 
     The mesh is opaque and never moves.
     """
@@ -195,7 +194,7 @@ def _front_mesh_arrays(path: Path, rendering: RenderSettings, fixed_at: _PoseKey
         to_camera = to_front_camera(sapien.Pose(fixed_at.position, fixed_at.quaternion))
         parts = [part.to_triangles() for part in _parts(_mesh_arrays(path, rendering))]
         corners = np.concatenate([part.corners for part in parts])
-        shown = unoccluded_triangles(corners @ to_camera[:3, :3].T + to_camera[:3, 3])
+        shown = reach_pixels(corners @ to_camera[:3, :3].T + to_camera[:3, 3])
         ends = np.cumsum([len(part.corners) for part in parts])[:-1]
         arrays: Arrays = {}
         for number, (part, mask) in enumerate(zip(parts, np.split(shown, ends), strict=True)):
@@ -203,7 +202,7 @@ def _front_mesh_arrays(path: Path, rendering: RenderSettings, fixed_at: _PoseKey
             arrays |= _numbered(index_triangles(seen), number)
         return arrays
 
-    sources = _source_bytes() + source_code("occlusion", "viewpoint") + repr(fixed_at).encode()
+    sources = _source_bytes() + source_code("viewpoint") + repr(fixed_at).encode()
     return cached_arrays(f"{_cache_name(path, rendering)}-front", sources, derive)
 
 

@@ -1,4 +1,4 @@
-"""Picture size, field of view, and the front camera's pose."""
+"""Picture size, field of view, the front camera's pose, and which triangles reach a pixel."""
 
 from __future__ import annotations
 
@@ -16,6 +16,10 @@ FOCAL_LENGTH = SIZE / 2 / math.tan(FIELD_OF_VIEW / 2)
 """Pixels."""
 NEAR, FAR = 0.01, 100.0
 """Near and far plane, m."""
+
+EDGE_TOLERANCE = 1.0 / 32
+"""Pixels by which a drawn edge may be displaced: ten times the effect of rounding corners to 1/256
+of a pixel, as renderers with the usual 8 subpixel bits do."""
 
 FRONT_EYE = (0.3, 0.0, 0.4)
 FRONT_TARGET = (0.0, 0.0, -0.2)
@@ -45,3 +49,21 @@ def to_front_camera(pose: sapien.Pose) -> NDArray[np.float64]:
 def front_camera_matrix() -> NDArray[np.float64]:
     """Return the transform (4, 4) from the world to the front camera (OpenCV)."""
     return to_front_camera(sapien.Pose())
+
+
+def reach_pixels(corners: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """Return for each triangle whether the box around it holds the center of a pixel.
+
+    All others are never drawn: of the robot's base, five of six in the front camera's view.
+
+    Args:
+        corners: of the triangles, (n, 3, 3), meters in the camera's frame: x right, y down, z
+            forward (OpenCV).
+
+    Returns:
+        (n); always true for triangles with a corner in front of the near plane.
+    """
+    places = FOCAL_LENGTH * corners[..., :2] / corners[..., 2:] + SIZE / 2
+    first = np.ceil(places.min(axis=1) - EDGE_TOLERANCE - 0.5).clip(min=0)
+    last = np.floor(places.max(axis=1) + EDGE_TOLERANCE - 0.5).clip(max=SIZE - 1)
+    return np.asarray((first <= last).all(axis=1) | (corners[..., 2].min(axis=1) < NEAR))
