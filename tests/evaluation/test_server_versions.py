@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import threading
 from pathlib import Path
-from unittest import mock
 
 import pytest
 from made_records import make_record
@@ -19,12 +17,10 @@ from roboirg.evaluation.records.record import Job, Record
 from roboirg.evaluation.records.record_codec import StoreError
 from roboirg.evaluation.records.store import RecordStore, read_records, read_results
 from roboirg.evaluation.run.executor import InProcess
-from roboirg.evaluation.run.progress import Reporter
 from roboirg.evaluation.run.runner import run_plan
 from roboirg.policies import make_policy
 from roboirg.policies.contract.policy_calls import server_version
 from roboirg.policies.planners.hierarchical_policy import HierarchicalPolicy
-from roboirg.policies.policy_server import open_server
 
 
 def plan_of(episodes: int, **options: object) -> Plan:
@@ -114,33 +110,3 @@ def test_the_version_comes_from_the_server_also_behind_a_planner() -> None:
         client.close()  # type: ignore[attr-defined]
     for told in ({}, {"version": "1"}, {"server": "x"}, {"server": "x", "version": "unknown"}):
         assert server_version(told) is None
-
-
-class Checkpoint:
-    """A policy behind a server."""
-
-    version = "7"
-
-    def reset(self, instruction: str, demonstration: object) -> None:
-        pass
-
-    def act(self, observation: object) -> list[list[float]]:
-        return [[0.0] * 8]
-
-
-def test_a_server_is_asked_when_everything_is_stored(tmp_path: Path) -> None:
-    server, ears = open_server(f"{__name__}:Checkpoint", "openpi"), mock.Mock(spec=Reporter)
-    thread = threading.Thread(target=server.listening.serve_forever)
-    thread.start()
-    few = {"tasks": "PickXtimes", "settings": "explicit", "episodes": 1}
-    plan = make_plan(f"mine={server.url}?connect=1", **few)
-    for version in "76":
-        run_plan(plan, tmp_path / version, Told(version), InProcess())
-    run_plan(plan, tmp_path / "7", Told(), InProcess(), reporter=ears)
-    ears.warn.assert_not_called()
-    with pytest.raises(StoreError, match="reported version 6, but now it reports 7; choose"):
-        run_plan(plan, tmp_path / "6", Told(), InProcess())
-    server.listening.shutdown()
-    thread.join()
-    run_plan(plan, tmp_path / "7", Told(), InProcess(), reporter=ears)
-    assert "mine is stored whole, from a server of version 7; whether" in ears.warn.call_args[0][0]

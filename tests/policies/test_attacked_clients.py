@@ -147,8 +147,8 @@ ESCAPED = answers(b"HTTP/1.1 400 No\r\nContent-Length: 4\r\n\r\n\x1b[2J")
 @pytest.mark.parametrize(
     ("provider", "answer", "words"),
     [
-        ("openai", GZIP, "the response is compressed"),
-        ("google", GZIP, "the response is compressed"),
+        ("openai", GZIP, "replied with something else"),
+        ("google", GZIP, "replied with something else"),
         ("openai", chunks, "the response has more than 64 MiB"),
         ("openai", ESCAPED, "refused or failed"),
         ("google", ESCAPED, "refused or failed"),

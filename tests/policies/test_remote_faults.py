@@ -115,7 +115,7 @@ def _played_in_time(policy):
     raise AssertionError("the server is always late")
 
 
-@pytest.mark.parametrize("protocol", ["mme-vla", "challenge"])
+@pytest.mark.parametrize("protocol", ["openpi", "mme-vla", "challenge"])
 def test_a_server_that_dies_ends_the_episode(protocol):
     with PROTOCOLS[protocol](faults=[None] * before_inference(protocol) + ["die"]) as server:
         policy = make_policy(f"{protocol}://{server.place}", 0)
@@ -124,19 +124,6 @@ def test_a_server_that_dies_ends_the_episode(protocol):
         with pytest.raises(PolicyConnectionError, match=r"call reset\(\)"):
             policy.act(moment(0, history=()))
         assert len(episode(policy, steps=2)) == 2
-        policy.close()
-
-
-def test_a_stateless_server_is_asked_once_more():
-    with WireServer(faults=["die"]) as server:
-        policy = make_policy(f"openpi://{server.place}", 0)
-        assert len(episode(policy)) == 1
-        assert server.messages[0] == server.messages[1]
-        policy.close()
-    with WireServer(faults=["die", "die"]) as server:
-        policy = make_policy(f"openpi://{server.place}", 0)
-        with pytest.raises(PolicyConnectionError, match="ended the connection"):
-            episode(policy)
         policy.close()
 
 

@@ -12,8 +12,7 @@ from roboirg.core.policy_needs import PolicyNeeds
 from roboirg.core.policy_ref import UNKNOWN_VERSION, PolicyRef
 from roboirg.policies.by_name.finding import declared_by, look_up, make_policy
 from roboirg.policies.by_name.policy_kinds import CLASS, LIVE
-from roboirg.policies.contract.base import Policy, close_policy
-from roboirg.policies.contract.policy_calls import server_version
+from roboirg.policies.contract.base import close_policy
 from roboirg.policies.contract.policy_version import read_version
 from roboirg.policies.contract.synthetic_episodes import SyntheticEpisodes
 
@@ -43,7 +42,8 @@ def opened(ref: PolicyRef, seed: int = 0) -> PolicyRef:
     # Of other kinds, what declares something is what was made, once.
     ref = ref if has_class else declared_by(ref, policy)
     try:
-        _begin(policy, needs)
+        episode = SyntheticEpisodes(needs).episode(FIRST_WORDS, VIDEO_STEPS)
+        policy.reset(episode.instruction, episode.demonstration)
     except (Exception, SystemExit) as error:  # noqa: BLE001 - likewise
         return replace(ref, version=UNKNOWN_VERSION, problem=f"reset(): {_words(error)}")
     else:
@@ -51,25 +51,6 @@ def opened(ref: PolicyRef, seed: int = 0) -> PolicyRef:
     finally:
         with contextlib.suppress(Exception):  # how it ends does not count
             close_policy(policy)
-
-
-def reported_version(ref: PolicyRef) -> str | None:
-    """Return the version that the server of a policy of ours reports now, in a synthetic episode.
-
-    Raises:
-        RoboIRGError: the server cannot be reached or does not answer.
-    """
-    policy = make_policy(ref, 0)
-    try:
-        _begin(policy, PolicyNeeds.of(policy))
-        return server_version(getattr(policy, "metadata", {}))
-    finally:
-        close_policy(policy)
-
-
-def _begin(policy: Policy, needs: PolicyNeeds) -> None:
-    episode = SyntheticEpisodes(needs).episode(FIRST_WORDS, VIDEO_STEPS)
-    policy.reset(episode.instruction, episode.demonstration)
 
 
 def _words(error: BaseException) -> str:

@@ -3,9 +3,6 @@
 from __future__ import annotations
 
 import functools
-import os
-import platform
-import subprocess
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
@@ -22,17 +19,6 @@ from roboirg.policies.remote.endpoints import Endpoint
 from roboirg.policies.remote.protocols import Protocol, protocols_by_scheme
 from roboirg.policies.remote.websocket_server import ServerOptions, WebsocketServer
 from roboirg.util.web.request_origin import LOOPBACK
-
-FLAG_VARIABLES = (
-    "XLA_FLAGS",
-    "JAX_DEFAULT_MATMUL_PRECISION",
-    "CUBLAS_WORKSPACE_CONFIG",
-    "NVIDIA_TF32_OVERRIDE",
-    "TORCH_ALLOW_TF32_CUBLAS_OVERRIDE",
-    "TF_DETERMINISTIC_OPS",
-)
-"""Environment variables that choose kernels or their precision."""
-TIMEOUT_S = 30.0
 
 
 class PolicyServer(NamedTuple):
@@ -115,7 +101,6 @@ def _metadata(policy: PolicyRef, protocol: str) -> dict[str, Any]:
         "protocol": protocol,
         "python": process.python,
         "libraries": process.libraries,
-        **describe_arithmetic(),
     }
 
 
@@ -132,23 +117,3 @@ def _lacking(needs: PolicyNeeds | None, protocol: Protocol) -> list[str]:
         if getattr(needs or usual, name) != getattr(usual, name) == getattr(shown, name)
         and name not in protocol.client.options_type.model_fields
     ]
-
-
-def describe_arithmetic() -> dict[str, str]:
-    """Return ``device``, ``driver`` if there is one, and ``flags`` if some are set."""
-    flags = [f"{name}={os.environ[name]}" for name in FLAG_VARIABLES if os.environ.get(name)]
-    return {**_device(), **({"flags": " ".join(flags)} if flags else {})}
-
-
-@functools.cache
-def _device() -> dict[str, str]:
-    command = ["nvidia-smi", "--query-gpu=name,driver_version", "--format=csv,noheader"]
-    try:
-        told = subprocess.check_output(command, text=True, timeout=TIMEOUT_S)  # noqa: S603
-    except (OSError, subprocess.SubprocessError):
-        told = ""
-    rows = [line.rpartition(", ") for line in told.splitlines()]
-    if not rows:
-        return {"device": f"{platform.machine()} processor"}
-    names, drivers = ([row[end] for row in rows] for end in (0, 2))
-    return {"device": ", ".join(names), "driver": drivers[0]}

@@ -102,11 +102,6 @@ class RecordStore:
         self.stored |= added
         self._told = told
 
-    def told_version(self, policy: str) -> str | None:
-        """Return the version that a policy's server reported for its verdicts, if it did."""
-        told = self._told.get(policy)
-        return None if told is None else told.server
-
     def _read(self, lines: LineFile) -> None:
         self.stored = {identity_key(one): one for one in lines.parse(read_summary)}
         self.torn, self.damaged = lines.torn, tuple(lines.damaged)

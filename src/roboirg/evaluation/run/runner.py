@@ -13,10 +13,10 @@ from types import FrameType
 from typing import NamedTuple
 
 from roboirg.core.episode import ENVIRONMENT_VERSION
-from roboirg.core.errors import InvalidValueError, RoboIRGError
+from roboirg.core.errors import InvalidValueError
 from roboirg.core.plain_text import counted
 from roboirg.core.policy_ref import UNKNOWN_VERSION
-from roboirg.evaluation.episode_errors import MAX_CAUSE_LENGTH, Terminated, format_cause, one_line
+from roboirg.evaluation.episode_errors import MAX_CAUSE_LENGTH, Terminated, format_cause
 from roboirg.evaluation.plan.plan import Plan
 from roboirg.evaluation.plan.stored_plans import write_plan
 from roboirg.evaluation.play.rollout import EpisodeRunner, PlayJob
@@ -33,7 +33,6 @@ from roboirg.evaluation.records.store import (
 from roboirg.evaluation.run.executor import Executor
 from roboirg.evaluation.run.progress import Reporter
 from roboirg.language import LANGUAGE_VERSION
-from roboirg.policies.opening import reported_version
 from roboirg.policies.vlm.models.reply_store import ReplySettings
 from roboirg.tasks.splits.splits import get_episode
 
@@ -105,7 +104,6 @@ def run_plan(
             for job, key in zip(jobs, keys, strict=True)
             if (one := store.stored.get(key)) is None or (retry_errors and one.outcome == "error")
         ]
-        _check_servers(plan, {job.policy for job in todo}, store, reporter)
         reporter.start(len(jobs), len(jobs) - len(todo))
         loop = _RunLoop(plan, store, reporter)
         loop.play(todo, play, executor)
@@ -268,32 +266,6 @@ def _check_versions(plan: Plan, records: Collection[Summary], folder: Path) -> N
                 f"has {expected}; choose another --out."
             )
     _check_policies(plan, records, folder)
-
-
-def _check_servers(
-    plan: Plan, playing: Collection[str], store: RecordStore, reporter: Reporter
-) -> None:
-    """Refuse stored records of another version of a server that nothing is left to be asked.
-
-    Where something is left to play, the first verdict shows it.
-    """
-    for one in plan.policies:
-        told = store.told_version(one.name)
-        if one.name in playing or told is None:
-            continue
-        try:
-            now = reported_version(one)
-        except (RoboIRGError, RuntimeError) as error:
-            reporter.warn(
-                f"{one.name} is stored whole, from a server of version {told}; whether it has "
-                f"another one now is not known ({one_line(error)})."
-            )
-            continue
-        if now != told:
-            raise StoreError(
-                f"{store.folder} holds episodes of {one.name} whose server reported version {told},"
-                f" but now it reports {now or 'none'}; choose another --out."
-            )
 
 
 def _check_policies(plan: Plan, records: Iterable[Summary], folder: Path) -> None:

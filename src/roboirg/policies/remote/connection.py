@@ -85,15 +85,6 @@ class ServerConnection:
         self.endpoint = lock.endpoint
         self._connect()
 
-    def reconnect(self) -> None:
-        """Connect to the same server again, if there was a connection.
-
-        Raises:
-            PolicyConnectionError: it cannot be reached in time, or refuses.
-        """
-        if self._websocket is not None:
-            self._connect()
-
     def exchange(
         self, data: bytes | None, awaited: str = "a reply", *, is_numbered: bool = False
     ) -> dict[str, Any]:

@@ -1,10 +1,9 @@
 """openpi://host:port: servers of the openpi repository and compatible ones.
 
 Such a server remembers nothing: there is no reset, and every request holds all that a reply
-needs. Several episodes may use it at once, and a request whose connection breaks is sent once
-more. Our service has one policy per connection; an episode begins with the connection and when
-the prompt changes. So a policy behind our service cannot hear an instruction in turns: every
-utterance begins an episode that knows nothing of the one before.
+needs. Several episodes may use it at once. Our service has one policy per connection; an episode
+begins with the connection and when the prompt changes. So a policy behind our service cannot hear
+an instruction in turns: every utterance begins an episode that knows nothing of the one before.
 """
 
 from __future__ import annotations
@@ -15,7 +14,6 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from roboirg.core.errors import PolicyConnectionError
 from roboirg.core.observations import Demonstration, Observation, proprioception
 from roboirg.policies.contract.base import close_policy
 from roboirg.policies.remote.endpoints import MIB, ActionSpaceName, RemoteOptions
@@ -71,14 +69,7 @@ class OpenpiPolicy(RemotePolicy):
             ),
             self.options.prompt: self.instruction,
         }
-        try:
-            reply = self.request(message)
-        except PolicyConnectionError:
-            # The request is complete in itself, so a new connection can answer it.
-            self.connection.reconnect()
-            self.greet()
-            reply = self.request(message)
-        return self.read_actions(reply)[: self.options.execute]
+        return self.read_actions(self.request(message))[: self.options.execute]
 
 
 class OpenpiService(Service):
