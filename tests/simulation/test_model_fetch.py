@@ -4,16 +4,14 @@ import hashlib
 import re
 import subprocess
 import sys
-import threading
 import zipfile
-from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 
 import pytest
 
 from roboirg import main as cli
 from roboirg.core.errors import InvalidValueError, MissingDependencyError
 from roboirg.simulation import model_fetch, model_files
-from roboirg.simulation.model_fetch import WHEEL, download_resumably, fetch_model_files
+from roboirg.simulation.model_fetch import WHEEL, fetch_model_files
 
 METADATA = {
     "METADATA": "Metadata-Version: 2.1\nName: mani_skill\nVersion: 3.0.1\n",
@@ -121,68 +119,18 @@ def test_pip_s_configuration_is_respected(wheel, folder, monkeypatch, capsys):
     assert WHEEL not in unpacked(folder)
 
 
-class BreakingServer(BaseHTTPRequestHandler):
-    """Serves `content` by ranges, at most `portion` bytes of it for each request."""
-
-    content, portion, ranges = b"", 0, True
-
-    def do_GET(self):
-        start = int(self.headers["Range"].removeprefix("bytes=").removesuffix("-"))
-        if self.ranges and start >= len(self.content):
-            self.send_error(416)
-            return
-        start = start if self.ranges else 0
-        self.send_response(206 if self.ranges else 200)
-        self.send_header("Content-Length", str(len(self.content) - start))
-        self.end_headers()
-        self.wfile.write(self.content[start : start + self.portion])
-
-    def log_message(self, *_):
-        pass
-
-
-@pytest.fixture
-def server(wheel):
-    handler = type("Server", (BreakingServer,), {"content": wheel.read_bytes(), "portion": 9000})
-    with ThreadingHTTPServer(("127.0.0.1", 0), handler) as one:
-        threading.Thread(target=one.serve_forever, daemon=True).start()
-        yield handler, f"http://127.0.0.1:{one.server_port}/{WHEEL}"
-        one.shutdown()
-
-
-def test_a_broken_download_goes_on_where_it_stopped(server, tmp_path):
-    handler, url = server
-    path, tries = tmp_path / "wheel", 1
-    while not path.exists():
-        try:
-            download_resumably(url, path)
-        except MissingDependencyError as error:
-            assert "--wheel" in str(error)  # noqa: PT017
-            tries += 1
-    assert path.read_bytes() == handler.content
-    assert tries == -(-len(handler.content) // handler.portion) > 2
-
-
-def test_a_server_without_ranges_starts_again(server, tmp_path):
-    handler, url = server
-    path = tmp_path / "wheel"
-    with pytest.raises(MissingDependencyError, match="broke off"):
-        download_resumably(url, path)
-    handler.ranges, handler.portion = False, len(handler.content)
-    download_resumably(url, path)
-    assert path.read_bytes() == handler.content
-
-
-def test_without_pip_the_wheel_comes_from_pypi_s_files(server, folder, monkeypatch):
-    handler, url = server
-    handler.portion = len(handler.content)
-    monkeypatch.setattr(model_fetch, "WHEEL_URL", url)
+def test_without_pip_the_wheel_comes_from_pypi_s_files(wheel, folder, monkeypatch):
+    monkeypatch.setattr(model_fetch, "WHEEL_URL", wheel.as_uri())
     monkeypatch.setattr(model_fetch.importlib.util, "find_spec", lambda name: None)
     said = []
     assert fetch_model_files(None, said.append) == folder
     assert unpacked(folder) == EVERYTHING
     assert len(said) == 1
-    assert url in said[0]
+    assert wheel.as_uri() in said[0]
+    (folder / model_files.MODEL_FILES[0]).unlink()
+    monkeypatch.setattr(model_fetch, "WHEEL_URL", f"{wheel.as_uri()}x")
+    with pytest.raises(MissingDependencyError, match=r"Cannot download .*--wheel"):
+        fetch_model_files(None, said.append)
 
 
 def test_an_installed_maniskill_serves_where_nothing_was_fetched(wheel, tmp_path, monkeypatch):

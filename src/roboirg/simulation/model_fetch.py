@@ -13,7 +13,6 @@ import importlib.util
 import shutil
 import subprocess
 import sys
-import urllib.error
 import urllib.request
 import zipfile
 from collections.abc import Callable
@@ -88,12 +87,21 @@ def _download(folder: Path, say: Callable[[str], None]) -> Path:
         _download_with_pip(folder)
     else:
         say(f"downloading {WHEEL_URL} ({_SIZE})")
-        download_resumably(WHEEL_URL, wheel)
+        try:
+            with (
+                urllib.request.urlopen(WHEEL_URL, timeout=_TIMEOUT) as reply,  # noqa: S310
+                wheel.open("wb") as file,
+            ):
+                shutil.copyfileobj(reply, file)
+        except (OSError, http.client.HTTPException) as error:
+            raise MissingDependencyError(
+                f"Cannot download {WHEEL_URL} ({error}); try again, {_BY_HAND}."
+            ) from error
     if not _is_right(wheel):
         wheel.unlink(missing_ok=True)
         raise MissingDependencyError(
-            f"The index's {WHEEL} is not PyPI's (SHA-256 {WHEEL_SHA256[:12]}...); use another "
-            f"index, {_BY_HAND}."
+            f"The index's {WHEEL} is not PyPI's, or not whole (SHA-256 {WHEEL_SHA256[:12]}...); "
+            f"try again or use another index, {_BY_HAND}."
         )
     return wheel
 
@@ -110,32 +118,6 @@ def _download_with_pip(folder: Path) -> None:
         raise MissingDependencyError(
             f"pip could not download {WHEEL} ({problem}); try again with a connection, {_BY_HAND}."
         )
-
-
-def download_resumably(url: str, path: Path) -> None:
-    """Download a file; a later call continues where an interrupted one stopped."""
-    part = path.with_suffix(".part")
-    have = part.stat().st_size if part.exists() else 0
-    request = urllib.request.Request(url, headers={"Range": f"bytes={have}-"})  # noqa: S310
-    try:
-        with urllib.request.urlopen(request, timeout=_TIMEOUT) as reply:  # noqa: S310
-            continues = reply.status == http.HTTPStatus.PARTIAL_CONTENT
-            with part.open("ab" if continues else "wb") as file:
-                shutil.copyfileobj(reply, file)
-            wanted = reply.headers.get("Content-Length")
-    except urllib.error.HTTPError as error:
-        if error.code != http.HTTPStatus.REQUESTED_RANGE_NOT_SATISFIABLE:
-            raise _failed(url, error) from error
-        wanted = None  # all of it is there, or too much, which the caller's checksum notices
-    except (OSError, http.client.HTTPException) as error:
-        raise _failed(url, error) from error
-    if wanted is not None and part.stat().st_size < int(wanted) + (have if continues else 0):
-        raise _failed(url, "the connection broke off; the next call continues")
-    part.replace(path)
-
-
-def _failed(url: str, problem: object) -> MissingDependencyError:
-    return MissingDependencyError(f"Cannot download {url} ({problem}); try again, {_BY_HAND}.")
 
 
 def _is_right(wheel: Path) -> bool:

@@ -11,6 +11,9 @@ from pathlib import Path
 
 from roboirg.core.errors import InvalidValueError
 
+PART = ".part"
+"""End of the name of a file that is not whole yet."""
+
 
 @contextlib.contextmanager
 def replacing(path: Path) -> Iterator[Path]:
@@ -20,7 +23,7 @@ def replacing(path: Path) -> Iterator[Path]:
     old or the new content, never a part, and the content is on the disk before the name is. A
     folder that is missing is made.
     """
-    part = path.with_name(f".{path.name}.{secrets.token_hex(8)}.part")
+    part = path.with_name(f".{path.name}.{secrets.token_hex(8)}{PART}")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         yield part

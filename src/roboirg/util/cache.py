@@ -12,7 +12,6 @@ from __future__ import annotations
 import hashlib
 import logging
 import os
-import secrets
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -21,7 +20,7 @@ from typing import Literal
 import platformdirs
 
 from roboirg.core.errors import InvalidValueError
-from roboirg.util.atomic_write import sync_to_disk
+from roboirg.util.atomic_write import PART, replacing
 
 FOLDER_VARIABLE = "ROBOIRG_CACHE"
 SIZE_VARIABLE = "ROBOIRG_CACHE_GIB"
@@ -35,7 +34,6 @@ _SHARES: dict[Kind, float] = {"actions": 1 / 16, "frames": 14 / 16, "meshes": 1 
 
 _MAGIC = b"roboirg1"
 _HEAD_SIZE = len(_MAGIC) + hashlib.sha256().digest_size
-_PART = ".part"
 _ABANDONED = 600.0
 """Seconds after which an unfinished entry must belong to a dead process."""
 
@@ -84,21 +82,12 @@ class Cache:
         size = _HEAD_SIZE + len(content)
         if self._folder is None or size > self._limit:
             return
-        part = self._folder / f".{key}.{secrets.token_hex(8)}{_PART}"
         try:
-            self._folder.mkdir(parents=True, exist_ok=True)
-            try:
+            with replacing(self._folder / key) as part:
                 with part.open("xb") as file:
-                    file.write(_head(key, content))
-                    file.write(content)
-                    file.flush()
-                    os.fsync(file.fileno())
+                    file.writelines((_head(key, content), content))
                 self._make_room(size)
-                part.replace(self._folder / key)
-            finally:
-                part.unlink(missing_ok=True)
-            sync_to_disk(self._folder)
-        except OSError as error:
+        except (OSError, InvalidValueError) as error:
             _warn_once(error)
 
     def _make_room(self, size: int) -> None:
@@ -116,7 +105,7 @@ class Cache:
         for path in Path(self._folder or "").iterdir():
             try:
                 state = path.stat()
-                if not path.name.endswith(_PART):
+                if not path.name.endswith(PART):
                     yield state.st_mtime_ns, state.st_size, path
                 elif time.time() - state.st_mtime > _ABANDONED:
                     path.unlink(missing_ok=True)
@@ -159,11 +148,12 @@ def _head(key: str, content: bytes | memoryview) -> bytes:
     return _MAGIC + digest.digest()
 
 
-_warned: set[type[OSError]] = set()
+_warned: set[type[BaseException]] = set()
 
 
-def _warn_once(error: OSError) -> None:
+def _warn_once(error: Exception) -> None:
     """Log an error of the cache, once in a process for each type of error."""
-    if type(error) not in _warned:
-        _warned.add(type(error))
+    kind = type(error.__cause__ or error)  # the disk's, whatever it was turned into
+    if kind not in _warned:
+        _warned.add(kind)
         _log.warning("The cache is unusable (%s); its entries will be rebuilt.", error)
