@@ -78,7 +78,7 @@ def test_missing_model_files_are_named(tmp_path: Path, monkeypatch: pytest.Monke
 
 
 def test_a_crash_of_the_driver_is_a_failed_check(monkeypatch: pytest.MonkeyPatch) -> None:
-    crash = subprocess.CompletedProcess([], -11, "device: a card\n", "")
+    crash = subprocess.CompletedProcess([], -11, "a card\n", "")
     monkeypatch.setattr(subprocess, "run", lambda *_, **__: crash)
     device, frame = doctor._check_rendering()
     assert device.ok

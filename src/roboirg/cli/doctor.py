@@ -7,8 +7,6 @@ does not end the report.
 
 from __future__ import annotations
 
-import importlib
-import importlib.util
 import os
 import platform
 import signal
@@ -40,9 +38,8 @@ _RENDER_REMEDY = (
     "run `make setup`, or install Mesa >= 23.2: apt-get install mesa-vulkan-drivers libvulkan1 "
     "libegl1 (see docs/install.md)"
 )
-# Prefixes of the lines by which the child process reports its progress.
-_DEVICE_PREFIX = "device: "
-_FRAME_PREFIX = "frame: "
+_FEWEST_COLORS = 100
+"""In a picture of a scene, which has thousands."""
 
 
 @dataclass(frozen=True)
@@ -63,7 +60,7 @@ class Check:
 
 
 def run_checks() -> list[Check]:
-    """Run all checks; takes a few seconds and raises nothing."""
+    """Run all checks, in seconds, or half a minute where no mesh is cached yet; raises nothing."""
     return [
         _check_python(),
         *_check_packages(),
@@ -146,59 +143,43 @@ def _check_model_files() -> Check:
 
 def _check_opencv() -> Check:
     """Load OpenCV in a child process; its wheel needs two system libraries."""
-    command = [sys.executable, "-c", "import cv2; print(cv2.__version__)"]
-    child = subprocess.run(  # noqa: S603 - a constant command in our own interpreter
-        command, capture_output=True, text=True, check=False, timeout=FRAME_TIMEOUT
-    )
-    lines = (child.stdout + child.stderr).strip().splitlines() or [f"exit code {child.returncode}"]
-    return Check(
-        "OpenCV libraries",
-        child.returncode == 0,
-        "loaded" if child.returncode == 0 else lines[-1],
-        "run `make setup`, or: apt-get install libgl1 libglib2.0-0",
-    )
+    loads, _, fault = _run_python("-c", "import cv2")
+    remedy = "run `make setup`, or: apt-get install libgl1 libglib2.0-0"
+    return Check("OpenCV libraries", loads, "loaded" if loads else fault, remedy)
 
 
 def _check_rendering() -> tuple[Check, Check]:
-    """Try the renderer in a child process and report its progress."""
-    code, output, fault = _run_frame_process()
-    reported = {
-        prefix: line.removeprefix(prefix)
-        for line in output.splitlines()
-        for prefix in (_DEVICE_PREFIX, _FRAME_PREFIX)
-        if line.startswith(prefix)
-    }
-    device, frame = reported.get(_DEVICE_PREFIX), reported.get(_FRAME_PREFIX)
-    drawn = frame is not None and code == 0
+    """Try the renderer in a child process, whose lines are the device and then the picture."""
+    is_drawn, output, fault = _run_python("-m", "roboirg.cli.doctor", "--frame")
+    device, *frames = output.splitlines() or [""]
     chosen = os.environ.get(DEVICE_VARIABLE)
     remedy = f"unset {DEVICE_VARIABLE} (now {chosen!r}), or " if chosen else ""
     remedy += _RENDER_REMEDY
+    found = frames[0] if is_drawn else fault if device else "not tried: no device"
     return (
-        Check("render device", device is not None, device or fault, remedy),
-        Check(
-            "test frame",
-            drawn,
-            (frame or "") if drawn else (fault if device else "not tried: no device"),
-            remedy,
-        ),
+        Check("render device", bool(device), device or fault, remedy),
+        Check("test frame", is_drawn, found, remedy),
     )
 
 
-def _run_frame_process() -> tuple[int, str, str]:
-    """Return the child's exit code, its output, and a description of what went wrong."""
-    command = [sys.executable, "-m", "roboirg.cli.doctor", "--frame"]
+def _run_python(*arguments: str) -> tuple[bool, str, str]:
+    """Run Python in a child process; return whether it succeeds, its output, and what is wrong."""
     try:
-        child = subprocess.run(  # noqa: S603 - our own module in our own interpreter
-            command, capture_output=True, text=True, check=False, timeout=FRAME_TIMEOUT
+        child = subprocess.run(  # noqa: S603 - constant words in our own interpreter
+            [sys.executable, *arguments],
+            capture_output=True,
+            text=True,
+            check=False,
+            timeout=FRAME_TIMEOUT,
         )
     except subprocess.TimeoutExpired as error:
         output = error.stdout.decode() if isinstance(error.stdout, bytes) else error.stdout or ""
-        return 1, output, f"no picture within {FRAME_TIMEOUT:.0f} s"
-    if child.returncode < 0:
-        number = -child.returncode
-        return child.returncode, child.stdout, f"the driver crashed ({signal.strsignal(number)})"
-    error_lines = child.stderr.strip().splitlines() or [f"exit code {child.returncode}"]
-    return child.returncode, child.stdout, error_lines[-1]
+        return False, output, f"no end within {FRAME_TIMEOUT:.0f} s"
+    code = child.returncode
+    if code < 0:
+        return False, child.stdout, f"the process crashed ({signal.strsignal(-code)})"
+    errors = child.stderr.strip().splitlines() or [f"exit code {code}"]
+    return code == 0, child.stdout, errors[-1]
 
 
 def _check_memory() -> Check:
@@ -214,53 +195,35 @@ def _check_memory() -> Check:
     )
 
 
-def _render_test_frame() -> str:
-    """Draw a lit red box; returns a description of the picture."""
+def _draw_test_frame() -> None:
+    """Draw a scene of the benchmark; print the device, and then what was drawn.
+
+    Raises:
+        RoboIRGError: no device can render, or there is no picture.
+    """
     # Imported here because only the child process may load them.
-    devices = importlib.import_module("roboirg.simulation.rendering.render_device")
-    device = devices.describe_device(devices.find_render_device())
+    from roboirg.simulation.rendering.render_device import describe_device, find_render_device
+    from roboirg.simulation.world import World
+    from roboirg.tasks.splits import get_episode
+
+    device = describe_device(find_render_device())
     kind = "drawn by the processor" if device.is_software else "GPU"
     # Flushed at once, because the next lines may crash this process.
-    sys.stdout.write(f"{_DEVICE_PREFIX}{device.name} at {device.alias} ({kind})\n")
+    sys.stdout.write(f"{device.name} at {device.alias} ({kind})\n")
     sys.stdout.flush()
-
     start = time.perf_counter()
-    sapien, np = importlib.import_module("sapien"), importlib.import_module("numpy")
-    scene = sapien.Scene([sapien.physx.PhysxCpuSystem(), devices.render_system()])
-    scene.set_ambient_light([0.3, 0.3, 0.3])
-    scene.add_directional_light([1.0, 0.2, -1.0], [1.0, 1.0, 1.0])
-    builder = scene.create_actor_builder()
-    red = sapien.render.RenderMaterial(base_color=[0.9, 0.05, 0.05, 1.0])
-    builder.add_box_visual(half_size=[0.1, 0.1, 0.1], material=red)
-    builder.set_initial_pose(sapien.Pose([1.0, 0.0, 0.0]))
-    builder.build_static()
-    sapien.render.set_camera_shader_dir("minimal")
-    camera = scene.add_camera("camera", 64, 64, 1.0, 0.01, 10.0)
-    # Otherwise SAPIEN spends seconds on a light table that this picture does not need.
-    table = sapien.render.RenderTexture(np.zeros((2, 2, 4), np.uint8), 2, "r8g8b8a8unorm")
-    camera.set_texture("BRDFLUT", table)
-    scene.update_render()
-    camera.take_picture()
-    picture = camera.get_picture("Color")
-    middle, corner = picture[32, 32, :3], picture[0, 0, :3]
-    if not _is_reddish(middle) or _is_reddish(corner):
-        raise RenderDeviceError(
-            f"the picture of a red box has the color {np.round(middle, 2).tolist()} in the "
-            f"middle and {np.round(corner, 2).tolist()} in the corner."
-        )
-    return f"64 x 64 pixels in {time.perf_counter() - start:.1f} s"
-
-
-def _is_reddish(color: Sequence[float]) -> bool:
-    red, green, blue = (float(part) for part in color)
-    return red > 0.2 and red > 2 * max(green, blue)  # noqa: PLR2004 - relative to full brightness
+    picture = World(get_episode("PickXtimes", "test", 0).scene).picture("front")
+    colors = len({*map(bytes, picture.reshape(-1, 3))})
+    if colors < _FEWEST_COLORS:
+        raise RenderDeviceError(f"the picture of a scene has only {colors} colors.")
+    sys.stdout.write(f"256 x 256 pixels in {time.perf_counter() - start:.1f} s\n")
 
 
 def _main() -> int:
     if "--frame" not in sys.argv[1:]:
         return run_doctor()
     try:
-        sys.stdout.write(f"{_FRAME_PREFIX}{_render_test_frame()}\n")
+        _draw_test_frame()
     except RoboIRGError as error:
         sys.stderr.write(f"{error}\n")
         return 1
