@@ -2,6 +2,7 @@
 
 import dataclasses
 import io
+from collections import Counter
 
 import pytest
 from language_variants import without_landmark
@@ -10,12 +11,13 @@ from rich.console import Console
 from roboirg.apps.language_lab.validation import episode_checks
 from roboirg.apps.language_lab.validation.episode_checks import (
     check_episode,
+    check_place,
     leaking,
     misread,
     not_needed,
+    places_of,
 )
 from roboirg.apps.language_lab.validation.validation_results import RuleViolation, ValidationResults
-from roboirg.apps.language_lab.validation.validation_run import Batch, batches, validate_batch
 from roboirg.apps.language_lab.validation.validation_tables import validation_tables
 from roboirg.core.episode import SPLITS
 from roboirg.core.errors import InvalidValueError
@@ -144,11 +146,11 @@ def test_random_scenes_are_not_those_of_the_splits():
 
 
 def test_processes_find_what_one_finds():
-    work = batches(("StopCube", "VideoUnmask"), (), 2)
+    work = places_of(("StopCube", "VideoUnmask"), (), 2)
     found = []
     for workers in (0, 1):
         total = ValidationResults()
-        for _, evidence in parallel_map(validate_batch, work, workers):
+        for _, evidence in parallel_map(check_place, work, workers):
             total.add(evidence)
         found.append(total)
     assert found[0] == found[1]
@@ -156,14 +158,13 @@ def test_processes_find_what_one_finds():
     assert found[0].texts["VideoUnmask", "direct-rival"] == 2 * 2
 
 
-def test_batches_cover_everything_once():
-    work = batches(("PickXtimes",), ("test", "train"), 120)
-    assert sum(batch.size for batch in work) == 50 + 100 + 120
-    assert len(set(work)) == len(work)
-    assert [batch.size for batch in work if batch.split == "random"] == [50, 50, 20]
+def test_every_episode_is_validated_once():
+    work = places_of(("PickXtimes",), ("test", "train"), 120)
+    assert len(set(work)) == len(work) == 50 + 100 + 120
+    assert Counter(split for _, split, _ in work) == {"test": 50, "train": 100, "random": 120}
     for seeds in (-1, 0):
         with pytest.raises(InvalidValueError):
-            batches(("PickXtimes",), (), seeds)
+            places_of(("PickXtimes",), (), seeds)
 
 
 def printed(found: ValidationResults, width: int) -> str:
@@ -176,7 +177,7 @@ def printed(found: ValidationResults, width: int) -> str:
 def test_the_tables_are_whole_at_80_columns():
     found = ValidationResults()
     for task in all_tasks():
-        found.add(validate_batch(Batch(task, "test", 3, 1)))
+        found.add(check_place((task, "test", 3)))
     text = printed(found, width=80)
     assert "…" not in text
     assert max(map(len, text.splitlines())) <= 80

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+import functools
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -23,20 +23,12 @@ from roboirg.core.errors import InvalidValueError, RoboIRGError
 from roboirg.core.plain_text import counted
 
 if TYPE_CHECKING:
-    from rich.console import Console
-
-    from roboirg.apps.language_lab.validation.validation_results import ValidationResults
-    from roboirg.apps.language_lab.validation.validation_run import Batch
+    from rich.console import RenderableType
 
 # Heavy modules are imported inside the commands, so that --help is fast.
 
-MINIMUM_WIDTH = 150
-"""Columns of output that is not a terminal."""
 MOST_FAILURES = 10
 """Most broken rules to print."""
-_LINE_EVERY = 200
-"""Without a terminal, print a line after this many batches."""
-
 
 language_app = typer.Typer(no_args_is_help=True, help="Count, validate and score the instructions.")
 
@@ -107,9 +99,7 @@ def stats(
     names, wanted = known_tasks(tasks), parse_splits(split)
     episodes = split_episodes(names, wanted)
     said = [one for _, one in instructions(episodes, plain_settings(), ("implicit",))]
-    console = _console()
-    for table in overview_tables(said):
-        console.print(table)
+    _print(*overview_tables(said))
     if out is not None:
         label = "all splits" if len(wanted) > 1 else f"{wanted[0]} split"
         title = f"Referring expressions by setting, {label} (each counted once per scene)"
@@ -134,9 +124,10 @@ def validate_instructions(
 
     Example: roboirg language validate --seeds 10
     """
+    from roboirg.apps.language_lab.validation.episode_checks import check_place, places_of
     from roboirg.apps.language_lab.validation.validation_results import ValidationResults
-    from roboirg.apps.language_lab.validation.validation_run import batches, validate_batch
     from roboirg.apps.language_lab.validation.validation_tables import validation_tables
+    from roboirg.cli.progress_bar import progress_bars
     from roboirg.evaluation.plan.option_parsing import parse_splits
     from roboirg.language.wordings.wording_store import open_wordings
     from roboirg.util.parallel_map import parallel_map
@@ -144,17 +135,17 @@ def validate_instructions(
 
     names = known_tasks(tasks, open_wordings(wordings))
     wanted = () if split.strip().lower() == "none" else parse_splits(split)
-    work = batches(names, wanted, seeds, wordings)
-    count = worker_count()
-    found = ValidationResults()
-    for results in _with_progress(parallel_map(validate_batch, work, count), work):
-        found.add(results)
-    console = _console()
+    places, found = places_of(names, wanted, seeds), ValidationResults()
+    work = functools.partial(check_place, wordings_file=wordings)
+    with progress_bars() as show:
+        for done, (_, results) in enumerate(parallel_map(work, places, worker_count()), 1):
+            found.add(results)
+            show("episodes", done, len(places), "")
     for table in validation_tables(found):
-        console.print(table, "")
+        _print(table, "")
     for failure in found.failures[:MOST_FAILURES]:
         where = f"{failure.episode}, seed {failure.seed}, {failure.setting}"
-        console.print(f"{failure.rule}: {where}: {failure.words}", markup=False)
+        typer.echo(f"{failure.rule}: {where}: {failure.words}")
     if found.failures:
         texts = found.texts.total()
         broken = counted(len(found.failures), "broken rule")
@@ -213,34 +204,19 @@ def score_shortcuts(
         )
     source = [*splits, *([f"{seeds:,} random scenes per task"] if seeds else [])]
     title = f"Shortcuts, {options.form} form, {' and '.join(source)}"
-    _console().print(shortcut_table(rows, title, grouping))
+    _print(shortcut_table(rows, title, grouping))
 
 
-def _with_progress(
-    found: Iterable[tuple[Batch, ValidationResults]], work: Sequence[Batch]
-) -> Iterable[ValidationResults]:
-    """Yield the results; show progress as a bar, or as lines without a terminal."""
-    from rich.progress import Progress
-
-    from roboirg.util.console_width import progress_console
-
-    console = progress_console(stderr=True)
-    with Progress(console=console, transient=True, disable=not console.is_terminal) as bar:
-        task = bar.add_task("episodes", total=sum(batch.size for batch in work))
-        for number, (batch, results) in enumerate(found, start=1):
-            bar.advance(task, batch.size)
-            if not console.is_terminal and number % _LINE_EVERY == 0:
-                console.print(f"{number} of {len(work)} batches", highlight=False)
-            yield results
-
-
-def _console() -> Console:
+def _print(*parts: RenderableType) -> None:
+    """Print tables, which are neither cut nor folded in a file."""
     from rich.console import Console
 
+    from roboirg.util.console_width import widen
+
     console = Console()
-    if not console.is_terminal:
-        console.width = max(console.width, MINIMUM_WIDTH)
-    return console
+    widen(console, *parts)
+    for part in parts:
+        console.print(part)
 
 
 @language_app.command("import-robomme")

@@ -3,65 +3,21 @@
 from __future__ import annotations
 
 import re
-import statistics
 from collections import Counter
-from collections.abc import Iterable, Mapping
-from typing import NamedTuple
+from collections.abc import Callable, Iterable, Mapping
 
 from roboirg.apps.language_lab.expressions import ClassCounts
 from roboirg.language.instruction import Instruction
-from roboirg.language.token_counts import SHORT_LIMIT, USUAL_LIMIT, count_tokens
 
 
-class Lengths(NamedTuple):
-    """Words per instruction."""
-
-    mean: float
-    shortest: int
-    longest: int
-
-
-def word_counts(instructions: Iterable[Instruction]) -> Mapping[str, Lengths]:
-    """Return the lengths of the prompts in words, by setting."""
+def by_setting(
+    instructions: Iterable[Instruction], size_of: Callable[[str], int]
+) -> dict[str, list[int]]:
+    """Return the sizes of the prompts by setting, in words for example."""
     found: dict[str, list[int]] = {}
     for instruction in instructions:
-        found.setdefault(instruction.setting, []).append(len(instruction.text.split()))
-    return {
-        setting: Lengths(statistics.fmean(words), min(words), max(words))
-        for setting, words in found.items()
-    }
-
-
-class TokenCounts(NamedTuple):
-    """Tokens per instruction (`roboirg.language.token_counts`).
-
-    Attributes:
-        median: half of the instructions need at most this number.
-        longest: the most.
-        over_short: share over the shortest limit of the field, 0 to 1.
-        over_usual: share over the usual limit.
-    """
-
-    median: float
-    longest: int
-    over_short: float
-    over_usual: float
-
-
-def token_counts(instructions: Iterable[Instruction]) -> Mapping[str, TokenCounts]:
-    """Return how many tokens the prompts need, by setting."""
-    found: dict[str, list[int]] = {}
-    for instruction in instructions:
-        found.setdefault(instruction.setting, []).append(count_tokens(instruction.text))
-    return {
-        setting: TokenCounts(
-            statistics.median(counts),
-            max(counts),
-            statistics.fmean(count > SHORT_LIMIT for count in counts),
-            statistics.fmean(count > USUAL_LIMIT for count in counts),
-        )
-        for setting, counts in found.items()
-    }
+        found.setdefault(instruction.setting, []).append(size_of(instruction.text))
+    return found
 
 
 PAPER_PHRASES: Mapping[str, tuple[tuple[str, str], ...]] = {

@@ -6,12 +6,11 @@ Only one file of RoboMME's repository is loaded, by its path: the one with the f
 
 from __future__ import annotations
 
-import importlib.util
 import json
-import sys
+import runpy
 from collections.abc import Callable
 from pathlib import Path
-from types import ModuleType, SimpleNamespace
+from types import SimpleNamespace
 
 from roboirg.core.episode import COLORS, DIFFICULTIES, Goal
 from roboirg.core.errors import InvalidValueError
@@ -30,7 +29,6 @@ from roboirg.tasks.splits.splits import SIZES
 
 FILE = Path("src/robomme/robomme_env/utils/task_goal.py")
 FUNCTION = "get_language_goal"
-_MODULE = "roboirg_robomme_task_goal"
 
 SentenceFunction = Callable[[object, str], object]
 """``get_language_goal(self, env)``, where ``env`` is a task's name."""
@@ -79,28 +77,15 @@ def _load_function(root: Path) -> SentenceFunction:
             f"There is no {FILE} in {str(root)!r}; name the folder of a clone of RoboMME's "
             "repository."
         )
-    function = getattr(_load(path), FUNCTION, None)
-    if not callable(function):
-        raise InvalidValueError(f"{str(path)!r} has no function {FUNCTION}.")
-    return function  # type: ignore[no-any-return]
-
-
-def _load(path: Path) -> ModuleType:
-    spec = importlib.util.spec_from_file_location(_MODULE, path)
-    if spec is None or spec.loader is None:
-        raise InvalidValueError(f"{str(path)!r} is no Python file.")
-    module = importlib.util.module_from_spec(spec)
-    wrote = sys.dont_write_bytecode
-    sys.dont_write_bytecode = True  # the folder is not ours
     try:
-        spec.loader.exec_module(module)
+        function = runpy.run_path(str(path)).get(FUNCTION)
     except Exception as error:
         raise InvalidValueError(
             f"{str(path)!r} cannot be loaded: {type(error).__name__}: {error}."
         ) from error
-    finally:
-        sys.dont_write_bytecode = wrote
-    return module
+    if not callable(function):
+        raise InvalidValueError(f"{str(path)!r} has no function {FUNCTION}.")
+    return function  # type: ignore[no-any-return]
 
 
 def _sentences(function: SentenceFunction, task: Task) -> dict[Goal, str]:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
+from statistics import fmean, median
 
 from rich.table import Table
 
@@ -15,14 +16,14 @@ from roboirg.apps.language_lab.expressions import (
 from roboirg.language.instruction import Instruction
 from roboirg.language.settings import setting_names
 from roboirg.language.templates.derivations import COUNTED_STEPS, RELATIONS, STEPS
-from roboirg.language.token_counts import SHORT_LIMIT, USUAL_LIMIT
+from roboirg.language.token_counts import SHORT_LIMIT, USUAL_LIMIT, count_tokens
 from roboirg.tasks import every_task
 
 
 def overview_tables(instructions: Sequence[Instruction]) -> Iterator[Table]:
     """Yield tables of lengths, expressions, patterns, relations and landmark classes."""
-    yield _lengths(corpus_statistics.word_counts(instructions))
-    yield _tokens(corpus_statistics.token_counts(instructions))
+    yield _lengths(instructions)
+    yield _tokens(instructions)
     yield expression_table(expression_counts(instructions))
     yield from phrase_tables(corpus_statistics.phrase_counts(instructions))
     by_task = (
@@ -55,23 +56,24 @@ def phrase_tables(counts: ClassCounts) -> Iterator[Table]:
         yield table
 
 
-def _lengths(lengths: Mapping[str, corpus_statistics.Lengths]) -> Table:
+def _lengths(instructions: Sequence[Instruction]) -> Table:
     table = _table("Words per instruction", "setting", ("mean", "fewest", "most"))
-    for setting in setting_names():
-        if setting in lengths:
-            one = lengths[setting]
-            table.add_row(setting, f"{one.mean:.1f}", str(one.shortest), str(one.longest))
+    found = corpus_statistics.by_setting(instructions, lambda text: len(text.split()))
+    for setting in filter(found.__contains__, setting_names()):
+        words = found[setting]
+        table.add_row(setting, f"{fmean(words):.1f}", str(min(words)), str(max(words)))
     return table
 
 
-def _tokens(counts: Mapping[str, corpus_statistics.TokenCounts]) -> Table:
+def _tokens(instructions: Sequence[Instruction]) -> Table:
     columns = ("median", "most", f"over {SHORT_LIMIT}", f"over {USUAL_LIMIT}")
     table = _table("Tokens per instruction (vocabulary of 32,000)", "setting", columns)
-    for setting in setting_names():
-        if setting in counts:
-            one = counts[setting]
-            shares = (f"{one.over_short:.1%}", f"{one.over_usual:.1%}")
-            table.add_row(setting, f"{one.median:.0f}", str(one.longest), *shares)
+    found = corpus_statistics.by_setting(instructions, count_tokens)
+    for setting in filter(found.__contains__, setting_names()):
+        counts = found[setting]
+        over = (fmean(one > limit for one in counts) for limit in (SHORT_LIMIT, USUAL_LIMIT))
+        shares = (f"{one:.1%}" for one in over)
+        table.add_row(setting, f"{median(counts):.0f}", str(max(counts)), *shares)
     return table
 
 

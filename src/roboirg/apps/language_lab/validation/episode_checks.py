@@ -1,4 +1,4 @@
-"""Check every instruction of one episode with the independent interpreter."""
+"""Check every instruction of an episode with the independent interpreter."""
 
 from __future__ import annotations
 
@@ -16,20 +16,60 @@ from roboirg.apps.language_lab.validation.validation_results import (
     RuleViolation,
     ValidationResults,
 )
-from roboirg.core.episode import Episode, Goal
+from roboirg.core.episode import SPLITS, Episode, Goal, Split
+from roboirg.core.errors import InvalidValueError
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.language.generator import expressible, find_refusal, instruct_with
 from roboirg.language.instruction import Instruction, Mention, hidden_slots
 from roboirg.language.settings import ACCEPTANCE_SETTINGS, EXPLICIT, all_settings, settings_of
 from roboirg.language.settings.setting import Instruct, Setting
 from roboirg.language.variants import expressible_options
+from roboirg.language.wordings.wording_store import open_wordings
 from roboirg.reader import Interpretation, interpret
 from roboirg.tasks import get_task, goals_of
+from roboirg.tasks.splits.splits import SIZES, get_episode
 
 Read = Callable[[str], Interpretation]
 """Interprets a text in the scene at hand."""
 Violation = tuple[Rule, str]
 """A rule and the words that break it."""
+
+
+EpisodePlace = tuple[str, Split, int]
+"""Task, split and position of an episode."""
+
+_identity_of = functools.cache(open_wordings)
+
+
+def places_of(tasks: Sequence[str], splits: Sequence[Split], seeds: int) -> list[EpisodePlace]:
+    """Return the places of all episodes of some splits, and of random ones.
+
+    Args:
+        tasks: names.
+        splits: names.
+        seeds: number of random episodes for each task.
+
+    Raises:
+        InvalidValueError: the number is negative, or there is nothing to validate.
+    """
+    if seeds < 0:
+        raise InvalidValueError(f"The number of random seeds is {seeds}; it must be at least 0.")
+    sizes: dict[Split, int] = {**{split: SIZES[split] for split in splits}, "random": seeds}
+    found = [
+        (task, split, index)
+        for task in tasks
+        for split, size in sizes.items()
+        for index in range(size)
+    ]
+    if not found:
+        raise InvalidValueError("There is nothing to validate: no split and no random seed.")
+    return found
+
+
+def check_place(place: EpisodePlace, wordings_file: str | None = None) -> ValidationResults:
+    """Check the episode of a place; `wordings_file` as for `open_wordings`."""
+    expected, identity = place[1] in SPLITS, _identity_of(wordings_file)
+    return check_episode(get_episode(*place), must_be_expressible=expected, wordings=identity)
 
 
 def check_episode(

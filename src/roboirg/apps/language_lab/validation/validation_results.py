@@ -79,10 +79,6 @@ class ValidationResults:
     failures: list[RuleViolation] = field(default_factory=list)
 
     def add(self, other: ValidationResults) -> None:
-        self.texts.update(other.texts)
-        self.commands.update(other.commands)
-        self.exceptions.update(other.exceptions)
-        self.scenes.update(other.scenes)
-        self.refused.update(other.refused)
-        self.reasons.update(other.reasons)
+        for name in ("texts", "commands", "exceptions", "scenes", "refused", "reasons"):
+            getattr(self, name).update(getattr(other, name))
         self.failures.extend(other.failures)
