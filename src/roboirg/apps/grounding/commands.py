@@ -41,7 +41,7 @@ def export_grounding(
     settings: Settings = "all",
     plan: PlanName = None,
 ) -> None:
-    """Export grounding questions with pictures: Parquet, JSON lines, VLMEvalKit's TSV.
+    """Export grounding questions with pictures: Parquet and JSON lines.
 
     A plan may have, under `grounding`: every_variant, frames, frames_every.
 
@@ -113,16 +113,17 @@ def score_grounding(
     """
     from rich.console import Console
 
-    from roboirg.apps.grounding.answer_floors import floor_answers
+    from roboirg.apps.grounding.answer_floors import FLOORS, floor_answers
     from roboirg.apps.grounding.answer_scores import score_answers
     from roboirg.apps.grounding.score_report import report_text
     from roboirg.apps.grounding.score_tables import score_table
+    from roboirg.cli.names import known_names
     from roboirg.evaluation.analysis.tables.rendering.terminal import renderable
     from roboirg.evaluation.grounding_items.answer_file import read_answers, write_answers
     from roboirg.evaluation.grounding_items.grounding_item import read_items
     from roboirg.util.atomic_write import write_atomically
 
-    names = _floors(floor)
+    names = () if floor is None else known_names("floor", floor, FLOORS)
     if not answers and not names:
         raise InvalidValueError("There is nothing to score; give files of answers or --floor.")
     items = read_items(data)
@@ -144,13 +145,6 @@ def score_grounding(
     if report is not None:
         write_atomically(report, report_text(scores, data, report))
         typer.echo(report)
-
-
-def _floors(text: str | None) -> tuple[str, ...]:
-    from roboirg.apps.grounding.answer_floors import FLOORS
-    from roboirg.cli.names import known_names
-
-    return () if text is None else known_names("floor", text, FLOORS)
 
 
 def _comparisons(scores: Sequence[GroundingScore]) -> list[str]:

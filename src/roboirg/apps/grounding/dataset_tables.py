@@ -1,10 +1,7 @@
-"""The items as tables: Parquet with pictures, and the TSV of VLMEvalKit."""
+"""The items as a table in Parquet, with their pictures."""
 
 from __future__ import annotations
 
-import base64
-import csv
-import io
 import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -12,13 +9,11 @@ from typing import Any
 
 import msgspec
 
-from roboirg.evaluation.grounding_items.grounding_item import LETTERS, GroundingItem
-from roboirg.policies.vlm.prompt_files import load_prompts
-from roboirg.util.atomic_write import replacing, write_atomically
+from roboirg.evaluation.grounding_items.grounding_item import GroundingItem
+from roboirg.util.atomic_write import replacing
 from roboirg.util.parquet_support import check_parquet_support
 
 DATA = "data"
-TSV_FOLDER = "vlmevalkit"
 ROWS_PER_GROUP = 256
 _DICTIONARY_LIMIT = 1 << 30
 """Bytes of a column's distinct values in a row group: so that each picture is stored once in it."""
@@ -56,64 +51,6 @@ def write_parquet(items: Sequence[GroundingItem], folder: Path, split: str) -> N
         for start in range(0, len(items), ROWS_PER_GROUP):
             rows = [_row(one, folder, contents) for one in items[start : start + ROWS_PER_GROUP]]
             writer.write_table(pa.Table.from_pylist(rows, schema=schema))
-
-
-def write_tsv(items: Sequence[GroundingItem], folder: Path, split: str) -> None:
-    """Write the choice questions of a split as VLMEvalKit reads them.
-
-    An item with the pictures of an earlier one names that one in their place, as the format allows.
-    """
-    questions = load_prompts("grounding_questions")
-    path = folder / TSV_FOLDER / f"roboirg_grounding_{split}.tsv"
-    text = io.StringIO()
-    columns = (
-        "index", "image", "image_path", "question", *LETTERS, "answer", "category", "l2-category",
-        "split", "id",
-    )  # fmt: skip
-    writer = csv.DictWriter(text, columns, delimiter="\t", lineterminator="\n")
-    writer.writeheader()
-    first: dict[tuple[str, ...], int] = {}
-    for index, item in enumerate(items):
-        pictures = (*item.frames, item.picture)
-        seen = first.setdefault(pictures, index)
-        writer.writerow(
-            {
-                "index": index,
-                "image": _images(pictures, folder) if seen == index else seen,
-                "image_path": _listed([Path(one).name for one in pictures]),
-                "question": "\n".join(
-                    (
-                        item.system,
-                        item.said,
-                        _pictures_note(len(item.frames), item.shown),
-                        questions.fill("choice_alone"),
-                    )
-                ),
-                **dict(zip(LETTERS, item.choices, strict=False)),
-                "answer": item.choice,
-                "category": item.setting,
-                "l2-category": item.task,
-                "split": split,
-                "id": item.id,
-            }
-        )
-    write_atomically(path, text.getvalue())
-
-
-def _pictures_note(frames: int, shown: str) -> str:
-    """Return which of the pictures, which all stand before the text, is what."""
-    if not frames:
-        return f"{shown} The picture shows the table as it is now."
-    return f"{shown} the first {frames} pictures. The last picture shows the table as it is now."
-
-
-def _images(pictures: Sequence[str], folder: Path) -> str:
-    return _listed([base64.b64encode((folder / one).read_bytes()).decode() for one in pictures])
-
-
-def _listed(values: Sequence[str]) -> str:
-    """Return one value as it is, several as a list."""
-    return values[0] if len(values) == 1 else repr(list(values))
 
 
 def _row(item: GroundingItem, folder: Path, contents: dict[str, bytes]) -> dict[str, Any]:

@@ -1,9 +1,7 @@
-"""Files of answers: JSON lines of ours, and the TSV that VLMEvalKit writes."""
+"""Files of answers, as JSON lines."""
 
 from __future__ import annotations
 
-import csv
-import io
 import json
 from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
@@ -41,8 +39,7 @@ def read_answers(path: Path, items: Sequence[GroundingItem]) -> list[Answer]:
 
     A line of JSON has the ``id`` of an item and any of ``answer`` (an object of slots, or its
     text), ``choice`` (a letter) and ``points`` (a list of objects with x and y); or a ``reply``,
-    the model's text, and the ``kind`` of question, by default slots. A TSV file has columns ``id``
-    and ``prediction``, replies to the choice question.
+    the model's text, and the ``kind`` of question, by default slots.
 
     Raises:
         InvalidValueError: the file cannot be read, a line is none of these, names an unknown item,
@@ -54,7 +51,7 @@ def read_answers(path: Path, items: Sequence[GroundingItem]) -> list[Answer]:
         raise InvalidValueError(f"Answers {str(path)!r} cannot be read ({error}).") from error
     known, seen = {item.id for item in items}, set()
     answers = []
-    for number, answer in _tsv_answers(text) if path.suffix == ".tsv" else _json_answers(text):
+    for number, answer in _json_answers(text):
         place = f"{path}, line {number}"
         if isinstance(answer, str):
             raise InvalidValueError(f"{place}: {answer}")
@@ -115,12 +112,3 @@ def _as_reply(field: str, value: Any) -> str:  # noqa: ANN401 - whatever JSON ho
     if field == "choice" or isinstance(value, str):
         return value if isinstance(value, str) else ""
     return json.dumps({"points": value} if field == "points" else value)
-
-
-def _tsv_answers(text: str) -> Iterator[tuple[int, Answer | str]]:
-    rows = csv.DictReader(io.StringIO(text), delimiter="\t")
-    for row in rows:
-        if row.get("id") is None or row.get("prediction") is None:
-            yield rows.line_num, "a TSV of answers has the columns id and prediction."
-            return
-        yield rows.line_num, Answer(row["id"], "choice", row["prediction"])
