@@ -76,7 +76,7 @@ def make_batch(n_envs, **options):
 
 
 def test_the_video_is_played_through_the_observations():
-    env = make_batch(1, video="stream", meshes=MESHES)
+    env = make_batch(1, video=True, meshes=MESHES)
     observation, info = env.reset(seed=[1001])
     video = roboirg.make(TASK, setting=SETTING, episode=1, meshes=MESHES)
     seen, shown = video.reset()
@@ -93,12 +93,10 @@ def test_the_video_is_played_through_the_observations():
     env.close()
 
 
-def test_the_video_is_a_key_on_request():
-    env = make_batch(2, video="key", video_frames=4, cameras="front", meshes=MESHES)
+def test_lerobot_preprocesses_a_batch():
+    env = make_batch(2, cameras="front", meshes=MESHES)
     observation, _ = env.reset(seed=[1000, 1001])
     batch = preprocess_observation(observation)
-    assert batch["observation.demonstration"].shape == (2, 4, 256, 256, 3)
-    assert batch["observation.demonstration_steps"].tolist() == [[66], [66]]
     assert batch["observation.images.front"].shape == (2, 3, 256, 256)
     assert batch["observation.state"].shape == (2, 8)
     env.close()

@@ -34,8 +34,7 @@ class RoboIRGEnvConfig(EnvConfig):  # type: ignore[misc] # LeRobot has no types
             ``task-setting-split``.
         cameras: likewise of cameras.
         size: width and height of the pictures, pixels.
-        video: none, stream or key, as in `LeRobotSubEnvironment`.
-        video_frames: frames of the video in the key.
+        video: whether the video's frames are the first observations.
         episode_length: control steps that a policy has.
         features: what a policy may see, by the environment's names.
         features_map: LeRobot's names for them.
@@ -52,8 +51,7 @@ class RoboIRGEnvConfig(EnvConfig):  # type: ignore[misc] # LeRobot has no types
     frame: str = DEFAULT_FRAME
     delivery: str = DEFAULT_DELIVERY
     meshes: str = DEFAULT_MESHES
-    video: str = "none"
-    video_frames: int = 16
+    video: bool = False
     fps: int = 20
     episode_length: int = MAX_STEPS
     features: dict[str, PolicyFeature] = field(default_factory=dict)
@@ -77,7 +75,7 @@ class RoboIRGEnvConfig(EnvConfig):  # type: ignore[misc] # LeRobot has no types
         """Keyword arguments of `LeRobotSubEnvironment`."""
         names = (
             "setting", "form", "split", "actions", "distractor", "frame", "delivery", "meshes",
-            "size", "video", "video_frames",
+            "size", "video",
         )  # fmt: skip
         chosen = {name: getattr(self, name) for name in names}
         return {**chosen, "cameras": _split(self.cameras), "max_steps": self.episode_length}

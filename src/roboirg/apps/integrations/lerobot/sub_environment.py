@@ -12,13 +12,12 @@ from gymnasium import spaces
 from numpy.typing import NDArray
 
 from roboirg.core.environment_options import MAX_STEPS
-from roboirg.core.errors import InvalidActionError, InvalidValueError, UnknownNameError
+from roboirg.core.errors import InvalidActionError, InvalidValueError
 from roboirg.core.observations import CAMERAS, proprioception
 from roboirg.envs.env_settings import EnvOptions
 from roboirg.envs.factory import make
 from roboirg.util.media import PICTURE_SIZE, scaled_square
 
-VIDEO_DELIVERIES = ("none", "stream", "key")
 NEW_ROLLOUT = "lerobot_new_rollout"
 """Option with which LeRobot, from 0.6.1 on, marks the resets that it means."""
 LONGEST_VIDEO = 2000
@@ -43,16 +42,13 @@ class LeRobotSubEnvironment(gymnasium.Env[dict[str, Any], NDArray[np.floating[An
 
     Args:
         task: name of the task.
-        video: what becomes of the demonstration. ``none``: it is left out; ``stream``: its frames
-            are the first observations, whatever the actions; ``key``: `demonstration` holds
-            `video_frames` frames of the first camera, evenly spaced, and `demonstration_steps`
-            their number, 0 without a video.
-        video_frames: frames in the key.
+        video: whether the video's frames are the first observations, whatever the actions; else
+            they are left out.
         size: width and height of the pictures, pixels.
         **options: the other keyword arguments of `roboirg.make`.
 
     Raises:
-        UnknownNameError: there is no such task, way with the video or option's value.
+        UnknownNameError: there is no such task or option's value.
         InvalidValueError: a number is out of range, or the combination is not defined.
     """
 
@@ -67,24 +63,19 @@ class LeRobotSubEnvironment(gymnasium.Env[dict[str, Any], NDArray[np.floating[An
         self,
         task: str,
         *,
-        video: str = "none",
-        video_frames: int = 16,
+        video: bool = False,
         size: int = PICTURE_SIZE,
         **options: Unpack[EnvOptions],
     ) -> None:
-        if video not in VIDEO_DELIVERIES:
-            raise UnknownNameError("way to show the video", video, VIDEO_DELIVERIES)
-        if not isinstance(video_frames, int) or video_frames < 1:
-            raise InvalidValueError(f"video_frames is {video_frames!r}; it must be 1 or more.")
         if not options.get("cameras", CAMERAS):
             raise InvalidValueError("cameras is empty; LeRobot needs at least one picture.")
         if not isinstance(size, int) or not 1 <= size <= PICTURE_SIZE:
             raise InvalidValueError(
                 f"size is {size!r}; it must be a number from 1 to {PICTURE_SIZE}."
             )
-        self._video, self._frames, self._size = video, video_frames, size
+        self._video, self._size = video, size
         usual: EnvOptions = {
-            "demonstration_frames": "none" if video == "none" else "all",
+            "demonstration_frames": "all" if video else "none",
             "episode": None,
         }
         chosen: EnvOptions = {**usual, **options}
@@ -92,12 +83,11 @@ class LeRobotSubEnvironment(gymnasium.Env[dict[str, Any], NDArray[np.floating[An
         self.observation_space = self._make_space()
         low, high = self._env.action_space.low, self._env.action_space.high  # type: ignore[attr-defined]
         self.action_space = spaces.Box(low.astype(np.float32), high.astype(np.float32))
-        longest = LONGEST_VIDEO if video == "stream" else 0
+        longest = LONGEST_VIDEO if video else 0
         self._max_episode_steps = options.get("max_steps", MAX_STEPS) + longest
         self.task_description = ""
         self._shown: Mapping[str, NDArray[Any]] = {}
         self._next_frame = self._length = 0
-        self._extra: dict[str, Any] = {}
         self._seen: dict[str, Any] = {}
         self._picture: NDArray[np.uint8] | None = None
         self._last: _Transition | None = None
@@ -119,13 +109,10 @@ class LeRobotSubEnvironment(gymnasium.Env[dict[str, Any], NDArray[np.floating[An
         self._seen, info = self._env.reset(seed=seed, options=chosen)
         self.task_description = self._seen["instruction"]
         demonstration = info["demonstration"]
-        self._length, self._next_frame = demonstration.length, 0
-        self._extra = self._sample(demonstration) if self._video == "key" else {}
-        if self._video == "stream" and self._length:
+        self._next_frame = self._length = 0
+        if self._video and demonstration.length:
             demonstration.draw()
-            self._shown = demonstration
-        else:
-            self._next_frame, self._shown = self._length, {}
+            self._shown, self._length = demonstration, demonstration.length
         return self._observe(self._seen), self._info(success=False)
 
     def step(self, action: NDArray[np.floating[Any]]) -> _Transition:
@@ -162,14 +149,8 @@ class LeRobotSubEnvironment(gymnasium.Env[dict[str, Any], NDArray[np.floating[An
         shape = (self._size, self._size, 3)
         picture: spaces.Space[Any] = spaces.Box(0, 255, shape, np.uint8)
         pictures = dict.fromkeys(self._env.cameras, picture)
-        fields: dict[str, spaces.Space[Any]] = {
-            "pixels": spaces.Dict(pictures),
-            "agent_pos": spaces.Box(-np.inf, np.inf, (STATE_SIZE,), np.float32),
-        }
-        if self._video == "key":
-            fields["demonstration"] = spaces.Box(0, 255, (self._frames, *shape), np.uint8)
-            fields["demonstration_steps"] = spaces.Box(0, LONGEST_VIDEO, (1,), np.int64)
-        return spaces.Dict(fields)
+        state = spaces.Box(-np.inf, np.inf, (STATE_SIZE,), np.float32)
+        return spaces.Dict({"pixels": spaces.Dict(pictures), "agent_pos": state})
 
     def _observe(self, seen: Mapping[str, Any]) -> dict[str, Any]:
         """Return an observation in LeRobot's form: of the video while it is played."""
@@ -180,20 +161,7 @@ class LeRobotSubEnvironment(gymnasium.Env[dict[str, Any], NDArray[np.floating[An
         }
         self._picture = next(iter(pixels.values()))
         state = proprioception(seen["joint_positions"], seen["gripper"])
-        return {"pixels": pixels, "agent_pos": state, **self._extra}
+        return {"pixels": pixels, "agent_pos": state}
 
     def _info(self, *, success: bool) -> dict[str, Any]:
         return {"is_success": success, "is_video_demo": self._next_frame < self._length}
-
-    def _sample(self, demonstration: Mapping[str, NDArray[Any]]) -> dict[str, Any]:
-        """Return evenly spaced frames of the video, the first and the last included."""
-        shape = self.observation_space["demonstration"].shape or ()
-        frames = np.zeros(shape, np.uint8)
-        if self._length:
-            picked = np.linspace(0, self._length - 1, self._frames).round().astype(int)
-            shown = demonstration[f"{self._env.cameras[0]}_rgb"][picked]
-            frames[:] = [scaled_square(one, self._size) for one in shown]
-        return {
-            "demonstration": frames,
-            "demonstration_steps": np.array([self._length], np.int64),
-        }
