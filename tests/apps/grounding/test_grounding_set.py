@@ -14,7 +14,6 @@ from roboirg.apps.grounding.dataset_export import export_grounding
 from roboirg.core.errors import InvalidValueError
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.envs.environment import RoboIRGEnv
-from roboirg.evaluation.grounding_items import question_set
 from roboirg.evaluation.grounding_items.grounding_item import (
     LETTERS,
     PointTarget,
@@ -23,15 +22,14 @@ from roboirg.evaluation.grounding_items.grounding_item import (
     read_items,
 )
 from roboirg.evaluation.grounding_items.item_builder import (
-    EpisodeMedia,
     item_id,
     make_items,
     wanted_options,
     words_back,
 )
+from roboirg.evaluation.grounding_items.media_store import EpisodeMedia, nearest_to_center
 from roboirg.evaluation.grounding_items.question_set import EpisodeName, ExportRequest
 from roboirg.evaluation.grounding_items.referents import find_referents, pointed_kinds
-from roboirg.evaluation.grounding_items.seen_scene import nearest_to_center
 from roboirg.language import FORMS, instruct, plain_settings
 from roboirg.language.settings import all_settings
 from roboirg.main import app
@@ -54,7 +52,7 @@ SEEN = [
 
 def unseen(steps=0):
     """Media in place of pictures, for tests of words and answers."""
-    point = PointTarget(kind="cube", picture="first", x=0, y=0, size=(2, 2), counts=[0, 1, 3])
+    point = PointTarget(kind="cube", x=0, y=0, size=(2, 2), counts=[0, 1, 3])
     return EpisodeMedia("pictures/0.png", None, (), steps, (point,), 0.5)
 
 
@@ -293,20 +291,6 @@ def project(observation, position):
     place = observation["front_extrinsic"] @ np.append(position, 1.0)
     x, y, depth = observation["front_intrinsic"] @ place
     return round(x / depth), round(y / depth)
-
-
-@pytest.mark.sim
-def test_an_export_goes_on_and_gives_the_same_bytes(exported, monkeypatch):
-    request, folder, facts = exported
-    before = {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()}
-    monkeypatch.setattr(question_set, "store_media", None)  # nothing is drawn again
-    assert export_grounding(request, folder, 0) == facts
-    assert {path: path.read_bytes() for path in before} == before
-    with pytest.raises(InvalidValueError, match="pictures with another frames; choose another"):
-        export_grounding(request._replace(frames=5), folder, 0)
-    fewer = export_grounding(request._replace(settings=("direct",)), folder, 0)
-    assert fewer.items == len(SEEN)
-    export_grounding(request, folder, 0)
 
 
 @pytest.mark.sim

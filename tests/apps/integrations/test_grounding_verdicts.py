@@ -6,14 +6,15 @@ import json
 
 import numpy as np
 import pytest
+from msgspec.structs import replace
 from planning_fakes import fake_vlm, make_listener, stand_in
 
 from roboirg.apps.grounding.answer_scores import score_answers
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.evaluation.grounding_items.answer_file import Answer
-from roboirg.evaluation.grounding_items.grounding_item import ITEMS_FILE, PointTarget, encode_items
-from roboirg.evaluation.grounding_items.item_builder import EpisodeMedia, make_items, wanted_options
-from roboirg.evaluation.grounding_items.media_store import store_content
+from roboirg.evaluation.grounding_items.grounding_item import PointTarget, write_items
+from roboirg.evaluation.grounding_items.item_builder import make_items, wanted_options
+from roboirg.evaluation.grounding_items.media_store import EpisodeMedia, store_content
 from roboirg.language import plain_settings
 from roboirg.policies.vlm.goal_schema import goal_schema
 from roboirg.shortcuts.command_chance import is_right
@@ -27,9 +28,7 @@ PICTURE = encode_png(Picture(np.zeros((256, 256, 3), np.uint8)))
 
 @functools.cache
 def items(count=NUMBER):
-    point = PointTarget(
-        kind="cube", picture="first", x=0, y=0, size=(256, 256), counts=[0, 1, 256**2 - 1]
-    )
+    point = PointTarget(kind="cube", x=0, y=0, size=(256, 256), counts=[0, 1, 256**2 - 1])
     name = "pictures/black.png"
     media = EpisodeMedia(name, None, (), 0, (point,), 0.5)
     found = []
@@ -110,10 +109,8 @@ def test_the_listener_is_asked_what_the_dataset_asks():
 @pytest.fixture(scope="module")
 def data(tmp_path_factory):
     folder = tmp_path_factory.mktemp("inspect") / "set"
-    folder.mkdir()
     stored = store_content(folder, "pictures", PICTURE, ".png")
-    content = encode_items(list(items()))
-    (folder / ITEMS_FILE).write_bytes(content.replace(b"pictures/black.png", stored.encode()))
+    write_items([replace(item, picture=stored) for item in items()], folder)
     return folder
 
 

@@ -35,7 +35,7 @@ def _score() -> None:
 
 def export_grounding(
     context: typer.Context,
-    out: Annotated[Path, typer.Option(help="Folder for the dataset; continued if interrupted.")],
+    out: Annotated[Path, typer.Option(help="Folder for the dataset; empty, or created.")],
     split: AnySplit = "test",
     tasks: Tasks = "all",
     settings: Settings = "all",

@@ -15,12 +15,7 @@ from roboirg.evaluation.grounding_items.grounding_item import (
     GroundingItem,
     write_items,
 )
-from roboirg.evaluation.grounding_items.question_set import (
-    PARTS,
-    ExportRequest,
-    Progress,
-    collect_items,
-)
+from roboirg.evaluation.grounding_items.question_set import ExportRequest, Progress, collect_items
 from roboirg.language.settings import setting_names
 from roboirg.util.atomic_write import write_atomically
 
@@ -89,13 +84,13 @@ def export_grounding(
 
     Args:
         request: what it holds.
-        folder: created if missing; a dataset of the same request is continued.
+        folder: created if missing, else empty.
         workers: worker processes; 0 uses this process only.
         progress: called with the number of episodes that are done, and of all.
 
     Raises:
-        InvalidValueError: the folder holds another dataset or cannot be written, or nothing is to
-            be exported.
+        InvalidValueError: the folder is not empty or cannot be written, or nothing is to be
+            exported.
         MissingDependencyError: pyarrow is not installed.
         RoboIRGError: a thing that is meant cannot be seen, or a video cannot be played.
     """
@@ -129,9 +124,7 @@ def export_grounding(
 def _size(folder: Path) -> int:
     """Return the size of all files of the dataset but its card, bytes."""
     return sum(
-        path.stat().st_size
-        for path in folder.rglob("*")
-        if path.is_file() and path.parent.name != PARTS and path.name != CARD
+        path.stat().st_size for path in folder.rglob("*") if path.is_file() and path.name != CARD
     )
 
 

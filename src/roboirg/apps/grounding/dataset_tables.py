@@ -73,7 +73,6 @@ def _arrow_schema() -> Any:  # noqa: ANN401 - pyarrow ships no types
     point = pa.struct(
         [
             ("kind", text),
-            ("picture", text),
             ("x", number),
             ("y", number),
             ("size", pa.list_(number)),

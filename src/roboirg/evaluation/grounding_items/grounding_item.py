@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Literal, get_args
+from typing import Literal, TypeVar, get_args
 
 import msgspec
 import numpy as np
@@ -22,6 +22,7 @@ QUESTION_KINDS: tuple[QuestionKind, ...] = get_args(QuestionKind)
 LETTERS = "ABCD"
 
 Mask = NDArray[np.bool_]
+T = TypeVar("T")
 
 
 class PointTarget(msgspec.Struct, frozen=True, kw_only=True):
@@ -29,8 +30,7 @@ class PointTarget(msgspec.Struct, frozen=True, kw_only=True):
 
     Attributes:
         kind: of the thing, such as ``cube``.
-        picture: the picture it is seen in; always ``first`` so far.
-        x: column of a pixel of its mask, from the left.
+        x: column of a pixel of its mask in the item's picture, from the left.
         y: row of that pixel, from the top.
         size: height and width of the picture.
         counts: lengths of the runs of the mask, column after column, alternating between pixels
@@ -38,7 +38,6 @@ class PointTarget(msgspec.Struct, frozen=True, kw_only=True):
     """
 
     kind: str
-    picture: str
     x: int
     y: int
     size: tuple[int, int]
@@ -144,32 +143,26 @@ def decode_mask(counts: list[int], size: tuple[int, int]) -> Mask:
     return np.repeat(inside, counts).reshape(size, order="F")
 
 
-def encode_items(items: list[GroundingItem]) -> bytes:
-    """Return items as JSON lines."""
-    return b"".join(msgspec.json.encode(item) + b"\n" for item in items)
-
-
 def write_items(items: list[GroundingItem], folder: Path) -> bytes:
     """Write the items of a dataset into its folder; return the content of the file."""
-    content = encode_items(items)
+    content = msgspec.json.Encoder().encode_lines(items)
     write_atomically(folder / ITEMS_FILE, content)
     return content
 
 
-def decode_items(content: bytes, origin: Path) -> Iterator[GroundingItem]:
-    """Yield the items of JSON lines.
+def decode_lines(content: bytes, kind: type[T], origin: Path) -> Iterator[tuple[int, T]]:
+    """Yield numbers and objects of JSON lines that are not empty.
 
     Raises:
-        InvalidValueError: a line is no item.
+        InvalidValueError: a line is no such object.
     """
-    decoder = msgspec.json.Decoder(GroundingItem)
+    decoder = msgspec.json.Decoder(kind)
     for number, line in enumerate(content.splitlines(), start=1):
         try:
-            yield decoder.decode(line)
-        except msgspec.DecodeError as error:
-            raise InvalidValueError(
-                f"{origin}, line {number}: not a grounding item ({error})."
-            ) from error
+            found = [decoder.decode(line)] if line.strip() else []
+        except (msgspec.DecodeError, UnicodeDecodeError) as error:
+            raise InvalidValueError(f"{origin}, line {number}: not valid ({error}).") from error
+        yield from ((number, one) for one in found)
 
 
 def read_items(folder: Path) -> list[GroundingItem]:
@@ -186,4 +179,4 @@ def read_items(folder: Path) -> list[GroundingItem]:
             f"{str(folder)!r} holds no grounding dataset ({error.strerror}: {path}); "
             "make one with: roboirg export grounding --out DIR."
         ) from error
-    return list(decode_items(content, path))
+    return [item for _, item in decode_lines(content, GroundingItem, path)]

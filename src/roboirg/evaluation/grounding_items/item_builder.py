@@ -6,13 +6,14 @@ import hashlib
 import json
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, astuple, replace
-from typing import Any, NamedTuple
+from typing import Any
 
 from roboirg.core.episode import ENVIRONMENT_VERSION, Episode
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.core.word_pools import POOLS
 from roboirg.evaluation.grounding_items.goal_choices import draw_choices, explicit_command
-from roboirg.evaluation.grounding_items.grounding_item import LETTERS, GroundingItem, PointTarget
+from roboirg.evaluation.grounding_items.grounding_item import LETTERS, GroundingItem
+from roboirg.evaluation.grounding_items.media_store import EpisodeMedia
 from roboirg.evaluation.grounding_items.referents import is_ordered, noun, pointed_kinds
 from roboirg.language import instruct_with
 from roboirg.language.generator import find_refusal
@@ -30,26 +31,6 @@ QUESTIONS = "grounding_questions"
 """Name of the prompts for the questions that the listener does not ask."""
 SIZE = 256
 ID_DIGITS = 16
-
-
-class EpisodeMedia(NamedTuple):
-    """Pictures of an episode, as stored, and where the things that are meant are seen.
-
-    Attributes:
-        picture: path of the first picture.
-        video: path of the video; None without one.
-        frames: paths of frames of the video, evenly spaced.
-        steps: control steps of the video.
-        points: one for each thing that is meant.
-        meters: distance of the first of them from the camera.
-    """
-
-    picture: str
-    video: str | None
-    frames: tuple[str, ...]
-    steps: int
-    points: tuple[PointTarget, ...]
-    meters: float
 
 
 def wanted_options(

@@ -1,14 +1,24 @@
-"""Pictures and videos of a dataset, each stored once under a hash of its content."""
+"""What is shown and seen of an episode: its video, the first picture, and masks of objects.
+
+Pictures and videos of a dataset are each stored once, under a hash of their content.
+"""
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 from fractions import Fraction
 from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
 
 from roboirg.core.episode import Episode
-from roboirg.evaluation.grounding_items.item_builder import EpisodeMedia
-from roboirg.evaluation.grounding_items.seen_scene import SeenScene, look_at_episode
+from roboirg.core.errors import RoboIRGError
+from roboirg.core.observations import FRONT
+from roboirg.envs.environment import RoboIRGEnv
+from roboirg.evaluation.grounding_items.grounding_item import Mask, PointTarget, encode_mask
+from roboirg.evaluation.grounding_items.referents import find_referents
 from roboirg.util.atomic_write import write_atomically
 from roboirg.util.media import (
     CONTROL_RATE,
@@ -24,8 +34,28 @@ PICTURES, VIDEOS = "pictures", "videos"
 NAME_DIGITS = 24
 
 
+class EpisodeMedia(NamedTuple):
+    """Pictures of an episode by the front camera, and where the things that are meant are seen.
+
+    Attributes:
+        picture: path of the picture at the start of the policy's turn.
+        video: path of the video; None without one.
+        frames: paths of frames of the video, evenly spaced.
+        steps: control steps of the video.
+        points: one for each thing that is meant.
+        meters: distance of the first of them from the camera.
+    """
+
+    picture: str
+    video: str | None
+    frames: tuple[str, ...]
+    steps: int
+    points: tuple[PointTarget, ...]
+    meters: float
+
+
 def store_media(folder: Path, episode: Episode, every: int, most: int) -> EpisodeMedia:
-    """Take the pictures of an episode and store them.
+    """Play the video of an episode, if it has one, take its pictures and store them.
 
     Args:
         folder: of the dataset.
@@ -37,17 +67,33 @@ def store_media(folder: Path, episode: Episode, every: int, most: int) -> Episod
         RoboIRGError: a thing that is meant cannot be seen, or the video cannot be played.
         InvalidValueError: the folder cannot be written.
     """
-    seen = look_at_episode(episode, every)
+    env = RoboIRGEnv(episode, cameras=(FRONT,), depth=True, demonstration_frames=every)
+    with contextlib.closing(env):
+        observation, info = env.reset()
+        segments = env.session.world.cameras.segmentation(FRONT)
+        numbers = {name: body.segment for name, body in env.session.world.bodies.items()}
+    points = []
+    for referent in find_referents(episode):
+        mask = np.isin(segments, [numbers[name] for name in referent.objects])
+        if not mask.any():
+            raise RoboIRGError(
+                f"{episode.key}: {' and '.join(referent.objects)} cannot be seen in the first "
+                "picture."
+            )
+        points.append(_target(referent.kind, mask))
+    shown, first = info["demonstration"], points[0]
+    video, frames = None, []
+    if shown.length:
+        clip = Clip(shown["front_rgb"], Fraction(CONTROL_RATE, every))
+        video = store_content(folder, VIDEOS, encode_mp4(clip), ".mp4")
+        frames = [encode_jpeg(pixels) for pixels in sample_evenly(clip.frames, most)]
     return EpisodeMedia(
-        picture=store_content(folder, PICTURES, encode_png(Picture(seen.picture)), ".png"),
-        video=_store_video(folder, seen, every),
-        frames=tuple(
-            store_content(folder, PICTURES, encode_jpeg(pixels), ".jpg")
-            for pixels in sample_evenly(seen.frames, most)
-        ),
-        steps=seen.steps,
-        points=seen.points,
-        meters=seen.meters,
+        store_content(folder, PICTURES, encode_png(Picture(observation["front_rgb"])), ".png"),
+        video,
+        tuple(store_content(folder, PICTURES, one, ".jpg") for one in frames),
+        steps=shown.length,
+        points=tuple(points),
+        meters=round(float(observation["front_depth"][first.y, first.x, 0]) / 1000, 3),
     )
 
 
@@ -60,8 +106,15 @@ def store_content(folder: Path, kind: str, content: bytes, suffix: str) -> str:
     return f"{kind}/{path.name}"
 
 
-def _store_video(folder: Path, seen: SeenScene, every: int) -> str | None:
-    if not seen.steps:
-        return None
-    clip = Clip(seen.frames, Fraction(CONTROL_RATE, every))
-    return store_content(folder, VIDEOS, encode_mp4(clip), ".mp4")
+def _target(kind: str, mask: Mask) -> PointTarget:
+    y, x = nearest_to_center(mask)
+    height, width = mask.shape
+    return PointTarget(kind=kind, x=x, y=y, size=(height, width), counts=encode_mask(mask))
+
+
+def nearest_to_center(mask: Mask) -> tuple[int, int]:
+    """Return row and column of the pixel of a mask that is nearest to the mean of all of them."""
+    places = np.argwhere(mask)
+    distances = np.square(places - places.mean(axis=0)).sum(axis=1)
+    row, column = places[int(distances.argmin())]
+    return int(row), int(column)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import functools
 import itertools
 import json
 import math
@@ -67,7 +66,7 @@ def guess_chance(item: GroundingItem, kind: QuestionKind) -> float:
         return len(item.answers) / len(item.goals)
     if kind == "choice":
         return 1 / len(item.choices)
-    shares = [_mask_share(tuple(point.counts)) for point in item.points]
+    shares = [float(point.mask.mean()) for point in item.points]
     orders = 1 if item.points_in_order else math.factorial(len(shares))
     return math.prod(shares) * orders
 
@@ -163,20 +162,7 @@ def _hits(target: PointTarget, point: Pixel) -> bool:
     """Return whether a point lies in the pixels of a mask; a pixel begins at its number."""
     column, row = math.floor(point[0]), math.floor(point[1])
     height, width = target.size
-    if not (0 <= column < width and 0 <= row < height):
-        return False
-    # Without the whole mask: the run of a pixel is inside if its number is odd.
-    place, run = column * height + row, 0
-    for run, length in enumerate(target.counts):  # noqa: B007 - the number is the result
-        place -= length
-        if place < 0:
-            break
-    return run % 2 == 1
-
-
-@functools.lru_cache(maxsize=4096)
-def _mask_share(counts: tuple[int, ...]) -> float:
-    return sum(counts[1::2]) / sum(counts)
+    return 0 <= column < width and 0 <= row < height and bool(target.mask[row, column])
 
 
 _JUDGES: Mapping[QuestionKind, Callable[[GroundingItem, str], ReplyVerdict]] = {
