@@ -119,8 +119,7 @@ def figures(
     which: Annotated[
         str,
         typer.Option(
-            help="gaps, forms, context, failures, strips (a failure in pictures), several "
-            "separated by commas, or all that apply."
+            help="gaps, forms, context, failures, several separated by commas, or all that apply."
         ),
     ] = _ALL,
     published: Annotated[bool, typer.Option(help="Add the paper's values.")] = False,
@@ -134,16 +133,15 @@ def figures(
     from roboirg.evaluation.analysis.results.reading import read_frame
     from roboirg.evaluation.analysis.stats.run_data import RunData
     from roboirg.evaluation.plan.sources import opened_sources
-    from roboirg.evaluation.records.packs import MEDIA_FOLDERS
 
     check_figure_support()
     if not runs and not published:
         raise InvalidValueError("Figures need a run; give its folder, a pack, or --published.")
-    names = FIGURES if which == _ALL else tuple(word.strip() for word in which.split(","))
-    with opened_sources(runs or [], MEDIA_FOLDERS) as sources:
+    names = known_names("figure", which, tuple(FIGURES))
+    with opened_sources(runs or []) as sources:
         content = RunData(read_frame(sources))
-        for path in write_figures(content, out, names, published=published, runs=sources):
-            typer.echo(path)
+    for path in write_figures(content, out, names, published=published):
+        typer.echo(path)
 
 
 def tables(
@@ -330,11 +328,10 @@ def _breakdown_tables(data: RunData, by: str) -> list[Table]:
 
 
 def _breakdowns(by: str | None) -> tuple[Breakdown, ...]:
-    from roboirg.evaluation.analysis.stats.breakdowns import BREAKDOWNS, find_breakdowns
+    from roboirg.evaluation.analysis.stats.breakdowns import BREAKDOWNS
 
-    if by is None:
-        return ()
-    return find_breakdowns(BREAKDOWNS if by == _ALL else map(str.strip, by.split(",")))
+    names = () if by is None else known_names("breakdown", by, tuple(BREAKDOWNS))
+    return tuple(BREAKDOWNS[name] for name in names)
 
 
 def _print(found: list[Table]) -> None:

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 from roboirg.core.errors import InvalidValueError, UnknownNameError
 from roboirg.core.extras import extra_needed
 from roboirg.core.plain_text import counted
-from roboirg.evaluation.analysis.figures import FIGURES, STRIPS, draw_figure
+from roboirg.evaluation.analysis.figures import draw_figure
 from roboirg.evaluation.analysis.results.frame import COLUMNS, MISSING
 from roboirg.evaluation.analysis.results.option_labels import options_label
 from roboirg.evaluation.analysis.results.reading import WORD_COLUMNS, read_frame
@@ -139,9 +139,6 @@ class Results:
             InvalidValueError: the run has nothing to draw for it.
             MissingDependencyError: matplotlib is not installed.
         """
-        names = tuple(name for name in FIGURES if name != STRIPS)
-        if which not in names:
-            raise UnknownNameError("figure", which, names)
         figure = draw_figure(which, self._data, published=published)
         if figure is None:
             raise InvalidValueError(f"The run has nothing to draw for {which!r}.")

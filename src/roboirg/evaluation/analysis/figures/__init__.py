@@ -12,30 +12,22 @@ from roboirg.evaluation.analysis.figures.failures import draw_failures
 from roboirg.evaluation.analysis.figures.figure_style import STYLE, check_figure_support, save
 from roboirg.evaluation.analysis.figures.forms import draw_forms
 from roboirg.evaluation.analysis.figures.gaps import draw_next_to_reference
-from roboirg.evaluation.analysis.figures.strips import draw_strips
 from roboirg.evaluation.analysis.stats.run_data import RunData
-from roboirg.evaluation.plan.sources import Source
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-STRIPS = "strips"
-_DRAWINGS: Mapping[str, Callable[[RunData, bool], Figure | None]] = {
+FIGURES: Mapping[str, Callable[[RunData, bool], Figure | None]] = {
     "gaps": partial(draw_next_to_reference, "main"),
     "forms": lambda content, _published: draw_forms(content),
     "context": partial(draw_next_to_reference, "context"),
     "failures": lambda content, _published: draw_failures(content),
 }
-FIGURES = (*_DRAWINGS, STRIPS)
+"""By name: what draws a figure of runs, and of the paper's values if wanted; None without data."""
 
 
 def write_figures(
-    content: RunData,
-    folder: Path,
-    which: Sequence[str] = FIGURES,
-    *,
-    published: bool = False,
-    runs: Sequence[Source] = (),
+    content: RunData, folder: Path, which: Sequence[str] = (*FIGURES,), *, published: bool = False
 ) -> tuple[Path, ...]:
     """Draw figures as PNG, SVG and PDF, and as PNG and SVG for dark pages.
 
@@ -44,17 +36,13 @@ def write_figures(
         folder: created if missing.
         which: names out of `FIGURES`; figures without data are left out.
         published: whether to add the paper's values, in gray.
-        runs: the runs themselves, for strips of pictures.
 
     Returns:
         The files.
     """
-    for name in which:
-        if name not in FIGURES:
-            raise UnknownNameError("figure", name, FIGURES)
     paths: list[Path] = []
     for name in which:
-        paths += save(partial(_drawn, name, content, published, runs), folder, name)
+        paths += save(partial(FIGURES[name], content.told, published), folder, name)
     if not paths:
         whose = "The runs have" if content.cells else "The paper's tables have"
         raise InvalidValueError(
@@ -65,16 +53,16 @@ def write_figures(
 
 
 def draw_figure(name: str, content: RunData, *, published: bool = False) -> Figure | None:
-    """Draw one of `FIGURES` but strips; return None without data."""
+    """Draw one of `FIGURES`; return None without data.
+
+    Raises:
+        UnknownNameError: there is no such figure.
+    """
+    if name not in FIGURES:
+        raise UnknownNameError("figure", name, FIGURES)
     check_figure_support()
     import matplotlib as mpl
 
     # The keys of its own type are those of one version.
     with mpl.rc_context(cast("Any", STYLE)):
-        return _drawn(name, content, published)
-
-
-def _drawn(
-    name: str, content: RunData, published: bool, runs: Sequence[Source] = ()
-) -> Figure | None:
-    return draw_strips(runs) if name == STRIPS else _DRAWINGS[name](content.told, published)
+        return FIGURES[name](content.told, published)

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from typing import NamedTuple
 
-from roboirg.core.errors import UnknownNameError
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.evaluation.analysis.results.frame import Frame
 from roboirg.evaluation.analysis.results.option_labels import REFERENCE, options_sort_key
@@ -68,14 +67,6 @@ class LabelKey(NamedTuple):
     run: PolicyRun
     options: InstructionOptions
     label: str
-
-
-def find_breakdowns(names: Iterable[str]) -> tuple[Breakdown, ...]:
-    wanted = tuple(names)
-    for name in wanted:
-        if name not in BREAKDOWNS:
-            raise UnknownNameError("breakdown", name, BREAKDOWNS)
-    return tuple(BREAKDOWNS[name] for name in dict.fromkeys(wanted))
 
 
 def labeled(frame: Frame, breakdown: Breakdown) -> Frame:
