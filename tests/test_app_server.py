@@ -17,7 +17,7 @@ from starlette.routing import Route
 from roboirg.apps.real.pages.score_server import ScoreServer
 from roboirg.apps.real.study.study_plan import make_study, write_study
 from roboirg.core.errors import InvalidValueError
-from roboirg.evaluation.analysis.page.page_server import PageServer
+from roboirg.evaluation.analysis.page.page_server import run_server
 from roboirg.util.web.app_server import AppServer, read_body
 
 VIDEO_BYTES = 64 << 20
@@ -27,7 +27,8 @@ VIDEO_BYTES = 64 << 20
 def page_server(folder):
     with (folder / "video.mp4").open("wb") as file:
         file.truncate(VIDEO_BYTES)
-    return PageServer(folder, lambda: "<p>page</p>")
+    (folder / "page").write_text("a page")
+    return run_server(folder)
 
 
 def score_server(folder):
@@ -80,7 +81,7 @@ def test_a_client_that_disconnects_prints_nothing(tmp_path, capfd):
             if "video" in request:
                 raw.recv(10)
             raw.close()
-        assert get(server, "/").status == 200
+        assert get(server, "/page").status == 200
     assert capfd.readouterr() == ("", "")
 
 
@@ -103,8 +104,8 @@ def test_what_is_no_request_or_too_large_is_refused(headers, status, tmp_path, c
     assert capfd.readouterr().err == ""
 
 
-@pytest.mark.parametrize("make", [page_server, score_server])
-def test_pages_of_other_sites_are_refused(make, tmp_path):
+@pytest.mark.parametrize(("make", "path"), [(page_server, "/page"), (score_server, "/")])
+def test_pages_of_other_sites_are_refused(make, path, tmp_path):
     server = make(tmp_path)
     with running(server) as port:
         for host, origin, status in (
@@ -118,7 +119,7 @@ def test_pages_of_other_sites_are_refused(make, tmp_path):
             ("127.0.0.1.evil.example", None, 403),
         ):
             headers = {"Host": host} | ({} if origin is None else {"Origin": origin})
-            response = get(server, "/", **headers)
+            response = get(server, path, **headers)
             assert response.status == status, headers
             assert response.headers["X-Content-Type-Options"] == "nosniff"
 
@@ -140,11 +141,11 @@ def test_a_body_that_does_not_come_is_not_waited_for_nor_logged(timeout_s, caplo
     assert caplog.text == ""
 
 
-def test_an_error_of_ours_logs_its_traceback(tmp_path, caplog):
-    def fail():
+def test_an_error_of_ours_logs_its_traceback(caplog):
+    def fail(request):
         raise RuntimeError("a bug")
 
-    server = PageServer(tmp_path, fail)
+    server = AppServer(Starlette(routes=[Route("/", fail)]))
     with running(server):
         assert get(server, "/").status == 500
         deadline = time.monotonic() + 60  # the log follows the response
@@ -154,10 +155,10 @@ def test_an_error_of_ours_logs_its_traceback(tmp_path, caplog):
 
 
 def test_a_port_in_use_is_an_error(tmp_path):
-    with PageServer(tmp_path, str) as server:
+    with run_server(tmp_path) as server:
         for port in (server.port, 70_000, -1):
             with pytest.raises(InvalidValueError, match=f"Cannot listen on 127.0.0.1:{port} "):
-                PageServer(tmp_path, str, port)
+                run_server(tmp_path, port)
 
 
 WAITING = """

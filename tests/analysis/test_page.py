@@ -19,8 +19,8 @@ import pytest
 from msgspec.structs import replace
 from page_text import PLAN, broken, played, store, words
 
-from roboirg.evaluation.analysis.page.page_server import PageServer
-from roboirg.evaluation.analysis.page.report import make_view, write_report
+from roboirg.evaluation.analysis.page.page_server import run_server
+from roboirg.evaluation.analysis.page.report import write_report
 from roboirg.evaluation.plan.sources import Source
 from roboirg.evaluation.play.video_writer import VideoWriter
 from roboirg.evaluation.records.episode_log import EpisodeLog, log_path
@@ -256,14 +256,16 @@ def test_a_served_page_seeks_in_the_film_and_has_what_was_printed(
     open_page: Any, run: Source
 ) -> None:
     with ExitStack() as stack:
-        server = stack.enter_context(PageServer(run.folder, lambda: make_view(run)))
+        written = write_report(run, served=True)
+        server = stack.enter_context(run_server(run.folder))
+        address = f"http://127.0.0.1:{server.port}/"
         threading.Thread(target=server.serve_forever).start()
         stack.callback(server.shutdown)
-        page = stack.enter_context(open_page(server.address))
+        page = stack.enter_context(open_page(address + written.name))
         for number in (0, 1):
             page.locator("#rows h3 button").nth(number).click()
         (link,) = page.get_by_text("what was printed").all()
-        answer = page.request.get(server.address + link.get_attribute("href"))
+        answer = page.request.get(address + link.get_attribute("href"))
         assert answer.body() == LOG
         assert answer.headers["content-type"] == "text/plain; charset=utf-8"
         row = page.locator("#rows > li").first

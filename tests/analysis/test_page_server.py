@@ -1,4 +1,4 @@
-"""The page over real sockets: ranges, refusals, a run that goes on, Ctrl-C."""
+"""The page over real sockets: ranges, refusals, Ctrl-C."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ import pytest
 from made_records import make_record
 from page_text import store
 
-from roboirg.core.errors import RoboIRGError
-from roboirg.evaluation.analysis.page.page_server import PageServer
+from roboirg.evaluation.analysis.page.page_server import run_server
 from roboirg.evaluation.plan.plan_maker import make_plan
+from roboirg.util.web.app_server import AppServer
 
 pytestmark = pytest.mark.usefixtures("patient_sockets")
 
@@ -43,9 +43,8 @@ def run(tmp_path: Path) -> Path:
 
 
 @pytest.fixture
-def server(run: Path) -> Iterator[PageServer]:
-    made = iter(range(100))
-    with PageServer(run, lambda: f"<p>page {next(made)}</p>") as serving:
+def server(run: Path) -> Iterator[AppServer]:
+    with run_server(run) as serving:
         thread = threading.Thread(target=serving.serve_forever)
         thread.start()
         yield serving
@@ -54,7 +53,7 @@ def server(run: Path) -> Iterator[PageServer]:
 
 
 def ask(
-    server: PageServer, path: str, method: str = "GET", **headers: str
+    server: AppServer, path: str, method: str = "GET", **headers: str
 ) -> tuple[http.client.HTTPResponse, bytes]:
     connection = http.client.HTTPConnection("127.0.0.1", server.port)
     connection.request(method, path, headers=headers)
@@ -64,7 +63,7 @@ def ask(
     return response, body
 
 
-def test_videos_are_answered_whole_and_in_parts_and_only_read(server: PageServer) -> None:
+def test_videos_are_answered_whole_and_in_parts_and_only_read(server: AppServer) -> None:
     path = "/videos/a%20b.mp4"
     response, body = ask(server, path)
     assert (response.status, body) == (200, FILM)
@@ -84,7 +83,7 @@ def test_videos_are_answered_whole_and_in_parts_and_only_read(server: PageServer
         "/.lock", "/videos/../.lock", "/videos/.b.mp4.part",
     ],
 )  # fmt: skip
-def test_nothing_outside_of_the_run_is_served(server: PageServer, path: str) -> None:
+def test_nothing_outside_of_the_run_is_served(server: AppServer, path: str) -> None:
     # A raw socket: clients would tidy up the path.
     with socket.create_connection(("127.0.0.1", server.port)) as raw:
         host = f"127.0.0.1:{server.port}"
@@ -93,25 +92,6 @@ def test_nothing_outside_of_the_run_is_served(server: PageServer, path: str) -> 
     assert answer.startswith(b"HTTP/1.1 404 ")
     assert b"secret" not in answer
     assert b"root:" not in answer
-
-
-def test_the_page_is_made_anew_when_the_run_goes_on(server: PageServer, run: Path) -> None:
-    assert ask(server, "/")[1] == ask(server, "/report.html")[1] == b"<p>page 0</p>"
-    store(run, [make_record(job, "success", steps=9) for job in PLAN.jobs()])
-    assert ask(server, "/")[1] == b"<p>page 1</p>"
-
-
-def test_records_that_cannot_be_read_are_one_sentence_in_the_browser(
-    run: Path, caplog: pytest.LogCaptureFixture
-) -> None:
-    def fail() -> str:
-        raise RoboIRGError("line 6 is damaged.")
-
-    with PageServer(run, fail) as server:
-        threading.Thread(target=server.serve_forever).start()
-        response, body = ask(server, "/")
-    assert (response.status, body) == (500, b"line 6 is damaged.\n")
-    assert caplog.text == ""
 
 
 def test_the_command_says_where_and_ends_with_ctrl_c(run: Path, wait_s: float) -> None:
@@ -123,10 +103,10 @@ def test_the_command_says_where_and_ends_with_ctrl_c(run: Path, wait_s: float) -
     ) as process:  # fmt: skip
         assert process.stdout is not None
         line = process.stdout.readline()
-        found = re.match(r"http://127\.0\.0\.1:(\d+)/", line)
+        found = re.match(r"http://127\.0\.0\.1:(\d+)/report.html ", line)
         assert found is not None, line
         connection = http.client.HTTPConnection("127.0.0.1", int(found[1]))
-        connection.request("GET", "/")
+        connection.request("GET", "/report.html")
         text = connection.getresponse().read().decode()
         connection.close()
         assert "<title>run – RoboIRGBench</title>" in text

@@ -14,7 +14,7 @@ from msgspec.structs import replace
 from page_text import PLAN, broken, played, render, store
 
 from roboirg.evaluation.analysis.page import report
-from roboirg.evaluation.analysis.page.report import make_view, write_report
+from roboirg.evaluation.analysis.page.report import write_report
 from roboirg.evaluation.plan.sources import Source
 from roboirg.evaluation.records.episode_log import EpisodeLog, log_path
 from roboirg.evaluation.records.record import MentionSpan, Record, UtteranceRecord
@@ -144,7 +144,7 @@ def test_videos_are_in_the_page_or_next_to_it(
     monkeypatch.setattr(report, "MAX_EMBEDDED_BYTES", 7)
     elsewhere = tmp_path / "pages" / "a.html"
     for text, before in (
-        (make_view(run), ""),
+        (write_report(run, served=True).read_text(), ""),
         (write_report(run, out=elsewhere).read_text(), "../"),
     ):
         page = Page(text)

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 from benchmarks.synthetic_run import write_synthetic_run
 
-from roboirg.evaluation.analysis.page.report import make_view
+from roboirg.evaluation.analysis.page.report import write_report
 from roboirg.evaluation.analysis.results.frame import make_frame
 from roboirg.evaluation.analysis.stats.cells import cells_of
 from roboirg.evaluation.plan.sources import Source
@@ -38,6 +38,8 @@ def test_parts_of_records_give_the_cells_of_whole_records(run: Path) -> None:
 
 def test_a_page_reads_one_record_after_the_other(run: Path) -> None:
     told: list[tuple[int, int]] = []
-    page = make_view(Source(run), lambda done, total: told.append((done, total)))
+    page = write_report(
+        Source(run), progress=lambda done, total: told.append((done, total))
+    ).read_text()
     assert page.count('"turns":') == COUNT
     assert told == [(done, COUNT) for done in range(1, COUNT + 1)]

@@ -57,7 +57,7 @@ def report(
     ] = None,
     serve: Annotated[
         bool,
-        typer.Option("--serve", help="Serve page and videos until Ctrl-C; write no file."),
+        typer.Option("--serve", help="Serve the run's folder until Ctrl-C: page and videos."),
     ] = False,
     port: Annotated[
         int, typer.Option(help="Port on loopback for --serve; 0 chooses a free one.")
@@ -76,37 +76,32 @@ def report(
     check_report_support()
     if serve and (against or out):
         raise InvalidValueError(
-            "--serve shows one run and writes no file; it excludes --against and --out."
+            "--serve shows one run, in its folder; it excludes --against and --out."
         )
     others = [] if against is None else [against]
     with (
         opened_sources([run], MEDIA_FOLDERS) as (source,),
         opened_sources(others, MEDIA_FOLDERS) as found,
     ):
-        if serve:
-            _serve(source, port)
-            return
         other = found[0] if found else None
         with progress_bar("episodes of the page") as progress:
-            page = write_report(source, against=other, out=out, videos=videos, progress=progress)
+            page = write_report(
+                source, against=other, out=out, videos=videos, served=serve, progress=progress
+            )
+        if serve:
+            _serve(page, port)
+            return
         print_tables_of(source)
     typer.echo(page)
 
 
-def _serve(source: Source, port: int) -> None:
+def _serve(page: Path, port: int) -> None:
     """Serve the page of a run with its videos on this machine."""
-    from roboirg.cli.progress_bar import progress_bar
-    from roboirg.evaluation.analysis.page.page_server import PageServer
-    from roboirg.evaluation.analysis.page.report import make_view
+    from roboirg.evaluation.analysis.page.page_server import run_server
+    from roboirg.util.web.request_origin import LOOPBACK
 
-    def make_page() -> str:
-        with progress_bar("episodes of the page") as progress:
-            return make_view(source, progress)
-
-    with PageServer(source.folder, make_page, port) as server:
-        # Problems of the run are errors here, not in the browser.
-        server.page()
-        typer.echo(f"{server.address}  Press Ctrl-C to stop.")
+    with run_server(page.parent, port) as server:
+        typer.echo(f"http://{LOOPBACK}:{server.port}/{page.name}  Press Ctrl-C to stop.")
         try:
             server.serve_forever()
         except KeyboardInterrupt:

@@ -1,4 +1,4 @@
-"""Serve the page of a run on loopback together with its videos.
+"""Serve the folder of a run on loopback: its page together with its videos.
 
 It answers GET and HEAD from this machine only, with files inside the run's folder only. Byte ranges
 are supported, so that a browser can seek in a video.
@@ -7,64 +7,24 @@ are supported, so that a browser can seek in a video.
 from __future__ import annotations
 
 import os
-import threading
-from collections.abc import Callable
 from pathlib import Path
 
 from starlette.applications import Starlette
 from starlette.requests import Request
-from starlette.responses import HTMLResponse, PlainTextResponse, Response
-from starlette.routing import Mount, Route
+from starlette.responses import PlainTextResponse, Response
+from starlette.routing import Mount
 from starlette.staticfiles import StaticFiles
 
-from roboirg.core.errors import RoboIRGError
-from roboirg.evaluation.records.store import RECORDS_FILE
-from roboirg.util.web.app_server import AppServer, RequestGuard, error_handler
-from roboirg.util.web.request_origin import LOOPBACK, LOOPBACK_NAMES, is_own_request
-
-PAGES = ("/", "/index.html", "/report.html")
+from roboirg.util.web.app_server import AppServer, RequestGuard
+from roboirg.util.web.request_origin import LOOPBACK_NAMES, is_own_request
 
 
-class PageServer(AppServer):
-    """Serves one run until it is shut down.
-
-    Args:
-        folder: of the run.
-        make_page: renders the page; called again when the records have changed.
-        port: 0 for any free port.
-    """
-
-    def __init__(self, folder: Path, make_page: Callable[[], str], port: int = 0) -> None:
-        self.folder = folder.resolve()
-        self._make_page = make_page
-        self._page: tuple[object, str] | None = None
-        self._lock = threading.Lock()
-        files = Mount("/", _RunFiles(directory=self.folder, check_dir=False))
-        app = Starlette(
-            routes=[*(Route(path, self._answer) for path in PAGES), files],
-            exception_handlers={RoboIRGError: error_handler(500)},
-        )
-        # The browser asks again each time: the records change while a run goes on.
-        guard = RequestGuard(app, _refuse, {"Cache-Control": "no-cache"})
-        super().__init__(guard, port)
-
-    @property
-    def address(self) -> str:
-        return f"http://{LOOPBACK}:{self.port}/"
-
-    def page(self) -> str:
-        """Return the page; rendered again only if the records have changed."""
-        records = self.folder / RECORDS_FILE
-        with self._lock:
-            state = records.stat() if records.exists() else None
-            mark = None if state is None else (state.st_mtime_ns, state.st_size)
-            if self._page is None or self._page[0] != mark:
-                self._page = (mark, self._make_page())
-            return self._page[1]
-
-    def _answer(self, request: Request) -> Response:
-        del request
-        return HTMLResponse(self.page())
+def run_server(folder: Path, port: int = 0) -> AppServer:
+    """Return the server of a run's folder; port 0 is any free one."""
+    files = Mount("/", _RunFiles(directory=folder.resolve(), check_dir=False))
+    # The browser asks again each time: the page may be written anew.
+    guard = RequestGuard(Starlette(routes=[files]), _refuse, {"Cache-Control": "no-cache"})
+    return AppServer(guard, port)
 
 
 class _RunFiles(StaticFiles):

@@ -7,7 +7,6 @@ import contextlib
 import json
 import re
 from collections.abc import Callable, Iterator
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -64,6 +63,7 @@ def write_report(
     against: Source | None = None,
     out: Path | None = None,
     videos: bool = True,
+    served: bool = False,
     progress: Progress | None = None,
 ) -> Path:
     """Write the page of a run atomically and return its path.
@@ -75,9 +75,11 @@ def write_report(
             folder, or a page next to its pack, with the pack's name.
         videos: whether to show the videos: in the page, or of more than `MAX_EMBEDDED_BYTES` next
             to it. Those of a pack cannot be next to it, as the files are gone when it is closed.
+        served: whether the page is for a server of the run's folder: it is written there and links
+            to all videos.
         progress: called after each episode.
     """
-    path = out or _usual_path(source)
+    path = source.folder / REPORT_FILE if served else out or _usual_path(source)
     sources = [source] if against is None else [source, against]
     runs = {one.name: one for one in sources}
     if len(runs) < len(sources):
@@ -85,9 +87,9 @@ def write_report(
     if len(runs) < len(sources):
         raise InvalidValueError(f"{source.path} is on both sides; name another run or policy.")
     episodes = PageEpisodes.of(runs, videos=videos)
-    embeds = sum(path.stat().st_size for path in _media(episodes).values()) <= MAX_EMBEDDED_BYTES
-    gone = [one.unpacked for one in sources if one.unpacked is not None]
-    details = EpisodeDetails(path.parent, embeds, gone)
+    size = sum(path.stat().st_size for path in _media(episodes).values())
+    gone = [one.unpacked for one in sources if one.unpacked is not None and not served]
+    details = EpisodeDetails(path.parent, not served and size <= MAX_EMBEDDED_BYTES, gone)
     pieces = _render(episodes, details, progress)
     with replacing(path) as part, part.open("w", encoding="utf-8") as file:
         file.writelines(pieces)
@@ -100,14 +102,6 @@ def _usual_path(source: Source) -> Path:
         return source.path.with_name(f"{source.path.name.removesuffix(PACK_SUFFIX)}.html")
     name = re.sub(r"\W+", "-", "-".join(("report", *(source.policies or ()))))
     return source.folder / f"{name}.html"
-
-
-@paused_collection()
-def make_view(source: Source, progress: Progress | None = None) -> str:
-    """Return the page of a run as it is served, with links to its videos."""
-    now = replace(source)  # without what was read before
-    episodes = PageEpisodes.of({now.name: now}, videos=True)
-    return "".join(_render(episodes, EpisodeDetails(now.folder, embeds=False), progress))
 
 
 def check_report_support() -> None:
