@@ -25,12 +25,11 @@ from roboirg.evaluation.grounding_items.item_builder import (
     item_id,
     make_items,
     wanted_options,
-    words_back,
 )
 from roboirg.evaluation.grounding_items.media_store import EpisodeMedia, nearest_to_center
 from roboirg.evaluation.grounding_items.question_set import EpisodeName, ExportRequest
 from roboirg.evaluation.grounding_items.referents import find_referents, pointed_kinds
-from roboirg.language import FORMS, instruct, plain_settings
+from roboirg.language import FORMS, plain_settings
 from roboirg.language.settings import all_settings
 from roboirg.main import app
 from roboirg.policies.vlm.goal_schema import goal_schema
@@ -53,7 +52,7 @@ SEEN = [
 def unseen(steps=0):
     """Media in place of pictures, for tests of words and answers."""
     point = PointTarget(kind="cube", x=0, y=0, size=(2, 2), counts=[0, 1, 3])
-    return EpisodeMedia("pictures/0.png", None, (), steps, (point,), 0.5)
+    return EpisodeMedia("pictures/0.png", None, (), steps, (point,))
 
 
 def items_of(task, index, *, forms=("implicit",), every_variant=False, split="test"):
@@ -224,17 +223,6 @@ def test_of_an_amount_every_thing_of_the_color_will_do():
         (color,) = {episode.scene[name].color for name in referent.objects}
         alike = [one for one in episode.scene.of_kind("cube") if one.color == color]
         assert len(alike) == len(referent.objects)
-
-
-def test_words_back_are_the_words_between_a_value_and_the_expression_for_it():
-    episode = get_episode("StopCube", "test", 1)
-    instruction = instruct(episode, "direct")
-    # "The cube's fourth visit is my favorite. Push ... during that visit."
-    said = instruction.text.split()
-    value = max(i for i, word in enumerate(said) if "fourth" in word)
-    distance = words_back(instruction)
-    assert said[value + 1 + distance].startswith(("that", "during"))
-    assert words_back(instruct(episode, "explicit")) is None
 
 
 def test_the_question_is_the_listener_s_and_the_others_share_its_beginning():

@@ -30,7 +30,7 @@ PICTURE = encode_png(Picture(np.zeros((256, 256, 3), np.uint8)))
 def items(count=NUMBER):
     point = PointTarget(kind="cube", x=0, y=0, size=(256, 256), counts=[0, 1, 256**2 - 1])
     name = "pictures/black.png"
-    media = EpisodeMedia(name, None, (), 0, (point,), 0.5)
+    media = EpisodeMedia(name, None, (), 0, (point,))
     found = []
     for index, task in itertools.product(range(20), all_tasks()):
         episode = get_episode(task, "test", index)

@@ -18,8 +18,7 @@ ROWS_PER_GROUP = 256
 _DICTIONARY_LIMIT = 1 << 30
 """Bytes of a column's distinct values in a row group: so that each picture is stored once in it."""
 
-_NUMBERS = ("episode", "distractors", "video_steps", "words_back", "environment_version")
-_FLOATS = ("command_chance", "meters")
+_NUMBERS = ("episode", "distractors", "video_steps", "environment_version")
 _TEXT_LISTS = (
     "turns", "choices", "answers", "goals", "choice_answers", "hidden_slots", "expressions",
 )  # fmt: skip
@@ -81,13 +80,13 @@ def _arrow_schema() -> Any:  # noqa: ANN401 - pyarrow ships no types
     )
     special = {
         **dict.fromkeys(_NUMBERS, number),
-        **dict.fromkeys(_FLOATS, pa.float64()),
         **dict.fromkeys(_TEXT_LISTS, pa.list_(text)),
         "stages": pa.list_(number),
         "picture": picture,
         "frames": pa.list_(picture),
         "points": pa.list_(point),
         "points_in_order": pa.bool_(),
+        "command_chance": pa.float64(),
     }
     schema = pa.schema(
         [(name, special.get(name, text)) for name in GroundingItem.__struct_fields__]

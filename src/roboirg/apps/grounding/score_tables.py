@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from itertools import pairwise
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 
 from roboirg.apps.grounding.answer_scores import GroundingScore, ScoreRow, score_rows
 from roboirg.core.plain_text import counted
 from roboirg.evaluation.analysis.results.frame import as_column
 from roboirg.evaluation.analysis.results.option_labels import options_label
-from roboirg.evaluation.analysis.stats.breakdowns import Breakdown
+from roboirg.evaluation.analysis.stats.breakdowns import BREAKDOWNS
 from roboirg.evaluation.analysis.stats.intervals import Interval
 from roboirg.evaluation.analysis.stats.rates import NOT_APPLICABLE, gap_words
 from roboirg.evaluation.analysis.tables.diagnostic_tables import make_breakdown_table
@@ -20,11 +19,7 @@ COLUMNS = named_columns(
     "items", "right", "95 % interval", "random", "above random", "command", "hidden slots", "gap",
     "p",
 )  # fmt: skip
-WORDS_BACK_EDGES = (0, 5, 10, 15, 20, 30)
-METERS_EDGES = (0.0, 0.4, 0.45, 0.5, 0.55)
 QUESTIONS = {"slots": "slots", "choice": "choices", "points": "points"}
-
-ItemLabels = Callable[[GroundingItem], Sequence[str]]
 
 
 def score_table(scores: Iterable[GroundingScore]) -> Table:
@@ -49,13 +44,12 @@ def score_table(scores: Iterable[GroundingScore]) -> Table:
 
 
 def breakdown_tables(score: GroundingScore) -> Iterator[Table]:
-    """Yield the gaps to explicit by pattern, expression, and distance of what is meant."""
-    items = score.frame["item"]
-    for breakdown, labels_of in _BREAKDOWNS:
-        labels = [tuple(labels_of(item)) for item in items]
-        frame = score.frame.extended({breakdown.name: as_column(labels)})
+    """Yield the gaps to explicit by pattern, expression, and names of hidden slots."""
+    for name, labels_of in _LABELS.items():
+        labels = [tuple(labels_of(item)) for item in score.frame["item"]]
+        frame = score.frame.extended({name: as_column(labels)})
         if any(labels):
-            yield make_breakdown_table(breakdown, frame)
+            yield make_breakdown_table(BREAKDOWNS[name], frame)
 
 
 def _words(row: ScoreRow) -> tuple[str, ...]:
@@ -100,52 +94,9 @@ def _interval(interval: Interval | None) -> str:
     return NOT_APPLICABLE if interval is None else " to ".join(map(_percent, interval))
 
 
-def range_label(value: float, edges: Sequence[float], unit: str) -> str:
-    """Return the range between two edges in which a value lies, with its unit."""
-    for low, high in pairwise(edges):
-        if low <= value < high:
-            return f"{low:g} to below {high:g} {unit}"
-    return f"{edges[-1]:g} {unit} or more"
-
-
-def _distance_labels(item: GroundingItem) -> Sequence[str]:
-    if item.words_back is None:
-        return ()
-    return (range_label(item.words_back, WORDS_BACK_EDGES, "words"),)
-
-
-_BREAKDOWNS: tuple[tuple[Breakdown, ItemLabels], ...] = tuple(
-    (Breakdown(name, title, note, in_explicit=name == "meters"), labels_of)
-    for name, title, note, labels_of in (
-        (
-            "pattern",
-            "reasoning pattern",
-            "Each episode counts once, under its main pattern.",
-            lambda item: () if item.pattern is None else (item.pattern,),
-        ),
-        (
-            "expression",
-            "referring expression",
-            "An episode counts in each class of expression that its command has.",
-            lambda item: item.expressions,
-        ),
-        (
-            "slots",
-            "hidden slots",
-            "Names of the slots that the command leaves to its context.",
-            lambda item: item.hidden_slots,
-        ),
-        (
-            "words_back",
-            "distance in words",
-            "Words between the farthest referring expression of the command and its value.",
-            _distance_labels,
-        ),
-        (
-            "meters",
-            "distance from the camera",
-            "The distance of the first object that is meant.",
-            lambda item: (range_label(item.meters, METERS_EDGES, "m"),),
-        ),
-    )
-)
+_LABELS: Mapping[str, Callable[[GroundingItem], Sequence[str]]] = {
+    "pattern": lambda item: () if item.pattern is None else (item.pattern,),
+    "expression": lambda item: item.expressions,
+    "slots": lambda item: item.hidden_slots,
+}
+"""The labels of an item by the name of a breakdown."""

@@ -92,8 +92,6 @@ class GroundingItem(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fi
     hidden_slots: list[str]
     pattern: str | None
     expressions: list[str]
-    words_back: int | None
-    meters: float
     language_version: str
     environment_version: int
 

@@ -133,43 +133,9 @@ def _make_item(
         hidden_slots=_hidden(episode, instruction),
         pattern=_text_or_none(instruction.metadata["pattern"]),
         expressions=_expressions(instruction),
-        words_back=words_back(instruction),
-        meters=media.meters,
         language_version=LANGUAGE_VERSION,
         environment_version=ENVIRONMENT_VERSION,
     )
-
-
-def words_back(instruction: Instruction) -> int | None:
-    """Return how many words stand between a value and the command's expression that means it.
-
-    It is the largest number over the referring expressions of the command, each counted from the
-    last time that its value was named; None if the command has none or nothing named its value.
-    """
-    last = len(instruction.utterances) - 1
-    places = [
-        (mention, _place(instruction, mention.utterance, mention.start))
-        for mention in instruction.mentions
-    ]
-    found = []
-    for mention, place in places:
-        if mention.role != "anaphor" or mention.utterance != last:
-            continue
-        named = [
-            _place(instruction, one.utterance, one.end)
-            for one, before in places
-            if (one.role, one.slot, one.value) == ("antecedent", mention.slot, mention.value)
-            and before < place
-        ]
-        if named:
-            found.append(place - max(named))
-    return max(found, default=None)
-
-
-def _place(instruction: Instruction, utterance: int, character: int) -> int:
-    """Return the number of words before a place in the prompt."""
-    before = sum(len(text.split()) for text in instruction.turns[:utterance])
-    return before + len(instruction.turns[utterance][:character].split())
 
 
 def _hidden(episode: Episode, instruction: Instruction) -> list[str]:

@@ -43,7 +43,6 @@ class EpisodeMedia(NamedTuple):
         frames: paths of frames of the video, evenly spaced.
         steps: control steps of the video.
         points: one for each thing that is meant.
-        meters: distance of the first of them from the camera.
     """
 
     picture: str
@@ -51,7 +50,6 @@ class EpisodeMedia(NamedTuple):
     frames: tuple[str, ...]
     steps: int
     points: tuple[PointTarget, ...]
-    meters: float
 
 
 def store_media(folder: Path, episode: Episode, every: int, most: int) -> EpisodeMedia:
@@ -67,7 +65,7 @@ def store_media(folder: Path, episode: Episode, every: int, most: int) -> Episod
         RoboIRGError: a thing that is meant cannot be seen, or the video cannot be played.
         InvalidValueError: the folder cannot be written.
     """
-    env = RoboIRGEnv(episode, cameras=(FRONT,), depth=True, demonstration_frames=every)
+    env = RoboIRGEnv(episode, cameras=(FRONT,), demonstration_frames=every)
     with contextlib.closing(env):
         observation, info = env.reset()
         segments = env.session.world.cameras.segmentation(FRONT)
@@ -81,8 +79,7 @@ def store_media(folder: Path, episode: Episode, every: int, most: int) -> Episod
                 "picture."
             )
         points.append(_target(referent.kind, mask))
-    shown, first = info["demonstration"], points[0]
-    video, frames = None, []
+    shown, video, frames = info["demonstration"], None, []
     if shown.length:
         clip = Clip(shown["front_rgb"], Fraction(CONTROL_RATE, every))
         video = store_content(folder, VIDEOS, encode_mp4(clip), ".mp4")
@@ -93,7 +90,6 @@ def store_media(folder: Path, episode: Episode, every: int, most: int) -> Episod
         tuple(store_content(folder, PICTURES, one, ".jpg") for one in frames),
         steps=shown.length,
         points=tuple(points),
-        meters=round(float(observation["front_depth"][first.y, first.x, 0]) / 1000, 3),
     )
 
 

@@ -7,7 +7,9 @@ import json
 import math
 import re
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple
+
+import msgspec
 
 from roboirg.evaluation.grounding_items.grounding_item import (
     LETTERS,
@@ -25,7 +27,12 @@ _CONCLUSION = re.compile(
 _ARTICLE = re.compile(r"a\s+[a-z]", re.IGNORECASE)
 """*A cube* names no choice."""
 
-Pixel = tuple[float, float]
+
+class Pixel(msgspec.Struct, frozen=True):
+    """A place in a picture: `x` columns from the left, `y` rows from the top."""
+
+    x: float
+    y: float
 
 
 class ReplyVerdict(NamedTuple):
@@ -123,7 +130,7 @@ def _judge_points(item: GroundingItem, reply: str) -> ReplyVerdict:
         hits = [point is not None and _hits(target, point) for target, point in pairs]
     else:
         hits = [any(_hits(target, point) for point in points) for target in item.points]
-    understood = json.dumps([{"x": x, "y": y} for x, y in points])
+    understood = msgspec.json.encode(points).decode()
     right = all(hits) and len(points) == len(item.points)
     return ReplyVerdict(right, understood, _numbered(hits))
 
@@ -135,34 +142,17 @@ def _numbered(hits: Sequence[bool]) -> dict[str, bool]:
 def _read_points(reply: str) -> list[Pixel] | None:
     """Return the points of a reply; None if it has none."""
     try:
-        found: dict[str, Any] = json_object(reply)
-    except UnparsableReplyError:
+        found = json_object(reply)
+        return msgspec.convert(found.get("points", [found]), list[Pixel]) or None
+    except (UnparsableReplyError, msgspec.ValidationError):
         return None
-    listed = found.get("points", [found])
-    if not isinstance(listed, list) or not listed:
-        return None
-    points = [_read_point(one) for one in listed]
-    return None if None in points else [point for point in points if point is not None]
-
-
-def _read_point(value: object) -> Pixel | None:
-    if not isinstance(value, dict):
-        return None
-    x, y = _number(value.get("x")), _number(value.get("y"))
-    return None if x is None or y is None else (x, y)
-
-
-def _number(value: Any) -> float | None:  # noqa: ANN401 - whatever JSON holds
-    if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
-        return None
-    return float(value)
 
 
 def _hits(target: PointTarget, point: Pixel) -> bool:
     """Return whether a point lies in the pixels of a mask; a pixel begins at its number."""
-    column, row = math.floor(point[0]), math.floor(point[1])
     height, width = target.size
-    return 0 <= column < width and 0 <= row < height and bool(target.mask[row, column])
+    is_inside = 0 <= point.x < width and 0 <= point.y < height
+    return is_inside and bool(target.mask[int(point.y), int(point.x)])
 
 
 _JUDGES: Mapping[QuestionKind, Callable[[GroundingItem, str], ReplyVerdict]] = {
