@@ -28,6 +28,7 @@ from roboirg.evaluation.analysis.stats.arm_figures import (
 from roboirg.evaluation.analysis.stats.cells import Cell, cells_of
 from roboirg.evaluation.analysis.stats.chance import silent_chance
 from roboirg.evaluation.analysis.stats.intervals import ALPHA
+from roboirg.evaluation.analysis.stats.measure import mean_rate
 from roboirg.evaluation.analysis.stats.paired_tests import holm, sign_flip_test
 from roboirg.evaluation.analysis.stats.run_data import RunData
 from roboirg.evaluation.records.packs import opened_run
@@ -179,7 +180,7 @@ def words_table(data: RunData) -> str:
 def arms_table(data: RunData) -> str:
     """Return what control arms show: both rates of each figure, by kind of words and setting."""
     found = {
-        (one.policy_run.policy, one.contrast.name, one.options.setting): one
+        (one.key.run.policy, one.key.contrast.name, one.key.options.setting): one
         for one in arm_figures(data.frame)
     }
     settings = plain_settings()
@@ -200,8 +201,8 @@ def blind_guess(task: str) -> float:
 
 
 def _both_rates(one: ArmFigure) -> str:
-    first, second = (100 * rate for rate in one.rates)
-    star = "\\*" if one.p_holm <= ALPHA else ""
+    first, second = (100 * float(mean_rate(own) or 0) for own in (one.cells, one.others))
+    star = "\\*" if one.p_holm is not None and one.p_holm <= ALPHA else ""
     return f"{first:.0f} / {second:.0f}{star}"
 
 

@@ -7,7 +7,6 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from roboirg.core.errors import InvalidValueError
 from roboirg.evaluation.analysis.stats.paired_tests import sign_flip_test
 from roboirg.evaluation.analysis.stats.power import (
     MAX_EPISODES,
@@ -63,7 +62,3 @@ def test_a_run_has_a_smallest_gap_that_it_can_find() -> None:
     assert mcnemar_power(50, gap, 0.3) >= 0.8 > mcnemar_power(50, gap - 0.001, 0.3)
     nothing = smallest_gap(5, 0.5), episodes_needed(0.0, 0.3), episodes_needed(0.0001, 0.3)
     assert nothing == (None, None, None)
-    with pytest.raises(InvalidValueError, match=r"gap of 0\.5 with a discordance of 0\.3"):
-        episodes_needed(0.5, 0.3)
-    with pytest.raises(InvalidValueError, match="at least 1"):
-        mcnemar_power(0, 0.1, 0.3)

@@ -13,7 +13,7 @@ from roboirg.evaluation.analysis.published import (
     NOTES,
     RATE_TABLES,
     TRIALS,
-    published_coverage,
+    published_lines,
     published_rows,
 )
 from roboirg.evaluation.analysis.results.frame import make_frame
@@ -121,7 +121,8 @@ def test_published_averages_are_means_of_the_printed_rates() -> None:
 def test_the_coverage_of_this_benchmark_is_read_off_its_tasks() -> None:
     table = make_table("coverage", None)
     found = [(row.group, row.name, row.cells) for row in table.rows]
-    published = [(one.kind, one.benchmark, [*one.covers.values()]) for one in published_coverage()]
+    lines = [tuple(one.values()) for one in published_lines("coverage")]
+    published = [(kind, name, list(words)) for name, kind, *words in lines]
     assert found == published
     assert len(found) == 14
     assert [row.name for row in table.rows if row.source == "ours"] == ["RoboIRGBench"]

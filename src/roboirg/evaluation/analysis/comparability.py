@@ -52,15 +52,6 @@ def differences_of(key: CellKey, cell: Cell) -> Differences | None:
     return tuple(_explicit_differences(key.policy_run, cell))
 
 
-def is_robomme(wordings: str | None) -> bool:
-    """Return whether the words of a record are RoboMME's explicit sentences.
-
-    Only a file with exactly these can be opened under that name, see
-    `roboirg.language.wordings.robomme_sentences`.
-    """
-    return wordings is not None and wordings.partition("@")[0] == ROBOMME_NAME
-
-
 def merged(differences: Iterable[Differences | None]) -> Differences | None:
     """Return what differs in an average of cells; None if one of them cannot be compared."""
     found: list[str] = []
@@ -114,7 +105,8 @@ def _text(tasks: Mapping[str, Differences]) -> str:
 def _explicit_differences(policy_run: PolicyRun, cell: Cell) -> Iterator[str]:
     conditions, versions = policy_run.conditions, policy_run.versions
     environment = conditions.environment
-    if not is_robomme(conditions.wordings):
+    # Only a file with exactly RoboMME's sentences can be opened under its name.
+    if (conditions.wordings or "").partition("@")[0] != ROBOMME_NAME:
         yield words_label(conditions.wordings)
     episodes = range(TRIALS["main"][0])
     played = len(cell.by_episode().keys() & set(episodes))

@@ -91,27 +91,13 @@ class PublishedRow(NamedTuple):
         return self.average if defined == set(tasks) else mean_percent(rates)
 
 
-class CoverageRow(NamedTuple):
-    """The kinds of implicit reference that a benchmark covers.
-
-    Attributes:
-        benchmark: its name.
-        kind: manipulation or memory.
-        covers: yes, no or partial, by setting.
-    """
-
-    benchmark: str
-    kind: str
-    covers: Mapping[str, str]
-
-
 @functools.cache
 def published_rows(table: str) -> tuple[PublishedRow, ...]:
     """Return the rows of a table, in the order of the paper."""
     if table not in RATE_TABLES:
         raise UnknownNameError("published table", table, RATE_TABLES)
     grouped: dict[tuple[str, InstructionOptions], dict[str, Decimal | None]] = {}
-    for line in _lines(_FILES[table]):
+    for line in published_lines(_FILES[table]):
         model = next(line[column] for column in _MODEL_COLUMNS if column in line)
         text = line["success_rate_percent"]
         rate = Decimal(text).quantize(DIGITS) if text else None
@@ -130,16 +116,6 @@ def published_tasks(table: str) -> tuple[str, ...]:
     return tuple(published_rows(table)[0].rates)
 
 
-@functools.cache
-def published_coverage() -> tuple[CoverageRow, ...]:
-    """Return what each benchmark covers, in the order of the paper."""
-    rows = []
-    for line in _lines("coverage"):
-        benchmark, kind = line.pop("benchmark"), line.pop("kind")
-        rows.append(CoverageRow(benchmark, kind, line))
-    return tuple(rows)
-
-
 def _options(line: Mapping[str, str]) -> InstructionOptions:
     if "stages" in line:
         stages = tuple(map(int, line["stages"].split(",")))
@@ -147,6 +123,7 @@ def _options(line: Mapping[str, str]) -> InstructionOptions:
     return InstructionOptions(line["setting"])
 
 
-def _lines(name: str) -> list[dict[str, str]]:
+def published_lines(name: str) -> list[dict[str, str]]:
+    """Return the lines of a file, in the order of the paper."""
     path = resources.files("roboirg.evaluation.analysis") / "published_results" / f"{name}.csv"
     return list(csv.DictReader(path.read_text(encoding="utf-8").splitlines()))

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import msgspec
@@ -23,10 +22,10 @@ from roboirg.core.instruction_options import InstructionOptions
 from roboirg.evaluation.analysis.results.frame import Frame
 from roboirg.evaluation.analysis.results.option_labels import options_sort_key
 from roboirg.evaluation.analysis.results.policy_run import PolicyRun
-from roboirg.evaluation.analysis.stats.cells import ByTask, Cell, Key, Trial, clustered_interval
-from roboirg.evaluation.analysis.stats.intervals import SEED, Interval
-from roboirg.evaluation.analysis.stats.measure import pair
-from roboirg.evaluation.analysis.stats.paired_tests import Gap, measure_gap, with_holm
+from roboirg.evaluation.analysis.stats.cells import Cell, Key, Trial, clustered_interval
+from roboirg.evaluation.analysis.stats.intervals import SEED
+from roboirg.evaluation.analysis.stats.measure import Measured, pair, with_holm
+from roboirg.evaluation.analysis.stats.paired_tests import measure_gap
 from roboirg.evaluation.records.record import Summary
 
 LANGUAGE_USE, WORDS_WORTH, ORDERS_WORTH = "language use", "words' worth", "order's worth"
@@ -53,35 +52,17 @@ class ArmContrast(NamedTuple):
     sides: Callable[[Arms], Sides | None]
 
 
-@dataclass(frozen=True, slots=True)
-class ArmFigure:
-    """A figure of one policy in one setting, the mean over tasks.
+class ArmKey(NamedTuple):
+    """Policy run as of the arm ``told``, options of the instruction, and which figure."""
 
-    Attributes:
-        policy_run: as of the arm ``told``.
-        options: of the instruction.
-        contrast: which figure.
-        cells: the results of the first and of the second rate by task, in order.
-        intervals: of the first and the second rate.
-        gap: first less second.
-        p_holm: its p-value after Holm's correction over all figures of the policy run.
-    """
-
-    policy_run: PolicyRun
+    run: PolicyRun
     options: InstructionOptions
     contrast: ArmContrast
-    cells: tuple[ByTask, ByTask]
-    intervals: tuple[Interval | None, Interval | None]
-    gap: Gap
-    p_holm: float
 
-    @property
-    def rates(self) -> tuple[float, float]:
-        """The first and the second rate, means over tasks."""
-        first, second = (
-            float(np.mean([float(cell.rate or 0) for cell in side.values()])) for side in self.cells
-        )
-        return first, second
+
+ArmFigure = Measured[ArmKey]
+"""The results of the first rate, its gap to the second, and its p-value, corrected over all figures
+of the policy run."""
 
 
 def arm_figures(frame: Frame) -> tuple[ArmFigure, ...]:
@@ -98,22 +79,16 @@ def arm_figures(frame: Frame) -> tuple[ArmFigure, ...]:
         figure
         for run, options in sorted(found, key=lambda key: options_sort_key(key[1]))
         for contrast in CONTRASTS
-        if (figure := _figure(run, options, contrast, found[run, options].values(), rng))
+        if (figure := _figure(ArmKey(run, options, contrast), found[run, options].values(), rng))
     ]
-    figures.sort(key=lambda one: runs.index(one.policy_run))
-    return with_holm(figures, lambda one: one.policy_run)
+    figures.sort(key=lambda one: runs.index(one.key.run))
+    return with_holm(figures, lambda key: key.run)
 
 
-def _figure(
-    policy_run: PolicyRun,
-    options: InstructionOptions,
-    contrast: ArmContrast,
-    trials: Iterable[Arms],
-    rng: np.random.Generator,
-) -> ArmFigure | None:
+def _figure(key: ArmKey, trials: Iterable[Arms], rng: np.random.Generator) -> ArmFigure | None:
     cells: tuple[dict[str, Cell], dict[str, Cell]] = {}, {}
     for arms in trials:
-        for side, results in zip(cells, contrast.sides(arms) or (), strict=False):
+        for side, results in zip(cells, key.contrast.sides(arms) or (), strict=False):
             for one in results:
                 # Paraphrases stand as policy seeds of their own.
                 seed = one.policy_seed * (MOST_PARAPHRASES + 1) + (paraphrase_number(one.arm) or 0)
@@ -122,11 +97,8 @@ def _figure(
     gap = measure_gap(pair(first, second), rng)
     if gap is None:
         return None
-    intervals = (
-        clustered_interval([*first.values()], rng),
-        clustered_interval([*second.values()], rng),
-    )
-    return ArmFigure(policy_run, options, contrast, cells, intervals, gap, gap.p_value)
+    interval, other = (clustered_interval([*side.values()], rng) for side in cells)
+    return Measured(key, first, second, interval, gap, other_interval=other)
 
 
 def _won(one: Summary) -> bool:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
@@ -26,7 +27,7 @@ from roboirg.evaluation.analysis.stats.cells import (
     gather,
 )
 from roboirg.evaluation.analysis.stats.intervals import SEED, Interval
-from roboirg.evaluation.analysis.stats.paired_tests import Gap, Pairs, measure_gap, with_holm
+from roboirg.evaluation.analysis.stats.paired_tests import Gap, Pairs, holm, measure_gap
 
 ALL_TASKS = "all tasks"
 TRIAL_OF = ("task", "episode", "outcome")
@@ -50,6 +51,7 @@ class Measured(Generic[K]):
         interval: 95 %, of the rate; None if it was not measured, or with too few episodes.
         gap: to the first reference on the same episodes; None without pairs.
         second_gap: to the second reference, if there is one.
+        other_interval: 95 %, of the rate of the first reference; None if it was not measured.
         p_holm: p-value of the gap after Holm's correction over its family.
     """
 
@@ -59,6 +61,7 @@ class Measured(Generic[K]):
     interval: Interval | None = None
     gap: Gap | None = None
     second_gap: Gap | None = None
+    other_interval: Interval | None = None
     p_holm: float | None = None
 
     @property
@@ -74,8 +77,13 @@ class Measured(Generic[K]):
     @property
     def rate(self) -> Fraction | None:
         """Unweighted mean of the tasks' success rates; None without a verdict."""
-        rates = [cell.rate for cell in self.cells.values() if cell.rate is not None]
-        return sum(rates, Fraction(0)) / len(rates) if rates else None
+        return mean_rate(self.cells)
+
+
+def mean_rate(cells: ByTask) -> Fraction | None:
+    """Return the unweighted mean of the tasks' success rates; None without a verdict."""
+    rates = [cell.rate for cell in cells.values() if cell.rate is not None]
+    return sum(rates, Fraction(0)) / len(rates) if rates else None
 
 
 def measure(
@@ -169,7 +177,22 @@ def measure_groups(
         others, *_ = (*against, NOTHING)
         first, second, *_ = (*gaps, None, None)
         found.append(Measured(key, cells, others, interval, first, second))
-    return with_holm(found, lambda one: family(one.key))
+    return with_holm(found, family)
+
+
+def with_holm(
+    rows: Sequence[Measured[K]], family: Callable[[K], object]
+) -> tuple[Measured[K], ...]:
+    """Return rows with the p-values of their gaps corrected over all rows of the same family."""
+    families: defaultdict[object, dict[int, float]] = defaultdict(dict)
+    for place, row in enumerate(rows):
+        if row.gap is not None:
+            families[family(row.key)][place] = row.gap.p_value
+    corrected = list(rows)
+    for own in families.values():
+        for place, p_value in zip(own, holm([*own.values()]), strict=True):
+            corrected[place] = replace(rows[place], p_holm=p_value)
+    return tuple(corrected)
 
 
 def _interval(cells: ByTask, rng: np.random.Generator, *, is_mean: bool) -> Interval | None:

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from collections import defaultdict
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
-from typing import Any, NamedTuple, Protocol, TypeVar, cast
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -204,29 +203,3 @@ def holm(p_values: Sequence[float]) -> tuple[float, ...]:
     adjusted = np.empty_like(values)
     adjusted[order] = np.maximum.accumulate(values[order] * np.arange(len(values), 0, -1))
     return tuple(np.minimum(adjusted, 1.0).tolist())
-
-
-class GapRow(Protocol):
-    """A dataclass with a gap that is tested together with those of others, and its `p_holm`."""
-
-    @property
-    def gap(self) -> Gap | None:
-        """The gap; None if there is none."""
-
-
-Tested = TypeVar("Tested", bound=GapRow)
-
-
-def with_holm(
-    rows: Sequence[Tested], family: Callable[[Tested], object] = lambda _row: None
-) -> tuple[Tested, ...]:
-    """Return rows with the p-values of their gaps corrected over all rows of the same family."""
-    families: defaultdict[object, dict[int, float]] = defaultdict(dict)
-    for place, row in enumerate(rows):
-        if row.gap is not None:
-            families[family(row)][place] = row.gap.p_value
-    corrected = list(rows)
-    for own in families.values():
-        for place, p_value in zip(own, holm([*own.values()]), strict=True):
-            corrected[place] = replace(cast("Any", rows[place]), p_holm=p_value)
-    return tuple(corrected)

@@ -7,7 +7,6 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from roboirg.core.errors import InvalidValueError
-from roboirg.core.instruction_options import InstructionOptions
 from roboirg.evaluation.analysis.results.frame import Frame
 from roboirg.evaluation.analysis.results.option_labels import options_label
 from roboirg.evaluation.analysis.results.policy_run import labels
@@ -18,10 +17,10 @@ from roboirg.evaluation.analysis.stats.arm_figures import (
     ArmFigure,
     arm_figures,
 )
+from roboirg.evaluation.analysis.stats.cells import ByTask
 from roboirg.evaluation.analysis.stats.chance import silent_chance
-from roboirg.evaluation.analysis.stats.intervals import SEED, Interval
-from roboirg.evaluation.analysis.stats.measure import pair
-from roboirg.evaluation.analysis.stats.paired_tests import Gap, holm, measure_gap
+from roboirg.evaluation.analysis.stats.intervals import Interval
+from roboirg.evaluation.analysis.stats.measure import mean_rate, measure_groups
 from roboirg.evaluation.analysis.stats.rates import (
     NOT_APPLICABLE,
     gap_words,
@@ -51,7 +50,7 @@ def make_arm_table(data: RunData) -> Table:
         raise InvalidValueError(
             "The runs have no control arms; play them with --arms told,other-goal,silent,scrambled."
         )
-    names = {**labels(one.policy_run for one in found), **data.told.frame.names}
+    names = {**labels(one.key.run for one in found), **data.told.frame.names}
     return Table(
         key="arms",
         title="Control arms",
@@ -61,8 +60,8 @@ def make_arm_table(data: RunData) -> Table:
         ),
         rows=tuple(
             Row(
-                f"{names[one.policy_run]}, {options_label(one.options)}",
-                f"{one.contrast.name}: {one.contrast.first} − {one.contrast.second}",
+                f"{names[one.key.run]}, {options_label(one.key.options)}",
+                f"{one.key.contrast.name}: {one.key.contrast.first} − {one.key.contrast.second}",
                 _words(one),
             )
             for one in found
@@ -76,37 +75,36 @@ def language_use_sentences(first: Frame, second: Frame, names: tuple[str, str]) 
 
     P-values are corrected over the settings.
     """
-    rng = np.random.default_rng(SEED)
     ours, theirs = (
-        {of.options: of.cells[0] for of in arm_figures(one) if of.contrast.name == LANGUAGE_USE}
-        for one in (first, second)
+        {(one.key.options,): one.cells for one in own if one.key.contrast.name == LANGUAGE_USE}
+        for own in map(arm_figures, (first, second))
     )
-    gaps: dict[InstructionOptions, Gap] = {}
-    for options, here in ours.items():
-        if (gap := measure_gap(pair(here, theirs.get(options, {})), rng)) is not None:
-            gaps[options] = gap
-    corrected = holm([gap.p_value for gap in gaps.values()])
-    for (options, gap), p_value in zip(gaps.items(), corrected, strict=True):
-        yield (
-            f"Language use, {options_label(options)}: {names[0]} less {names[1]} "
-            f"{points(gap.value, 1)} points{interval_note(gap.interval)}, {p_text(p_value)}, "
-            f"{gap.episodes} scenes."
-        )
+    found = measure_groups(ours, [lambda key: theirs.get(key, {})], with_intervals=False)
+    for one in found:
+        if one.gap is not None and one.p_holm is not None:
+            gap = one.gap
+            yield (
+                f"Language use, {options_label(one.key[0])}: {names[0]} less {names[1]} "
+                f"{points(gap.value, 1)} points{interval_note(gap.interval)}, "
+                f"{p_text(one.p_holm)}, {gap.episodes} scenes."
+            )
 
 
 def _words(one: ArmFigure) -> Sequence[str]:
-    rates = [_rate_text(*side) for side in zip(one.rates, one.intervals, strict=True)]
+    sides = ((one.cells, one.interval), (one.others, one.other_interval))
+    rates = [_rate_text(*side) for side in sides]
     chance = NOT_APPLICABLE
-    if one.contrast.name == WORDS_WORTH:
-        split = one.policy_run.conditions.split
+    if one.key.contrast.name == WORDS_WORTH:
+        split = one.key.run.conditions.split
         chances = [
             np.mean([silent_chance(task, split, trial.episode) for trial in silent.verdicts])
-            for task, silent in one.cells[1].items()
+            for task, silent in one.others.items()
         ]
         chance = f"{100 * float(np.mean(chances)):.1f}"
-    return (str(one.gap.episodes), *rates, chance, *gap_words(one.gap, one.p_holm))
+    episodes = one.gap.episodes if one.gap else 0
+    return (str(episodes), *rates, chance, *gap_words(one.gap, one.p_holm))
 
 
-def _rate_text(rate: float, interval: Interval | None) -> str:
+def _rate_text(cells: ByTask, interval: Interval | None) -> str:
     ends = "" if interval is None else f" ({100 * interval.low:.1f} to {100 * interval.high:.1f})"
-    return f"{100 * rate:.1f}{ends}"
+    return f"{100 * float(mean_rate(cells) or 0):.1f}{ends}"

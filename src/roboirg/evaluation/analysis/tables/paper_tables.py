@@ -12,7 +12,7 @@ from roboirg.core.instruction_options import InstructionOptions
 from roboirg.evaluation.analysis.comparability import AllDifferences, differences_of
 from roboirg.evaluation.analysis.published import (
     PublishedRow,
-    published_coverage,
+    published_lines,
     published_rows,
 )
 from roboirg.evaluation.analysis.results.option_labels import (
@@ -205,20 +205,20 @@ def _reference_finder(table: PaperTable, rows: Sequence[Row]) -> Callable[[Row],
 
 def _coverage() -> Table:
     """Return the paper's table with this benchmark's row derived from its tasks."""
-    rows = published_coverage()
-    kinds = tuple(rows[0].covers)
+    heads = ("kind", "benchmark")
     has = {setting for task in all_tasks().values() for setting in settings_of(task)}
-    table_rows = []
-    for row in rows:
-        words = {kind: "yes" if kind in has else "no" for kind in kinds}
-        is_own = row.benchmark == OWN_NAME
-        cells = [*(words if is_own else row.covers).values()]
-        table_rows.append(Row(row.kind, row.benchmark, cells, "ours" if is_own else "cited"))
+    rows = []
+    for line in published_lines(COVERAGE):
+        covers = {name: word for name, word in line.items() if name not in heads}
+        is_own = line["benchmark"] == OWN_NAME
+        own = {setting: "yes" if setting in has else "no" for setting in covers}
+        words = list((own if is_own else covers).values())
+        rows.append(Row(line["kind"], line["benchmark"], words, "ours" if is_own else "cited"))
     return Table(
         key=COVERAGE,
         title="Implicit references in benchmarks",
-        heads=("kind", "benchmark"),
-        columns=named_columns(*kinds),
-        rows=tuple(table_rows),
+        heads=heads,
+        columns=named_columns(*covers),
+        rows=tuple(rows),
         notes=("partial: pronouns within a chain of actions only. Source: the paper.",),
     )
