@@ -69,11 +69,10 @@ def report(
     """
     from roboirg.cli.progress_bar import progress_bar
     from roboirg.cli.run_commands import print_tables_of
-    from roboirg.evaluation.analysis.page.report import check_report_support, write_report
+    from roboirg.evaluation.analysis.page.report import write_report
     from roboirg.evaluation.plan.sources import opened_sources
     from roboirg.evaluation.records.packs import MEDIA_FOLDERS
 
-    check_report_support()
     if serve and (against or out):
         raise InvalidValueError(
             "--serve shows one run, in its folder; it excludes --against and --out."

@@ -111,12 +111,7 @@ class GroundingItem(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fi
 
     def question(self, kind: QuestionKind) -> str:
         """Return the question of a kind, which follows words, video and picture."""
-        questions: dict[QuestionKind, str] = {
-            "slots": self.slots_question,
-            "choice": self.choice_question,
-            "points": self.points_question,
-        }
-        return questions[kind]
+        return str(getattr(self, f"{kind}_question"))
 
 
 def encode_mask(mask: Mask) -> list[int]:

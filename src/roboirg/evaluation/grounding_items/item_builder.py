@@ -6,7 +6,7 @@ import hashlib
 import json
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, astuple, replace
-from typing import Any
+from typing import Any, cast
 
 from roboirg.core.episode import ENVIRONMENT_VERSION, Episode
 from roboirg.core.instruction_options import InstructionOptions
@@ -131,7 +131,7 @@ def _make_item(
         points_in_order=is_ordered(episode.goal),
         command_chance=float(right_share(blind_goals(instruction, episode), episode)),
         hidden_slots=_hidden(episode, instruction),
-        pattern=_text_or_none(instruction.metadata["pattern"]),
+        pattern=cast("str | None", instruction.metadata["pattern"]),
         expressions=_expressions(instruction),
         language_version=LANGUAGE_VERSION,
         environment_version=ENVIRONMENT_VERSION,
@@ -168,7 +168,3 @@ def _option_fields(options: InstructionOptions) -> dict[str, Any]:
     known = GroundingItem.__struct_fields__
     fields = {name: value for name, value in asdict(options).items() if name in known}
     return {**fields, "stages": list(options.stages), "wordings": options.wordings or "own"}
-
-
-def _text_or_none(value: object) -> str | None:
-    return None if value is None else str(value)

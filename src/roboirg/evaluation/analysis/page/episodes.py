@@ -5,14 +5,13 @@ from __future__ import annotations
 import operator
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from functools import cached_property
 from pathlib import Path
 from typing import NamedTuple
 
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.evaluation.analysis.results.frame import Frame, join, make_frame
 from roboirg.evaluation.analysis.results.policy_run import PolicyRun
-from roboirg.evaluation.analysis.stats.cells import Cells, cells_of
+from roboirg.evaluation.analysis.stats.run_data import RunData
 from roboirg.evaluation.plan.sources import Source
 from roboirg.evaluation.records.episode_log import log_path, logged_slugs
 from roboirg.evaluation.records.film import poster_name
@@ -51,12 +50,12 @@ class PageEpisodes:
 
     Attributes:
         runs: that the page shows.
-        frame: the results of all runs, with those that are missing.
+        data: the results of all runs, with those that are missing.
         all: by policy run, task, episode, options and policy seed.
     """
 
     runs: Runs
-    frame: Frame
+    data: RunData
     all: tuple[PageEpisode, ...]
 
     @classmethod
@@ -68,16 +67,12 @@ class PageEpisodes:
             make_frame([(name, run.results)], run.planned, policies, named=name)
             for name, run in _named(runs)
         )
-        return cls(runs, frame, tuple(_episodes(runs, frame, videos=videos)))
+        return cls(runs, RunData(frame), tuple(_episodes(runs, frame, videos=videos)))
 
     @property
     def names(self) -> Mapping[PolicyRun, str]:
         """Labels of the policy runs, in the order of the page."""
-        return self.frame.names
-
-    @cached_property
-    def cells(self) -> Cells:
-        return cells_of(self.frame)
+        return self.data.frame.names
 
     def whole(self) -> Iterator[Record]:
         """Yield the whole records of all episodes in order, each read when it is asked for."""

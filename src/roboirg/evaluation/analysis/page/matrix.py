@@ -25,14 +25,14 @@ def make_matrix(episodes: PageEpisodes) -> dict[str, Any]:
     There is one set of cells for all episodes and, if there are several difficulties, one for
     each. Missing episodes have no difficulty yet; they count among all episodes only.
     """
-    columns = sorted({key.options for key in episodes.cells}, key=options_sort_key)
-    rows = _rows(episodes.cells)
+    columns = sorted({key.options for key in episodes.data.cells}, key=options_sort_key)
+    rows = _rows(episodes.data.cells)
     found = {one.record.difficulty for one in episodes.all}
-    levels = {"": episodes.cells}
+    levels = {"": episodes.data.cells}
     if len(found) > 1:
         ordered = dict.fromkeys((*DIFFICULTIES, *found))
         levels |= {
-            level: cells_of(episodes.frame.where(difficulty=level))
+            level: cells_of(episodes.data.frame.where(difficulty=level))
             for level in ordered
             if level in found
         }
@@ -44,7 +44,10 @@ def make_matrix(episodes: PageEpisodes) -> dict[str, Any]:
         ],
         "rows": [{"name": name, **scope} for name, scope in rows.items()],
         "levels": [
-            {"difficulty": level, "cells": _matrix_cells(cells, episodes.names, rows, columns)}
+            {
+                "difficulty": level,
+                "cells": _matrix_cells(cells, episodes.names, rows, columns),
+            }
             for level, cells in levels.items()
         ],
     }

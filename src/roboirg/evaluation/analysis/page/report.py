@@ -79,6 +79,7 @@ def write_report(
             to all videos.
         progress: called after each episode.
     """
+    check_page_support("The report")
     path = source.folder / REPORT_FILE if served else out or _usual_path(source)
     sources = [source] if against is None else [source, against]
     runs = {one.name: one for one in sources}
@@ -104,20 +105,14 @@ def _usual_path(source: Source) -> Path:
     return source.folder / f"{name}.html"
 
 
-def check_report_support() -> None:
-    """Check that the page can be made."""
-    check_page_support("The report")
-
-
 def _render(
     episodes: PageEpisodes, details: EpisodeDetails, progress: Progress | None
 ) -> Iterator[str]:
     """Return the page in pieces, as a large one takes memory; the details are made for it."""
-    check_report_support()
     template = template_environment("roboirg.evaluation.analysis.page").get_template(
         f"{REPORT_FILE}.j2"
     )
-    frame = with_words(episodes.frame, _add_all(details, episodes, progress))
+    frame = with_words(episodes.data.frame, _add_all(details, episodes, progress))
     data = json.dumps(
         _data(episodes, details), ensure_ascii=False, separators=(",", ":"), allow_nan=False
     )

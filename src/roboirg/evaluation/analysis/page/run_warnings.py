@@ -43,9 +43,9 @@ def run_warnings(episodes: PageEpisodes) -> list[tuple[str, str]]:
 
     These are sentences above the results, each after its kind, ``warning`` or ``note``.
     """
-    heard = heard_notes(episodes.frame, episodes.names)
+    heard = heard_notes(episodes.data.frame, episodes.names)
     warnings = (_incomplete(episodes), mixtures([one.record for one in episodes.all]), heard)
-    headline = headline_notes(episodes.cells, episodes.names)
+    headline = headline_notes(episodes.data.cells, episodes.names)
     notes = (_without_reference(episodes), _private(episodes), headline)
     return [
         *(("warning", text) for text in chain(*warnings)),
@@ -85,7 +85,7 @@ def comparisons(episodes: PageEpisodes) -> list[dict[str, Any]]:
 
 
 def _compared(episodes: PageEpisodes, first: PolicyRun, second: PolicyRun) -> list[str]:
-    ours, theirs = (episodes.frame.where(run=policy_run) for policy_run in (first, second))
+    ours, theirs = (episodes.data.frame.where(run=policy_run) for policy_run in (first, second))
     try:
         comparison = compare(ours, theirs)
     except InvalidValueError as error:
@@ -94,7 +94,7 @@ def _compared(episodes: PageEpisodes, first: PolicyRun, second: PolicyRun) -> li
 
 
 def _incomplete(episodes: PageEpisodes) -> Iterable[str]:
-    missing = [*episodes.frame["outcome"]].count(MISSING)
+    missing = [*episodes.data.frame["outcome"]].count(MISSING)
     total = len(episodes.all)
     if missing:
         have = verb_for(missing, "have")
@@ -119,7 +119,7 @@ def _without_reference(episodes: PageEpisodes) -> Iterable[str]:
             "Only one policy: without the forgetful listener’s results next to it, a rate does not "
             "show how much of it is chance (roboirg tables RUN --floors chance adds the level)."
         )
-    if all(key.options.setting != EXPLICIT for key in episodes.cells):
+    if all(key.options.setting != EXPLICIT for key in episodes.data.cells):
         yield "Explicit was not played, so there is no gap to it."
 
 

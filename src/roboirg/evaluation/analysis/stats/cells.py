@@ -121,11 +121,10 @@ Columns = Mapping[str, Any]
 Key = tuple[Any, ...]
 """What a group is about: the values of the columns that it is grouped by."""
 ByTask = Mapping[str, Cell]
-Groups = Mapping[Key, ByTask]
 NOTHING: ByTask = {}
 
 
-def gather(frame: Columns, by: Sequence[str]) -> Groups:
+def gather(frame: Columns, by: Sequence[str]) -> Mapping[Key, ByTask]:
     """Group the rows of a frame by some columns, in the order in which their values occur.
 
     The frame has the columns ``task``, ``episode``, ``policy_seed`` and ``outcome``, too.

@@ -48,11 +48,6 @@ def wilson_interval(successes: int, trials: int) -> Interval:
     return Interval(low, high)
 
 
-def unseen_share(episodes: int) -> float:
-    """Return the largest share of episodes unlike those seen: Wilson's upper end for 0 of n."""
-    return wilson_interval(0, episodes).high
-
-
 def resampled_rates(
     tasks: Sequence[Rows], rng: np.random.Generator, draws: int = DRAWS
 ) -> NDArray[np.float64]:
@@ -110,10 +105,10 @@ def resampled_interval(
 def without_spread(value: float, episodes: int, least: float = 0.0) -> Interval:
     """Return the interval if all episodes have the same value, so that resampling has no spread.
 
-    Up to `unseen_share` of all episodes may have other values, from `least` to 1. For rates of 0
-    and 1 this is Wilson's interval on episodes.
+    A share of all episodes up to Wilson's upper end for 0 of n may have other values, from `least`
+    to 1. For rates of 0 and 1 this is Wilson's interval on episodes.
     """
-    share = unseen_share(episodes)
+    share = wilson_interval(0, episodes).high
     return Interval((1 - share) * value + share * least, (1 - share) * value + share)
 
 

@@ -177,10 +177,10 @@ def _published_row(table: PaperTable, columns: Sequence[Column], row: PublishedR
 def _grouped(table: PaperTable, rows: Iterable[Row]) -> list[Row]:
     """Put the rows of each group together: settings in their order, policies as they come."""
     found = list(rows)
-    groups = list(dict.fromkeys(row.group for row in found))
     if not table.is_by_stages:
-        groups.sort(key=setting_sort_key)
-    return [row for group in groups for row in found if row.group == group]
+        return sorted(found, key=lambda row: setting_sort_key(row.group))
+    groups = list(dict.fromkeys(row.group for row in found))
+    return sorted(found, key=lambda row: groups.index(row.group))
 
 
 def _by_policy(rows: Sequence[Row]) -> list[Row]:
