@@ -76,7 +76,7 @@ def test_results_have_figures_and_a_page(unplayed: None, tmp_path: Path) -> None
     results = roboirg.evaluate(
         "listener", settings="explicit,direct", forms="implicit,resolved", out=tmp_path, **QUICK
     )
-    assert results.plot("forms")._repr_png_().startswith(b"\x89PNG")
+    assert results.plot("gaps")._repr_png_().startswith(b"\x89PNG")
     assert results.report().read_text().startswith("<!doctype html>")
     results.plot("gaps", published=True).save(tmp_path / "a.svg")
     assert "<!-- MemER -->" in (tmp_path / "a.svg").read_text()

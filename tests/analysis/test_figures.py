@@ -12,7 +12,7 @@ from msgspec.structs import replace
 from page_text import played
 
 from roboirg.core.instruction_options import InstructionOptions
-from roboirg.evaluation.analysis.figures import draw_figure, failures, forms, write_figures
+from roboirg.evaluation.analysis.figures import draw_figure, failures, write_figures
 from roboirg.evaluation.analysis.published import published_rows
 from roboirg.evaluation.analysis.results.frame import make_frame
 from roboirg.evaluation.analysis.stats.measure import ALL_TASKS
@@ -81,10 +81,10 @@ def dots(figure: Figure) -> dict[tuple[str, str], list[float]]:
 @pytest.mark.slow
 def test_all_figures_that_apply_are_written_and_are_the_same_again(tmp_path: Path) -> None:
     paths = write_figures(content(planned=PLAN.jobs()), tmp_path / "a" / "b")
-    # Nothing is known about contexts of other lengths, and nothing was filmed.
+    # Nothing is known about contexts of other lengths.
     assert {path.name for path in paths} == {
         f"{name}{ending}"
-        for name in ("gaps", "forms", "failures")
+        for name in ("gaps", "failures")
         for ending in (".png", ".svg", ".pdf", "-dark.png", "-dark.svg")
     }
     turned = content(results()[::-1], planned=PLAN.jobs())
@@ -100,7 +100,6 @@ LIMITS = "Played on the test split, in our own words, with at most 1300 steps."
     ("name", "shown"),
     [
         ("gaps", ["listener (privileged), n = 3", "direct", "mean over 2 tasks", "−100"]),
-        ("forms", ["only resolved", "all tasks", "counting", "direct, n = 3", "−100 [−100, −22]"]),
         ("failures", ["grounding: wrong object", "n = 6", "direct (resolved)"]),
     ],
 )
@@ -122,11 +121,6 @@ def widths(panel: Axes) -> dict[str, float]:
 
 def test_bars_are_shares_of_what_was_played() -> None:
     found = content(planned=PLAN.jobs())
-    both, resolved = (part.color.lower() for part in forms.PARTS[:2])
-    # Four settings, one without the reference suite, in two suites and all tasks.
-    listener, forgetful = (widths(panel) for panel in draw("forms", found).axes)
-    assert listener == pytest.approx({both: 1200.0, resolved: 0.0})
-    assert forgetful == pytest.approx({both: 0.0, resolved: 1200.0})
     # Everything failed in the four implicit tellings, nothing in the rest.
     listener, forgetful = (widths(panel) for panel in draw("failures", found).axes)
     assert sum(listener.values()) == 0
@@ -201,9 +195,7 @@ def test_the_context_is_compared_with_the_shortest_on_the_same_tasks(
     assert draw_figure("context", only) is None
 
 
-@pytest.mark.parametrize(
-    ("name", "policies"), [("gaps", 5), ("context", 1), ("forms", 1), ("failures", 5)]
-)
+@pytest.mark.parametrize(("name", "policies"), [("gaps", 5), ("context", 1), ("failures", 5)])
 def test_no_text_leaves_the_figure_or_lies_on_another(
     name: str, policies: int, published_like: Callable[..., list[Summary]]
 ) -> None:
@@ -236,4 +228,3 @@ def test_rates_without_another_setting_stand_alone(kept: str) -> None:
         found.summaries[key, ALL_TASKS, InstructionOptions(kept)].rate for key in found.frame.names
     ]
     assert [*shown.values()] == [[100 * float(rate)] for rate in own if rate is not None]
-    assert draw_figure("forms", found) is None

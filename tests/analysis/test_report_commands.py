@@ -143,7 +143,7 @@ def test_mixed_render_devices_are_named(run: Path, tmp_path: Path) -> None:
         ("figures RUN --out EMPTY --which gap", "Did you mean 'gaps'"),
         ("figures RUN --out FILE --which gaps", "Cannot write to"),
         ("figures RUN:listener --out EMPTY --which failures", "nothing to draw for failures"),
-        ("figures --published --out EMPTY --which forms", "The paper's tables have nothing to"),
+        ("figures --published --out EMPTY --which failures", "The paper's tables have nothing to"),
         ("compare RUN nowhere", "There is no run at nowhere;"),
         ("compare RUN nowhere:other", "There is no run at nowhere;"),
         ("compare RUN RUN:forgetful", "name one as RUN:listener"),

@@ -113,7 +113,7 @@ def figures(
     which: Annotated[
         str,
         typer.Option(
-            help="gaps, forms, context, failures, several separated by commas, or all that apply."
+            help="gaps, context, failures, several separated by commas, or all that apply."
         ),
     ] = _ALL,
     published: Annotated[bool, typer.Option(help="Add the paper's values.")] = False,

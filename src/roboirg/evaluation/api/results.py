@@ -132,7 +132,7 @@ class Results:
         return get_format(format).draw(noted)
 
     def plot(self, which: str = "gaps", *, published: bool = False) -> Plot:
-        """Return one of the figures: gaps, forms, context or failures.
+        """Return one of the figures: gaps, context or failures.
 
         Raises:
             UnknownNameError: there is no such figure.

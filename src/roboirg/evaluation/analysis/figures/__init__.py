@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Any, cast
 from roboirg.core.errors import InvalidValueError, UnknownNameError
 from roboirg.evaluation.analysis.figures.failures import draw_failures
 from roboirg.evaluation.analysis.figures.figure_style import STYLE, check_figure_support, save
-from roboirg.evaluation.analysis.figures.forms import draw_forms
 from roboirg.evaluation.analysis.figures.gaps import draw_next_to_reference
 from roboirg.evaluation.analysis.stats.run_data import RunData
 
@@ -19,7 +18,6 @@ if TYPE_CHECKING:
 
 FIGURES: Mapping[str, Callable[[RunData, bool], Figure | None]] = {
     "gaps": partial(draw_next_to_reference, "main"),
-    "forms": lambda content, _published: draw_forms(content),
     "context": partial(draw_next_to_reference, "context"),
     "failures": lambda content, _published: draw_failures(content),
 }

@@ -1,31 +1,45 @@
-"""Figure: causes of failures, by policy and setting."""
+"""Figure: causes of failures, a panel for each policy and in it a stacked bar for each setting."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import TYPE_CHECKING
+from collections import Counter
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, NamedTuple
 
-from roboirg.core.instruction_options import InstructionOptions
-from roboirg.evaluation.analysis.figures.bars import Bar, Part, draw_bars
+from roboirg.evaluation.analysis.figures.figure_style import panels, paper
 from roboirg.evaluation.analysis.results.option_labels import options_label, options_sort_key
 from roboirg.evaluation.analysis.stats.run_data import RunData
 from roboirg.evaluation.analysis.tables.diagnostic_tables import FAILURES, count_failures
 from roboirg.evaluation.analysis.tables.table_notes import where_played
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
+MOST_COLUMNS = 2
+HEIGHT = 1.55
+"""Of a bar, of the two lines of a row."""
+MIN_LABELED_PERCENT = 6.0
+"""Smallest part with room for its number, percent."""
 _ORANGE = ("#7f2704", "#a63603", "#c0510a", "#ee8130", "#fbb477", "#fddfbf", "#fff1e3")
 _BLUE = ("#08306b", "#20578f", "#3f85bd", "#74b0d8", "#a9d0e8", "#d9ebf6")
 _DARK = frozenset((*_ORANGE[:3], *_BLUE[:3]))
 NOTE = "n: trials with a verdict; the rest of a bar succeeded."
 
 
+class Part(NamedTuple):
+    """What a part of a bar is, its color, and the color of the number in it."""
+
+    label: str
+    color: str
+    ink: str
+
+
 PARTS = {
     failure: Part(
         f"{kind}: " * bool(kind) + failure.replace("_", " "),
         color,
-        ink="white" if color in _DARK else "black",
+        "white" if color in _DARK else "black",
     )
     for (failure, kind), color in zip(FAILURES.items(), (*_ORANGE, *_BLUE, "#bbbbbb"), strict=True)
 }
@@ -34,20 +48,41 @@ PARTS = {
 
 def draw_failures(content: RunData) -> Figure | None:
     """Draw the shares of episodes by cause of failure; return None without failures."""
+    from matplotlib.patches import Patch
+
     counts = count_failures(content.frame, ("run", "options"))
-    if not any(own[name] for own in counts.values() for name in PARTS):
+    shown = [name for name in PARTS if any(own[name] for own in counts.values())]
+    if not shown:
         return None
     columns = sorted({options for _, options in counts}, key=options_sort_key)
-    names = [one for one in content.frame.names if any(run == one for run, _ in counts)]
-    rows = {
-        content.name(one): [_bar(options, counts.get((one, options), {})) for options in columns]
-        for one in names
-    }
-    notes = [NOTE, where_played([one.conditions for one in names])]
-    return draw_bars(rows, list(PARTS.values()), notes)
+    runs = [one for one in content.frame.names if any(run == one for run, _ in counts)]
+    labels = {content.name(run): list(map(options_label, columns)) for run in runs}
+    parts = [PARTS[name] for name in shown]
+    keys = {one.label: Patch(facecolor=one.color, edgecolor=paper()) for one in parts}
+    notes = [NOTE, where_played([one.conditions for one in runs])]
+    figure, found = panels(labels, MOST_COLUMNS, keys, notes)
+    for (axes, places), run in zip(found, runs, strict=True):
+        for place, options in zip(places, columns, strict=True):
+            _draw_bar(axes, place, counts.get((run, options), Counter()), shown)
+        axes.set_xlim(0, 100)
+        axes.set_xticks(range(0, 101, 25))
+        axes.set_xlabel("share of the episodes with a verdict, %", fontsize=6.5)
+    return figure
 
 
-def _bar(options: InstructionOptions, counts: Mapping[str, int]) -> Bar:
-    parts = {part.label: counts.get(name, 0) for name, part in PARTS.items()}
-    n = counts.get("trials", 0)
-    return Bar(options_label(options), parts, n, f"n = {n}" if n else "–")
+def _draw_bar(axes: Axes, place: float, counts: Counter[str], shown: Sequence[str]) -> None:
+    left, trials = 0.0, counts["trials"]
+    for name in shown:
+        width = 100 * counts[name] / max(1, trials)
+        axes.barh(
+            place, width, left=left, height=HEIGHT, color=PARTS[name].color, edgecolor=paper(),
+            linewidth=0.5,
+        )  # fmt: skip
+        if width >= MIN_LABELED_PERCENT:
+            axes.text(
+                left + width / 2, place, str(counts[name]), ha="center", va="center", fontsize=6.5,
+                color=PARTS[name].ink,
+            )  # fmt: skip
+        left += width
+    text = f"n = {trials}" if trials else "–"
+    axes.text(1.02, place, text, transform=axes.get_yaxis_transform(), va="center", fontsize=6.5)

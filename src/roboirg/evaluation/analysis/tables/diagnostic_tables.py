@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import replace
 
 from roboirg.core.errors import InvalidValueError
 from roboirg.evaluation.analysis.results.frame import Frame, suite
@@ -25,8 +26,7 @@ from roboirg.evaluation.analysis.stats.heard_rates import (
     cut_text,
     rate_of,
 )
-from roboirg.evaluation.analysis.stats.measure import ALL_TASKS, Measured, ScopeKey
-from roboirg.evaluation.analysis.stats.paired_tests import Gap, holm
+from roboirg.evaluation.analysis.stats.measure import ALL_TASKS, Measured, with_holm
 from roboirg.evaluation.analysis.stats.rates import NOT_APPLICABLE, gap_words, percent
 from roboirg.evaluation.analysis.stats.run_data import RunData
 from roboirg.evaluation.analysis.tables.arm_table import make_arm_table
@@ -76,52 +76,41 @@ _HEARD_NOTE = (
 )
 
 
-def form_rows(data: RunData) -> Iterator[tuple[ScopeKey, Gap]]:
-    """Yield the gaps between the two forms by policy run, suite and setting.
-
-    Of a policy run, those over all tasks come last, if there are several suites.
-    """
-    found = {
-        key: one.second_gap
-        for key, one in data.summaries.items()
-        if one.second_gap is not None
-        and has_default_options(key.options)
-        and key.scope not in one.cells
-    }
-    suites = {suite(key.task) for key in data.cells} - {None}
-    runs = list(data.frame.names)
-    scopes = list(dict.fromkeys(key.scope for key in found))
-    for key in sorted(
-        found,
-        key=lambda key: (
-            runs.index(key.policy_run), scopes.index(key.scope),
-            setting_sort_key(key.options.setting),
-        ),
-    ):  # fmt: skip
-        if key.scope != ALL_TASKS or len(suites) > 1:
-            yield key, found[key]
-
-
 def make_forms_table(data: RunData) -> Table:
-    """Make the table of implicit against resolved forms, as numbers of the figure.
+    """Make the table of implicit against resolved forms, by policy run, suite and setting.
+
+    Of a policy run, the rows over all tasks come last, if there are several suites.
 
     Raises:
         InvalidValueError: no episode was played in both forms.
     """
-    found = list(form_rows(data))
-    if not found:
+    several = len({suite(key.task) for key in data.cells} - {None}) > 1
+    found = [
+        replace(one, gap=one.second_gap)
+        for key, one in data.summaries.items()
+        if has_default_options(key.options)
+        and key.scope not in one.cells
+        and (several or key.scope != ALL_TASKS)
+    ]
+    runs, scopes = list(data.frame.names), [one.key.scope for one in found]
+    found.sort(
+        key=lambda one: (
+            runs.index(one.key.policy_run), scopes.index(one.key.scope),
+            setting_sort_key(one.key.options.setting),
+        )
+    )  # fmt: skip
+    rows = []
+    for one in with_holm(found, lambda key: key.policy_run):
+        if (gap := one.gap) is not None:
+            of = gap.overlap
+            counts = (of.trials, of.both, of.only_second, of.only_first, of.neither)
+            words = (*map(str, counts), *gap_words(gap, one.p_holm))
+            group = f"{data.frame.names[one.key.policy_run]}, {one.key.scope}"
+            rows.append(Row(group, one.key.options.setting, words))
+    if not rows:
         raise InvalidValueError(
             "The runs have no episode in both forms; play them with --forms implicit,resolved."
         )
-    rows = []
-    for run, name in data.frame.names.items():
-        own = [(key, gap) for key, gap in found if key.policy_run == run]
-        corrected = holm([gap.p_value for _, gap in own])
-        for (key, gap), p_value in zip(own, corrected, strict=True):
-            of = gap.overlap
-            counts = (of.trials, of.both, of.only_second, of.only_first, of.neither)
-            words = (*map(str, counts), *gap_words(gap, p_value))
-            rows.append(Row(f"{name}, {key.scope}", key.options.setting, words))
     return Table(
         key="forms",
         title="Implicit and resolved form",
