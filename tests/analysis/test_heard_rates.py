@@ -87,8 +87,8 @@ def test_tables_have_rates_over_what_was_heard_next_to_rates_over_all(result: Ma
         ("listener, contextual", "all tasks"): ["6", "50–67", "40.00", "2", "100.00"],
     }
     note = (
-        "listener did not read every instruction to its end (its prompt is limited): contextual "
-        "50–67 % cut, success 40 % of 5, 100 % of the 2 heard whole."
+        "listener did not read every instruction to its end (its prompt is limited): 38–50 % of "
+        "its prompts were cut; tables --which heard has the rates."
     )
     assert [note in one.notes for one in make_run_tables(data.frame)] == [True, False]
 

@@ -10,12 +10,13 @@ page omits them for others.
 
 from __future__ import annotations
 
+import functools
 import os
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 from urllib.parse import quote
 
 import msgspec
@@ -28,7 +29,7 @@ from roboirg.core.plain_text import counted
 from roboirg.core.word_pools import words_label
 from roboirg.evaluation.analysis.page.episodes import PageEpisode
 from roboirg.evaluation.play.job_instruction import PreparedJob, instruct_job
-from roboirg.evaluation.records.record import EventRecord, Record, SubgoalRecord
+from roboirg.evaluation.records.record import EventRecord, Job, Record, SubgoalRecord
 from roboirg.judging.episode_replay import Event, completed_stages
 from roboirg.judging.judge import describe_object, plain_subgoal
 from roboirg.language import LANGUAGE_VERSION
@@ -64,8 +65,6 @@ class EpisodeDetails:
     strings: dict[str, int] = field(default_factory=dict)
     words: list[list[int]] = field(default_factory=list)
     lines: list[str] = field(default_factory=list)
-    _scenes: dict[tuple[object, ...], _PlayedScene] = field(default_factory=dict)
-    _resolved: dict[tuple[object, ...], str | None] = field(default_factory=dict)
 
     def add(self, episode: PageEpisode, record: Record) -> None:
         """Add an episode, given its whole record."""
@@ -86,7 +85,12 @@ class EpisodeDetails:
     def details_of(self, record: Record) -> Details:
         """Return the details of an episode, with texts as indices; empty ones are left out."""
         index = self._index
-        scene = self._scene(record)
+        job = msgspec.structs.replace(
+            record.identity, policy="", policy_seed=0, wordings_file=record.wordings_file
+        )
+        is_current = record.environment_version == ENVIRONMENT_VERSION
+        scene = _played_scene(job) if is_current else _PlayedScene(None, {}, {})
+        is_known = is_current and record.language_version == LANGUAGE_VERSION
         cause, audit = record.attribution, record.prompt
         found: Details = {
             "turns": [[index(turn.stage), index(turn.text)] for turn in record.instruction],
@@ -98,7 +102,7 @@ class EpisodeDetails:
                 for one in record.mentions
             ],
             "command": None if record.setting == EXPLICIT else index(record.command),
-            "resolved": self._optional(self._resolved_form(record)),
+            "resolved": self._optional(_resolved_form(job) if is_known else None),
             "goal": [[index(slot), index(_value(value))] for slot, value in record.goal.items()],
             "cause": self._optional(record.cause),
             "attribution": cause and [*map(index, (cause.kind, cause.failure)), cause.step,
@@ -126,36 +130,22 @@ class EpisodeDetails:
     def _optional(self, text: str | None) -> int | None:
         return None if text is None else self._index(text)
 
-    def _scene(self, record: Record) -> _PlayedScene:
-        version = record.environment_version
-        key = (record.task, record.split, record.episode, record.arm, version)
-        if key not in self._scenes:
-            self._scenes[key] = _PlayedScene.of(record)
-        return self._scenes[key]
 
-    def _resolved_form(self, record: Record) -> str | None:
-        """Return the same instruction with every reference resolved.
+@functools.lru_cache(maxsize=4096)
+def _resolved_form(job: Job) -> str | None:
+    """Return the same instruction with every reference resolved.
 
-        None if the record has this form already, another language or environment version, or words
-        of a wording file that is gone.
-        """
-        versions = record.language_version, record.environment_version
-        is_resolved = record.setting == EXPLICIT or record.form == "resolved"
-        if is_resolved or versions != (LANGUAGE_VERSION, ENVIRONMENT_VERSION):
-            return None
-        words = record.options, record.arm, record.wordings_file
-        key = (record.task, record.split, record.episode, *words)
-        if key not in self._resolved:
-            job = msgspec.structs.replace(record.identity, wordings_file=record.wordings_file)
-            try:
-                self._resolved[key] = instruct_job(job.with_options(form="resolved")).text
-            except RoboIRGError:
-                self._resolved[key] = None  # a task or a wording file that is no longer there
-        return self._resolved[key]
+    None if it has this form already, or if its task or wording file is no longer there.
+    """
+    if job.setting == EXPLICIT or job.form == "resolved":
+        return None
+    try:
+        return instruct_job(job.with_options(form="resolved")).text
+    except RoboIRGError:
+        return None
 
 
-@dataclass
-class _PlayedScene:
+class _PlayedScene(NamedTuple):
     """What is the same whenever a scene is played.
 
     Attributes:
@@ -167,29 +157,12 @@ class _PlayedScene:
     episode: Episode | None
     names: Mapping[str, str]
     facts: Mapping[Fact, Fact]
-    _acts: dict[tuple[object, ...], str | None] = field(default_factory=dict)
-
-    @classmethod
-    def of(cls, record: Record) -> _PlayedScene:
-        if record.environment_version != ENVIRONMENT_VERSION:
-            return cls(None, {}, {})
-        try:
-            episode = PreparedJob(record.identity).episode
-        except RoboIRGError:
-            return cls(None, {}, {})
-        stages = (*episode.demonstration, *episode.stages)
-        conditions = (one for stage in stages for one in (stage.expects, *stage.forbids))
-        facts = {fact: fact for condition in conditions for fact in facts_of(condition)}
-        return cls(episode, _object_names(episode.scene), facts)
 
     def act(self, event: EventRecord) -> str | None:
         """Return an event in words; None if timelines do not show it."""
-        key = (event.kind, event.subject, event.place, event.holds)
-        if key not in self._acts:
-            shown = fact_traits(event.kind).timeline
-            is_shown = shown == "both" or (shown == "start" and event.holds)
-            self._acts[key] = event_text(event, self.names) if is_shown else None
-        return self._acts[key]
+        shown = fact_traits(event.kind).timeline
+        is_shown = shown == "both" or (shown == "start" and event.holds)
+        return event_text(event, self.names) if is_shown else None
 
     def stages(self, record: Record) -> list[tuple[str, int | None]]:
         """Return the stages of the policy's turn: subgoals, and the steps that completed them."""
@@ -210,6 +183,18 @@ class _PlayedScene:
             (plain_subgoal(stage), done[place] - turn if place in done else None)
             for place, stage in enumerate(self.episode.stages)
         ]
+
+
+@functools.lru_cache(maxsize=4096)
+def _played_scene(job: Job) -> _PlayedScene:
+    try:
+        episode = PreparedJob(job).episode
+    except RoboIRGError:
+        return _PlayedScene(None, {}, {})
+    stages = (*episode.demonstration, *episode.stages)
+    conditions = (one for stage in stages for one in (stage.expects, *stage.forbids))
+    facts = {fact: fact for condition in conditions for fact in facts_of(condition)}
+    return _PlayedScene(episode, _object_names(episode.scene), facts)
 
 
 def event_text(event: EventRecord, names: Mapping[str, str]) -> str:

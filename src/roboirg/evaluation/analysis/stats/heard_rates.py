@@ -6,9 +6,7 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from fractions import Fraction
 
-from roboirg.core.instruction_options import InstructionOptions
 from roboirg.evaluation.analysis.results.frame import MISSING, Frame
-from roboirg.evaluation.analysis.results.option_labels import options_label, options_sort_key
 from roboirg.evaluation.analysis.results.policy_run import PolicyRun
 from roboirg.evaluation.analysis.stats.cells import Key
 from roboirg.evaluation.analysis.stats.rates import whole_percent
@@ -47,17 +45,13 @@ def rate_of(counts: HeardCounts, heard: str = "") -> Fraction | None:
 
 def heard_notes(frame: Frame, names: Mapping[PolicyRun, str]) -> list[str]:
     """Return a sentence for each policy of which some prompts were cut, or may have been."""
-    parts: dict[PolicyRun, list[str]] = {}
-    counts = count_heard(frame, ("options",))
-    for run, options in sorted(counts, key=lambda key: options_sort_key(key[1])):
-        one = counts[run, options]
-        if one["cut"] or one["unknown"]:
-            parts.setdefault(run, []).append(_part(options, one))
+    counts = count_heard(frame, ())
+    found = {run: one for (run,), one in counts.items() if one["cut"] or one["unknown"]}
     return [
         f"{name} did not read every instruction to its end (its prompt is limited): "
-        f"{'; '.join(parts[run])}."
+        f"{cut_text(found[run])} % of its prompts were cut; tables --which heard has the rates."
         for run, name in names.items()
-        if run in parts
+        if run in found
     ]
 
 
@@ -68,14 +62,3 @@ def cut_text(one: HeardCounts) -> str:
         for count in (one["cut"], one["cut"] + one["unknown"])
     )
     return low if low == high else f"{low}–{high}"
-
-
-def _part(options: InstructionOptions, one: HeardCounts) -> str:
-    text = f"{options_label(options)} {cut_text(one)} % cut"
-    rate, heard_rate = rate_of(one), rate_of(one, "heard ")
-    if rate is None:
-        return text
-    heard = "none heard whole"
-    if heard_rate is not None:
-        heard = f"{whole_percent(heard_rate)} % of the {one['heard trials']:,} heard whole"
-    return f"{text}, success {whole_percent(rate)} % of {one['trials']:,}, {heard}"
