@@ -14,7 +14,7 @@ from roboirg.language.instruction import REFERENCE, Expression
 from roboirg.language.number_words import plural
 from roboirg.language.phrases import Phrase, anaphor, antecedent, fill, listed, plain
 from roboirg.language.request import GoalValue, InstructionRequest
-from roboirg.language.slot_types.slot_type import Fields, SlotType, competing_remarks
+from roboirg.language.slot_types.slot_type import Fields, SlotType, competing_with
 from roboirg.language.templates import introductions, remarks
 
 Pointer = tuple[str, Expression]
@@ -139,9 +139,8 @@ def them(goal_values: tuple[GoalValue, ...], introduced: tuple[str, ...]) -> Phr
 
 def competing(request: InstructionRequest, goal_values: tuple[GoalValue, ...]) -> list[Phrase]:
     """Return remarks that name other colors."""
-    colors = request.task.commands.colors
-    sentences = remarks.COMPETING_COLOR_DISTRACTORS.of(request.pool)
-    return competing_remarks(sentences, colors, str, goal_values)
+    words: dict[str, str] = {color: color for color in request.task.commands.colors}
+    return competing_with(remarks.COMPETING_COLOR_DISTRACTORS, words)(request, goal_values)
 
 
 def _described(

@@ -6,11 +6,11 @@ from roboirg.core.word_pools import Pools
 from roboirg.language.number_words import cardinal, times
 from roboirg.language.phrases import Phrase, anaphor, antecedent, fill
 from roboirg.language.request import GoalValue, InstructionRequest
-from roboirg.language.slot_types.slot_type import Fields, SlotType, competing_remarks
+from roboirg.language.slot_types.slot_type import Fields, SlotType, competing_with, pointing_at
 from roboirg.language.templates import introductions, remarks
 
-COMPETING_NUMBERS = tuple(range(1, 11))
-"""The numbers that a competing remark may name."""
+MOST = 10
+"""The largest number that a competing remark may name."""
 SAME_NUMBER = Pools(
     train=("the same number of times", "just as many times"),
     test=("that same number of times", "that number of times"),
@@ -45,16 +45,10 @@ def introduce_quantity(request: InstructionRequest, slot: str, quantity: int) ->
     return fill(template, {"times": antecedent(times(quantity), slot, quantity)})
 
 
-def _pointing(_request: InstructionRequest, goal_values: tuple[GoalValue, ...]) -> Phrase:
-    return anaphor("that number", "that", goal_values[0].slot, goal_values[0].value)
-
-
-def competing(request: InstructionRequest, goal_values: tuple[GoalValue, ...]) -> list[Phrase]:
-    """Return remarks that name other numbers."""
-    sentences = remarks.COMPETING_NUMBER_DISTRACTORS.of(request.pool)
-    return competing_remarks(
-        sentences, COMPETING_NUMBERS, lambda value: cardinal(int(value)), goal_values
-    )
+competing = competing_with(
+    remarks.COMPETING_NUMBER_DISTRACTORS, {one: cardinal(one) for one in range(1, MOST + 1)}
+)
+"""Returns remarks that name other numbers."""
 
 
 NUMBER = SlotType(
@@ -62,7 +56,7 @@ NUMBER = SlotType(
     stated=_stated,
     reduced=_reduced,
     introduce=_introduce,
-    pointing=_pointing,
+    pointing=pointing_at("number"),
     reinforcements=remarks.NUMBER_REINFORCEMENTS,
     competing=competing,
 )

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from typing import Literal
+
 from roboirg.core.motions import Shuttle
+from roboirg.core.word_pools import Pools
 from roboirg.language.instruction import REFERENCE
 from roboirg.language.number_words import ordinal
 from roboirg.language.phrases import Phrase, anaphor, antecedent, fill
 from roboirg.language.request import GoalValue, InstructionRequest
-from roboirg.language.slot_types.slot_type import Fields, SlotType, competing_remarks
+from roboirg.language.slot_types.slot_type import Fields, SlotType, competing_with, pointing_at
 from roboirg.language.templates import introductions, remarks
 
 INTRODUCTIONS = {
@@ -24,9 +27,8 @@ OWNERS = {"visit": "its", "placement": "the"}
 """The determiner; *its placement* would give the cube away, as only one was placed."""
 INTRODUCED_OWNERS = {"visit": "the cube's", "placement": "the"}
 """The same before anything is named."""
-VISITS = (1, 2, 3, 4, 5)
-PLACEMENTS = (1, 2, 3, 4)
-"""The positions that a competing remark may name."""
+MOST = {"visit": 5, "placement": 4}
+"""The last position that a competing remark may name."""
 
 
 def series_length(request: InstructionRequest, goal_value: GoalValue) -> int:
@@ -79,44 +81,23 @@ def introduce_position(
     return fill(template, {"which": which})
 
 
-def _pointing(_request: InstructionRequest, goal_values: tuple[GoalValue, ...]) -> Phrase:
-    (goal_value,) = goal_values
-    return anaphor(f"that {goal_value.slot_type}", "that", goal_value.slot, goal_value.value)
+def _element(
+    name: Literal["visit", "placement"], reinforcements: Pools[str], distractors: Pools[str]
+) -> SlotType:
+    return SlotType(
+        name=name,
+        stated=_stated,
+        reduced=_reduced,
+        introduce=_introduce,
+        pointing=pointing_at(name),
+        reinforcements=reinforcements,
+        competing=competing_with(
+            distractors, {one: ordinal(one) for one in range(1, MOST[name] + 1)}
+        ),
+    )
 
 
-def _visit_competing(
-    request: InstructionRequest, goal_values: tuple[GoalValue, ...]
-) -> list[Phrase]:
-    sentences = remarks.COMPETING_VISIT_DISTRACTORS.of(request.pool)
-    return competing_remarks(sentences, VISITS, _word, goal_values)
-
-
-def _placement_competing(
-    request: InstructionRequest, goal_values: tuple[GoalValue, ...]
-) -> list[Phrase]:
-    sentences = remarks.COMPETING_PLACEMENT_DISTRACTORS.of(request.pool)
-    return competing_remarks(sentences, PLACEMENTS, _word, goal_values)
-
-
-def _word(value: str | int) -> str:
-    return ordinal(int(value))
-
-
-VISIT = SlotType(
-    name="visit",
-    stated=_stated,
-    reduced=_reduced,
-    introduce=_introduce,
-    pointing=_pointing,
-    reinforcements=remarks.VISIT_REINFORCEMENTS,
-    competing=_visit_competing,
-)
-PLACEMENT = SlotType(
-    name="placement",
-    stated=_stated,
-    reduced=_reduced,
-    introduce=_introduce,
-    pointing=_pointing,
-    reinforcements=remarks.VIDEO_REINFORCEMENTS,
-    competing=_placement_competing,
+VISIT = _element("visit", remarks.VISIT_REINFORCEMENTS, remarks.COMPETING_VISIT_DISTRACTORS)
+PLACEMENT = _element(
+    "placement", remarks.VIDEO_REINFORCEMENTS, remarks.COMPETING_PLACEMENT_DISTRACTORS
 )

@@ -5,7 +5,7 @@ from __future__ import annotations
 from roboirg.language.instruction import Expression
 from roboirg.language.phrases import Phrase, anaphor, antecedent, fill, plain
 from roboirg.language.request import GoalValue, InstructionRequest
-from roboirg.language.slot_types.slot_type import Fields, SlotType, competing_remarks
+from roboirg.language.slot_types.slot_type import Fields, SlotType, competing_with, pointing_at
 from roboirg.language.templates import derivations, introductions, remarks
 
 USED = "the target used "
@@ -50,24 +50,12 @@ def _introduce(request: InstructionRequest, goal_values: tuple[GoalValue, ...]) 
     return fill(template, {"moment": named(goal_values[0])})
 
 
-def _pointing(_request: InstructionRequest, goal_values: tuple[GoalValue, ...]) -> Phrase:
-    return anaphor("that moment", "that", goal_values[0].slot, goal_values[0].value)
-
-
-def _competing(request: InstructionRequest, goal_values: tuple[GoalValue, ...]) -> list[Phrase]:
-    values = tuple(derivations.MOMENTS)
-    sentences = remarks.COMPETING_MOMENT_DISTRACTORS.of(request.pool)
-    return competing_remarks(
-        sentences, values, lambda value: derivations.MOMENTS[str(value)], goal_values
-    )
-
-
 RELATION = SlotType(
     name="relation",
     stated=_stated,
     reduced=_reduced,
     introduce=_introduce,
-    pointing=_pointing,
+    pointing=pointing_at("moment"),
     reinforcements=remarks.VIDEO_REINFORCEMENTS,
-    competing=_competing,
+    competing=competing_with(remarks.COMPETING_MOMENT_DISTRACTORS, derivations.MOMENTS),
 )

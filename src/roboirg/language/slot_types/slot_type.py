@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 from roboirg.core.goal_slots import SlotTypeName
 from roboirg.core.word_pools import Pools
-from roboirg.language.phrases import Phrase, fill, plain
+from roboirg.language.phrases import Phrase, anaphor, fill, plain
 from roboirg.language.request import GoalValue, InstructionRequest
 
 Fields = dict[str, Phrase]
@@ -46,17 +46,20 @@ class SlotType:
     ) = None
 
 
-def competing_remarks(
-    templates: Sequence[str],
-    candidates: Sequence[str | int],
-    word: Callable[[str | int], str],
-    goal_values: tuple[GoalValue, ...],
-) -> list[Phrase]:
-    """Fill every template with every candidate that is no value of the goal."""
-    taken = {one.value for one in goal_values}
-    return [
-        fill(template, {"other": plain(word(candidate))}, plural=candidate != 1)
-        for candidate in candidates
-        if candidate not in taken
-        for template in templates
+def pointing_at(noun: str) -> Callable[[InstructionRequest, tuple[GoalValue, ...]], Phrase]:
+    """Return what points at the first value of a type: *that number* for the noun ``number``."""
+    return lambda _request, goal_values: anaphor(
+        f"that {noun}", "that", goal_values[0].slot, goal_values[0].value
+    )
+
+
+def competing_with(
+    templates: Pools[str], words: Mapping[str, str] | Mapping[int, str]
+) -> Callable[[InstructionRequest, tuple[GoalValue, ...]], list[Phrase]]:
+    """Return what fills every template with the words of every value that is not the goal's."""
+    return lambda request, goal_values: [
+        fill(template, {"other": plain(word)}, plural=value != 1)
+        for value, word in words.items()
+        if value not in {one.value for one in goal_values}
+        for template in templates.of(request.pool)
     ]
