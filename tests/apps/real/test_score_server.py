@@ -101,7 +101,6 @@ def test_only_pages_of_this_server_are_answered(served):
         ask(served, "/score", form, key=""),
         ask(served, "/score", form, host=f"evil.example:{port}"),
         ask(served, "/score", form, origin="http://evil.example"),
-        ask(served, "/undo", {"last": ""}, key=""),
     ]
     assert {status for status, _, _ in refused} == {403}
     assert not any(served.key in f"{headers}{text}" for _, headers, text in refused)
@@ -134,9 +133,6 @@ def test_a_page_that_is_out_of_date_scores_nothing(served):
     _, headers, _ = ask(served, "/score", {**form, "choice": "dropped"})
     assert "has+changed+since" in headers["Location"]
     assert served.read_trial_log().newest(trial.name).outcome == "success"
-    _, headers, _ = ask(served, "/undo", {"last": "another"})
-    assert "nothing+was+undone" in headers["Location"]
-    assert served.read_trial_log().state(trial.name) == "scored"
 
 
 def test_what_an_operator_types_is_text(served):
@@ -183,7 +179,7 @@ def press(page, key):
 
 
 @pytest.mark.browser
-def test_notes_corrections_and_undo_by_keyboard(browser, served, wait_s):
+def test_notes_and_corrections_by_keyboard(browser, served, wait_s):
     first = served.plan.trials[0]
     page = browser.new_page(viewport=NARROW)
     page.set_default_timeout(1000 * wait_s)
@@ -201,10 +197,6 @@ def test_notes_corrections_and_undo_by_keyboard(browser, served, wait_s):
     assert page.locator("button[aria-pressed=true]").count() == 1
     press(page, "1")
     assert served.read_trial_log().newest(first.name).attribution.failure == "wrong_place"
-    press(page, "u")
-    assert served.read_trial_log().newest(first.name).outcome == "success"
-    press(page, "u")
-    assert served.read_trial_log().state(first.name) == "open"
     page.close()
 
 

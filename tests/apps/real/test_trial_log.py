@@ -1,4 +1,4 @@
-"""Verdicts are stored at once, can be undone, and are never lost."""
+"""Verdicts are stored at once, can be corrected, and are never lost."""
 
 from pathlib import Path
 
@@ -7,7 +7,7 @@ from made_records import make_record
 from page_text import render
 
 from roboirg.apps.real.study.failure_choices import failure_choices
-from roboirg.apps.real.study.trial_log import VOID, WITHDRAWN, TrialLog, trial_metadata
+from roboirg.apps.real.study.trial_log import VOID, TrialLog, trial_metadata
 from roboirg.core.errors import InvalidValueError
 from roboirg.evaluation.analysis.results.frame import make_frame
 from roboirg.evaluation.analysis.stats.run_data import RunData
@@ -34,7 +34,7 @@ def test_a_score_is_a_record_like_any_other(small):
     assert (record.outcome, record.attribution, record.events) == ("success", None, ())
     assert record.robot == "a robot"
     assert trial_metadata(record) == {
-        "action": "score", "operator": "ann", "note": "shaky", "trial": first.name,
+        "operator": "ann", "note": "shaky", "trial": first.name,
         "plan": plan.fingerprint,
     }  # fmt: skip
     wrong, dropped = found[second.identity], found[third.identity]
@@ -50,30 +50,17 @@ def test_a_score_is_a_record_like_any_other(small):
     assert "slipped" in render(read_records(folder))
 
 
-def test_undo_brings_back_what_was_before(small):
+def test_the_newest_score_counts_and_all_stay_in_the_file(small):
     plan, folder = small
-    first, second, *_ = plan.trials
-    trial_log = read(plan, folder)
-    trial_log.score(first, "success", operator="ann")
-    trial_log.score(second, "dropped", operator="ann")
-    trial_log.score(first, "misplaced", operator="ann")
-    steps = [
-        (first.name, "scored", "success"),
-        (second.name, "open", "error"),
-        (first.name, "open", "error"),
-    ]
-    for name, state, outcome in steps:
-        assert read(plan, folder).undo(operator="bob") == name
+    trial = plan.trials[0]
+    for number, choice in enumerate(("success", "misplaced", "void", "success"), 1):
+        read(plan, folder).score(trial, choice, operator="ann")
         now = read(plan, folder)
-        assert now.state(name) == state
-        newest = {one.identity: one for one in read_records(folder)}[plan.trial(name).identity]
-        assert newest.outcome == outcome
-    # An undone score counts in no rate.
-    assert newest.cause == WITHDRAWN
-    with pytest.raises(InvalidValueError, match="no score to undo"):
-        read(plan, folder).undo(operator="bob")
-    # Everything that ever was is still in the file.
-    assert len((folder / "records.jsonl").read_text().splitlines()) == 6
+        assert now.state(trial.name) == ("void" if choice == "void" else "scored")
+        assert now.revision(trial.name) == number
+    (newest,) = read_records(folder)
+    assert (newest.outcome, newest.cause, newest.attribution) == ("success", None, None)
+    assert len((folder / "records.jsonl").read_text().splitlines()) == 4
 
 
 def test_trials_come_in_order_and_void_is_a_verdict(small):

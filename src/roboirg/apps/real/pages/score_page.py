@@ -70,7 +70,6 @@ def render_trial(trial_log: TrialLog, trial: PlannedTrial, *, nonce: str, messag
         note=metadata.get("note", ""),
         video=(record.video or "") if record else "",
         revision=trial_log.revision(trial.name),
-        undo=trial_log.last_scored or "",
         nonce=nonce,
         message=message,
     )

@@ -47,7 +47,6 @@ class ScoreServer(KeyedPageServer):
         routes = [
             Route("/", self._page),
             Route("/score", self._take_form, methods=["POST"]),
-            Route("/undo", self._take_form, methods=["POST"]),
         ]
         super().__init__(routes, secrets.token_urlsafe(18), port)
 
@@ -78,22 +77,6 @@ class ScoreServer(KeyedPageServer):
             )
         return f"Stored for {trial.name}: {record.cause or 'success'}{warning}"
 
-    def undo(self, form: dict[str, str]) -> tuple[str, str]:
-        """Undo the last score; returns the trial's name and the message for the operator.
-
-        Raises:
-            InvalidValueError: there is no score, or a newer one than the page showed.
-            StoreError: the record cannot be written.
-        """
-        with self._writing:
-            trial_log = self.read_trial_log()
-            if form.get("last") != (trial_log.last_scored or ""):
-                raise InvalidValueError(
-                    "There is a newer score than the page showed; nothing was undone."
-                )
-            name = trial_log.undo(operator=self.operator)
-        return name, f"The score of {name} was undone."
-
     def _find_video(self, name: str) -> tuple[str, str]:
         """Return a video's path, or a warning if it does not exist; the verdict counts anyway."""
         if not name:
@@ -113,22 +96,14 @@ class ScoreServer(KeyedPageServer):
         )
 
     async def _take_form(self, request: Request) -> Response:
-        """Store a verdict or undo one, then redirect: reloading the page must not repeat it."""
+        """Store a verdict, then redirect: reloading the page must not repeat it."""
         body = await read_body(request, MAX_BODY_BYTES)
         form = dict(parse_qsl(body.decode("utf-8", "replace"), keep_blank_values=True))
-        shown = await run_in_threadpool(self._apply, request.url.path, form)
-        return RedirectResponse(f"/?{urlencode(shown)}", 303)
-
-    def _apply(self, path: str, form: dict[str, str]) -> dict[str, str]:
-        """Return what the page shows next."""
         try:
-            if path == "/score":
-                return {"message": self.score(form)}
-            name, message = self.undo(form)
+            shown = {"message": await run_in_threadpool(self.score, form)}
         except RoboIRGError as error:
-            trial = {"trial": form["trial"]} if "trial" in form else {}
-            return {**trial, "message": str(error)}
-        return {"trial": name, "message": message}
+            shown = {"trial": form.get("trial", ""), "message": str(error)}
+        return RedirectResponse(f"/?{urlencode(shown)}", 303)
 
 
 def _select_trial(trial_log: TrialLog, name: str) -> PlannedTrial:
