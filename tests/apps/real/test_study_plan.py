@@ -24,7 +24,6 @@ from roboirg.apps.real.study.counterbalancing import (
 from roboirg.apps.real.study.failure_choices import failure_choices
 from roboirg.apps.real.study.study_csv import demonstrations_csv, trials_csv
 from roboirg.apps.real.study.study_plan import StudyPlan, make_study, read_study, write_study
-from roboirg.apps.real.study.trial_text import spoken_turns
 from roboirg.core.errors import InvalidValueError
 from roboirg.language.settings import plain_settings
 from roboirg.tasks.splits.splits import get_episode
@@ -241,7 +240,7 @@ def test_the_sheet_has_each_trial_and_demonstration_with_what_is_said():
     for number, trial in enumerate(plan.trials, 1):
         _, _, shown = page.partition(f"{number}. {trial.name}<")
         said = shown.partition("☐")[0]
-        assert all(escape(turn) in said for turn in spoken_turns(trial))
+        assert all(escape(turn) in said for turn in trial.turns)
     assert all(f">{one.name}<" in page for one in plan.demonstrations)
 
 

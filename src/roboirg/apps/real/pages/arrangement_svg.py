@@ -7,7 +7,7 @@ from html import escape
 
 from roboirg.apps.real.study.arrangement_shapes import (
     Shape,
-    describe_position,
+    describe_positions,
     scene_shapes,
 )
 from roboirg.core.episode import Scene
@@ -29,8 +29,7 @@ INTRODUCTION = "The table from above, the robot at the bottom."
 def draw_svg(scene: Scene) -> str:
     """Return the picture; its title describes it in words."""
     width, height = 2 * HALF_WIDTH * SCALE, (FARTHEST - NEAREST) * SCALE + ROBOT_ROW
-    shapes = scene_shapes(scene)
-    description = "; ".join(describe_position(shape) for shape in shapes)
+    shapes, description = scene_shapes(scene), "; ".join(describe_positions(scene))
     middle, bottom = width / 2, height - 12
     parts = [
         f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {width:g} {height:g}"',

@@ -7,10 +7,10 @@ from collections import Counter
 from typing import TYPE_CHECKING, NamedTuple
 
 from roboirg.apps.real.pages.arrangement_svg import draw_svg
+from roboirg.apps.real.study.arrangement_shapes import describe_positions
 from roboirg.apps.real.study.failure_choices import failure_choices
 from roboirg.apps.real.study.study_plan import PlannedTrial
 from roboirg.apps.real.study.trial_log import SUCCESS, VOID_CHOICE, TrialLog, trial_metadata
-from roboirg.apps.real.study.trial_text import describe_positions, explicit_command, spoken_turns
 from roboirg.evaluation.records.record import Record
 from roboirg.util.web.page_templates import template_environment
 
@@ -61,9 +61,9 @@ def render_trial(trial_log: TrialLog, trial: PlannedTrial, *, nonce: str, messag
         scored=states["scored"] + states["void"],
         previous=names[index - 1] if index else "",
         following=names[index + 1] if index + 1 < len(names) else "",
-        turns=spoken_turns(trial),
-        meaning=explicit_command(trial),
-        positions=describe_positions(trial),
+        turns=trial.turns,
+        meaning=trial.meaning,
+        positions=describe_positions(trial.episode.scene),
         drawing=draw_svg(trial.episode.scene),
         buttons=verdict_buttons(trial, record, trial_log.state(trial.name)),
         state=trial_log.state(trial.name),

@@ -7,9 +7,9 @@ from collections.abc import Iterable, Iterator
 from html import escape
 
 from roboirg.apps.real.pages.arrangement_svg import draw_svg
+from roboirg.apps.real.study.arrangement_shapes import describe_positions
 from roboirg.apps.real.study.failure_choices import failure_choices
 from roboirg.apps.real.study.study_plan import PlannedDemonstration, PlannedTrial, StudyPlan
-from roboirg.apps.real.study.trial_text import describe_positions, explicit_command, spoken_turns
 
 SHEET_FILE = "sheet.html"
 BOX = "☐"
@@ -59,8 +59,8 @@ def _block(trials: list[PlannedTrial], numbers: Iterator[int]) -> Iterator[str]:
     yield (
         f"{draw_svg(first.episode.scene)}\n"
         "<p>Arrange, measured from the center of the robot's base:</p>\n"
-        f"{_listed(describe_positions(first))}"
-        f"<p>Meaning of all instructions of this block: {escape(explicit_command(first))}</p>\n"
+        f"{_listed(describe_positions(first.episode.scene))}"
+        f"<p>Meaning of all instructions of this block: {escape(first.meaning)}</p>\n"
         "<p>Arrange the table again before each trial. Say the whole instruction as printed, then "
         "start.</p>\n"
     )
@@ -68,7 +68,7 @@ def _block(trials: list[PlannedTrial], numbers: Iterator[int]) -> Iterator[str]:
         boxes = " ".join(f"{BOX}&nbsp;{escape(word)} &nbsp;" for word in _verdicts(trial))
         yield (
             f"<article><h2>{next(numbers)}. {trial.name}</h2>\n"
-            f"{_listed(spoken_turns(trial))}<p>{boxes}</p>\n"
+            f"{_listed(trial.turns)}<p>{boxes}</p>\n"
             "<p>note ______________________________ video ____________</p></article>\n"
         )
 
@@ -84,7 +84,7 @@ def _verdicts(trial: PlannedTrial) -> list[str]:
 def _demonstration(one: PlannedDemonstration) -> str:
     return (
         f"<article><h2>{one.name}</h2>\n{draw_svg(one.episode.scene)}\n"
-        f"{_listed(spoken_turns(one))}{_listed(describe_positions(one))}"
+        f"{_listed(one.turns)}{_listed(describe_positions(one.episode.scene))}"
         f"<p>{BOX}&nbsp;recorded &nbsp; {BOX}&nbsp;discarded</p></article>\n"
     )
 

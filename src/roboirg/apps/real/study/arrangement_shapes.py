@@ -44,10 +44,13 @@ def scene_shapes(scene: Scene) -> tuple[Shape, ...]:
     return tuple(_shape(item) for item in scene.objects)
 
 
-def describe_position(shape: Shape) -> str:
-    """Return a shape's label and position in words, to measure with a tape."""
-    side = "left" if shape.y >= 0 else "right"
-    return f"{shape.label}: {100 * shape.x:.0f} cm forward, {100 * abs(shape.y):.0f} cm {side}"
+def describe_positions(scene: Scene) -> tuple[str, ...]:
+    """Return the name and position of each object in words, to measure with a tape."""
+    return tuple(
+        f"{one.label}: {100 * one.x:.0f} cm forward, {100 * abs(one.y):.0f} cm "
+        f"{'left' if one.y >= 0 else 'right'}"
+        for one in scene_shapes(scene)
+    )
 
 
 def _shape(item: SceneObject) -> Shape:

@@ -6,9 +6,9 @@ import csv
 import io
 from collections.abc import Iterable, Mapping
 
+from roboirg.apps.real.study.arrangement_shapes import describe_positions
 from roboirg.apps.real.study.counterbalancing import read_arrangement
 from roboirg.apps.real.study.study_plan import PlannedDemonstration, PlannedTrial, StudyPlan
-from roboirg.apps.real.study.trial_text import describe_positions, spoken_turns
 
 TRIALS_FILE, DEMONSTRATIONS_FILE = "trials.csv", "demonstrations.csv"
 
@@ -53,8 +53,8 @@ def _common_columns(planned: PlannedTrial | PlannedDemonstration) -> dict[str, o
         "target_side": arrangement.side,
         "left_color": arrangement.left,
         "repeats": arrangement.repeats or "",
-        "places": "; ".join(describe_positions(planned)),
-        "instruction": " ".join(spoken_turns(planned)),
+        "places": "; ".join(describe_positions(planned.episode.scene)),
+        "instruction": " ".join(planned.turns),
     }
 
 

@@ -23,7 +23,9 @@ from roboirg.core.instruction_options import InstructionOptions
 from roboirg.core.policy_ref import unknown_policy
 from roboirg.evaluation.plan.option_parsing import name_and_spec
 from roboirg.evaluation.plan.plan import Plan
+from roboirg.evaluation.play.job_instruction import instruct_job
 from roboirg.evaluation.records.record import Job
+from roboirg.language import instruct
 from roboirg.language.settings import plain_settings, settings_of
 from roboirg.tasks import get_task
 from roboirg.tasks.splits.splits import get_episode
@@ -65,6 +67,16 @@ class PlannedTrial(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fie
         """The arrangement and the goal."""
         return get_episode(self.job.task, self.job.split, self.job.episode)
 
+    @property
+    def turns(self) -> tuple[str, ...]:
+        """The utterances in the order in which they are spoken."""
+        return instruct_job(self.job).turns
+
+    @property
+    def meaning(self) -> str:
+        """The command in explicit words, for the operator who judges the trial."""
+        return instruct(self.episode).command
+
 
 class PlannedDemonstration(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """One demonstration for fine-tuning, in the explicit setting.
@@ -83,6 +95,11 @@ class PlannedDemonstration(msgspec.Struct, frozen=True, kw_only=True, forbid_unk
     def episode(self) -> Episode:
         """The arrangement and the goal."""
         return get_episode(self.task, DEMONSTRATION_SPLIT, self.number)
+
+    @property
+    def turns(self) -> tuple[str, ...]:
+        """The utterances, which are explicit."""
+        return instruct(self.episode).turns
 
 
 class StudyPlan(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
