@@ -359,7 +359,7 @@ def test_a_closed_environment_lets_go_of_its_world():
         ({"episode": 50}, "episodes 0 to 49"),
         *(({"max_steps": wrong}, f"max_steps is {wrong!r}") for wrong in (0, 2.5, "3", None)),
         ({"actions": "pose"}, "no action space 'pose'.*ee_pose"),
-        ({"cameras": (), "depth": True}, "depth=True needs a camera"),
+        ({"cameras": (), "depth": True}, "depth is True, but cameras is"),
         ({"depth": 1}, "depth is 1; it must be True or False"),
         *(
             ({"demonstration_frames": wrong}, f"demonstration_frames is {wrong!r}")

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import re
 import signal
 import subprocess
 import sys
@@ -83,17 +82,13 @@ def test_all_ways_to_print_end_in_the_log_and_not_on_the_terminal(tmp_path: Path
     assert b"after" not in printed
 
 
-def test_a_flood_is_cut_in_the_middle_and_counted(tmp_path: Path) -> None:
+def test_a_flood_is_cut_in_the_middle(tmp_path: Path) -> None:
     assert run(FLOODS, tmp_path / "a.txt").returncode == 0
     text = (tmp_path / "a.txt").read_text()
     assert len(text) <= 10_000
     assert text.startswith("first words\nline 0\n")
     assert text.endswith("line 29999\nlast words\n")
-    (note,) = re.findall(r"\n\[roboirg: ([\d,]+) bytes are left out here; .*10,000\]\n", text)
-    printed = len("first words\nlast words\n") + sum(len(f"line {n}\n") for n in range(30_000))
-    shown = len(re.sub(r"\n\[roboirg: .*\]\n", "", text))
-    # A little may be written while the middle is taken out.
-    assert 0 <= printed - shown - int(note.replace(",", "")) < printed / 2
+    assert text.count("\n[roboirg: the middle of this log is left out]\n") == 1
 
 
 def test_what_a_killed_process_printed_is_there(tmp_path: Path) -> None:
@@ -118,7 +113,7 @@ def test_the_size_is_bounded_while_the_episode_goes_on(tmp_path: Path) -> None:
         os.write(log.descriptor, b"the end")
     text = (tmp_path / "a.txt").read_text()
     assert text.endswith("the end")
-    assert "[roboirg: 999,250 bytes are left out here; a log has at most 1,000]" in text
+    assert "[roboirg: the middle of this log is left out]" in text
 
 
 def test_an_episode_that_prints_nothing_has_no_log(tmp_path: Path) -> None:

@@ -101,11 +101,7 @@ def check_demonstration_frames(value: object) -> DemonstrationFrames:
     Raises:
         InvalidValueError: it is neither ``"all"`` nor ``"none"`` nor a whole number from 1 on.
     """
-    if value == "all":
-        return "all"
-    if value == "none":
-        return "none"
-    if type(value) is int and value >= 1:
+    if value in ("all", "none") or (type(value) is int and value >= 1):
         return value
     raise InvalidValueError(
         f"demonstration_frames is {value!r}; it must be 'all', 'none' or a whole number of at "

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Literal, NamedTuple, get_args
+from typing import Literal, NamedTuple, TypeVar, get_args
 
 from roboirg.core.conditions import Condition, Fact, Rule
 from roboirg.core.motions import Motion, Point
@@ -44,6 +44,7 @@ ROBOT_BASE = (-0.615, 0.0, 0.0)
 """Position of the Panda's base link in the world frame, meters; its rotation is the identity."""
 
 SlotValue = str | int | tuple[str, ...] | tuple[int, ...]
+Value = TypeVar("Value")
 
 
 def values_in(content: SlotValue) -> tuple[str | int, ...]:
@@ -138,31 +139,25 @@ class Goal:
 
     def number(self, slot: str) -> int:
         """Return the value of a slot that holds a count or an ordinal."""
-        value = self[slot]
-        if not isinstance(value, int):
-            raise TypeError(f"slot {slot!r} holds {value!r}, not a number")
-        return value
+        return self._value(slot, int)
 
     def text(self, slot: str) -> str:
         """Return the value of a slot that holds one word."""
-        value = self[slot]
-        if not isinstance(value, str):
-            raise TypeError(f"slot {slot!r} holds {value!r}, not a word")
-        return value
+        return self._value(slot, str)
 
     def texts(self, slot: str) -> tuple[str, ...]:
         """Return the value of a slot that holds several words in order."""
-        value = self[slot]
-        if not isinstance(value, tuple):
-            raise TypeError(f"slot {slot!r} holds {value!r}, not a sequence of words")
-        return tuple(str(word) for word in value)
+        return tuple(map(str, self._value(slot, tuple)))
 
     def numbers(self, slot: str) -> tuple[int, ...]:
         """Return the value of a slot that holds several counts in order."""
+        return tuple(map(int, self._value(slot, tuple)))
+
+    def _value(self, slot: str, kind: type[Value]) -> Value:
         value = self[slot]
-        if not isinstance(value, tuple):
-            raise TypeError(f"slot {slot!r} holds {value!r}, not a sequence of numbers")
-        return tuple(int(number) for number in value)
+        if not isinstance(value, kind):
+            raise TypeError(f"slot {slot!r} holds {value!r}, which is no {kind.__name__}")
+        return value
 
     def as_mapping(self) -> Mapping[str, SlotValue]:
         """Return the slots as a dictionary, for records."""

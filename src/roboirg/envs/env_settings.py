@@ -25,7 +25,7 @@ from roboirg.core.instruction_options import (
 from roboirg.core.observations import CAMERAS
 from roboirg.language.wordings.wording_store import open_wordings
 from roboirg.simulation.observation_builder import ObservationSpec
-from roboirg.simulation.rendering.render_settings import find_render_settings
+from roboirg.simulation.rendering.render_settings import RenderSettings
 from roboirg.tasks.splits.splits import get_episode, split_size
 
 EXPLICIT_WORDS = InstructionOptions()
@@ -108,7 +108,7 @@ class EnvSettings:
             check_demonstration_frames(self.environment.demonstration_frames),
             self.environment.observe_every,
             self.history_cameras,
-            find_render_settings(self.environment.meshes),
+            RenderSettings(meshes=self.environment.meshes),
         ).validated()
 
     def with_reset_options(self, options: Mapping[str, Any]) -> EnvSettings:

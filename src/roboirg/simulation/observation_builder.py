@@ -9,13 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from roboirg.core.actions import JOINT_LOW, POSE_SIZE
-from roboirg.core.environment_options import (
-    DemonstrationFrames,
-    check_demonstration_frames,
-    check_observe_every,
-)
+from roboirg.core.environment_options import DemonstrationFrames
 from roboirg.core.errors import InvalidValueError
-from roboirg.core.observations import check_cameras
+from roboirg.core.policy_needs import PolicyNeeds
 from roboirg.simulation.proprioception import Proprioception
 from roboirg.simulation.rendering.render_settings import FAITHFUL, RenderSettings
 from roboirg.simulation.rendering.viewpoint import SIZE
@@ -51,23 +47,15 @@ class ObservationSpec(NamedTuple):
 
     def validated(self) -> ObservationSpec:
         """Return this spec, with the cameras as a tuple, if it is valid."""
-        check_demonstration_frames(self.demonstration_frames)
-        check_observe_every(self.observe_every)
-        cameras = check_cameras(self.cameras)
-        for camera in check_cameras(self.for_history.cameras):
-            if camera not in cameras:
+        fields = self._asdict()
+        del fields["rendering"]
+        needs = PolicyNeeds(**fields)  # which checks them
+        for camera in needs.history_cameras or ():
+            if camera not in needs.cameras:
                 raise InvalidValueError(
-                    f"history_cameras has {camera!r}, but cameras is {cameras}; add it there."
+                    f"history_cameras has {camera!r}, but cameras is {needs.cameras}; add it there."
                 )
-        for name, wanted in (("depth", self.depth), ("calibration", self.calibration)):
-            if not isinstance(wanted, bool):
-                raise InvalidValueError(f"{name} is {wanted!r}; it must be True or False.")
-            if wanted and not cameras:
-                raise InvalidValueError(
-                    f"{name}=True needs a camera, but cameras is (); "
-                    "add one, for example cameras=('front',)."
-                )
-        return self._replace(cameras=cameras)
+        return self._replace(cameras=needs.cameras)
 
 
 class ObservationBuilder:

@@ -19,8 +19,8 @@ from roboirg.core.errors import InvalidValueError
 from roboirg.core.plain_text import counted
 from roboirg.evaluation.plan.stored_plans import read_plans
 from roboirg.evaluation.records.record import Summary
-from roboirg.evaluation.records.record_codec import identity_key
-from roboirg.evaluation.records.store import StoredRun, read_summaries
+from roboirg.evaluation.records.record_codec import identity_key, read_summary
+from roboirg.evaluation.records.store import StoredRun
 from roboirg.tasks.splits.private_splits import check_salt
 from roboirg.util.parallel_map import parallel_map
 
@@ -80,7 +80,7 @@ def verify_run(
     """
     if not 0.0 <= sample <= 1.0:
         raise InvalidValueError(f"sample is {sample}; it must be between 0 % and 100 %.")
-    run = read_summaries(folder)
+    run = StoredRun(folder, read_summary)
     for split in sorted({one.split for one in run.newest}):
         check_salt(split)
     checks: list[RecordCheck] = []

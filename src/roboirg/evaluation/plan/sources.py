@@ -13,8 +13,8 @@ from roboirg.core.errors import InvalidValueError, UnknownNameError
 from roboirg.evaluation.plan.stored_plans import read_plan
 from roboirg.evaluation.records.packs import PACK_SUFFIX, opened_run
 from roboirg.evaluation.records.record import Job, Record, Summary
-from roboirg.evaluation.records.record_codec import StoreError
-from roboirg.evaluation.records.store import StoredRun, iterate_records, read_summaries
+from roboirg.evaluation.records.record_codec import StoreError, read_summary
+from roboirg.evaluation.records.store import StoredRun, iterate_records
 from roboirg.util.freed_memory import paused_collection
 
 AnyJob = TypeVar("AnyJob", bound=Job)
@@ -54,7 +54,7 @@ class Source:
         """
         try:
             with paused_collection():
-                return read_summaries(self.folder)
+                return StoredRun(self.folder, read_summary)
         except StoreError as error:  # of a pack, the temporary folder means nothing
             raise StoreError(str(error).replace(str(self.folder), str(self.path))) from error
 

@@ -27,8 +27,7 @@ MAX_LOG_BYTES = 262_144
 _HEAD_SHARE, _TAIL_SHARE = 0.5, 0.25
 _PERIOD_S = 0.25
 """How often the size is checked while a log is written."""
-_TRIES = 10
-"""How often the end is read again because something was printed meanwhile, which would be lost."""
+_NOTE = b"\n[roboirg: the middle of this log is left out]\n"
 _STREAMS = (1, 2)
 """Descriptors of stdout and stderr."""
 
@@ -67,7 +66,6 @@ class EpisodeLog:
 
     def __init__(self, path: Path, limit: int = MAX_LOG_BYTES) -> None:
         self.path, self._limit = path, limit
-        self._left_out = self._note_size = 0
         self._finished = threading.Event()
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
@@ -78,23 +76,13 @@ class EpisodeLog:
         self._thread = threading.Thread(target=self._watch, name="episode log", daemon=True)
 
     def trim(self) -> None:
-        """Replace the middle of a log that is too long by a line that says how much it was."""
+        """Replace the middle of a log that is too long by a line about it."""
         head, length = int(self._limit * _HEAD_SHARE), int(self._limit * _TAIL_SHARE)
-        for _ in range(_TRIES):
-            size = os.fstat(self.descriptor).st_size
-            if size <= self._limit:
-                return
+        size = os.fstat(self.descriptor).st_size
+        if size > self._limit:
             tail = os.pread(self.descriptor, length, size - length)
-            if os.fstat(self.descriptor).st_size == size:
-                break
-        self._left_out += size - head - len(tail) - self._note_size
-        note = (
-            f"\n[roboirg: {self._left_out:,} bytes are left out here; a log has at most "
-            f"{self._limit:,}]\n"
-        ).encode()
-        os.ftruncate(self.descriptor, head)
-        os.write(self.descriptor, note + tail)
-        self._note_size = len(note)
+            os.ftruncate(self.descriptor, head)
+            os.write(self.descriptor, _NOTE + tail)
 
     def __enter__(self) -> Self:
         self._thread.start()

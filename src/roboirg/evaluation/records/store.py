@@ -135,16 +135,7 @@ def read_results(folder: Path) -> tuple[Summary, ...]:
     Raises:
         StoreError: there are none, or a line is not a record of this schema version.
     """
-    return read_summaries(folder).newest
-
-
-def read_summaries(folder: Path) -> StoredRun[Summary]:
-    """Read the summaries of a run's folder; its records are read again one by one.
-
-    Raises:
-        StoreError: there are none, or a line is not a record of this schema version.
-    """
-    return StoredRun(folder, read_summary)
+    return StoredRun(folder, read_summary).newest
 
 
 def iterate_records(folder: Path) -> Iterator[Record]:

@@ -2,13 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Literal
-
-from roboirg.core.errors import UnknownNameError
-
-Meshes = Literal["stock", "faithful", "light"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,21 +22,10 @@ class RenderSettings:
 
     culling: bool = True
     slim_shader: bool = True
-    meshes: Meshes = "faithful"
+    meshes: str = "faithful"
     quick_start: bool = True
 
 
 FAITHFUL = RenderSettings()
 LIGHT = RenderSettings(meshes="light")
 STOCK = RenderSettings(culling=False, slim_shader=False, meshes="stock", quick_start=False)
-
-SELECTABLE: Mapping[str, RenderSettings] = {"faithful": FAITHFUL, "light": LIGHT}
-"""Settings that users can select, by meshes."""
-
-
-def find_render_settings(meshes: str) -> RenderSettings:
-    """Return the settings with the given meshes."""
-    try:
-        return SELECTABLE[meshes]
-    except KeyError:
-        raise UnknownNameError("kind of meshes", meshes, SELECTABLE) from None

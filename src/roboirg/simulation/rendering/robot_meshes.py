@@ -8,9 +8,7 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Sequence
-from dataclasses import astuple, dataclass
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 import sapien
@@ -38,50 +36,16 @@ MIN_TRIANGLES = 500
 """Parts with fewer triangles are not simplified."""
 
 
-class _PoseKey(NamedTuple):
-    """A hashable pose in the world frame."""
-
-    position: tuple[float, ...]
-    quaternion: tuple[float, ...]
+Numbers = tuple[float, ...]
+"""Of a pose: position, quaternion. Of a material: emission, base color, specular, roughness,
+metallic, transmission, index of refraction, roughness of transmission. Both can be hashed."""
 
 
-@dataclass(frozen=True)
-class _MaterialKey:
-    """A hashable material without textures."""
-
-    emission: tuple[float, ...]
-    base_color: tuple[float, ...]
-    specular: float
-    roughness: float
-    metallic: float
-    transmission: float
-    ior: float
-    transmission_roughness: float
-
-    @classmethod
-    def from_sapien(cls, material: sapien.render.RenderMaterial) -> _MaterialKey:
-        return cls(
-            tuple(material.emission),
-            tuple(material.base_color),
-            material.specular,
-            material.roughness,
-            material.metallic,
-            material.transmission,
-            material.ior,
-            material.transmission_roughness,
-        )
-
-    def packed(self) -> NDArray[np.float32]:
-        return np.array(np.hstack([*astuple(self)]), np.float32)
-
-    @classmethod
-    def unpacked(cls, numbers: NDArray[np.float32]) -> _MaterialKey:
-        values = [float(number) for number in numbers]
-        return cls(tuple(values[:4]), tuple(values[4:8]), *values[8:])
-
-    def material(self) -> sapien.render.RenderMaterial:
-        emission, base_color, *rest = astuple(self)
-        return sapien.render.RenderMaterial(list(emission), list(base_color), *rest)
+def _numbers_of(material: sapien.render.RenderMaterial) -> Numbers:
+    """Return a material without textures as numbers."""
+    rest = (material.specular, material.roughness, material.metallic, material.transmission)
+    last = (material.ior, material.transmission_roughness)
+    return (*map(float, material.emission), *map(float, material.base_color), *rest, *last)
 
 
 def link_shapes(
@@ -99,10 +63,10 @@ def link_shapes(
         fixed_at: fixed pose of the mesh in the world frame; keeps only what reaches a
             pixel of the front camera there.
     """
-    material_key = None if material is None else _MaterialKey.from_sapien(material)
+    material_key = None if material is None else _numbers_of(material)
     pose_key = None
     if fixed_at is not None:
-        pose_key = _PoseKey(*(tuple(map(float, numbers)) for numbers in (fixed_at.p, fixed_at.q)))
+        pose_key = (*map(float, fixed_at.p), *map(float, fixed_at.q))
     return [shape.clone() for shape in _shapes(path, material_key, rendering, pose_key)]
 
 
@@ -121,9 +85,9 @@ def apply_shading(body: sapien.render.RenderBodyComponent, rendering: RenderSett
 @functools.cache
 def _shapes(
     path: Path,
-    default_material: _MaterialKey | None,
+    default_material: Numbers | None,
     rendering: RenderSettings,
-    fixed_at: _PoseKey | None,
+    fixed_at: Numbers | None,
 ) -> Sequence[sapien.render.RenderShapeTriangleMesh]:
     arrays = _mesh_arrays(path, rendering)
     drawn = arrays if fixed_at is None else _front_mesh_arrays(path, rendering, fixed_at)
@@ -131,20 +95,15 @@ def _shapes(
     for number, part in enumerate(_parts(drawn)):
         if not len(part.triangles):
             continue
-        numbers = arrays[f"material{number}"]
+        own = arrays[f"material{number}"].tolist() or default_material
         vertices, normals, triangles = part if rendering.slim_shader else duplicate_vertices(part)
-        own = (
-            _MaterialKey.unpacked(np.asarray(numbers, np.float32))
-            if len(numbers)
-            else default_material
-        )
         shapes.append(
             sapien.render.RenderShapeTriangleMesh(
                 vertices=vertices,
                 triangles=triangles,
                 normals=normals,
                 uvs=np.zeros((len(vertices), 2), np.float32),
-                material=None if own is None else own.material(),
+                material=own and sapien.render.RenderMaterial(own[:4], own[4:8], *own[8:]),
             )
         )
     return shapes
@@ -173,7 +132,7 @@ def _mesh_arrays(path: Path, rendering: RenderSettings) -> Arrays:
             lighter = light and len(flat.corners) > MIN_TRIANGLES
             drawn = Triangles(*simplify(flat.corners, share=share)) if lighter else flat
             arrays |= _numbered(index_triangles(drawn), part)
-            arrays[f"material{part}"] = np.zeros(0) if material is None else material.packed()
+            arrays[f"material{part}"] = np.array(material, np.float32)
         points = np.concatenate([part.vertices for part in _parts(arrays)])
         # Importing SciPy takes a quarter of a second, and cached arrays do not need it.
         from scipy.spatial import ConvexHull
@@ -184,14 +143,14 @@ def _mesh_arrays(path: Path, rendering: RenderSettings) -> Arrays:
     return cached_arrays(_cache_name(path, rendering), _source_bytes(), derive)
 
 
-def _front_mesh_arrays(path: Path, rendering: RenderSettings, fixed_at: _PoseKey) -> Arrays:
+def _front_mesh_arrays(path: Path, rendering: RenderSettings, fixed_at: Numbers) -> Arrays:
     """Return the fields of `IndexedTriangles` of each part that reach a pixel of the front camera.
 
     The mesh is opaque and never moves.
     """
 
     def derive() -> Arrays:
-        to_camera = to_front_camera(sapien.Pose(fixed_at.position, fixed_at.quaternion))
+        to_camera = to_front_camera(sapien.Pose(fixed_at[:3], fixed_at[3:]))
         parts = [part.to_triangles() for part in _parts(_mesh_arrays(path, rendering))]
         corners = np.concatenate([part.corners for part in parts])
         shown = reach_pixels(corners @ to_camera[:3, :3].T + to_camera[:3, 3])
@@ -224,16 +183,16 @@ def _numbered(part: IndexedTriangles, number: int) -> Arrays:
     return {f"{field}{number}": array for field, array in part._asdict().items()}
 
 
-def _read_installed_mesh(path: Path) -> list[tuple[Triangles, _MaterialKey | None]]:
-    """Return the visible parts of an installed mesh with their materials."""
+def _read_installed_mesh(path: Path) -> list[tuple[Triangles, Numbers]]:
+    """Return the visible parts of an installed mesh with their materials; of STL without."""
     if path.suffix == ".stl":
-        return [(Triangles(*camera_mesh.visible_triangles(path)), None)]
+        return [(Triangles(*camera_mesh.visible_triangles(path)), ())]
     return [
         (
             Triangles(
                 part.vertices[part.triangles], part.get_vertex_normal()[part.triangles[:, 0]]
             ),
-            _MaterialKey.from_sapien(part.material),
+            _numbers_of(part.material),
         )
         for part in sapien.render.RenderShapeTriangleMesh(str(path)).parts
     ]
