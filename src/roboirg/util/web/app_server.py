@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import asyncio
-import contextlib
 import logging
 import threading
 from collections.abc import Callable, Mapping
@@ -23,8 +21,6 @@ _LAST = {"Connection": "close"}
 """Header of a response after which nothing more is read, such as the rest of a body."""
 _STOP_S = 1
 """Seconds that requests have to end when the server stops."""
-_SMALL_BODY, _DISCARD_S = 65536, 1.0
-"""Bytes of a refused request that are read, and seconds in which they must have arrived."""
 
 
 class AppServer:
@@ -126,46 +122,21 @@ class RequestGuard:
         refusal = self._refuse(request)
         if refusal is not None:
             refusal.headers.update(_LAST)
-            await _discard_small_body(request)
         await (refusal or self._app)(scope, receive, send_with_headers)
 
 
-async def _discard_small_body(request: Request) -> None:
-    """Read a small body, as closing a connection with unread bytes also discards the response.
-
-    A client that waits to be asked for its body sends none.
-    """
-    if "expect" in request.headers:
-        return
-    with contextlib.suppress(HTTPException):
-        await read_body(request, _SMALL_BODY, _DISCARD_S)
-
-
-async def read_body(request: Request, limit: int, timeout_s: float = TIMEOUT_S) -> bytes:
-    """Return the body of a request.
-
-    Args:
-        request: that has one.
-        limit: largest size, bytes.
-        timeout_s: seconds until it must have arrived.
+async def read_body(request: Request, limit: int) -> bytes:
+    """Return the body of a request of at most `limit` bytes.
 
     Raises:
-        HTTPException: it is too large, late or cut short.
+        HTTPException: it is too large or cut short.
     """
     if int(request.headers.get("content-length", 0)) > limit:
         raise HTTPException(413, "Too large.", _LAST)
-    body = bytearray()
     try:
-        async with asyncio.timeout(timeout_s):
-            async for piece in request.stream():
-                body += piece
-                if len(body) > limit:
-                    raise HTTPException(413, "Too large.", _LAST)
-    except TimeoutError as error:
-        raise HTTPException(408, f"The request took longer than {timeout_s:g} s.", _LAST) from error
+        return await request.body()
     except ClientDisconnect as error:
         raise HTTPException(400, "The request is cut short.") from error
-    return bytes(body)
 
 
 def error_handler(status: int) -> Callable[[Request, Exception], Response]:

@@ -15,7 +15,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from roboirg.core.errors import PolicyReplyError, RoboIRGError
+from roboirg.core.errors import InvalidValueError, PolicyReplyError, RoboIRGError
 from roboirg.core.observations import Demonstration, Observation, proprioception
 from roboirg.core.version import __version__
 from roboirg.policies.remote.endpoints import ActionSpaceName, RemoteOptions
@@ -79,6 +79,7 @@ class VlaEvalPolicy(RemotePolicy):
 
     def begin_episode(self, demonstration: Demonstration) -> None:
         """Begin an episode; the demonstration goes with the first observation."""
+        self._check_params()
         self._subgoal = None
         shows = self.options.video and self._wants("send_video_history")
         self._demonstration = demonstration if shows else None
@@ -148,6 +149,15 @@ class VlaEvalPolicy(RemotePolicy):
         """Return whether the server wants to be shown something; by default it does."""
         params = self.metadata.get("observation_params")
         return not isinstance(params, Mapping) or bool(params.get(name, True))
+
+    def _check_params(self) -> None:
+        params = self.metadata.get("observation_params")
+        wanted = params.get("action_space") if isinstance(params, Mapping) else None
+        if wanted not in (None, self.actions):
+            raise InvalidValueError(
+                f"The server acts in the action space {str(wanted)[:80]!r}, but the policy's URL "
+                f"says actions={self.actions}."
+            )
 
 
 PROTOCOL = Protocol(
