@@ -6,11 +6,10 @@
 import functools
 
 import pytest
-from language_variants import SPATIAL_TASKS, TASKS, random_episodes
+from language_variants import SPATIAL_TASKS, TASKS, random_episodes, validated
 from selection import slow_but
 
 from roboirg.apps.language_lab.validation.validation_results import ValidationResults
-from roboirg.apps.language_lab.validation.validation_run import Batch, validate_batch
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.language import instruct
 from roboirg.language.generator import find_refusal
@@ -26,7 +25,7 @@ RANDOM_SCENES = 8
 @functools.cache
 def results(task: str, split: str, episodes: int) -> ValidationResults:
     """Results for the first episodes of a split of a task, or for random scenes."""
-    return validate_batch(Batch(task, split, 0, episodes))
+    return validated(task, split, episodes)
 
 
 ALL = (("random", RANDOM_SCENES), ("test", SIZES["test"]))

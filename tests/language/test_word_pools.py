@@ -9,7 +9,7 @@ import pytest
 from language_variants import TASKS, split_episodes
 from page_text import call, words
 
-from roboirg.apps.language_lab.validation.validation_run import Batch, validate_batch
+from roboirg.apps.language_lab.validation.episode_checks import check_place
 from roboirg.core.episode import SPLITS
 from roboirg.core.word_pools import POOLS, Pools, pool_of
 from roboirg.language import instruct, plain_settings
@@ -117,7 +117,7 @@ def test_no_text_of_the_test_split_is_in_training(setting):
 @pytest.mark.parametrize("task", TASKS)
 def test_every_split_is_valid_in_the_words_of_the_other_pool(task):
     for split, pool in (("train", "test"), ("test", "train")):
-        found = validate_batch(Batch(task, split, 2, 1, wordings_file=pool))
+        found = check_place((task, split, 2), pool)
         assert not found.failures
         assert found.texts[task, "direct"] == 2
 

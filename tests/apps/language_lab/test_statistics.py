@@ -5,7 +5,7 @@ from statistics import fmean
 
 import pytest
 
-from roboirg.apps.language_lab import corpus_statistics, expressions
+from roboirg.apps.language_lab import corpus_statistics
 from roboirg.core.errors import MissingDependencyError
 from roboirg.evaluation.analysis.figures import figure_style
 from roboirg.language import plain_settings
@@ -24,19 +24,16 @@ def said():
 
 
 def test_expressions_are_counted_once_per_scene():
-    counts = expressions.expression_counts(said())
-    assert expressions.expression_counts(said() * 2) == counts
-    scenes = expressions.scene_counts(said() * 2)
-    assert scenes["direct"] == 50 * len(TASKS)
-    assert scenes["spatial"] == 50 * 3
+    counts = corpus_statistics.expression_counts(said())
+    assert corpus_statistics.expression_counts(said() * 2) == counts
     assert "explicit" not in counts
     for setting, by_class in counts.items():
-        assert max(by_class.values()) <= scenes[setting]
+        assert max(by_class.values()) <= 50 * (3 if setting == "spatial" else len(TASKS))
     ranks = {"former", "latter", "first", "second", "third"}
     assert set(counts["direct"]) == {"it", "one", "them", "that", "then", *ranks}
     assert {"pair", "that", "each", "other"} == set(counts["reasoning"])
     assert {"there", *ranks} == set(counts["spatial"])
-    order = expressions.expression_order(counts)
+    order = corpus_statistics.expression_order(counts)
     assert set(order) == {name for by_class in counts.values() for name in by_class}
     assert order.index("it") < order.index("former") < order.index("there")
 
@@ -61,15 +58,6 @@ def test_lengths_patterns_relations_and_landmarks():
         "2",
         "3",
     }
-
-
-def test_the_figure_has_a_panel_for_each_setting_with_expressions(tmp_path):
-    Text = pytest.importorskip("matplotlib.text").Text  # noqa: N806
-    drawn = {one.get_text() for one in expressions._draw(said(), "A title").findobj(Text)}
-    for setting, by_class in expressions.expression_counts(said()).items():
-        scenes = expressions.scene_counts(said())[setting]
-        assert {setting, f"of {scenes} scenes", *map(str, by_class.values())} <= drawn
-    assert expressions.write_figure((), tmp_path, "none", "Nothing") == ()
 
 
 def test_without_matplotlib_one_sentence_says_what_to_install(monkeypatch):

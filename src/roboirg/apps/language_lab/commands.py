@@ -77,35 +77,20 @@ def export_instructions(
 def stats(
     split: AnySplit = "test",
     tasks: Tasks = "all",
-    out: Annotated[
-        Path | None,
-        typer.Option(help="Folder for a figure of the referring expressions, as PNG and SVG."),
-    ] = None,
 ) -> None:
     """Count words, referring expressions, patterns, relations and landmarks.
 
     Example: roboirg language stats --split val
     """
-    from roboirg.apps.language_lab.expressions import write_figure
     from roboirg.apps.language_lab.statistics_tables import overview_tables
-    from roboirg.evaluation.analysis.figures.figure_style import check_figure_support
     from roboirg.evaluation.plan.option_parsing import parse_splits
     from roboirg.language import plain_settings
     from roboirg.language.variants import instructions
     from roboirg.tasks.splits.splits import split_episodes
 
-    if out is not None:
-        check_figure_support()
-    names, wanted = known_tasks(tasks), parse_splits(split)
-    episodes = split_episodes(names, wanted)
+    episodes = split_episodes(known_tasks(tasks), parse_splits(split))
     said = [one for _, one in instructions(episodes, plain_settings(), ("implicit",))]
     _print(*overview_tables(said))
-    if out is not None:
-        label = "all splits" if len(wanted) > 1 else f"{wanted[0]} split"
-        title = f"Referring expressions by setting, {label} (each counted once per scene)"
-        name = f"expressions-{wanted[0] if len(wanted) == 1 else 'all'}"
-        for path in write_figure(said, out, name, title):
-            typer.echo(path)
 
 
 @language_app.command("validate")

@@ -5,9 +5,12 @@ from __future__ import annotations
 import re
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping
+from typing import get_args
 
-from roboirg.apps.language_lab.expressions import ClassCounts
-from roboirg.language.instruction import Instruction
+from roboirg.language.instruction import Expression, Instruction
+
+ClassCounts = Mapping[str, Mapping[str, int]]
+"""Counts by group (setting or task), then by class."""
 
 
 def by_setting(
@@ -18,6 +21,29 @@ def by_setting(
     for instruction in instructions:
         found.setdefault(instruction.setting, []).append(size_of(instruction.text))
     return found
+
+
+def expression_counts(instructions: Iterable[Instruction]) -> ClassCounts:
+    """Count the scenes with each expression class, by setting.
+
+    A scene counts once for a setting, even if it has several instructions there.
+    """
+    scenes = {
+        (instruction.setting, instruction.episode, mention.expression)
+        for instruction in instructions
+        for mention in instruction.mentions
+        if mention.expression is not None
+    }
+    counts: dict[str, Counter[str]] = {}
+    for setting, _, expression in sorted(scenes):
+        counts.setdefault(setting, Counter())[expression] += 1
+    return counts
+
+
+def expression_order(counts: ClassCounts) -> tuple[str, ...]:
+    """Return the classes that occur, in the order of their definition."""
+    found = {name for one in counts.values() for name in one}
+    return tuple(name for name in get_args(Expression) if name in found)
 
 
 PAPER_PHRASES: Mapping[str, tuple[tuple[str, str], ...]] = {

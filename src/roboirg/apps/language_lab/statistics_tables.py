@@ -8,11 +8,7 @@ from statistics import fmean, median
 from rich.table import Table
 
 from roboirg.apps.language_lab import corpus_statistics
-from roboirg.apps.language_lab.expressions import (
-    ClassCounts,
-    expression_counts,
-    expression_order,
-)
+from roboirg.apps.language_lab.corpus_statistics import ClassCounts
 from roboirg.language.instruction import Instruction
 from roboirg.language.settings import setting_names
 from roboirg.language.templates.derivations import COUNTED_STEPS, RELATIONS, STEPS
@@ -24,7 +20,7 @@ def overview_tables(instructions: Sequence[Instruction]) -> Iterator[Table]:
     """Yield tables of lengths, expressions, patterns, relations and landmark classes."""
     yield _lengths(instructions)
     yield _tokens(instructions)
-    yield expression_table(expression_counts(instructions))
+    yield expression_table(corpus_statistics.expression_counts(instructions))
     yield from phrase_tables(corpus_statistics.phrase_counts(instructions))
     by_task = (
         ("Reasoning patterns (scenes)", "pattern", None),
@@ -42,7 +38,7 @@ _RELATIONS = [*(one.name for one in (*RELATIONS, *COUNTED_STEPS, *STEPS)), "neig
 
 def expression_table(counts: ClassCounts) -> Table:
     """Return the number of scenes with each class of referring expression, by setting."""
-    classes = expression_order(counts)
+    classes = corpus_statistics.expression_order(counts)
     title = "Referring expressions (each once per scene)"
     return _count_table(title, "setting", counts, setting_names(), classes)
 
