@@ -10,10 +10,10 @@ from rich.console import Console
 
 from roboirg.evaluation.analysis.results.frame import Frame, make_frame
 from roboirg.evaluation.analysis.stats.rates import points
+from roboirg.evaluation.analysis.tables.rendering.terminal import print_tables
 from roboirg.evaluation.analysis.tables.run_tables import (
     make_run_tables,
     print_failures,
-    print_run_tables,
 )
 from roboirg.evaluation.records.record import Job, Summary
 
@@ -35,7 +35,7 @@ def frame_of(*results: Sequence[Summary], planned: Sequence[Job] = ()) -> Frame:
 
 def printed(frame: Frame, width: int = 100) -> str:
     console = Console(file=io.StringIO(), width=width)
-    print_run_tables(make_run_tables(frame), console)
+    print_tables(make_run_tables(frame), console)
     print_failures(frame, console)
     return console.file.getvalue()  # type: ignore[attr-defined,no-any-return]
 

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from roboirg.cli.names import known_names
-from roboirg.core.errors import InvalidValueError, UnknownNameError
+from roboirg.cli.names import known_name, known_names
+from roboirg.core.errors import InvalidValueError
 
 if TYPE_CHECKING:
     from roboirg.evaluation.analysis.stats.breakdowns import Breakdown
@@ -170,10 +170,13 @@ def tables(
 
     Example: roboirg tables runs/first --which main --published
     """
+    from rich.console import Console
+
     from roboirg.cli.run_commands import warn_of_mixtures
     from roboirg.evaluation.analysis.results.reading import read_frame
     from roboirg.evaluation.analysis.stats.run_data import RunData
     from roboirg.evaluation.analysis.tables.rendering import get_format
+    from roboirg.evaluation.analysis.tables.rendering.terminal import print_tables
     from roboirg.evaluation.analysis.tables.table_notes import with_mixtures
     from roboirg.evaluation.plan.sources import opened_sources
     from roboirg.util.atomic_write import write_atomically
@@ -193,7 +196,7 @@ def tables(
             write_atomically(path, output.draw(table))
             typer.echo(path)
     elif format == "terminal":
-        _print(found)
+        print_tables(found, Console())
     else:
         typer.echo("\n".join(output.draw(table) for table in found), nl=False)
 
@@ -254,8 +257,7 @@ def _check_choice(
     from roboirg.evaluation.analysis.tables.paper_tables import WHICH
 
     alone = (*DIAGNOSTIC_TABLES, *RECORD_TABLES)
-    if which not in (*WHICH, *alone, _ALL):
-        raise UnknownNameError("table", which, (*WHICH, *alone, _ALL))
+    known_name("table", which, (*WHICH, *alone, _ALL))
     asked = [which] * (which != _ALL) + ["--by"] * (by is not None)
     if {*alone, "--by"} & {*asked} and (published or floors or len(asked) > 1):
         raise InvalidValueError(
@@ -326,13 +328,3 @@ def _breakdowns(by: str | None) -> tuple[Breakdown, ...]:
 
     names = () if by is None else known_names("breakdown", by, tuple(BREAKDOWNS))
     return tuple(BREAKDOWNS[name] for name in names)
-
-
-def _print(found: list[Table]) -> None:
-    from rich.console import Console
-
-    from roboirg.evaluation.analysis.tables.rendering.terminal import renderable
-
-    console = Console()
-    for table in found:
-        console.print(renderable(table, console), highlight=False)

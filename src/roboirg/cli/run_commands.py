@@ -143,14 +143,11 @@ def print_tables_of(source: Source) -> None:
     from rich.console import Console
 
     from roboirg.evaluation.analysis.results.reading import read_frame
-    from roboirg.evaluation.analysis.tables.run_tables import (
-        make_run_tables,
-        print_failures,
-        print_run_tables,
-    )
+    from roboirg.evaluation.analysis.tables.rendering.terminal import print_tables
+    from roboirg.evaluation.analysis.tables.run_tables import make_run_tables, print_failures
 
     frame, console = read_frame([source]), Console()
-    print_run_tables(make_run_tables(frame), console)
+    print_tables(make_run_tables(frame), console)
     warn_of_mixtures(frame)
     print_failures(frame, console)
 

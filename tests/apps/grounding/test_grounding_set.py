@@ -27,7 +27,7 @@ from roboirg.evaluation.grounding_items.item_builder import (
     wanted_options,
 )
 from roboirg.evaluation.grounding_items.media_store import EpisodeMedia, nearest_to_center
-from roboirg.evaluation.grounding_items.question_set import EpisodeName, ExportRequest
+from roboirg.evaluation.grounding_items.question_set import ExportRequest
 from roboirg.evaluation.grounding_items.referents import find_referents, pointed_kinds
 from roboirg.language import FORMS, plain_settings
 from roboirg.language.settings import all_settings
@@ -241,7 +241,7 @@ def test_the_question_is_the_listener_s_and_the_others_share_its_beginning():
 def exported(tmp_path_factory):
     folder = tmp_path_factory.mktemp("grounding") / "set"
     request = ExportRequest(
-        tuple(EpisodeName(task, "test", index) for task, index in SEEN),
+        tuple((task, "test", index) for task, index in SEEN),
         plain_settings(),
         ("implicit",),
         frames=4,
@@ -318,6 +318,6 @@ def test_a_set_of_no_episode_is_refused(tmp_path):
 
 def test_a_folder_of_something_else_is_not_touched(tmp_path):
     (tmp_path / "thesis.tex").write_text("mine")
-    request = ExportRequest((EpisodeName("StopCube", "test", 0),), ("explicit",), ("implicit",))
+    request = ExportRequest((("StopCube", "test", 0),), ("explicit",), ("implicit",))
     with pytest.raises(InvalidValueError, match="not an empty folder"):
         export_grounding(request, tmp_path, 0)

@@ -51,7 +51,6 @@ def export_grounding(
     from roboirg.cli.names import known_settings, known_tasks
     from roboirg.cli.progress_bar import progress_bar
     from roboirg.evaluation.grounding_items.question_set import (
-        EpisodeName,
         ExportRequest,
     )
     from roboirg.evaluation.plan.option_parsing import parse_episodes, parse_splits
@@ -65,7 +64,7 @@ def export_grounding(
     check_options(options)
     request = ExportRequest(
         episodes=tuple(
-            EpisodeName(task, one, index)
+            (task, one, index)
             for task in known_tasks(words.given("tasks", tasks), options.wordings)
             for one in parse_splits(words.given("split", split))
             for index in parse_episodes(words.fields.get("episodes", "all"), one, [task])
@@ -118,7 +117,7 @@ def score_grounding(
     from roboirg.apps.grounding.score_report import report_text
     from roboirg.apps.grounding.score_tables import score_table
     from roboirg.cli.names import known_names
-    from roboirg.evaluation.analysis.tables.rendering.terminal import renderable
+    from roboirg.evaluation.analysis.tables.rendering.terminal import print_tables
     from roboirg.evaluation.grounding_items.answer_file import read_answers, write_answers
     from roboirg.evaluation.grounding_items.grounding_item import read_items
     from roboirg.util.atomic_write import write_atomically
@@ -139,7 +138,7 @@ def score_grounding(
             write_answers(write_floors / f"{name}.jsonl", found)
         scores += score_answers(items, found, name)
     console = Console()
-    console.print(renderable(score_table(scores), console))
+    print_tables([score_table(scores)], console)
     for sentence in compared:
         console.print(sentence, highlight=False, markup=False)
     if report is not None:

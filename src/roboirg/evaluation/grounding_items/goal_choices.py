@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Sequence
-from typing import NamedTuple
 
 import numpy as np
 
@@ -20,19 +19,9 @@ _BLOCK = 12
 divided by every number of choices."""
 
 
-class GoalChoices(NamedTuple):
-    """The choices of an item.
-
-    Attributes:
-        goals: two to four goals of the scene, or one if it has no other.
-        right: index of the goal that is meant.
-    """
-
-    goals: tuple[Goal, ...]
-    right: int
-
-
-def draw_choices(episode: Episode, instruction: Instruction, identity: str) -> GoalChoices:
+def draw_choices(
+    episode: Episode, instruction: Instruction, identity: str
+) -> tuple[tuple[Goal, ...], int]:
     """Return the choices, in an order that does not depend on the goal.
 
     The others are goals that fit the command alone: who ignores its context can only guess. Where
@@ -42,6 +31,10 @@ def draw_choices(episode: Episode, instruction: Instruction, identity: str) -> G
         episode: the episode.
         instruction: what is said.
         identity: of the item; equal identities have equal choices.
+
+    Returns:
+        Two to four goals of the scene, or one if it has no other; and the index of that which is
+        meant.
     """
     wrong = _wrong_goals(episode, instruction)
     drawn = _generator("goals", identity).permutation(len(wrong))[: MOST - 1]
@@ -49,7 +42,7 @@ def draw_choices(episode: Episode, instruction: Instruction, identity: str) -> G
     block, place = divmod(episode.index, _BLOCK)
     group = (episode.task, episode.split, repr(instruction.setting), instruction.form, str(block))
     right = int(_generator("place", *group).permutation(_BLOCK)[place]) % (len(others) + 1)
-    return GoalChoices((*others[:right], episode.goal, *others[right:]), right)
+    return (*others[:right], episode.goal, *others[right:]), right
 
 
 def explicit_command(episode: Episode, goal: Goal, pool: str) -> str:

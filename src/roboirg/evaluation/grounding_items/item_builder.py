@@ -94,9 +94,9 @@ def _make_item(
     task, instruction = get_task(episode.task), instruct_with(episode, options)
     schema, name = goal_schema(episode.task), item_id(episode, options)
     texts = question_texts(listener, schema, instruction.text, media.steps)
-    choices = draw_choices(episode, instruction, name)
+    choices, right = draw_choices(episode, instruction, name)
     pool = next(one for one in POOLS if one != instruction.metadata["pool"])
-    commands = [explicit_command(episode, goal, pool) for goal in choices.goals]
+    commands = [explicit_command(episode, goal, pool) for goal in choices]
     goals, answers = task.goals(episode.scene), schema.answers
     return GroundingItem(
         id=name,
@@ -125,8 +125,8 @@ def _make_item(
         answer=answers[episode.goal],
         answers=[answers[goal] for goal in goals if is_right(goal, episode)],
         goals=[answers[goal] for goal in goals],
-        choice=LETTERS[choices.right],
-        choice_answers=[answers[goal] for goal in choices.goals],
+        choice=LETTERS[right],
+        choice_answers=[answers[goal] for goal in choices],
         points=list(media.points),
         points_in_order=is_ordered(episode.goal),
         command_chance=float(right_share(blind_goals(instruction, episode), episode)),

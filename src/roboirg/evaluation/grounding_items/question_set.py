@@ -26,12 +26,8 @@ FRAMES_EVERY = 8
 Progress = Callable[[int, int], None]
 
 
-class EpisodeName(NamedTuple):
-    """Which episode."""
-
-    task: str
-    split: Split
-    number: int
+EpisodeName = tuple[str, Split, int]
+"""Which episode: task, split and number."""
 
 
 class ExportRequest(NamedTuple):

@@ -52,18 +52,14 @@ def make_filters(episodes: PageEpisodes) -> dict[str, Filter]:
     tasks = task_order({one.task for one in records})
     suites = {task: known.suite if (known := all_tasks().get(task)) else "other tasks"
               for task in tasks}  # fmt: skip
-    options = sorted({one.options for one in episodes.all}, key=options_sort_key)
+    options = sorted({one.column for one in records}, key=options_sort_key)
     settings = {one: setting_label(one) for one in options}
     seeds = [str(one.policy_seed) for one in records]
     return {
         "policy": Filter("policy", list(episodes.names.values()), played_by),
         "task": _filter("task", [one.task for one in records], tasks, suites),
-        "setting": _filter(
-            "setting", [settings[one.options] for one in episodes.all], settings.values()
-        ),
-        "form": _filter(
-            "form", [one.options.form for one in episodes.all], [one.form for one in options]
-        ),
+        "setting": _filter("setting", [settings[one.column] for one in records], settings.values()),
+        "form": _filter("form", [one.form for one in records], [one.form for one in options]),
         "difficulty": _filter("difficulty", [one.difficulty for one in records], DIFFICULTIES),
         "outcome": _filter("outcome", [one.outcome for one in records], get_args(Outcome)),
         "failure": _filter("why it failed", list(map(_failure, records)), _KINDS, _KINDS),
@@ -95,8 +91,8 @@ def make_numbers(episodes: PageEpisodes) -> dict[str, Sequence[int | str]]:
     records = [one.record for one in episodes.all]
     scenes = [(one.task, one.split, one.episode) for one in records]
     pairs = [
-        (*scene, one.record.policy_seed, one.options, fairness(one.record))
-        for scene, one in zip(scenes, episodes.all, strict=True)
+        (*scene, one.policy_seed, one.column, fairness(one))
+        for scene, one in zip(scenes, records, strict=True)
     ]
     return {
         "key": [one.key for one in episodes.all],

@@ -8,7 +8,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
 
-from roboirg.core.instruction_options import InstructionOptions
 from roboirg.evaluation.analysis.results.frame import Frame, join, make_frame
 from roboirg.evaluation.analysis.results.policy_run import PolicyRun
 from roboirg.evaluation.analysis.stats.run_data import RunData
@@ -28,7 +27,6 @@ class PageEpisode(NamedTuple):
     Attributes:
         key: short, unique on the page, the same in every page about the run.
         record: of the episode, without instruction and events.
-        options: of its instruction, without whose words they are.
         policy_run: that played it.
         film: its video, which is there; None without one.
         poster: the last frame of the video.
@@ -37,7 +35,6 @@ class PageEpisode(NamedTuple):
 
     key: str
     record: Summary
-    options: InstructionOptions
     policy_run: PolicyRun
     film: Path | None
     poster: Path | None
@@ -93,11 +90,11 @@ def _episodes(runs: Runs, frame: Frame, *, videos: bool) -> Iterator[PageEpisode
     logs = {name: logged_slugs(run.folder) for name, run in named.items()}
     places: dict[object, int] = {}
     rows = [
-        (places.setdefault((owner, one.task), len(places)), one.episode, owner, one, options)
-        for owner, one, options in zip(frame["run"], frame["result"], frame["options"], strict=True)
+        (places.setdefault((owner, one.task), len(places)), one.episode, owner, one)
+        for owner, one in zip(frame["run"], frame["result"], strict=True)
         if isinstance(one, Summary)
     ]
-    for _, _, owner, record, options in sorted(rows, key=operator.itemgetter(0, 1)):
+    for _, _, owner, record in sorted(rows, key=operator.itemgetter(0, 1)):
         folder, number = named[owner.run].folder, [*named].index(owner.run)
         slug, film, poster = record.slug, None, None
         if videos and record.video is not None:
@@ -106,7 +103,6 @@ def _episodes(runs: Runs, frame: Frame, *, videos: bool) -> Iterator[PageEpisode
         yield PageEpisode(
             key=slug.rpartition("-")[2] + (f"-{number + 1}" if number else ""),
             record=record,
-            options=options,
             policy_run=owner,
             film=film,
             poster=poster,

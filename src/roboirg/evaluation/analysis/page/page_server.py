@@ -6,7 +6,6 @@ are supported, so that a browser can seek in a video.
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 
 from starlette.applications import Starlette
@@ -21,23 +20,10 @@ from roboirg.util.web.request_origin import LOOPBACK_NAMES, is_own_request
 
 def run_server(folder: Path, port: int = 0) -> AppServer:
     """Return the server of a run's folder; port 0 is any free one."""
-    files = Mount("/", _RunFiles(directory=folder.resolve(), check_dir=False))
+    files = Mount("/", StaticFiles(directory=folder.resolve(), check_dir=False))
     # The browser asks again each time: the page may be written anew.
     guard = RequestGuard(Starlette(routes=[files]), _refuse, {"Cache-Control": "no-cache"})
     return AppServer(guard, port)
-
-
-class _RunFiles(StaticFiles):
-    """The files of a run, without those whose name begins with a dot.
-
-    The lock, and videos that are not finished, are the run's own.
-    """
-
-    def lookup_path(self, path: str) -> tuple[str, os.stat_result | None]:
-        found, state = super().lookup_path(path)
-        if state is not None and "/." in found[len(str(self.directory)) :]:
-            return "", None
-        return found, state
 
 
 def _refuse(request: Request) -> Response | None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -89,8 +89,8 @@ def make_table(
         rows.extend(_floor_rows(floor, table, columns, cells))
     if shows_published and table.of_paper is not None:
         rows += [_published_row(table, columns, row) for row in published_rows(table.of_paper)]
-    reference_of = _reference_finder(table, rows)
-    rows = list(with_best(with_changes(columns, _grouped(table, rows), reference_of)))
+    rows = _grouped(table, rows)
+    rows = list(with_best(with_changes(columns, zip(rows, _references(table, rows), strict=True))))
     return Table(
         key=table.name,
         title=table.title,
@@ -190,17 +190,14 @@ def _by_policy(rows: Sequence[Row]) -> list[Row]:
     return [replace(row, group=row.name, name=row.group) for row in found]
 
 
-def _reference_finder(table: PaperTable, rows: Sequence[Row]) -> Callable[[Row], Row | None]:
-    """Return a function that finds a row's reference: explicit, or the shortest context."""
+def _references(table: PaperTable, rows: Sequence[Row]) -> Iterator[Row | None]:
+    """Yield each row's reference: explicit, or the shortest context."""
     by_position = {(row.group, row.name, row.source): row for row in rows}
     shortest = stages_text(table.reference)
-
-    def reference_of(row: Row) -> Row | None:
+    for row in rows:
         place = (row.group, shortest) if table.is_by_stages else (EXPLICIT, row.name)
         is_itself = place == (row.group, row.name) or row.source == "chance"
-        return None if is_itself else by_position.get((*place, row.source))
-
-    return reference_of
+        yield None if is_itself else by_position.get((*place, row.source))
 
 
 def _coverage() -> Table:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Set
+from collections.abc import Iterator, Mapping, Set
 from dataclasses import replace
 
 from rich.console import Console
@@ -33,7 +33,6 @@ from roboirg.evaluation.analysis.stats.measure import (
 )
 from roboirg.evaluation.analysis.stats.paired_tests import pooled_overlap
 from roboirg.evaluation.analysis.stats.rates import NOT_APPLICABLE, points, whole_percent
-from roboirg.evaluation.analysis.tables.rendering.terminal import renderable
 from roboirg.evaluation.analysis.tables.table import (
     ERROR_MARK,
     MISSING_MARK,
@@ -84,11 +83,6 @@ def make_run_tables(frame: Frame) -> list[Table]:
     legend = "; ".join(_legend(found, set(gaps.values())))
     last = (replace(table, notes=(*table.notes, legend)) for table in tables[-1:])
     return [*tables[:-1], *last]
-
-
-def print_run_tables(tables: Iterable[Table], console: Console) -> None:
-    for table in tables:
-        console.print(renderable(table, console), highlight=False)
 
 
 def print_failures(frame: Frame, console: Console) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from decimal import Decimal
 from typing import Literal, NamedTuple
@@ -196,19 +196,15 @@ def with_averages(columns: Iterable[Column], entries: Mapping[str, Entry]) -> tu
     )
 
 
-def with_changes(
-    columns: Sequence[Column], rows: Iterable[Row], reference_of: Callable[[Row], Row | None]
-) -> list[Row]:
-    """Return the rows with the change of each entry compared with its reference.
+def with_changes(columns: Sequence[Column], rows: Iterable[tuple[Row, Row | None]]) -> list[Row]:
+    """Return rows with the change of each entry compared with the reference next to it.
 
     An average is compared with the reference's average over the same tasks, as some tasks lack
     some settings.
     """
     return [
-        row
-        if (reference := reference_of(row)) is None
-        else replace(row, cells=tuple(_changed(columns, row, reference)))
-        for row in rows
+        row if reference is None else replace(row, cells=tuple(_changed(columns, row, reference)))
+        for row, reference in rows
     ]
 
 

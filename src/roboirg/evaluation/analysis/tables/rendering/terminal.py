@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 from rich.console import Console, Group, RenderableType
 from rich.table import Table as Grid
@@ -36,6 +36,11 @@ def renderable(table: Table, console: Console) -> RenderableType:
     return Group(
         *(line for part in titled for line in part), *(Text(note, "dim") for note in table.notes)
     )
+
+
+def print_tables(tables: Iterable[Table], console: Console) -> None:
+    for table in tables:
+        console.print(renderable(table, console), highlight=False)
 
 
 def plain(table: Table) -> str:
