@@ -126,10 +126,9 @@ def test_bars_are_shares_of_what_was_played() -> None:
     assert sum(listener.values()) == 0
     assert sum(forgetful.values()) == pytest.approx(400)
     failed = [one.attribution.failure for one in results() if one.attribution is not None]
-    for name, part in failures.PARTS.items():
-        assert forgetful.get(part.color, 0) == pytest.approx(100 * failed.count(name) / 6)
-    colors = {part.color for part in failures.PARTS.values()}
-    assert len(colors) == len(GROUNDING) + len(EXECUTION) + 1
+    for name, color in failures.COLORS.items():
+        assert forgetful.get(color, 0) == pytest.approx(100 * failed.count(name) / 6)
+    assert len({*failures.COLORS.values()}) == len(GROUNDING) + len(EXECUTION) + 1
 
 
 def test_gaps_are_those_of_the_summary() -> None:

@@ -8,11 +8,10 @@ from collections.abc import Collection, Mapping
 from dataclasses import replace
 from decimal import Decimal
 from importlib import resources
-from typing import Literal, NamedTuple
+from typing import Literal, NamedTuple, cast
 
-from roboirg.core.errors import UnknownNameError
 from roboirg.core.instruction_options import InstructionOptions
-from roboirg.evaluation.analysis.results.option_labels import options_label, staged_options
+from roboirg.evaluation.analysis.results.option_labels import staged_options
 from roboirg.evaluation.analysis.stats.rates import DIGITS, mean_percent
 
 RateTable = Literal["main", "planner", "context", "real", "harder", "other"]
@@ -64,7 +63,6 @@ NOTES: Mapping[RateTable, tuple[str, ...]] = {
 """What tables say of the published rates; their numbers never change."""
 
 _FILES = {"main": "main", "planner": "planner", "context": "context", "real": "real_world"}
-_MODEL_COLUMNS = ("model", "planner")
 
 
 class PublishedRow(NamedTuple):
@@ -94,19 +92,15 @@ class PublishedRow(NamedTuple):
 @functools.cache
 def published_rows(table: str) -> tuple[PublishedRow, ...]:
     """Return the rows of a table, in the order of the paper."""
-    if table not in RATE_TABLES:
-        raise UnknownNameError("published table", table, RATE_TABLES)
     grouped: dict[tuple[str, InstructionOptions], dict[str, Decimal | None]] = {}
     for line in published_lines(_FILES[table]):
-        model = next(line[column] for column in _MODEL_COLUMNS if column in line)
+        model = line.get("model") or line["planner"]
         text = line["success_rate_percent"]
         rate = Decimal(text).quantize(DIGITS) if text else None
         grouped.setdefault((model, _options(line)), {})[line["task"]] = rate
     rows = []
     for (model, options), rates in grouped.items():
-        average = rates.pop(AVERAGE)
-        if average is None:
-            raise ValueError(f"{table}.csv has no average of {model}, {options_label(options)}")
+        average = cast("Decimal", rates.pop(AVERAGE))
         rows.append(PublishedRow(model, options, rates, average))
     return tuple(rows)
 

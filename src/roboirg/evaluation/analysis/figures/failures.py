@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 from roboirg.evaluation.analysis.figures.figure_style import panels, paper
 from roboirg.evaluation.analysis.results.option_labels import options_label, options_sort_key
@@ -27,22 +27,7 @@ _DARK = frozenset((*_ORANGE[:3], *_BLUE[:3]))
 NOTE = "n: trials with a verdict; the rest of a bar succeeded."
 
 
-class Part(NamedTuple):
-    """What a part of a bar is, its color, and the color of the number in it."""
-
-    label: str
-    color: str
-    ink: str
-
-
-PARTS = {
-    failure: Part(
-        f"{kind}: " * bool(kind) + failure.replace("_", " "),
-        color,
-        "white" if color in _DARK else "black",
-    )
-    for (failure, kind), color in zip(FAILURES.items(), (*_ORANGE, *_BLUE, "#bbbbbb"), strict=True)
-}
+COLORS = dict(zip(FAILURES, (*_ORANGE, *_BLUE, "#bbbbbb"), strict=True))
 """By name of the failure: shades of orange for grounding, of blue for execution."""
 
 
@@ -51,14 +36,18 @@ def draw_failures(content: RunData) -> Figure | None:
     from matplotlib.patches import Patch
 
     counts = count_failures(content.frame, ("run", "options"))
-    shown = [name for name in PARTS if any(own[name] for own in counts.values())]
+    shown = [name for name in COLORS if any(own[name] for own in counts.values())]
     if not shown:
         return None
     columns = sorted({options for _, options in counts}, key=options_sort_key)
     runs = [one for one in content.frame.names if any(run == one for run, _ in counts)]
     labels = {content.name(run): list(map(options_label, columns)) for run in runs}
-    parts = [PARTS[name] for name in shown]
-    keys = {one.label: Patch(facecolor=one.color, edgecolor=paper()) for one in parts}
+    keys = {
+        f"{FAILURES[name]}: " * bool(FAILURES[name]) + name.replace("_", " "): Patch(
+            facecolor=COLORS[name], edgecolor=paper()
+        )
+        for name in shown
+    }
     notes = [NOTE, where_played([one.conditions for one in runs])]
     figure, found = panels(labels, MOST_COLUMNS, keys, notes)
     for (axes, places), run in zip(found, runs, strict=True):
@@ -75,13 +64,13 @@ def _draw_bar(axes: Axes, place: float, counts: Counter[str], shown: Sequence[st
     for name in shown:
         width = 100 * counts[name] / max(1, trials)
         axes.barh(
-            place, width, left=left, height=HEIGHT, color=PARTS[name].color, edgecolor=paper(),
+            place, width, left=left, height=HEIGHT, color=COLORS[name], edgecolor=paper(),
             linewidth=0.5,
         )  # fmt: skip
         if width >= MIN_LABELED_PERCENT:
             axes.text(
                 left + width / 2, place, str(counts[name]), ha="center", va="center", fontsize=6.5,
-                color=PARTS[name].ink,
+                color="white" if COLORS[name] in _DARK else "black",
             )  # fmt: skip
         left += width
     text = f"n = {trials}" if trials else "–"

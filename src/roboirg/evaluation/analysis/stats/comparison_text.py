@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
+from typing import cast
 
 from roboirg.core.plain_text import counted, verb_for
 from roboirg.evaluation.analysis.results.option_labels import options_label
@@ -73,12 +74,11 @@ class _Result:
 
     @property
     def gap(self) -> Gap:
-        assert self.result.gap is not None  # noqa: S101 - results without one are left out
-        return self.result.gap
+        return cast("Gap", self.result.gap)  # results without one are left out
 
     @property
     def p_holm(self) -> float:
-        return self.gap.p_value if self.result.p_holm is None else self.result.p_holm
+        return cast("float", self.result.p_holm)
 
     @property
     def is_decided(self) -> bool:

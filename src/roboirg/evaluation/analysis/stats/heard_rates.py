@@ -37,12 +37,6 @@ def count_heard(frame: Frame, by: Sequence[str]) -> Mapping[Key, HeardCounts]:
     return {key: one for key, one in found.items() if key[0] in declared}
 
 
-def rate_of(counts: HeardCounts, heard: str = "") -> Fraction | None:
-    """Return the success rate over all trials, or those ``heard ``; None without one."""
-    trials = counts[f"{heard}trials"]
-    return Fraction(counts[f"{heard}successes"], trials) if trials else None
-
-
 def heard_notes(frame: Frame, names: Mapping[PolicyRun, str]) -> list[str]:
     """Return a sentence for each policy of which some prompts were cut, or may have been."""
     counts = count_heard(frame, ())

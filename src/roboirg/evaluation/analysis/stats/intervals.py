@@ -36,9 +36,7 @@ class Interval(NamedTuple):
 
 
 def wilson_interval(successes: int, trials: int) -> Interval:
-    """Return Wilson's score interval of a proportion, which assumes independent trials."""
-    if not 0 <= successes <= trials or trials == 0:
-        raise ValueError(f"{successes} successes of {trials} trials are not a proportion")
+    """Return Wilson's score interval of a proportion, of one trial or more, all independent."""
     rate, weight = successes / trials, Z_95 * Z_95 / trials
     center = (rate + weight / 2) / (1 + weight)
     half = Z_95 * math.sqrt(rate * (1 - rate) / trials + weight / (4 * trials)) / (1 + weight)

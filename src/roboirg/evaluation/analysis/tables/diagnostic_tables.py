@@ -24,7 +24,6 @@ from roboirg.evaluation.analysis.stats.heard_rates import (
     HeardCounts,
     count_heard,
     cut_text,
-    rate_of,
 )
 from roboirg.evaluation.analysis.stats.measure import ALL_TASKS, Measured, with_holm
 from roboirg.evaluation.analysis.stats.rates import NOT_APPLICABLE, gap_words, percent
@@ -196,11 +195,10 @@ def make_heard_table(data: RunData) -> Table:
 
 
 def _heard_rate(one: HeardCounts, heard: str) -> Entry:
-    rate = rate_of(one, heard)
-    if rate is None:
-        return Entry(word=NOT_APPLICABLE)
     counts = Counts(one[f"{heard}successes"], one[f"{heard}trials"])
-    return Entry(percent=percent(rate), counts=counts)
+    if counts.rate is None:
+        return Entry(word=NOT_APPLICABLE)
+    return Entry(percent=percent(counts.rate), counts=counts)
 
 
 def _with_scope(frame: Frame) -> Frame:

@@ -75,7 +75,7 @@ def make_table(
     table = PAPER_TABLES[which]
     tasks = table.tasks(cells)
     columns = table.columns(tasks)
-    shows_published = published and table.is_published
+    shows_published = published and table.of_paper == table.name
     differences: AllDifferences = (
         {key: differences_of(key, cell) for key, cell in cells.items()} if shows_published else {}
     )

@@ -45,7 +45,6 @@ class PaperTable:
         reference: the options that changes are from.
         heads: of the groups of rows and of their names.
         by_suite: whether its columns are grouped by suite, each with an average.
-        is_published: whether the paper has rows for it.
     """
 
     name: str
@@ -55,7 +54,6 @@ class PaperTable:
     reference: InstructionOptions = REFERENCE
     heads: tuple[str, ...] = ("setting", POLICY)
     by_suite: bool = False
-    is_published: bool = True
 
     @property
     def is_by_stages(self) -> bool:
@@ -124,9 +122,7 @@ PAPER_TABLES: Mapping[str, PaperTable] = {
             heads=(POLICY, *map(str, ALL_STAGES)),
         ),
         PaperTable("real", "Real world", "real"),
-        PaperTable(
-            "harder", "Harder settings", "main", _is_harder, by_suite=True, is_published=False
-        ),
-        PaperTable("other", "Tasks outside the paper", None, is_published=False),
+        PaperTable("harder", "Harder settings", "main", _is_harder, by_suite=True),
+        PaperTable("other", "Tasks outside the paper", None),
     )
 }
