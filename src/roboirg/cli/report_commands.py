@@ -250,13 +250,10 @@ def _check_choice(
     which: str, by: str | None, runs: Sequence[str], *, published: bool, floors: str | None
 ) -> None:
     """Refuse tables that do not exist or that have no such rows, before anything is read."""
-    from roboirg.evaluation.analysis.tables.diagnostic_tables import (
-        DIAGNOSTIC_TABLES,
-        RECORD_TABLES,
-    )
+    from roboirg.evaluation.analysis.tables.diagnostic_tables import DIAGNOSTIC_TABLES
     from roboirg.evaluation.analysis.tables.paper_tables import WHICH
 
-    alone = (*DIAGNOSTIC_TABLES, *RECORD_TABLES)
+    alone = tuple(DIAGNOSTIC_TABLES)
     known_name("table", which, (*WHICH, *alone, _ALL))
     asked = [which] * (which != _ALL) + ["--by"] * (by is not None)
     if {*alone, "--by"} & {*asked} and (published or floors or len(asked) > 1):
@@ -277,18 +274,13 @@ def _tables(
     published: bool,
     floors: str | None,
 ) -> list[Table]:
-    from roboirg.evaluation.analysis.tables.diagnostic_tables import (
-        DIAGNOSTIC_TABLES,
-        RECORD_TABLES,
-    )
+    from roboirg.evaluation.analysis.tables.diagnostic_tables import DIAGNOSTIC_TABLES
 
     if by is not None:
         return _breakdown_tables(data, by)
     if which in DIAGNOSTIC_TABLES:
-        return [DIAGNOSTIC_TABLES[which](data)]
-    if which in RECORD_TABLES:
         records = (one for source in sources for one in source.records())
-        return [RECORD_TABLES[which](data, records)]
+        return [DIAGNOSTIC_TABLES[which](data, records)]
     return _paper_tables(which, data, published=published, floors=floors)
 
 

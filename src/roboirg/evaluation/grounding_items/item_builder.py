@@ -130,17 +130,15 @@ def _make_item(
         points=list(media.points),
         points_in_order=is_ordered(episode.goal),
         command_chance=float(right_share(blind_goals(instruction, episode), episode)),
-        hidden_slots=_hidden(episode, instruction),
+        # A resolved command leaves none to its context.
+        hidden_slots=[]
+        if options.form == "resolved"
+        else list(hidden_slots((episode, instruction))),
         pattern=cast("str | None", instruction.metadata["pattern"]),
         expressions=_expressions(instruction),
         language_version=LANGUAGE_VERSION,
         environment_version=ENVIRONMENT_VERSION,
     )
-
-
-def _hidden(episode: Episode, instruction: Instruction) -> list[str]:
-    """Return the slots that the command leaves to its context; a resolved command leaves none."""
-    return [] if instruction.form == "resolved" else list(hidden_slots((episode, instruction)))
 
 
 def _expressions(instruction: Instruction) -> list[str]:

@@ -58,11 +58,8 @@ class PageEpisodes:
     @classmethod
     def of(cls, runs: Runs, *, videos: bool) -> PageEpisodes:
         """Gather and sort the episodes, with or without their videos."""
-        jobs = (job for run in runs.values() for job in (*run.planned, *run.results))
-        policies = list(dict.fromkeys(job.policy for job in jobs))
         frame = join(
-            make_frame([(name, run.results)], run.planned, policies, named=name)
-            for name, run in _named(runs)
+            make_frame([(name, run.results)], run.planned, named=name) for name, run in _named(runs)
         )
         return cls(runs, RunData(frame), tuple(_episodes(runs, frame, videos=videos)))
 

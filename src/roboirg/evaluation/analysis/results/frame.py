@@ -229,16 +229,15 @@ def join(frames: Iterable[Frame]) -> Frame:
     return Frame({name: np.concatenate([one[name] for one in found]) for name in found[0].columns})
 
 
-def make_frame(
-    runs: Runs, planned: Sequence[Job] = (), policies: Sequence[str] = (), *, named: str = ""
-) -> Frame:
+def make_frame(runs: Runs, planned: Sequence[Job] = (), *, named: str = "") -> Frame:
     """Return the results of one or several runs, sorted by policy run, task, options and episode.
+
+    Policies are in the order of the planned jobs; others follow by name.
 
     Args:
         runs: the results of a run have different identities. Runs that hold the same episodes of a
             policy stay apart; others complete each other.
         planned: jobs that should have a result; those without one are missing.
-        policies: in order, by default that of the planned jobs; others follow by name.
         named: name of a run that its policy runs bear in any case.
     """
     jobs = {identity_key(job): job for job in planned}
@@ -255,7 +254,7 @@ def make_frame(
         conditions = EvalConditions.of(job)
         unplayed = PolicyRun(job.policy, conditions, None, named)
         rows.append((owners.get((job.policy, conditions), unplayed), job, MISSING))
-    return _sorted(rows, policies or list(dict.fromkeys(job.policy for job in planned)))
+    return _sorted(rows, list(dict.fromkeys(job.policy for job in planned)))
 
 
 def _sorted(rows: Sequence[tuple[PolicyRun, Job, str]], policies: Sequence[str]) -> Frame:

@@ -255,15 +255,12 @@ def _rate(one: Measured[LabelKey]) -> Entry:
     return Entry(percent=rate, counts=one.counts, interval=one.interval)
 
 
-DIAGNOSTIC_TABLES: Mapping[str, Callable[[RunData], Table]] = {
-    "forms": make_forms_table,
-    "failures": make_failure_table,
-    "heard": make_heard_table,
-    "arms": make_arm_table,
-}
-"""By name, as in the command line."""
-RECORD_TABLES: Mapping[str, Callable[[RunData, Iterable[Record]], Table]] = {
+DIAGNOSTIC_TABLES: Mapping[str, Callable[[RunData, Iterable[Record]], Table]] = {
+    "forms": lambda data, _records: make_forms_table(data),
+    "failures": lambda data, _records: make_failure_table(data),
+    "heard": lambda data, _records: make_heard_table(data),
+    "arms": lambda data, _records: make_arm_table(data),
     "subgoals": make_subgoal_table,
     "facts": make_facts_table,
 }
-"""Those that need whole records, too."""
+"""By name, as in the command line; the last two read whole records, too."""

@@ -131,9 +131,8 @@ def _entry(
 
 def _applies(task: str, options: InstructionOptions) -> bool:
     """Whether a task has a setting; taken for granted if either is not installed."""
-    known = every_task().get(task)
-    is_known = known is not None and options.setting in all_settings()
-    return known is None or not is_known or options.setting in settings_of(known)
+    known, setting = every_task().get(task), options.setting
+    return known is None or setting not in all_settings() or setting in settings_of(known)
 
 
 def _floor_rows(
