@@ -63,9 +63,7 @@ def everything() -> tuple[dict[str, list[str]], set[str]]:
 
 def test_every_kind_of_policy_and_every_application_is_there(everything):
     commands, kinds = everything
-    assert kinds == set(entry_names("roboirg.policy_kinds")) == {
-        "learned", "recorded", "trained",
-    }  # fmt: skip
+    assert kinds == set(entry_names("roboirg.policy_kinds")) == {"learned", "trained"}
     assert len(APPLICATIONS) >= 8
     assert {
         "run",
