@@ -40,7 +40,7 @@ def test_a_video_is_small_playable_and_appears_when_complete(tmp_path: Path) -> 
         assert stream.codec_context.pix_fmt == "yuv420p"
         assert (stream.width, stream.height, stream.average_rate) == (512 + GAP, 256, 10)
         frames = [frame.to_ndarray(format="rgb24") for frame in container.decode(stream)]
-    assert len(frames) == 21 + 8  # the page and the strips of stored videos count on it
+    assert len(frames) == 21 + 8  # the page counts on it
     assert stream.average_rate * FRAME_STEPS == 4 * CONTROL_RATE  # fourfold speed
     assert np.abs(frames[0][1, 100].astype(int) - DEMONSTRATION_COLOR).max() < 40
     assert abs(int(frames[-1][128, 128, 0]) - 90) < 8
