@@ -189,6 +189,7 @@ class _RunLoop:
                     waiting.insert(0 if record.error == "infrastructure" else len(waiting), job)
 
     def _store_record(self, job: Job, record: Record) -> None:
+        _check_record_version(record)
         # Only code in the world's process can write this, such as a policy that patches the judge.
         if record.outcome == "success" and record.cause is not None:
             cause = format_cause("policy", f"a success came with a cause ({record.cause})")
@@ -220,6 +221,16 @@ class _RunLoop:
             f"({record.cause}); this run skips its remaining episodes."
         )
         return True
+
+
+def _check_record_version(record: Record) -> None:
+    """Refuse what a worker with another version of language or environment has played."""
+    for what, ours in _OUR_VERSIONS.items():
+        if (version := getattr(record, f"{what}_version")) != ours:
+            raise StoreError(
+                f"A worker returned {record.slug} with {what} version {version}, but this roboirg "
+                f"has version {ours}; the record was not stored."
+            )
 
 
 def _report_damage(store: RecordStore, reporter: Reporter) -> None:
