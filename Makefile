@@ -22,7 +22,7 @@ style: dev
 	$(PYTHON) -m ruff format --check .
 
 # More workers than cores, as many tests wait for processes; each has 0.5 GiB. What the tests of a
-# file make for all of them is made once. tests/conftest.py has the order of the files;
+# file make for all of them is made once. conftest.py has the order of the files;
 # scripts/test_costs.py reads the report.
 PYTEST = $(PYTHON) -m pytest -n 4 --dist loadfile --no-loadscope-reorder --max-worker-restart 3 --junitxml build/$@.xml
 

@@ -14,8 +14,6 @@ import numpy as np
 from numpy.typing import NDArray
 from written_parts import rate_text, with_part
 
-from roboirg.apps.learning.listener.study_report import TrainedRate, trained_rate
-from roboirg.apps.learning.policy.paper_experiment import row_of
 from roboirg.core.arms import TOLD
 from roboirg.evaluation.analysis.results.frame import make_frame
 from roboirg.evaluation.analysis.stats.arm_figures import (
@@ -37,6 +35,7 @@ from roboirg.evaluation.records.store import read_results
 from roboirg.language.settings import EXPLICIT, plain_settings
 from roboirg.tasks import all_tasks
 from roboirg.tasks.splits.splits import SIZES
+from roboirg_learn.listener.study_report import TrainedRate, trained_rate
 
 ROOT = Path(__file__).parent.parent
 PAGE = ROOT / "docs" / "learned-policy-results.md"
@@ -55,6 +54,12 @@ Cells = Mapping[tuple[str, str], Mapping[str, Mapping[int, Cell]]]
 """By row and setting, then by task, then by training seed."""
 Verdicts = NDArray[np.int64]
 """1 where an episode is solved, else 0; shape (training seeds, episodes)."""
+
+
+def row_of(policy: str) -> tuple[str, int]:
+    """Return the row of a policy, and its training seed."""
+    row, _, seed = policy.partition("-seed")
+    return row, int(seed or 0)
 
 
 @functools.cache

@@ -1,4 +1,4 @@
-"""Write docs/learned-listener-results.md and its figure from the answers of a study.
+"""Write docs/learned-listener-results.md from the answers of a study.
 
 python scripts/write_listener_study.py [FOLDER]  # of a study, whose answers are stored first
 """
@@ -8,27 +8,20 @@ from __future__ import annotations
 import functools
 import json
 import lzma
-import shutil
 import sys
-import tempfile
 from pathlib import Path
 
 from written_parts import with_part
 
-from roboirg.apps.learning.listener.listener_study import StudyAnswer
-from roboirg.apps.learning.listener.study_report import (
-    BY_TASK,
-    FIGURE,
+from roboirg_learn.listener.listener_study import StudyAnswer
+from roboirg_learn.listener.study_report import (
     study_rates,
     tables_text,
-    write_study,
 )
 
 ROOT = Path(__file__).parent.parent
 PAGE = ROOT / "docs" / "learned-listener-results.md"
-PICTURE = ROOT / "docs" / "images" / "learned-listeners.png"
 ANSWERS = ROOT / "results" / "listener-study-answers.jsonl.xz"
-TASKS = ROOT / "results" / "listener-study-by-task.csv"
 
 
 @functools.cache
@@ -48,10 +41,6 @@ def main() -> None:
     if sys.argv[1:]:
         files = sorted(Path(sys.argv[1]).glob("*-?.jsonl"))
         ANSWERS.write_bytes(lzma.compress(b"".join(path.read_bytes() for path in files)))
-    with tempfile.TemporaryDirectory() as folder:
-        write_study(answers(), {}, Path(folder))
-        shutil.copy(Path(folder) / BY_TASK, TASKS)
-        shutil.copy(Path(folder) / f"{FIGURE}.png", PICTURE)
     PAGE.write_text(page_text(), encoding="utf-8")
 
 

@@ -6,23 +6,27 @@ python scripts/write_paper_results.py
 from __future__ import annotations
 
 import functools
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 
 from written_parts import rate_text, with_part
 
-from roboirg.apps.learning.policy.paper_experiment import CONTEXT, MAIN, PLANNER, SYSTEMS, row_name
-from roboirg.apps.learning.policy.paper_page import answers_text, row_frame, tables_text
-from roboirg.apps.learning.policy.policy_plan import PLANNERS
+from roboirg import results
 from roboirg.evaluation.analysis.published import published_rows
-from roboirg.evaluation.analysis.results.frame import Frame
+from roboirg.evaluation.analysis.results.frame import Frame, make_frame
 from roboirg.evaluation.analysis.stats.cells import cells_of
 from roboirg.evaluation.analysis.stats.measure import ALL_TASKS, Measured, ScopeKey, summarize
+from roboirg.evaluation.analysis.stats.run_data import RunData
+from roboirg.evaluation.analysis.tables.paper_tables import make_table
+from roboirg.evaluation.analysis.tables.rendering.markdown import markdown
 from roboirg.evaluation.plan.plan_file import read_plan_file
 from roboirg.evaluation.records.packs import opened_run
 from roboirg.evaluation.records.record import Summary
 from roboirg.evaluation.records.store import read_results
 from roboirg.language.settings import plain_settings
+from roboirg_learn.policy.paper_experiment import CONTEXT, MAIN, PLANNER, SYSTEMS, row_name
+from roboirg_learn.policy.paper_page import answers_text
+from roboirg_learn.policy.policy_plan import PLANNERS
 
 ROOT = Path(__file__).parent.parent
 RATES, TABLES = ROOT / "docs" / "paper-results.md", ROOT / "docs" / "paper-tables.md"
@@ -36,25 +40,20 @@ PACKS = {
 
 @functools.cache
 def played() -> Mapping[str, Frame]:
-    """Return the results of each part of the experiment."""
+    """Return the results of each part of the experiment; planners of the main part join theirs."""
     results: dict[str, list[Summary]] = {}
     for part, pack in PACKS.items():
         with opened_run(pack, ()) as run:
             results[part] = list(read_results(run))
     if PLANNER in results:
-        results[PLANNER] += _planners_of_main(results[MAIN])
-    return {part: row_frame(part, found) for part, found in results.items()}
-
-
-def _planners_of_main(results: Iterable[Summary]) -> list[Summary]:
-    """Return the results with which those with other planners or hands are compared."""
-    tasks = read_plan_file("paper-planners")["tasks"]
-    rows = {row_name(memory) for memory in PLANNERS}
-    return [
-        one
-        for one in results
-        if one.policy in rows and one.task in tasks and one.options.form == "implicit"
-    ]
+        tasks = read_plan_file("paper-planners")["tasks"]
+        rows = {row_name(memory) for memory in PLANNERS}
+        results[PLANNER] += [
+            one
+            for one in results[MAIN]
+            if one.policy in rows and one.task in tasks and one.options.form == "implicit"
+        ]
+    return {part: make_frame([(part, found)]).told() for part, found in results.items()}
 
 
 def rates_table(main: Frame) -> str:
@@ -91,8 +90,13 @@ def rates_page() -> str:
 def tables_page() -> str:
     """Return the page of answers and tables with those of the packs."""
     page = TABLES.read_text(encoding="utf-8")
-    page = with_part(page, "paper answers", answers_text(played()))
-    return with_part(page, "paper tables", tables_text(played()))
+    answers = answers_text({part: results(pack) for part, pack in PACKS.items()})
+    page = with_part(page, "paper answers", answers)
+    tables = (
+        markdown(make_table(part, RunData(frame), published=True)).rstrip()
+        for part, frame in played().items()
+    )
+    return with_part(page, "paper tables", "\n\n".join(tables))
 
 
 if __name__ == "__main__":

@@ -6,6 +6,7 @@ Exit codes: 0 success; 2 invalid usage, or episodes ended in errors (one sentenc
 
 from __future__ import annotations
 
+import importlib.metadata
 import importlib.util
 import pkgutil
 import sys
@@ -39,6 +40,8 @@ _WrongUsage: type[Exception] = next(
     if kind.__name__ == "ClickException" and issubclass(kind, Exception)
 )
 _MAX_MESSAGE_LENGTH = 300
+COMMANDS = "roboirg.commands"
+"""Entry points of other packages: a function is a command, a `typer.Typer` a group of them."""
 
 
 app = typer.Typer(
@@ -55,7 +58,6 @@ _MODULES: Mapping[str, tuple[str, ...]] = {
     "report": ("jinja2", "markupsafe", "matplotlib", "sklearn", "scipy"),
     "export": ("pyarrow",),
     "demonstrations": ("h5py",),
-    "learn": ("torch",),
     "ray": ("ray",),
     "remote": ("websockets", "msgpack"),
     "tokens": ("sentencepiece", "tokenizers"),
@@ -104,6 +106,21 @@ def _add_commands() -> None:
         commands = f"{apps.__name__}.{application.name}.commands"
         if importlib.util.find_spec(commands) is not None:
             importlib.import_module(commands).add_commands(app)
+    for entry in importlib.metadata.entry_points(group=COMMANDS):
+        _add_outside(entry)
+
+
+def _add_outside(entry: importlib.metadata.EntryPoint) -> None:
+    """Add what another package offers; one that is broken takes no other command away."""
+    try:
+        found = entry.load()
+    except Exception as error:  # noqa: BLE001 - a stranger's module
+        typer.echo(f"roboirg: no command {entry.name}: {entry.value}: {error!r}", err=True)
+        return
+    if isinstance(found, typer.Typer):
+        app.add_typer(found, name=entry.name)
+    else:
+        app.command(entry.name)(found)
 
 
 _add_commands()

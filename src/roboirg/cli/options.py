@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any, get_type_hints
 
 import typer
 
-from roboirg.cli.names import known_names
+from roboirg.cli.names import known_names, known_settings, known_tasks
 from roboirg.core.errors import InvalidValueError
 
 if TYPE_CHECKING:
@@ -71,6 +71,14 @@ class PlanWords:
         source = self._context.get_parameter_source(name)
         is_typed = source is not None and source.name != "DEFAULT"
         return value if is_typed else self.fields.get(name, value)
+
+    def tasks(self, typed: str = "all") -> tuple[str, ...]:
+        """Return the names of tasks that were typed, or else those of the plan."""
+        return known_tasks(self.given("tasks", typed))
+
+    def settings(self, typed: str = "all") -> tuple[str, ...]:
+        """Return the names of settings that were typed, or else those of the plan."""
+        return known_settings(self.given("settings", typed))
 
     def choices(self, kind: type) -> dict[str, Any]:
         """Return what the plan's section gives of the fields of this class.

@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib
 import importlib.metadata
 import pkgutil
+from collections.abc import Collection
 from types import ModuleType
 from typing import Protocol, TypeVar
 
@@ -45,16 +46,16 @@ def discover(package: ModuleType, attribute: str, kind: type[Thing], group: str)
     return found
 
 
-def entry_names(group: str, package: str | None = None) -> tuple[str, ...]:
+def entry_names(group: str, packages: Collection[str] | None = None) -> tuple[str, ...]:
     """Return the names of the installed entry points of a group; nothing is imported.
 
-    With a package, only of those that name something in it.
+    With packages, only of those that name something in one of them.
     """
     entries = _sorted_entry_points(group)
     return tuple(
         entry.name
         for entry in entries
-        if package is None or entry.module.partition(".")[0] == package
+        if packages is None or entry.module.partition(".")[0] in packages
     )
 
 

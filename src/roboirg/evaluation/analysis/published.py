@@ -80,6 +80,11 @@ class PublishedRow(NamedTuple):
     rates: Mapping[str, Decimal | None]
     average: Decimal
 
+    @property
+    def label(self) -> str:
+        """Its options, as tables and the column ``instruction_options`` of results name them."""
+        return options_label(self.options)
+
     def average_over(self, tasks: Collection[str]) -> Decimal | None:
         """Return the mean over some tasks; None without any, or if one of them has no rate."""
         rates = [rate for task in tasks if (rate := self.rates.get(task)) is not None]

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-import importlib.resources
 import itertools
 import textwrap
 from collections.abc import Mapping, Sequence
+from importlib import resources
+from importlib.metadata import entry_points
 from importlib.resources.abc import Traversable
 from pathlib import Path
 from typing import Any
@@ -16,10 +17,13 @@ import yaml
 from roboirg.core.errors import InvalidValueError, UnknownNameError
 from roboirg.evaluation.plan.option_parsing import check_names
 from roboirg.evaluation.plan.plan import PLAN_KEYS, Plan, plan_options
+from roboirg.util.discovery import entry_names
 from roboirg.util.regular_file import read_regular
 
 _PACKAGE = "roboirg.evaluation.plan"
 _FOLDER = "plans"
+GROUP = "roboirg.plans"
+"""Entry points of other packages: NAME = "package" with the file NAME.yaml."""
 _MOST_BYTES = 4_000_000
 """Of a plan file; lists of 10,000 numbers, the longest that are played, have less than 0.2 MB."""
 _SUFFIXES = (".yaml", ".yml", ".json")
@@ -28,9 +32,10 @@ _WIDTH = 100
 
 
 def named_plans() -> tuple[str, ...]:
-    """Return the names of the plans that come with the package."""
+    """Return the names of the plans that come with this package and with others."""
     names = (Path(file.name) for file in _folder().iterdir())
-    return tuple(sorted(name.stem for name in names if name.suffix in _SUFFIXES))
+    ours = (name.stem for name in names if name.suffix in _SUFFIXES)
+    return tuple(sorted({*ours, *entry_names(GROUP)}))
 
 
 def read_plan_file(name: str, section: str = "") -> dict[str, Any]:
@@ -116,11 +121,12 @@ def _find(name: str) -> Path | Traversable:
         return path
     if name not in named_plans():
         raise UnknownNameError("plan", name, [*named_plans(), "FILE.yaml"])
-    return _folder() / f"{name}.yaml"
+    others = [resources.files(one.value) for one in entry_points(group=GROUP, name=name)]
+    return (others or [_folder()])[0] / f"{name}.yaml"
 
 
 def _folder() -> Traversable:
-    return importlib.resources.files(_PACKAGE) / _FOLDER
+    return resources.files(_PACKAGE) / _FOLDER
 
 
 def plan_text(plan: Plan) -> str:

@@ -44,6 +44,8 @@ from roboirg.policies.planners.systems import System, find_system, with_options
 from roboirg.policies.vlm.vlm_listener import ListenerOptions, VLMListener
 from roboirg.util.discovery import entry_names, find_entry
 
+OUR_PACKAGES = "roboirg", "roboirg_learn"
+"""Their kinds may read the simulator's state, as built-in policies do."""
 CLASS, LIVE, LISTENER, PLANNER, SYSTEM = "class", "live", "vlm-listener", "planner", "system"
 PolicyMaker = Callable[[int], Policy]
 """Makes a policy from a seed, without network or the libraries of providers."""
@@ -91,8 +93,8 @@ def split_spec(name: str, spec: str) -> PolicyRef:
 
 @functools.cache
 def known_kinds() -> Mapping[str, bool]:
-    """Return the names of all kinds, and whether their code comes with us; imports none."""
-    ours = (*OURS, *entry_names(KINDS_GROUP, package="roboirg"))
+    """Return the names of all kinds, and whether their code is ours; imports none."""
+    ours = (*OURS, *entry_names(KINDS_GROUP, OUR_PACKAGES))
     return {name: name in ours for name in (*OURS, *entry_names(KINDS_GROUP))}
 
 

@@ -1,0 +1,58 @@
+"""The policy: what has been learned names the goal, and the scripted expert executes it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from roboirg.extension.episodes import Goal, goals_of
+from roboirg.extension.policies import Demonstration, RoboIRGEnv, ScriptedPolicy
+from roboirg_learn.labeled_views import pictures_to_see
+from roboirg_learn.learn_support import check_learn_support, file_version
+
+if TYPE_CHECKING:
+    from roboirg_learn.listener.learned_model import LearnedModel
+
+FRAMES_EVERY = 8
+"""Control steps between the frames of the video that it gets."""
+
+
+class LearnedListener(ScriptedPolicy):
+    """Executes the goal that a trained listener understands.
+
+    It gets the words and the pictures of `pictures_to_see`; only the hands are privileged. If the
+    scene does not have the goal, it holds still.
+    """
+
+    cameras = ("front",)
+    demonstration_frames = FRAMES_EVERY
+
+    def __init__(self, path: Path, seed: int = 0) -> None:
+        super().__init__(seed)
+        check_learn_support()
+        from roboirg_learn.listener.learned_model import load_model
+
+        self.version = file_version(path, "listener")
+        self.understood: Goal | None = None
+        self._model: LearnedModel = load_model(path)
+        self._demonstration: Demonstration = {}
+
+    @property
+    def metadata(self) -> dict[str, Any]:
+        """How it was trained, and the goal that it understood."""
+        goal = self.understood
+        understood = None if goal is None else dict(goal.as_mapping())
+        return {"trained": self._model.about, "understood": understood}
+
+    def reset(self, instruction: str, demonstration: Demonstration) -> None:
+        """Understand the instruction, or first hear the rest of it."""
+        self._demonstration, self.understood = demonstration, None
+        super().reset(instruction, demonstration)
+
+    def decide(self, env: RoboIRGEnv, instruction: str) -> Goal | None:
+        """Return the goal that is understood; None if the scene does not have it."""
+        frames = self._demonstration.get("front_rgb", ())
+        pictures = pictures_to_see(env.picture("front"), frames, FRAMES_EVERY)
+        self._demonstration = {}
+        self.understood = self._model.understand(env.episode.task, instruction, pictures)
+        return self.understood if self.understood in goals_of(env.episode) else None

@@ -1,0 +1,91 @@
+"""What a listener reads and names: an instruction with what is seen, words, parts of goals."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any, Literal, NamedTuple, get_args
+
+from roboirg.extension.episodes import goal_schema
+from roboirg_learn.labeled_views import Pixels
+from roboirg_learn.listener.object_relations import ObjectsInView
+
+_WORD = re.compile(r"\d+(?:st|nd|rd|th)?|[a-z']+|[.,]")
+_CARDINALS = ("zero", "one", "two", "three", "four", "five", "six", "seven", "eight", "nine", "ten")
+_ORDINALS = (
+    *("zeroth", "first", "second", "third", "fourth", "fifth", "sixth", "seventh", "eighth"),
+    *("ninth", "tenth"),
+)
+_NUMBERS = {str(number): word for number, word in enumerate(_CARDINALS)}
+_NUMBERS |= {
+    f"{number}{end}": word
+    for number, word in enumerate(_ORDINALS)
+    for end in ("st", "nd", "rd", "th")
+}
+WordPool = Literal["train", "test"]
+WORD_POOLS: tuple[WordPool, ...] = get_args(WordPool)
+USUAL_ENCODERS: Mapping[str, dict[str, Any]] = {"words": {}, "objects": {}}
+"""The encoders of a reader, with the settings of each."""
+
+
+class Vocabulary(NamedTuple):
+    """What a listener can name: all plain data, for the checkpoint.
+
+    Attributes:
+        words: known words.
+        classes: classes of objects.
+        tasks: names of tasks.
+        parts: parts of answers, such as ``color=red`` and ``colors.0=blue``.
+    """
+
+    words: tuple[str, ...]
+    classes: tuple[str, ...]
+    tasks: tuple[str, ...]
+    parts: tuple[str, ...]
+
+
+class ListenerInput(NamedTuple):
+    """One instruction with what is seen.
+
+    Attributes:
+        task: name of the task.
+        text: everything that was said.
+        seen: objects of one or two pictures.
+        pictures: the pictures themselves; none in training unless an encoder reads pixels.
+    """
+
+    task: str
+    text: str
+    seen: ObjectsInView
+    pictures: tuple[Pixels, ...] = ()
+
+
+def split_words(text: str) -> list[str]:
+    """Return the words and stops of a text, in lower case; digits up to 10 become words."""
+    return [_NUMBERS.get(word, word) for word in _WORD.findall(text.lower())]
+
+
+def parts_of(answer: str) -> list[str]:
+    """Return the parts of an answer, given as canonical JSON."""
+    found = []
+    for name, value in json.loads(answer).items():
+        if isinstance(value, list):
+            found.append(f"{name}.length={len(value)}")
+            found += [f"{name}.{place}={one}" for place, one in enumerate(value)]
+        else:
+            found.append(f"{name}={value}")
+    return found
+
+
+def make_vocabulary(
+    texts: Iterable[str], classes: Iterable[str], tasks: Sequence[str]
+) -> Vocabulary:
+    """Return the vocabulary of texts, classes of objects and the answers of tasks."""
+    answers = (answer for task in tasks for answer in goal_schema(task).goals)
+    return Vocabulary(
+        tuple(sorted({word for text in texts for word in split_words(text)})),
+        tuple(sorted(set(classes))),
+        tuple(tasks),
+        tuple(sorted({part for answer in answers for part in parts_of(answer)})),
+    )

@@ -1,0 +1,118 @@
+"""A memory of looks evenly spaced over all that was seen, which modulates the body's layers."""
+
+from __future__ import annotations
+
+import torch
+from torch import Tensor, nn
+from torch.nn import functional
+
+from roboirg_learn.policy.body_layers import (
+    HEADS,
+    LAYERS,
+    WIDTH,
+    Join,
+    join_heads,
+    split_heads,
+)
+from roboirg_learn.policy.memories import (
+    FrameTokens,
+    LookMemory,
+    Looks,
+    Remembered,
+    at_frames,
+    at_looks,
+    seen_now,
+)
+
+FRAMES = 32
+SMALL = 0.002
+"""Standard deviation of the weights of scale and shift before anything is learned."""
+
+
+def even_frames(now: Tensor) -> Tensor:
+    """Return the numbers (…, FRAMES) of looks evenly spaced from 0 to `now` (…), both included.
+
+    As long as there are fewer, it is all of them, and the rest is -1.
+    """
+    spread = (now[..., None] * torch.linspace(0, 1, FRAMES)).round().long()
+    first = torch.arange(FRAMES)
+    every = torch.where(first <= now[..., None], first, -1)
+    return torch.where(now[..., None] < FRAMES, every, spread)
+
+
+class EvenFrameMemory(LookMemory):
+    """The tokens of `FRAMES` looks give scale and shift in each layer; no token is added."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.frames = FrameTokens()
+        self.layers = nn.ModuleList(Modulation() for _ in range(LAYERS))
+
+    def forward(self, looks: Looks, decisions: Tensor) -> Remembered:
+        tokens, there = self.frames(looks)
+        joins = [layer(tokens, there, self.chosen(looks, decisions)) for layer in self.layers]
+        return seen_now(looks, decisions, joins)
+
+    def chosen(self, looks: Looks, decisions: Tensor) -> Tensor:  # noqa: ARG002
+        """Return the numbers of looks (B, D, frames) that are attended to; -1 for none."""
+        return even_frames(decisions)
+
+
+class KeptFrameMemory(EvenFrameMemory):
+    """The same with looks that a planner keeps; it may point at what is out of sight."""
+
+    def forward(self, looks: Looks, decisions: Tensor) -> Remembered:
+        return (
+            super().forward(looks, decisions)._replace(can_choose=at_looks(looks.known, decisions))
+        )
+
+    def chosen(self, looks: Looks, decisions: Tensor) -> Tensor:  # noqa: ARG002
+        """Return the numbers of the looks that are kept (B, D, S); -1 for none."""
+        if looks.kept is None:
+            raise RuntimeError("KeptFrameMemory needs a planner's looks.")
+        return looks.kept
+
+
+class Modulation(nn.Module):
+    """Cross-attention from the body's tokens to those of frames, which gives scale and shift."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.norm = nn.RMSNorm(WIDTH)
+        self.query = nn.Linear(WIDTH, WIDTH, bias=False)
+        self.keyed = nn.Linear(WIDTH, 2 * (WIDTH // HEADS), bias=False)
+        self.out = nn.Linear(WIDTH, WIDTH, bias=False)
+        self.scale_shift = nn.Linear(WIDTH, 2 * WIDTH)
+        nn.init.normal_(self.scale_shift.weight, std=SMALL)
+        nn.init.zeros_(self.scale_shift.bias)
+
+    def forward(self, tokens: Tensor, there: Tensor, chosen: Tensor) -> ModulationJoin:
+        """Return what modulates a layer.
+
+        Args:
+            tokens: (B, T, m, WIDTH) of all looks.
+            there: (B, T, m).
+            chosen: (B, D, frames) looks to attend to; -1 for none.
+        """
+        found, there = at_frames(self.keyed(self.norm(tokens)), there, chosen)
+        keys, values = found[:, None].chunk(2, -1)
+        return ModulationJoin(self, keys, values, there[:, None, None])
+
+
+class ModulationJoin(Join):
+    """Scales and shifts what goes into the feed-forward network; the residual stays as it is."""
+
+    def __init__(self, own: Modulation, keys: Tensor, values: Tensor, there: Tensor) -> None:
+        self._own, self._keys, self._values, self._there = own, keys, values, there
+
+    def modulated(self, normed: Tensor) -> Tensor:
+        """Return the input of the feed-forward network, scaled and shifted."""
+        queries = split_heads(self._own.query(normed))
+        # Queries have four heads, keys and values one, which all of them share.
+        found = functional.scaled_dot_product_attention(
+            queries.flatten(1, 2)[:, None], self._keys, self._values, self._there
+        )
+        joined = join_heads(found.reshape(queries.shape))
+        scale, shift = self._own.scale_shift(self._own.out(joined)).chunk(2, -1)
+        after: Tensor = normed * (1.0 + scale) + shift
+        return after

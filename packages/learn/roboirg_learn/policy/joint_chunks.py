@@ -1,0 +1,96 @@
+"""Learned policies as policies in joint angles, which every policy server can offer."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any, ClassVar, cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from roboirg.extension.policies import Demonstration, Observation
+from roboirg.extension.sight import LOOK_EVERY, ObservedRobot
+from roboirg_learn.policy.learned_policy import LearnedPolicy
+from roboirg_learn.policy.subgoal_following import LearnedHands
+
+JointTrajectory = NDArray[np.floating[Any]]
+"""Joint angles with the gripper (T, 8), rad."""
+
+
+class JointChunks:
+    """Plans the waypoints of a learned policy, and returns the plan in chunks of joint angles.
+
+    A chunk ends where the policy looks next, after at most eight rows; all of them must be
+    executed. Joint positions, fingers and pictures of the front camera are all that is read of
+    observations and of the video: the tool's pose is computed, and a history is not needed. While
+    a waypoint cannot be reached the robot keeps still, and the policy is asked again at each look.
+
+    Args:
+        policy: chooses the waypoints.
+    """
+
+    cameras = ("front",)
+    actions: ClassVar[str] = "joint_angle"
+    demonstration_frames = LOOK_EVERY
+
+    def __init__(self, policy: LearnedPolicy) -> None:
+        self.policy, self.version = policy, policy.version
+
+    @property
+    def metadata(self) -> dict[str, Any]:
+        return self.policy.metadata
+
+    def reset(self, instruction: str, demonstration: Demonstration) -> None:
+        """Begin an episode, and see the video, whose pictures are all or every eighth."""
+        self._robot = ObservedRobot()
+        self._steps, self._gripper = 0, 1.0  # open
+        self._plan: Iterator[JointTrajectory] = iter(())
+        self._rows: JointTrajectory = np.empty((0, 8))
+        joints, video = demonstration["joint_positions"], demonstration
+        if len(joints):
+            fingers, pictures = demonstration["gripper"], demonstration["front_rgb"]
+            states = map(self._robot.observe, joints, fingers)
+            video = {
+                "joint_positions": joints,
+                "gripper": fingers,
+                "end_effector": np.stack([one["end_effector"] for one in states]),
+                "front_rgb": pictures[:: LOOK_EVERY if len(pictures) == len(joints) else 1],
+            }
+        self.policy.reset(instruction, video)
+
+    def hear(self, text: str, step: int) -> None:
+        self.policy.hear(text, step)
+
+    def act(self, observation: Observation) -> JointTrajectory:
+        """Return the rows until the next look (n, 8), n <= 8."""
+        state = self._robot.observe(observation["joint_positions"], observation["gripper"])
+        now = cast("Observation", {**observation, **state, "history": ()})
+        to_look = LOOK_EVERY - self._steps % LOOK_EVERY
+        if not len(self._rows):
+            # After the move this plans the gripper's motion where the arm has arrived.
+            self._rows = next(self._plan, self._rows)
+        if not len(self._rows):
+            (waypoint,) = self.policy.act(now)
+            self._plan = self._robot.plan(waypoint)
+            still = np.append(state["joint_positions"], self._gripper)
+            self._rows = next(self._plan, np.tile(still, (to_look, 1)))
+        elif to_look == LOOK_EVERY:
+            self.policy.watch(now)
+        chunk, self._rows = self._rows[:to_look], self._rows[to_look:]
+        self._steps, self._gripper = self._steps + len(chunk), float(chunk[-1, -1])
+        return chunk
+
+
+class JointChunksOfHands(JointChunks):
+    """The same for hands, which follow subgoals."""
+
+    policy: LearnedHands
+
+    @property
+    def subgoal(self) -> str | None:
+        """The one that they follow."""
+        return self.policy.subgoal
+
+    def follow(self, subgoal: str) -> None:
+        """Set the subgoal, which holds from the next waypoint on."""
+        self.policy.follow(subgoal)

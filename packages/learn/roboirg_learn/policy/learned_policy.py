@@ -1,0 +1,98 @@
+"""The policy that learned to act: pictures, words and proprioception become waypoints."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from roboirg.extension.policies import Demonstration, Observation
+from roboirg.extension.sight import LOOK_EVERY
+
+if TYPE_CHECKING:
+    from roboirg_learn.policy.policy_model import PolicyModel, SeenEpisode
+
+
+class LearnedPolicy:
+    """Acts on what it sees, hears and remembers; it has no access to the simulator.
+
+    It looks at every eighth control step of the video and of its own time, and at each decision.
+
+    Args:
+        model: what it has learned.
+        version: of the file that holds it.
+        seed: without effect, as nothing is random.
+
+    Attributes:
+        seen: the episode as it was seen so far; there is one after `reset`.
+    """
+
+    seen: SeenEpisode
+    cameras = ("front",)
+    actions: ClassVar[str] = "waypoint"
+    demonstration_frames = LOOK_EVERY
+    observe_every = LOOK_EVERY
+
+    def __init__(self, model: PolicyModel, version: str, seed: int = 0) -> None:
+        self.seed, self.version = seed, version
+        self.model = model
+        self._heard: list[str] = []
+        self._goal: NDArray[np.float32] | None = None
+
+    @property
+    def metadata(self) -> dict[str, Any]:
+        """How it was trained."""
+        return {"trained": self.model.about}
+
+    def reset(self, instruction: str, demonstration: Demonstration) -> None:
+        """Begin an episode, and see the video."""
+        from roboirg_learn.policy.policy_model import SeenEpisode
+
+        self._heard, self._goal = [instruction], None
+        self.seen = SeenEpisode(self.model)
+        length = len(demonstration["joint_positions"])
+        if length:
+            poses, fingers = demonstration["end_effector"], demonstration["gripper"]
+            tools = [
+                np.append(poses[time], fingers[time][0]) for time in range(0, length, LOOK_EVERY)
+            ]
+            self.seen.look(list(demonstration["front_rgb"]), tools, is_video=True)
+
+    def hear(self, text: str, step: int) -> None:  # noqa: ARG002
+        """Hear another utterance; the goal is understood anew."""
+        self._heard.append(text)
+        self._goal = None
+
+    def act(self, observation: Observation) -> NDArray[np.float64]:
+        """Return the next waypoint (1, 7)."""
+        seen = self.watch(observation)
+        chosen = seen.decide(self.understand(), tool_of(observation))
+        return np.asarray(chosen, np.float64)[None]
+
+    def understand(self) -> NDArray[np.float32]:
+        """Return the goal that was heard, as `PolicyModel.understand` does."""
+        if self._goal is None:
+            self._goal = self.seen.understand(" ".join(self._heard))
+        return self._goal
+
+    def watch(self, observation: Observation) -> SeenEpisode:
+        """See what happened since the last action, and what there is now."""
+        passed: Sequence[Observation] = observation.get("history", ())
+        looks: list[Mapping[str, Any]] = [*passed]
+        if not passed or not _same(passed[-1], observation):
+            looks.append(observation)
+        pictures = [one["front_rgb"] for one in looks]
+        self.seen.look(pictures, [tool_of(one) for one in looks], is_video=False)
+        return self.seen
+
+
+def tool_of(observation: Mapping[str, Any]) -> NDArray[np.float64]:
+    """Return the pose of the tool and the opening of a finger, (7,)."""
+    return np.append(observation["end_effector"], observation["gripper"][0])
+
+
+def _same(one: Mapping[str, Any], other: Mapping[str, Any]) -> bool:
+    """Return whether two observations are of the same moment."""
+    return all(np.array_equal(one[name], other[name]) for name in ("joint_positions", "gripper"))

@@ -1,0 +1,131 @@
+"""The kinds of waypoints that the expert makes, and the waypoint of a kind at a place."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Iterable, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from roboirg.extension.sight import ExpertRecording
+
+Z_GRID = 0.0025
+"""Meters to which heights are rounded."""
+HOME = (math.pi, 0.0, 0.0)
+"""Roll, pitch and yaw of the tool at the beginning, rad."""
+STAY = "stay"
+"""The turn of a tool that stays where it is while the gripper opens or closes."""
+LEAVE = 0.0
+"""Gripper value of a waypoint that neither opens nor closes it."""
+XY_GRID = 0.1
+"""Meters to which a way in the plane from the tool's place is rounded."""
+RAREST = 0.0005
+"""Share of all waypoints; kinds that are rarer are not learned."""
+
+
+class Move(NamedTuple):
+    """A kind of waypoint.
+
+    Attributes:
+        at_thing: whether it is at the place of a thing; else at that of the tool.
+        x: from there, m.
+        y: from there, m.
+        z: of the tool, m; 0 if it stays.
+        turn: how the tool turns: keep, align, home; stay if it does not move at all.
+        gripper: -1 closes it, 1 opens it, 0 leaves it.
+    """
+
+    at_thing: bool
+    x: float
+    y: float
+    z: float
+    turn: str
+    gripper: float
+
+
+class Decision(NamedTuple):
+    """A decision to learn.
+
+    Attributes:
+        look: number of the look at which it is made.
+        move: the kind of waypoint, or the form of the subgoal.
+        thing: number of the object at whose place it is, or at which the subgoal points; -1 for
+            none: then the waypoint is at the tool's place.
+    """
+
+    look: int
+    move: Any
+    thing: int
+
+
+def decisions_of(recorded: ExpertRecording) -> list[Decision]:
+    """Return the decisions of an episode; opening or closing belongs to the move before it."""
+    found: list[Decision] = []
+    for look, action, anchor, turn in zip(
+        recorded.looks, recorded.actions, recorded.anchors, recorded.turns, strict=True
+    ):
+        x, y, z = action[:3] - np.append(recorded.tool[look, :2], 0.0)
+        gripper = float(action[-1])
+        is_still = gripper != LEAVE
+        if is_still and found and found[-1].move.gripper == LEAVE:
+            _end_with(found, gripper)
+            continue
+        at_thing = bool(anchor >= 0)
+        if at_thing or is_still:
+            x = y = 0.0
+        places = _round(x, XY_GRID), _round(y, XY_GRID), 0.0 if is_still else _round(z, Z_GRID)
+        move = Move(at_thing, *places, STAY if is_still else turn, gripper)
+        found.append(Decision(int(look), move, int(anchor)))
+    return found
+
+
+def _end_with(found: list[Decision], gripper: float) -> None:
+    """Let the last move open or close the gripper, and the same before it that were not made."""
+    last = found[-1]
+    for number in range(len(found) - 1, -1, -1):
+        one = found[number]
+        if (one.move, one.thing) != (last.move, last.thing):
+            break
+        found[number] = one._replace(move=one.move._replace(gripper=gripper))
+
+
+def common_moves(decisions: Iterable[Sequence[Decision]]) -> tuple[Move, ...]:
+    """Return the kinds of waypoints that occur often enough, the commonest first."""
+    counts = Counter(one.move for own in decisions for one in own)
+    return tuple(move for move, count in counts.most_common() if count >= RAREST * counts.total())
+
+
+def waypoint(
+    move: Move,
+    tool: NDArray[np.floating],
+    place: NDArray[np.floating],
+    turn: NDArray[np.floating],
+) -> NDArray[np.float64]:
+    """Return the waypoint (7) of a kind.
+
+    Args:
+        move: its kind.
+        tool: (6,) x, y, z, m, roll, pitch, yaw, rad, of the tool now.
+        place: (2,) x and y of the thing, m.
+        turn: (2,) cosine and sine of four times the angle of the thing.
+    """
+    if move.turn == STAY:
+        return np.append(tool[:6], move.gripper)
+    x, y = place if move.at_thing else tool[:2]
+    angles = np.array(HOME if move.turn != "keep" else tool[3:6], np.float64)
+    if move.turn == "align":
+        angles[2] = _nearest_side(math.atan2(turn[1], turn[0]) / 4.0, float(tool[5]))
+    return np.array([x + move.x, y + move.y, move.z, *angles, move.gripper], np.float64)
+
+
+def _nearest_side(angle: float, now: float) -> float:
+    """Return the angle of a side of a square thing that needs the shortest turn from `now`."""
+    quarter = math.pi / 2.0
+    return angle + quarter * round((now - angle) / quarter)
+
+
+def _round(value: float, grid: float) -> float:
+    return round(round(float(value) / grid) * grid, 4) + 0.0

@@ -1,0 +1,130 @@
+"""What a learned planner has named, and the looks that it keeps."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from roboirg.extension.episodes import merge_keyframes
+from roboirg.extension.sight import LOOK_EVERY
+from roboirg_learn.policy.subgoals import POINT_NUMBERS
+
+VIDEO_FRAMES, SWITCHES, KEYS, RECENT = 10, 4, 16, 8
+"""Most looks of the video, at changes of subgoal, chosen, and recent ones that are kept."""
+LONGEST = 40
+"""Looks since a subgoal was named; more count as this many."""
+
+
+class PlannedNumbers(NamedTuple):
+    """What a body with subgoals, or a planner, is given at D decisions.
+
+    Attributes:
+        context: (D, C) the subgoal asked for, or what was named before; `POINT_NUMBERS` at the end.
+        kept: (D, S) numbers of looks that a planner keeps; -1 for none.
+        keys: (D, RECENT) whether each of the recent looks is to be kept; -1 where there is none.
+    """
+
+    context: NDArray[np.float32]
+    kept: NDArray[np.int64]
+    keys: NDArray[np.int64]
+
+
+def asked_for(rows: Sequence[NDArray[np.float32]]) -> PlannedNumbers:
+    """Return what hands are given that follow subgoals, as `asked_numbers` returns them."""
+    nothing = [np.full((len(rows), size), -1, np.int64) for size in (1, RECENT)]
+    return PlannedNumbers(np.stack(rows), *nothing)
+
+
+class PlannerHistory:
+    """One episode as a planner remembers it.
+
+    Args:
+        forms: number of forms of subgoals.
+        chooses: whether it keeps the looks that it chose, or those at changes of subgoal.
+
+    Attributes:
+        switches: looks at which a new subgoal was named.
+    """
+
+    def __init__(self, forms: int, *, chooses: bool) -> None:
+        self._forms, self._chooses = forms, chooses
+        self._named: list[int] = []
+        self.switches: list[int] = []
+        self._keys: tuple[int, ...] = ()
+
+    def name(self, form: int, look: int) -> None:
+        """Remember a subgoal; the same again is the same one."""
+        if not self._named or self._named[-1] != form:
+            self._named.append(form)
+            self.switches.append(look)
+
+    def choose(self, looks: Iterable[int]) -> None:
+        """Keep some looks; those in a row become one."""
+        steps = (look * LOOK_EVERY for look in (*self._keys, *looks))
+        self._keys = tuple(step // LOOK_EVERY for step in merge_keyframes(steps))
+
+    def context(self, look: int) -> NDArray[np.float32]:
+        """Return how often each form was done, which is under way, and since when."""
+        done, under_way = (np.zeros(self._forms, np.float32) for _ in range(2))
+        for form in self._named[:-1]:
+            done[form] += 1.0
+        under_way[self._named[-1:]] = 1.0
+        since = min(look - self.switches[-1], LONGEST) / LONGEST if self.switches else 0.0
+        return np.concatenate([done, under_way, [since], np.zeros(POINT_NUMBERS)], dtype=np.float32)
+
+    def kept(self, video: int, look: int) -> NDArray[np.int64]:
+        """Return the looks to attend to, -1 for none; the present one is always among them.
+
+        Args:
+            video: number of looks of the video.
+            look: the present one.
+        """
+        evenly = np.linspace(0, video - 1, min(video, VIDEO_FRAMES)).round().astype(int)
+        if self._chooses:
+            rest = [*self._keys[-KEYS:], *recent_looks(look)]
+            size = VIDEO_FRAMES + KEYS + RECENT
+        else:
+            rest, size = [*self.switches[-SWITCHES:], look], VIDEO_FRAMES + SWITCHES + 1
+        found = np.full(size, -1, np.int64)
+        every = [*evenly, *rest]
+        found[: len(every)] = every
+        return found
+
+
+def recent_looks(look: int) -> list[int]:
+    """Return the numbers of the recent looks, the present one last; below 0 there is none."""
+    return list(range(look - RECENT + 1, look + 1))
+
+
+def context_size(forms: int) -> int:
+    """Return how many numbers `PlannerHistory.context` has."""
+    return 2 * forms + 1 + POINT_NUMBERS
+
+
+def replayed(
+    forms: NDArray[np.int64], looks: NDArray[np.int64], video: int, size: int, *, chooses: bool
+) -> PlannedNumbers:
+    """Return what a planner would be given that names what is due, and chooses where it changes.
+
+    Args:
+        forms: (D,) the subgoal due at each decision; -1 where nothing is named.
+        looks: (D,) of the decisions.
+        video: number of looks of the video.
+        size: number of forms.
+        chooses: as for `PlannerHistory`.
+    """
+    history = PlannerHistory(size, chooses=chooses)
+    context, kept, keys = [], [], []
+    for form, look in zip(forms.tolist(), looks.tolist(), strict=True):
+        context.append(history.context(look))
+        kept.append(history.kept(video, look))
+        if form >= 0:
+            history.name(form, look)
+            history.choose(one for one in history.switches[-1:] if one == look)
+        recent = np.array(recent_looks(look))
+        is_asked = (recent >= 0) & (form >= 0)
+        keys.append(np.where(is_asked, np.isin(recent, history.switches), -1))
+    return PlannedNumbers(np.stack(context), np.stack(kept), np.stack(keys))

@@ -1,0 +1,75 @@
+"""What a network is given at each decision: a subgoal, or what a planner named and keeps."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import torch
+from torch import Tensor, nn
+
+from roboirg_learn.policy.body_layers import WIDTH
+from roboirg_learn.policy.memories import Looks, at_looks
+from roboirg_learn.policy.planner_history import RECENT
+
+NEAR = 25.0
+"""Per meter: how fast a thing counts less, the farther it is from the point."""
+
+
+class PlannedBatch(NamedTuple):
+    """What is given at each decision, padded; fields as in `PlannedNumbers`, with B."""
+
+    context: Tensor
+    kept: Tensor
+    keys: Tensor
+
+
+class ContextInput(nn.Module):
+    """Adds the context to the tokens of a decision, and to things how far the point is.
+
+    Args:
+        numbers: of the context.
+    """
+
+    def __init__(self, numbers: int) -> None:
+        super().__init__()
+        self.every = nn.Linear(numbers, WIDTH)
+        self.pointed = nn.Linear(4, WIDTH, bias=False)
+
+    def forward(self, context: Tensor, places: Tensor) -> tuple[Tensor, Tensor]:
+        """Return what is added to the robot's token (B, D, WIDTH), and to things (B, D, K, WIDTH).
+
+        Args:
+            context: (B, D, numbers), with the point at the end.
+            places: (B, D, K, 2) of the things, m.
+        """
+        has, point = context[:, :, None, -3:-2], context[:, :, None, -2:]
+        away = places - point
+        near = (-away.norm(dim=-1, keepdim=True) * NEAR).exp()
+        numbers = torch.cat([away * 5.0, near, torch.ones_like(near)], -1) * has
+        every = self.every(context)
+        return every, every[:, :, None] + self.pointed(numbers)
+
+
+class KeepScore(nn.Module):
+    """Scores the recent looks: which of them is to be kept."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.layers = nn.Sequential(nn.Linear(3 * WIDTH + 1, WIDTH), nn.ReLU(), nn.Linear(WIDTH, 1))
+
+    def forward(self, looks: Looks, decisions: Tensor, now: Tensor) -> Tensor:
+        """Return logits (B, D, RECENT), the present look last.
+
+        Args:
+            looks: of the episodes.
+            decisions: (B, D) the numbers of their looks.
+            now: (B, D, WIDTH) the robot's token after all layers.
+        """
+        recent = decisions[..., None] - torch.arange(RECENT - 1, -1, -1)
+        shown = torch.cat([looks.tool, (looks.things * looks.seen[..., None]).mean(2)], -1)
+        found = at_looks(shown, recent.clamp(min=0).flatten(1))
+        frames = found.reshape(*recent.shape, -1)
+        thought = now[:, :, None].expand(-1, -1, RECENT, -1)
+        is_now = (recent == decisions[..., None]).float()[..., None]
+        scores: Tensor = self.layers(torch.cat([frames, thought, is_now], -1))
+        return scores.squeeze(-1)

@@ -1,0 +1,58 @@
+"""What hands and planners learn from: recordings with the subgoal that is due at each decision."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from roboirg.extension.commands import InvalidValueError
+from roboirg_learn.policy.planner_history import asked_for, replayed
+from roboirg_learn.policy.policy_data import EpisodeNumbers
+from roboirg_learn.policy.policy_plan import CHOOSES, HANDS, PLANNERS, Recorded
+from roboirg_learn.policy.sight import Sight
+from roboirg_learn.policy.subgoals import asked_numbers, recorded_subgoals
+
+IS_VIDEO = 6
+"""Where the numbers of the tool have whether a look is one of the video."""
+
+
+def with_planned(
+    memory: str,
+    one: Recorded,
+    numbers: EpisodeNumbers,
+    forms: int,
+    sight: Sight,
+    rng: np.random.Generator,
+) -> EpisodeNumbers:
+    """Return an episode with what hands or a planner are given; of other bodies as it is.
+
+    Args:
+        memory: a name of `MEMORIES`.
+        one: the episode.
+        numbers: the same for the network.
+        forms: number of forms of subgoals, for a planner.
+        sight: of the camera.
+        rng: moves the points of subgoals.
+    """
+    if memory == HANDS:
+        done = numbers.done.tolist()
+        subgoals = recorded_subgoals(one.recording, one.episode, done, rng)
+        # Hands know what they are asked for, and no goal.
+        return numbers._replace(
+            goal=np.zeros_like(numbers.goal),
+            planned=asked_for([_known(subgoal, sight) for subgoal in subgoals]),
+        )
+    if memory in PLANNERS:
+        video = int(numbers.looks.tool[:, IS_VIDEO].sum())
+        planned = replayed(
+            numbers.moves, numbers.decisions, video, forms, chooses=memory == CHOOSES
+        )
+        return numbers._replace(planned=planned)
+    return numbers
+
+
+def _known(subgoal: str, sight: Sight) -> NDArray[np.float32]:
+    found = asked_numbers(subgoal, sight)
+    if found is None:
+        raise InvalidValueError(f"The subgoal {subgoal!r} has no form that hands know.")
+    return found

@@ -1,0 +1,41 @@
+"""Which task an episode is of, from its words and what is seen at the beginning."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import torch
+from torch import Tensor, nn
+
+from roboirg_learn.listener.object_relations import ObjectsInView
+from roboirg_learn.listener.vocabulary import Vocabulary, split_words
+
+WIDTH = 32
+
+
+class TaskNet(nn.Module):
+    """Scores the tasks of a vocabulary.
+
+    Args:
+        vocabulary: of words, classes and tasks.
+    """
+
+    def __init__(self, vocabulary: Vocabulary) -> None:
+        super().__init__()
+        self._words = {word: number for number, word in enumerate(vocabulary.words)}
+        self._classes = len(vocabulary.classes)
+        numbers = len(self._words) + self._classes + 1
+        self.layers = nn.Sequential(
+            nn.Linear(numbers, WIDTH), nn.ReLU(), nn.Linear(WIDTH, len(vocabulary.tasks))
+        )
+
+    def forward(self, texts: Sequence[str], seen: Sequence[ObjectsInView]) -> Tensor:
+        """Return logits (n, tasks); two looks mean that there is a video."""
+        rows = torch.zeros(len(texts), len(self._words) + self._classes + 1)
+        for row, text, objects in zip(rows, texts, seen, strict=True):
+            row[[self._words[word] for word in split_words(text) if word in self._words]] = 1.0
+            for kind in objects.kinds[objects.views == 0]:
+                row[len(self._words) + int(kind)] += 0.3
+            row[-1] = float(objects.looks > 1)
+        scores: Tensor = self.layers(rows)
+        return scores

@@ -1,0 +1,88 @@
+"""A policy that acts in waypoints as one that acts in joint angles."""
+
+import numpy as np
+import pytest
+
+from roboirg.core.policy_needs import PolicyNeeds
+from roboirg.envs.factory import make
+from roboirg.policies import play
+from roboirg.policies.builtin.waypoint_expert import WaypointExpert
+from roboirg.simulation.physics_settings import HOME
+from roboirg.tasks.splits.splits import get_episode
+from roboirg_learn.policy.joint_chunks import JointChunks
+from roboirg_learn.policy.learned_policy import LearnedPolicy
+
+
+class Rehearsed(LearnedPolicy):
+    """Returns waypoints in order, and keeps what it sees."""
+
+    def __init__(self, waypoints):
+        super().__init__(None, "rehearsed")
+        self.waypoints, self.pictures, self.tools = waypoints, [], []
+
+    def reset(self, instruction, demonstration):
+        self.left, self.demonstration, self.seen = [*self.waypoints], demonstration, self
+
+    def look(self, pictures, tools, *, is_video):
+        self.pictures += pictures
+        self.tools += tools
+
+    def act(self, observation):
+        self.watch(observation)
+        return self.left.pop(0)
+
+
+class Guided(Rehearsed):
+    """Returns the expert's waypoints, to be rehearsed."""
+
+    def __init__(self):
+        super().__init__([])
+        self.expert = WaypointExpert()
+
+    def attach(self, env):
+        self.expert.attach(env)
+
+    def reset(self, instruction, demonstration):
+        super().reset(instruction, demonstration)
+        self.expert.reset(instruction, demonstration)
+
+    def act(self, observation):
+        self.left.append(self.expert.act(observation))
+        self.waypoints.append(self.left[-1])
+        return super().act(observation)
+
+
+@pytest.mark.sim
+def test_in_joint_angles_a_policy_sees_and_does_what_it_does_in_waypoints():
+    episode, one = get_episode("ButtonUnmask", "train", 0), Guided()
+    other = Rehearsed(one.waypoints)
+    ends = [
+        play(make(episode, **PolicyNeeds.of(policy).env_options), policy)
+        for policy in (one, JointChunks(other))
+    ]
+    assert [end["status"] for end in ends] == ["success"] * 2
+    assert ends[0]["steps"] == ends[1]["steps"]
+    # Looks within the last waypoint are not seen any more where that is one action.
+    count = len(one.tools)
+    assert np.allclose(one.tools, other.tools[:count], atol=1e-5)
+    assert np.array_equal(one.pictures, other.pictures[:count])
+
+
+STATE = {"front_rgb": 0, "joint_positions": HOME, "gripper": np.full(2, 0.04)}
+
+
+@pytest.mark.sim
+def test_what_cannot_be_reached_is_waited_for_and_the_video_is_thinned():
+    video = {
+        "joint_positions": np.tile(HOME, (10, 1)), "gripper": np.full((10, 2), 0.04),
+        "front_rgb": np.arange(10),
+    }  # fmt: skip
+    policy = Rehearsed([np.array([[2.0, 2.0, 2.0, np.pi, 0.0, 0.0, 0.0]])] * 2)
+    chunks = JointChunks(policy)
+    chunks.reset("wait", video)
+    assert policy.demonstration["front_rgb"].tolist() == [0, 8]
+    assert policy.demonstration["end_effector"].shape == (10, 6)
+    for _ in range(2):
+        assert np.allclose(chunks.act(STATE), np.tile([*HOME, 1.0], (8, 1)))
+    chunks.reset("wait", {**video, "front_rgb": np.arange(0, 10, 8)})
+    assert policy.demonstration["front_rgb"].tolist() == [0, 8]

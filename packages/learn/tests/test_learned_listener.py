@@ -1,0 +1,293 @@
+"""The listener that learns: labels, what it reads and sees, its file, and its command."""
+
+import json
+import re
+from collections import Counter
+from pathlib import Path
+
+import numpy as np
+import pytest
+import write_listener_study as study
+from plan_files import plan_file
+from typer.testing import CliRunner
+
+from roboirg.core.errors import InvalidValueError, MissingDependencyError
+from roboirg.extension import episodes
+from roboirg.extension.sight import class_of
+from roboirg.main import app
+from roboirg.policies.by_name.finding import make_policy, read_policy
+from roboirg.policies.vlm.goal_schema import goal_schema
+from roboirg.tasks import get_task
+from roboirg.tasks.splits.splits import get_episode
+from roboirg_learn.labeled_views import look
+from roboirg_learn.listener import listener_study, study_report
+from roboirg_learn.listener.listener_study import VARIANTS
+from roboirg_learn.listener.study_report import trained_rate
+from roboirg_learn.listener.vocabulary import parts_of, split_words
+
+PAGE = Path(__file__).parents[3] / "docs" / "learned-listener.md"
+
+
+def test_the_page_has_the_tables_of_the_study_s_answers():
+    assert study.PAGE.read_text(encoding="utf-8") == study.page_text(), "write_listener_study.py"
+
+
+def test_each_listener_of_the_study_answered_every_instruction_with_every_seed():
+    asked = Counter((one.listener, one.seed) for one in study.answers())
+    assert asked.keys() == {(one.name, seed) for one in VARIANTS for seed in range(3)}
+    assert len(set(asked.values())) == 1
+
+
+def test_without_pytorch_one_sentence_says_what_to_do(monkeypatch, tmp_path):
+    monkeypatch.setitem(__import__("sys").modules, "torch", None)
+    for kind in ("learned", "trained"):
+        with pytest.raises(MissingDependencyError, match="pip install torch"):
+            make_policy(f"{kind}:{tmp_path / 'none.pt'}", 0)
+    done = CliRunner().invoke(app, ["learn", "listener", "--out", str(tmp_path / "new.pt")])
+    with pytest.raises(MissingDependencyError, match="pip install torch"):
+        raise done.exception
+
+
+@pytest.mark.sim
+def test_labels_are_what_is_visible_and_where():
+    episode = get_episode("VideoUnmask", "train", 0)
+    first, later = look(episode)
+    cubes = {"cube red", "cube green", "cube blue"}
+    assert cubes <= set(first.names)
+    assert "container" not in first.names  # they appear over the cubes
+    assert not cubes & set(later.names)
+    assert later.names.count("container") == len(episode.scene.of_kind("container"))
+    for view in (first, later):
+        assert (view.picture.shape, len(view.centers)) == ((256, 256, 3), len(view.names))
+        there = {item.name: item.position[:2] for item in episode.scene.objects}
+        for name, place in zip(view.names, view.positions, strict=True):
+            assert min(np.linalg.norm(place - one) for one in there.values()) < 0.01, name
+    for name, (column, row) in zip(first.names, first.centers, strict=True):
+        if name in cubes:
+            pixel = first.picture[round(float(row)), round(float(column))].astype(int)
+            assert ("red", "green", "blue")[int(pixel.argmax())] in name
+    hidden = episode.scene.of_kind("hidden_cube")[0]
+    assert class_of(hidden) == f"cube {hidden.color}"
+
+
+@pytest.fixture(scope="module")
+def torch():
+    return pytest.importorskip("torch")
+
+
+def test_answers_fall_apart_into_parts_that_tell_them_apart():
+    assert parts_of('{"color": "red", "repeats": 2}') == ["color=red", "repeats=2"]
+    assert parts_of('{"colors": ["red", "blue"]}') == [
+        "colors.length=2",
+        "colors.0=red",
+        "colors.1=blue",
+    ]
+    for task in ("BinFill", "VideoUnmask", "PickXtimes"):
+        goals = goal_schema(task).goals
+        assert len({tuple(parts_of(answer)) for answer in goals}) == len(goals)
+
+
+def test_digits_are_read_as_words():
+    said = "Pick up the 3rd cube 2 times, then 57."
+    assert split_words(said) == split_words("pick up the third cube two times, then 57.")
+    assert "57" in split_words(said)
+
+
+def test_intervals_grow_with_the_differences_between_trainings():
+    rng = np.random.default_rng(0)
+    tasks = [(rng.random((3, 50)) < 0.8).astype(float) for _ in range(11)]
+    alike = trained_rate([np.tile(one[:1], (3, 1)) for one in tasks])
+    single = trained_rate([one[:1] for one in tasks])
+    assert alike.rate == pytest.approx(single.rate)
+    assert alike.interval == pytest.approx(single.interval)
+    apart = trained_rate([one * [[1], [1], [0.5]] for one in tasks])
+    assert len(set(apart.by_seed)) == 3
+    low, high = apart.interval
+    assert low < min(apart.by_seed) < max(apart.by_seed) < high
+    certain = trained_rate([np.ones((3, 50))])
+    assert certain.rate == 1.0
+    assert 0.9 < certain.interval[0] < certain.interval[1] == 1.0
+
+
+def scene_of(*views):
+    """What is seen of a scene with containers and red cubes."""
+    from roboirg_learn.listener.object_relations import SeenObjects, TablePlane, relate
+
+    classes = ("container", "cube red")
+    seen = [
+        SeenObjects(
+            np.array([classes.index(one[0]) for one in view], np.int64),
+            np.array([one[1:] for one in view], np.float32),
+        )
+        for view in views
+    ]
+    return relate(seen, TablePlane(np.eye(3), np.zeros((4, 2))), classes)
+
+
+def plan_of(**changes):
+    from roboirg_learn.listener.listener_training import TrainingPlan
+
+    few = TrainingPlan(
+        ("StopCube",), ("explicit", "direct"), scenes=3, detector_epochs=1, reader_epochs=24
+    )
+    return few._replace(**changes)
+
+
+@pytest.fixture
+def few(torch, monkeypatch):
+    """Few episodes of each split, and two listeners in a study."""
+    from roboirg_learn.listener import listener_training
+
+    monkeypatch.setattr(episodes, "SIZES", {"train": 4, "test": 3})
+    monkeypatch.setattr(listener_training, "VALIDATED", 1)
+    for module in (listener_study, study_report):
+        monkeypatch.setattr(module, "VARIANTS", VARIANTS[:2])
+
+
+@pytest.fixture(scope="module")
+def trained(torch, tmp_path_factory):
+    """Explicit and direct StopCube: the words are enough."""
+    from roboirg_learn.listener.learned_model import save_model
+    from roboirg_learn.listener.listener_training import train_listener
+
+    torch.set_num_threads(1)
+    folder = tmp_path_factory.mktemp("learned")
+    model = train_listener(plan_of(), folder, "listener", 0, lambda *_: None)
+    path = folder / "listener.pt"
+    save_model(model, path)
+    return model, path
+
+
+@pytest.mark.sim
+def test_it_learns_and_its_file_is_the_same_listener(trained):
+    from roboirg_learn.listener.learned_model import load_model
+
+    model, path = trained
+    again = load_model(path)
+    assert again.vocabulary == model.vocabulary
+    assert again.about["settings"] == ["explicit", "direct"]
+    picture = look(get_episode("StopCube", "train", 0))[0].picture
+    texts = {
+        visit: f"Stop the cube on the target during its {word} visit by pressing the button."
+        for visit, word in ((2, "second"), (3, "third"), (4, "fourth"), (5, "fifth"))
+    }
+    understood = {
+        visit: again.understand("StopCube", text, [picture])["visit"]
+        for visit, text in texts.items()
+    }
+    assert understood == {visit: visit for visit in texts}
+    assert all(
+        model.understand("StopCube", text, [picture])["visit"] == understood[visit]
+        for visit, text in texts.items()
+    )
+    with pytest.raises(InvalidValueError, match="was not trained on BinFill, but on StopCube"):
+        again.understand("BinFill", "Do it.", [picture])
+
+
+def test_by_place_other_goals_of_a_scene_are_told_too(torch):
+    from roboirg_learn.listener.reader_training import said
+
+    episode = get_episode("ButtonUnmask", "train", 3)
+    told = list(said([episode], ("explicit", "spatial"), "train", 3, 0))
+    explicit, *others = [one.goal for one, _ in told]
+    assert explicit == episode.goal
+    by_place = others
+    assert by_place[0] == episode.goal
+    assert len(set(by_place)) == 3
+    assert set(by_place) <= set(get_task(episode.task).goals(episode.scene))
+    assert len({text for _, text in told}) == 4
+
+
+@pytest.mark.sim
+def test_it_plays_with_the_hands_of_the_oracle(trained):
+    import roboirg
+
+    _, path = trained
+    spec = f"learned:{path}"
+    assert read_policy(spec).is_privileged
+    policy = make_policy(spec, 0)
+    env = roboirg.make("StopCube", setting="explicit", split="train", episode=1, cameras=("front",))
+    observation, info = env.reset()
+    policy.attach(env.unwrapped)
+    policy.reset(observation["instruction"], info["demonstration"])
+    goal = env.unwrapped.episode.goal
+    assert policy.metadata["understood"] == dict(goal.as_mapping())
+    assert policy.act(observation).shape[1] == 8
+
+
+@pytest.mark.sim
+def test_an_encoder_of_one_s_own_is_trained_and_loaded(few, torch, tmp_path, monkeypatch):
+    from roboirg_learn.listener import encoders
+    from roboirg_learn.listener.learned_model import load_model, save_model
+    from roboirg_learn.listener.listener_training import train_listener
+
+    monkeypatch.setitem(encoders.ENCODERS, "shades", None)  # which takes it away in the end
+    (block,) = re.findall(r"```python\n(.*?class .*?)```", PAGE.read_text(), re.DOTALL)
+    exec(block, {})  # noqa: S102 - the page's example
+    plan = plan_of(reader_epochs=2, encoders={"shades": {"size": 4}, "words": {}})
+    model = train_listener(plan, tmp_path, "own", 0, lambda *_: None)
+    save_model(model, tmp_path / "own.pt")
+    again = load_model(tmp_path / "own.pt")
+    assert again.about["encoders"] == {"shades": {"size": 4}, "words": {}}
+    picture = look(get_episode("StopCube", "val", 0))[0].picture
+    with torch.no_grad():
+        mine, theirs, dark = (
+            one.reader([one.see([seen])._replace(task="StopCube", text="Stop it.")])[0]
+            for one, seen in ((model, picture), (again, picture), (again, picture // 2))
+        )
+    assert torch.equal(mine, theirs)
+    assert not torch.equal(mine, dark)
+
+
+def test_wrong_encoders_end_before_pictures_are_drawn(torch, tmp_path):
+    for encoders, words in (
+        ({"wrods": {}}, "encoder 'wrods'"),
+        ({"words": {"size": 3}}, "Encoder 'words' with {'size': 3}"),
+    ):
+        plan = plan_file(tasks="StopCube", training={"encoders": encoders})
+        call = ["learn", "listener", "--plan", plan, "--out", str(tmp_path / "own.pt")]
+        with pytest.raises(InvalidValueError, match=words):
+            raise CliRunner().invoke(app, call).exception
+    assert not list(tmp_path.rglob("*.*"))
+
+
+def test_what_a_variant_does_not_get_changes_nothing(torch):
+    from roboirg_learn.listener.learned_model import hide
+    from roboirg_learn.listener.vocabulary import ListenerInput
+
+    seen = scene_of([("cube red", 0.0, 0.1)], [("container", 0.0, 0.1)])
+    given = ListenerInput("StopCube", "Stop it.", seen)
+    assert hide(given, "none") is given
+    assert hide(given, "words").text == ""
+    assert len(hide(given, "pictures").seen.kinds) == 0
+    assert len(hide(given, "video").seen.kinds) == 0
+    without_video = given._replace(seen=scene_of([("cube red", 0.0, 0.1)]))
+    assert hide(without_video, "video") is without_video
+
+
+@pytest.mark.sim
+def test_the_study_writes_every_listener_tables_and_goes_on(few, tmp_path):
+    short = {"scenes": 2, "detector_epochs": 1, "reader_epochs": 1, "seeds": 2}
+    plan = plan_file(tasks="StopCube", training=short)
+    words = ["learn", "listener", "--study", "--plan", plan, "--out", str(tmp_path)]
+    done = CliRunner().invoke(app, words)
+    assert done.exit_code == 0, done.output
+    files = {path: path.stat().st_mtime_ns for path in tmp_path.glob("*-?.*")}
+    names = {f"{variant.name}-{seed}" for variant in VARIANTS[:2] for seed in (0, 1)}
+    assert {path.name for path in files} == {
+        f"{name}.{end}" for name in names for end in ("pt", "jsonl")
+    }
+    text = (tmp_path / "study.md").read_text()
+    assert text.count("## ") == 3
+    assert "2 training seeds" in text
+    answers = [json.loads(line) for line in (tmp_path / "all-1.jsonl").read_text().splitlines()]
+    goals = {place: get_episode("StopCube", "test", place).goal["visit"] for place in range(3)}
+    for one in answers:
+        assert one["is_right"] == (one["understood"]["visit"] == goals[one["episode"]])
+    lost = tmp_path / "explicit-1.pt"
+    lost.unlink()
+    again = CliRunner().invoke(app, words)
+    assert again.exit_code == 0, again.output
+    changed = {path for path, time in files.items() if path.stat().st_mtime_ns != time}
+    assert changed == {lost, lost.with_suffix(".jsonl")}
+    assert (tmp_path / "study.md").read_text() == text

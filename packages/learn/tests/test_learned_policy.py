@@ -1,0 +1,290 @@
+"""The policy that learns to act: what it is recorded from, its file, its command, and its play."""
+
+import json
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from plan_files import plan_file
+from typer.testing import CliRunner
+
+from roboirg.core.errors import InvalidValueError
+from roboirg.envs.factory import make
+from roboirg.evaluation.records.store import read_records
+from roboirg.extension.sight import ExpertRecording, record_expert
+from roboirg.main import app
+from roboirg.policies import play
+from roboirg.policies.builtin.waypoint_expert import WaypointExpert
+from roboirg.policies.by_name.finding import make_policy, read_policy
+from roboirg.tasks.splits.splits import get_episode
+from roboirg.util.atomic_write import locked
+from roboirg_learn.policy.moves import common_moves, decisions_of
+from roboirg_learn.policy.policy_plan import PolicyPlan, Recorded
+from roboirg_learn.policy.recording_files import load_recording, save_recording
+from roboirg_learn.policy.sight import sight_of, turns_of
+
+
+@pytest.mark.parametrize("kind", ["trained", "learned"])
+@pytest.mark.parametrize(
+    ("named", "words"),
+    [("", "names no file"), ("a.pt?speed=2", "no option of"), ("none.pt", "No such file")],
+)
+def test_wrong_names_are_one_sentence(kind, named, words):
+    pytest.importorskip("torch")
+    with pytest.raises(InvalidValueError, match=words):
+        make_policy(f"{kind}:{named}", 0)
+
+
+@pytest.mark.sim
+def test_undisturbed_waypoints_solve_an_episode():
+    env = make(get_episode("PickXtimes", "train", 0), actions="waypoint", cameras=())
+    assert play(env, WaypointExpert())["status"] == "success"
+
+
+@pytest.fixture(scope="module")
+def recorded():
+    return record_expert(get_episode("ButtonUnmask", "random", 0))
+
+
+@pytest.mark.sim
+def test_labels_are_the_expert_s_own_while_the_way_is_disturbed(recorded):
+    assert recorded.status == "success"
+    episode = get_episode("ButtonUnmask", "random", 0)
+    for decision in decisions_of(recorded):
+        if decision.move.at_thing:
+            at = recorded.things[decision.look, decision.thing, :2]
+            action = recorded.actions[recorded.looks.tolist().index(decision.look)]
+            assert np.linalg.norm(action[:2] - at) < 0.02
+    grasped = [one.thing for one in decisions_of(recorded) if one.move.turn == "align"]
+    goal = episode.goal.texts("colors")
+    inside = {item.inside for item in episode.scene.objects if item.color in goal}
+    assert {recorded.names[thing] for thing in grasped} == inside
+    plain = record_expert(episode, disturbed=False)
+    assert not np.array_equal(plain.tool[: len(recorded.tool)], recorded.tool[: len(plain.tool)])
+
+
+def made_up(actions, looks):
+    """Return a recording of these waypoints at one thing, at looks in which nothing moves."""
+    length = max(looks) + 1
+    times = np.arange(length)
+    return ExpertRecording(
+        key="made/up/0",
+        names=("cube",),
+        classes=("cube",),
+        things=np.zeros((length, 1, 4), np.float32),
+        visible=np.ones((length, 1), bool),
+        tool=np.zeros((length, 7), np.float32),
+        is_video=np.zeros(length, bool),
+        steps=times,
+        done=np.zeros_like(times),
+        looks=np.array(looks),
+        actions=np.array(actions, np.float32),
+        anchors=np.zeros(len(actions), int),
+        turns=("align",) * len(actions),
+        pictures={},
+        status="success",
+    )
+
+
+def test_a_move_that_was_not_made_has_the_label_of_the_one_that_was():
+    down, close = [0, 0, 0.02, 0, 0, 0, 0], [0, 0, 0.02, 0, 0, 0, -1]
+    above = [0, 0, 0.15, 0, 0, 0, 0]
+    found = decisions_of(made_up([above, down, down, close, above], [0, 1, 2, 3, 4]))
+    assert [one.look for one in found] == [0, 1, 2, 4]
+    assert [one.move.gripper for one in found] == [0, -1, -1, 0]
+
+
+@pytest.mark.sim
+def test_an_interrupted_training_goes_on_where_it_was(recorded, tmp_path):
+    torch = pytest.importorskip("torch")
+    from roboirg_learn.listener.vocabulary import make_vocabulary
+    from roboirg_learn.policy.body_training import train_body
+
+    plan = PolicyPlan(("ButtonUnmask",), body_epochs=4)
+    episode = get_episode("ButtonUnmask", "random", 0)
+    sight, decisions = sight_of([recorded]), decisions_of(recorded)
+    vocabulary = make_vocabulary([""], sight.classes, plan.tasks)
+
+    def stop(work, done, total, note):
+        if done == 2:
+            raise KeyboardInterrupt
+
+    def train(name, progress):
+        folder = tmp_path / name
+        folder.mkdir(exist_ok=True)
+        learned = [Recorded(episode, recorded)] * 3
+        moves = common_moves([decisions])
+        return train_body(
+            plan, learned, [decisions] * 3, moves, sight, vocabulary, folder, progress
+        )
+
+    whole = train("whole", lambda *_: None)
+    with pytest.raises(KeyboardInterrupt):
+        train("parts", stop)
+    passes = []
+    parts = train("parts", lambda work, done, total, note: passes.append(done))
+    assert passes == [3, 4]
+    for name, value in whole.state_dict().items():
+        assert torch.equal(value, parts.state_dict()[name]), name
+    curve = json.loads((tmp_path / "parts" / "body-recurrent-0.json").read_text())
+    assert [one["epoch"] for one in curve] == [1, 2, 3, 4]
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_moved_and_mirrored_pictures_keep_their_labels(seed):
+    pytest.importorskip("torch")
+    from roboirg_learn.policy.thing_detector import LabeledPicture, varied
+
+    picture = np.zeros((256, 256, 3), np.uint8)
+    picture[100, 50] = 255
+    turns = turns_of(np.array([0.2]))
+    view = LabeledPicture(picture, np.array([0]), np.array([[50.5, 100.5]]), turns)
+    found = varied(view, np.random.default_rng(seed))
+    ((row, column),) = np.argwhere(found.picture[..., 0] == 255)
+    assert found.points.tolist() == [[column + 0.5, row + 0.5]]
+    is_mirrored = column > 128
+    assert np.allclose(found.turns, turns_of(np.array([-0.2 if is_mirrored else 0.2])))
+
+
+@pytest.mark.sim
+def test_covered_cubes_are_not_to_be_seen_and_completed_stages_are_counted(recorded):
+    stages = len(get_episode("ButtonUnmask", "random", 0).stages)
+    assert recorded.done[0] == 0
+    assert (np.diff(recorded.done) >= 0).all()
+    assert stages - 1 <= recorded.done[-1] <= stages
+    classes = np.array(recorded.classes)
+    cubes = np.char.startswith(classes, "cube")
+    assert recorded.visible[0, cubes].all()
+    assert not recorded.visible[0, classes == "container"].any()
+    covered = int(np.flatnonzero(recorded.steps >= 40)[0])
+    assert not recorded.visible[covered, cubes].any()
+    assert recorded.visible[covered, classes == "container"].all()
+
+
+@pytest.mark.sim
+def test_a_recording_is_read_as_it_was_written(recorded, tmp_path):
+    path = tmp_path / "one.npz"
+    save_recording(recorded, path)
+    for name, value in load_recording(path)._asdict().items():
+        np.testing.assert_equal(value, getattr(recorded, name), err_msg=name)
+    path.write_bytes(path.read_bytes()[:100])
+    with pytest.raises(InvalidValueError, match="delete it to make it again"):
+        load_recording(path)
+
+
+def test_a_file_that_cannot_be_loaded_is_said_with_the_reason(tmp_path):
+    torch = pytest.importorskip("torch")
+    from roboirg_learn.trained_file import load_trained
+
+    path = tmp_path / "policy.pt"
+    path.write_bytes(b"nothing")
+    with pytest.raises(InvalidValueError, match="it is damaged"):
+        load_trained(path, "policy", "this", dict)
+    for content, words in (
+        ([1], "its format is not 'this'"),
+        ({"format": "that"}, "its format is not 'this'"),
+        ({"format": "this"}, "it is damaged"),
+    ):
+        torch.save(content, path)
+        with pytest.raises(InvalidValueError, match=words):
+            load_trained(path, "policy", "this", lambda content: content["body"])
+    assert load_trained(path, "policy", "this", dict) == {"format": "this"}
+
+
+@settings(max_examples=25)
+@given(st.lists(st.sampled_from(["PickXtimes", "BinFill", "StopCube"]), max_size=90))
+def test_each_task_is_learned_and_shows_how_training_goes(tasks):
+    pytest.importorskip("torch")
+    from roboirg_learn.policy.body_training import HELD_BACK, held_back
+
+    found = list(zip(tasks, held_back(tasks), strict=True))
+    for task in set(tasks):
+        own = [is_held for one, is_held in found if one == task]
+        assert not own[0]
+        assert sum(own) == (len(own) + HELD_BACK - 2) // HELD_BACK
+
+
+def learn(*options):
+    """Return the error of the command with wrong options."""
+    pytest.importorskip("torch")
+    done = CliRunner().invoke(app, ["learn", "policy", *map(str, options)])
+    assert isinstance(done.exception, InvalidValueError), done.output
+    return str(done.exception)
+
+
+def test_what_cannot_be_learned_is_said_before_anything_is_recorded(tmp_path, monkeypatch):
+    pytest.importorskip("torch")
+    from roboirg_learn.listener.encoders import ENCODERS, TokenEncoder
+
+    class PixelEncoder(TokenEncoder):
+        reads_pixels = True
+
+        def __init__(self, vocabulary):
+            super().__init__()
+
+    monkeypatch.setitem(ENCODERS, "pixels", PixelEncoder)
+    out = tmp_path / "policy"
+    (tmp_path / "file").touch()
+    for place, options, words in (
+        (out, ("--tasks", "StopCube", "--settings", "spatial"), "None of these tasks has the"),
+        (out, ("--plan", plan_file(training={"encoders": {"bert": {}}})), "no encoder 'bert'"),
+        (out, ("--plan", plan_file(training={"encoders": {"pixels": {}}})), "reader has none"),
+        (out, ("--paper", "--memory", "none"), "training.memories"),
+        (tmp_path / "file", (), "is a file; --out needs a folder"),
+        (tmp_path / "file" / "policy", (), "Cannot write"),
+    ):
+        assert words in learn(*options, "--out", place)
+    with locked(out / ".lock", "held"):
+        assert "Another command learns in" in learn("--out", out)
+    assert not (out / "recordings").exists()
+
+
+FEW = {"scenes": 3, "drawn": 2, "detector_epochs": 1, "body_epochs": 2, "reader_epochs": 1}
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """A policy that has hardly learned, made by the command."""
+    pytest.importorskip("torch")
+    folder = tmp_path_factory.mktemp("policy")
+    plan = plan_file(training=FEW)
+    call = ["learn", "policy", "--tasks", "ButtonUnmask", "--out", str(folder), "--plan", plan]
+    done = CliRunner().invoke(app, [*call, "--workers", "0"])
+    assert done.exit_code == 0, done.output
+    return folder, call
+
+
+@pytest.mark.sim
+@pytest.mark.slow
+def test_the_command_makes_a_policy_that_plays_by_pictures_alone(folder, tmp_path):
+    path = folder[0] / "recurrent-explicit-0.pt"
+    spec = f"trained:{path}"
+    assert (read_policy(spec).is_privileged, read_policy(spec).is_hosted) == (False, True)
+    assert not hasattr(make_policy(spec, 0), "attach")
+    out = tmp_path / "runs"
+    call = ["run", "--policy", spec, "--tasks", "ButtonUnmask", "--settings", "explicit,direct"]
+    done = CliRunner().invoke(app, [*call, "--episodes", "1", "--out", str(out)])
+    assert done.exit_code == 0, done.output
+    played = read_records(next(out.rglob("records.jsonl")).parent)
+    memories = [(one.error, one.policy_metadata["trained"]["memory"]) for one in played]
+    assert memories == [(None, "recurrent")] * 2
+    curve = json.loads((folder[0] / "body-recurrent-0.json").read_text())
+    assert [one["epoch"] for one in curve] == [1, 2]
+
+
+@pytest.mark.sim
+@pytest.mark.slow
+def test_what_is_there_is_used_again_and_another_plan_loses_nothing(folder):
+    place, (*call, plan) = folder
+    before = {path: path.stat().st_mtime_ns for path in place.rglob("*.*")}
+    for options, words in (
+        (["--tasks", "PickXtimes", *call[4:], plan, "--memory", "none"], "recordings with tasks"),
+        ([*call[2:-1], "--memory", "none"], "recordings with drawn 2, not 300"),
+        ([*call[2:], plan_file(training=FEW | {"body_epochs": 3})], "was trained by another plan"),
+    ):
+        assert words in learn(*options)
+    done = CliRunner().invoke(app, [*call, plan, "--memory", "none", "--settings", "none"])
+    assert done.exit_code == 0, done.output
+    assert (place / "none-none-0.pt").exists()
+    assert {path: path.stat().st_mtime_ns for path in before} == before

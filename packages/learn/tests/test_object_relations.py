@@ -1,0 +1,122 @@
+"""Places on the table, and the ranks that objects tell."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from roboirg.core.episode import ROBOT_BASE
+from roboirg_learn.listener.object_relations import (
+    SeenObjects,
+    TablePlane,
+    fit_plane,
+    nothing_of,
+    relate,
+    relation_count,
+)
+
+CLASSES = ("button", "container", "cube blue", "cube red")
+CORNERS = np.array([(x, y) for x in (-0.3, 0.2) for y in (-0.4, 0.3)])
+FLAT = TablePlane(np.eye(3), CORNERS)
+LEFT, FORWARD, DISTANCE = range(3)
+FIXED, CODES, RANKS = 7, 6, 3
+
+
+def objects_of(*items):
+    """Objects given by class, x and y; with `FLAT`, the picture is the table."""
+    kinds = np.array([CLASSES.index(name) for name, _, _ in items], np.int64)
+    places = np.array([(x, y) for _, x, y in items], np.float32).reshape(-1, 2)
+    return SeenObjects(kinds, places)
+
+
+def scene_of(*views):
+    return relate([objects_of(*view) for view in views], FLAT, CLASSES)
+
+
+def rank(scene, number, landmark):
+    """The ranks of an object from the first and from the last, where they are told."""
+    told = scene.relations[number, landmark * CODES : (landmark + 1) * CODES]
+    return list(np.flatnonzero(told[:RANKS])), list(np.flatnonzero(told[RANKS:]))
+
+
+def landmark_of(name, view=0):
+    return FIXED + view * len(CLASSES) + CLASSES.index(name)
+
+
+def test_a_plane_is_found_from_pairs_of_places():
+    rng = np.random.default_rng(0)
+    matrix = np.array([[0.9, -0.2, 0.1], [0.1, -1.1, 0.4], [0.3, 0.2, 1.0]])
+    places = rng.random((30, 2))
+    positions = TablePlane(matrix, CORNERS).find(places)
+    found = fit_plane(places, positions)
+    assert found.find(places) == pytest.approx(positions, abs=1e-9)
+    assert found.corners.min(axis=0) == pytest.approx(positions.min(axis=0))
+    assert found.corners.max(axis=0) == pytest.approx(positions.max(axis=0))
+
+
+def test_cubes_are_ranked_among_cubes_whatever_their_color():
+    scene = scene_of(
+        [
+            ("cube red", 0.0, 0.2),
+            ("cube blue", 0.1, 0.0),
+            ("cube red", 0.0, -0.3),
+            ("button", -0.2, 0.25),
+        ]
+    )
+    assert [rank(scene, number, LEFT) for number in range(3)] == [
+        ([0], [2]),
+        ([1], [1]),
+        ([2], [0]),
+    ]
+    assert rank(scene, 3, LEFT) == ([0], [0])  # the only button
+    assert rank(scene, 0, landmark_of("button")) == ([0], [2])
+    assert rank(scene, 2, landmark_of("button")) == ([2], [0])
+    # From the blue cube the two others are ranked, and it is not.
+    assert rank(scene, 0, landmark_of("cube blue")) == ([0], [1])
+    assert rank(scene, 1, landmark_of("cube blue")) == ([], [])
+
+
+def test_containers_are_ranked_by_what_an_earlier_picture_showed():
+    scene = scene_of(
+        [("cube red", 0.0, 0.2), ("cube blue", 0.0, -0.2)],
+        [("container", 0.01, -0.2), ("container", 0.0, 0.0), ("container", 0.0, 0.21)],
+    )
+    assert scene.looks == 2
+    assert list(scene.views) == [0, 0, 1, 1, 1]
+    assert rank(scene, 4, landmark_of("cube red")) == ([0], [2])
+    assert rank(scene, 2, landmark_of("cube blue")) == ([0], [2])
+    assert rank(scene, 0, landmark_of("container", view=1)) != ([], [])
+
+
+coordinates = st.floats(-0.5, 0.5).map(lambda one: round(one, 3))
+
+
+@given(st.lists(st.tuples(st.sampled_from(CLASSES), coordinates, coordinates), max_size=12))
+def test_ranks_are_those_of_sorting(items):
+    scene = scene_of(items)
+    assert scene.relations.shape == (len(items), relation_count(len(CLASSES)))
+    for number, (name, x, y) in enumerate(items):
+        kind = name.split()[0]
+        others = [one for one in items if one[0].split()[0] == kind]
+        far = np.hypot(x - ROBOT_BASE[0], y - ROBOT_BASE[1])
+        for landmark, own, key in (
+            (LEFT, -y, lambda one: -one[2]),
+            (FORWARD, x, lambda one: one[1]),
+            (DISTANCE, far, lambda one: np.hypot(one[1] - ROBOT_BASE[0], one[2] - ROBOT_BASE[1])),
+        ):
+            values = [key(one) for one in others]
+            near, _ = rank(scene, number, landmark)
+            before = sum(value < own - 1e-6 for value in values)
+            ties = sum(abs(value - own) <= 1e-6 for value in values)
+            assert len(near) <= 1
+            if near:
+                assert before <= near[0] < before + ties
+            else:
+                assert before + ties > RANKS
+
+
+def test_nothing_is_left_of_a_scene_that_is_not_looked_at():
+    left = nothing_of(scene_of([("cube red", 0.0, 0.0)]))
+    assert left.looks == 0
+    assert all(len(one) == 0 for one in left[:4])
+    assert left.relations.shape[1] == relation_count(len(CLASSES))

@@ -1,0 +1,129 @@
+"""The paper's experiment with small policies: what is played, and what is asked of both."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import msgspec
+import pandas as pd
+import pytest
+from published_results import like_published
+
+from roboirg.core.errors import InvalidValueError
+from roboirg.evaluation.analysis.results.frame import make_frame
+from roboirg.evaluation.plan.plan_maker import make_plan
+from roboirg.tasks import all_tasks
+from roboirg.tasks.splits.splits import get_episode
+from roboirg_learn.policy.paper_experiment import (
+    PARTS,
+    SYSTEMS,
+    ExperimentPlan,
+    check_experiment,
+    part_options,
+    row_name,
+)
+from roboirg_learn.policy.paper_page import answers_text
+
+FILES = {row_name(memory): Path(f"{memory}-explicit-0.pt") for memory in SYSTEMS}
+ROW_OF = {system: row_name(memory) for memory, system in SYSTEMS.items()}
+
+
+def played(options):
+    """Return what one policy plays; those of the options need PyTorch and files."""
+    others = {name: one for name, one in options.items() if name != "policy"}
+    return make_plan(**others, policies=["oracle"]).jobs()
+
+
+@pytest.mark.parametrize(
+    ("part", "cells", "policies"),
+    [("main", 51, 5), ("resolved", 91, 5), ("context", 12, 5), ("planner", 15, 7)],
+)
+def test_each_part_plays_the_cells_of_the_paper(part, cells, policies):
+    options = part_options(part, ExperimentPlan(), FILES, {"episodes": "2"})
+    assert len(options["policy"]) == policies
+    assert len(played(options)) == cells * 2
+
+
+def test_held_out_words_are_spoken_in_every_split():
+    changes = {"episodes": "1", "split": "val", "tasks": "PickXtimes"}
+    for part in PARTS:
+        jobs = played(part_options(part, ExperimentPlan(), FILES, changes))
+        assert {job.options.wordings for job in jobs} == {"test"}
+    jobs = played(part_options("main", ExperimentPlan(), FILES, {"episodes": "1"}))
+    assert {job.options.wordings for job in jobs} == {None}
+
+
+def values(section, row):
+    """Return the differences in a row of a section's table."""
+    line = next(line for line in section.splitlines() if line.startswith(f"| {row} |"))
+    texts = [part.strip().split(" ")[0].strip("\\*") for part in line.split("|")[2:-1]]
+    return [None if text == "–" else float(text) for text in texts]
+
+
+def rows_like(found):
+    """Return published-like results as those of the rows of the systems."""
+    return [
+        msgspec.structs.replace(one, policy=ROW_OF[one.policy])
+        for one in found
+        if one.policy in ROW_OF
+    ]
+
+
+def resolved(results):
+    """Return their implicit results in the resolved form, all won."""
+    return [
+        msgspec.structs.replace(
+            one, outcome="success", options=replace(one.options, form="resolved")
+        )
+        for one in results
+        if one.options.setting != "explicit"
+    ]
+
+
+def sections(part, *results):
+    frame = make_frame([(part, [*results])])
+    columns = pd.DataFrame({name: frame[name] for name in frame})
+    filmed = {task: len(get_episode(task, "test", 0).demonstration) for task in all_tasks()}
+    columns["demonstration_steps"] = columns["task"].map(filmed)
+    return answers_text({part: columns}).split("### ")[1:]
+
+
+def test_the_same_questions_have_the_same_answers_for_equal_rates():
+    """Resolved forms are compared with references, and with nothing else."""
+    systems = "pi0.5", "FrameS-Modul"
+    found = rows_like(one for system in systems for one in like_published("main", system))
+    carried, apart, where, kept = sections("main", *found)
+    for system in systems:
+        row = ROW_OF[system]
+        assert values(carried, row) == pytest.approx(values(carried, system), abs=0.11)
+        assert values(kept, row) == pytest.approx(values(kept, system), abs=1.01)
+        if row != row_name("none"):
+            assert values(apart, row) == pytest.approx(values(apart, system), abs=0.11)
+            assert values(where, row) == pytest.approx(values(where, system), abs=0.11)
+    assert values(where, "FrameS-Modul") == pytest.approx([39.8, 5.3, 24.4, 17.3], abs=0.1)
+    assert values(carried, "FrameS-Modul")[0] == pytest.approx(-16.1, abs=0.1)
+    both = sections("main", *found, *resolved(found))
+    lost = [100 - 21.2, 100 - 13.6, 100 - 17.3, 100 - 12.4]
+    assert values(both[-1], "small-none") == pytest.approx(lost, abs=0.2)
+    assert values(apart, row) == values(both[1], row)
+
+
+def test_stages_are_compared_with_the_fewest():
+    section = sections("context", *rows_like(like_published("context")))[-1]
+    for system in ("FrameS-Modul", "GroundSG-QwenVL"):
+        published = values(section, system)
+        assert values(section, ROW_OF[system]) == pytest.approx(published, abs=0.11)
+    assert values(section, "FrameS-Modul")[-1] == pytest.approx(24.44 - 29.11, abs=0.1)
+
+
+@pytest.mark.parametrize(
+    ("changes", "named"),
+    [
+        ({"memories": ("perceptual",)}, "perceptual"),
+        ({"parts": ("side",)}, "side"),
+        ({"played": ("implied",)}, "implied"),
+        ({"memories": ("none", "framesamp")}, "memories are none, framesamp"),
+    ],
+)
+def test_a_wrong_name_ends_it_before_training(changes, named):
+    with pytest.raises(InvalidValueError, match=named):
+        check_experiment(ExperimentPlan(**changes))

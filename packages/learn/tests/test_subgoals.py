@@ -1,0 +1,265 @@
+"""Subgoals as numbers, what a planner keeps, and hands that follow any planner."""
+
+import numpy as np
+import pytest
+
+from roboirg.core.subgoal_text import split_point
+from roboirg.extension.sight import ExpertRecording, points_of
+from roboirg.tasks import all_tasks
+from roboirg.tasks.splits.splits import get_episode
+from roboirg_learn.policy.planner_history import (
+    KEYS,
+    RECENT,
+    SWITCHES,
+    VIDEO_FRAMES,
+    PlannerHistory,
+    context_size,
+    recent_looks,
+    replayed,
+)
+from roboirg_learn.policy.sight import Sight
+from roboirg_learn.policy.subgoals import (
+    FARTHEST,
+    MARKS,
+    SubgoalForm,
+    asked_numbers,
+    forms_of,
+    recorded_subgoals,
+    subgoals_due,
+)
+
+SIGHT = Sight(
+    ("button", "container", "cube blue", "cube green", "cube red", "target"),
+    np.array([0.01, 0.05, 0.02, 0.02, 0.02, 0.0]),
+)
+
+
+@pytest.mark.parametrize("task", sorted(all_tasks()))
+def test_hands_know_the_subgoals_of_every_task(task):
+    for number in range(10):
+        for stage in get_episode(task, "train", number).stages:
+            subgoal = SubgoalForm(stage.subgoal).at(np.array([100.0, 90.0]))
+            found = asked_numbers(subgoal, SIGHT)
+            assert found is not None, subgoal
+            assert found[MARKS.index(stage.primitive.kind.removesuffix("_until"))] or (
+                stage.primitive.kind == "press_below"
+            )
+
+
+def test_a_point_means_the_place_that_it_was_taken_from():
+    place = np.array([-0.05, 0.11, 0.02])
+    subgoal = SubgoalForm("pick up the red cube {at}").at(points_of(place))
+    assert split_point(subgoal)[1] is not None
+    found = asked_numbers(subgoal, SIGHT)
+    assert found[-3] == 1
+    assert np.allclose(found[-2:], place[:2], atol=0.004)
+    assert asked_numbers("pick up the red cube", SIGHT)[-3] == 0
+    assert asked_numbers("make me a sandwich", SIGHT) is None
+
+
+def recorded_of(episode, done):
+    """Return a recording in which every object moves a little at each look."""
+    names = tuple(item.name for item in episode.scene.objects)
+    looks, rng = len(done), np.random.default_rng(0)
+    things = np.zeros((looks, len(names), 4), np.float32)
+    things[..., :2] = (
+        rng.uniform(-0.1, 0.1, (len(names), 2)) + np.arange(looks)[:, None, None] / 500
+    )
+    empty = np.zeros(looks, np.int32)
+    return ExpertRecording(
+        episode.key, names, names, things, np.ones(things.shape[:2], bool),
+        np.zeros((looks, 7), np.float32), empty.astype(bool), empty, np.array(done, np.int32),
+        np.arange(looks), np.zeros((looks, 7), np.float32), empty, ("keep",) * looks, {}, "success",
+    )  # fmt: skip
+
+
+def test_recordings_yield_the_subgoal_that_is_due_with_a_point_from_its_beginning():
+    episode = get_episode("PickXtimes", "train", 0)
+    recorded = recorded_of(episode, [0, 0, 1, 1, 1])
+    due = subgoals_due(recorded, episode, range(5))
+    assert [one.move.words for one in due] == [
+        episode.stages[number].subgoal for number in (0, 0, 1, 1, 1)
+    ]
+    assert [recorded.names[one.thing] for one in due] == [
+        episode.stages[number].points_at for number in (0, 0, 1, 1, 1)
+    ]
+    done = [0, 0, 1, 1, 1]
+    exact = recorded_subgoals(recorded, episode, done, None)
+    assert exact[0] == exact[1] != exact[2] == exact[3] == exact[4]
+    wanted = points_of(recorded.things[2, due[2].thing, :3].astype(float))
+    assert np.abs(np.array(split_point(exact[2])[1])[::-1] - wanted).max() <= 0.5
+    moved = recorded_subgoals(recorded, episode, done, np.random.default_rng(0))
+    away = np.subtract(split_point(moved[2])[1], split_point(exact[2])[1])
+    assert 0 < np.abs(away).max() <= FARTHEST + 1
+
+
+def test_a_planner_remembers_changes_of_subgoal():
+    history = PlannerHistory(3, chooses=False)
+    for form, look in ((0, 2), (0, 4), (1, 7), (0, 9)):
+        history.name(form, look)
+    assert history.switches == [2, 7, 9]
+    done, under_way, rest = np.split(history.context(19), [3, 6])
+    assert done.tolist() == [1, 1, 0]
+    assert under_way.tolist() == [1, 0, 0]
+    assert rest.tolist() == [0.25, 0, 0, 0]
+    assert len(history.context(19)) == context_size(3)
+    kept = history.kept(video=2, look=19)
+    assert [one for one in kept if one >= 0] == [0, 1, 2, 7, 9, 19]
+    assert len(kept) == VIDEO_FRAMES + SWITCHES + 1
+
+
+def test_chosen_looks_in_a_row_become_their_middle_one():
+    """Looks are as far apart as the merge rule's gap, so that neighbors join."""
+    history = PlannerHistory(3, chooses=True)
+    history.choose([5, 6, 7])
+    history.choose([20, 21])
+    history.choose([23, 40])
+    kept = history.kept(video=0, look=60)
+    assert kept[:4].tolist() == [6, 21, 23, 40]
+    assert kept[4 : 4 + RECENT].tolist() == recent_looks(60)
+    history.choose([22])  # joins what was apart, as of an even group the later one counts
+    assert history.kept(video=0, look=60)[:3].tolist() == [6, 22, 40]
+    history.choose(range(100, 200, 2))
+    assert (history.kept(video=50, look=300) >= 0).sum() == VIDEO_FRAMES + KEYS + RECENT
+
+
+def test_what_is_replayed_is_what_a_planner_that_is_right_would_be_given():
+    forms, looks = np.array([0, 0, 1, 1, 0]), np.array([1, 4, 6, 9, 12])
+    planned = replayed(forms, looks, 0, 2, chooses=True)
+    history = PlannerHistory(2, chooses=True)
+    for number, (form, look) in enumerate(zip(forms, looks, strict=True)):
+        assert np.array_equal(planned.context[number], history.context(look))
+        assert np.array_equal(planned.kept[number], history.kept(0, look))
+        history.name(form, look)
+        if look in history.switches:
+            history.choose([look])
+    assert planned.keys[:, -1].tolist() == [1, 0, 1, 0, 1]
+    unasked = replayed(np.array([0, -1, 1]), np.array([1, 2, 6]), 0, 2, chooses=True)
+    assert (unasked.keys[1] == -1).all()
+    assert np.array_equal(unasked.context[2], planned.context[2])
+    assert planned.keys[0, :-2].tolist() == [-1] * (RECENT - 2)
+    assert [recent_looks(9)[place] for place in np.flatnonzero(planned.keys[3] == 1)] == [6]
+
+
+def policy_of(memory):
+    """Return a policy that has learned nothing."""
+    torch = pytest.importorskip("torch")
+    from roboirg_learn.listener.listener_net import ListenerNet
+    from roboirg_learn.listener.vocabulary import make_vocabulary
+    from roboirg_learn.policy.moves import Move
+    from roboirg_learn.policy.policy_model import PolicyModel, make_body
+    from roboirg_learn.policy.policy_plan import HANDS
+    from roboirg_learn.policy.task_net import TaskNet
+    from roboirg_learn.policy.thing_detector import ThingDetector
+
+    torch.manual_seed(0)
+    vocabulary = make_vocabulary(["pick the cube"], SIGHT.classes, ["PickXtimes"])
+    moves = Move(True, 0.0, 0.0, 0.15, "align", 0.0), Move(False, 0.0, 0.0, 0.1, "keep", 0.0)
+    forms = forms_of([get_episode("PickXtimes", "train", 0)])
+    nets = [make_body(SIGHT, vocabulary, moves, HANDS), make_body(SIGHT, vocabulary, forms, memory)]
+    every = [ThingDetector(len(SIGHT.classes)), TaskNet(vocabulary), ListenerNet(vocabulary), *nets]
+    for net in every:
+        net.eval()
+    about = {"words": "train"}
+    return PolicyModel(
+        SIGHT, every[0], vocabulary, every[1], every[2], np.zeros((4, 2)), moves, memory, nets[0],
+        about, forms, nets[1],
+    )  # fmt: skip
+
+
+@pytest.fixture(params=["subgoal", "keyframes"])
+def saved(request, tmp_path):
+    policy, path = policy_of(request.param), tmp_path / "policy.pt"
+    from roboirg_learn.policy.policy_model import save_policy
+
+    save_policy(policy, path)
+    return path
+
+
+def observation_of(seed=0):
+    picture = np.random.default_rng(seed).integers(0, 255, (256, 256, 3)).astype(np.uint8)
+    tool = np.array([0.0, 0.0, 0.2, np.pi, 0.0, 0.0])
+    return {
+        "front_rgb": picture, "end_effector": tool, "gripper": np.array([0.04, 0.04]),
+        "joint_positions": np.zeros(7), "history": (),
+    }  # fmt: skip
+
+
+NO_VIDEO = {"joint_positions": np.zeros((0, 7))}
+
+
+@pytest.mark.sim
+def test_hands_follow_any_planner_and_name_their_own_subgoals_without_one(saved):
+    from roboirg.policies.contract.base import SubgoalFollower
+    from roboirg_learn.kinds import make_learned
+
+    hands = make_learned(saved)
+    assert isinstance(hands, SubgoalFollower)
+    hands.reset("pick the cube", NO_VIDEO)
+    assert hands.act(observation_of()).shape == (1, 7)
+    words = split_point(hands.subgoal)[0]
+    assert words in {SubgoalForm(form.words).at(None) for form in hands.model.forms}
+    hands.follow("press the button at <100, 90>")
+    hands.act(observation_of())
+    assert hands.subgoal == "press the button at <100, 90>"
+    hands.follow("sing")
+    assert hands.subgoal == "press the button at <100, 90>"
+    hands.reset("pick the cube", NO_VIDEO)
+    assert hands.subgoal is None
+    hands.follow("sing")
+    still = hands.act(observation_of())
+    assert np.allclose(still[0], [*observation_of()["end_effector"], 0.0])
+
+
+@pytest.mark.sim
+def test_a_learned_planner_leads_the_scripted_hands_and_others_lead_learned_ones(saved):
+    from roboirg.core.errors import InvalidValueError
+    from roboirg.policies.by_name.finding import make_policy, read_policy
+    from roboirg_learn.policy.subgoal_following import LearnedHands, LearnedPlanner
+
+    own, scripted = f"trained:{saved}", f"trained:{saved}?hands=scripted"
+    assert read_policy(own).is_hosted
+    assert not read_policy(own).is_privileged
+    assert read_policy(scripted).is_privileged
+    assert not read_policy(scripted).is_hosted
+    policy = make_policy(scripted, 0)
+    assert isinstance(policy.planner, LearnedPlanner)
+    assert "front" in policy.cameras
+    policy = make_policy(f"planner:oracle?hands={own}", 0)
+    assert isinstance(policy.policy, LearnedHands)
+    assert policy.actions == "waypoint"
+    assert (
+        make_policy(f"planner:oracle?hands={own}?actions=joint_angle", 0).actions == "joint_angle"
+    )
+    with pytest.raises(InvalidValueError, match="other hands"):
+        make_policy(f"{scripted}&actions=joint_angle", 0)
+    with pytest.raises(InvalidValueError, match="when-done"):
+        make_policy(f"planner:stateless?model=none&hands={own}", 0)
+
+
+@pytest.mark.sim
+def test_hands_know_no_goal_and_planners_point_at_what_is_out_of_sight(saved):
+    torch = pytest.importorskip("torch")
+    from roboirg_learn.policy.body_net import TOOL_NUMBERS
+    from roboirg_learn.policy.policy_data import EpisodeNumbers, LookNumbers, to_batch
+    from roboirg_learn.policy.policy_model import load_policy
+
+    model = load_policy(saved)
+    size = len(model.forms)
+    looks, things, rng = 6, 3, np.random.default_rng(0)
+    seen = np.ones((looks, things), bool)
+    seen[4:, 1] = False
+    shown = LookNumbers(
+        rng.integers(0, 5, (looks, things)),
+        *(rng.normal(0, 0.1, (looks, things, 2)).astype(np.float32) for _ in range(2)),
+        seen, np.ones_like(seen), rng.normal(0, 1, (looks, TOOL_NUMBERS)).astype(np.float32),
+    )  # fmt: skip
+    planned = replayed(np.array([0, 1]), np.array([2, 5]), 0, size, chooses=True)
+    goal, nothing = np.zeros(model.goal_size, np.float32), np.array([-1, -1])
+    numbers = EpisodeNumbers(shown, goal, np.array([2, 5]), *[nothing] * 3, planned)
+    answer = model.planner(to_batch([numbers]))
+    assert (answer.things[0, 1, :, 1] > -1e3).all()
+    assert (answer.keys is None) == (model.memory == "subgoal")
+    context = planned._replace(context=planned.context + 1)
+    other = model.planner(to_batch([numbers._replace(planned=context)]))
+    assert not torch.equal(answer.moves, other.moves)

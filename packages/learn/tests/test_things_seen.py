@@ -1,0 +1,104 @@
+"""Things that a policy sees: where they are, and which is which from look to look."""
+
+import math
+
+import numpy as np
+from hypothesis import given
+from hypothesis import strategies as st
+
+from roboirg.extension.sight import points_of
+from roboirg_learn.policy.moves import RAREST, Decision, Move, common_moves, waypoint
+from roboirg_learn.policy.sight import Sight
+from roboirg_learn.policy.tracks import MOST_TRACKS, LookTokens, Tracks
+
+SIGHT = Sight(("button", "cube red", "target"), np.array([0.01, 0.02, 0.005]))
+places = st.tuples(st.floats(-0.25, 0.15), st.floats(-0.25, 0.25))
+
+
+def look_of(classes, spots):
+    count = len(classes)
+    turns = np.tile(np.array([1.0, 0.0], np.float32), (count, 1))
+    return LookTokens(
+        np.array(classes, np.int64), np.array(spots, np.float32).reshape(count, 2), turns
+    )
+
+
+@given(st.lists(st.tuples(places, st.integers(0, 2)), min_size=1, max_size=8))
+def test_a_point_of_the_picture_is_the_place_that_it_shows(things):
+    spots = np.array([spot for spot, _ in things])
+    classes = np.array([kind for _, kind in things])
+    positions = np.column_stack([spots, SIGHT.heights[classes]])
+    found = SIGHT.places(classes, points_of(positions))
+    np.testing.assert_allclose(found, spots, atol=1e-5)
+
+
+@given(
+    st.lists(st.tuples(places, st.integers(0, 2)), min_size=1, max_size=10),
+    st.randoms(use_true_random=False),
+)
+def test_things_that_stay_keep_their_tracks_in_whatever_order_they_are_found(things, rng):
+    apart = [one for n, one in enumerate(things) if all(
+        math.dist(one[0], other[0]) > 0.02 or one[1] != other[1] for other in things[:n]
+    )]  # fmt: skip
+    tracks = Tracks()
+    first = tracks.update(look_of([kind for _, kind in apart], [spot for spot, _ in apart]))
+    mixed = rng.sample(range(len(apart)), len(apart))
+    again = tracks.update(look_of([apart[n][1] for n in mixed], [apart[n][0] for n in mixed]))
+    assert again.tolist() == [first[n] for n in mixed]
+    assert tracks.count == len(apart)
+    assert tracks.seen.all()
+
+
+def test_containers_that_change_places_keep_their_tracks():
+    tracks = Tracks()
+    for share in np.linspace(0.0, 1.0, 8):
+        smooth = share * share * (3 - 2 * share)
+        aside = 0.07 * math.sin(math.pi * smooth)
+        one, other = (-0.1 + 0.2 * smooth, aside), (0.1 - 0.2 * smooth, -aside)
+        mine = tracks.update(look_of([0, 0], [one, other]))
+        assert mine.tolist() == [0, 1], share
+    np.testing.assert_allclose(tracks.places, [(0.1, 0.0), (-0.1, 0.0)], atol=1e-6)
+
+
+def test_what_is_lost_keeps_its_place_and_is_found_again():
+    tracks = Tracks()
+    tracks.update(look_of([1, 2], [(0.0, 0.1), (0.1, -0.1)]))
+    tracks.update(look_of([2], [(0.1, -0.1)]))
+    assert tracks.seen.tolist() == [False, True]
+    np.testing.assert_allclose(tracks.places[0], (0.0, 0.1))
+    # The way it was carried out of sight is no speed: it need not go on.
+    for x in (0.35, 0.2):
+        assert tracks.update(look_of([1], [(x, 0.1)])).tolist() == [0]
+
+
+def test_there_are_never_more_tracks_than_the_most():
+    spots = [(0.001 * n, 0.0) for n in range(MOST_TRACKS + 5)]
+    mine = Tracks().update(look_of([1] * len(spots), spots))
+    assert mine.tolist() == [*range(MOST_TRACKS), *[-1] * 5]
+
+
+@given(st.floats(-10.0, 10.0), st.floats(-math.pi, math.pi))
+def test_a_grasp_takes_the_side_that_needs_the_shortest_turn(now, angle):
+    move = Move(True, 0.0, 0.0, 0.02, "align", -1.0)
+    tool = np.array([0.3, 0.3, 0.15, math.pi, 0.0, now, 0.04])
+    turn = np.array([math.cos(4 * angle), math.sin(4 * angle)])
+    found = waypoint(move, tool, np.array([0.1, -0.1]), turn)
+    assert found[[0, 1, 2, 6]].tolist() == [0.1, -0.1, 0.02, -1.0]
+    assert abs(found[5] - now) <= math.pi / 4 + 1e-9
+    quarters = (found[5] - angle) / (math.pi / 2)
+    assert abs(quarters - round(quarters)) < 1e-6
+
+
+def test_a_move_from_the_tool_keeps_its_angle():
+    move = Move(False, -0.1, 0.0, 0.2, "keep", 0.0)
+    tool = np.array([0.3, 0.2, 0.15, math.pi, 0.0, 1.0, 0.04])
+    found = waypoint(move, tool, np.zeros(2), np.array([1.0, 0.0]))
+    np.testing.assert_allclose(found, [0.2, 0.2, 0.2, math.pi, 0.0, 1.0, 0.0])
+
+
+def test_rare_moves_are_not_learned():
+    usual, rare = (Move(True, 0.0, 0.0, z, "align", 0.0) for z in (0.1, 0.2))
+    often = [Decision(0, usual, 0)] * round(3 / RAREST)
+    once = [Decision(0, rare, 0)]
+    assert common_moves([often, once]) == (usual,)
+    assert common_moves([often[:3], once]) == (usual, rare)

@@ -1,0 +1,1 @@
+"""What packages built on the benchmark import: the names of these modules stay."""
