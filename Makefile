@@ -3,7 +3,7 @@
 PYTHON := .venv/bin/python
 
 .DEFAULT_GOAL := help
-.PHONY: help setup dev style types test fast-tests test-slow test-all every-test net integrations lint docs demo card clean
+.PHONY: help setup dev learn style types test fast-tests test-slow test-all test-learn every-test net integrations lint docs demo card clean
 
 help: ## list the targets
 	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):.*## /  make \1\t/' | expand -t 21
@@ -13,6 +13,9 @@ setup: ## make .venv and a Vulkan driver, for playing and results; quick when no
 
 dev: ## the same, and what tests, lint and documentation need
 	@scripts/setup dev
+
+learn: setup ## roboirg learn from this checkout, with PyTorch
+	$(PYTHON) -m pip install --quiet --editable packages/learn
 
 lint: style ## ruff and mypy
 	$(PYTHON) -m mypy
@@ -43,6 +46,9 @@ test-all: lint every-test ## lint, then every test; both at once with --jobs 2
 every-test: dev
 	$(PYTEST)
 
+test-learn: dev learn ## the tests of what learns, with PyTorch
+	$(PYTEST) packages/learn/tests
+
 net: dev ## compare words, prints, golden runs and packs with what is stored of them; takes minutes
 	$(PYTHON) tests/net/net.py compare
 
@@ -61,4 +67,4 @@ card: dev ## write docs/language-card.md anew, after a change of words or episod
 
 clean: ## remove what the tools left behind; .venv and runs stay
 	rm -rf build dist .mypy_cache .ruff_cache .pytest_cache .hypothesis
-	find src tests -name __pycache__ -type d -prune -exec rm -rf {} +
+	find src packages tests -name __pycache__ -type d -prune -exec rm -rf {} +

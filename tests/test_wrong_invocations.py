@@ -58,7 +58,6 @@ RIGHT = {
     "score grounding": ["nowhere", "--data", "nowhere"],
     "learn listener": ["--out", "out"],
     "learn policy": ["--out", "out"],
-    "learn answers": ["nowhere", "--data", "nowhere", "--out", "out"],
 }
 """Words for commands whose work needs what is not there: files, or a library."""
 

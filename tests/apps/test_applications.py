@@ -1,5 +1,6 @@
 """Each application may be left out: its commands and kinds of policies go, and nothing else."""
 
+import ast
 import contextlib
 import io
 import json
@@ -12,20 +13,24 @@ import layout
 import pytest
 from selection import slow_but
 
+from roboirg.evaluation.plan.plan_file import named_plans
 from roboirg.util.discovery import entry_names
 
 APPLICATIONS = sorted(path.parent.name for path in (layout.PACKAGE / "apps").glob("*/__init__.py"))
 
 RUN = "\nfrom roboirg.main import main; sys.argv[0] = 'roboirg'; main()"
 """Behind `WALK`: the command of the process's arguments."""
-KINDS_OF = {
-    "demonstrations": {"recorded"},
-    "learning": {"learned", "trained"},
-}
+KINDS_OF = {"demonstrations": {"recorded"}}
+LEARN = "roboirg_learn"
 
 WALK = """
-import json, sys
-from importlib.metadata import entry_points
+left_out = ""
+import importlib.metadata, json, sys
+all_entry_points = importlib.metadata.entry_points
+def entry_points(**wanted):
+    found = all_entry_points(**wanted)
+    return [one for one in found if not left_out or left_out not in one.value]
+importlib.metadata.entry_points = entry_points
 import typer
 from roboirg.core.errors import RoboIRGError
 from roboirg.main import app
@@ -73,8 +78,22 @@ def test_every_kind_of_policy_and_every_application_is_there(everything):
     } <= commands.keys()
 
 
+def test_without_what_learns_its_commands_kinds_and_plans_go_and_nothing_else(everything):
+    shown = (
+        f"{WALK}\nfrom roboirg.evaluation.plan.plan_file import named_plans\nprint(named_plans())"
+    )
+    without = shown.replace('left_out = ""', f"left_out = {LEARN!r}", 1)
+    walked, plans = subprocess.run(
+        [sys.executable, "-c", without], capture_output=True, text=True, check=True
+    ).stdout.splitlines()
+    commands, kinds = json.loads(walked)
+    assert everything[0].keys() - commands.keys() == {"learn", "learn listener", "learn policy"}
+    assert everything[1] - set(kinds) == {"learned", "trained"}
+    assert set(named_plans()) - set(ast.literal_eval(plans)) == {"paper-small"}
+
+
 @pytest.mark.sim
-@pytest.mark.parametrize("application", slow_but(["learning"], APPLICATIONS))
+@pytest.mark.parametrize("application", slow_but(["show"], APPLICATIONS))
 def test_without_an_application_the_rest_works(application, everything, tmp_path):
     shutil.copytree(layout.PACKAGE, tmp_path / "roboirg")
     shutil.rmtree(tmp_path / "roboirg" / "apps" / application)

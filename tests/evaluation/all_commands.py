@@ -40,7 +40,6 @@ WORDS = {
     "replay": "--help",
     "score grounding": "--help",
     "learn listener": "--help",
-    "learn answers": "--help",
     "learn policy": "--help",
     "leaderboard pack": "{run} --out {folder}/packed.zip",
     "leaderboard verify": "--help",

@@ -37,6 +37,7 @@ outside = "roboirg_outside.setting:SETTING"
 [project.entry-points."roboirg.protocols"]
 outside = "roboirg_outside.protocol"
 """
+LAB = ROOT / "docs" / "add-package.md"
 WITH_SETTING = "PickXtimes"
 """A task of the benchmark to which the recipe's setting applies."""
 NAMES = """\
@@ -80,6 +81,12 @@ def outside(tmp_path_factory):
     (package.parent / "pyproject.toml").write_text(PYPROJECT)
     for name, (page, heading) in RECIPES.items():
         (package / f"{name}.py").write_text(recipe(page, heading))
+    lab = folder / "lab" / "my_lab"
+    lab.mkdir(parents=True)
+    blocks = re.findall(r"```(toml|python|yaml)\n(.*?)```", LAB.read_text(), re.DOTALL)
+    files = (lab.parent / "pyproject.toml", lab / "__init__.py", lab / "lab-quick.yaml")
+    for path, (_, text) in zip(files, blocks, strict=True):
+        path.write_text(text)
     venv.create(folder / "env", with_pip=False)
     python = folder / "env" / "bin" / "python"
     scheme = {"base": str(folder / "env"), "platbase": str(folder / "env")}
@@ -88,7 +95,8 @@ def outside(tmp_path_factory):
     here = [sysconfig.get_path("purelib"), str(ROOT / "src")]
     (site / "parent.pth").write_text("\n".join(here) + "\n")
     install = ["install", "--quiet", "--no-deps", "--no-build-isolation", "--target", str(site)]
-    subprocess.run([sys.executable, "-m", "pip", *install, str(package.parent)], check=True)
+    projects = [str(package.parent), str(lab.parent)]
+    subprocess.run([sys.executable, "-m", "pip", *install, *projects], check=True)
     return python
 
 
@@ -157,6 +165,20 @@ def test_an_episode_of_each_is_played_and_shown(roboirg, names):
     assert setting in table
     roboirg("figures", "played", "--out", "figures")
     assert any(setting in path.read_text() for path in (roboirg.folder / "figures").glob("*.svg"))
+
+
+@pytest.mark.sim
+def test_the_package_of_the_page_adds_a_task_a_setting_a_kind_a_command_and_a_plan(roboirg):
+    assert roboirg("lab", "--times", "2") == "hello hello\n"
+    assert "Greet the lab." in roboirg("--help")
+    roboirg("run", "--plan", "lab-quick", "--max-steps", "400", "--out", "lab")
+    records = [json.loads(line) for line in (roboirg.folder / "lab/records.jsonl").open()]
+    played = {(one["policy"], one["task"], one["options"]["setting"]) for one in records}
+    assert played == {
+        (who, "LabPick", own) for who in ("oracle", "lab:any") for own in ("explicit", "lab")
+    }
+    assert {one["outcome"] for one in records if one["policy"] == "oracle"} == {"success"}
+    assert {one["error"] for one in records} == {None}
 
 
 def test_the_other_episodes_and_words_have_not_changed(outside, names):

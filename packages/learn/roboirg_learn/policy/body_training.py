@@ -22,7 +22,7 @@ from roboirg.extension.episodes import goal_schema
 from roboirg_learn.listener.vocabulary import Vocabulary
 from roboirg_learn.policy.body_net import MOST_DONE, BodyAnswer, BodyNet, EpisodeBatch
 from roboirg_learn.policy.memories import CLOSED
-from roboirg_learn.policy.moves import Decision
+from roboirg_learn.policy.moves import LookDecision
 from roboirg_learn.policy.policy_data import (
     EpisodeNumbers,
     to_batch,
@@ -48,7 +48,7 @@ HELD_BACK = 10
 def train_body(
     plan: PolicyPlan,
     recorded: Sequence[Recorded],
-    decisions: Sequence[Sequence[Decision]],
+    decisions: Sequence[Sequence[LookDecision]],
     moves: Sequence[Kind],
     sight: Sight,
     vocabulary: Vocabulary,

@@ -46,7 +46,7 @@ class Move(NamedTuple):
     gripper: float
 
 
-class Decision(NamedTuple):
+class LookDecision(NamedTuple):
     """A decision to learn.
 
     Attributes:
@@ -61,9 +61,9 @@ class Decision(NamedTuple):
     thing: int
 
 
-def decisions_of(recorded: ExpertRecording) -> list[Decision]:
+def decisions_of(recorded: ExpertRecording) -> list[LookDecision]:
     """Return the decisions of an episode; opening or closing belongs to the move before it."""
-    found: list[Decision] = []
+    found: list[LookDecision] = []
     for look, action, anchor, turn in zip(
         recorded.looks, recorded.actions, recorded.anchors, recorded.turns, strict=True
     ):
@@ -78,11 +78,11 @@ def decisions_of(recorded: ExpertRecording) -> list[Decision]:
             x = y = 0.0
         places = _round(x, XY_GRID), _round(y, XY_GRID), 0.0 if is_still else _round(z, Z_GRID)
         move = Move(at_thing, *places, STAY if is_still else turn, gripper)
-        found.append(Decision(int(look), move, int(anchor)))
+        found.append(LookDecision(int(look), move, int(anchor)))
     return found
 
 
-def _end_with(found: list[Decision], gripper: float) -> None:
+def _end_with(found: list[LookDecision], gripper: float) -> None:
     """Let the last move open or close the gripper, and the same before it that were not made."""
     last = found[-1]
     for number in range(len(found) - 1, -1, -1):
@@ -92,7 +92,7 @@ def _end_with(found: list[Decision], gripper: float) -> None:
         found[number] = one._replace(move=one.move._replace(gripper=gripper))
 
 
-def common_moves(decisions: Iterable[Sequence[Decision]]) -> tuple[Move, ...]:
+def common_moves(decisions: Iterable[Sequence[LookDecision]]) -> tuple[Move, ...]:
     """Return the kinds of waypoints that occur often enough, the commonest first."""
     counts = Counter(one.move for own in decisions for one in own)
     return tuple(move for move, count in counts.most_common() if count >= RAREST * counts.total())

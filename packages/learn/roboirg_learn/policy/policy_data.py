@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from roboirg.extension.sight import LOOK_EVERY, ExpertRecording
 from roboirg_learn.policy.body_net import EpisodeBatch
-from roboirg_learn.policy.moves import Decision
+from roboirg_learn.policy.moves import LookDecision
 from roboirg_learn.policy.planner_history import PlannedNumbers
 from roboirg_learn.policy.sight import GHOST, Sight, labeled_looks
 from roboirg_learn.policy.subgoal_net import PlannedBatch
@@ -99,7 +99,7 @@ def _tool_numbers(tool: NDArray[np.floating[Any]], *, is_video: bool) -> NDArray
 
 def to_numbers(
     recorded: ExpertRecording,
-    decisions: Sequence[Decision],
+    decisions: Sequence[LookDecision],
     goal: NDArray[np.float32],
     sight: Sight,
     moves: Mapping[Any, int],

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from roboirg.extension.episodes import Episode, read_subgoal
 from roboirg.extension.sight import ExpertRecording, points_of
-from roboirg_learn.policy.moves import Decision
+from roboirg_learn.policy.moves import LookDecision
 from roboirg_learn.policy.sight import Sight
 
 AT = "{at}"
@@ -49,14 +49,14 @@ class SubgoalForm(NamedTuple):
 
 def subgoals_due(
     recorded: ExpertRecording, episode: Episode, looks: Sequence[int]
-) -> list[Decision]:
+) -> list[LookDecision]:
     """Return the subgoal that is due at each of some looks."""
     found, stages = [], episode.stages
     for look in looks:
         stage = stages[min(int(recorded.done[look]), len(stages) - 1)]
         at = stage.points_at
         thing = -1 if at is None else recorded.names.index(at)
-        found.append(Decision(look, SubgoalForm(stage.subgoal), thing))
+        found.append(LookDecision(look, SubgoalForm(stage.subgoal), thing))
     return found
 
 
