@@ -24,7 +24,7 @@ EVERY = [*SOURCES, *(path for one in PACKAGES for path in one.rglob("*.py") if p
 """The benchmark's files and those of the packages next to it."""
 
 MOST_ROOMS = 17
-MOST_ARROWS = 70
+MOST_ARROWS = 73
 MOST_NAMES = 50
 """Of the benchmark, that the packages next to it import."""
 

@@ -159,6 +159,8 @@ def checkout(tmp_path: Path) -> Path:
     (tmp_path / "scripts").mkdir()
     shutil.copy(SETUP, tmp_path / "scripts")
     (tmp_path / "pyproject.toml").write_text("[project]")
+    (tmp_path / "packages" / "learn").mkdir(parents=True)
+    (tmp_path / "packages" / "learn" / "pyproject.toml").touch()
     return tmp_path
 
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 from roboirg.cli.names import known_name
 from roboirg.cli.options import PlanName, PlanWords, Tasks, Workers, check_output_file
 from roboirg.core.errors import InvalidValueError, MissingDependencyError
-from roboirg.evaluation.plan.plan_file import read_plan_file
 from roboirg.util.atomic_write import locked, write_atomically
 from roboirg.util.parallel_map import parallel_map
 from roboirg.util.processor import worker_count
@@ -22,7 +21,6 @@ __all__ = [
     "known_name",
     "locked",
     "parallel_map",
-    "read_plan_file",
     "short_hash",
     "worker_count",
     "write_atomically",

@@ -1,4 +1,4 @@
-"""What a package needs for a page: tables in Markdown, statistics, the published rates."""
+"""The paper's plans and rates, statistics, and tables in Markdown."""
 
 from __future__ import annotations
 
@@ -9,8 +9,9 @@ from roboirg.evaluation.analysis.stats.intervals import without_spread
 from roboirg.evaluation.analysis.stats.paired_tests import holm
 from roboirg.evaluation.analysis.tables.rendering.markdown import markdown
 from roboirg.evaluation.analysis.tables.table import Column, Row, Table
+from roboirg.evaluation.plan.plan_file import read_plan_file
 
-__all__ = ["holm", "markdown_table", "published_rows", "without_spread"]
+__all__ = ["holm", "markdown_table", "published_rows", "read_plan_file", "without_spread"]
 
 
 def markdown_table(

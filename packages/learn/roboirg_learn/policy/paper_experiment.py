@@ -6,8 +6,9 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from roboirg.extension.commands import InvalidValueError, known_name, read_plan_file
+from roboirg.extension.commands import InvalidValueError, known_name
 from roboirg.extension.episodes import all_settings
+from roboirg.extension.pages import read_plan_file
 from roboirg_learn.policy.policy_plan import MEMORY_NAMES, PLANNERS, PolicyPlan
 
 if TYPE_CHECKING:
