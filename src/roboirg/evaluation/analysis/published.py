@@ -11,7 +11,7 @@ from importlib import resources
 from typing import Literal, NamedTuple, cast
 
 from roboirg.core.instruction_options import InstructionOptions
-from roboirg.evaluation.analysis.results.option_labels import staged_options
+from roboirg.evaluation.analysis.results.option_labels import options_label, staged_options
 from roboirg.evaluation.analysis.stats.rates import DIGITS, mean_percent
 
 RateTable = Literal["main", "planner", "context", "real", "harder", "other"]
