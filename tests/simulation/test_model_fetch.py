@@ -133,20 +133,6 @@ def test_without_pip_the_wheel_comes_from_pypi_s_files(wheel, folder, monkeypatc
         fetch_model_files(None, said.append)
 
 
-def test_an_installed_maniskill_serves_where_nothing_was_fetched(wheel, tmp_path, monkeypatch):
-    monkeypatch.delenv(model_files.FOLDER_VARIABLE, raising=False)
-    monkeypatch.setenv("XDG_DATA_HOME", str(tmp_path / "data"))
-    with zipfile.ZipFile(wheel) as archive:
-        archive.extractall(tmp_path / "site")
-    monkeypatch.syspath_prepend(str(tmp_path / "site"))
-    assert model_files.look_for_model_files().root == tmp_path / "site" / "mani_skill"
-    fetched = model_files.fetched_folder()
-    fetched.mkdir(parents=True)
-    (fetched / model_files.MODEL_FILES[0]).parent.mkdir(parents=True)
-    (fetched / model_files.MODEL_FILES[0]).write_text("a part")
-    assert model_files.look_for_model_files().root == tmp_path / "site" / "mani_skill"
-
-
 def test_a_kill_while_unpacking_leaves_whole_files(wheel, folder):
     program = (
         "import os, sys; from pathlib import Path\n"

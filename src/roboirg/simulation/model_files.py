@@ -1,17 +1,15 @@
 """Model files of the Panda and the table, which are ManiSkill's.
 
-They are looked for in the folder that ``ROBOIRG_MODEL_FILES`` names and nowhere else if it is set,
-then where ``roboirg fetch-models`` puts them, then in an installed ManiSkill, which is located
-without importing it. A hash verifies them: other files would change pictures and dynamics.
+They are looked for in the folder that ``ROBOIRG_MODEL_FILES`` names, such as that of an installed
+ManiSkill, by default where ``roboirg fetch-models`` puts them. A hash verifies them: other files
+would change pictures and dynamics.
 """
 
 from __future__ import annotations
 
 import functools
 import hashlib
-import importlib.util
 import os
-from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -63,23 +61,21 @@ def find_model_files() -> ModelFiles:
 
 def look_for_model_files() -> ModelFiles:
     """Locate and verify the model files without caching."""
-    problems = []
-    for root in _folders():
-        problem = _problem_of(root)
-        if problem is None:
-            return ModelFiles(
-                root=root,
-                robot=root / MODEL_FILES[0],
-                wrist_camera=root / MODEL_FILES[2],
-                table=root / MODEL_FILES[-2],
-                ground_texture=root / MODEL_FILES[-1],
-            )
-        problems.append(problem)
-    raise MissingDependencyError(f"{problems[0]}; {REMEDY}")
+    root = fetched_folder()
+    problem = _problem_of(root)
+    if problem is not None:
+        raise MissingDependencyError(f"{problem}; {REMEDY}")
+    return ModelFiles(
+        root=root,
+        robot=root / MODEL_FILES[0],
+        wrist_camera=root / MODEL_FILES[2],
+        table=root / MODEL_FILES[-2],
+        ground_texture=root / MODEL_FILES[-1],
+    )
 
 
 def fetched_folder() -> Path:
-    """Return the folder to which the model files are fetched, which may not exist."""
+    """Return the folder of the model files, which may not exist."""
     if chosen := os.environ.get(FOLDER_VARIABLE):
         return Path(chosen).expanduser()
     try:
@@ -87,14 +83,6 @@ def fetched_folder() -> Path:
     except ImportError as error:
         raise MissingDependencyError(f"platformdirs is not installed ({error})") from error
     return platformdirs.user_data_path("roboirgbench") / "mani_skill-3.0.1"
-
-
-def _folders() -> Iterator[Path]:
-    yield fetched_folder()
-    if not os.environ.get(FOLDER_VARIABLE):
-        spec = importlib.util.find_spec("mani_skill")
-        if spec is not None and spec.submodule_search_locations:
-            yield Path(spec.submodule_search_locations[0])
 
 
 def _problem_of(root: Path) -> str | None:
