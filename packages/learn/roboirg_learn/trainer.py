@@ -69,8 +69,10 @@ class Trainer(Generic[One]):
     ) -> None:
         self._net, self._loss_of = net, loss_of
         self._optimizer = torch.optim.AdamW(net.parameters(), lr=rate, weight_decay=0.01)
+        # With ten steps the rising tenth would last no time, by which PyTorch divides.
+        total = max(steps, 1) + (steps == 10)  # noqa: PLR2004
         self._schedule = torch.optim.lr_scheduler.OneCycleLR(
-            self._optimizer, rate, total_steps=max(steps, 1), pct_start=0.1
+            self._optimizer, rate, total_steps=total, pct_start=0.1
         )
 
     def run(self, batches: Iterable[Sequence[One]]) -> float:
