@@ -31,6 +31,7 @@ from roboirg.shortcuts.shortcut_scores import (
     score_rule,
 )
 from roboirg.shortcuts.shortcut_tables import shortcut_rows
+from roboirg.shortcuts.text_guess import slot_share
 from roboirg.tasks import get_task
 from roboirg.tasks.splits.splits import get_episode
 
@@ -274,6 +275,19 @@ def test_shares_by_hand():
     assert score_rule("surface", told) == ({"relation": 1}, 1)
     assert score_rule("first-mention", told) == ({"relation": 0}, 0)
     assert score_chance((episode, instruct(episode))) == ({}, 1)
+
+
+@pytest.mark.parametrize(
+    ("guessed", "share"),
+    [
+        ((("red",),), Fraction(1, 3)),
+        ((("red",), ("red",), ("red",)), Fraction(2, 3)),
+        ((COLORS, ("green", "blue")), Fraction(5, 18)),
+        ((("red",), COLORS, ("blue",), ("green",)), Fraction(4, 9)),
+    ],
+)
+def test_a_share_is_of_the_values_of_the_goal_however_many_are_guessed(guessed, share):
+    assert slot_share({"colors": guessed}, "colors", ("red", "green", "red")) == share
 
 
 def test_only_slots_that_a_text_touches_count():

@@ -283,20 +283,23 @@ def test_pixels_lie_in_masks_of_the_right_things(exported):
             assert mask[point.y, point.x]
             seen = 0
             for name in referent.objects:
-                column, row = project(observation, env.session.world.bodies[name].position)
+                column, row, _ = project(observation, env.session.world.bodies[name].position)
                 near = mask[max(0, row - 9) : row + 10, max(0, column - 9) : column + 10]
                 seen += near.any()
             assert seen
             rows, columns = np.nonzero(mask)
             if len(referent.objects) == 1:
                 assert np.hypot(rows.mean() - row, columns.mean() - column) < 12
+        far = [project(observation, env.session.world.bodies[one].position)[2]
+               for one in referents[0].objects]  # fmt: skip
+        assert min(abs(one - item.meters) for one in far) < 0.04
 
 
 def project(observation, position):
-    """Column and row of a point of the world in the front picture."""
+    """Column and row of a point of the world in the front picture, and its depth in meters."""
     place = observation["front_extrinsic"] @ np.append(position, 1.0)
     x, y, depth = observation["front_intrinsic"] @ place
-    return round(x / depth), round(y / depth)
+    return round(x / depth), round(y / depth), depth
 
 
 @pytest.mark.sim
