@@ -23,6 +23,7 @@ from plan_files import plan_file
 from roboirg import main as cli
 from roboirg.apps.show import playthrough
 from roboirg.apps.show.episode_strip import StripMoment
+from roboirg.cli import progress_bar
 from roboirg.cli.progress_bar import progress_bars
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.evaluation.plan.stored_plans import read_plan
@@ -479,8 +480,13 @@ def test_progress_moves_no_cursor_in_a_pipe_even_if_colors_are_forced(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setenv("FORCE_COLOR", "1")
+    # The time left goes by what was done since the first of them.
+    times = iter([0, 20, 60, 65, 100, 101])
+    monkeypatch.setattr(progress_bar, "time", SimpleNamespace(monotonic=times.__next__))
     with progress_bars() as report:
-        report("record", 1, 2, "")
-        report("record", 2, 2, "done")
+        for done in (3, 5, 6, 9, 10):
+            report("record", done, 10, "done" if done == 10 else "")
     assert not progress_console().is_terminal
-    assert capsys.readouterr().err.splitlines() == ["record 1/2", "record 2/2  done"]
+    assert capsys.readouterr().err.splitlines() == [
+        "record 3/10", "record 5/10 2 min left", "record 9/10 17 s left", "record 10/10  done",
+    ]  # fmt: skip

@@ -132,13 +132,18 @@ def test_privilege_is_declared(unplayed: None, tmp_path: Path, policy) -> None:
     }  # fmt: skip
 
 
-def test_what_can_be_imported_has_a_spec_as_on_the_command_line() -> None:
+def test_what_can_be_imported_has_a_spec_as_on_the_command_line(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """No other process finds what a script defines, although it is there under its name."""
     from roboirg.policies.builtin.random_policy import RandomPolicy
     from roboirg.policies.by_name.finding import policy_of
 
     assert policy_of(RandomPolicy).spec == "roboirg.policies.builtin.random_policy:RandomPolicy"
-    given = (RandomPolicy, RandomPolicy(seed=1), type("Made", (Still,), {}))
-    assert [policy_of(one).place for one in given] == ["own", "python", "python"]
+    scripts = type("OfScript", (Still,), {"__module__": "__main__"})
+    monkeypatch.setattr(sys.modules["__main__"], "OfScript", scripts, raising=False)
+    given = (RandomPolicy, RandomPolicy(seed=1), type("Made", (Still,), {}), scripts)
+    assert [policy_of(one).place for one in given] == ["own", "python", "python", "python"]
 
 
 def test_options_are_those_of_a_plan(unplayed: None, tmp_path: Path) -> None:

@@ -251,8 +251,12 @@ def test_who_asks_at_the_same_moment_waits_for_all_before(
     store = reply_store.ReplyStore(ReplySettings(tmp_path), "episode")
     for _ in range(3):
         store.wait_for_turn("service", 60.0)
+    # What asked for a pause is given the longest one, even if nothing limits its rate.
+    for seconds in (9.0, 4.0):
+        store.pause("other", seconds)
+    store.wait_for_turn("other", None)
     store.close()
-    assert waits == [1.0, 2.0]
+    assert waits == [1.0, 2.0, 9.0]
 
 
 def test_processes_keep_one_limit_together(tmp_path: Path) -> None:
