@@ -64,7 +64,7 @@ def test_difficulties_select_the_episodes_that_have_them_in_every_task() -> None
     ("parse", "given", "words"),
     [
         (parse_episodes, ("0", "test", ()), r"for episode 0 alone write '0,'\.$"),
-        (parse_episodes, ("0-999999999", "train", ()), "split 'train' has episodes 0 to 99"),
+        (parse_episodes, ("3,0-999999999,5", "train", ()), "split 'train' has episodes 0 to 99"),
         (parse_stages, ("5-1",), "1,5; 1,2,5; 1,2,3,5; 1,2,3,4,5"),
         (parse_numbers, ("policy seed", "0-999999999"), "1,000,000,000 numbers; at most 10,000"),
     ],
@@ -185,7 +185,7 @@ def test_jobs_are_ordered_and_named_uniquely() -> None:
         ({"settings": "contextal"}, r"no setting 'contextal'.*Did you mean 'contextual'\?"),
         ({"split": "tests"}, r"no split 'tests'.*Did you mean 'test'\?"),
         ({"forms": "resolve"}, r"no form 'resolve'.*Did you mean 'resolved'\?"),
-        ({"episodes": "0,50"}, r"no episode 50: split 'test' has episodes 0 to 49"),
+        ({"episodes": "0,50,3"}, r"no episode 50: split 'test' has episodes 0 to 49"),
         ({"episodes": "51"}, r"no episode 50"),
         ({"video": "on"}, r"video is 'on'; it must be 'off', 'failures' or 'all'"),
         ({"stages": "2,5"}, r"stages \(2, 5\)"),

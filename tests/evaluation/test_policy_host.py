@@ -384,10 +384,13 @@ class It:
         over.usage()  # what it has cost is lost
     for one in (good, bad, over, late):
         one.close()
-    again = HostedPolicy(pool.connect(), read_policy(spec), 0)  # in a new process
+    hosts = pool.connect()
+    again = HostedPolicy(hosts, read_policy(spec), 0)  # in a new process
     again.reset("live", {})
     assert again.act({}).shape == (1, 8)  # type: ignore[typeddict-item]
     again.close()
+    HostedPolicy(hosts, read_policy("hosting_fakes:Dice"), 0).close()
+    assert child_of(pool)  # there is one again: nobody plays the other policy
 
 
 def test_a_host_goes_on_after_worlds_that_die_or_are_interrupted(

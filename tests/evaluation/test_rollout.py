@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import re
 from collections.abc import Callable
 from pathlib import Path
@@ -29,6 +30,7 @@ from roboirg.evaluation.play.video_writer import VideoWriter
 from roboirg.evaluation.records.record import EventRecord, Job, Record
 from roboirg.evaluation.records.record_codec import encode, read_record
 from roboirg.policies.by_name.finding import read_policy
+from roboirg.policies.contract.base import SubgoalEnd
 
 JOB = Job(
     policy="random",
@@ -362,6 +364,34 @@ def test_a_record_tells_a_mirrored_pick_where_the_words_name_a_side(
     record = make_record(job, "failure", "picked up the red cube", steps=9, events=events)
     assert record.attribution is not None
     assert (record.attribution.failure, record.attribution.subject) == (failure, "cube_red")
+
+
+class Stubborn(PaperPolicy):
+    """Names the same subgoal again, however its last try ended."""
+
+    reports, subgoal, turns = True, "go", itertools.count()
+
+    def act(self, observation: Any) -> Any:
+        failed = (SubgoalEnd("go", how, f"{how}!") for how in ("time-out", "missed", "blocked"))
+        ends = [*failed, SubgoalEnd("go", "done"), SubgoalEnd("sing", "refused", "no", "cube")]
+        self.endings = ends[: next(self.turns)]
+        return super().act(observation)
+
+
+def test_a_subgoal_is_noted_again_where_its_last_try_came_to_nothing(
+    stage: Callable[..., Record],
+) -> None:
+    world = PaperWorld(30)
+    world.due_stage = None  # type: ignore[attr-defined]
+    found = stage(world, Stubborn()).subgoals
+    assert [(one.step, one.text, one.ended, one.why, one.thing) for one in found] == [
+        (0, "go", "time-out", "time-out!", None),
+        (3, "go", "missed", "missed!", None),
+        (6, "go", "blocked", "blocked!", None),
+        (9, "go", "done", None, None),
+        (15, "sing", "refused", "no", "cube"),
+        (15, "go", None, None, None),
+    ]
 
 
 class TellingWorld(PaperWorld):

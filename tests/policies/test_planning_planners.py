@@ -25,6 +25,7 @@ from roboirg.policies.hands.scripted_hands import ScriptedHands
 from roboirg.policies.planners import make_planner as make_by_kind
 from roboirg.policies.planners.hierarchical_policy import HierarchicalPolicy
 from roboirg.policies.planners.oracle_planner import OraclePlanner
+from roboirg.policies.planners.vlm_planner import MOST_USELESS
 from roboirg.policies.vlm.models import ModelOptions
 
 CHUNK = 16
@@ -196,6 +197,17 @@ def test_a_useless_reply_leaves_the_last_subgoal(kind):
         usage = planner.usage()
         assert usage["unparsed"] == (2 if kind == "gemini" else 4)
         assert usage["calls"] == len(server.requests) == 1 + 2 * usage["unparsed"]
+
+
+def test_one_that_waits_asks_again_after_a_useless_reply_but_not_for_ever():
+    with fake_vlm([GO, "{}"]) as server:
+        planner = make_planner("qwen", server, asked="when-done")
+        planner.reset("Do it.", NO_VIDEO)
+        assert planner.plan(moment(0), 0) == SUBGOAL
+        planner.hear("Now.", 1)
+        for step in range(CHUNK, 20 * CHUNK, CHUNK):
+            planner.plan(moment(step), step)
+        assert len(server.requests) == 1 + 2 * MOST_USELESS
 
 
 def test_qwen_shows_video_task_history_and_picture():

@@ -52,12 +52,13 @@ def test_another_process_waits_takes_another_server_or_inherits(holder, tmp_path
     (wait, end) = told
     assert (wait.what, wait.is_queue, end) == ("a free server: h:8001", True, None)
     assert queued_seconds() - before >= 0.2
-    lock = lock_server([ONE, TWO], wait=0, folder=tmp_path)
+    monkeypatch.setattr(os, "getpid", lambda: 1)  # it begins with the second, then the first
+    lock = lock_server([TWO, ONE], wait=0, folder=tmp_path)
     assert lock.endpoint == TWO
-    with pytest.raises(PolicyTimeoutError, match="used h:8001, h:8002 for"):
-        lock_server([ONE, TWO], wait=0, folder=tmp_path, shared=True)
+    with pytest.raises(PolicyTimeoutError, match="used h:8002, h:8001 for"):
+        lock_server([TWO, ONE], wait=0, folder=tmp_path, shared=True)
     os.kill(holder.pid, signal.SIGKILL)
-    again = lock_server([ONE, TWO], wait=300, folder=tmp_path)
+    again = lock_server([TWO, ONE], wait=300, folder=tmp_path)
     assert again.endpoint == ONE
     lock.file.close()
     again.file.close()
