@@ -388,6 +388,14 @@ OPEN = {
             {("blue", "green")},
         ),
         (
+            "swaps",  # what is chosen last counts
+            (
+                "I like red. I like blue. I want the former. I chose the latter. Lift the "
+                "container that hides the cube I chose."
+            ),
+            {("blue",)},
+        ),
+        (
             "swaps",
             "I like red. I like blue. Lift the container first that hides the latter.",
             {("blue",)},

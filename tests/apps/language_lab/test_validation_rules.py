@@ -14,6 +14,7 @@ from roboirg.apps.language_lab.validation.episode_checks import (
     misread,
     not_needed,
 )
+from roboirg.apps.language_lab.validation.leaks import find_leaks
 from roboirg.apps.language_lab.validation.validation_results import RuleViolation, ValidationResults
 from roboirg.apps.language_lab.validation.validation_run import Batch, batches, validate_batch
 from roboirg.apps.language_lab.validation.validation_tables import validation_tables
@@ -81,6 +82,14 @@ def test_a_command_that_says_all_leaks(setting):
         placed = instruct(EPISODE, setting, "resolved").command
         assert list(leaking(commanding(said, placed), EPISODE))
     assert " in: " in words
+
+
+def test_a_value_behind_several_pointers_leaks():
+    episode = get_episode("VideoUnmask", "test", 3)
+    said = instruct(episode, "direct")
+    last = Utterance("command", said.command.replace("second one.", "second one in red."))
+    telling = dataclasses.replace(said, utterances=(*said.utterances[:-1], last))
+    assert find_leaks(telling, episode.goal) == {"red"}
 
 
 @pytest.mark.parametrize(
