@@ -196,15 +196,11 @@ def test_errors_are_told_and_are_exit_code_2(
     assert roboirg(*command).code == 0
 
 
-def test_instructions_are_printed(roboirg) -> None:
+def test_instructions_are_printed(roboirg, snapshot) -> None:
     said = roboirg(
         "show", "PickXtimes", "3", "--words", "--settings", "contextual", "--stages", "1,5"
     )
-    words = [line.split()[0] for line in said.out.splitlines()]
-    assert words == ["contextual", "introduction", "command"]
-    assert re.search(
-        r"explicit \(\d+ tokens\):", roboirg("show", "VideoUnmask", "0", "--words").out
-    )
+    assert said.out + roboirg("show", "VideoUnmask", "0", "--words").out == snapshot
     wrong = roboirg("show", "VideoUnmask", "99", "--words")
     assert (wrong.code, wrong.err.count("\n")) == (2, 1)
 
@@ -221,8 +217,11 @@ def test_failures_are_named_below_the_table(
     assert "and 5 more" in roboirg("report", tmp_path).out
 
 
-def test_an_episode_is_shown(roboirg, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_episode_is_shown(
+    roboirg, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, snapshot
+) -> None:
     monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("COLUMNS", "100")
     save = lambda _, path, **__: Path(path).touch()  # noqa: E731
     monkeypatch.setattr("matplotlib.figure.Figure.savefig", save)
     picture = StripMoment(7, "the end", np.zeros((256, 256, 3), np.uint8))
@@ -231,13 +230,8 @@ def test_an_episode_is_shown(roboirg, tmp_path: Path, monkeypatch: pytest.Monkey
     said = roboirg("show", "VideoPlaceButton", "3", "--split", "val")
     assert (said.code, said.err) == (0, "")
     names = [f"VideoPlaceButton-val-3{end}.png" for end in ("", "-dark")]
-    assert said.out.splitlines()[-3:] == ["oracle: success after 7 steps", *names]
     assert sorted(one.name for one in tmp_path.iterdir()) == sorted(names)
-    words = " ".join(said.out.split())
-    for told in ("VideoPlaceButton/val/3 hard, seed", "target_3", "change places", "that is: cube_",
-                 "relation", "contextual", "resolved"):  # fmt: skip
-        assert told in words, told
-    assert "spatial" not in words
+    assert said.out == snapshot
 
 
 def test_help_needs_nothing_heavy() -> None:

@@ -8,15 +8,18 @@ import itertools
 from collections import Counter
 from dataclasses import replace
 
+import msgspec
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from typer.testing import CliRunner
 
+from roboirg.apps.grounding.dataset_card import CARD, DatasetFacts, write_card
 from roboirg.apps.grounding.dataset_export import export_grounding
 from roboirg.core.errors import InvalidValueError
 from roboirg.core.instruction_options import InstructionOptions
+from roboirg.core.version import __version__
 from roboirg.envs.environment import RoboIRGEnv
 from roboirg.evaluation.grounding_items import question_set
 from roboirg.evaluation.grounding_items.grounding_item import (
@@ -33,7 +36,7 @@ from roboirg.evaluation.grounding_items.item_builder import (
     wanted_options,
     words_back,
 )
-from roboirg.evaluation.grounding_items.question_set import EpisodeName, ExportRequest
+from roboirg.evaluation.grounding_items.question_set import PARTS, EpisodeName, ExportRequest
 from roboirg.evaluation.grounding_items.referents import find_referents, pointed_kinds
 from roboirg.evaluation.grounding_items.seen_scene import nearest_to_center
 from roboirg.language import FORMS, instruct, plain_settings
@@ -327,9 +330,28 @@ def test_pictures_are_stored_once_and_all_are_there(exported):
     assert (folder / video.video).read_bytes()[4:8] == b"ftyp"
     assert 0 < len(video.frames) <= 4
     assert all(item.video is None for item in items if not item.task.startswith("Video"))
-    card = (folder / "README.md").read_text()
-    assert facts.sha256 in card
-    assert "license: apache-2.0" in card
+    assert facts.size == sum(
+        path.stat().st_size
+        for path in folder.rglob("*")
+        if path.is_file() and path.name != "README.md" and path.parent.name != PARTS
+    )
+    read = pytest.importorskip("pyarrow.parquet").read_table
+    rows = read(folder / "data" / "test-00000-of-00001.parquet").to_pylist()
+    for row, item in zip(rows, items, strict=True):
+        assert (row["id"], row["choices"], row["meters"]) == (item.id, item.choices, item.meters)
+        for one in (row["picture"], *row["frames"]):
+            assert one["bytes"] == (folder / one["path"]).read_bytes()
+
+
+def test_the_card_says_what_the_dataset_holds(tmp_path, snapshot):
+    items = [
+        msgspec.structs.replace(one, video=f"{task}.mp4" if task == "StopCube" else None)
+        for task in ("StopCube", "BinFill")
+        for one in items_of(task, 1, every_variant=task == "BinFill")[1]
+    ]
+    facts = DatasetFacts.of(items, "0" * 64, 3 << 20, ("val", "test"))
+    write_card(tmp_path, facts, 8, 16)
+    assert (tmp_path / CARD).read_text().replace(__version__, "VERSION") == snapshot
 
 
 @pytest.mark.sim
@@ -354,12 +376,14 @@ def test_the_tsv_names_earlier_items_in_place_of_their_pictures(exported):
     items = read_items(folder)
     for row, item in zip(rows, items, strict=True):
         assert row["answer"] == item.choice
+        assert (row["category"], row["l2-category"]) == (item.setting, item.task)
         assert [row[letter] for letter in LETTERS if row[letter]] == item.choices
         image = row["image"] if len(row["image"]) > 64 else rows[int(row["image"])]["image"]
         images = ast.literal_eval(image) if image.startswith("[") else [image]
         wanted = [(folder / path).read_bytes() for path in (*item.frames, item.picture)]
         assert [base64.b64decode(one) for one in images] == wanted
         assert item.text in row["question"]
+        assert bool(item.frames) == (f" the first {len(item.frames)} pictures." in row["question"])
 
 
 def test_a_set_of_no_episode_is_refused(tmp_path):

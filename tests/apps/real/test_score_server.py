@@ -11,8 +11,9 @@ import urllib.request
 
 import pytest
 
+from roboirg.apps.real.pages.score_page import render_trial
 from roboirg.apps.real.pages.score_server import ScoreServer
-from roboirg.apps.real.study.trial_log import trial_metadata
+from roboirg.apps.real.study.trial_log import TrialLog, trial_metadata
 from roboirg.evaluation.records.store import read_records
 
 NARROW = {"width": 400, "height": 800}
@@ -228,8 +229,14 @@ def test_the_page_fits_narrow_screens_and_says_what_it_shows(browser, served, wa
         page.close()
 
 
-def test_the_page_does_not_name_the_policy(served):
-    _, _, page = ask(served, "/")
-    assert "listener" not in page
-    assert "forgetful" not in page
-    assert served.plan.trials[0].name in page
+def test_the_page_says_what_is_meant_and_what_was_scored(small, snapshot):
+    """Before and after a failure, a success, and a void trial with a note; the last is open."""
+    plan, folder = small
+    trial_log = TrialLog.read(plan, folder)
+    pages = [render_trial(trial_log, plan.trials[0], nonce="n")]
+    for trial, choice in zip(plan.trials, ("misplaced", "success", "void"), strict=False):
+        trial_log.score(trial, choice, operator="ann", note=f"note on {choice}", video="a.mp4")
+    pages += [render_trial(trial_log, one, nonce="n", message="Stored") for one in plan.trials]
+    hidden = re.compile(r"(?s)<(style|script|svg)\b.*?</\1>")
+    assert [hidden.sub("", page) for page in pages] == snapshot
+    assert not re.search("listener|forgetful", "".join(pages))
