@@ -12,6 +12,7 @@ from attribution_cases import CASES, Case, NotOfferedError
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from staged import Staged
+from syrupy.assertion import SnapshotAssertion
 
 from roboirg.core.conditions import ExecutionFailure, Fact, GroundingFailure, Rule, facts_of
 from roboirg.core.episode import Episode
@@ -51,7 +52,8 @@ def played(task: str, one: Case) -> list[Staged]:
 
 
 @each_case
-def test_each_way_to_fail_is_told(task: str, one: Case) -> None:
+def test_each_way_to_fail_is_told(task: str, one: Case, snapshot: SnapshotAssertion) -> None:
+    """With the object, the step and the words: as stored, of the last episode."""
     courses = played(task, one)
     assert courses, "no episode of the sample offers it"
     for staged in courses:
@@ -60,6 +62,7 @@ def test_each_way_to_fail_is_told(task: str, one: Case) -> None:
         assert found.failure == one.failure, (staged.episode.key, found, staged.judge.cause)
         assert (staged.judge.status is Status.FAILURE) == one.early
         check(staged, found)
+    assert f"{found.step} {found.subject}: {found.sentence}" == snapshot
 
 
 def check(staged: Staged, found: FailureAttribution) -> None:

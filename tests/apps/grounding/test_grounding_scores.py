@@ -115,8 +115,9 @@ def test_random_pixels_hit_as_often_as_masks_are_large():
     item = item_of("StopCube")
     one = replace(item, points=item.points[:1])
     share = 64 / 256**2
-    chances = [guess_chance(each, "points") for each in (one, item)]
-    assert chances == pytest.approx([share, share**2])
+    either = replace(item, points_in_order=False)
+    chances = [guess_chance(each, "points") for each in (one, item, either)]
+    assert chances == pytest.approx([share, share**2, 2 * share**2])
 
 
 @pytest.mark.parametrize(
@@ -130,6 +131,7 @@ def test_random_pixels_hit_as_often_as_masks_are_large():
         ("**A**", "A", "A"),
         ("A: the green cube", "A", "A"),
         ("Let me see. A cube ... The answer is B.", "B", "B"),
+        ("A? No, the answer is C.", "C", "C"),
         ("Not A. Answer: D", None, None),  # there are three choices
         ('{"choice": "B"}', "B", "B"),
         ("A cube is meant.", None, None),

@@ -312,8 +312,8 @@ def test_an_export_goes_on_and_gives_the_same_bytes(exported, monkeypatch):
     monkeypatch.setattr(question_set, "store_media", None)  # nothing is drawn again
     assert export_grounding(request, folder, 0) == facts
     assert {path: path.read_bytes() for path in before} == before
-    with pytest.raises(InvalidValueError, match="pictures with another frames; choose another"):
-        export_grounding(request._replace(frames=5), folder, 0)
+    with pytest.raises(InvalidValueError, match="with another frames and frames_every; choose"):
+        export_grounding(request._replace(frames=5, frames_every=8), folder, 0)
     fewer = export_grounding(request._replace(settings=("direct",)), folder, 0)
     assert fewer.items == len(SEEN)
     export_grounding(request, folder, 0)
