@@ -1,5 +1,6 @@
 """The commands: what they print, and what they say of bad input."""
 
+import math
 import sys
 
 import pytest
@@ -44,10 +45,12 @@ def roboirg(monkeypatch, capsys):
             "6 trajectories, 12 episodes, about",
         ),
         ({"cameras": ["front"], "size": 96}, "2,032 frames and 14.9 MB"),
+        ({"tasks": "VideoUnmask", "format": "robomme-hdf5"}, "824 frames and"),  # with the video's
     ],
 )
 def test_a_dry_run_says_how_big_it_gets_and_writes_nothing(roboirg, tmp_path, choices, size):
-    words = ("export", "demonstrations", *FEW, *within(**choices), "--dry-run", "--out")
+    typed = [f"--{name}={choices.pop(name)}" for name in ("tasks", "format") if name in choices]
+    words = ("export", "demonstrations", *FEW, *typed, *within(**choices), "--dry-run", "--out")
     code, out, err = roboirg(*words, tmp_path / "data")
     assert (code, out) == (0, "")
     assert size in err
@@ -126,18 +129,22 @@ def test_bad_input_is_one_sentence(roboirg, tmp_path, words, message):
 
 @pytest.mark.usefixtures("in_this_process")
 def test_a_replay_prints_what_deviates(roboirg, export, monkeypatch):
-    root = export(tasks=("PickXtimes",), episodes=(0, 2))
+    root = export(tasks=("PickXtimes",), episodes=(0, 2, 3, 4))
 
     def replay(recorded):
-        final = 0.0 if recorded.index == 0 else 0.5
-        status = "success" if recorded.index == 0 else "failure"
+        # The last one's dataset does not say how it ended.
+        final = {0: 0.0, 2: 0.5, 3: 0.25, 4: math.nan}[recorded.index]
+        status = "failure" if recorded.index == 2 else "success"
         return ReplayResult(recorded.name, recorded.task, status, "success", 3, 6, final, final)
 
     monkeypatch.setattr(dataset_replay, "replay", replay)
     code, out, _ = roboirg("replay", root)
     assert code == 2
     assert "PickXtimes/train/2/0: failure after 3 of 6 steps (recorded: success)" in out
-    assert "2 trajectories: 1 with the same verdict, 1 also with a final state" in out
+    assert (
+        "4 trajectories: 3 with the same verdict, 1 also with a final state within 0.0001 "
+        "(largest difference 0.5)"
+    ) in out
 
 
 @pytest.mark.usefixtures("in_this_process")

@@ -8,6 +8,7 @@ import subprocess
 import sys
 import time
 from pathlib import Path
+from types import SimpleNamespace
 
 import killed_export
 import numpy as np
@@ -16,10 +17,11 @@ import synthetic_trajectories
 from pyarrow import parquet
 
 from roboirg.apps.demonstrations import export_run
+from roboirg.apps.demonstrations.data_card import _error_lines
 from roboirg.apps.demonstrations.dataset_reading import read_dataset
 from roboirg.apps.demonstrations.size_estimate import estimate_size
+from roboirg.core.episode import ENVIRONMENT_VERSION
 from roboirg.core.errors import InvalidValueError
-from roboirg.tasks.splits.splits import get_episode
 
 HERE = Path(__file__).parent
 KILLS = int(os.environ.get("ROBOIRG_TEST_KILLS", "4"))
@@ -116,19 +118,35 @@ def test_kept_trajectories_serve_other_formats(tmp_path, synthetic, make_plan, m
     assert summary.episodes == 4
 
 
-def test_kept_trajectories_of_other_pictures_are_not_taken(tmp_path, synthetic, make_plan):
+def test_kept_trajectories_of_other_pictures_or_worlds_are_not_taken(
+    tmp_path, synthetic, make_plan, monkeypatch
+):
     kept = tmp_path / "kept"
-    for number, plan in enumerate((make_plan(), make_plan(size=64), make_plan(cameras=("front",)))):
-        summary = export_run.run_export(plan, tmp_path / str(number), 0, quiet, kept)
-        assert summary.recorded == 6
+    for number, (version, changes, recorded) in enumerate(
+        (
+            (ENVIRONMENT_VERSION, {}, 6),
+            (ENVIRONMENT_VERSION, {"size": 64}, 6),
+            (ENVIRONMENT_VERSION, {"cameras": ("front",)}, 6),
+            (ENVIRONMENT_VERSION, {"outcomes": "all"}, 2),  # of failures no pictures were kept
+            (ENVIRONMENT_VERSION + 1, {}, 6),
+        )
+    ):
+        monkeypatch.setattr(export_run, "ENVIRONMENT_VERSION", version)
+        summary = export_run.run_export(
+            make_plan(**changes), tmp_path / str(number), 0, quiet, kept
+        )
+        assert summary.recorded == recorded
 
 
 def test_failures_are_exported_only_on_request(export):
     successes = list(read_dataset(export("successes")))
-    everything = list(read_dataset(export("all", outcomes="all")))
+    root = export("all", outcomes="all")
+    everything = list(read_dataset(root))
     assert {one.status for one in successes} == {"success"}
     assert [one.status for one in everything].count("failure") == 2
     assert len(everything) == len(successes) + 2
+    stats = json.loads((root / "meta/stats.json").read_text())["next.success"]
+    assert stats["mean"] == pytest.approx([4 / (6 * synthetic_trajectories.STEPS)])
 
 
 def test_variations_are_trajectories_of_their_own(export):
@@ -211,7 +229,7 @@ def test_plans_that_make_no_sense_are_refused(make_plan, changes, message):
 
 def test_the_card_tells_counts_and_measured_errors(export):
     card = (export(pictures="lossy-video") / "README.md").read_text()
-    assert "| all | 4 | 8 | 48 |" in card
+    assert "| VideoUnmask | 2 | 4 | 28 |\n| all | 4 | 8 | 56 |" in card
     assert "4 success, 2 failure" in card
     assert "front: mean error" in card
     assert "lerobot-train" in card
@@ -221,6 +239,18 @@ def test_the_card_tells_counts_and_measured_errors(export):
     config = text.split("```python\n")[1].split("```")[0]
     compile(config, "config", "exec")
     assert '"observation/wrist_image": "wrist_image"' in config
+
+
+def test_measured_errors_are_averages_of_frames_and_the_worst_of_all():
+    facts = [
+        SimpleNamespace(
+            rows=rows, picture_error={"front.mp4": {"mean": mean, "largest": most, "psnr": psnr}}
+        )
+        for rows, mean, most, psnr in ((1, 1.0, 9.0, 40.0), (3, 2.0, 5.0, 50.0))
+    ]
+    assert list(_error_lines(facts))[1:] == [
+        "- front: mean error 1.75, largest 9, lowest PSNR of a trajectory 40.0 dB"
+    ]
 
 
 def test_the_estimate_counts_words_once_for_pictures(make_plan):
@@ -233,7 +263,10 @@ def test_the_estimate_counts_words_once_for_pictures(make_plan):
     assert apart.size > 1.8 * one.size
     small = estimate_size(make_plan(settings=("explicit",), cameras=("front",), size=128))
     assert 0.1 < small.size / one.size < 0.13
-    assert get_episode("PickXtimes", "train", 0).task in make_plan().tasks
+    # An explicit instruction is its own resolved form.
+    assert estimate_size(make_plan(forms=("implicit", "resolved"))).episodes == 6 * (1 + 2)
+    assert estimate_size(make_plan(actions="waypoint")).frames == 6 * (508 // 20 + 140 // 20)
+    assert estimate_size(make_plan(video="sidecar")).frames == two.frames + 6 * 66
 
 
 def test_states_alone_need_no_pictures(export):

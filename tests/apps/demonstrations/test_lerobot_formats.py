@@ -2,6 +2,7 @@
 
 import io
 import json
+from types import SimpleNamespace
 
 import av
 import numpy as np
@@ -12,6 +13,10 @@ from PIL import Image
 from pyarrow import parquet
 
 from roboirg.apps.demonstrations.dataset_reading import read_dataset
+from roboirg.apps.demonstrations.frame_columns import FrameColumns
+from roboirg.apps.demonstrations.language_columns import _utterances
+from roboirg.core.delivery import SPACING
+from roboirg.core.instruction_options import InstructionOptions
 from roboirg.language import instruct
 from roboirg.tasks.splits.splits import get_episode
 from roboirg.util.media import scaled_square
@@ -56,9 +61,9 @@ def check_statistics(root):
     pixels = np.stack([decoded(frame[name]) for frame in frames]).reshape(-1, 3) / 255.0
     assert np.ravel(stats[name]["mean"]) == pytest.approx(pixels.mean(axis=0))
     assert np.ravel(stats[name]["q01"]) == pytest.approx(np.quantile(pixels, 0.01, axis=0))
-    row, own = next(load_v3(root))
-    state = np.array([frame["observation.state"] for frame in own])
-    assert np.allclose(row["stats/observation.state/max"], state.max(axis=0))
+    for row, own in load_v3(root):
+        state = np.array([frame["observation.state"] for frame in own])
+        assert np.allclose(row["stats/observation.state/max"], state.max(axis=0))
     assert set(stats) == set(read_json(root / "meta/info.json")["features"]) - {
         "subgoal",
         "grounded_subgoal",
@@ -143,8 +148,12 @@ def test_one_camera_in_small_pictures(export, version, pictures):
 def test_the_video_comes_before_the_policy_and_is_marked(export):
     root = export(video="prefix", pictures="lossless-video", tasks=("VideoUnmask",), episodes=(0,))
     episode = get_episode("VideoUnmask", "train", 0)
+    counted = read_json(root / "meta/stats.json")[WRIST]["count"]
+    assert counted == [2 * (4 + synthetic.STEPS)]
     for row, frames in load_v3(root):
-        assert [frame["is_video_demo"] for frame in frames] == [True] * 4 + [False] * 6
+        assert [frame["is_video_demo"] for frame in frames] == [True] * 4 + [
+            False
+        ] * synthetic.STEPS
         expected = synthetic.arrays_of(episode, len(frames) + 1, 4, has_depth=False)
         assert frames[3]["action"] == expected["actions"][4].tolist()
         key = "videos/observation.images.wrist"
@@ -187,13 +196,26 @@ def test_language_columns_tell_subtasks_and_other_words(export):
         spoken = frames[0]["language_persistent"]
         assert all(frame["language_persistent"] == spoken for frame in frames)
         subtasks = [(one["content"], one["timestamp"]) for one in spoken if one["role"] != "user"]
-        changes = [0, *(i for i in range(1, 6) if frames[i]["subgoal"] != frames[i - 1]["subgoal"])]
+        changes = [
+            0,
+            *(i for i in range(1, len(frames)) if frames[i]["subgoal"] != frames[i - 1]["subgoal"]),
+        ]
         assert subtasks == [
             (frames[i]["subgoal"], pytest.approx(i / 20, abs=1e-6)) for i in changes
         ]
         others = [one["content"] for one in spoken if one["style"] == "task_aug"]
         assert others == ([] if row["episode_index"] == 0 else [next(load_v3(root))[0]["tasks"][0]])
         assert all(frame["language_events"] == [] for frame in frames)
+
+
+def test_later_utterances_have_the_frame_at_which_they_are_said(make_plan):
+    facts = {"turns": [{"text": text} for text in ("One.", "Two.", "Three.")]}
+    words = SimpleNamespace(options=InstructionOptions(delivery="turns"), facts=facts)
+    trajectory = SimpleNamespace(facts=SimpleNamespace(video_length=4, steps=90))
+    for video, first in (("prefix", 4), ("none", 0)):
+        columns = FrameColumns(make_plan(video=video))
+        said = list(_utterances(columns, trajectory, SimpleNamespace(words=words)))
+        assert said == [(first + SPACING, "Two."), (first + 2 * SPACING, "Three.")]
 
 
 def test_version_2_1_has_a_file_per_episode(export):

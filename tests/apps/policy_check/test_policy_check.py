@@ -235,18 +235,6 @@ def test_the_command_prints_a_table_and_an_exit_code(name, code, tmp_path, monke
     assert "Actions joint_angle" in result.output
 
 
-def test_global_random_numbers_belong_to_an_episode():
-    assert not found(f"{__name__}:GlobalDice", FAIL)
-
-
-class GlobalDice(Sound):
-    def reset(self, instruction, demonstration):
-        np.random.seed(7)  # noqa: NPY002
-
-    def act(self, observation):
-        return np.random.uniform(-0.1, 0.1, (5, 8))  # noqa: NPY002
-
-
 class Versioned(Sound):
     version = "step 3000"
 
