@@ -15,7 +15,7 @@ from roboirg.evaluation.api import python_run
 from roboirg.evaluation.api.results import Results
 from roboirg.evaluation.plan.stored_plans import read_plan
 from roboirg.evaluation.records.record import Job, Record
-from roboirg.evaluation.records.store import read_records
+from roboirg.evaluation.records.store import RECORDS_FILE, read_records
 
 
 class Still:
@@ -70,6 +70,10 @@ def test_results_are_those_of_the_records(unplayed: None, tmp_path: Path) -> Non
     assert "forgetful explicit: 100.0 %" in repr(results)
     with pytest.raises(UnknownNameError):
         results.compare("listener", "nobody")
+    lines = (tmp_path / RECORDS_FILE).read_bytes().splitlines(keepends=True)
+    (tmp_path / RECORDS_FILE).write_bytes(b"".join(lines[:-2]))
+    cut = Results(tmp_path)
+    assert (len(cut.frame), cut.errors, cut.missing) == (2 * 3 * 3 - 2, 0, 2)
 
 
 def test_results_have_figures_and_a_page(unplayed: None, tmp_path: Path) -> None:

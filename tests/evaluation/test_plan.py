@@ -31,7 +31,7 @@ def test_a_number_is_the_first_episodes_and_a_list_is_a_list() -> None:
 @pytest.mark.parametrize(
     "text",
     [
-        "0", "-3", "a", "3-1", "1.5", "", ",", "1,,b", "300000000", "0-999999999",
+        "0", "-3", "a", "3-1", "5-0", "1.5", "", ",", "1,,b", "300000000", "0-999999999",
         "9" * 5000, "0," + "9" * 5000, "a" * 5000,
     ],
 )  # fmt: skip
@@ -63,6 +63,7 @@ def test_difficulties_select_the_episodes_that_have_them_in_every_task() -> None
 @pytest.mark.parametrize(
     ("parse", "given", "words"),
     [
+        (parse_episodes, ("all", "random", ()), "'random' has .* say how many"),
         (parse_episodes, ("0", "test", ()), r"for episode 0 alone write '0,'\.$"),
         (parse_episodes, ("3,0-999999999,5", "train", ()), "split 'train' has episodes 0 to 99"),
         (parse_stages, ("5-1",), "1,5; 1,2,5; 1,2,3,5; 1,2,3,4,5"),

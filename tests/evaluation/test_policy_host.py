@@ -632,6 +632,6 @@ class It:
     plan = paper_plan(spec, 1)
     runner: PaperRunner = paper_runner(plan, tmp_path, seconds=0.2)
     (record,) = InProcess().run(deque(plan.jobs()), runner)
-    assert (record.outcome, record.error) == ("error", "policy")
+    assert (record.outcome, record.error, record.attempt) == ("error", "policy", 2)
     assert "the process ended with exit code 5" in str(record.cause)
     assert "last words" in capfd.readouterr().err  # in a worker, of the episode's log

@@ -29,6 +29,7 @@ from roboirg.core.errors import InvalidValueError, RenderDeviceError
 from roboirg.evaluation.plan.stored_plans import read_plan
 from roboirg.evaluation.records.record import ErrorKind, Job, Record
 from roboirg.evaluation.records.record_codec import StoreError
+from roboirg.evaluation.records.run_files import earlier_plans
 from roboirg.evaluation.records.store import (
     RECORDS_FILE,
     TORN_FILE,
@@ -127,7 +128,8 @@ def test_a_worker_that_dies_twice_costs_one_error_and_the_rest_goes_on(tmp_path:
     assert (same.played, len(same.errors)) == (0, 1)
     mended = run_plan(plan, tmp_path, FakePlay(), InProcess())
     assert (mended.played, len(mended.errors)) == (1, 0)
-    assert run_plan(plan, tmp_path, FakePlay(), InProcess()).played == 0
+    again = run_plan(plan, tmp_path, FakePlay(), InProcess())
+    assert (again.played, earlier_plans(tmp_path)) == (0, [])  # it was the same plan
 
 
 def test_a_worker_that_dies_once_costs_nothing(tmp_path: Path) -> None:
@@ -197,10 +199,12 @@ def test_lost_videos_are_counted(tmp_path: Path) -> None:
     assert not run_plan(small_plan(1), tmp_path, play, InProcess()).video_errors
 
 
-def test_workers_are_counted() -> None:
+def test_workers_are_counted(monkeypatch: pytest.MonkeyPatch) -> None:
+    assert isinstance(choose_executor(None), LocalProcesses)
+    monkeypatch.setenv("ROBOIRG_WORKERS", "5")
+    assert choose_executor(None) == LocalProcesses(5)
     assert choose_executor(0) == InProcess()
     assert choose_executor(3) == LocalProcesses(3)
-    assert isinstance(choose_executor(None), LocalProcesses)
     with pytest.raises(InvalidValueError, match="workers is -1"):
         choose_executor(-1)
 
