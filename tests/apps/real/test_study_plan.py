@@ -150,6 +150,7 @@ def test_all_arrangements_are_there_and_neighbors_are_opposites(task):
         ("a", {"tasks": ("PickXtimes",)}, "PickXtimes is not a task for a real robot"),
         ("a", {"settings": ("spatail",)}, "no setting of PutInBox 'spatail'"),
         ("a", {"trials": 0}, "trials is 0; it must be at least 1"),
+        ("a", {"seed": -1}, "seed is -1; it must be at least 0"),
     ],
 )
 def test_what_cannot_be_is_said(policies, options, words):
@@ -167,7 +168,7 @@ def test_a_plan_is_read_as_it_was_written_and_not_overwritten(tmp_path):
         == msgspec.json.decode(msgspec.json.encode(plan), type=StudyPlan)
     )
     with pytest.raises(InvalidValueError, match="holds another plan"):
-        write_study(make_study(("a",), tasks=TASKS, trials=1, seed=1), tmp_path)
+        write_study(make_study(("a",), tasks=TASKS, trials=1, demonstrations=2), tmp_path)
     with pytest.raises(InvalidValueError, match="There is no plan in"):
         read_study(tmp_path / "elsewhere")
     (tmp_path / "plan.json").write_text('{"policies": ["oracle"]}')
