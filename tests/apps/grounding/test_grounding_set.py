@@ -5,9 +5,11 @@ import base64
 import csv
 import io
 import itertools
+import json
 from collections import Counter
 from dataclasses import replace
 
+import av
 import msgspec
 import numpy as np
 import pytest
@@ -47,6 +49,7 @@ from roboirg.policies.vlm.prompt_files import load_prompts
 from roboirg.reader import interpret
 from roboirg.tasks import all_tasks, get_task
 from roboirg.tasks.splits.splits import SIZES, get_episode
+from roboirg.util.media import CONTROL_RATE
 
 BENCHMARK = [name for name, task in all_tasks().items() if task.suite != "real"]
 SEEN = [
@@ -57,6 +60,11 @@ SEEN = [
     ("VideoUnmask", 1),
 ]
 """Without and with a video; hidden things, things that come later, amounts."""
+SHOWN = (
+    "id", "text", "stages", "wordings", "choices", "choice", "answers", "command_chance",
+    "hidden_slots", "pattern", "expressions", "words_back", "points_question",
+)  # fmt: skip
+"""Fields of an item that are compared as they are."""
 
 
 def unseen(steps=0):
@@ -112,6 +120,16 @@ def test_who_hears_the_command_alone_can_only_guess_among_the_choices():
             assert set(item.choice_answers) <= set(answers), item.text
 
 
+def test_items_are_as_stored(snapshot):
+    """Choices, hidden slots, expressions and questions, of amounts, of two things and of one."""
+    found = [
+        [getattr(item, name) for name in SHOWN]
+        for task, index in SEEN[1:]
+        for item in items_of(task, index, forms=FORMS)[1]
+    ]
+    assert "\n".join(map(json.dumps, found)) == snapshot
+
+
 def test_places_of_the_right_choice_are_balanced():
     places = Counter(
         (item.setting, item.choice)
@@ -159,9 +177,10 @@ def test_the_test_split_has_2550_items():
 
 def test_options_that_a_setting_does_not_read_keep_their_defaults():
     episode = get_episode("PickXtimes", "test", 3)
-    changed = InstructionOptions(delivery="turns", stages=(1, 5), frame="camera")
+    changed = InstructionOptions(delivery="turns", stages=(1, 5), frame="camera", wordings="train")
     for options in wanted_options(episode, plain_settings(), FORMS, changed, every_variant=True):
         reads = all_settings()[options.setting].reads
+        assert options.wordings == "train"
         for name in ("delivery", "stages", "frame"):
             value = getattr(options, name)
             assert value == getattr(InstructionOptions(), name) or name in reads
@@ -321,14 +340,16 @@ def test_an_export_goes_on_and_gives_the_same_bytes(exported, monkeypatch):
 
 @pytest.mark.sim
 def test_pictures_are_stored_once_and_all_are_there(exported):
-    _, folder, facts = exported
+    request, folder, facts = exported
     items = read_items(folder)
     paths = {path for item in items for path in (item.picture, *item.frames)}
     assert facts.pictures == len(paths) == sum(1 for _ in (folder / "pictures").iterdir())
     assert all((folder / path).is_file() for path in paths)
     video = next(item for item in items if item.task == "VideoUnmask")
     assert (folder / video.video).read_bytes()[4:8] == b"ftyp"
-    assert 0 < len(video.frames) <= 4
+    with av.open(str(folder / video.video)) as film:  # as fast as it was
+        assert film.streams.video[0].average_rate * request.frames_every == CONTROL_RATE
+    assert len(video.frames) == 4
     assert all(item.video is None for item in items if not item.task.startswith("Video"))
     assert facts.size == sum(
         path.stat().st_size
