@@ -152,6 +152,8 @@ def test_prompts_are_versioned_and_can_be_replaced(tmp_path):
         mine.fill("goal", instruction="x")
     with pytest.raises(InvalidValueError, match=r"'system' .*missing.*\$why"):
         mine.fill("system", why="so")
+    file.write_text('again = "never"')
+    assert load_prompts("qwen", str(file)).fingerprint != mine.fingerprint
     file.write_text("= 3")
     with pytest.raises(InvalidValueError, match="not TOML"):
         load_prompts("qwen", str(file))

@@ -26,9 +26,9 @@ def captured(protocol):
 
 def test_openpi_sends_these_bytes():
     with WireServer() as server:
-        policy = make_policy(f"openpi://{server.place}", 0)
+        policy = make_policy(f"openpi://{server.place}?version=mine", 0)
         policy.reset(INSTRUCTION, video(3))
-        assert policy.act(moment(3)).shape == (20, 8)
+        assert (policy.act(moment(3)).shape, policy.version) == ((20, 8), "mine")
         policy.close()
         assert server.messages == captured("openpi")
 

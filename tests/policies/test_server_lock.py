@@ -17,7 +17,7 @@ from roboirg.policies.remote.endpoints import Endpoint
 from roboirg.policies.remote.server_lock import lock_server
 
 SPAWN = multiprocessing.get_context("spawn")
-ONE, TWO = Endpoint("h", 8001), Endpoint("h", 8002)
+ONE, TWO = Endpoint("h", 8001), Endpoint("h", 8001, "/two")
 
 
 def hold(folder, endpoint, ready, seconds):
@@ -58,7 +58,7 @@ def test_another_process_waits_takes_another_server_or_inherits(holder, tmp_path
     monkeypatch.setattr(os, "getpid", lambda: 1)  # it begins with the second, then the first
     lock = lock_server([TWO, ONE], wait=0, folder=tmp_path)
     assert lock.endpoint == TWO
-    with pytest.raises(PolicyTimeoutError, match="used h:8002, h:8001 for"):
+    with pytest.raises(PolicyTimeoutError, match="used h:8001/two, h:8001 for"):
         lock_server([TWO, ONE], wait=0, folder=tmp_path, shared=True)
     os.kill(holder.pid, signal.SIGKILL)
     again = lock_server([TWO, ONE], wait=300, folder=tmp_path)
