@@ -4,7 +4,7 @@ import functools
 
 import pytest
 
-from roboirg.apps.language_lab import corpus_statistics, expressions
+from roboirg.apps.language_lab import expressions
 from roboirg.core.errors import MissingDependencyError
 from roboirg.evaluation.analysis.figures import figure_style
 from roboirg.language import plain_settings
@@ -38,26 +38,6 @@ def test_expressions_are_counted_once_per_scene():
     order = expressions.expression_order(counts)
     assert set(order) == {name for by_class in counts.values() for name in by_class}
     assert order.index("it") < order.index("former") < order.index("there")
-
-
-def test_lengths_patterns_relations_and_landmarks():
-    lengths = corpus_statistics.word_counts(said())
-    assert lengths["explicit"].mean < lengths["direct"].mean < lengths["contextual"].mean
-    assert all(one.shortest <= one.mean <= one.longest for one in lengths.values())
-    patterns = corpus_statistics.metadata_counts(said(), "pattern")
-    assert patterns["PickXtimes"] == {
-        "color exclusion": 17, "number deduction": 17, "contextual logic": 16,
-    }  # fmt: skip
-    assert sum(corpus_statistics.metadata_counts(said(), "relation")["PickXtimes"].values()) == 17
-    assert set(corpus_statistics.metadata_counts(said(), "relation")["VideoPlaceOrder"]) >= {
-        "right after",
-        "neighbor",
-    }
-    assert set(corpus_statistics.metadata_counts(said(), "landmark_classes")["VideoUnmask"]) >= {
-        "1",
-        "2",
-        "3",
-    }
 
 
 def test_the_figure_has_a_panel_for_each_setting_with_expressions(tmp_path):

@@ -133,17 +133,20 @@ def test_a_page_that_is_out_of_date_scores_nothing(served):
     form = form_of(served, trial, "success")
     ask(served, "/score", form)
     _, headers, _ = ask(served, "/score", {**form, "choice": "dropped"})
-    assert "has+changed+since" in headers["Location"]
+    assert headers["Location"].startswith(f"/?trial={trial.name}&message={trial.name}+has+changed")
     assert served.read_trial_log().newest(trial.name).outcome == "success"
     _, headers, _ = ask(served, "/undo", {"last": "another"})
     assert "nothing+was+undone" in headers["Location"]
     assert served.read_trial_log().state(trial.name) == "scored"
+    _, headers, _ = ask(served, "/undo", {"last": trial.name})
+    assert headers["Location"].startswith(f"/?trial={trial.name}&message=The+score+of")
 
 
 def test_what_an_operator_types_is_text(served):
     trial = served.plan.trials[0]
     note = "<script>alert(1)</script> \"quoted\" & 'so'"
-    ask(served, "/score", form_of(served, trial, "success", note=note, video="../secret.mp4"))
+    form = form_of(served, trial, "success", note=note.replace(" ", " \n"), video="../secret.mp4")
+    assert "+has+no+file+" in ask(served, "/score", form)[1]["Location"]
     record = served.read_trial_log().newest(trial.name)
     assert trial_metadata(record)["note"] == note
     assert record.video is None
