@@ -34,6 +34,7 @@ from roboirg.evaluation.hosting.messages import Call, HostRequest, Loss, ask, re
 from roboirg.evaluation.hosting.policy_child import PolicyChild
 from roboirg.evaluation.hosting.policy_opening import open_policy
 from roboirg.evaluation.plan.plan import Plan
+from roboirg.evaluation.plan.plan_sections import Hosting
 from roboirg.evaluation.records.record import Job, Record
 from roboirg.evaluation.records.store import iterate_records, read_records
 from roboirg.evaluation.run.executor import Executor, InProcess, LocalProcesses
@@ -276,7 +277,7 @@ class It(hostile_policies.Hostile):
 """,
         )
     )
-    with HostPool(HostSettings(devices=("0", "3"))) as pool:
+    with HostPool(Hosting(devices=("0", "3")).settings or HostSettings()) as pool:
         worlds = [HostedPolicy(pool.connect(), ref, 0) for _ in range(4)]
         for world in worlds:
             world.reset("Pick it.", {})
@@ -384,8 +385,7 @@ class It:
         over.usage()  # what it has cost is lost
     for one in (good, bad, over, late):
         one.close()
-    hosts = pool.connect()
-    again = HostedPolicy(hosts, read_policy(spec), 0)  # in a new process
+    again = HostedPolicy(hosts := pool.connect(), read_policy(spec), 0)  # in a new process
     again.reset("live", {})
     assert again.act({}).shape == (1, 8)  # type: ignore[typeddict-item]
     again.close()

@@ -45,7 +45,7 @@ JOB = Job(
 class PaperWorld:
     """Ends after `length` steps with `status`."""
 
-    render_device = "none"
+    render_device, due_stage = "none", None
 
     def __init__(self, length: int = 5, status: str = "success", cause: str | None = None) -> None:
         self.length, self.status, self.cause = length, status, cause
@@ -371,19 +371,17 @@ class Stubborn(PaperPolicy):
 
     reports, subgoal, turns = True, "go", itertools.count()
 
-    def act(self, observation: Any) -> Any:
+    @property
+    def endings(self) -> list[SubgoalEnd]:
         failed = (SubgoalEnd("go", how, f"{how}!") for how in ("time-out", "missed", "blocked"))
         ends = [*failed, SubgoalEnd("go", "done"), SubgoalEnd("sing", "refused", "no", "cube")]
-        self.endings = ends[: next(self.turns)]
-        return super().act(observation)
+        return ends[: next(self.turns)]
 
 
 def test_a_subgoal_is_noted_again_where_its_last_try_came_to_nothing(
     stage: Callable[..., Record],
 ) -> None:
-    world = PaperWorld(30)
-    world.due_stage = None  # type: ignore[attr-defined]
-    found = stage(world, Stubborn()).subgoals
+    found = stage(PaperWorld(30), Stubborn()).subgoals
     assert [(one.step, one.text, one.ended, one.why, one.thing) for one in found] == [
         (0, "go", "time-out", "time-out!", None),
         (3, "go", "missed", "missed!", None),
