@@ -5,17 +5,26 @@ from __future__ import annotations
 import io
 from collections.abc import Sequence
 
+import pytest
 from flat_jobs import make_result
 from rich.console import Console
+from syrupy.assertion import SnapshotAssertion
 
 from roboirg.evaluation.analysis.results.frame import Frame, make_frame
+from roboirg.evaluation.analysis.stats.breakdowns import BREAKDOWNS
 from roboirg.evaluation.analysis.stats.rates import points
+from roboirg.evaluation.analysis.stats.run_data import RunData
+from roboirg.evaluation.analysis.tables.diagnostic_tables import (
+    DIAGNOSTIC_TABLES,
+    make_breakdown_table,
+)
+from roboirg.evaluation.analysis.tables.rendering import get_format
 from roboirg.evaluation.analysis.tables.run_tables import (
     make_run_tables,
     print_failures,
     print_run_tables,
 )
-from roboirg.evaluation.records.record import Job, Summary
+from roboirg.evaluation.records.record import Attribution, Job, Summary
 
 OUTCOMES = {"1": "success", "0": "failure", "!": "error"}
 
@@ -79,6 +88,35 @@ def test_rates_gaps_what_is_incomplete_and_failures_are_printed() -> None:
         planned=[one.identity for one in play("111111", "direct")],
     )
     assert printed(frame) == PRINTED.replace("LONG", LONG)
+
+
+WRONG = [
+    Attribution(kind=kind, failure=failure, step=1, sentence="So.")
+    for kind, failure in (("grounding", "wrong_count"), ("execution", "dropped"))
+]
+"""A failure of either kind."""
+MIXED = frame_of(
+    play("110100!111", prompt_verdict="heard", difficulty="hard"),
+    play("10001!1001", "direct", prompt_verdict="cut", attribution=WRONG[0], difficulty="hard"),
+    play("0110111111", "direct", form="resolved", prompt_verdict="heard"),
+    play("1011", task="BinFill", prompt_verdict="heard"),
+    play("0010", "direct", task="BinFill", prompt_verdict="unknown", attribution=WRONG[1]),
+    play("0110", "direct", task="BinFill", form="resolved", prompt_verdict="cut"),
+    play("0001", "direct", task="VideoUnmask", prompt_verdict="heard", attribution=WRONG[1]),
+    play("0111", "direct", task="VideoUnmask", form="resolved", prompt_verdict="heard"),
+)
+"""Other numbers of everything in every cell."""
+
+
+@pytest.mark.parametrize("name", ["forms", "failures", "heard"])
+def test_other_tables_are_as_stored(snapshot: SnapshotAssertion, name: str) -> None:
+    """Numbers of one row, column, form or outcome in place of another."""
+    assert get_format("markdown").draw(DIAGNOSTIC_TABLES[name](RunData(MIXED))) == snapshot
+
+
+def test_the_breakdown_by_difficulty_is_as_stored(snapshot: SnapshotAssertion) -> None:
+    table = make_breakdown_table(BREAKDOWNS["difficulty"], MIXED)
+    assert get_format("markdown").draw(table) == snapshot
 
 
 def test_the_legend_explains_only_what_occurs_and_many_failures_are_counted() -> None:
