@@ -408,6 +408,19 @@ OPEN = {
             {("blue", "green")},
         ),
         (
+            "repicks",
+            (
+                "Two and three are my numbers. I prefer two and three. Lift it and put it down "
+                "the other number of times."
+            ),
+            {2, 3},
+        ),
+        (
+            "swaps",
+            "I like red, green and blue. Lift the container that hides the latter.",
+            {("blue",)},
+        ),
+        (
             "swaps",  # what is chosen last counts
             (
                 "I like red. I like blue. I want the former. I chose the latter. Lift the "

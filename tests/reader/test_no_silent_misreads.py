@@ -86,6 +86,10 @@ def test_is_understood(task, text, goal):
          'each "container"'),
         ("VideoUnmask", "I like red and blue. Lift the container over the cube I mean.",
          "which of two values"),
+        ("VideoUnmask", ("I like red and blue. I want the former and the latter. Lift the "
+         "container over the cube I chose."), "which of two values"),
+        ("VideoUnmask", "I like red. I want the former. Lift the container over the cube I chose.",
+         "introduces two values of which"),
         ("VideoUnmask", "Lift the container over the except red cube.", '"except red cube'),
         ("VideoPlaceOrder", "Put the red cube on the first target, but use the other one.",
          '"but use the other"'),
