@@ -83,6 +83,7 @@ def planned(**fields: object) -> tuple[str, ...]:
         ((*RUN, "--episodes", "9" * 5000), "…' is not a valid episode; write numbers and ranges"),
         ((*RUN, "--stages", "5-1"), "the possible lists are 1,5;"),
         ((*RUN, "--out", ""), "folder is empty"),
+        ((*RUN, "--out", "o", "--max-steps", "0"), "max_steps is 0"),
         ((*RUN, "--episodes", "50,"), "no episode 50: split 'test' has episodes 0 to 49."),
         ((*RUN, "--policy", "../../x=random"), "is '../../x' (in '../../x=random')"),
         ((*RUN, "--out", "o", "--workers", "-1"), "workers is -1; it must be at least 0 (this"),

@@ -279,19 +279,6 @@ def test_a_planner_is_asked_five_times_for_what_is_refused_in_each_episode():
             assert planner.ends == [SubgoalEnd(SUBGOAL, "refused", "no")]
 
 
-def test_who_waits_for_an_end_is_asked_after_it_after_words_and_five_times_in_vain():
-    with fake_vlm([GO, GO, GO, "?<"]) as server:
-        planner = make_planner("stateless", server)
-        planner.reset("Do it.", NO_VIDEO)
-        calls = []
-        said, done = lambda: planner.hear("Now.", 0), lambda: planner.learn(SubgoalEnd(GO, "done"))
-        for happens in (int, int, said, int, done, int, said, *[int] * 6):
-            happens()
-            planner.plan(moment(0), 0)
-            calls.append(planner.usage()["calls"])
-    assert calls == [1, 1, 2, 2, 3, 3, 5, 7, 9, 11, 13, 13, 13]
-
-
 @pytest.mark.parametrize(
     ("ends", "stages"),
     [

@@ -36,6 +36,7 @@ from roboirg.policies.vlm.vlm_query import VLMQuery
 from roboirg.util.media import Clip, Picture
 
 PRICES = {"input_price": 100_000.0, "output_price": 0.0}
+BUSY, LOST = ModelBusyError("busy"), PolicyConnectionError("lost")
 COST = TOKENS[0] * PRICES["input_price"] / 1_000_000
 """US dollars of each reply."""
 
@@ -138,27 +139,24 @@ def test_a_busy_service_is_waited_for(tmp_path: Path, provider: str, code: int) 
     assert next_at >= started + 0.15
 
 
-def test_patience_ends(tmp_path: Path) -> None:
-    busy = Status(429, headers={"retry-after": "3600"})
-    with fake_vlm([busy]) as server:
-        with pytest.raises(ModelBusyError, match="is not available"):
-            play(server, ReplySettings(tmp_path), "a", "words", patience_s=60)
-        assert len(server.requests) == 1
-
-
-def test_pauses_grow_and_only_who_cannot_be_reached_is_given_up(
-    monkeypatch: pytest.MonkeyPatch,
+@pytest.mark.parametrize(
+    ("said", "waits"),
+    [
+        ([BUSY, ModelBusyError("busy", 7.0), LOST, BUSY, LOST, LOST], [1.0, 7.0, 4.0, 8.0, 16.0]),
+        ([BUSY, ModelBusyError("busy", 99.5)], [1.0]),  # patience would end
+    ],
+)
+def test_pauses_grow_until_it_cannot_be_reached_or_patience_ends(
+    monkeypatch: pytest.MonkeyPatch, said: list[Exception], waits: list[float]
 ) -> None:
-    waits: list[float] = []
-    clock = SimpleNamespace(monotonic=lambda: sum(waits), sleep=waits.append)
+    waited: list[float] = []
+    clock = SimpleNamespace(monotonic=lambda: sum(waited), sleep=waited.append)
     monkeypatch.setattr(vlm_query, "time", clock)
-    busy, lost = ModelBusyError("busy"), PolicyConnectionError("lost")
-    said = [busy, ModelBusyError("busy", 7.0), lost, busy, lost, lost]
-    options = ModelOptions(model="m", retries=2)
+    options = ModelOptions(model="m", retries=2, patience_s=100.0)
     model = SimpleNamespace(answer=Mock(side_effect=said))
-    with pytest.raises(PolicyConnectionError, match="lost"):
+    with pytest.raises(PolicyConnectionError, match=str(said[-1])):
         VLMQuery(options, Template(""), lambda _: model).ask(query("words"), str)
-    assert waits == [1.0, 7.0, 4.0, 8.0, 16.0]
+    assert waited == waits
 
 
 def test_what_is_no_chat_completion_is_not_asked_again_nor_stored(tmp_path: Path) -> None:

@@ -2,7 +2,6 @@
 
 import io
 import json
-from types import SimpleNamespace
 
 import av
 import numpy as np
@@ -13,10 +12,6 @@ from PIL import Image
 from pyarrow import parquet
 
 from roboirg.apps.demonstrations.dataset_reading import read_dataset
-from roboirg.apps.demonstrations.frame_columns import FrameColumns
-from roboirg.apps.demonstrations.language_columns import _utterances
-from roboirg.core.delivery import SPACING
-from roboirg.core.instruction_options import InstructionOptions
 from roboirg.language import instruct
 from roboirg.tasks.splits.splits import get_episode
 from roboirg.util.media import scaled_square
@@ -207,15 +202,6 @@ def test_language_columns_tell_subtasks_and_other_words(export):
         others = [one["content"] for one in spoken if one["style"] == "task_aug"]
         assert others == ([] if row["episode_index"] == 0 else [next(load_v3(root))[0]["tasks"][0]])
         assert all(frame["language_events"] == [] for frame in frames)
-
-
-def test_later_utterances_have_the_frame_at_which_they_are_said(make_plan):
-    facts = {"turns": [{"text": text} for text in ("One.", "Two.", "Three.")]}
-    words = SimpleNamespace(options=InstructionOptions(delivery="turns"), facts=facts)
-    trajectory = SimpleNamespace(facts=SimpleNamespace(video_length=4, steps=90))
-    columns = FrameColumns(make_plan(video="prefix"))
-    said = list(_utterances(columns, trajectory, SimpleNamespace(words=words)))
-    assert said == [(4 + SPACING, "Two."), (4 + 2 * SPACING, "Three.")]
 
 
 def test_version_2_1_has_a_file_per_episode(export):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import random
 import shutil
+from collections import Counter
 from dataclasses import replace
 from pathlib import Path
 
@@ -12,8 +13,9 @@ from forgeries import FORGERIES, Forgery, Lines, forge
 from selection import slow_but
 from typer.testing import CliRunner
 
-from roboirg.apps.leaderboard.record_check import ReplayVerdict
-from roboirg.apps.leaderboard.run_verification import verify_run
+from roboirg.apps.leaderboard import commands
+from roboirg.apps.leaderboard.record_check import RecordCheck, ReplayVerdict
+from roboirg.apps.leaderboard.run_verification import Verification, verify_run
 from roboirg.evaluation.plan.plan_maker import make_plan
 from roboirg.evaluation.play.rollout import EpisodeRunner
 from roboirg.evaluation.records.action_log import read_actions, write_actions
@@ -90,10 +92,10 @@ def test_an_episode_of_the_plan_that_was_left_out_is_named(honest: Path, tmp_pat
 def test_only_other_processors_may_end_a_little_elsewhere(honest: Path, tmp_path: Path) -> None:
     def shift(by: float, **changes: object) -> Forgery:
         def forgery(lines: Lines, folder: Path, rng: random.Random) -> Lines:
-            one = rng.choice(lines)
-            log = read_actions(folder, one["action_log"])
-            moved = replace(log, end_state=log.end_state + by)
-            one.update(action_log=write_actions(moved, folder), end_state="0" * 64, **changes)
+            for place, one in enumerate(lines, start=1):  # the first is farthest
+                log = read_actions(folder, one["action_log"])
+                moved = replace(log, end_state=log.end_state + by / place)
+                one.update(action_log=write_actions(moved, folder), end_state="0" * 64, **changes)
             return lines
 
         return forgery
@@ -110,7 +112,8 @@ def test_only_other_processors_may_end_a_little_elsewhere(honest: Path, tmp_path
         forge(folder, shift(by, **changes), random.Random(0))
         found = verify_run(folder)
         assert found.holds is holds
-        assert found.verdicts[ReplayVerdict.TOLERANT] == holds
+        assert found.verdicts[ReplayVerdict.TOLERANT] == holds * found.records
+        assert found.deviation == pytest.approx(by * holds)
         assert any("another kind of processor" in note for note in found.notes) is excused
 
 
@@ -127,6 +130,19 @@ def test_a_sample_is_drawn_again_from_its_seed(honest: Path) -> None:
     assert found.holds
 
 
+def test_what_is_printed_of_a_verification(
+    capsys: pytest.CaptureFixture[str], snapshot: object
+) -> None:
+    """At most twenty of each kind, and how many there are besides."""
+    checks = tuple(RecordCheck(f"check-{n}", ("one.", "two.")) for n in range(23))
+    verdicts = Counter({ReplayVerdict.EXACT: 30, ReplayVerdict.TOLERANT: 4})
+    verdicts[ReplayVerdict.NOT_REPLAYED] = 26
+    missing = tuple(f"missing-{n}" for n in range(22))
+    commands._print(Verification(60, checks, missing, verdicts, 0.0123, 2, ("A note.",)))
+    commands._print(Verification(2, (), (), Counter({ReplayVerdict.EXACT: 2})))
+    assert capsys.readouterr().out == snapshot
+
+
 @pytest.fixture
 def cli() -> CliRunner:
     return CliRunner()
@@ -134,9 +150,11 @@ def cli() -> CliRunner:
 
 @pytest.mark.usefixtures("in_this_process")
 def test_the_command_tells_what_does_not_hold(honest: Path, tmp_path: Path, cli: CliRunner) -> None:
-    good = cli.invoke(app, ["leaderboard", "verify", str(honest), "--sample", "10%"])
-    assert good.exit_code == 0, good.output
-    assert "All that was checked holds." in good.output
+    for share, played in (("10%", "1 was"), ("1.0", "2 were")):
+        good = cli.invoke(app, ["leaderboard", "verify", str(honest), "--sample", share])
+        assert good.exit_code == 0, good.output
+        assert f"2 records; {played} played again" in good.output
+        assert ("All that was checked holds." in good.output) == (share == "10%")
     forged = tmp_path / "forged"
     shutil.copytree(honest, forged)
     forge(forged, FORGERIES["failure to success"][0], random.Random(0))
