@@ -15,7 +15,7 @@ from page_text import store
 import roboirg
 from roboirg.apps.leaderboard.packing import pack_run
 from roboirg.evaluation.analysis.results.frame import COLUMNS, make_frame
-from roboirg.evaluation.analysis.results.reading import WORD_COLUMNS
+from roboirg.evaluation.analysis.results.reading import WORD_COLUMNS, with_columns
 from roboirg.evaluation.analysis.stats.cells import cells_of
 from roboirg.evaluation.analysis.stats.measure import summarize
 from roboirg.evaluation.plan.plan_maker import make_plan
@@ -133,7 +133,10 @@ def test_order_and_runs_of_the_records_make_no_difference(result, plays, random)
 
 
 def test_the_same_episode_in_two_runs_stays_apart(result) -> None:
-    twice = make_frame([("a", [result("success", 0)]), ("b", [result("failure", 0)])])
+    both = [result(outcome, 0, started_at=outcome) for outcome in OUTCOMES[:2]]
+    twice = make_frame([("a", both[:1]), ("b", both[1:])])
+    found = with_columns(twice, both[::-1], {"cause": lambda one: one.outcome})
+    assert list(found["cause"]) == ["success", "failure"]
     assert list(twice.names.values()) == ["listener, a", "listener, b"]
     assert [cell.rate for cell in cells_of(twice).values()] == [1, 0]
 

@@ -20,6 +20,7 @@ from roboirg.evaluation.analysis.tables.diagnostic_tables import (
 )
 from roboirg.evaluation.analysis.tables.rendering import get_format
 from roboirg.evaluation.analysis.tables.run_tables import (
+    failure_text,
     make_run_tables,
     print_failures,
     print_run_tables,
@@ -126,6 +127,13 @@ def test_the_legend_explains_only_what_occurs_and_many_failures_are_counted() ->
     assert [line.split()[1] for line in lines[-11:-1]] == [f"test/{index}" for index in range(10)]
     assert lines[-1] == "  and 3 more"
     assert "without success" not in printed(frame_of(play("1")))
+    (silent,) = play("0", arm="silent", cause="late")
+    assert failure_text(silent) == "PickXtimes test/0 explicit (silent): late"
+
+
+def test_rates_have_their_colors() -> None:
+    tables = [make_run_tables(frame_of(play(one)))[0] for one in ("1110", "110", "100")]
+    assert [one.rows[0].entries[0].style for one in tables] == ["green", "yellow", "red"]
 
 
 def test_policies_and_conditions_have_tables_of_their_own_in_the_order_of_the_plan() -> None:
