@@ -14,7 +14,9 @@ from roboirg.language.settings import plain_settings
 from roboirg.policies import Policy, PrivilegedPolicy, find_policy, make_policy
 from roboirg.policies.builtin import BUILTIN, scripted
 from roboirg.policies.builtin.listeners import ForgetfulPolicy, ListenerPolicy
+from roboirg.policies.builtin.oracle_policy import PreviousGoalPolicy
 from roboirg.tasks import every_task
+from roboirg.tasks.splits.splits import get_episode
 
 
 @pytest.mark.parametrize("name", BUILTIN)
@@ -58,6 +60,16 @@ def test_what_the_expert_missed_is_tried_again_and_only_three_times(
     monkeypatch.setattr(scripted, "completed_stages", lambda *_: next(counts))
     chunks = scripted._execute(MagicMock(), stages, primitives)
     assert " ".join(chunk for _, chunk in chunks) == executed
+
+
+@pytest.mark.parametrize(
+    ("task", "numbers"),
+    [("VideoUnmask", (0, 49)), ("PickXtimes", (1, 0)), ("PickXtimes", (5,))],
+)
+def test_the_previous_goal_is_that_of_the_episode_before_if_the_scene_has_it(task, numbers):
+    episode, *before = (get_episode(task, "test", number) for number in numbers)
+    goal = PreviousGoalPolicy().decide(SimpleNamespace(episode=episode), "")
+    assert goal == (before[0].goal if before else None)
 
 
 class Silent:

@@ -116,12 +116,14 @@ def test_a_served_policy_gets_what_the_client_was_given(protocol, monkeypatch):
             assert expected.items() <= client.metadata.items()
             assert client.metadata["device"]
     _opened, one, two = Recorder.episodes
-    assert (one.seed, two.seed) == (7, 7)
+    assert (one.seed, two.seed, one.closed) == (7, 7, protocol != "openpi")
     for policy in (one, two):
         assert policy.instruction == (INSTRUCTION.lower() if protocol == "mme-vla" else INSTRUCTION)
         for given, observation in zip((first, later), policy.calls, strict=True):
             same(given, observation, SEEN[protocol])
-            assert observation["gripper"].shape == (2,)
+            assert (*observation["gripper"].shape, observation["gripper"][0]) == (
+                2, given["gripper"][0],
+            )  # fmt: skip
     if protocol == "openpi":
         assert len(one.demonstration["joint_positions"]) == 0
         return
@@ -180,7 +182,8 @@ def test_a_list_of_another_length_is_refused():
         assert "front_depth_list must be lists of the same length" in raw.recv()
 
 
-def test_mme_vla_has_one_memory_for_all_connections():
+@pytest.mark.parametrize("kind", ["grounded", "simple"])
+def test_mme_vla_has_one_memory_for_all_connections(kind):
     frames = np.stack([moment(n)["front_rgb"][None] for n in range(3)])
     with served(HERE, "mme-vla") as url:
         place = url.replace("mme-vla", "ws")
@@ -206,7 +209,7 @@ def test_mme_vla_has_one_memory_for_all_connections():
                         "observation/wrist_image": frames[2, 0],
                         "observation/state": np.zeros(8),
                         "prompt": "go",
-                        "grounded_subgoal": "pick up the cube at <1, 2>",
+                        f"{kind}_subgoal": "pick up the cube at <1, 2>",
                     }
                 )
             )

@@ -15,8 +15,8 @@ from roboirg.tasks.splits.splits import get_episode
 
 
 def within(**choices):
-    """Return words with a plan that has these choices of an export."""
-    return "--plan", plan_file(demonstrations=choices)
+    """Return words with a plan that has these choices of an export; what is typed goes before."""
+    return "--plan", plan_file(tasks="StopCube", episodes=9, demonstrations=choices)
 
 
 FEW = ("--tasks", "PickXtimes", "--episodes", "2", "--settings", "explicit,direct")

@@ -154,7 +154,6 @@ def test_the_command_tells_what_does_not_hold(honest: Path, tmp_path: Path, cli:
         good = cli.invoke(app, ["leaderboard", "verify", str(honest), "--sample", share])
         assert good.exit_code == 0, good.output
         assert f"2 records; {played} played again" in good.output
-        assert ("All that was checked holds." in good.output) == (share == "10%")
     forged = tmp_path / "forged"
     shutil.copytree(honest, forged)
     forge(forged, FORGERIES["failure to success"][0], random.Random(0))
