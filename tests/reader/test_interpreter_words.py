@@ -246,6 +246,7 @@ def test_contradictions_fit_nothing(text, scene, task):
         ("Stop the cube during the visit right after visit 4.", 5),
         ("My number is 2. Stop the cube during the visit whose number is double that.", 4),
         ("My number is 7. Stop the cube on the visit whose number is that minus 4.", 3),
+        ("My number is 1. Stop the cube on the visit whose number is thrice that.", 3),
         ("Stop the cube during the visit whose number is three less than eight.", 5),
         (("I like the third visit. My number is 3. Stop the cube during the visit whose number is "
          "one less than that."), 2),

@@ -23,7 +23,7 @@ from roboirg.core.errors import InvalidValueError
 from roboirg.core.plain_text import counted
 from roboirg.language import FORMS, Utterance, expressible, instruct, instruct_with
 from roboirg.reader import interpret
-from roboirg.tasks import all_tasks, every_task, get_task
+from roboirg.tasks import all_tasks, every_task, get_task, with_goal
 from roboirg.tasks.splits.splits import SIZES, get_episode, slot_seed
 from roboirg.util.parallel_map import parallel_map
 
@@ -81,6 +81,13 @@ def test_a_command_that_says_all_leaks(setting):
         placed = instruct(EPISODE, setting, "resolved").command
         assert list(leaking(commanding(said, placed), EPISODE))
     assert " in: " in words
+
+
+def test_every_color_and_number_of_repetitions_leaks():
+    for goal in get_task(EPISODE.task).goals(EPISODE.scene):
+        stated = with_goal(EPISODE, goal)
+        telling = commanding(instruct(stated, "direct"), instruct(stated).command)
+        assert len(find_leaks(telling, goal)) == 2, telling.command
 
 
 def test_a_value_behind_several_pointers_leaks():
