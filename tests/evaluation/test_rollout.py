@@ -153,8 +153,8 @@ def test_a_record_holds_what_the_job_prescribes_instead_of_the_policy(
     job = replace(JOB, environment=EnvironmentOptions(demonstration_frames=4))
     needs = stage(PaperWorld(), PaperPolicy(), job).needs
     assert (needs["demonstration_frames"], needs["cameras"]) == (4, [])
-    other = replace(JOB, environment=EnvironmentOptions(actions="ee_pose"))
-    assert stage(PaperWorld(), PaperPolicy(), other).cause == (
+    job = replace(JOB, environment=EnvironmentOptions(actions="ee_pose"))
+    assert stage(PaperWorld(), PaperPolicy(), job).cause == (
         "policy: the policy's action space is 'joint_angle', but the plan requires 'ee_pose'."
     )
 

@@ -50,14 +50,6 @@ def test_a_video_is_small_playable_and_appears_when_complete(tmp_path: Path) -> 
     assert (np.abs(shades - [90, 200, 240]) < [8, 8, 50]).all(), shades
 
 
-def test_a_video_thrown_away_leaves_nothing(tmp_path: Path) -> None:
-    video = VideoWriter(tmp_path / "x.mp4")
-    video.add_frame(Grey())
-    video.discard()
-    assert not video.finish()
-    assert list(tmp_path.iterdir()) == []
-
-
 def test_a_caption_that_grows_has_room_for_all_of_it(tmp_path: Path) -> None:
     video = VideoWriter(tmp_path / "x.mp4")
     first, longest = "This one is red.", "This one is red. " * 20
