@@ -21,6 +21,7 @@ from roboirg.evaluation.play.episode_record import audit_record
 from roboirg.evaluation.play.job_instruction import PreparedJob
 from roboirg.evaluation.records.episode_log import EpisodeLog, log_path
 from roboirg.evaluation.records.record import (
+    EventRecord,
     MentionSpan,
     Record,
     SubgoalRecord,
@@ -104,6 +105,15 @@ def test_what_is_of_other_versions_or_unknown_is_shown_as_it_is() -> None:
         page = Page(render([record]))
         assert {"resolved", "stages"} - page.details[0].keys() == missing
     assert page.string(page.details[0]["events"][-1][1]) == "took cube green off target"
+
+
+def test_things_of_one_look_have_numbers_and_what_ends_by_itself_is_not_shown() -> None:
+    first, *_ = played(PICKS.model_copy(update={"tasks": ("BinFill",)}))
+    event = EventRecord(step=1, kind="picked", subject="cube_red_1")
+    over = replace(event, kind="over", place="bin", holds=False)
+    page = Page(render([replace(first, events=(event, over))]))
+    acts = [page.string(act) for _, act, _ in page.details[0]["events"]]
+    assert acts == ["picked up the red cube (1)"]
 
 
 def test_what_is_amiss_is_said_first() -> None:

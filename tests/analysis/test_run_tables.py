@@ -109,10 +109,13 @@ MIXED = frame_of(
 """Other numbers of everything in every cell."""
 
 
-@pytest.mark.parametrize("name", ["forms", "failures", "heard"])
-def test_other_tables_are_as_stored(snapshot: SnapshotAssertion, name: str) -> None:
+@pytest.mark.parametrize(
+    ("name", "kind"),
+    [("forms", "markdown"), ("failures", "markdown"), ("heard", "markdown"), ("heard", "csv")],
+)
+def test_other_tables_are_as_stored(snapshot: SnapshotAssertion, name: str, kind: str) -> None:
     """Numbers of one row, column, form or outcome in place of another."""
-    assert get_format("markdown").draw(DIAGNOSTIC_TABLES[name](RunData(MIXED))) == snapshot
+    assert get_format(kind).draw(DIAGNOSTIC_TABLES[name](RunData(MIXED))) == snapshot
 
 
 def test_the_breakdown_by_difficulty_is_as_stored(snapshot: SnapshotAssertion) -> None:
