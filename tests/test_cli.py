@@ -25,10 +25,12 @@ from roboirg.apps.show import playthrough
 from roboirg.apps.show.episode_strip import StripMoment
 from roboirg.cli import progress_bar
 from roboirg.cli.progress_bar import progress_bars
+from roboirg.cli.run_commands import report_problems
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.evaluation.plan.stored_plans import read_plan
 from roboirg.evaluation.records.record import Job
 from roboirg.evaluation.records.store import RecordStore
+from roboirg.evaluation.run.runner import RunSummary
 from roboirg.util.console_width import progress_console
 
 RUN = ("run", "--policy", "random", "--tasks", "PickXtimes")
@@ -305,6 +307,13 @@ def test_ctrl_c_within_a_class_definition_is_one_sentence() -> None:
         [sys.executable, "-c", INTERRUPTED_CLASS], capture_output=True, text=True, check=False
     )
     assert (ended.returncode, ended.stderr) == (130, "roboirg: stopped.\n")
+
+
+def test_episodes_that_were_not_played_are_an_error(capsys: pytest.CaptureFixture[str]) -> None:
+    summary = RunSummary(10, 7, (), 3, (), ())
+    with pytest.raises(SystemExit, match="2"):
+        report_problems(summary, Path("out"))
+    assert "3 of 10 episodes were not played; run the same command" in capsys.readouterr().err
 
 
 def test_what_is_typed_goes_before_what_the_plan_says(

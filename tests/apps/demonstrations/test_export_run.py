@@ -264,7 +264,8 @@ def test_the_estimate_counts_words_once_for_pictures(make_plan):
     small = estimate_size(make_plan(settings=("explicit",), cameras=("front",), size=128))
     assert 0.1 < small.size / one.size < 0.13
     # An explicit instruction is its own resolved form.
-    assert estimate_size(make_plan(forms=("implicit", "resolved"))).episodes == 6 * (1 + 2)
+    both = make_plan(forms=("implicit", "resolved"), settings=("explicit", "direct", "spatial"))
+    assert estimate_size(both).episodes == 6 * (1 + 2 + 2)
     assert estimate_size(make_plan(actions="waypoint")).frames == 6 * (508 // 20 + 140 // 20)
     assert estimate_size(make_plan(video="sidecar")).frames == two.frames + 6 * 66
 
