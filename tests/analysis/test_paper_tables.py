@@ -79,7 +79,7 @@ def test_what_is_incomplete_is_marked_and_compared_with_nothing(result) -> None:
     """
     settings = ("explicit", "direct", "spatial")
     good, poor = (
-        [one for one in whole(result, name, settings) if one.task != "PickXtimes"]
+        [one for one in whole(result, name, settings, split="val") if one.task != "PickXtimes"]
         for name in ("good", "poor")
     )
     good = [
@@ -90,9 +90,17 @@ def test_what_is_incomplete_is_marked_and_compared_with_nothing(result) -> None:
     missing = ("StopCube", "explicit", 1)
     poor = [one for one in poor if (one.task, one.setting, one.episode) != missing]
     poor += [
-        result("error", 2, policy="poor", task="ButtonUnmask", setting="direct"),
-        result("failure", 0, policy="poor", task="BinFill", setting="direct", form="resolved"),
-        result("failure", 0, policy="poor", task="Other"),
+        result("error", 2, policy="poor", task="ButtonUnmask", setting="direct", split="val"),
+        result(
+            "failure",
+            0,
+            policy="poor",
+            task="BinFill",
+            setting="direct",
+            form="resolved",
+            split="val",
+        ),
+        result("failure", 0, policy="poor", task="Other", split="val"),
     ]
     table = table_of("main", good, poor, planned=planned, floors=(CHANCE,))
     assert get_format("markdown").draw(table) == PRINTED.read_text("utf-8")
@@ -106,6 +114,8 @@ def test_only_informative_tables_are_wanted(result) -> None:
     assert wanted(whole(result, settings=("explicit", "contextual"))) == {"main"}
     assert wanted(two) == {"main"}
     assert wanted([with_version(two[0], "planner + scripted hands"), *two]) == {"main", "planner"}
+    alone = [with_version(one, "planner + scripted hands") for one in whole(result)]
+    assert wanted(alone) == {"main"}
     short = whole(result, settings=("contextual",), stages=(1, 5))
     assert wanted(whole(result, settings=("contextual",)), short) == {"main", "context"}
     assert wanted([result(task="PutInBox")]) == {"real"}
