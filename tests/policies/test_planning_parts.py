@@ -132,10 +132,9 @@ def test_chosen_frames_are_spread_evenly(length, most):
 def test_a_sheet_shows_frames_in_reading_order_each_with_its_label():
     shades = [10 * number for number in range(18)]
     frames = np.uint8(shades)[:, None, None, None].repeat(128, 1).repeat(128, 2).repeat(3, 3)
-    sheets = contact_sheets(frames, ["x" if number == 5 else "" for number in range(18)])
     tiles = [
         sheet[row : row + 64, column : column + 64]
-        for sheet in sheets
+        for sheet in contact_sheets(frames, ["x" if shade == 50 else "" for shade in shades])
         for row in range(0, len(sheet), 64)
         for column in range(0, 256, 64)
     ]
