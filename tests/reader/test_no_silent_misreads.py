@@ -96,6 +96,8 @@ def test_is_understood(task, text, goal):
         ("VideoUnmask", "I like red. I want the former. Lift the container over the cube I chose.",
          "introduces two values of which"),
         ("VideoUnmask", "Lift the container over the except red cube.", '"except red cube'),
+        ("VideoPlaceOrder", "Put the red cube on the target of the fifth to last placement.",
+         '"the fifth to last placement"'),
         ("VideoPlaceOrder", "Put the red cube on the first target, but use the other one.",
          '"but use the other"'),
         ("VideoPlaceOrder", "Put the red cube on one of the targets.",
