@@ -10,7 +10,6 @@ from roboirg.core.actions import (
     ACTION_SPACES,
     EE_POSE,
     JOINT_ANGLE,
-    WAYPOINT,
     check_action,
     check_chunk,
     find_action_space,
@@ -77,10 +76,6 @@ def test_each_space_takes_its_own_size_and_names_itself_when_it_refuses(space):
             assert words in str(caught.value)
     with pytest.raises(InvalidActionError, match=rf"\({space.name}\) is an array of {space.size}"):
         check_action("up", space)
-
-
-def test_sizes_are_robomme_s():
-    assert [space.size for space in (JOINT_ANGLE, EE_POSE, WAYPOINT)] == [8, 7, 7]
 
 
 @pytest.mark.parametrize("name", ["waypoints", "", None, ["ee_pose"]])

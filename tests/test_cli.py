@@ -23,11 +23,14 @@ from plan_files import plan_file
 from roboirg import main as cli
 from roboirg.apps.show import playthrough
 from roboirg.apps.show.episode_strip import StripMoment
+from roboirg.cli import progress_bar
 from roboirg.cli.progress_bar import progress_bars
+from roboirg.cli.run_commands import report_problems
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.evaluation.plan.stored_plans import read_plan
 from roboirg.evaluation.records.record import Job
 from roboirg.evaluation.records.store import RecordStore
+from roboirg.evaluation.run.runner import RunSummary
 from roboirg.util.console_width import progress_console
 
 RUN = ("run", "--policy", "random", "--tasks", "PickXtimes")
@@ -82,6 +85,7 @@ def planned(**fields: object) -> tuple[str, ...]:
         ((*RUN, "--episodes", "9" * 5000), "…' is not a valid episode; write numbers and ranges"),
         ((*RUN, "--stages", "5-1"), "the possible lists are 1,5;"),
         ((*RUN, "--out", ""), "folder is empty"),
+        ((*RUN, "--out", "o", "--max-steps", "0"), "max_steps is 0"),
         ((*RUN, "--episodes", "50,"), "no episode 50: split 'test' has episodes 0 to 49."),
         ((*RUN, "--policy", "../../x=random"), "is '../../x' (in '../../x=random')"),
         ((*RUN, "--out", "o", "--workers", "-1"), "workers is -1; it must be at least 0 (this"),
@@ -195,15 +199,11 @@ def test_errors_are_told_and_are_exit_code_2(
     assert roboirg(*command).code == 0
 
 
-def test_instructions_are_printed(roboirg) -> None:
+def test_instructions_are_printed(roboirg, snapshot) -> None:
     said = roboirg(
         "show", "PickXtimes", "3", "--words", "--settings", "contextual", "--stages", "1,5"
     )
-    words = [line.split()[0] for line in said.out.splitlines()]
-    assert words == ["contextual", "introduction", "command"]
-    assert re.search(
-        r"explicit \(\d+ tokens\):", roboirg("show", "VideoUnmask", "0", "--words").out
-    )
+    assert said.out + roboirg("show", "VideoUnmask", "0", "--words").out == snapshot
     wrong = roboirg("show", "VideoUnmask", "99", "--words")
     assert (wrong.code, wrong.err.count("\n")) == (2, 1)
 
@@ -220,8 +220,11 @@ def test_failures_are_named_below_the_table(
     assert "and 5 more" in roboirg("report", tmp_path).out
 
 
-def test_an_episode_is_shown(roboirg, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_episode_is_shown(
+    roboirg, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, snapshot
+) -> None:
     monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("COLUMNS", "100")
     save = lambda _, path, **__: Path(path).touch()  # noqa: E731
     monkeypatch.setattr("matplotlib.figure.Figure.savefig", save)
     picture = StripMoment(7, "the end", np.zeros((256, 256, 3), np.uint8))
@@ -230,13 +233,8 @@ def test_an_episode_is_shown(roboirg, tmp_path: Path, monkeypatch: pytest.Monkey
     said = roboirg("show", "VideoPlaceButton", "3", "--split", "val")
     assert (said.code, said.err) == (0, "")
     names = [f"VideoPlaceButton-val-3{end}.png" for end in ("", "-dark")]
-    assert said.out.splitlines()[-3:] == ["oracle: success after 7 steps", *names]
     assert sorted(one.name for one in tmp_path.iterdir()) == sorted(names)
-    words = " ".join(said.out.split())
-    for told in ("VideoPlaceButton/val/3 hard, seed", "target_3", "change places", "that is: cube_",
-                 "relation", "contextual", "resolved"):  # fmt: skip
-        assert told in words, told
-    assert "spatial" not in words
+    assert said.out == snapshot
 
 
 def test_help_needs_nothing_heavy() -> None:
@@ -309,6 +307,13 @@ def test_ctrl_c_within_a_class_definition_is_one_sentence() -> None:
         [sys.executable, "-c", INTERRUPTED_CLASS], capture_output=True, text=True, check=False
     )
     assert (ended.returncode, ended.stderr) == (130, "roboirg: stopped.\n")
+
+
+def test_episodes_that_were_not_played_are_an_error(capsys: pytest.CaptureFixture[str]) -> None:
+    summary = RunSummary(10, 7, (), 3, (), ())
+    with pytest.raises(SystemExit, match="2"):
+        report_problems(summary, Path("out"))
+    assert "3 of 10 episodes were not played; run the same command" in capsys.readouterr().err
 
 
 def test_what_is_typed_goes_before_what_the_plan_says(
@@ -479,8 +484,13 @@ def test_progress_moves_no_cursor_in_a_pipe_even_if_colors_are_forced(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setenv("FORCE_COLOR", "1")
+    # The time left goes by what was done since the first of them.
+    times = iter([0, 20, 60, 65, 100, 101])
+    monkeypatch.setattr(progress_bar, "time", SimpleNamespace(monotonic=times.__next__))
     with progress_bars() as report:
-        report("record", 1, 2, "")
-        report("record", 2, 2, "done")
+        for done in (3, 5, 6, 9, 10):
+            report("record", done, 10, "done" if done == 10 else "")
     assert not progress_console().is_terminal
-    assert capsys.readouterr().err.splitlines() == ["record 1/2", "record 2/2  done"]
+    assert capsys.readouterr().err.splitlines() == [
+        "record 3/10", "record 5/10 2 min left", "record 9/10 17 s left", "record 10/10  done",
+    ]  # fmt: skip

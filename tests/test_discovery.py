@@ -12,6 +12,7 @@ from roboirg.tasks import Task, get_task
 from roboirg.util import discovery
 
 OUTSIDE = dataclasses.replace(get_task("PickXtimes"), name="Outside", suite="lab")
+OTHER = dataclasses.replace(OUTSIDE, name="Other")
 MODULE = ModuleType("outside")
 MODULE.TASK = OUTSIDE
 
@@ -23,16 +24,16 @@ def fail():
 class EntryPoint:
     dist = type("Distribution", (), {"name": "a-lab"})
 
-    def __init__(self, load):
-        self.name, self.value, self.load = "outside", "outside:TASK", load
+    def __init__(self, number, load):
+        self.name, self.value, self.load = f"outside-{number}", "outside:TASK", load
 
 
 @pytest.fixture
 def install(monkeypatch):
-    """Make an entry point the only one that is installed."""
+    """Make entry points the only ones that are installed; they are found in any order."""
 
-    def add(load):
-        entries = [EntryPoint(load)]
+    def add(*loads):
+        entries = [EntryPoint(*one) for one in enumerate(loads)][::-1]
         monkeypatch.setattr(importlib.metadata, "entry_points", lambda *, group: entries)
 
     return add
@@ -44,24 +45,26 @@ def found():
 
 @pytest.mark.parametrize("thing", [OUTSIDE, MODULE], ids=["object", "module"])
 def test_an_entry_point_names_the_object_or_its_module(install, thing):
-    install(lambda: thing)
-    assert found()[-1] is OUTSIDE
-    assert len(found()) == len(discovery.discover_in_modules(tasks, "TASK", Task)) + 1
+    install(lambda: thing, lambda: OTHER)
+    assert found()[-2:] == [OUTSIDE, OTHER]
+    assert len(found()) == len(discovery.discover_in_modules(tasks, "TASK", Task)) + 2
+    assert discovery.find_entry("outside-1", "TASK", Task, tasks.ENTRY_POINTS) is OTHER
 
 
 @pytest.mark.parametrize(
     ("load", "sentence"),
     [
-        (fail, r"'outside' \(outside:TASK\) of a-lab .* cannot be loaded: RuntimeError: out of"),
+        (fail, r"'outside-0' \(outside:TASK\) of a-lab .* cannot be loaded: RuntimeError: out of"),
         (lambda: 7, r"of a-lab in the group 'roboirg.tasks' is 7; it must be a Task, or a module"),
         (lambda: ModuleType("empty"), "is None; it must be a Task, or a module with one as TASK"),
         (lambda: get_task("BinFill"), "a-lab adds 'BinFill' .* a name that roboirg has; choose"),
+        (lambda: OTHER, "a-lab adds 'Other' .* a name that a-lab has; choose"),
     ],
-    ids=["raises", "no task", "empty module", "taken"],
+    ids=["raises", "no task", "empty module", "taken", "taken by another"],
 )
 def test_a_bad_entry_point_is_one_sentence_that_names_its_package(install, load, sentence):
     get_task("BinFill")  # known before the entry points change
-    install(load)
+    install(load, lambda: OTHER)
     with pytest.raises(InvalidValueError, match=sentence):
         found()
 

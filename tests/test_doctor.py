@@ -35,6 +35,7 @@ def test_without_vulkan_the_remedy_is_named() -> None:
     result = run_module(**nowhere)
     assert result.returncode == 1
     assert "FAIL  render device" in result.stdout
+    assert "not tried: no device" in result.stdout
     assert "apt-get install mesa-vulkan-drivers" in result.stdout
 
 
@@ -46,7 +47,7 @@ def test_an_unknown_render_device_is_named_with_the_known_ones() -> None:
 
 
 def test_a_missing_package_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
-    versions = {"roboirgbench": "0.1.0", "av": "9.2", "sapien": "3.0.3"}
+    versions = {"roboirgbench": "0.1.0", "av": "9.2", "sapien": "3.0.3", "jinja2": "3.2rc1"}
 
     def version(name: str) -> str:
         if name not in versions:
@@ -57,6 +58,7 @@ def test_a_missing_package_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
         "numpy>=1.26",
         "av>=12; extra == 'sim'",
         "sapien==3.0.3; extra == 'sim'",
+        "jinja2>=3; extra == 'report'",
         "ruff>=0.6; extra == 'dev'",
     ]
     monkeypatch.setattr(metadata, "version", version)
@@ -66,6 +68,7 @@ def test_a_missing_package_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
         Check("numpy", False, "not installed; needs >=1.26", "pip install 'numpy>=1.26'"),
         Check("av", False, "9.2; needs >=12", "pip install 'av>=12'"),
         Check("sapien", True, "3.0.3"),
+        Check("jinja2", True, "3.2rc1"),
     ]
 
 
@@ -78,7 +81,7 @@ def test_missing_model_files_are_named(tmp_path: Path, monkeypatch: pytest.Monke
 
 
 def test_a_crash_of_the_driver_is_a_failed_check(monkeypatch: pytest.MonkeyPatch) -> None:
-    crash = subprocess.CompletedProcess([], -11, "a card\n", "")
+    crash = subprocess.CompletedProcess([], -11, "a card\ndrawn\n", "")
     monkeypatch.setattr(subprocess, "run", lambda *_, **__: crash)
     device, frame = doctor._check_rendering()
     assert device.ok

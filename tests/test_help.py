@@ -49,10 +49,11 @@ def test_help_is_short_and_has_an_example(name, monkeypatch, capsys):
     all_commands()[name].make_context(name, words[len(name.split()) :])
 
 
-def test_a_plan_explains_all_of_its_fields_and_is_read_back(tmp_path):
+@pytest.mark.parametrize("episodes", ["3,0-2,7", "7,"])  # 7 alone would be the first seven
+def test_a_plan_explains_all_of_its_fields_and_is_read_back(tmp_path, episodes):
     plan = make_plan(
         ["oracle", "b=listener"], tasks="PickXtimes,VideoUnmask", settings="direct,contextual",
-        forms="implicit,resolved", episodes="0-2,7", stages="1,5;1-5", distractors=3,
+        forms="implicit,resolved", episodes=episodes, stages="1,5;1-5", distractors=3,
         delivery="turns", frame="camera", observe_every=4, demonstration_frames="none",
         video="failures", devices="0,1", retry_on="none", wordings="train",
     )  # fmt: skip

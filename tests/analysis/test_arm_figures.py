@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pytest
 from flat_jobs import make_result
+from syrupy.assertion import SnapshotAssertion
 
 from roboirg.core.errors import InvalidValueError
 from roboirg.evaluation.analysis.results.frame import make_frame
@@ -12,6 +13,7 @@ from roboirg.evaluation.analysis.stats.chance import silent_chance
 from roboirg.evaluation.analysis.stats.measure import mean_rate
 from roboirg.evaluation.analysis.stats.run_data import RunData
 from roboirg.evaluation.analysis.tables.arm_table import language_use_sentences, make_arm_table
+from roboirg.evaluation.analysis.tables.rendering import get_format
 from roboirg.evaluation.records.record import GoalOutcomes, Summary
 
 TASKS = ("PickXtimes", "VideoUnmask")
@@ -90,20 +92,18 @@ def test_paraphrases_against_their_mean_and_what_counts_in_no_figure():
     assert figure(data_of(results), "words' worth").gap.episodes == 6
 
 
-def test_tables_and_sentences_have_each_policy_once():
-    table = make_arm_table(data_of(play("mine", LISTENER), play("knows", HABIT)))
-    assert len(table.rows) == 6
-    uses = {row.group: row.entries for row in table.rows if row.name.startswith("language use")}
-    assert [(group, entries[0].text, entries[1].text[:5]) for group, entries in uses.items()] == [
-        ("knows, explicit", "24", "0.0 ("),
-        ("mine, explicit", "24", "100.0"),
-    ]
+def test_tables_and_sentences_are_as_stored(snapshot: SnapshotAssertion) -> None:
+    """Of a policy that listens, mostly, with another rate in each arm, and one that never does."""
+    mixed = play("mine", LISTENER | {"scrambled": "own"}, range(6))
+    mixed += play("mine", HABIT | {"scrambled": "none"}, range(6, 9))
+    mixed += play("mine", FIXED, range(9, 11)) + play("mine", {"again": "own"}, range(4, 11))
+    table = make_arm_table(data_of(mixed, play("knows", HABIT)))
+    assert get_format("markdown").draw(table) == snapshot
     told = data_of(play("knows", {"told": "own"}))
     with pytest.raises(InvalidValueError, match="--arms told"):
         make_arm_table(told)
-    mine, knows = data_of(play("mine", LISTENER)), data_of(play("knows", HABIT))
-    (sentence,) = language_use_sentences(mine.frame, knows.frame, ("mine", "knows"))
-    assert sentence.startswith("Language use, explicit: mine less knows +100.0 points")
+    mine, knows = data_of(mixed), data_of(play("knows", HABIT))
+    assert [*language_use_sentences(mine.frame, knows.frame, ("mine", "knows"))] == snapshot
     assert not [*language_use_sentences(mine.frame, told.frame, ("", ""))]
 
 

@@ -117,3 +117,5 @@ def test_who_plays_and_how_often_makes_no_difference() -> None:
     again = [msgspec.structs.replace(one, policy="else", policy_seed=3) for one in jobs[:1]]
     assert floor_level(CHANCE, jobs + again * 5) == floor_level(CHANCE, jobs)
     assert floor_level(CHANCE, []) is None
+    # Learned floors are those of the usual options.
+    assert floor_level("text-only", [job("PickXtimes", "contextual", stages=(1, 5))]) is None

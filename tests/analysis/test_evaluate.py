@@ -15,7 +15,7 @@ from roboirg.evaluation.api import python_run
 from roboirg.evaluation.api.results import Results
 from roboirg.evaluation.plan.stored_plans import read_plan
 from roboirg.evaluation.records.record import Job, Record
-from roboirg.evaluation.records.store import read_records
+from roboirg.evaluation.records.store import RECORDS_FILE, read_records
 
 
 class Still:
@@ -70,6 +70,10 @@ def test_results_are_those_of_the_records(unplayed: None, tmp_path: Path) -> Non
     assert "forgetful explicit: 100.0 %" in repr(results)
     with pytest.raises(UnknownNameError):
         results.compare("listener", "nobody")
+    *lines, _, _ = (tmp_path / RECORDS_FILE).read_text().splitlines(keepends=True)
+    (tmp_path / RECORDS_FILE).write_text("".join(lines))
+    cut = Results(tmp_path)
+    assert (len(cut.frame), cut.errors, cut.missing) == (2 * 3 * 3 - 2, 0, 2)
 
 
 def test_results_have_figures_and_a_page(unplayed: None, tmp_path: Path) -> None:
@@ -132,13 +136,18 @@ def test_privilege_is_declared(unplayed: None, tmp_path: Path, policy) -> None:
     }  # fmt: skip
 
 
-def test_what_can_be_imported_has_a_spec_as_on_the_command_line() -> None:
+def test_what_can_be_imported_has_a_spec_as_on_the_command_line(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """No other process finds what a script defines, although it is there under its name."""
     from roboirg.policies.builtin.random_policy import RandomPolicy
     from roboirg.policies.by_name.finding import policy_of
 
     assert policy_of(RandomPolicy).spec == "roboirg.policies.builtin.random_policy:RandomPolicy"
-    given = (RandomPolicy, RandomPolicy(seed=1), type("Made", (Still,), {}))
-    assert [policy_of(one).place for one in given] == ["own", "python", "python"]
+    scripts = type("OfScript", (Still,), {"__module__": "__main__"})
+    monkeypatch.setattr(sys.modules["__main__"], "OfScript", scripts, raising=False)
+    given = (RandomPolicy, RandomPolicy(seed=1), type("Made", (Still,), {}), scripts)
+    assert [policy_of(one).place for one in given] == ["own", "python", "python", "python"]
 
 
 def test_options_are_those_of_a_plan(unplayed: None, tmp_path: Path) -> None:

@@ -38,7 +38,8 @@ def facts(folder: Path, *records: Record) -> Facts:
 
 
 def test_a_run_has_its_facts(tmp_path: Path) -> None:
-    again = record(0, "error", error="policy"), record(0, attempt=2)
+    failed = {"error": "policy", "steps": 50, "calls": 1, "executed": 20}
+    again = record(0, "error", **failed), record(0, attempt=2, steps=30, calls=3, executed=10)
     later = record(2, "error", error="timeout"), record(3, setting="direct")
     write_plan(make_plan(["mine=random"], tasks="PickXtimes", settings="direct"), tmp_path)
     expected = {
@@ -54,7 +55,10 @@ def test_a_run_has_its_facts(tmp_path: Path) -> None:
         "trials begun again": "1",
         "render device": NOT_REPORTED,
     }
-    assert facts(tmp_path, *again, *later)[RUN].items() >= expected.items()
+    found = facts(tmp_path, *again, *later)
+    assert found[RUN].items() >= expected.items()
+    # Without the episode that was played again.
+    assert found["mine"]["control steps per call, mean"] == "10.0"
 
 
 SILENT = ("version", "cameras", "trained on", "dtype", "python", "prompts")
@@ -110,8 +114,17 @@ MINE = InferenceFacts(
         ),
         (  # The policy behind a planner does not speak for the planner.
             {},
-            {"planner": {"model": "large"}, "policy": {"network": "none", "chunk": 16}},
-            {"chunk": "16", "network": NOT_REPORTED, "dtype": NOT_REPORTED},
+            {
+                "planner": {"model": "large"},
+                "policy": {"network": "none", "chunk": 16, "device": "cpu"},
+                "device": "a card",
+            },
+            {
+                "chunk": "16",
+                "network": NOT_REPORTED,
+                "dtype": NOT_REPORTED,
+                "device": "a card",
+            },
         ),
     ],
 )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from pathlib import Path
 
 import pandas as pd
@@ -14,10 +15,11 @@ from page_text import store
 import roboirg
 from roboirg.apps.leaderboard.packing import pack_run
 from roboirg.evaluation.analysis.results.frame import COLUMNS, make_frame
-from roboirg.evaluation.analysis.results.reading import WORD_COLUMNS
+from roboirg.evaluation.analysis.results.reading import WORD_COLUMNS, with_columns
 from roboirg.evaluation.analysis.stats.cells import cells_of
 from roboirg.evaluation.analysis.stats.measure import summarize
 from roboirg.evaluation.plan.plan_maker import make_plan
+from roboirg.evaluation.records.store import iterate_records
 
 OUTCOMES = ("success", "failure", "error")
 
@@ -57,6 +59,8 @@ def test_columns_have_their_types_and_lack_what_they_may_lack(run: Path) -> None
     assert (found["error"].notna() == (found["outcome"] == "error")).all()
     assert (found["pattern"].notna() == (found["setting"] == "reasoning")).all()
     assert found["privileged"].all()
+    texts = [[turn.text for turn in one.instruction] for one in iterate_records(run)]
+    assert found["words"].sum() == len(" ".join(itertools.chain(*texts)).split())
     assert set(found["suite"]) == {"counting"}
 
 
@@ -70,8 +74,26 @@ def test_a_pack_has_the_results_of_its_folder(run: Path, tmp_path: Path) -> None
 def test_policies_of_their_own_versions_are_called_by_their_names(result) -> None:
     both = [result(policy=name, policy_version=name) for name in "ba"]
     assert list(make_frame([("run", both)]).names.values()) == ["a", "b"]
+    assert list(make_frame([("run", both)]).names_as_played.values()) == ["b", "a"]
     planned = [one.identity for one in both]
     assert list(make_frame([("run", both)], planned).names.values()) == ["b", "a"]
+
+
+def test_rows_are_sorted_by_task_then_episode_then_seed(result) -> None:
+    """In the order of the benchmark; unknown tasks come last."""
+    rows = [("StopCube", 0, 0), ("StopCube", 0, 1), ("StopCube", 1, 0), ("BinFill", 2, 0),
+            ("Another", 0, 0)]  # fmt: skip
+    found = [result("success", at, task=task, policy_seed=seed) for task, at, seed in rows[::-1]]
+    frame = make_frame([("run", found)])
+    assert [*zip(frame["task"], frame["episode"], frame["policy_seed"], strict=True)] == rows
+
+
+def test_what_is_missing_belongs_to_the_version_that_played_first(result) -> None:
+    two = [result("success", at, policy_version=name) for at, name in enumerate("ba")]
+    cells = cells_of(make_frame([("run", two)], [result("success", 2).identity]))
+    assert {key.policy_run.versions.policy: one.missing for key, one in cells.items()} == {
+        "a": 0, "b": 1,
+    }  # fmt: skip
 
 
 PLAYS = st.dictionaries(
@@ -111,7 +133,10 @@ def test_order_and_runs_of_the_records_make_no_difference(result, plays, random)
 
 
 def test_the_same_episode_in_two_runs_stays_apart(result) -> None:
-    twice = make_frame([("a", [result("success", 0)]), ("b", [result("failure", 0)])])
+    both = [result(outcome, 0, started_at=outcome) for outcome in OUTCOMES[:2]]
+    twice = make_frame([("a", both[:1]), ("b", both[1:])])
+    found = with_columns(twice, both[::-1], {"cause": lambda one: one.outcome})
+    assert list(found["cause"]) == ["success", "failure"]
     assert list(twice.names.values()) == ["listener, a", "listener, b"]
     assert [cell.rate for cell in cells_of(twice).values()] == [1, 0]
 

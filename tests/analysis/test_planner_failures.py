@@ -23,18 +23,19 @@ def failed() -> Record:
 
 
 @pytest.mark.parametrize(
-    ("verdict", "attribution", "named"),
+    ("verdicts", "attribution", "named"),
     [
         ("right", WRONG, "wrong thing"),
-        ("wrong_count", None, "wrong count"),
+        ("wrong_place wrong_count right", None, "wrong count"),
         ("right", None, "hands"),
     ],
 )
 def test_the_act_that_ended_the_episode_names_the_failure(
-    failed: Record, verdict: str, attribution: Attribution | None, named: str
+    failed: Record, verdicts: str, attribution: Attribution | None, named: str
 ) -> None:
-    said = SubgoalRecord(step=5, text="pick up the cube", verdict=verdict)
-    record = replace(failed, steps=9, subgoals=(said,), attribution=attribution)
+    """Or else the last wrong subgoal, as those before it were corrected."""
+    said = [SubgoalRecord(step=5, text="pick it up", verdict=one) for one in verdicts.split()]
+    record = replace(failed, steps=9, subgoals=tuple(said), attribution=attribution)
     assert planner_failure(record) == named
 
 

@@ -12,12 +12,22 @@ from typing import Any
 import pytest
 from msgspec.structs import replace
 from page_text import PLAN, broken, played, render, store
+from syrupy.assertion import SnapshotAssertion
 
 from roboirg.evaluation.analysis.page import report
 from roboirg.evaluation.analysis.page.report import write_report
 from roboirg.evaluation.plan.sources import Source
+from roboirg.evaluation.play.episode_record import audit_record
+from roboirg.evaluation.play.job_instruction import PreparedJob
 from roboirg.evaluation.records.episode_log import EpisodeLog, log_path
-from roboirg.evaluation.records.record import MentionSpan, Record, UtteranceRecord
+from roboirg.evaluation.records.record import (
+    EventRecord,
+    MentionSpan,
+    Record,
+    SubgoalRecord,
+    UtteranceRecord,
+)
+from roboirg.policies.prompt_length.prompt_audit import PromptLimit, most_tokens
 
 pytest.importorskip("jinja2")
 
@@ -97,6 +107,15 @@ def test_what_is_of_other_versions_or_unknown_is_shown_as_it_is() -> None:
     assert page.string(page.details[0]["events"][-1][1]) == "took cube green off target"
 
 
+def test_things_of_one_look_have_numbers_and_what_ends_by_itself_is_not_shown() -> None:
+    first, *_ = played(PICKS.model_copy(update={"tasks": ("BinFill",)}))
+    event = EventRecord(step=1, kind="picked", subject="cube_red_1")
+    over = replace(event, kind="over", place="bin", holds=False)
+    page = Page(render([replace(first, events=(event, over))]))
+    acts = [page.string(act) for _, act, _ in page.details[0]["events"]]
+    assert acts == ["picked up the red cube (1)"]
+
+
 def test_what_is_amiss_is_said_first() -> None:
     found = records()
     page = Page(render([*found[:-6], found[-1]], PICKS))
@@ -107,6 +126,31 @@ def test_what_is_amiss_is_said_first() -> None:
     assert Page(render(found[:-1])).notes == ""
     lost = [replace(one, outcome="failure") for one in found if one.policy == "listener"]
     assert "Only one policy" in Page(render(lost)).notes
+
+
+def test_cells_choices_and_details_are_as_stored(snapshot: SnapshotAssertion) -> None:
+    """Of three scenes with other cubes, seeds and outcomes, with everything a record may hold."""
+    settings = ("explicit", "contextual")
+    own = [one for one in records() if one.policy == "listener" and one.setting in settings]
+    *others, cut = sorted(own, key=lambda one: (one.episode, one.setting == "contextual"))
+    audit_record(cut, PreparedJob(cut.identity), PromptLimit(24, 0, most_tokens, "some.model"))
+    said = [
+        SubgoalRecord(step=0, text="pick it up", due="pick it up", verdict="right", ended="done"),
+        SubgoalRecord(step=8, text="dance", due="put it down", verdict="lost", ended="refused",
+                      why="it fits nothing"),
+        SubgoalRecord(step=9, text="sing", verdict="wrong_count", ended="failed"),
+    ]  # fmt: skip
+    cut = replace(cut, subgoals=tuple(said), started_at="2026-01-02T05:06:07", video_error="full")
+    lost = {("contextual", 0), ("explicit", 1), ("contextual", 2)}
+    found = [
+        replace(one, policy_seed=8 + one.episode, server_version="9",
+                outcome="failure" if (one.setting, one.episode) in lost else "success")
+        for one in (*others, cut)
+    ]  # fmt: skip
+    page = Page(render(found))
+    assert "2026-01-02 03:04 to 05:06 UTC" in page.text
+    shown = json.dumps([page.data, page.details, page.notes], indent=0, ensure_ascii=False)
+    assert re.sub(r"language \S+, environment \d+", "", shown) == snapshot
 
 
 def test_words_that_differ_stand_apart_and_are_named() -> None:

@@ -44,6 +44,7 @@ def test_tables_are_written(run: Path, tmp_path: Path) -> None:
     assert sorted(printed) == sorted(map(str, out.iterdir())) == sorted(str(out / n) for n in names)
     call("tables", "--format", "latex", "--out", out, "--published", "--which", "context")
     assert "29.11" in (out / "context.tex").read_text()
+    assert "coverage,ours" in call("tables", "--which", "coverage", "--format", "csv")
 
 
 def test_a_pack_is_read_like_the_folder_it_was_made_of(
@@ -149,6 +150,7 @@ def test_mixed_render_devices_are_named(run: Path, tmp_path: Path) -> None:
         ("compare RUN RUN:forgetful", "name one as RUN:listener"),
         ("report EMPTY", "no records in"),
         ("report RUN --serve --out FILE", "--serve shows one run"),
+        ("report RUN --serve --against RUN", "--serve shows one run"),
     ],
 )
 def test_what_cannot_be_shown_is_one_sentence(
@@ -166,5 +168,6 @@ def test_an_incomplete_run_is_named_next_to_a_whole_one(run: Path, tmp_path: Pat
     part = write_run(tmp_path / "part", ("listener",), leave_out=3)
     assert "100.00 …" in call("tables", part, "--which", "main", "--format", "markdown")
     output = " ".join(call("compare", part, f"{run}:listener").split())
-    assert f"listener (privileged) ({part}) against" in output
-    assert "Incomplete: 3 trials" in output
+    assert f"listener (privileged) ({part}) against listener (privileged) ({run}:l" in output
+    output += " ".join(call("compare", f"{run}:listener", part).split())
+    assert output.count("Incomplete: 3 trials") == 2

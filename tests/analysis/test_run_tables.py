@@ -5,17 +5,27 @@ from __future__ import annotations
 import io
 from collections.abc import Sequence
 
+import pytest
 from flat_jobs import make_result
 from rich.console import Console
+from syrupy.assertion import SnapshotAssertion
 
 from roboirg.evaluation.analysis.results.frame import Frame, make_frame
+from roboirg.evaluation.analysis.stats.breakdowns import BREAKDOWNS
 from roboirg.evaluation.analysis.stats.rates import points
+from roboirg.evaluation.analysis.stats.run_data import RunData
+from roboirg.evaluation.analysis.tables.diagnostic_tables import (
+    DIAGNOSTIC_TABLES,
+    make_breakdown_table,
+)
+from roboirg.evaluation.analysis.tables.rendering import get_format
 from roboirg.evaluation.analysis.tables.rendering.terminal import print_tables
 from roboirg.evaluation.analysis.tables.run_tables import (
+    failure_text,
     make_run_tables,
     print_failures,
 )
-from roboirg.evaluation.records.record import Job, Summary
+from roboirg.evaluation.records.record import Attribution, Job, Summary
 
 OUTCOMES = {"1": "success", "0": "failure", "!": "error"}
 
@@ -81,6 +91,38 @@ def test_rates_gaps_what_is_incomplete_and_failures_are_printed() -> None:
     assert printed(frame) == PRINTED.replace("LONG", LONG)
 
 
+WRONG = [
+    Attribution(kind=kind, failure=failure, step=1, sentence="So.")
+    for kind, failure in (("grounding", "wrong_count"), ("execution", "dropped"))
+]
+"""A failure of either kind."""
+MIXED = frame_of(
+    play("110100!111", prompt_verdict="heard", difficulty="hard"),
+    play("10001!1001", "direct", prompt_verdict="cut", attribution=WRONG[0], difficulty="hard"),
+    play("0110111111", "direct", form="resolved", prompt_verdict="heard"),
+    play("1011", task="BinFill", prompt_verdict="heard"),
+    play("0010", "direct", task="BinFill", prompt_verdict="unknown", attribution=WRONG[1]),
+    play("0110", "direct", task="BinFill", form="resolved", prompt_verdict="cut"),
+    play("0001", "direct", task="VideoUnmask", prompt_verdict="heard", attribution=WRONG[1]),
+    play("0111", "direct", task="VideoUnmask", form="resolved", prompt_verdict="heard"),
+)
+"""Other numbers of everything in every cell."""
+
+
+@pytest.mark.parametrize(
+    ("name", "kind"),
+    [("forms", "markdown"), ("failures", "markdown"), ("heard", "markdown"), ("heard", "csv")],
+)
+def test_other_tables_are_as_stored(snapshot: SnapshotAssertion, name: str, kind: str) -> None:
+    """Numbers of one row, column, form or outcome in place of another."""
+    assert get_format(kind).draw(DIAGNOSTIC_TABLES[name](RunData(MIXED), ())) == snapshot
+
+
+def test_the_breakdown_by_difficulty_is_as_stored(snapshot: SnapshotAssertion) -> None:
+    table = make_breakdown_table(BREAKDOWNS["difficulty"], MIXED)
+    assert get_format("markdown").draw(table) == snapshot
+
+
 def test_the_legend_explains_only_what_occurs_and_many_failures_are_counted() -> None:
     text = printed(frame_of(play("0" * 13, privileged=True, cause="late")))
     assert "success rate in %; privileged policies and scripted hands use the simulator's" in text
@@ -88,6 +130,13 @@ def test_the_legend_explains_only_what_occurs_and_many_failures_are_counted() ->
     assert [line.split()[1] for line in lines[-11:-1]] == [f"test/{index}" for index in range(10)]
     assert lines[-1] == "  and 3 more"
     assert "without success" not in printed(frame_of(play("1")))
+    (silent,) = play("0", arm="silent", cause="late")
+    assert failure_text(silent) == "PickXtimes test/0 explicit (silent): late"
+
+
+def test_rates_have_their_colors() -> None:
+    tables = [make_run_tables(frame_of(play(one)))[0] for one in ("1110", "110", "100")]
+    assert [one.rows[0].entries[0].style for one in tables] == ["green", "yellow", "red"]
 
 
 def test_policies_and_conditions_have_tables_of_their_own_in_the_order_of_the_plan() -> None:

@@ -29,7 +29,12 @@ class Pointer:
 
     def usage(self):
         named = sum(one.thing is not None for one in self.ends)
-        return {"process": os.getpid(), "pictures": self.pictures, "named": named}
+        return {
+            "process": os.getpid(),
+            "pictures": self.pictures,
+            "ends": len(self.ends),
+            "named": named,
+        }
 
 
 class Insider(Pointer):

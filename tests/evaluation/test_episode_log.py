@@ -125,7 +125,7 @@ def test_an_episode_that_prints_nothing_has_no_log(tmp_path: Path) -> None:
     assert logged_slugs(tmp_path) == {"loud"}
     # Played again, it prints nothing.
     with EpisodeLog(log_path(tmp_path, "loud")):
-        pass
+        assert logged_slugs(tmp_path) == frozenset()
     assert logged_slugs(tmp_path) == frozenset()
 
 

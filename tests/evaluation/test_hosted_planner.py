@@ -47,7 +47,8 @@ def test_it_sees_pictures_and_words_only() -> None:
     ]
     spent = result.usage
     assert spent["process"] != os.getpid()
-    assert (spent["refused"], spent["named"]) == (5, 0)
+    # Each end is told once, the last one never.
+    assert (spent["refused"], spent["named"], spent["ends"]) == (5, 0, 1 + 4)
     assert spent["pictures"] == 1 + 5  # one where it named the first, and five refusals
     assert result.policy_metadata["planner"] == {"world": False}
     # The whole is marked as it acts by the simulator's state, and described alike beforehand.

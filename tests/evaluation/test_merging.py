@@ -46,32 +46,35 @@ def test_two_halves_make_the_whole(tmp_path: Path) -> None:
 
 
 def test_a_verdict_beats_an_error_and_the_first_verdict_a_later_one(tmp_path: Path) -> None:
-    one, two, *_ = some()
-    error = replace(one, outcome="error", error="connection")
+    one, two, three, *_ = (replace(record, server_version="8") for record in some())
+    two, silent = replace(two, code="old"), replace(three, arm="silent", code="older")
+    lost = {"outcome": "error", "error": "connection", "server_version": None}
     other = {"success": "failure", "failure": "success"}[two.outcome]
     cause = None if other == "success" else "it fell"
     disputed = replace(two, outcome=other, cause=cause)
-    merged = merge_runs(
-        [fill(tmp_path / "a", error, two), fill(tmp_path / "b", one, disputed)], tmp_path / "out"
-    )
-    assert {record.outcome for record in read_records(tmp_path / "out")} == {
-        one.outcome,
-        two.outcome,
-    }
-    (conflict,) = merged.conflicts
-    assert (identity_key(conflict), conflict.outcome) == (identity_key(two), other)
+    sources = [(replace(one, **lost), two), (one, disputed, silent), (replace(two, **lost),)]
+    folders = [fill(tmp_path / str(number), *run) for number, run in enumerate(sources)]
+    merged = merge_runs(folders, tmp_path / "out")
+    assert read_records(tmp_path / "out") == (one, two, silent)
+    assert [(identity_key(conflict), conflict.outcome) for conflict in merged.conflicts] == [
+        (identity_key(two), other)
+    ]
+    assert (merged.added, merged.duplicates) == (3, 3)
+    assert [warning.partition(".")[0] for warning in merged.warnings] == [
+        f"Mixed states of the package's code: {one.code}, old"  # of the told ones
+    ]
 
 
-def test_videos_are_copied(tmp_path: Path) -> None:
-    record = replace(some()[0], video="videos/x.mp4")
+def test_videos_and_actions_are_copied(tmp_path: Path) -> None:
+    record = replace(some()[0], video="videos/x.mp4", action_log="ab" * 32)
     lost = replace(some()[1], video="videos/gone.mp4")
     source = fill(tmp_path / "a", record, lost)
-    (source / "videos").mkdir()
-    (source / "videos/x.mp4").write_bytes(b"video")
-    (source / "videos/x.jpg").write_bytes(b"poster")
+    names = ["videos/x.mp4", "videos/x.jpg", f"actions/ab/{'ab' * 32}.npz"]
+    for name in names:
+        (source / name).parent.mkdir(parents=True, exist_ok=True)
+        (source / name).write_text(name)
     merge_runs([source], tmp_path / "out")
-    assert (tmp_path / "out/videos/x.mp4").read_bytes() == b"video"
-    assert (tmp_path / "out/videos/x.jpg").read_bytes() == b"poster"
+    assert [(tmp_path / "out" / name).read_text() for name in names] == names
     assert [record.video for record in read_records(tmp_path / "out")] == ["videos/x.mp4", None]
 
 
@@ -99,6 +102,7 @@ def test_logs_are_copied_with_the_records_that_are_kept(tmp_path: Path) -> None:
         ("language_version", "0.9", "language version is '0.9' in the first"),
         ("environment_version", 7, "environment version is 7 in the first"),
         ("policy_version", "old", "version of policy random is 'old' in the first"),
+        ("server_version", "8", "version of the server of random is '8' in the first and None"),
         ("seed", 5, "seed of PickXtimes test 0 is 5 in the first"),
     ],
 )
@@ -106,8 +110,10 @@ def test_versions_are_not_mixed(tmp_path: Path, field: str, value: object, words
     record = some()[0]
     is_policy = field == "policy_version"
     odd = with_version(record, "old") if is_policy else replace(record, **{field: value})
-    with pytest.raises(StoreError, match=f"cannot be merged: the {words}"):
-        merge_runs([fill(tmp_path / "a", record), fill(tmp_path / "b", odd)], tmp_path / "out")
+    one, other = fill(tmp_path / "a", record), fill(tmp_path / "b", odd)
+    for folders, out in (([one, other], tmp_path / "out"), ([other], one)):
+        with pytest.raises(StoreError, match=f"cannot be merged: the {words}"):
+            merge_runs(folders, out)
     assert not (tmp_path / "out").exists()
 
 

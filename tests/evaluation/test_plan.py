@@ -12,7 +12,7 @@ from roboirg.evaluation.plan.option_parsing import (
     parse_stages,
 )
 from roboirg.evaluation.plan.plan import Plan
-from roboirg.evaluation.plan.plan_maker import make_plan
+from roboirg.evaluation.plan.plan_maker import make_plan, word_options
 from roboirg.evaluation.records.record import Job
 from roboirg.evaluation.records.record_codec import identity_key
 from roboirg.language import expressible, plain_settings
@@ -31,7 +31,7 @@ def test_a_number_is_the_first_episodes_and_a_list_is_a_list() -> None:
 @pytest.mark.parametrize(
     "text",
     [
-        "0", "-3", "a", "3-1", "1.5", "", ",", "1,,b", "300000000", "0-999999999",
+        "0", "-3", "a", "3-1", "5-0", "1.5", "", ",", "1,,b", "300000000", "0-999999999",
         "9" * 5000, "0," + "9" * 5000, "a" * 5000,
     ],
 )  # fmt: skip
@@ -63,9 +63,11 @@ def test_difficulties_select_the_episodes_that_have_them_in_every_task() -> None
 @pytest.mark.parametrize(
     ("parse", "given", "words"),
     [
+        (parse_episodes, ("all", "random", ()), "'random' has .* say how many"),
         (parse_episodes, ("0", "test", ()), r"for episode 0 alone write '0,'\.$"),
-        (parse_episodes, ("0-999999999", "train", ()), "split 'train' has episodes 0 to 99"),
+        (parse_episodes, ("3,0-999999999,5", "train", ()), "split 'train' has episodes 0 to 99"),
         (parse_stages, ("5-1",), "1,5; 1,2,5; 1,2,3,5; 1,2,3,4,5"),
+        (lambda text: word_options(stages=text), ("1,5;1-5",), "is '1,5;1-5'; here it must be one"),
         (parse_numbers, ("policy seed", "0-999999999"), "1,000,000,000 numbers; at most 10,000"),
     ],
 )
@@ -173,9 +175,22 @@ def test_episodes_without_a_rival_are_left_out() -> None:
 
 
 def test_jobs_are_ordered_and_named_uniquely() -> None:
-    plan = make_plan(["random", "oracle"], policy_seeds="0-2", forms="implicit,resolved")
-    assert plan.jobs() == plan.jobs()
-    assert len({job.slug for job in plan.jobs()}) == len(plan.jobs())
+    """As given, but what leaves the goal implicit comes first in each scene."""
+    jobs = make_plan(
+        ["random", "oracle"], tasks="VideoUnmask,BinFill", episodes="3,0", policy_seeds="2,0",
+        forms="resolved,implicit",
+    ).jobs()  # fmt: skip
+    order = [
+        (
+            job.policy == "oracle",
+            job.task == "BinFill",
+            job.episode == 0,
+            job.setting == "explicit" or job.form == "resolved",
+        )
+        for job in jobs
+    ]
+    assert order == sorted(order)
+    assert len({job.slug for job in jobs}) == len(jobs)
 
 
 @pytest.mark.parametrize(
@@ -185,9 +200,10 @@ def test_jobs_are_ordered_and_named_uniquely() -> None:
         ({"settings": "contextal"}, r"no setting 'contextal'.*Did you mean 'contextual'\?"),
         ({"split": "tests"}, r"no split 'tests'.*Did you mean 'test'\?"),
         ({"forms": "resolve"}, r"no form 'resolve'.*Did you mean 'resolved'\?"),
-        ({"episodes": "0,50"}, r"no episode 50: split 'test' has episodes 0 to 49"),
+        ({"episodes": "0,50,3"}, r"no episode 50: split 'test' has episodes 0 to 49"),
         ({"episodes": "51"}, r"no episode 50"),
         ({"video": "on"}, r"video is 'on'; it must be 'off', 'failures' or 'all'"),
+        ({"retry_on": "none,policy"}, r"no kind of error 'none'"),
         ({"stages": "2,5"}, r"stages \(2, 5\)"),
         ({"distractor": "loud"}, r"no distractor 'loud'"),
         ({"frame": "world"}, r"no frame 'world'"),

@@ -158,7 +158,15 @@ def test_a_plan_and_its_files_are_the_same_plan(tmp_path: Path, options: dict[st
 
 
 def test_workers_are_placed_only_where_their_labels_are() -> None:
-    needs = WorkerNeeds(memory_gb=2.0, labels={"rack": "b"})
-    machine = {"Labels": {"rack": "b"}, "Resources": {"CPU": 9.0, "memory": 5e9}}
-    assert needs.slots(machine) == 2
-    assert needs.slots({**machine, "Labels": {"rack": "a"}}) == 0
+    needs = WorkerNeeds(cpus=1.5, gpus=0.25, memory_gb=2.0, labels={"rack": "b"})
+    usual = {"CPU": 9.0, "GPU": 1.0, "memory": 7e9}  # for 6, 4 and 3
+    for rack, changes, slots in (
+        ("a", {}, 0),
+        ("b", {}, 3),
+        ("b", {"CPU": 3.0}, 2),
+        ("b", {"GPU": 0.3}, 1),
+        ("b", {"memory": 1e9}, 0),
+    ):
+        machine = {"Labels": {"rack": rack}, "Resources": {**usual, **changes}}
+        assert needs.slots(machine) == slots
+    assert needs.options() == {"num_cpus": 1.5, "num_gpus": 0.25, "memory": 2_000_000_000}

@@ -34,6 +34,7 @@ from roboirg.evaluation.hosting.messages import Call, HostRequest, Loss, ask, re
 from roboirg.evaluation.hosting.policy_child import PolicyChild
 from roboirg.evaluation.hosting.policy_opening import open_policy
 from roboirg.evaluation.plan.plan import Plan
+from roboirg.evaluation.plan.plan_sections import Hosting
 from roboirg.evaluation.records.record import Job, Record
 from roboirg.evaluation.records.store import iterate_records, read_records
 from roboirg.evaluation.run.executor import Executor, InProcess, LocalProcesses
@@ -276,7 +277,7 @@ class It(hostile_policies.Hostile):
 """,
         )
     )
-    with HostPool(HostSettings(devices=("0", "3"))) as pool:
+    with HostPool(Hosting(devices=("0", "3")).settings or HostSettings()) as pool:
         worlds = [HostedPolicy(pool.connect(), ref, 0) for _ in range(4)]
         for world in worlds:
             world.reset("Pick it.", {})
@@ -384,10 +385,12 @@ class It:
         over.usage()  # what it has cost is lost
     for one in (good, bad, over, late):
         one.close()
-    again = HostedPolicy(pool.connect(), read_policy(spec), 0)  # in a new process
+    again = HostedPolicy(hosts := pool.connect(), read_policy(spec), 0)  # in a new process
     again.reset("live", {})
     assert again.act({}).shape == (1, 8)  # type: ignore[typeddict-item]
     again.close()
+    HostedPolicy(hosts, read_policy("hosting_fakes:Dice"), 0).close()
+    assert child_of(pool)  # there is one again: nobody plays the other policy
 
 
 def test_a_host_goes_on_after_worlds_that_die_or_are_interrupted(
@@ -629,6 +632,6 @@ class It:
     plan = paper_plan(spec, 1)
     runner: PaperRunner = paper_runner(plan, tmp_path, seconds=0.2)
     (record,) = InProcess().run(deque(plan.jobs()), runner)
-    assert (record.outcome, record.error) == ("error", "policy")
+    assert (record.outcome, record.error, record.attempt) == ("error", "policy", 2)
     assert "the process ended with exit code 5" in str(record.cause)
     assert "last words" in capfd.readouterr().err  # in a worker, of the episode's log

@@ -263,7 +263,7 @@ def test_a_success_with_a_cause_is_refused(tmp_path: Path) -> None:
     plan: Plan = small_plan(1)
     run_plan(plan, tmp_path, Liar(tmp_path), InProcess())
     for record in read_records(tmp_path):
-        assert (record.outcome, record.error) == ("error", "policy")
+        assert (record.outcome, record.error, record.goals) == ("error", "policy", None)
         assert record.cause == "policy: a success came with a cause (picked the wrong cube)"
     (honest, *_) = (FakePlay()(job) for job in plan.jobs())
     line = encode(replace(honest, outcome="success", cause="no"))

@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import io
 import itertools
+import re
 from types import SimpleNamespace
 
 import pytest
@@ -21,7 +22,7 @@ def report(records: list[Record], *, terminal: bool) -> str:
     with ConsoleReporter(console) as reporter:
         reporter.start(6, 2)
         for record in records:
-            reporter.advance(record)
+            reporter.advance(record, is_new=record.attempt == 1)
     return console.file.getvalue()  # type: ignore[attr-defined]
 
 
@@ -42,9 +43,19 @@ def test_elsewhere_every_episode_is_one_plain_line(monkeypatch: pytest.MonkeyPat
     """The time left goes by the pace of this run, a minute an episode, not by what was stored."""
     minutes = itertools.count(0, 60)
     monkeypatch.setattr(progress, "time", SimpleNamespace(monotonic=minutes.__next__))
-    lines = report(RECORDS, terminal=False).splitlines()
+    lines = report(
+        [
+            RECORDS[0],
+            replace(RECORDS[1].with_options(form="resolved"), arm="silent"),
+            *RECORDS[2:],
+        ],
+        terminal=False,
+    ).splitlines()
     assert lines[0] == "2 of 6 episodes already stored."
-    assert lines[1].startswith("[3/6] random PickXtimes test/0 direct: failure")
+    assert [*lines[1].split()[:6], *lines[2].split()[4:8]] == [
+        "[3/6]", "random", "PickXtimes", "test/0", "direct:", "failure:",
+        "explicit", "(resolved)", "(silent):", "success",
+    ]  # fmt: skip
     assert [line[-11:] for line in lines[1:]] == [f"({left}:00 left)" for left in (3, 2, 1, 0)]
     assert "\x1b" not in "".join(lines)
 
@@ -55,5 +66,6 @@ def test_a_warning_is_printed_at_once_on_stderr(capsys: pytest.CaptureFixture[st
 
 
 def test_errors_are_in_the_score_but_in_no_rate() -> None:
-    text = report([RECORDS[0], replace(RECORDS[0], outcome="error")], terminal=True)
-    assert "direct 0/1 · errors 1" in text[text.rindex("episodes") :]
+    """What is played again is not done twice."""
+    text = report([RECORDS[0], replace(RECORDS[0], outcome="error", attempt=2)], terminal=True)
+    assert re.search(r"3/6.*direct 0/1 · errors 1", text[text.rindex("episodes") :], re.DOTALL)

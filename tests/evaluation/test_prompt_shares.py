@@ -70,9 +70,17 @@ def test_options_that_add_words_are_cut() -> None:
     assert share_text(cut.settings["explicit"]) == "0 %"
     assert share_text(whole.settings["contextual"]) == "0 %"
     assert silent.limit is None
-    (line,) = warning_lines([cut, whole, silent])
+    line, other = warning_lines(
+        [
+            cut,
+            whole,
+            silent,
+            whole._replace(settings={"direct": Counter(unknown=1, heard=1)}),
+        ]
+    )
     assert line.startswith("a reads 64 tokens of a prompt")
     assert line.endswith("contextual 100 %.")
+    assert other.endswith("instructions does not reach it: direct 0–50 %.")
 
 
 @pytest.mark.parametrize(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import re
 from collections.abc import Callable
 from pathlib import Path
@@ -29,6 +30,7 @@ from roboirg.evaluation.play.video_writer import VideoWriter
 from roboirg.evaluation.records.record import EventRecord, Job, Record
 from roboirg.evaluation.records.record_codec import encode, read_record
 from roboirg.policies.by_name.finding import read_policy
+from roboirg.policies.contract.base import SubgoalEnd
 
 JOB = Job(
     policy="random",
@@ -43,7 +45,7 @@ JOB = Job(
 class PaperWorld:
     """Ends after `length` steps with `status`."""
 
-    render_device = "none"
+    render_device, due_stage = "none", None
 
     def __init__(self, length: int = 5, status: str = "success", cause: str | None = None) -> None:
         self.length, self.status, self.cause = length, status, cause
@@ -151,6 +153,10 @@ def test_a_record_holds_what_the_job_prescribes_instead_of_the_policy(
     job = replace(JOB, environment=EnvironmentOptions(demonstration_frames=4))
     needs = stage(PaperWorld(), PaperPolicy(), job).needs
     assert (needs["demonstration_frames"], needs["cameras"]) == (4, [])
+    job = replace(JOB, environment=EnvironmentOptions(actions="ee_pose"))
+    assert stage(PaperWorld(), PaperPolicy(), job).cause == (
+        "policy: the policy's action space is 'joint_angle', but the plan requires 'ee_pose'."
+    )
 
 
 def test_an_insider_is_attached_before_reset(stage: Callable[..., Record]) -> None:
@@ -362,6 +368,32 @@ def test_a_record_tells_a_mirrored_pick_where_the_words_name_a_side(
     record = make_record(job, "failure", "picked up the red cube", steps=9, events=events)
     assert record.attribution is not None
     assert (record.attribution.failure, record.attribution.subject) == (failure, "cube_red")
+
+
+class Stubborn(PaperPolicy):
+    """Names the same subgoal again, however its last try ended."""
+
+    reports, subgoal, turns = True, "go", itertools.count()
+
+    @property
+    def endings(self) -> list[SubgoalEnd]:
+        failed = (SubgoalEnd("go", how, f"{how}!") for how in ("time-out", "missed", "blocked"))
+        ends = [*failed, SubgoalEnd("go", "done"), SubgoalEnd("sing", "refused", "no", "cube")]
+        return ends[: next(self.turns)]
+
+
+def test_a_subgoal_is_noted_again_where_its_last_try_came_to_nothing(
+    stage: Callable[..., Record],
+) -> None:
+    found = stage(PaperWorld(30), Stubborn()).subgoals
+    assert [(one.step, one.text, one.ended, one.why, one.thing) for one in found] == [
+        (0, "go", "time-out", "time-out!", None),
+        (3, "go", "missed", "missed!", None),
+        (6, "go", "blocked", "blocked!", None),
+        (9, "go", "done", None, None),
+        (15, "sing", "refused", "no", "cube"),
+        (15, "go", None, None, None),
+    ]
 
 
 class TellingWorld(PaperWorld):

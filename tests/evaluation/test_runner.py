@@ -26,9 +26,11 @@ from flat_jobs import with_version
 from msgspec.structs import replace
 
 from roboirg.core.errors import InvalidValueError, RenderDeviceError
-from roboirg.evaluation.plan.stored_plans import read_plan
+from roboirg.core.policy_ref import unknown_policy
+from roboirg.evaluation.plan.stored_plans import read_plan, read_plans
 from roboirg.evaluation.records.record import ErrorKind, Job, Record
 from roboirg.evaluation.records.record_codec import StoreError
+from roboirg.evaluation.records.run_files import earlier_plans
 from roboirg.evaluation.records.store import (
     RECORDS_FILE,
     TORN_FILE,
@@ -126,8 +128,9 @@ def test_a_worker_that_dies_twice_costs_one_error_and_the_rest_goes_on(tmp_path:
     same = run_plan(plan, tmp_path, FakePlay(), InProcess(), retry_errors=False)
     assert (same.played, len(same.errors)) == (0, 1)
     mended = run_plan(plan, tmp_path, FakePlay(), InProcess())
-    assert (mended.played, len(mended.errors)) == (1, 0)
+    assert (mended.played, max(one.attempt for one in read_records(tmp_path))) == (1, 3)
     assert run_plan(plan, tmp_path, FakePlay(), InProcess()).played == 0
+    assert not earlier_plans(tmp_path)  # it was the same one each time
 
 
 def test_a_worker_that_dies_once_costs_nothing(tmp_path: Path) -> None:
@@ -148,9 +151,10 @@ def test_a_folder_may_get_more_and_fewer_jobs(tmp_path: Path) -> None:
     more = run_plan(small_plan(4), tmp_path, FakePlay(), InProcess())
     assert (more.played, more.total) == (4, 8)
     fewer = run_plan(small_plan(1), tmp_path, FakePlay(), InProcess())
-    assert (fewer.played, fewer.total) == (0, 2)
+    assert (fewer.played, fewer.total, fewer.missing) == (0, 2, 0)
     assert len(read_records(tmp_path)) == 8
-    assert read_plan(tmp_path) == small_plan(1)
+    # What the larger one lacks is not missing any more.
+    assert (read_plan(tmp_path), *read_plans(tmp_path)) == (small_plan(1), small_plan(1))
 
 
 @pytest.mark.parametrize(
@@ -197,10 +201,12 @@ def test_lost_videos_are_counted(tmp_path: Path) -> None:
     assert not run_plan(small_plan(1), tmp_path, play, InProcess()).video_errors
 
 
-def test_workers_are_counted() -> None:
+def test_workers_are_counted(monkeypatch: pytest.MonkeyPatch) -> None:
+    assert isinstance(choose_executor(None), LocalProcesses)
+    monkeypatch.setenv("ROBOIRG_WORKERS", "5")
+    assert choose_executor(None) == LocalProcesses(5)
     assert choose_executor(0) == InProcess()
     assert choose_executor(3) == LocalProcesses(3)
-    assert isinstance(choose_executor(None), LocalProcesses)
     with pytest.raises(InvalidValueError, match="workers is -1"):
         choose_executor(-1)
 
@@ -241,11 +247,11 @@ def test_machines_of_other_versions_are_named() -> None:
     from roboirg.evaluation.run.ray_machines import MachineVersions
 
     random = read_policy("random")
-    here = MachineVersions.expected((random,))
-    assert here.difference(MachineVersions.expected((random,))) is None
+    here = MachineVersions.expected((unknown_policy("x"), random))
+    assert here.difference(MachineVersions.expected((read_policy("oracle"), random))) is None
     there = here._replace(language="2.0.1")
     assert here.difference(there) == (
         f"its language has version 2.0.1 there and {here.language} here"
     )
-    other = here._replace(policies=(dataclasses.replace(random, version="old"),))
+    other = here._replace(policies=(here.policies[0], dataclasses.replace(random, version="old")))
     assert str(here.difference(other)).startswith("random has version old there")

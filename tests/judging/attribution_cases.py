@@ -184,7 +184,7 @@ def above_the_button_without_pressing(staged: Staged) -> None:
 @case("out_of_time", *UNMASK, early=False)
 def rests_a_moment_after_the_first_of_two(staged: Staged) -> None:
     need(kinds(staged).count(PICK) >= 2)
-    staged.lift(first_pick(staged)).set(Fact("still", "robot")).tick(50)
+    staged.lift(first_pick(staged)).set(Fact("still", "robot")).tick(99)
 
 
 @case("out_of_time", "StopCube", early=False)
@@ -209,16 +209,18 @@ def drops_on_the_site(staged: Staged) -> None:
 
 
 @case("dropped", "PickXtimes", "BinFill")
-def drops_and_goes_on(staged: Staged) -> None:
+def drops_one_puts_the_next_beside_and_goes_on(staged: Staged) -> None:
     stages = staged.episode.stages
+    need(len(stages) >= 5)
     target = first_pick(staged)
-    staged.lift(target).tick(5).drop(target).play(stages[2:])
+    staged.lift(target).tick(5).drop(target).do(stages[2])
+    staged.put(stages[2].primitive.subject).play(stages[4:])
 
 
 @case("misplaced", *PLACING, "PickXtimes", "BinFill", "PutInBox", "PickByCount", early=False)
-def puts_it_beside(staged: Staged) -> None:
+def puts_it_beside_after_a_drop(staged: Staged) -> None:
     target = first_pick(staged)
-    staged.lift(target).put(target).tick(50)
+    staged.lift(target).drop(target).lift(target).put(target).tick(50)
 
 
 @case("misplaced", "SwingXtimes", early=False)
@@ -445,7 +447,7 @@ def one_cube_too_many_in_the_hand(staged: Staged) -> None:
 @case("wrong_count", *UNMASK, early=False)
 def rests_after_the_first_of_two(staged: Staged) -> None:
     need(kinds(staged).count(PICK) >= 2)
-    staged.lift(first_pick(staged)).set(Fact("still", "robot")).tick(150)
+    staged.lift(first_pick(staged)).set(Fact("still", "robot")).tick(100)
 
 
 # The wrong order

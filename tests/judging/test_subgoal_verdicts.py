@@ -38,6 +38,7 @@ def test_what_is_due_is_right_and_another_act_is_lost(task: str) -> None:
     [
         ("PickXtimes", 0, "pick up the green cube for the first time", "right"),
         ("PickXtimes", 0, "pick up the green cube for the second time", "wrong_count"),
+        ("PickXtimes", 0, "pick up the green cube for the 12th time", "wrong_count"),
         ("PickXtimes", 0, "pick up the blue cube for the first time", "wrong_thing"),
         ("PickXtimes", 0, "press the button to stop", "lost"),
         ("PickXtimes", 1, "place the green cube onto the target", "right"),
@@ -45,6 +46,7 @@ def test_what_is_due_is_right_and_another_act_is_lost(task: str) -> None:
         ("PickXtimes", 1, "place the green cube onto the table", "wrong_place"),
         ("PickXtimes", 1, "", "lost"),
         ("BinFill", 0, "pick up the third red cube", "wrong_count"),
+        ("StopCube", 1, "remain static for 30 steps", "right"),
     ],
 )
 def test_what_is_wrong(task: str, number: int, said: str, verdict: str) -> None:
@@ -57,3 +59,4 @@ def test_a_point_off_the_thing_is_wrong_whatever_the_words() -> None:
     assert judge_subgoal(plain_subgoal(pick), pick, {"target_0"}) == "wrong_thing"
     assert judge_subgoal(plain_subgoal(place), place, {place.points_at, "cube"}) == "right"
     assert judge_subgoal(plain_subgoal(place), place, set()) == "wrong_place"
+    assert judge_subgoal("remain static", due("StopCube", 1), {"button"}) == "right"

@@ -31,7 +31,7 @@ from roboirg.policies.vlm.prompt_files import load_prompts
 from roboirg.tasks import every_task
 from roboirg.tasks.splits.splits import get_episode
 from roboirg.util.json_reply import UnparsableReplyError, json_object, text_of
-from roboirg.util.media import sample_evenly
+from roboirg.util.media import contact_sheets, sample_evenly
 
 thousandths = st.integers(0, 1000)
 PROMPTS = ("listener", "qwen", "gemini", "memer", "subgoals")
@@ -114,11 +114,6 @@ def _pattern(form):
     )  # fmt: skip
 
 
-def test_complete_is_no_subgoal():
-    assert says_finished("all tasks completed")
-    assert says_finished("the task is complete")
-
-
 @given(st.integers(1, 60), st.integers(1, 12))
 def test_chosen_frames_are_spread_evenly(length, most):
     frames = np.arange(length, dtype=np.uint8)[:, None, None, None]
@@ -132,6 +127,19 @@ def test_chosen_frames_are_spread_evenly(length, most):
         assert not len(gaps) or gaps.max() - gaps.min() <= 1
     clip = summary_clip(frames, most, length)
     assert len(kept) / clip.rate == Fraction(length, 30)
+
+
+def test_a_sheet_shows_frames_in_reading_order_each_with_its_label():
+    shades = [10 * number for number in range(18)]
+    frames = np.uint8(shades)[:, None, None, None].repeat(128, 1).repeat(128, 2).repeat(3, 3)
+    tiles = [
+        sheet[row : row + 64, column : column + 64]
+        for sheet in contact_sheets(frames, ["x" if shade == 50 else "" for shade in shades])
+        for row in range(0, len(sheet), 64)
+        for column in range(0, 256, 64)
+    ]
+    found = [(int(tile[-1, -1, 0]), bool(np.ptp(tile))) for tile in tiles]
+    assert found == [(shade, shade == 50) for shade in (*shades, 0, 0)]
 
 
 @pytest.mark.parametrize("text", ["", "none", "[1]", "{", "{]}", '{"a": {"b": }'])
@@ -157,6 +165,8 @@ def test_prompts_are_versioned_and_can_be_replaced(tmp_path):
         mine.fill("goal", instruction="x")
     with pytest.raises(InvalidValueError, match=r"'system' .*missing.*\$why"):
         mine.fill("system", why="so")
+    file.write_text('again = "never"')
+    assert load_prompts("qwen", str(file)).fingerprint != mine.fingerprint
     file.write_text("= 3")
     with pytest.raises(InvalidValueError, match="not TOML"):
         load_prompts("qwen", str(file))

@@ -1,16 +1,22 @@
 """The built-in policies, and policies made from names."""
 
+from types import SimpleNamespace
+from unittest.mock import MagicMock
+
 import numpy as np
 import pytest
 
 import roboirg
 from roboirg.core.actions import JOINT_ANGLE, check_chunk
+from roboirg.core.episode import Primitive
 from roboirg.core.errors import InvalidValueError, UnknownNameError
 from roboirg.language.settings import plain_settings
 from roboirg.policies import Policy, PrivilegedPolicy, find_policy, make_policy
-from roboirg.policies.builtin import BUILTIN
+from roboirg.policies.builtin import BUILTIN, scripted
 from roboirg.policies.builtin.listeners import ForgetfulPolicy, ListenerPolicy
+from roboirg.policies.builtin.oracle_policy import PreviousGoalPolicy
 from roboirg.tasks import every_task
+from roboirg.tasks.splits.splits import get_episode
 
 
 @pytest.mark.parametrize("name", BUILTIN)
@@ -34,6 +40,36 @@ def test_random_actions_are_valid_and_depend_on_seed_and_instruction_alone():
     assert np.array_equal(walk(1), actions)
     assert not np.array_equal(walk(2), actions)
     assert not np.array_equal(walk(1, "Stop."), actions)
+
+
+@pytest.mark.parametrize(
+    ("completed", "executed"),
+    [
+        # What handles the thing that was not picked begins with the pick; what fails before, alone.
+        ([1, 1, 2, 2, 2, 3], "hover pick_cube pick_cube drop_into pick_cube drop_into"),
+        ([0, 0, 0, 0], "hover hover hover hover"),
+    ],
+)
+def test_what_the_expert_missed_is_tried_again_and_only_three_times(
+    monkeypatch, completed, executed
+):
+    kinds = ("hover", "pick_cube", "drop_into")
+    stages = tuple(SimpleNamespace(primitive=Primitive(kind, "cube")) for kind in kinds)
+    primitives = SimpleNamespace(execute=lambda primitive: [primitive.kind])
+    counts = iter(completed)
+    monkeypatch.setattr(scripted, "completed_stages", lambda *_: next(counts))
+    chunks = scripted._execute(MagicMock(), stages, primitives)
+    assert " ".join(chunk for _, chunk in chunks) == executed
+
+
+@pytest.mark.parametrize(
+    ("task", "numbers"),
+    [("VideoUnmask", (0, 49)), ("PickXtimes", (1, 0)), ("PickXtimes", (5,))],
+)
+def test_the_previous_goal_is_that_of_the_episode_before_if_the_scene_has_it(task, numbers):
+    episode, *before = (get_episode(task, "test", number) for number in numbers)
+    goal = PreviousGoalPolicy().decide(SimpleNamespace(episode=episode), "")
+    assert goal == (before[0].goal if before else None)
 
 
 class Silent:

@@ -26,9 +26,9 @@ def captured(protocol):
 
 def test_openpi_sends_these_bytes():
     with WireServer() as server:
-        policy = make_policy(f"openpi://{server.place}", 0)
+        policy = make_policy(f"openpi://{server.place}?version=mine", 0)
         policy.reset(INSTRUCTION, video(3))
-        assert policy.act(moment(3)).shape == (20, 8)
+        assert (policy.act(moment(3)).shape, policy.version) == ((20, 8), "mine")
         policy.close()
         assert server.messages == captured("openpi")
 
@@ -154,7 +154,7 @@ def test_a_server_may_be_at_a_path_and_have_the_dialect_of_msgpack_numpy():
     reply = {"actions": {**described, b"data": rows.tobytes()}}
     with WireServer(faults=[reply]) as server:
         place = f"{server.place}/v1/realtime/robot/openpi"
-        policy = make_policy(f"openpi://{place}?execute=2", 0)
+        policy = make_policy(f"openpi://{place}/?execute=2", 0)
         policy.reset(INSTRUCTION, {})
         assert (server.path, policy.metadata["server"]) == ("/v1/realtime/robot/openpi", place)
         assert np.array_equal(policy.act(moment(0)), rows)

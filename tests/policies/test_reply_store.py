@@ -11,23 +11,32 @@ import textwrap
 import time
 from collections import Counter
 from collections.abc import Iterator
+from fractions import Fraction
 from pathlib import Path
 from string import Template
 from types import SimpleNamespace
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
 from planning_fakes import TOKENS, Garbage, Status, fake_vlm, model_options, words_of
 
-from roboirg.core.errors import BudgetError, ModelBusyError, PolicyReplyError
+from roboirg.core.errors import (
+    BudgetError,
+    ModelBusyError,
+    PolicyConnectionError,
+    PolicyReplyError,
+)
+from roboirg.policies.vlm import vlm_query
 from roboirg.policies.vlm.model_content import ChatTurn
-from roboirg.policies.vlm.models import ModelQuery, reply_store
+from roboirg.policies.vlm.models import ModelOptions, ModelQuery, reply_store
 from roboirg.policies.vlm.models.http_model import retry_after_s
 from roboirg.policies.vlm.models.reply_store import REPLIES_FILE, ReplySettings, use_replies
 from roboirg.policies.vlm.vlm_query import VLMQuery
-from roboirg.util.media import Picture
+from roboirg.util.media import Clip, Picture
 
 PRICES = {"input_price": 100_000.0, "output_price": 0.0}
+BUSY, LOST = ModelBusyError("busy"), PolicyConnectionError("lost")
 COST = TOKENS[0] * PRICES["input_price"] / 1_000_000
 """US dollars of each reply."""
 
@@ -78,10 +87,25 @@ def test_what_is_sent_decides_and_differences_are_counted(tmp_path: Path) -> Non
         assert (replies, len(server.requests)) == (["one"], 3)
 
 
+def test_all_that_is_sent_is_in_the_digest() -> None:
+    one = query("words")
+    clips = (Clip(np.full((2, 4, 4, 3), shade, np.uint8), Fraction(rate)) for shade, rate in
+             ((0, 30), (1, 30), (0, 15)))  # fmt: skip
+    others = (
+        one._replace(system="another"),
+        one._replace(schema={"type": "object"}),
+        one._replace(turns=(ChatTurn("model", ("words",)),)),
+        one._replace(turns=(*one.turns, *one.turns)),
+        *(one._replace(turns=(ChatTurn("user", (clip,)),)) for clip in clips),
+    )
+    found = {reply_store.digest(each, ModelOptions(model="m")) for each in (one, *others)}
+    assert len(found) == 1 + len(others)
+
+
 def test_a_run_ends_when_it_has_spent_what_it_may_and_can_go_on_with_more(tmp_path: Path) -> None:
     with fake_vlm(lambda body: words_of(body)[-1]) as server:
-        with pytest.raises(BudgetError, match=r"have cost 20\.00 of at most 15\.00 US dollars"):
-            play(server, ReplySettings(tmp_path, 1.5 * COST), "a", *"0123", **PRICES)
+        with pytest.raises(BudgetError, match=r"have cost 20\.00 of at most 20\.00 US dollars"):
+            play(server, ReplySettings(tmp_path, 2 * COST), "a", *"0123", **PRICES)
         assert len(server.requests) == 2
         replies, counts = play(server, ReplySettings(tmp_path, 9 * COST), "a", *"0123", **PRICES)
         assert (replies, counts["stored"]) == (list("0123"), 2)
@@ -97,7 +121,10 @@ def test_a_limit_of_costs_needs_prices(tmp_path: Path) -> None:
     assert not server.requests
 
 
-@pytest.mark.parametrize(("provider", "code"), [("openai", 429), ("google", 503)])
+@pytest.mark.parametrize(
+    ("provider", "code"),
+    [("openai", 429), ("google", 503), ("openai", 408), ("google", 502), ("openai", 504)],
+)
 def test_a_busy_service_is_waited_for(tmp_path: Path, provider: str, code: int) -> None:
     """As long as it asks for, and other processes of the run wait, too."""
     busy = Status(code, headers={"Retry-After": "0.05"})
@@ -112,12 +139,24 @@ def test_a_busy_service_is_waited_for(tmp_path: Path, provider: str, code: int) 
     assert next_at >= started + 0.15
 
 
-def test_patience_ends(tmp_path: Path) -> None:
-    busy = Status(429, headers={"retry-after": "3600"})
-    with fake_vlm([busy]) as server:
-        with pytest.raises(ModelBusyError, match="is not available"):
-            play(server, ReplySettings(tmp_path), "a", "words", patience_s=60)
-        assert len(server.requests) == 1
+@pytest.mark.parametrize(
+    ("said", "waits"),
+    [
+        ([BUSY, ModelBusyError("busy", 7.0), LOST, BUSY, LOST, LOST], [1.0, 7.0, 4.0, 8.0, 16.0]),
+        ([BUSY, ModelBusyError("busy", 99.5)], [1.0]),  # patience would end
+    ],
+)
+def test_pauses_grow_until_it_cannot_be_reached_or_patience_ends(
+    monkeypatch: pytest.MonkeyPatch, said: list[Exception], waits: list[float]
+) -> None:
+    waited: list[float] = []
+    clock = SimpleNamespace(monotonic=lambda: sum(waited), sleep=waited.append)
+    monkeypatch.setattr(vlm_query, "time", clock)
+    options = ModelOptions(model="m", retries=2, patience_s=100.0)
+    model = SimpleNamespace(answer=Mock(side_effect=said))
+    with pytest.raises(PolicyConnectionError, match=str(said[-1])):
+        VLMQuery(options, Template(""), lambda _: model).ask(query("words"), str)
+    assert waited == waits
 
 
 def test_what_is_no_chat_completion_is_not_asked_again_nor_stored(tmp_path: Path) -> None:
@@ -251,8 +290,12 @@ def test_who_asks_at_the_same_moment_waits_for_all_before(
     store = reply_store.ReplyStore(ReplySettings(tmp_path), "episode")
     for _ in range(3):
         store.wait_for_turn("service", 60.0)
+    # What asked for a pause is given the longest one, even if nothing limits its rate.
+    for seconds in (9.0, 4.0):
+        store.pause("other", seconds)
+    store.wait_for_turn("other", None)
     store.close()
-    assert waits == [1.0, 2.0]
+    assert waits == [1.0, 2.0, 9.0]
 
 
 def test_processes_keep_one_limit_together(tmp_path: Path) -> None:

@@ -17,7 +17,7 @@ from roboirg.policies import make_policy, play
 from roboirg.policies.by_name.finding import read_policy
 from roboirg.policies.hands.scripted_hands import ScriptedHands
 from roboirg.policies.hands.subgoal_words import read_subgoal
-from roboirg.policies.planners import make_planner
+from roboirg.policies.planners import make_planner, model_planners
 from roboirg.policies.planners.hierarchical_policy import MOST_REFUSALS, HierarchicalPolicy
 from roboirg.policies.planners.oracle_planner import OraclePlanner
 from roboirg.policies.planners.planner import SubgoalOptions
@@ -260,16 +260,26 @@ def test_wrong_specs_are_one_sentence(spec, words):
 
 
 @pytest.mark.sim
-def test_the_stateless_planner_asks_when_a_subgoal_has_ended():
-    with fake_vlm(["remain static", "remain static for 5 steps", "?<", "done", "done"]) as server:
+def test_the_stateless_planner_asks_when_a_subgoal_has_ended(monkeypatch):
+    labels = []
+    monkeypatch.setattr(
+        model_planners, "contact_sheets", lambda frames, said: labels.append(said) or frames[:1]
+    )
+    thought = "First the cubes.\n\nRemain static for 5 steps.\n"
+    with fake_vlm(["sing", "remain static", thought, "?<", "done", "done"]) as server:
         spec = f"planner:stateless?base_url={server.url}/v1&model=x"
         policy = make_policy(spec, 0)
         needs = PolicyNeeds.of(policy).env_options
         env = roboirg.make("VideoUnmask", max_steps=60, **needs)
         play(env, policy)
         texts = [words_of(body) for body in server.requests]
-        assert len(texts) == 4  # after "done" it is asked no more
+        assert len(texts) == 5  # after "done" it is asked no more
         assert "nothing has been done" in texts[0]
-        assert "1. remain static: done (step 16)" in texts[1]
-        assert "2. remain static for 5 steps: done (step 21)" in texts[2]
+        assert (
+            "1. sing: refused, these words are no subgoal that the hands know (step 0)" in texts[1]
+        )
+        assert "2. remain static: done (step 16)" in texts[2]
+        assert "3. remain static for 5 steps: done (step 21)" in texts[3]
         assert policy.usage()["finished"] == 1
+        # Of the video, and of what was seen since, in the last two questions.
+        assert [(said[0], said[-1]) for said in labels[-4:]] == [("1", "66"), ("16", "16")] * 2

@@ -17,7 +17,7 @@ from roboirg.policies.remote.endpoints import Endpoint
 from roboirg.policies.remote.server_lock import lock_server
 
 SPAWN = multiprocessing.get_context("spawn")
-ONE, TWO = Endpoint("h", 8001), Endpoint("h", 8002)
+ONE, TWO = Endpoint("h", 8001), Endpoint("h", 8001, "/two")
 
 
 def hold(folder, endpoint, ready, seconds):
@@ -46,18 +46,22 @@ def test_another_process_waits_takes_another_server_or_inherits(holder, tmp_path
     lock_server([TWO], wait=5, folder=tmp_path).file.close()
     assert (told, queued_seconds()) == ([], before)
     start = time.monotonic()
-    with pytest.raises(PolicyTimeoutError, match=r"Other episodes used h:8001 for 0\.2 s"):
+    with (
+        waiting.waiting("its turn in a test"),
+        pytest.raises(PolicyTimeoutError, match=r"Other episodes used h:8001 for 0\.2 s"),
+    ):
         lock_server([ONE], wait=0.2, folder=tmp_path)
     assert 0.2 <= time.monotonic() - start < 300
-    (wait, end) = told
-    assert (wait.what, wait.is_queue, end) == ("a free server: h:8001", True, None)
+    (outer, wait, again, end) = told
+    assert (wait.what, wait.is_queue, again, end) == ("a free server: h:8001", True, outer, None)
     assert queued_seconds() - before >= 0.2
-    lock = lock_server([ONE, TWO], wait=0, folder=tmp_path)
+    monkeypatch.setattr(os, "getpid", lambda: 1)  # it begins with the second, then the first
+    lock = lock_server([TWO, ONE], wait=0, folder=tmp_path)
     assert lock.endpoint == TWO
-    with pytest.raises(PolicyTimeoutError, match="used h:8001, h:8002 for"):
-        lock_server([ONE, TWO], wait=0, folder=tmp_path, shared=True)
+    with pytest.raises(PolicyTimeoutError, match="used h:8001/two, h:8001 for"):
+        lock_server([TWO, ONE], wait=0, folder=tmp_path, shared=True)
     os.kill(holder.pid, signal.SIGKILL)
-    again = lock_server([ONE, TWO], wait=300, folder=tmp_path)
+    again = lock_server([TWO, ONE], wait=300, folder=tmp_path)
     assert again.endpoint == ONE
     lock.file.close()
     again.file.close()

@@ -105,6 +105,7 @@ SCENE = Scene(
          "red", 3),
         ("Take the cube farthest from the button and put it on the target five times.", "blue", 5),
         ("Take the cube second from the right and put it on the target five times.", "blue", 5),
+        ("Take the cube third from the back and put it on the target five times.", "green", 5),
         ("I like green. Ignore the red thing. Pick it up and put it on the disc once.", "green", 1),
     ],
 )  # fmt: skip
@@ -151,6 +152,12 @@ BLUE = "Blue is nice. My neighbor prefers red, but that does not matter here."
 )  # fmt: skip
 def test_rivals_that_are_not_waved_aside_make_a_text_ambiguous(text, slot, values):
     assert {goal[slot] for goal in interpret(text, SCENE, "PickXtimes").goals} == values
+
+
+def test_what_stays_open_is_named():
+    text = f"I like red. I also like blue. Three! My cat has four kittens. {TAKE}"
+    found = interpret(text, SCENE, "PickXtimes")
+    assert found.not_understood == ("leaves color and repeats open: it can be red or blue",)
 
 
 @pytest.mark.parametrize("task", every_task())

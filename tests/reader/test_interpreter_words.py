@@ -246,11 +246,14 @@ def test_contradictions_fit_nothing(text, scene, task):
         ("Stop the cube during the visit right after visit 4.", 5),
         ("My number is 2. Stop the cube during the visit whose number is double that.", 4),
         ("My number is 7. Stop the cube on the visit whose number is that minus 4.", 3),
+        ("My number is 1. Stop the cube on the visit whose number is thrice that.", 3),
         ("Stop the cube during the visit whose number is three less than eight.", 5),
         (("I like the third visit. My number is 3. Stop the cube during the visit whose number is "
          "one less than that."), 2),
         (("I like the fifth visit. My number is 3. Stop the cube during the visit whose number is "
          "one less than that."), 2),
+        (("I like the third visit. My number is 2. Stop the cube during the visit right after "
+         "that."), 4),
         (("I like the third visit. My aunt likes the fifth visit, but ignore that. Stop the cube "
          "during that visit."), 3),
     ],
@@ -294,6 +297,8 @@ def test_placements_in_other_words(text, color, placement):
          "the press. Take the red cube, put it where it was at the other moment."), "after"),
         ("Take the red cube, put it where it was at the other moment than after the press.",
          "before"),
+        (("There's a moment before the press and one after the press. I'd go for the one after "
+         "the press. Take the red cube, put it where it was at the other moment."), "before"),
         (("I loved the placement after the press. Take the red cube and put it on the target of "
          "the placement next to that."), "before"),
         (("I liked the part before the press. My aunt liked the part after the press, but never "
@@ -357,6 +362,22 @@ OPEN = {
         ("repicks", "Lift it and lower it, once you are ready, two times.", {2}),
         ("repicks", "I say four. Lift the same cube and put it down half as often as that.", {2}),
         ("repicks", "Lift it and put it down one time fewer than that.", {1, 2, 3}),
+        (
+            "repicks",
+            (
+                "Two and three are my numbers. I prefer two. The sun is out. Lift it and put it "
+                "down the other number of times."
+            ),
+            {3},
+        ),
+        (
+            "repicks",
+            (
+                "I say this twice, but three is fine. I want the latter. Lift it and put it down "
+                "that number of times."
+            ),
+            {3},
+        ),
         ("swaps", "Lift the container that was at the far left before they moved.", {("red",)}),
         ("swaps", "Lift the container that was originally at the far left.", {("red",)}),
         ("swaps", "Lift the container that is now at the far left.", {("blue",)}),
@@ -386,6 +407,27 @@ OPEN = {
                 "from the left then."
             ),
             {("blue", "green")},
+        ),
+        (
+            "repicks",
+            (
+                "Two and three are my numbers. I prefer two and three. Lift it and put it down "
+                "the other number of times."
+            ),
+            {2, 3},
+        ),
+        (
+            "swaps",
+            "I like red, green and blue. Lift the container that hides the latter.",
+            {("blue",)},
+        ),
+        (
+            "swaps",  # what is chosen last counts
+            (
+                "I like red. I like blue. I want the former. I chose the latter. Lift the "
+                "container that hides the cube I chose."
+            ),
+            {("blue",)},
         ),
         (
             "swaps",

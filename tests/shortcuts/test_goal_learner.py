@@ -112,11 +112,12 @@ def test_a_cue_of_the_scene_is_found_without_words():
     assert 0.3 < np.mean(right) < 0.7
 
 
-def test_the_facts_of_a_scene_do_not_follow_from_its_goal():
+def test_the_facts_of_a_scene_are_as_stored_and_do_not_follow_from_its_goal(snapshot):
     for task in (TASK, "BinFill", "StopCube", "VideoUnmaskSwap"):
         scene = get_episode(task, "random", 3).scene
         again = replace(scene, objects=scene.objects[::-1], color_order=())
         assert scene_facts(again) == scene_facts(scene)
+        assert [f"{fact}: {value:.3f}" for fact, value in scene_facts(scene).items()] == snapshot
         assert not any(one.name in fact for one in scene.objects for fact in scene_facts(scene)
                        if one.name != one.kind)  # fmt: skip
 

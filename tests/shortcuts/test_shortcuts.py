@@ -30,7 +30,8 @@ from roboirg.shortcuts.shortcut_scores import (
     score_chance,
     score_rule,
 )
-from roboirg.shortcuts.shortcut_tables import shortcut_rows
+from roboirg.shortcuts.shortcut_tables import Excess, excess_text, shortcut_rows
+from roboirg.shortcuts.text_guess import slot_share
 from roboirg.tasks import get_task
 from roboirg.tasks.splits.splits import get_episode
 
@@ -276,6 +277,19 @@ def test_shares_by_hand():
     assert score_chance((episode, instruct(episode))) == ({}, 1)
 
 
+@pytest.mark.parametrize(
+    ("guessed", "share"),
+    [
+        ((("red",),), Fraction(1, 3)),
+        ((("red",), ("red",), ("red",)), Fraction(2, 3)),
+        ((COLORS, ("green", "blue")), Fraction(5, 18)),
+        ((("red",), COLORS, ("blue",), ("green",)), Fraction(4, 9)),
+    ],
+)
+def test_a_share_is_of_the_values_of_the_goal_however_many_are_guessed(guessed, share):
+    assert slot_share({"colors": guessed}, "colors", ("red", "green", "red")) == share
+
+
 def test_only_slots_that_a_text_touches_count():
     episode = get_episode("VideoPlaceButton", "test", 0)
     said = instruct(episode, "direct")
@@ -321,19 +335,25 @@ def call(*words):
     return CliRunner().invoke(app, ["language", "shortcuts", *words])
 
 
-def test_the_command_prints_a_row_for_each_setting_or_pattern():
-    output = call("--tasks", "StopCube", "--settings", "direct,reasoning").output
-    assert "Shortcuts, implicit form, test" in output
-    (direct,) = [line for line in output.splitlines() if "direct" in line]
-    assert "25 / 25" in direct
-    assert "100 / 100" in direct
-    output = call("--tasks", "StopCube", "--settings", "reasoning", "--by", "pattern").output
-    assert all(name in output for name in ("number deduction", "sequential relation"))
-    output = call(
-        "--tasks", "StopCube", "--settings", "direct", "--split", "none", "--seeds", "3"
-    ).output
-    assert "3 random scenes per task" in output
-    assert "│     3 │" in output
+@pytest.mark.parametrize(
+    "words",
+    [
+        ("--settings", "direct,reasoning"),
+        ("--settings", "reasoning", "--by", "pattern"),
+        ("--settings", "spatial,direct", "--tasks", "BinFill", "--by", "slot"),
+        ("--settings", "direct", "--split", "none", "--seeds", "3"),
+    ],
+    ids=" ".join,
+)
+def test_the_command_prints_a_row_for_each_setting_pattern_or_slot(words, snapshot):
+    assert call("--tasks", "StopCube", *words).output == snapshot
+
+
+@pytest.mark.parametrize(
+    ("value", "text"), [(0.25, "+25.0 (+21.1 to +28.9)"), (-0.02, "−2.0 (−5.9 to +1.9)")]
+)
+def test_an_excess_has_its_signs_and_its_ends_in_order(value, text):
+    assert excess_text(Excess(value, 0.02), 1) == text
 
 
 @pytest.mark.parametrize(

@@ -101,6 +101,7 @@ def test_the_gripper_opens_and_closes():
     for _ in range(10):
         world.step(closing)
     assert world.robot.finger_positions == pytest.approx([0, 0], abs=1e-3)
+    assert Fact("home", "robot") not in world.facts
     rest(world, 10)
     assert world.robot.finger_positions == pytest.approx([0.04, 0.04], abs=1e-3)
 

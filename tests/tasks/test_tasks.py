@@ -15,6 +15,7 @@ from roboirg.core.footprints import Circle, overlap
 from roboirg.core.motions import Away, Glow, Shuttle, Swap, Vanish
 from roboirg.language.settings import plain_settings
 from roboirg.tasks import every_task, get_task
+from roboirg.tasks.other_goals import other_goals
 from roboirg.tasks.shared.fixtures import bin_footprint, button_footprint, cube_footprint
 from roboirg.tasks.shared.real_table import box_footprint
 from roboirg.tasks.shared.unmask import container_footprint
@@ -102,6 +103,22 @@ def test_the_registry_holds_each_task_once_in_the_order_of_its_code():
         sides = ("spatial",) if task.spatial else ()
         assert plain_settings(task)[:4] == ("explicit", "direct", "reasoning", "contextual"), name
         assert plain_settings(task)[4:] == sides, name
+
+
+OTHER_GOALS = {
+    "PickXtimes": [0, 2, 2], "StopCube": [3, 3, 3], "SwingXtimes": [2, 8, 8],
+    "BinFill": [0, 1, 7], "VideoUnmaskSwap": [5, 2, 5], "VideoUnmask": [2, 2, 5],
+    "ButtonUnmaskSwap": [5, 2, 5], "ButtonUnmask": [2, 2, 5], "VideoRepick": [0, 0, 0],
+    "VideoPlaceButton": [1, 5, 5], "VideoPlaceOrder": [3, 8, 5], "PutInBox": [1, 1, 1],
+    "PickByCount": [1, 1, 1],
+}  # fmt: skip
+"""How many goals of a scene take as many picks as its own and are not on the way, by episode."""
+
+
+@each_task
+def test_other_goals_take_as_many_picks_and_are_not_on_the_way(task):
+    episodes = [get_episode(task, "test", index) for index in (0, 2, 3)]
+    assert [len(other_goals(one)) for one in episodes] == OTHER_GOALS[task]
 
 
 @each_task

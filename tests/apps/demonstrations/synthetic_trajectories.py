@@ -12,7 +12,8 @@ from roboirg.core.episode import ENVIRONMENT_VERSION
 from roboirg.core.observations import CAMERAS
 from roboirg.util.atomic_write import replacing
 
-STEPS = 6
+STEPS = 7
+"""With a video more than ten rows: the names of the last ones come before *2* by letters."""
 
 
 def picture(camera, seed, row):

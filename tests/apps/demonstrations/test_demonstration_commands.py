@@ -1,5 +1,6 @@
 """The commands: what they print, and what they say of bad input."""
 
+import math
 import sys
 
 import pytest
@@ -14,8 +15,8 @@ from roboirg.tasks.splits.splits import get_episode
 
 
 def within(**choices):
-    """Return words with a plan that has these choices of an export."""
-    return "--plan", plan_file(demonstrations=choices)
+    """Return words with a plan that has these choices of an export; what is typed goes before."""
+    return "--plan", plan_file(tasks="StopCube", episodes=9, demonstrations=choices)
 
 
 FEW = ("--tasks", "PickXtimes", "--episodes", "2", "--settings", "explicit,direct")
@@ -64,6 +65,16 @@ def test_an_export_tells_its_progress_and_its_end(roboirg, tmp_path, synthetic):
     code, _, err = roboirg(*words)
     assert code == 2
     assert "complete export already" in err
+
+
+@pytest.mark.parametrize(
+    ("format", "frames"), [("lerobot-v3", "left out"), ("robomme-hdf5", "come before the policy")]
+)
+def test_robomme_s_format_has_the_video(roboirg, tmp_path, synthetic, format, frames):  # noqa: A002
+    root = tmp_path / "data"
+    words = (*FEW, "--tasks", "VideoUnmask", "--format", format, "--workers", "0", "--out", root)
+    assert roboirg("export", "demonstrations", *words)[0] == 0
+    assert f" {frames}" in (root / "README.md").read_text()
 
 
 @pytest.mark.parametrize(
@@ -121,18 +132,22 @@ def test_bad_input_is_one_sentence(roboirg, tmp_path, words, message):
 
 @pytest.mark.usefixtures("in_this_process")
 def test_a_replay_prints_what_deviates(roboirg, export, monkeypatch):
-    root = export(tasks=("PickXtimes",), episodes=(0, 2))
+    root = export(tasks=("PickXtimes",), episodes=(0, 2, 3, 4))
 
     def replay(recorded):
-        final = 0.0 if recorded.index == 0 else 0.5
-        status = "success" if recorded.index == 0 else "failure"
+        # The last one's dataset does not say how it ended.
+        final = {0: 0.0, 2: 0.5, 3: 0.25, 4: math.nan}[recorded.index]
+        status = "failure" if recorded.index == 2 else "success"
         return ReplayResult(recorded.name, status, "success", 3, 6, final, final)
 
     monkeypatch.setattr(dataset_replay, "replay", replay)
     code, out, _ = roboirg("replay", root)
     assert code == 2
     assert "PickXtimes/train/2/0: failure after 3 of 6 steps (recorded: success)" in out
-    assert "2 trajectories: 1 with the same verdict, 1 also with a final state" in out
+    assert (
+        "4 trajectories: 3 with the same verdict, 1 also with a final state within 0.0001 "
+        "(largest difference 0.5)"
+    ) in out
 
 
 def test_a_folder_without_a_data_set_cannot_be_replayed(roboirg, tmp_path):

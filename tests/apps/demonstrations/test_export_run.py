@@ -17,6 +17,8 @@ from pyarrow import parquet
 
 from roboirg.apps.demonstrations import export_run
 from roboirg.apps.demonstrations.dataset_reading import read_dataset
+from roboirg.apps.demonstrations.export_plan import recording_jobs
+from roboirg.core.episode import ENVIRONMENT_VERSION
 from roboirg.core.errors import InvalidValueError
 
 HERE = Path(__file__).parent
@@ -113,19 +115,35 @@ def test_kept_trajectories_serve_other_formats(tmp_path, synthetic, make_plan, m
     assert summary.episodes == 4
 
 
-def test_kept_trajectories_of_other_pictures_are_not_taken(tmp_path, synthetic, make_plan):
+def test_kept_trajectories_of_other_pictures_or_worlds_are_not_taken(
+    tmp_path, synthetic, make_plan, monkeypatch
+):
     kept = tmp_path / "kept"
-    for number, plan in enumerate((make_plan(), make_plan(size=64), make_plan(cameras=("front",)))):
-        summary = export_run.run_export(plan, tmp_path / str(number), 0, quiet, kept)
-        assert summary.recorded == 6
+    for number, (version, changes, recorded) in enumerate(
+        (
+            (ENVIRONMENT_VERSION, {}, 6),
+            (ENVIRONMENT_VERSION, {"size": 64}, 6),
+            (ENVIRONMENT_VERSION, {"cameras": ("front",)}, 6),
+            (ENVIRONMENT_VERSION, {"outcomes": "all"}, 2),  # of failures no pictures were kept
+            (ENVIRONMENT_VERSION + 1, {}, 6),
+        )
+    ):
+        monkeypatch.setattr(export_run, "ENVIRONMENT_VERSION", version)
+        summary = export_run.run_export(
+            make_plan(**changes), tmp_path / str(number), 0, quiet, kept
+        )
+        assert summary.recorded == recorded
 
 
 def test_failures_are_exported_only_on_request(export):
     successes = list(read_dataset(export("successes")))
-    everything = list(read_dataset(export("all", outcomes="all")))
+    root = export("all", outcomes="all")
+    everything = list(read_dataset(root))
     assert {one.status for one in successes} == {"success"}
     assert [one.status for one in everything].count("failure") == 2
     assert len(everything) == len(successes) + 2
+    stats = json.loads((root / "meta/stats.json").read_text())["next.success"]
+    assert stats["mean"] == pytest.approx([4 / (6 * synthetic_trajectories.STEPS)])
 
 
 def test_variations_are_trajectories_of_their_own(export):
@@ -207,7 +225,7 @@ def test_plans_that_make_no_sense_are_refused(make_plan, changes, message):
 
 def test_the_card_tells_counts_and_lines_to_train(export):
     card = (export(pictures="lossy-video") / "README.md").read_text()
-    assert "| all | 4 | 6 to 6 | 8 | 48 |" in card
+    assert "| VideoUnmask | 2 | 7 to 7 | 4 | 28 |\n| all | 4 | 7 to 7 | 8 | 56 |" in card
     assert "4 success, 2 failure" in card
     assert "with loss: H.264, yuv420p" in card
     assert "lerobot-train" in card
@@ -217,6 +235,11 @@ def test_the_card_tells_counts_and_lines_to_train(export):
     config = text.split("```python\n")[1].split("```")[0]
     compile(config, "config", "exec")
     assert '"observation/wrist_image": "wrist_image"' in config
+
+
+def test_an_explicit_instruction_is_its_own_resolved_form(make_plan):
+    both = make_plan(forms=("implicit", "resolved"), settings=("explicit", "direct", "spatial"))
+    assert [len(said) for _, said in recording_jobs(both)] == [1 + 2 + 2] * 6
 
 
 def test_states_alone_need_no_pictures(export):

@@ -49,16 +49,17 @@ def check_statistics(root):
     frames = [frame for _, own in load_v3(root) for frame in own]
     for name in ("observation.state", "action", "index", "next.success"):
         values = np.array([np.atleast_1d(frame[name]) for frame in frames], dtype=float)
-        assert np.allclose(stats[name]["mean"], values.mean(axis=0))
+        for what in ("min", "max", "mean", "std"):
+            assert np.allclose(stats[name][what], getattr(values, what)(axis=0))
         assert np.allclose(stats[name]["q99"], np.quantile(values, 0.99, axis=0))
         assert stats[name]["count"] == [len(frames)]
     name = "observation.images.wrist"
     pixels = np.stack([decoded(frame[name]) for frame in frames]).reshape(-1, 3) / 255.0
     assert np.ravel(stats[name]["mean"]) == pytest.approx(pixels.mean(axis=0))
     assert np.ravel(stats[name]["q01"]) == pytest.approx(np.quantile(pixels, 0.01, axis=0))
-    row, own = next(load_v3(root))
-    state = np.array([frame["observation.state"] for frame in own])
-    assert np.allclose(row["stats/observation.state/max"], state.max(axis=0))
+    for row, own in load_v3(root):
+        state = np.array([frame["observation.state"] for frame in own])
+        assert np.allclose(row["stats/observation.state/max"], state.max(axis=0))
     assert set(stats) == set(read_json(root / "meta/info.json")["features"]) - {
         "subgoal",
         "grounded_subgoal",
@@ -141,8 +142,12 @@ def test_one_camera_in_small_pictures(export, version, pictures):
 def test_the_video_comes_before_the_policy_and_is_marked(export):
     root = export(video=True, pictures="lossless-video", tasks=("VideoUnmask",), episodes=(0,))
     episode = get_episode("VideoUnmask", "train", 0)
+    counted = read_json(root / "meta/stats.json")[WRIST]["count"]
+    assert counted == [2 * (4 + synthetic.STEPS)]
     for row, frames in load_v3(root):
-        assert [frame["is_video_demo"] for frame in frames] == [True] * 4 + [False] * 6
+        assert [frame["is_video_demo"] for frame in frames] == [True] * 4 + [
+            False
+        ] * synthetic.STEPS
         expected = synthetic.arrays_of(episode, len(frames) + 1, 4, has_depth=False)
         assert frames[3]["action"] == expected["actions"][4].tolist()
         key = "videos/observation.images.wrist"

@@ -56,6 +56,7 @@ def read_like_mme_vla(path):
                         "is_demo": bool(info["is_video_demo"][()]),
                         "subgoals": {text: info[text][()].decode() for text in TEXTS},
                         "is_boundary": bool(info["is_subgoal_boundary"][()]),
+                        "is_closed": bool(obs["is_gripper_close"][()]),
                     }
                 )
             yield int(episode["setup/seed"][()]), goal, frames
@@ -96,6 +97,7 @@ def test_time_steps_have_robommes_fields_and_a_builder_reads_what_was_recorded(e
                 assert np.array_equal(frame["action"], expected["actions"][row])
                 assert np.array_equal(frame["state"][:7], expected["joint_positions"][row])
                 assert frame["is_demo"] == (row < video)
+                assert frame["is_closed"] == (expected["gripper"][row].min() < 0.03)
                 assert frame["subgoals"]["grounded_subgoal"] == expected["grounded_subgoals"][row]
             labels = [(frame["is_demo"], frame["subgoals"]["simple_subgoal"]) for frame in frames]
             changes = [i == 0 or labels[i] != labels[i - 1] for i in range(len(labels))]

@@ -1,18 +1,23 @@
 """The grounding dataset: what interpreter and scene say, and pictures that show it."""
 
 import itertools
+import json
 from collections import Counter
 from dataclasses import replace
 
+import av
+import msgspec
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from typer.testing import CliRunner
 
-from roboirg.apps.grounding.dataset_export import export_grounding
+from roboirg.apps.grounding import dataset_export
+from roboirg.apps.grounding.dataset_export import CARD, export_grounding
 from roboirg.core.errors import InvalidValueError
 from roboirg.core.instruction_options import InstructionOptions
+from roboirg.core.version import __version__
 from roboirg.envs.environment import RoboIRGEnv
 from roboirg.evaluation.grounding_items.grounding_item import (
     LETTERS,
@@ -37,6 +42,7 @@ from roboirg.policies.vlm.prompt_files import load_prompts
 from roboirg.reader import interpret
 from roboirg.tasks import all_tasks, get_task
 from roboirg.tasks.splits.splits import SIZES, get_episode
+from roboirg.util.media import CONTROL_RATE
 
 BENCHMARK = [name for name, task in all_tasks().items() if task.suite != "real"]
 SEEN = [
@@ -47,6 +53,11 @@ SEEN = [
     ("VideoUnmask", 1),
 ]
 """Without and with a video; hidden things, things that come later, amounts."""
+SHOWN = (
+    "id", "text", "stages", "wordings", "choices", "choice", "answers", "command_chance",
+    "hidden_slots", "pattern", "expressions", "points_question",
+)  # fmt: skip
+"""Fields of an item that are compared as they are."""
 
 
 def unseen(steps=0):
@@ -102,6 +113,16 @@ def test_who_hears_the_command_alone_can_only_guess_among_the_choices():
             assert set(item.choice_answers) <= set(answers), item.text
 
 
+def test_items_are_as_stored(snapshot):
+    """Choices, hidden slots, expressions and questions, of amounts, of two things and of one."""
+    found = [
+        [getattr(item, name) for name in SHOWN]
+        for task, index in SEEN[1:]
+        for item in items_of(task, index, forms=FORMS)[1]
+    ]
+    assert "\n".join(map(json.dumps, found)) == snapshot
+
+
 def test_places_of_the_right_choice_are_balanced():
     places = Counter(
         (item.setting, item.choice)
@@ -149,9 +170,10 @@ def test_the_test_split_has_2550_items():
 
 def test_options_that_a_setting_does_not_read_keep_their_defaults():
     episode = get_episode("PickXtimes", "test", 3)
-    changed = InstructionOptions(delivery="turns", stages=(1, 5), frame="camera")
+    changed = InstructionOptions(delivery="turns", stages=(1, 5), frame="camera", wordings="train")
     for options in wanted_options(episode, plain_settings(), FORMS, changed, every_variant=True):
         reads = all_settings()[options.setting].reads
+        assert options.wordings == "train"
         for name in ("delivery", "stages", "frame"):
             value = getattr(options, name)
             assert value == getattr(InstructionOptions(), name) or name in reads
@@ -283,18 +305,43 @@ def project(observation, position):
 
 @pytest.mark.sim
 def test_pictures_are_stored_once_and_all_are_there(exported):
-    _, folder, facts = exported
+    request, folder, facts = exported
     items = read_items(folder)
     paths = {path for item in items for path in (item.picture, *item.frames)}
     assert facts.pictures == len(paths) == sum(1 for _ in (folder / "pictures").iterdir())
     assert all((folder / path).is_file() for path in paths)
     video = next(item for item in items if item.task == "VideoUnmask")
     assert (folder / video.video).read_bytes()[4:8] == b"ftyp"
-    assert 0 < len(video.frames) <= 4
+    with av.open(str(folder / video.video)) as film:  # as fast as it was
+        assert film.streams.video[0].average_rate * request.frames_every == CONTROL_RATE
+    assert len(video.frames) == 4
     assert all(item.video is None for item in items if not item.task.startswith("Video"))
-    card = (folder / "README.md").read_text()
-    assert facts.sha256 in card
-    assert "license: apache-2.0" in card
+    assert facts.size == sum(
+        path.stat().st_size
+        for path in folder.rglob("*")
+        if path.is_file() and path.name != "README.md"
+    )
+    read = pytest.importorskip("pyarrow.parquet").read_table
+    rows = read(folder / "data" / "test-00000-of-00001.parquet").to_pylist()
+    for row, item in zip(rows, items, strict=True):
+        assert (row["id"], row["choices"]) == (item.id, item.choices)
+        for one in (row["picture"], *row["frames"]):
+            assert one["bytes"] == (folder / one["path"]).read_bytes()
+
+
+def test_the_card_says_what_the_dataset_holds(tmp_path, monkeypatch, snapshot):
+    items = [
+        msgspec.structs.replace(one, video=f"{task}.mp4" if task == "StopCube" else None)
+        for task, split in (("StopCube", "val"), ("BinFill", "test"))
+        for one in items_of(task, 1, every_variant=task == "BinFill", split=split)[1]
+    ]
+    (tmp_path / "large").write_bytes(bytes(3 << 20))
+    monkeypatch.setattr(dataset_export, "collect_items", lambda *_: items)
+    monkeypatch.setattr(dataset_export, "write_parquet", lambda *_: None)
+    request = ExportRequest((), (), (), frames=8, frames_every=16)
+    digest = export_grounding(request, tmp_path, 0).sha256
+    card = (tmp_path / CARD).read_text().replace(digest, "SHA-256")
+    assert card.replace(__version__, "VERSION") == snapshot
 
 
 @pytest.mark.sim

@@ -9,6 +9,7 @@ from language_variants import TASKS
 
 from roboirg.apps.language_lab import instruction_export
 from roboirg.core.errors import MissingDependencyError
+from roboirg.core.instruction_options import InstructionOptions
 from roboirg.language import FORMS, plain_settings
 from roboirg.language.instruction_row import row
 from roboirg.language.variants import instructions
@@ -45,12 +46,12 @@ def test_every_row_has_the_same_columns_and_types():
         assert len(found - {type(None)}) == 1, name
 
 
-def test_ids_are_unique_and_say_what_the_row_is():
+def test_ids_are_unique_and_say_what_the_row_is(snapshot):
     assert len({one["id"] for one in rows()}) == len(rows())
-    first = rows()[1]
-    assert first["id"] == "PickXtimes/test/0/explicit/resolved"
-    assert (first["task"], first["split"], first["episode"]) == ("PickXtimes", "test", 0)
-    assert first["suite"] == "counting"
+    episode = get_episode("SwingXtimes", "val", 3)
+    wanted = ("contextual", "spatial", "direct-rival", "grounded")
+    options = InstructionOptions(stages=(1, 2, 3, 5), distractor="competing", distractors=2)
+    assert [row(*one) for one in instructions([episode], wanted, FORMS[:1], options)] == snapshot
 
 
 def test_spans_count_in_the_whole_prompt():

@@ -1,7 +1,6 @@
 """Counting what instructions are made of, and drawing it."""
 
 import functools
-from statistics import fmean
 
 import pytest
 
@@ -36,28 +35,6 @@ def test_expressions_are_counted_once_per_scene():
     order = corpus_statistics.expression_order(counts)
     assert set(order) == {name for by_class in counts.values() for name in by_class}
     assert order.index("it") < order.index("former") < order.index("there")
-
-
-def test_lengths_patterns_relations_and_landmarks():
-    lengths = corpus_statistics.by_setting(said(), len)
-    explicit, direct, contextual = (
-        fmean(lengths[name]) for name in ("explicit", "direct", "contextual")
-    )
-    assert explicit < direct < contextual
-    patterns = corpus_statistics.metadata_counts(said(), "pattern")
-    assert patterns["PickXtimes"] == {
-        "color exclusion": 17, "number deduction": 17, "contextual logic": 16,
-    }  # fmt: skip
-    assert sum(corpus_statistics.metadata_counts(said(), "relation")["PickXtimes"].values()) == 17
-    assert set(corpus_statistics.metadata_counts(said(), "relation")["VideoPlaceOrder"]) >= {
-        "right after",
-        "neighbor",
-    }
-    assert set(corpus_statistics.metadata_counts(said(), "landmark_classes")["VideoUnmask"]) >= {
-        "1",
-        "2",
-        "3",
-    }
 
 
 def test_without_matplotlib_one_sentence_says_what_to_install(monkeypatch):

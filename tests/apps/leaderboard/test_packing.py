@@ -27,7 +27,7 @@ def run(tmp_path: Path) -> Path:
             rows = np.ones((episode + 1, 8))
             log = ActionLog("joint_angle", rows, np.zeros(1, np.int32), np.ones(2))
             job = Job(
-                policy="random",
+                policy="random" if episode else "oracle",
                 task="PickXtimes",
                 split="test",
                 episode=episode,
@@ -42,7 +42,7 @@ def run(tmp_path: Path) -> Path:
 
 def test_the_same_run_comes_out(run: Path, tmp_path: Path) -> None:
     manifest = pack_run(run, tmp_path / "a.zip")
-    assert (manifest.records, manifest.policies) == (3, ("random",))
+    assert (manifest.records, manifest.policies) == (3, ("oracle", "random"))
     with zipfile.ZipFile(tmp_path / "a.zip") as archive:
         assert json.loads(archive.read(MANIFEST)) == manifest.model_dump(mode="json")
     with opened_run(tmp_path / "a.zip") as folder:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import random
 import shutil
+from collections import Counter
 from dataclasses import replace
 from pathlib import Path
 
@@ -12,8 +13,9 @@ from forgeries import FORGERIES, Forgery, Lines, forge
 from selection import slow_but
 from typer.testing import CliRunner
 
-from roboirg.apps.leaderboard.record_check import ReplayVerdict
-from roboirg.apps.leaderboard.run_verification import verify_run
+from roboirg.apps.leaderboard import commands
+from roboirg.apps.leaderboard.record_check import RecordCheck, ReplayVerdict
+from roboirg.apps.leaderboard.run_verification import Verification, verify_run
 from roboirg.evaluation.plan.plan_maker import make_plan
 from roboirg.evaluation.play.rollout import EpisodeRunner
 from roboirg.evaluation.records.action_log import read_actions, write_actions
@@ -88,26 +90,31 @@ def test_an_episode_of_the_plan_that_was_left_out_is_named(honest: Path, tmp_pat
 
 
 def test_only_other_processors_may_end_a_little_elsewhere(honest: Path, tmp_path: Path) -> None:
-    def shift(processor: str | None, by: float) -> Forgery:
+    def shift(by: float, **changes: object) -> Forgery:
         def forgery(lines: Lines, folder: Path, rng: random.Random) -> Lines:
-            one = rng.choice(lines)
-            log = read_actions(folder, one["action_log"])
-            moved = replace(log, end_state=log.end_state + by)
-            one.update(action_log=write_actions(moved, folder), end_state="0" * 64)
-            one.update({} if processor is None else {"processor": processor})
+            for place, one in enumerate(lines, start=1):  # the first is farthest
+                log = read_actions(folder, one["action_log"])
+                moved = replace(log, end_state=log.end_state + by / place)
+                one.update(action_log=write_actions(moved, folder), end_state="0" * 64, **changes)
             return lines
 
         return forgery
 
-    other = "x86_64 OtherMaker 1"
-    for processor, by, holds in ((None, 0.001, False), (other, 0.001, True), (other, 0.1, False)):
-        folder = tmp_path / f"{processor}-{by}"
+    other = {"processor": "x86_64 OtherMaker 1"}
+    for by, changes, holds, excused in (
+        (0.001, {}, False, False),
+        (0.001, other, True, False),
+        (0.1, other, False, True),
+        (0.1, {**other, "seed": 1}, False, False),  # no processor changes that
+    ):
+        folder = tmp_path / f"{by}-{len(changes)}"
         shutil.copytree(honest, folder)
-        forge(folder, shift(processor, by), random.Random(0))
+        forge(folder, shift(by, **changes), random.Random(0))
         found = verify_run(folder)
         assert found.holds is holds
-        assert found.verdicts[ReplayVerdict.TOLERANT] == holds
-        assert any("another kind of processor" in note for note in found.notes) is (by == 0.1)
+        assert found.verdicts[ReplayVerdict.TOLERANT] == holds * found.records
+        assert found.deviation == pytest.approx(by * holds)
+        assert any("another kind of processor" in note for note in found.notes) is excused
 
 
 def test_a_merged_run_holds_by_the_plans_of_its_parts(honest: Path, tmp_path: Path) -> None:
@@ -123,6 +130,21 @@ def test_a_sample_is_drawn_again_from_its_seed(honest: Path) -> None:
     assert found.holds
 
 
+def test_what_is_printed_of_a_verification(
+    capsys: pytest.CaptureFixture[str], snapshot: object
+) -> None:
+    """At most twenty of each kind, and how many there are besides."""
+    checks = tuple(RecordCheck(f"check-{n}", ("one.", "two.")) for n in range(23))
+    verdicts = Counter({ReplayVerdict.EXACT: 30, ReplayVerdict.TOLERANT: 4})
+    verdicts[ReplayVerdict.NOT_REPLAYED] = 26
+    missing = tuple(f"missing-{n}" for n in range(22))
+    commands._print(Verification(60, checks, missing, verdicts, 0.0123, 2, ("A note.",)))
+    commands._print(
+        Verification(2, (), (), Counter({ReplayVerdict.EXACT: 1, ReplayVerdict.NOT_REPLAYED: 1}))
+    )
+    assert capsys.readouterr().out == snapshot
+
+
 @pytest.fixture
 def cli() -> CliRunner:
     return CliRunner()
@@ -130,9 +152,10 @@ def cli() -> CliRunner:
 
 @pytest.mark.usefixtures("in_this_process")
 def test_the_command_tells_what_does_not_hold(honest: Path, tmp_path: Path, cli: CliRunner) -> None:
-    good = cli.invoke(app, ["leaderboard", "verify", str(honest), "--sample", "10%"])
-    assert good.exit_code == 0, good.output
-    assert "All that was checked holds." in good.output
+    for share, played in (("10%", "1 was"), ("1.0", "2 were")):
+        good = cli.invoke(app, ["leaderboard", "verify", str(honest), "--sample", share])
+        assert good.exit_code == 0, good.output
+        assert f"2 records; {played} played again" in good.output
     forged = tmp_path / "forged"
     shutil.copytree(honest, forged)
     forge(forged, FORGERIES["failure to success"][0], random.Random(0))

@@ -74,10 +74,6 @@ def test_nothing_is_found_in_honest_policies(kind, seed):
     assert {one.verdict for one in results_of(kind, seed=seed)} <= {PASS, NOTE}
 
 
-def test_nothing_is_found_in_the_random_policy():
-    assert {one.verdict for one in check_policy("random", record_expert=record)} <= {PASS, NOTE}
-
-
 def test_the_expert_s_error_is_told():
     (told,) = [one for one in results_of(Honest) if one.check == "expert"]
     assert told.verdict == PASS

@@ -1,10 +1,7 @@
 """Plans: balanced for any seed, interleaved, and a seed changes the order and nothing else."""
 
-import csv
-import io
 from collections import Counter
 from dataclasses import replace
-from html import escape
 from itertools import groupby
 
 import msgspec
@@ -12,10 +9,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from roboirg import language
 from roboirg.apps.real.pages.arrangement_svg import draw_svg
 from roboirg.apps.real.pages.trial_sheet import sheet_text
-from roboirg.apps.real.study.arrangement_shapes import scene_shapes
 from roboirg.apps.real.study.counterbalancing import (
     Arrangement,
     counterbalanced_order,
@@ -153,6 +148,7 @@ def test_all_arrangements_are_there_and_neighbors_are_opposites(task):
         ("a", {"tasks": ("PickXtimes",)}, "PickXtimes is not a task for a real robot"),
         ("a", {"settings": ("spatail",)}, "no setting of PutInBox 'spatail'"),
         ("a", {"trials": 0}, "trials is 0; it must be at least 1"),
+        ("a", {"seed": -1}, "seed is -1; it must be at least 0"),
     ],
 )
 def test_what_cannot_be_is_said(policies, options, words):
@@ -170,7 +166,7 @@ def test_a_plan_is_read_as_it_was_written_and_not_overwritten(tmp_path):
         == msgspec.json.decode(msgspec.json.encode(plan), type=StudyPlan)
     )
     with pytest.raises(InvalidValueError, match="holds another plan"):
-        write_study(make_study(("a",), tasks=TASKS, trials=1, seed=1), tmp_path)
+        write_study(make_study(("a",), tasks=TASKS, trials=1, demonstrations=2), tmp_path)
     with pytest.raises(InvalidValueError, match="There is no plan in"):
         read_study(tmp_path / "elsewhere")
     (tmp_path / "plan.json").write_text('{"policies": ["oracle"]}')
@@ -190,37 +186,23 @@ def test_the_plans_for_the_twin_have_the_trials_and_no_others(plan):
     assert set(played) == {trial.identity for trial in plan.trials}
 
 
-def test_csv_says_what_the_plan_says():
+def test_csv_says_what_the_plan_says(snapshot):
     plan = make_study(("a", "b"), tasks=TASKS, trials=2, demonstrations=2)
-    rows = list(csv.DictReader(io.StringIO(trials_csv(plan))))
-    assert [row["trial"] for row in rows] == [trial.name for trial in plan.trials]
-    for row, trial in zip(rows, plan.trials, strict=True):
-        assert row["policy"] == trial.job.policy
-        assert row["instruction"] == language.instruct(trial.episode, trial.job.setting).text
-    shown = list(csv.DictReader(io.StringIO(demonstrations_csv(plan))))
-    assert [row["demonstration"] for row in shown] == [one.name for one in plan.demonstrations]
-    for row, one in zip(shown, plan.demonstrations, strict=True):
-        assert row["instruction"] == language.instruct(one.episode, "explicit").text
+    assert trials_csv(plan) + demonstrations_csv(plan) == snapshot
 
 
-def test_drawings_have_the_robot_s_left_on_the_left():
-    plan = make_study(("a",), tasks=TASKS, trials=4, demonstrations=0)
-    for trial in plan.trials:
-        for shape in scene_shapes(trial.episode.scene):
-            # Base frame: y to the left, and everything is in reach in front of the robot.
-            assert 0.35 < shape.x < 0.85
-            assert abs(shape.y) < 0.3
-        left = max(
-            (s for s in scene_shapes(trial.episode.scene) if s.form in ("square", "ring")),
-            key=lambda shape: shape.y,
-        )
-        picture = draw_svg(trial.episode.scene)
-        place = picture.index(f">{left.label}<")
-        x = float(picture[:place].rsplit('x="', 1)[1].split('"')[0])
-        others = [s.label for s in scene_shapes(trial.episode.scene) if s is not left]
-        for label in others:
-            at = picture.index(f">{label}<")
-            assert float(picture[:at].rsplit('x="', 1)[1].split('"')[0]) >= x
+@pytest.mark.parametrize("task", TASKS)
+def test_the_drawing_has_the_robot_s_left_on_the_left(task, snapshot):
+    (trial,) = make_study(("a",), tasks=(task,), settings=("direct",), trials=1).trials
+    assert draw_svg(trial.episode.scene) == snapshot
+
+
+def test_the_sheet_has_its_texts_and_drawings_in_their_places(snapshot):
+    plan = make_study("ab", tasks=TASKS, trials=1, demonstrations=2)
+    page = sheet_text(plan)
+    for one in (*plan.trials, *plan.demonstrations):
+        page = page.replace(draw_svg(one.episode.scene), f"[drawing of {one.name}]")
+    assert page == snapshot
 
 
 def test_a_turned_box_is_drawn_counter_clockwise():
@@ -230,18 +212,6 @@ def test_a_turned_box_is_drawn_counter_clockwise():
     picture = draw_svg(replace(scene, objects=(turned,)))
     x, y = 1000 * (0.3 - box.position.y), 1000 * (0.85 - (box.position.x + 0.615))
     assert f"translate({x:.1f} {y:.1f}) rotate(-28.6)" in picture
-
-
-def test_the_sheet_has_each_trial_and_demonstration_with_what_is_said():
-    plan = make_study(("a",), tasks=TASKS, trials=1, demonstrations=4)
-    page = sheet_text(plan)
-    assert page.count("<section>") == 2 + 1
-    assert page.count("<svg") == 2 + 2 * 4
-    for number, trial in enumerate(plan.trials, 1):
-        _, _, shown = page.partition(f"{number}. {trial.name}<")
-        said = shown.partition("☐")[0]
-        assert all(escape(turn) in said for turn in trial.turns)
-    assert all(f">{one.name}<" in page for one in plan.demonstrations)
 
 
 @pytest.mark.parametrize(

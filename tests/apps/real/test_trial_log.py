@@ -39,8 +39,11 @@ def test_a_score_is_a_record_like_any_other(small):
     }  # fmt: skip
     wrong, dropped = found[second.identity], found[third.identity]
     assert (wrong.outcome, wrong.cause) == ("failure", wrong.attribution.sentence)
-    kinds = [(one.attribution.kind, one.attribution.failure) for one in (wrong, dropped)]
-    assert kinds == [("grounding", "wrong_place"), ("execution", "dropped")]
+    kinds = [
+        (one.attribution.kind, one.attribution.failure, one.attribution.step)
+        for one in (wrong, dropped)
+    ]
+    assert kinds == [("grounding", "wrong_place", None), ("execution", "dropped", None)]
     assert "slipped" in dropped.cause
     assert dropped.plan == plan.fingerprint
     # All that reads records reads these.
