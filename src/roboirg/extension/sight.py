@@ -216,8 +216,8 @@ def record_expert(
 ) -> ExpertRecording:
     """Let the expert play an episode in waypoints, and return what was to be seen.
 
-    It is recorded undisturbed where a disturbance leads where the arm cannot go on. Of a scene in
-    which not even the video can be planned, only key and status are returned.
+    If a disturbance leads to where the arm cannot go on, the episode is recorded undisturbed. Of a
+    scene in which not even the video can be planned, only key and status are returned.
 
     Args:
         episode: the episode.
