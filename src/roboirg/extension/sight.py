@@ -271,7 +271,7 @@ class _LookRecorder(EpisodeLoop):
             np.array(done, np.int32),
             np.array([look for look, _ in self._decisions], np.int32),
             np.array([one.action for one in decided], np.float32).reshape(-1, 7),
-            np.array([-1 if one.anchor is None else names.index(one.anchor) for one in decided]),
+            np.array([names.index(one.anchor) if one.anchor else -1 for one in decided], np.int32),
             tuple(one.turn for one in decided),
             self._pictures,
             info["status"],

@@ -152,9 +152,8 @@ def read_position(text: str) -> OrdinalExpression | None:
 def _read_relative(text: str) -> OrdinalExpression | None:
     waited = _WAITED.search(text)
     if waited and _ELEMENT.search(text) is None:
-        return OrdinalExpression(
-            number_of(waited["times"] or "") or ADVERBS[waited["adverb"]], (1,)
-        )
+        times, adverb = waited["times"], waited["adverb"]
+        return OrdinalExpression(ADVERBS[adverb] if adverb else number_of(times) or 0, (1,))
     # Before `_STEP`, which would take the "one" of "the preceding one" for a number.
     following = _NEXT.search(text)
     if following:
