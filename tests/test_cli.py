@@ -90,7 +90,7 @@ def planned(**fields: object) -> tuple[str, ...]:
         ((*RUN, "--policy", "../../x=random"), "is '../../x' (in '../../x=random')"),
         ((*RUN, "--out", "o", "--workers", "-1"), "workers is -1; it must be at least 0 (this"),
         ((*RUN, "--out", "o", "--executor", "slurm"), "There is no executor 'slurm'; known: local"),
-        (planned(actions="joints"), "known: joint_angle, ee_pose, waypoint."),
+        (planned(actions="joints"), "known: joint_angle, ee_pose, waypoint, choice."),
         (planned(tries="many"), "tries is 'many'"),
         (planned(retry_on=["conection"]), "Did you mean 'connection'?"),
         (planned(policy_timeout_s=0), "policy_timeout_s is 0; it must be greater than 0."),

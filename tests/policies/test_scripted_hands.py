@@ -1,5 +1,6 @@
 """The scripted hands: what they read, what they refuse, and what planners reach with them."""
 
+import math
 import re
 
 import planner_faults
@@ -9,7 +10,8 @@ from planning_fakes import fake_vlm, words_of
 from selection import slow_but
 
 import roboirg
-from roboirg.core.errors import InvalidValueError
+from roboirg.core.actions import choice_action
+from roboirg.core.errors import InvalidActionError, InvalidValueError
 from roboirg.core.policy_needs import PolicyNeeds
 from roboirg.evaluation.analysis.stats.planner_failures import planner_failure
 from roboirg.judging import plain_subgoal
@@ -22,6 +24,7 @@ from roboirg.policies.planners.hierarchical_policy import MOST_REFUSALS, Hierarc
 from roboirg.policies.planners.oracle_planner import OraclePlanner
 from roboirg.policies.planners.planner import SubgoalOptions
 from roboirg.tasks import all_tasks, get_task
+from roboirg.tasks.choices import choices_of
 from roboirg.tasks.splits.splits import get_episode
 
 TASKS = [name for name in all_tasks() if get_task(name).suite != "real"]
@@ -283,3 +286,48 @@ def test_the_stateless_planner_asks_when_a_subgoal_has_ended(monkeypatch):
         assert policy.usage()["finished"] == 1
         # Of the video, and of what was seen since, in the last two questions.
         assert [(said[0], said[-1]) for said in labels[-4:]] == [("1", "66"), ("16", "16")] * 2
+
+
+@pytest.mark.parametrize(
+    ("task", "choices"),
+    [
+        ("BinFill", "pick_cube+ drop_into press"),
+        ("PickXtimes", "pick_cube+ place_on press"),
+        ("SwingXtimes", "pick_cube+ move_over+ put_down press"),
+        ("StopCube", "hover hold_until press_below"),
+        ("VideoUnmask", "pick_container+ put_down"),
+        ("VideoUnmaskSwap", "pick_container+ put_down"),
+        ("ButtonUnmask", "press pick_container+ put_down"),
+        ("ButtonUnmaskSwap", "press press pick_container+ put_down"),
+        ("VideoRepick", "pick_cube+ put_down press"),
+        ("VideoPlaceButton", "pick_cube+ place_on+ press"),
+        ("VideoPlaceOrder", "pick_cube+ place_on+ press"),
+    ],
+)
+def test_choices_are_robommes_in_every_episode(task, choices):
+    for index in range(20):
+        found = choices_of(get_episode(task, "test", index))
+        motions = [one.primitives[0].kind + "+" * (one.kind is not None) for one in found]
+        if task != "StopCube" or len(found) == 3:  # some episodes leave no time to wait
+            assert " ".join(motions) == choices
+        assert [one.label for one in found] == list("abcd"[: len(found)])
+
+
+@pytest.mark.sim
+def test_a_program_acts_by_choices():
+    from roboirg.simulation.expert.things import origin_pixel
+
+    env = roboirg.make("PickXtimes", episode=2, actions="choice", cameras=())
+    _, info = env.reset()
+    assert [one["label"] for one in info["available_multi_choices"]] == ["a", "b", "c"]
+    for wrong in ([3, 0, 0], [0, -1, -1], [0.5, 1, 1]):
+        with pytest.raises(InvalidActionError, match=r"Choice"):
+            env.step(wrong)
+    assert env.executed_actions == 0
+    while info["status"] == "ongoing":
+        motion = env.session.judge.published.primitive
+        label = {"pick_cube": "a", "place_on": "b", "press": "c"}[motion.kind]
+        point = origin_pixel(env.session.world.bodies[motion.subject]) if label == "a" else None
+        *_, info = env.step(choice_action(label, point))
+    assert info["status"] == "success"
+    assert math.isfinite(info["steps"])

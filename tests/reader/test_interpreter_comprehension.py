@@ -161,6 +161,8 @@ def test_the_page_teaches_a_new_verb():
          "the number is out of range: repeats can be 1 to 5"),
         ("Take the red cube and put it on the target zero times.", PICK, "PickXtimes",
          "the number is out of range: repeats can be 1 to 5"),
+        ("Press the button after the cube has passed zero times.", STOP, "StopCube",
+         "the number is out of range: visit can be 2 to 5"),
         ("Stop the cube at the sixth visit.", STOP, "StopCube",
          "the number is out of range: visit can be 2 to 5"),
         ("Put 19 red cubes into the bin.", BIN, "BinFill",

@@ -105,15 +105,15 @@ class PlanWords:
         }
 
     def options(self) -> InstructionOptions:
-        """Return the options of instructions, but setting and form, checked one by one.
+        """Return the options of instructions without setting and form, each checked by itself.
 
         `check_options` checks whether they go together.
         """
         from roboirg.evaluation.plan.plan import FLAT
         from roboirg.evaluation.plan.plan_maker import word_options
 
-        own = (one for one, section in FLAT.items() if section == "instruction")
-        names = {"stages", "wordings", "instruction", *own}
+        flat = (one for one, section in FLAT.items() if section == "instruction")
+        names = {"stages", "wordings", "instruction", *flat}
         return word_options(**{one: self.fields[one] for one in self.fields if one in names})
 
     def forms(self, usual: Sequence[str] = ("implicit",)) -> tuple[str, ...]:
@@ -146,6 +146,7 @@ def add_working_directory(*, last: bool = False) -> None:
     """Add the working directory to the import path, as `python -m` does.
 
     Args:
-        last: for commands whose processes hold worlds, which import none of a policy's files.
+        last: whether it comes last, so that a file there replaces no installed module; for
+            commands whose processes hold worlds.
     """
     sys.path.insert(len(sys.path) if last else 0, str(Path.cwd()))

@@ -71,9 +71,26 @@ WAYPOINT = ActionSpace(
 )
 """The same pose, reached by a straight move of many steps; then the gripper closes or opens."""
 
+NO_POINT = -1.0
+CHOICE = ActionSpace(
+    "choice",
+    np.array([0.0, NO_POINT, NO_POINT]),
+    np.array([3.0, 255.0, 255.0]),
+    f"the number of a choice (a is 0), row and column of a point or {NO_POINT:g}, {NO_POINT:g}",
+    takes_many_steps=True,
+)
+"""RoboMME's multi-choice mode: one of the task's motions, and a point of the front picture."""
+
 ACTION_SPACES: Mapping[str, ActionSpace] = {
-    space.name: space for space in (JOINT_ANGLE, EE_POSE, WAYPOINT)
+    space.name: space for space in (JOINT_ANGLE, EE_POSE, WAYPOINT, CHOICE)
 }
+
+
+def choice_action(label: str, point: tuple[float, float] | None = None) -> NDArray[np.float64]:
+    """Return the action of a choice: its letter, and row and column of the point if it has one."""
+    if len(label) != 1 or not label.isascii() or not label.isalpha():
+        raise InvalidActionError(f"Choice {label!r} is not a letter.")
+    return np.array([ord(label.lower()) - ord("a"), *(point or (NO_POINT, NO_POINT))])
 
 
 def find_action_space(name: object) -> ActionSpace:

@@ -25,7 +25,7 @@ class EnvironmentOptions:
     Plans, environments, jobs and records take their options of environments from these fields.
 
     Attributes:
-        actions: joint_angle, ee_pose or waypoint.
+        actions: joint_angle, ee_pose, waypoint or choice.
         observe_every: n adds `history` to each observation: the observations after every n-th
             control step since the last one.
         meshes: those of ``light`` make pictures faster, which differ slightly from RoboMME's.

@@ -30,7 +30,7 @@ from roboirg.tasks.splits.splits import get_episode, split_size
 
 EXPLICIT_WORDS = InstructionOptions()
 USUAL = EnvironmentOptions(actions=JOINT_ANGLE.name, demonstration_frames="all")
-"""Without the wishes of a policy."""
+"""What is played if neither the caller nor a policy asks for anything else."""
 RENDER_MODES = ("rgb_array",)
 RESET_OPTIONS = ("split", "episode", "arm", *OPTION_NAMES)
 """Options that `reset` takes: which episode is played, and in which words."""

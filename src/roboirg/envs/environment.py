@@ -10,7 +10,8 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import ArrayLike, NDArray
 
-from roboirg.core.actions import check_action, check_chunk, find_action_space
+from roboirg.core.actions import CHOICE, check_action, check_chunk, find_action_space
+from roboirg.core.choices import check_choices
 from roboirg.core.delivery import SpokenInstruction
 from roboirg.core.episode import Episode, Stage
 from roboirg.core.errors import InvalidValueError, MotionPlanningError
@@ -31,6 +32,7 @@ from roboirg.simulation.recording import Recording
 from roboirg.simulation.rendering.render_device import describe_device, find_render_device
 from roboirg.simulation.video.demonstration_cache import replay_or_plan
 from roboirg.simulation.video.demonstration_video import make_video
+from roboirg.tasks.choices import choices_of
 from roboirg.tasks.splits.recordings import is_recorded, recorded_actions
 
 COMPLETED = "All tasks completed"
@@ -56,7 +58,8 @@ class RoboIRGEnv(gymnasium.Env[dict[str, Any], NDArray[np.floating[Any]]]):
     extrinsic x-y-z angles (rad) of the tool center in the world frame, and the gripper; one control
     step. `waypoint` (7,): the same pose, reached by a straight move of many control steps; then
     -1 closes the gripper and +1 opens it in six more steps, and any other value leaves it. The
-    episode fails if a pose cannot be reached.
+    episode fails if a pose cannot be reached. `choice` (3,): the number of one of the task's
+    `choices`, row and column of a point (-1, -1 without); the scripted expert's motion follows.
 
     Reward: 1 at the step that completes the task, else 0.
 
@@ -68,7 +71,7 @@ class RoboIRGEnv(gymnasium.Env[dict[str, Any], NDArray[np.floating[Any]]]):
     `grounded`. At reset also `demonstration`, arrays as in the observation with a leading axis T
     (pictures are drawn when they are read), and `demonstration_subgoals`, T texts, and
     `demonstration_source`: ``recorded`` (RoboMME's actions), ``planned`` by the oracle, or
-    ``none``. In the
+    ``none``; with actions of the space `choice`, `available_multi_choices`, as in RoboMME. In the
     arm ``other-goal`` also `verdict` and `original`: the status of the stated goal and of the
     scene's own one.
 
@@ -79,6 +82,7 @@ class RoboIRGEnv(gymnasium.Env[dict[str, Any], NDArray[np.floating[Any]]]):
         instruction: its instruction.
         original: the scene's own episode in the arm ``other-goal``, whose `episode` has another
             goal; else None.
+        choices: the task's choices of motions; empty in the other action spaces.
         draws: whether observations hold pictures; `picture` draws one at any time.
 
     Raises:
@@ -215,6 +219,8 @@ class RoboIRGEnv(gymnasium.Env[dict[str, Any], NDArray[np.floating[Any]]]):
             "demonstration_subgoals": state.video_subgoals,
             "demonstration_source": recording.source,
         }
+        if self.choices:
+            shown["available_multi_choices"] = [one.as_dict() for one in self.choices]
         return self._observe(), {**self._info(), **shown}
 
     def step(self, action: ArrayLike) -> tuple[dict[str, Any], float, bool, bool, dict[str, Any]]:
@@ -243,6 +249,8 @@ class RoboIRGEnv(gymnasium.Env[dict[str, Any], NDArray[np.floating[Any]]]):
         chunk = check_chunk(actions, self._space)
         if self.status != "ongoing":
             raise gymnasium.error.ResetNeeded(f"The episode is over ({self.status}); call reset().")
+        if self._space is CHOICE:
+            check_choices(chunk, self.choices)
         for action in chunk:
             self._execute(action)
             if self.status != "ongoing":
@@ -323,6 +331,8 @@ class RoboIRGEnv(gymnasium.Env[dict[str, Any], NDArray[np.floating[Any]]]):
             self.episode, self.instruction, self.original = say_arm(*chosen)
             self._instructed = chosen
         self.delivery = settings.words.delivery
+        is_choice = settings.environment.actions == CHOICE.name
+        self.choices = choices_of(self.episode) if is_choice else ()
 
     def _play_demonstration(self, recording: Recording | None) -> Recording:
         """Start the episode and play its demonstration."""
@@ -347,7 +357,7 @@ class RoboIRGEnv(gymnasium.Env[dict[str, Any], NDArray[np.floating[Any]]]):
             session,
             SpokenInstruction(self.instruction.turns, self.delivery),
             ObservationBuilder(world, self._spec),
-            make_controller(self._space, world.robot),
+            make_controller(self._space, world, self.choices),
             PixelGrounding(world.bodies, world.cameras) if self.grounded else None,
         )
 

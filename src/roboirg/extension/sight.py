@@ -216,8 +216,8 @@ def record_expert(
 ) -> ExpertRecording:
     """Let the expert play an episode in waypoints, and return what was to be seen.
 
-    It is recorded undisturbed where a disturbance leads where the arm cannot go on. Of a scene in
-    which not even the video can be planned, only key and status are returned.
+    If a disturbance leads to where the arm cannot go on, the episode is recorded undisturbed. Of a
+    scene in which not even the video can be planned, only key and status are returned.
 
     Args:
         episode: the episode.
@@ -271,7 +271,7 @@ class _LookRecorder(EpisodeLoop):
             np.array(done, np.int32),
             np.array([look for look, _ in self._decisions], np.int32),
             np.array([one.action for one in decided], np.float32).reshape(-1, 7),
-            np.array([-1 if one.anchor is None else names.index(one.anchor) for one in decided]),
+            np.array([names.index(one.anchor) if one.anchor else -1 for one in decided], np.int32),
             tuple(one.turn for one in decided),
             self._pictures,
             info["status"],

@@ -208,8 +208,8 @@ def refine_wrong_object(
 ) -> FailureAttribution:
     """Return a ``mirrored_pick`` if the wrong object or place is the mirrored one.
 
-    The mirrored one of which object depends on the order: it is the one that the current stage
-    expects or, if it expects none that the words mean, the last one before or the next one after.
+    Whose mirror image counts depends on the stages: that of the object that the words mean and the
+    current stage expects; without one, of the nearest stage before it, or else after it.
     The step of `found` counts since the world began; `place` is None if the act has none.
     """
     if found.failure not in ("wrong_object", "wrong_place"):
@@ -225,7 +225,7 @@ def refine_wrong_object(
 def _meant_objects(
     replay: EpisodeReplay, mirrored: MirroredObjects, current: int
 ) -> frozenset[str]:
-    """Return the objects named by places that a stage expects, looking first back, then ahead."""
+    """Return the keys of `mirrored` that the current stage expects, or one before, or one after."""
     stages = replay.stages
     for stage in (*reversed(stages[: current + 1]), *stages[current + 1 :]):
         facts = facts_of(stage.expects)

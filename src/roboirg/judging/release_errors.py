@@ -35,7 +35,7 @@ class MisplacedRelease(NamedTuple):
 
 
 def find_excusing_release(replay: EpisodeReplay, act: Fact) -> FailureAttribution | None:
-    """Return the execution failure but for which an act would not be too early, if there is one."""
+    """Return the failed release or grasp that made a right act too early; None if there is none."""
     current = replay.expected_stage
     later = [
         index

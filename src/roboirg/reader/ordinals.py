@@ -146,16 +146,15 @@ def read_position(text: str) -> OrdinalExpression | None:
     value = read_value(text)
     if value is not None:
         return OrdinalExpression(value=value)
-    return _read_last(text) or _read_relative(text) or _read_named(text)
+    return _read_penultimate(text) or _read_relative(text) or _read_named(text)
 
 
 def _read_relative(text: str) -> OrdinalExpression | None:
     waited = _WAITED.search(text)
     if waited and _ELEMENT.search(text) is None:
-        return OrdinalExpression(
-            number_of(waited["times"] or "") or ADVERBS[waited["adverb"]], (1,)
-        )
-    # First of all: the "one" of "the preceding one" is no number.
+        times, adverb = waited["times"], waited["adverb"]
+        return OrdinalExpression(ADVERBS[adverb] if adverb else number_of(times) or 0, (1,))
+    # Before `_STEP`, which would take the "one" of "the preceding one" for a number.
     following = _NEXT.search(text)
     if following:
         return OrdinalExpression("that", (1 if following["way"] in _LATER else -1,))
@@ -171,7 +170,8 @@ def _read_relative(text: str) -> OrdinalExpression | None:
     return None
 
 
-def _read_last(text: str) -> OrdinalExpression | None:
+def _read_penultimate(text: str) -> OrdinalExpression | None:
+    """Read *third to last*, and *next to last* or *penultimate* for the second to last."""
     found = _PENULTIMATE.search(text)
     if found is None:
         return None

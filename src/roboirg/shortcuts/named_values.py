@@ -125,13 +125,13 @@ def pointed_value(text: str) -> int | None:
     *not the former but the latter* has a *not*, too.
     """
     for words in reversed(_sentences(text)[:-1]):
-        pointers = [word for word in words if word in POINTERS]
-        ranks = not {"former", "latter"}.isdisjoint(pointers) or any(
+        pointed = [POINTERS[word] for word in words if word in POINTERS]
+        is_rank = not {"former", "latter"}.isdisjoint(words) or any(
             before in ("first", "second") and word in ONE
             for before, word in itertools.pairwise(words)
         )
-        if pointers and (ranks or not SAYING.isdisjoint(words)):
-            return abs(POINTERS[pointers[-1]] - (not OPPOSITES.isdisjoint(words)))
+        if pointed and (is_rank or not SAYING.isdisjoint(words)):
+            return pointed[-1] if OPPOSITES.isdisjoint(words) else 1 - pointed[-1]
     return None
 
 
@@ -206,7 +206,7 @@ def _number(words: Sentence, place: int, *, ordinals: bool, counts: bool) -> int
     """
     word, following = words[place], words[place + 1 : place + 3]
     if word in ADVERBS:
-        multiplies = following[:1] and (
+        multiplies = bool(following) and (
             following[0] in ("as", "that", "the") or number_of(following[0]) is not None
         )
         return None if multiplies else ADVERBS[word]

@@ -6,19 +6,22 @@ before the next is planned. Rules and step counts follow RoboMME.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from roboirg.core.actions import EE_POSE, JOINT_ANGLE, POSE_SIZE, WAYPOINT, ActionSpace
+from roboirg.core.actions import CHOICE, EE_POSE, JOINT_ANGLE, POSE_SIZE, WAYPOINT, ActionSpace
+from roboirg.core.choices import Choice
+from roboirg.core.episode import HANDLES_HELD, PICKS, ROBOT, Primitive
 from roboirg.core.errors import MotionPlanningError
 from roboirg.simulation.panda import JointTrajectory, Panda
 from roboirg.simulation.physics_settings import CLOSED, GRIPPER_STEPS, OPEN
 
 if TYPE_CHECKING:
     from roboirg.simulation.expert.motion_planning import MotionPlanner, ToolPose
+    from roboirg.simulation.world import World
 
 
 class Controller(Protocol):
@@ -32,9 +35,17 @@ class Controller(Protocol):
         """
 
 
-def make_controller(space: ActionSpace, robot: Panda) -> Controller:
-    """Create a controller for one episode; the robot's gripper is assumed to be open."""
-    return _CONTROLLERS[space.name](robot)
+def make_controller(space: ActionSpace, world: World, choices: Sequence[Choice] = ()) -> Controller:
+    """Create a controller for one episode; the robot's gripper is assumed to be open.
+
+    Args:
+        space: of the actions.
+        world: in which they are executed.
+        choices: of the task, for actions in `CHOICE`.
+    """
+    if space is CHOICE:
+        return ChoiceController(world, choices)
+    return _CONTROLLERS[space.name](world.robot)
 
 
 class JointAngleController:
@@ -89,6 +100,43 @@ class WaypointController:
 
     def _with_gripper(self, joints: NDArray[np.float64]) -> JointTrajectory:
         return np.column_stack([joints, np.full(len(joints), self._gripper)])
+
+
+class ChoiceController:
+    """Executes the scripted expert's motions by a task's choices, on what a point is nearest to."""
+
+    def __init__(self, world: World, choices: Sequence[Choice]) -> None:
+        from roboirg.simulation.expert.primitives import MotionPrimitives
+
+        self._world, self._choices = world, choices
+        self._expert = MotionPrimitives(world)
+
+    def trajectories(self, action: NDArray[np.float64]) -> Iterator[JointTrajectory]:
+        """Yield the trajectories of the motion; one control step at rest if it has none."""
+        motion = self._motion(self._choices[int(action[0])], (round(action[1]), round(action[2])))
+        if motion is None:
+            yield np.append(self._world.robot.arm_positions, self._expert.gripper)[None]
+            return
+        yield from self._expert.execute(motion)
+
+    def _motion(self, choice: Choice, point: tuple[int, int]) -> Primitive | None:
+        """Return the motion of a choice; None if nothing is left to wait for or to point at."""
+        from roboirg.simulation.expert.things import held_thing, nearest_thing, present_things
+
+        world = self._world
+        ahead = (one for one in choice.primitives if not 0 < one.steps <= world.elapsed)
+        motion = next(ahead, None)
+        if motion is None or choice.kind is None:
+            meant = None if motion is None else motion.place
+        elif (found := nearest_thing(present_things(world, (choice.kind,)), point)) is None:
+            return None
+        else:
+            meant = found[0].item.name
+        if motion is None or motion.kind in PICKS:
+            return motion and motion._replace(subject=str(meant))
+        if motion.kind in HANDLES_HELD:
+            return motion._replace(subject=held_thing(world) or ROBOT, place=meant)
+        return motion
 
 
 def tool_pose(action: NDArray[np.float64]) -> ToolPose:

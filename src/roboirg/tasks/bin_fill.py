@@ -42,6 +42,7 @@ from roboirg.tasks.task import Commands, Task, Wording
 
 COLORS_PRESENT: dict[Difficulty, int] = {"easy": 1, "medium": 2, "hard": 3}
 CUBES: dict[Difficulty, tuple[int, int]] = {"easy": (4, 6), "medium": (8, 10), "hard": (10, 12)}
+"""Fewest and most cubes on the table."""
 GOAL_COLORS: dict[Difficulty, tuple[int, int]] = {
     "easy": (1, 1),
     "medium": (1, 2),
@@ -49,6 +50,7 @@ GOAL_COLORS: dict[Difficulty, tuple[int, int]] = {
 }
 """Number of colors among which the goal's cubes are drawn; one may get none."""
 GOAL_CUBES: dict[Difficulty, tuple[int, int]] = {"easy": (1, 3), "medium": (2, 4), "hard": (3, 5)}
+"""Fewest and most cubes that the goal puts into the bin."""
 MAX_GOAL_CUBES = 5
 GOAL_ORDER: tuple[Color, ...] = ("red", "blue", "green")
 
@@ -193,9 +195,9 @@ def _wrong_counts(scene: Scene, goal: Goal) -> Iterator[Rule]:
             continue
         cubes = f"{counted(count, f'{color} cube')} into the bin"
         more, fewer = FactCount(binned, least=count + 1), FactCount(binned, 0, count - 1)
-        few = f"fewer than {cubes}" if count > 1 else f"no {color} cube into the bin"
+        too_few = f"fewer than {cubes}" if count > 1 else f"no {color} cube into the bin"
         yield Rule(more, f"put more than {cubes}", "wrong_count")
-        yield Rule(fewer, f"put {few}", "wrong_count")
+        yield Rule(fewer, f"put {too_few}", "wrong_count")
 
 
 def _of_color(scene: Scene, color: str) -> list[str]:

@@ -155,8 +155,8 @@ def _orders(
     """Yield landmarks, with objects of a kind and the value by which the landmark orders them."""
     own = positions[members]
     points = np.vstack([np.array([ROBOT_BASE[:2]]), corners])
-    far = np.linalg.norm(own[:, None] - points[None], axis=2)
-    for landmark, values in enumerate([-own[:, 1], own[:, 0], *far.T]):
+    distances = np.linalg.norm(own[:, None] - points[None], axis=2)
+    for landmark, values in enumerate([-own[:, 1], own[:, 0], *distances.T]):
         yield landmark, members, values
     for other, (kind, view) in enumerate(zip(kinds, where, strict=True)):
         rest = members[members != other]
@@ -167,9 +167,10 @@ def _orders(
 def _note_ranks(
     relations: NDArray[np.uint8], landmark: int, others: NDArray[np.int64], values: Points
 ) -> None:
+    """Mark in `relations` which objects have the least and the greatest values at a landmark."""
     order = others[np.argsort(values, kind="stable")]
     first = landmark * _CODES
-    for rank, (near, far) in enumerate(zip(order, order[::-1], strict=True)):
-        if rank == _RANKS:
+    for number, (least, most) in enumerate(zip(order, order[::-1], strict=True)):
+        if number == _RANKS:
             break
-        relations[near, first + rank] = relations[far, first + _RANKS + rank] = 1
+        relations[least, first + number] = relations[most, first + _RANKS + number] = 1

@@ -150,7 +150,7 @@ class NoMemory(LookMemory):
 
 
 class RecurrentMemory(LookMemory):
-    """A recurrent state for each thing, and one for the whole; things see who is near them."""
+    """A recurrent state for each thing, and one for the whole; each sees which others are near."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -205,7 +205,7 @@ class RecurrentMemory(LookMemory):
         return scores.softmax(-1)[..., :-1]
 
     def _summary(self, things: Tensor, known: Tensor) -> tuple[Tensor, Tensor]:
-        """Return a weighed mean and the maximum (B, WIDTH) of things (B, K, …) known (B, K, 1)."""
+        """Return a weighted mean and the maximum (B, WIDTH) of things (B, K, …) known (B, K, 1)."""
         scores = self.pool(things).masked_fill(~known, CLOSED)
         mean = (scores.softmax(1) * known).transpose(1, 2) @ things
         return mean[:, 0], things.masked_fill(~known, -2.0).amax(1)

@@ -127,15 +127,15 @@ def score_rows(score: GroundingScore) -> tuple[ScoreRow, ...]:
 
 
 def _policy_run(items: Sequence[GroundingItem], name: str) -> PolicyRun:
-    kinds = {
+    sources = {
         (one.split, one.wordings, one.language_version, one.environment_version) for one in items
     }
-    if len(kinds) != 1:
+    if len(sources) != 1:
         raise InvalidValueError(
             "The items come from several splits, wordings or versions, whose scores are not "
             "averaged; export and score each separately."
         )
-    ((split, wordings, language, environment),) = kinds
+    ((split, wordings, language, environment),) = sources
     conditions = EvalConditions(split, wordings=None if wordings == OWN_WORDS else wordings)
     return PolicyRun(name, conditions, Versions(ANSWERS_VERSION, language, environment))
 
@@ -200,5 +200,5 @@ def hidden_fields(item: GroundingItem) -> tuple[str, ...]:
     """
     fields = json.loads(item.answer)
     hidden = tuple(field for field in fields if field in item.hidden_slots)
-    amounts = not hidden and item.hidden_slots
-    return tuple(fields) if amounts else hidden
+    is_amounts = bool(item.hidden_slots) and not hidden
+    return tuple(fields) if is_amounts else hidden

@@ -38,6 +38,7 @@ MAX_BEGUN = 64
 MOST_QUESTIONS = 64
 """How often a call may ask for the video of an episode; a field is kept once it is read."""
 MAX_WORDS = 300
+"""Most characters of the error for a reply that is not valid."""
 PHASES: Mapping[str, str] = {
     "describe": "policy's constructor",
     "open": "policy's constructor",

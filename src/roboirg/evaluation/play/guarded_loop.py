@@ -10,7 +10,7 @@ import numpy as np
 from msgspec.structs import replace
 from numpy.typing import ArrayLike, NDArray
 
-from roboirg.core.actions import ActionSpace
+from roboirg.core.actions import CHOICE, ActionSpace
 from roboirg.core.delivery import SpokenInstruction
 from roboirg.core.errors import InvalidValueError
 from roboirg.core.inference_facts import inference_facts
@@ -120,6 +120,8 @@ class GuardedLoop(EpisodeLoop):
             self._note_version()
             self._read_metadata()
             record.inference = inference_facts(self.policy)
+        if self._space is CHOICE:
+            record.ref = dataclasses.replace(record.ref, is_privileged=True)
         self.has_begun = True
         return observation, info
 

@@ -26,7 +26,7 @@ from roboirg.util.regular_file import open_regular
 
 LOCK_FILE = ".lock"
 MOST_BYTES = 64 << 20
-"""Of a line; longer ones are not read."""
+"""Of a line with its newline; a file with a longer one is refused."""
 
 Parsed = TypeVar("Parsed")
 

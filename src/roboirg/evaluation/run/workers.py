@@ -45,7 +45,7 @@ class Worker:
         watchdog: current phase of the process.
         job: the current job.
         started: when the job was assigned, seconds of the monotonic clock.
-        started_at: the same for records.
+        started_at: the same for records, in ISO 8601, UTC.
     """
 
     def __init__(
@@ -73,7 +73,7 @@ class Worker:
         return time.monotonic() - self.started - self.watchdog.queued_s
 
     def poll(self, episode_timeout_s: float, wait_s: float = 0.0) -> Record | None:
-        """Return the record of the job, or None if it goes on; then the worker may be dead.
+        """Return the record of the job, or None if it goes on; with it the worker may have died.
 
         A process whose job exceeds a time limit is killed, and the record is an error.
 

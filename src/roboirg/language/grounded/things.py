@@ -25,8 +25,14 @@ FEW = 3
 """Things of which two are set aside."""
 _ANCHORS = (LandmarkClass.EXTREME, LandmarkClass.FIXTURE)
 """Of the two things that are set aside."""
-_LINKS = (_ANCHORS, (LandmarkClass.CORNER,), (LandmarkClass.RANK,))
-"""Of the thing whose neighbor is meant: the later ones only where there is nothing simpler."""
+_LINKS = (
+    (0, _ANCHORS),
+    (0, (LandmarkClass.CORNER,)),
+    (0, (LandmarkClass.RANK,)),
+    (1, _ANCHORS),
+)
+"""Of the thing whose neighbor is meant, after the neighbor's rank: 0 for the nearest. The later
+ones only where there is nothing simpler."""
 
 
 def thing_clues(request: InstructionRequest, color: GoalValue) -> list[Clue]:
@@ -39,12 +45,12 @@ def thing_clues(request: InstructionRequest, color: GoalValue) -> list[Clue]:
             return []
         return [Clue("events", words) for words in templates.CARRIED.of(request.pool)]
     targets = request.objects_to_point_at(color)
-    words = [_places(request, scene, targets)]
-    if request.values_of("amount"):
+    clues = _places(request, scene, targets)
+    if request.values_of("amount") and scene.motions:
         # Some cubes arrive later: the words must fit before and afterwards.
         complete = replace(scene, motions=())
-        words += [_places(request, complete, targets)] if complete != scene else []
-    clues = [one for one in words[0] if all(one in others for others in words[1:])]
+        afterwards = _places(request, complete, targets)
+        clues = [one for one in clues if one in afterwards]
     return clues + _moves(request, color)
 
 
@@ -80,7 +86,7 @@ def _places(
     fields = {**standing._asdict(), "noun": thing.removeprefix("hidden_")}
     form = int(bool(standing.started))
     found = _middles(things, targets, templates.MIDDLE.of(pool)[form], fields)
-    for rank, kinds in (*((0, kinds) for kinds in _LINKS), (1, _ANCHORS)):
+    for rank, kinds in _LINKS:
         anchors = _anchors(scene, thing, kinds)
         # What is harder to hear is only said where there is nothing simpler.
         if any(one.kind == "bridging" for one in found) or (rank and (found or len(things) <= FEW)):
@@ -114,14 +120,14 @@ def _left_over(
     pool: PoolName,
     fields: Mapping[str, str],
 ) -> list[Clue]:
-    """Return the words for one of three things, without the two others."""
+    """Return the words for the one of three things that is left when two are set aside."""
     found: list[Clue] = []
     (words,), (short,) = templates.LEFT_OVER.of(pool), templates.LEFT.of(pool)
-    is_now = fields["started"] or ("that is now " if fields["now"] else "that is ")
+    started_or_is = fields["started"] or ("that is now " if fields["now"] else "that is ")
     for (first, one), (second, other) in itertools.combinations(anchors, 2):
         left = [item for item in things if item not in (one, other)]
         if len(things) == FEW and len(left) == 1 and left[0] in targets and _differ(first, second):
-            places = {**fields, "first": first, "second": second, "started_or_is": is_now}
+            places = {**fields, "first": first, "second": second, "started_or_is": started_or_is}
             found += [
                 Clue("sets", words.format(**places), said=said.format(**places), short=short)
                 for said in templates.LEFT_OVER_SAID.of(pool)

@@ -69,12 +69,12 @@ def read_policy(spec: str, name: str | None = None) -> PolicyRef:
     is_split = False
     asks: Asker | None = "listener" if kind == LISTENER else None
     if system is not None:
-        planner = (system.planner or {}).get("kind")
-        has_own_planner = ":" in str(planner)
+        planner_kind = (system.planner or {}).get("kind")
+        has_own_planner = ":" in str(planner_kind)  # package.module:Class
         is_split = has_own_planner and system.policy == SCRIPTED
         has_hands = system.policy not in (SCRIPTED, ELSEWHERE)
         is_foreign = has_own_planner or (has_hands and read_policy(system.policy).is_foreign)
-        asks = "planner" if planner in OF_MODELS else None
+        asks = "planner" if planner_kind in OF_MODELS else None
     ref = replace(ref, asks=asks, is_foreign=is_foreign, is_privileged=ref.is_declared)
     if ref.is_declared and not is_foreign:
         raise InvalidValueError(

@@ -20,7 +20,7 @@ class Policy(Protocol):
 
     The class attribute ``cameras`` selects the pictures of observations, for example ``()``; by
     default there are both. ``actions`` names the action space of `act`: ``"joint_angle"`` (the
-    default), ``"ee_pose"`` or ``"waypoint"``.
+    default), ``"ee_pose"``, ``"waypoint"`` or ``"choice"``.
 
     Pictures of the demonstration are rendered when they are read. ``demonstration_frames = 4``
     keeps every fourth, ``"none"`` none. With ``observe_every = n`` each observation has a
@@ -49,7 +49,7 @@ class Policy(Protocol):
         """Return the next n >= 1 actions; all are executed before the next call.
 
         Returns:
-            Shape (n, 8); (n, 7) in the spaces ee_pose and waypoint.
+            Shape (n, 8); (n, 7) in the spaces ee_pose and waypoint, (n, 3) in choice.
         """
 
 

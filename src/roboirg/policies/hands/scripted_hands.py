@@ -18,7 +18,6 @@ from roboirg.core.observations import Demonstration, Observation
 from roboirg.core.subgoal_text import EMPTY_HAND, SCRIPTED_HANDS, UNKNOWN_WORDS, split_point
 from roboirg.policies.contract.base import AttachedPolicy, EndKind, SubgoalEnd
 from roboirg.policies.hands.subgoal_words import WAIT_STEPS, Request, read_subgoal
-from roboirg.tasks import goals_of, with_goal
 
 if TYPE_CHECKING:
     from roboirg.simulation.world import World
@@ -161,6 +160,7 @@ class ScriptedHands(AttachedPolicy):
     def _find_motion(self, subgoal: str) -> tuple[Primitive, str | None]:
         """Return the motion of a subgoal, and the name of the object that it means."""
         from roboirg.simulation.expert.things import held_thing
+        from roboirg.tasks.choices import choices_of
 
         request = read_subgoal(subgoal)
         if request is None:
@@ -178,11 +178,7 @@ class ScriptedHands(AttachedPolicy):
                 is_above = Fact("hovering", ROBOT, button) in self._world.facts
                 return Primitive("press_below" if is_above else "press", button), thing
             case "put_down":  # at the height at which this task's expert lets go
-                motions = (
-                    stage.primitive
-                    for goal in goals_of(self.env.episode)
-                    for stage in with_goal(self.env.episode, goal).stages
-                )
+                motions = (one.primitives[0] for one in choices_of(self.env.episode))
                 usual = Primitive("put_down", ROBOT).height
                 height = next((one.height for one in motions if one.kind == "put_down"), usual)
                 return Primitive("put_down", str(held), height=height), held

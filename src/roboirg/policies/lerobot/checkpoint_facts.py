@@ -32,7 +32,7 @@ UNKNOWN = CheckpointFacts(dict.fromkeys(CAMERAS))
 
 
 def read_facts(place: str) -> CheckpointFacts:
-    """Return what a checkpoint takes, as far as its configuration is here and says so.
+    """Return what a checkpoint takes, as far as a configuration on this computer gives it.
 
     Args:
         place: a folder, or the id of a repository of the Hub; nothing is downloaded.

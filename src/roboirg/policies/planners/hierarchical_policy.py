@@ -138,7 +138,7 @@ class HierarchicalPolicy(PlannerParts):
     def reset(self, instruction: str, demonstration: Demonstration) -> None:
         """Begin an episode with both."""
         self.subgoal: str | None = None
-        self._observed = self._step = self._rows = self._told = 0
+        self._observed = self._step = self._rows = self._reported = 0
         self._gave_up = False
         views = [
             DemonstrationSubset(
@@ -171,22 +171,23 @@ class HierarchicalPolicy(PlannerParts):
         if isinstance(self.policy, ReportingFollower):
             self.policy.settle()
         for _ in range(MOST_REFUSALS):
-            self._tell()
+            self._report_endings()
             subgoal = self.planner.plan(view, self._step)
             if subgoal is None:
                 return
             self.subgoal = subgoal
             self.policy.follow(subgoal)
-            if not any(one.how == "refused" for one in self.endings[self._told :]):
+            if not any(one.how == "refused" for one in self.endings[self._reported :]):
                 return
+            # The planner has the history already.
             view = cast("Observation", {**view, "history": ()})
-        self._tell()
+        self._report_endings()
         self._gave_up = True
 
-    def _tell(self) -> None:
-        """Tell the planner how its subgoals ended."""
-        new = self.endings[self._told :]
-        self._told += len(new)
+    def _report_endings(self) -> None:
+        """Report how subgoals ended since the last call to a planner that learns from it."""
+        new = self.endings[self._reported :]
+        self._reported += len(new)
         for end in new if hasattr(self.planner, "learn") else ():
             # Names of objects are the world's: they would do the remembering.
             self.planner.learn(end._replace(thing=None))  # type: ignore[attr-defined]
@@ -200,6 +201,6 @@ def _attach(parts: tuple[object, ...], env: RoboIRGEnv) -> None:
 
 
 def joint_version(*parts: object) -> str:
-    """Return the versions of a planner and its policy as one, of their files if they have none."""
+    """Return the versions of a planner and its policy as one; of a part's file if it has none."""
     found = (read_version(one) or file_fingerprint(one) or UNKNOWN_VERSION for one in parts)
     return BETWEEN_VERSIONS.join(found)

@@ -160,7 +160,7 @@ class ServerConnection:
         self._websocket = found
 
     def _attempt(self, left: float) -> ClientConnection | str:
-        """Return a connection, or the reason why there is none, which may pass."""
+        """Return a connection, or why there is none yet; raise if another attempt cannot help."""
         endpoint, options, headers = self.endpoint, self._options, self._options.headers
         try:
             return self._held.enter_context(
@@ -195,6 +195,7 @@ class ServerConnection:
             raise PolicyConnectionError(f"{self} refused: {_describe(error)}.") from error
 
     def _refuse_surplus(self, websocket: ClientConnection) -> None:
+        """Raise if there is a message already, before the request."""
         with contextlib.suppress(TimeoutError):
             surplus = websocket.recv(timeout=0)
             if isinstance(surplus, str):

@@ -28,6 +28,7 @@ from roboirg.simulation.world import World
 
 CUBE_HOVER = 0.15
 CONTAINER_HOVER = 0.2
+"""Tool heights before and after handling an object. Heights are above the table, in meters."""
 CONTAINER_GRASP = 0.01
 """Tool height above a container's origin at which the fingers enclose the knob."""
 TARGET_RELEASE = 0.005
@@ -38,6 +39,7 @@ BOX_RELEASE = 0.065
 BIN_RETREAT = 0.1
 """Meters by which the hand moves back towards the robot after releasing over the bin."""
 OVER_TARGET = 0.1
+"""Tool height at which a cube is carried over a target."""
 BUTTON_PRESS = 0.0075
 BUTTON_CONTACT = 0.037
 """Tool height at which closed fingers have pressed a button."""
@@ -49,6 +51,7 @@ after the pick with open fingers has failed, as they landed on something."""
 SHORTFALLS = (0.0, 0.0025, 0.005, 0.0075, 0.01)
 """Meters by which a move stays short of a place that lies just beyond the arm's reach."""
 ASIDE = Point(0.0, 0.0, 0.2)
+"""Where the tool goes to be away from the objects, world frame, m."""
 HOMING_STEPS = 30
 
 STRAIGHT_DOWN = Rotation.from_quat([1.0, 0.0, 0.0, 0.0])
@@ -97,7 +100,7 @@ class MotionPrimitives:
         return self._release(primitive, BOX_RELEASE)
 
     def _release(self, primitive: Primitive, height: float) -> Iterator[JointTrajectory]:
-        """Yield the trajectories that let go of a thing at a height above a place."""
+        """Yield the trajectories that let go of a thing over a place, at a tool height."""
         place, rotation = self._place(primitive), self._rotation()
         yield self._move(_above(place, CUBE_HOVER), rotation)
         yield self._move(_above(place, height), rotation)
@@ -204,7 +207,7 @@ class MotionPrimitives:
                 return self._plan(_towards_robot(position, shortfall), rotation), rotation
             except MotionPlanningError as error:
                 refused.append(error)
-        raise refused[len(rotations) - 1]  # the place itself, from the last side
+        raise refused[len(rotations) - 1]  # of the place itself, with the last rotation
 
     def _plan(self, position: Point, rotation: Rotation) -> JointTrajectory:
         goal = ToolPose(np.asarray(position, dtype=np.float64), rotation)
@@ -245,6 +248,7 @@ _ROUTINES: dict[str, Callable[[MotionPrimitives, Primitive], Iterator[JointTraje
 
 
 def _above(place: Point, height: float) -> Point:
+    """Return the point over a place at a height above the table; the place's own is ignored."""
     return Point(place.x, place.y, height)
 
 

@@ -82,7 +82,7 @@ def counterbalanced_order(task: str) -> tuple[Arrangement, ...]:
 
 
 def counterbalanced_episodes(task: str, split: str, count: int) -> tuple[int, ...]:
-    """Return the first episodes of a split whose arrangements are as even as possible.
+    """Return the indices of a split's first episodes whose arrangements are as even as possible.
 
     Args:
         task: a task for a real robot.
@@ -111,7 +111,7 @@ def _arrangement(color: Color, left: Color, repeats: object) -> Arrangement:
 
 
 def _by_arrangement(task: str, split: str) -> dict[Arrangement, list[int]]:
-    """Return the episodes of a split with each arrangement, in order."""
+    """Return the indices of a split's episodes with each arrangement, in order."""
     found: dict[Arrangement, list[int]] = defaultdict(list)
     for index in range(SIZES[check_fixed_split(split)]):
         found[read_arrangement(get_episode(task, split, index))].append(index)

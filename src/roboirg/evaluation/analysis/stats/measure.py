@@ -111,9 +111,9 @@ def measure(
     changed = against or {}
     _check(frame, by, changed, family)
     # What else distinguishes trials of an episode takes the place of the policy seed.
-    apart = [name for name in TRIAL if name in frame and name not in by]
+    distinguishing = [name for name in TRIAL if name in frame and name not in by]
     rows = {name: [_known(one) for one in frame[name]] for name in (*by, *TRIAL_OF)}
-    rows["policy_seed"] = list(zip(*(frame[name] for name in apart), strict=True))
+    rows["policy_seed"] = list(zip(*(frame[name] for name in distinguishing), strict=True))
     groups = gather(rows, by)
     counts = [cell.counts for own in groups.values() for cell in own.values()]
     if sum(one.trials + one.errors + one.missing for one in counts) < len(rows["task"]):
@@ -174,7 +174,7 @@ def measure_groups(
         interval = _interval(cells, rng, is_mean=is_mean(key)) if with_intervals else None
         against = [one(key) for one in references]
         gaps = [measure_gap(pair(cells, one), rng) for one in against]
-        others, *_ = (*against, NOTHING)
+        others = against[0] if against else NOTHING
         first, second, *_ = (*gaps, None, None)
         found.append(Measured(key, cells, others, interval, first, second))
     return with_holm(found, family)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Set
 from dataclasses import replace
+from fractions import Fraction
 
 from rich.console import Console
 from rich.text import Text
@@ -47,7 +48,7 @@ from roboirg.evaluation.records.record import Summary
 MAX_FAILURES = 10
 """Episodes of a policy that are listed below the tables."""
 
-_GOOD, _FAIR = 0.75, 0.4
+_GOOD, _FAIR = Fraction(3, 4), Fraction(2, 5)
 
 
 def make_run_tables(frame: Frame) -> list[Table]:

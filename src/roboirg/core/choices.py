@@ -1,0 +1,59 @@
+"""The choices of RoboMME's multi-choice mode: motions by a letter and perhaps a point."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from roboirg.core.actions import CHOICE
+from roboirg.core.episode import Primitive
+from roboirg.core.errors import InvalidActionError
+
+
+class Choice(NamedTuple):
+    """One motion that can be chosen.
+
+    Attributes:
+        label: its letter, from a.
+        action: the motion in words.
+        primitives: the motion, with the kind of object in place of what a point or the hand
+            decides; of waiting, one for each checkpoint.
+        kind: of the objects that a point can mean; None if the choice needs no point.
+    """
+
+    label: str
+    action: str
+    primitives: tuple[Primitive, ...]
+    kind: str | None = None
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return what a program is given, as in RoboMME."""
+        return {
+            "label": self.label,
+            "action": self.action,
+            "need_parameter": self.kind is not None,
+        }
+
+
+def check_choices(actions: NDArray[np.float64], choices: Sequence[Choice]) -> None:
+    """Check that actions (n, 3) choose one of a task's choices, with a point where it needs one.
+
+    Raises:
+        InvalidActionError: one does not; the message names the choices.
+    """
+    low, high = CHOICE.low[1:], CHOICE.high[1:]
+    for number, *point in actions:
+        if number not in range(len(choices)):
+            listed = ", ".join(f"{one.label} ({one.action})" for one in choices)
+            raise InvalidActionError(
+                f"Choice number {number:g} is not one of 0 to {len(choices) - 1}: {listed}."
+            )
+        chosen = choices[int(number)]
+        if chosen.kind is not None and not ((point > low) & (point <= high)).all():
+            raise InvalidActionError(
+                f"Choice {chosen.label} ({chosen.action}) needs the row and column of a point, "
+                f"0 to {high[0]:g}; got {point[0]:g}, {point[1]:g}."
+            )
