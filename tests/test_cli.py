@@ -18,6 +18,7 @@ import numpy as np
 import pytest
 import typer.main
 from made_records import make_record
+from page_text import store
 from plan_files import plan_file
 
 from roboirg import main as cli
@@ -27,6 +28,7 @@ from roboirg.cli import progress_bar
 from roboirg.cli.progress_bar import progress_bars
 from roboirg.cli.run_commands import report_problems
 from roboirg.core.instruction_options import InstructionOptions
+from roboirg.evaluation.plan.plan_maker import make_plan
 from roboirg.evaluation.plan.stored_plans import read_plan
 from roboirg.evaluation.records.record import Job
 from roboirg.evaluation.records.store import RecordStore
@@ -339,6 +341,17 @@ def test_a_dry_run_counts_and_plays_nothing(roboirg, tmp_path: Path) -> None:
     assert "150 + 150" in said.out
     assert "13,650 episodes, 0 already stored." in " ".join(said.out.split())
     assert not (tmp_path / "out").exists()
+
+
+def test_a_dry_run_counts_calls_of_models_for_what_is_still_to_be_played(
+    roboirg, tmp_path: Path
+) -> None:
+    model = "p=vlm-listener:openai?model=x&base_url=http://localhost:1/v1"
+    played = make_plan([model], tasks="PickXtimes", settings="direct", episodes="1").jobs()
+    store(tmp_path, [make_record(job, "success") for job in played])
+    words = ("--tasks", "PickXtimes", "--settings", "direct", "--episodes", "3", "--dry-run")
+    said = roboirg("run", "--policy", model, *words, "--out", tmp_path)
+    assert re.search(r"p\W+direct\W+2\W", said.out)
 
 
 @pytest.mark.parametrize(

@@ -13,8 +13,10 @@ from page_text import played
 
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.evaluation.analysis.figures import draw_figure, failures, write_figures
+from roboirg.evaluation.analysis.figures.rates import Rate, RateRow, draw_rates
 from roboirg.evaluation.analysis.published import published_rows
 from roboirg.evaluation.analysis.results.frame import make_frame
+from roboirg.evaluation.analysis.stats.intervals import Interval
 from roboirg.evaluation.analysis.stats.measure import ALL_TASKS
 from roboirg.evaluation.analysis.stats.run_data import RunData
 from roboirg.evaluation.plan.plan import Plan
@@ -140,6 +142,19 @@ def test_gaps_are_those_of_the_summary() -> None:
         gap = found.summaries[key, ALL_TASKS, InstructionOptions(setting)].gap
         assert gap is not None
         assert implicit - explicit == pytest.approx(100 * gap.value)
+
+
+@pytest.mark.parametrize(
+    ("rate", "ends"),
+    [
+        (Rate(0.5, None, Interval(0.25, 0.625)), [25, 62.5]),
+        (Rate(0.5, 0.75, Interval(-0.375, -0.125)), [37.5, 62.5]),
+    ],
+)
+def test_bands_lie_around_their_rates(rate: Rate, ends: list[float]) -> None:
+    """The interval of a difference is drawn from the reference, not from the rate."""
+    figure = draw_rates({"direct": ""}, [RateRow("a", {"direct": rate})], ("", "", ""), [])
+    assert [*figure.axes[0].lines[0].get_xdata()] == ends
 
 
 def test_published_gaps_are_over_the_tasks_of_their_setting() -> None:

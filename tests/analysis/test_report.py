@@ -74,8 +74,8 @@ def test_nothing_comes_from_outside_and_no_words_end_a_script() -> None:
 
 
 def test_mentions_and_the_resolved_form_are_those_of_the_episode() -> None:
-    """The resolved form is said again where it was not played."""
-    plan = PICKS.model_copy(update={"forms": PLAN.forms})
+    """The resolved form is said again where it was not played, of each goal by itself."""
+    plan = PICKS.model_copy(update={"forms": PLAN.forms, "arms": ("told", "other-goal")})
     found = [one for one in played(plan) if one.setting != "explicit"]
     implicit, resolved = ([one for one in found if one.form == form] for form in PLAN.forms)
     page = Page(render(implicit))

@@ -17,6 +17,7 @@ from roboirg.evaluation.records.store import (
     RecordStore,
     read_records,
     read_results,
+    read_summaries,
 )
 from roboirg.evaluation.run.executor import InProcess
 from roboirg.evaluation.run.runner import run_plan
@@ -35,7 +36,10 @@ def test_a_damaged_line_loses_only_its_episode(tmp_path: Path) -> None:
         assert (len(store.stored), store.damaged, store.torn) == (7, (3,), b"")
     summary = run_plan(small_plan(), tmp_path, FakePlay(), InProcess())
     assert summary.played == 1
-    assert len(read_records(tmp_path)) == 8
+    records, index = read_records(tmp_path), read_summaries(tmp_path)
+    assert len(records) == 8
+    # Whole records are found behind the damage, too.
+    assert tuple(index.records(index.newest)) == records
 
 
 def test_results_are_records_without_the_course(tmp_path: Path) -> None:

@@ -48,6 +48,7 @@ class Follower:
 
     cameras = ()
     demonstration_frames = "none"
+    observe_every = 3  # no planner has this period, and CHUNK is no multiple of it
 
     def __init__(self, rows=CHUNK):
         self.rows, self.told, self.seen = rows, [], []
@@ -313,13 +314,16 @@ def test_memer_shows_recent_frames_and_remembers_what_it_chose():
 
     with fake_vlm([choose(1), choose(8, 2), choose(1), choose(), choose(8)]) as server:
         planner = make_planner("memer", server)
-        drive(planner, 64)
+        policy = drive(planner, 64).policy
         shown = [pictures(body) for body in server.requests]
     recent = [[0], *(list(range(end - 14, end + 1, 2)) for end in (16, 32, 48, 64))]
     # 0; 0, 4, 16 make 4 and 16, where 16 and 18 make 18; then 64 besides.
     memory = [[], [0], [4, 16], [4, 18], [4, 18]]
     assert shown == [kept + new for kept, new in zip(memory, recent, strict=True)]
     assert list(planner.frames) == [4, 18, 64]
+    # The policy sees the moments of its own period.
+    seen = [one["front_rgb"][0, 0, 0] for view in policy.seen for one in view["history"]]
+    assert seen == list(range(3, 65, 3))
 
 
 @pytest.mark.parametrize("positions", [[0], [9], ["1"], [True], "1", None])

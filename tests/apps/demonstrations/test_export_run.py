@@ -115,16 +115,18 @@ def test_kept_trajectories_serve_other_formats(tmp_path, synthetic, make_plan, m
     assert summary.episodes == 4
 
 
-def test_kept_trajectories_of_other_pictures_or_worlds_are_not_taken(
+def test_kept_trajectories_of_other_pictures_words_or_worlds_are_not_taken(
     tmp_path, synthetic, make_plan, monkeypatch
 ):
-    kept = tmp_path / "kept"
+    kept, spoken = tmp_path / "kept", {"policy": "listener", "episodes": (0,)}
     for number, (version, changes, recorded) in enumerate(
         (
             (ENVIRONMENT_VERSION, {}, 6),
             (ENVIRONMENT_VERSION, {"size": 64}, 6),
             (ENVIRONMENT_VERSION, {"cameras": ("front",)}, 6),
             (ENVIRONMENT_VERSION, {"outcomes": "all"}, 2),  # of failures no pictures were kept
+            (ENVIRONMENT_VERSION, spoken, 4),
+            (ENVIRONMENT_VERSION, {**spoken, "forms": ("implicit", "resolved")}, 2),
             (ENVIRONMENT_VERSION + 1, {}, 6),
         )
     ):
