@@ -18,8 +18,8 @@ from roboirg.language.settings import all_settings
 from roboirg.tasks import all_tasks
 from roboirg.tasks.splits.splits import get_episode
 
-PINNED = ("challenge", "paper", "paper-context", "standard")
-"""Named plans with a test of their own."""
+PINNED = ("challenge", "paper", "paper-context", "paper-small", "standard")
+"""Named plans with a test of their own, or of the package that brings them."""
 
 
 def write(folder: Path, text: str) -> str:
