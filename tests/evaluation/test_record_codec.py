@@ -11,13 +11,13 @@ from msgspec.structs import replace
 from roboirg.core.environment_options import EnvironmentOptions
 from roboirg.core.policy_ref import unknown_policy
 from roboirg.evaluation.records.record import Job, Summary
-from roboirg.evaluation.records.record_codec import identity_key
+from roboirg.evaluation.records.record_codec import identity_key, read_summary
 from roboirg.evaluation.records.store import (
     RECORDS_FILE,
     RecordStore,
+    StoredRun,
     read_records,
     read_results,
-    read_summaries,
 )
 from roboirg.evaluation.run.executor import InProcess
 from roboirg.evaluation.run.runner import run_plan
@@ -36,7 +36,7 @@ def test_a_damaged_line_loses_only_its_episode(tmp_path: Path) -> None:
         assert (len(store.stored), store.damaged, store.torn) == (7, (3,), b"")
     summary = run_plan(small_plan(), tmp_path, FakePlay(), InProcess())
     assert summary.played == 1
-    records, index = read_records(tmp_path), read_summaries(tmp_path)
+    records, index = read_records(tmp_path), StoredRun(tmp_path, read_summary)
     assert len(records) == 8
     # Whole records are found behind the damage, too.
     assert tuple(index.records(index.newest)) == records
