@@ -135,8 +135,10 @@ def test_order_and_runs_of_the_records_make_no_difference(result, plays, random)
 def test_the_same_episode_in_two_runs_stays_apart(result) -> None:
     both = [result(outcome, 0, started_at=outcome) for outcome in OUTCOMES[:2]]
     twice = make_frame([("a", both[:1]), ("b", both[1:])])
-    found = with_columns(twice, both[::-1], {"cause": lambda one: one.outcome})
+    reads = {"cause": lambda one: one.outcome, "one": lambda _: 1, "true": lambda _: True}
+    found = with_columns(twice, both[::-1], reads)
     assert list(found["cause"]) == ["success", "failure"]
+    assert [*map(repr, found["true"])] == ["True"] * 2, "equal values of two kinds are two"
     assert list(twice.names.values()) == ["listener, a", "listener, b"]
     assert [cell.rate for cell in cells_of(twice).values()] == [1, 0]
 
