@@ -134,7 +134,7 @@ def test_order_and_runs_of_the_records_make_no_difference(result, plays, random)
 
 def test_the_same_episode_in_two_runs_stays_apart(result) -> None:
     both = [result(outcome, 0, started_at=outcome) for outcome in OUTCOMES[:2]]
-    twice = make_frame([("a", both[:1]), ("b", both[1:])])
+    twice = make_frame([("a", both[:1]), ("none", []), ("b", both[1:])])
     reads = {"cause": lambda one: one.outcome, "one": lambda _: 1, "true": lambda _: True}
     found = with_columns(twice, both[::-1], reads)
     assert list(found["cause"]) == ["success", "failure"]
@@ -144,8 +144,9 @@ def test_the_same_episode_in_two_runs_stays_apart(result) -> None:
 
 
 def test_a_policy_that_has_not_begun_is_there(result) -> None:
-    ((key, cell),) = cells_of(make_frame([], [result(policy="late").identity])).items()
-    assert (key.policy_run.policy, key.policy_run.versions, cell.missing) == ("late", None, 1)
+    frame = make_frame([], [result(policy="late").identity], named="mine")
+    ((key, cell),) = cells_of(frame).items()
+    assert (key.policy_run[0], *key.policy_run[2:4], cell.missing) == ("late", None, "mine", 1)
 
 
 def test_the_page_lists_the_columns() -> None:

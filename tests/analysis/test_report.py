@@ -183,6 +183,7 @@ def test_a_pair_is_of_one_scene_told_alike_under_equal_conditions() -> None:
     choices = {one["name"]: one["values"] for one in page.data["choices"]}
     assert choices["difficulty"] == [first.difficulty, "odd"]
     assert "rendered on" not in page.text  # it is not known of any
+    assert len(page.data["comparisons"]) == 3, "of the three policy runs that were told"
 
 
 def test_videos_are_in_the_page_or_next_to_it(

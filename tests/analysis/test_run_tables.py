@@ -105,6 +105,8 @@ MIXED = frame_of(
     play("0110", "direct", task="BinFill", form="resolved", prompt_verdict="cut"),
     play("0001", "direct", task="VideoUnmask", prompt_verdict="heard", attribution=WRONG[1]),
     play("0111", "direct", task="VideoUnmask", form="resolved", prompt_verdict="heard"),
+    play("0", policy="other", attribution=WRONG[1]),
+    play("0", "direct", policy="other", attribution=WRONG[1]),
 )
 """Other numbers of everything in every cell."""
 
@@ -146,7 +148,9 @@ def test_policies_and_conditions_have_tables_of_their_own_in_the_order_of_the_pl
     ]  # fmt: skip
     for names in (["listener", "random"], ["random", "listener"]):
         planned = [make_result(policy=name).identity for name in names]
-        found = [table.title for table in make_run_tables(frame_of(results, planned=planned))]
+        tables = make_run_tables(frame_of(results, planned=planned))
+        assert "privileged policies" in tables[-1].notes[-1], "whichever table is the last"
+        found = [table.title for table in tables]
         assert sorted(found, key=lambda title: names.index(title.split(",")[0])) == found
         assert sorted(found) == [
             "listener, split test, max steps 1300",
