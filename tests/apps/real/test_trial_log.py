@@ -57,12 +57,16 @@ def test_the_newest_score_counts_and_all_stay_in_the_file(small):
     plan, folder = small
     trial = plan.trials[0]
     for number, choice in enumerate(("success", "misplaced", "void", "success"), 1):
-        read(plan, folder).score(trial, choice, operator="ann")
+        # The operator names the video once.
+        film, note = "a.mp4" * (number == 1), f"note {number}"
+        read(plan, folder).score(trial, choice, operator="ann", note=note, video=film)
         now = read(plan, folder)
         assert now.state(trial.name) == ("void" if choice == "void" else "scored")
         assert now.revision(trial.name) == number
     (newest,) = read_records(folder)
     assert (newest.outcome, newest.cause, newest.attribution) == ("success", None, None)
+    assert (newest.error, newest.video) == (None, "a.mp4")
+    assert trial_metadata(newest)["note"] == "note 4"
     assert len((folder / "records.jsonl").read_text().splitlines()) == 4
 
 
