@@ -19,6 +19,7 @@ from roboirg.evaluation.analysis.results.reading import WORD_COLUMNS, with_colum
 from roboirg.evaluation.analysis.stats.cells import cells_of
 from roboirg.evaluation.analysis.stats.measure import summarize
 from roboirg.evaluation.plan.plan_maker import make_plan
+from roboirg.evaluation.plan.sources import opened_sources
 from roboirg.evaluation.records.store import iterate_records
 
 OUTCOMES = ("success", "failure", "error")
@@ -156,3 +157,17 @@ def test_the_page_lists_the_columns() -> None:
         for one in (*COLUMNS.values(), *WORD_COLUMNS.values())
     ]
     assert "\n".join(rows) in page, "\n".join(rows)
+
+
+def test_a_run_is_opened_once_for_all_that_is_wanted_of_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Two spellings of a folder are one run; a folder alone wants all of its policies."""
+    monkeypatch.chdir(tmp_path)
+    for name in ("a", "b", "c", "c:d"):
+        Path(name).mkdir()
+    given = ["a:x", "b:y", "./a", "b:z:Z", f"../{tmp_path.name}/b:y", "c:d", "c:e"]
+    with opened_sources(given) as found:
+        assert [(str(one.path), one.policies) for one in found] == [
+            ("a", None), ("b", ("y", "z:Z")), ("c:d", None), ("c", ("e",)),
+        ]  # fmt: skip
