@@ -103,6 +103,8 @@ def test_each_trajectory_is_recorded_once(tmp_path, synthetic, make_plan, monkey
     assert len(played[4:]) == 3
     assert told[0][:3] == ("record", 3, 6)
     assert told[-1][:3] == ("write", 4, 4)
+    sizes = [size for work, _, _, size in told if work == "record"]
+    assert sizes == sorted(set(sizes))  # of all trajectories up to then
     assert not (tmp_path / "data" / export_run.WORK_FOLDER).exists()
 
 
@@ -269,6 +271,8 @@ def test_the_card_tells_counts_and_lines_to_train(export):
 def test_an_explicit_instruction_is_its_own_resolved_form(make_plan):
     both = make_plan(forms=("implicit", "resolved"), settings=("explicit", "direct", "spatial"))
     assert [len(said) for _, said in recording_jobs(both)] == [1 + 2 + 2] * 6
+    alone = make_plan(forms=("resolved",), settings=("explicit", "direct"))
+    assert [len(said) for _, said in recording_jobs(alone)] == [2] * 6
 
 
 def test_states_alone_need_no_pictures(export):

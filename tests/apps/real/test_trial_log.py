@@ -6,6 +6,7 @@ import pytest
 from made_records import make_record
 from page_text import render
 
+from roboirg.apps.real.pages.score_server import _select_trial
 from roboirg.apps.real.study.failure_choices import failure_choices
 from roboirg.apps.real.study.trial_log import VOID, TrialLog, trial_metadata
 from roboirg.core.errors import InvalidValueError
@@ -78,6 +79,7 @@ def test_trials_come_in_order_and_void_is_a_verdict(small):
         trial_log.score(trial, "void", operator="ann", note="the lamp fell")
     last = read(plan, folder)
     assert last.next_to_score() is None
+    assert _select_trial(last, "") == plan.trials[-1]
     assert last.state(plan.trials[0].name) == "void"
     assert last.newest(plan.trials[0].name).cause == f"{VOID}; the lamp fell"
 
