@@ -32,13 +32,15 @@ def goals(arm: str, done: str) -> tuple[str, GoalOutcomes]:
     )
 
 
-def play(policy: str, acts: dict[str, str], scenes: range = SCENES) -> list[Summary]:
+def play(
+    policy: str, acts: dict[str, str], scenes: range = SCENES, **fields: object
+) -> list[Summary]:
     """Return results of a policy that does something in each arm."""
     found = []
     for arm, done in acts.items():
         outcome, outcomes = goals(arm, done)
         found += [
-            make_result(outcome, scene, policy=policy, task=task, arm=arm, goals=outcomes)
+            make_result(outcome, scene, policy=policy, task=task, arm=arm, goals=outcomes, **fields)
             for task in TASKS
             for scene in scenes
         ]
@@ -93,11 +95,19 @@ def test_paraphrases_against_their_mean_and_what_counts_in_no_figure():
 
 
 def test_tables_and_sentences_are_as_stored(snapshot: SnapshotAssertion) -> None:
-    """Of a policy that listens, mostly, with another rate in each arm, and one that never does."""
+    """Of a policy that listens, mostly, with another rate in each arm, and one that never does.
+
+    In two settings each, and with two seeds.
+    """
     mixed = play("mine", LISTENER | {"scrambled": "own"}, range(6))
     mixed += play("mine", HABIT | {"scrambled": "none"}, range(6, 9))
     mixed += play("mine", FIXED, range(9, 11)) + play("mine", {"again": "own"}, range(4, 11))
-    table = make_arm_table(data_of(mixed, play("knows", HABIT)))
+    mixed += play("mine", HABIT | {"paraphrase-1": "own"}, range(3), policy_seed=1)
+    mixed += play("mine", {"paraphrase-1": "own", "paraphrase-2": "none"}, range(5))
+    mixed += play("mine", {"paraphrase-2": "own"}, range(3), policy_seed=1)
+    other = [play("mine", HABIT, range(2), setting="direct")]
+    other += [play("knows", {"told": "own", "silent-empty": "none"}, setting="direct")]
+    table = make_arm_table(data_of(mixed, play("knows", HABIT), *other))
     assert get_format("markdown").draw(table) == snapshot
     told = data_of(play("knows", {"told": "own"}))
     with pytest.raises(InvalidValueError, match="--arms told"):

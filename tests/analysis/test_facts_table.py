@@ -134,7 +134,9 @@ def test_a_policy_has_what_it_declares_and_its_process_reports(
     # In the mean of steps by calls, longer episodes count for more.
     short = {**fields, "steps": 10, "calls": 1, "executed": 10} if "steps" in fields else fields
     both = (record(at, policy_metadata=metadata, **own) for at, own in enumerate((fields, short)))
-    assert facts(tmp_path, *both)["mine"].items() >= expected.items()
+    found = facts(tmp_path, *both)
+    assert found["mine"].items() >= expected.items()
+    assert found[RUN]["errors, in no rate"] == "0"
 
 
 class Network:

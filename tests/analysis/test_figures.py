@@ -134,8 +134,11 @@ def test_bars_are_shares_of_what_was_played() -> None:
 
 
 def test_gaps_are_those_of_the_summary() -> None:
-    found = content(planned=PLAN.jobs())
+    """And who lacks a trial is marked, of two policies that played the same otherwise."""
+    found = content(planned=[*PLAN.jobs(), replace(PLAN.jobs()[0], policy_seed=1)])
     shown = dots(draw("gaps", found))
+    names = {label.partition(",")[0] for _, label in shown}
+    assert names == {"listener (privileged) (incomplete)", "forgetful (privileged)"}
     assert {setting for setting, _ in shown} == {"direct", "reasoning", "contextual", "spatial"}
     for (setting, label), (explicit, implicit) in shown.items():
         key = next(one for one, name in found.frame.names.items() if label.startswith(name))

@@ -19,6 +19,7 @@ from roboirg.evaluation.analysis.results.reading import WORD_COLUMNS, with_colum
 from roboirg.evaluation.analysis.stats.cells import cells_of
 from roboirg.evaluation.analysis.stats.measure import summarize
 from roboirg.evaluation.plan.plan_maker import make_plan
+from roboirg.evaluation.plan.sources import opened_sources
 from roboirg.evaluation.records.store import iterate_records
 
 OUTCOMES = ("success", "failure", "error")
@@ -134,16 +135,19 @@ def test_order_and_runs_of_the_records_make_no_difference(result, plays, random)
 
 def test_the_same_episode_in_two_runs_stays_apart(result) -> None:
     both = [result(outcome, 0, started_at=outcome) for outcome in OUTCOMES[:2]]
-    twice = make_frame([("a", both[:1]), ("b", both[1:])])
-    found = with_columns(twice, both[::-1], {"cause": lambda one: one.outcome})
+    twice = make_frame([("a", both[:1]), ("none", []), ("b", both[1:])])
+    reads = {"cause": lambda one: one.outcome, "one": lambda _: 1, "true": lambda _: True}
+    found = with_columns(twice, both[::-1], reads)
     assert list(found["cause"]) == ["success", "failure"]
+    assert [*map(repr, found["true"])] == ["True"] * 2, "equal values of two kinds are two"
     assert list(twice.names.values()) == ["listener, a", "listener, b"]
     assert [cell.rate for cell in cells_of(twice).values()] == [1, 0]
 
 
 def test_a_policy_that_has_not_begun_is_there(result) -> None:
-    ((key, cell),) = cells_of(make_frame([], [result(policy="late").identity])).items()
-    assert (key.policy_run.policy, key.policy_run.versions, cell.missing) == ("late", None, 1)
+    frame = make_frame([], [result(policy="late").identity], named="mine")
+    ((key, cell),) = cells_of(frame).items()
+    assert (key.policy_run[0], *key.policy_run[2:4], cell.missing) == ("late", None, "mine", 1)
 
 
 def test_the_page_lists_the_columns() -> None:
@@ -153,3 +157,17 @@ def test_the_page_lists_the_columns() -> None:
         for one in (*COLUMNS.values(), *WORD_COLUMNS.values())
     ]
     assert "\n".join(rows) in page, "\n".join(rows)
+
+
+def test_a_run_is_opened_once_for_all_that_is_wanted_of_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Two spellings of a folder are one run; a folder alone wants all of its policies."""
+    monkeypatch.chdir(tmp_path)
+    for name in ("a", "b", "c", "c:d"):
+        Path(name).mkdir()
+    given = ["a:x", "b:y", "./a", "b:z:Z", f"../{tmp_path.name}/b:y", "c:d", "c:e"]
+    with opened_sources(given) as found:
+        assert [(str(one.path), one.policies) for one in found] == [
+            ("a", None), ("b", ("y", "z:Z")), ("c:d", None), ("c", ("e",)),
+        ]  # fmt: skip

@@ -11,6 +11,7 @@ from roboirg.evaluation.analysis.stats.cells import cells_of
 from roboirg.evaluation.analysis.stats.headline import headline_notes, measure_headline
 from roboirg.evaluation.analysis.stats.measured_floors import (
     RANDOM,
+    TEST,
     FloorKey,
     measured_floors,
     settings_at_chance,
@@ -38,7 +39,8 @@ def floors(excess):
 def two_settings(monkeypatch):
     """Floors of version 1 of the language, which made-up results have."""
     found = floors({"direct": 0.7, "reasoning": 0.05, "spatial": -0.1})
-    stored = {"1": found, LANGUAGE_VERSION: found}
+    others = floors({"direct": 0.7, "reasoning": 0.7, "spatial": -0.1})
+    stored = {"1": found, LANGUAGE_VERSION: others}
     monkeypatch.setattr(headline, "measured_floors", stored.get)
 
 
@@ -133,6 +135,8 @@ def test_it_stands_next_to_every_table_or_why_there_is_none(result, two_settings
 
 def test_settings_count_up_to_five_points_above_chance() -> None:
     found = floors({"direct": 0.0501, "reasoning": 0.05, "spatial": -0.3})
+    parts = [FloorKey(TEST, "direct"), FloorKey(RANDOM, "direct", "StopCube")]
+    found |= dict.fromkeys(parts, found[RANDOM, "spatial", "", ""])
     assert settings_at_chance(found) == ("reasoning", "spatial")
 
 

@@ -158,5 +158,8 @@ def test_gaps_are_paired_and_corrected_and_forms_compared(result) -> None:
     assert [one.p_holm for one in (direct, resolved, reasoning)] == pytest.approx(
         [3 * 2 / 2**20, 2 * 2 / 2**5, 1.0]
     )
+    assert [
+        one.p_holm for key, one in summaries.items() if key.options == InstructionOptions("direct")
+    ] == pytest.approx([3 * 2 / 2**20] * 3), "tasks, suites and all of them are three families"
     assert direct.second_gap.value == -0.75
     assert direct.second_gap.overlap == (0, 0, 15, 5)

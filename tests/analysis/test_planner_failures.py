@@ -46,15 +46,18 @@ def test_the_act_that_ended_the_episode_names_the_failure(
         ("refused", "it fits two things", 9, "refused"),
         ("done", None, 9, "went on too long"),
         ("done", None, IDLE_STEPS + 1, "stopped early"),
+        (None, None, IDLE_STEPS, "went on too long"),
         ("failed", None, 9, "hands"),
     ],
 )
 def test_the_last_subgoal_names_it_when_time_is_up(
-    failed: Record, ended: str, why: str | None, ago: int, named: str
+    failed: Record, ended: str | None, why: str | None, ago: int, named: str
 ) -> None:
+    """Whatever replies could not be read before it."""
     steps = failed.environment.max_steps
     said = SubgoalRecord(
         step=steps - ago, text="pick up the cube", verdict="right", ended=ended, why=why
     )
-    record = replace(failed, steps=steps, subgoals=(said,), attribution=WRONG)
+    usage = {"unparsed": 2.0}
+    record = replace(failed, steps=steps, subgoals=(said,), attribution=WRONG, usage=usage)
     assert planner_failure(record) == named

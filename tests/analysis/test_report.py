@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import re
+from collections import Counter
 from html import unescape
 from pathlib import Path
 from typing import Any
@@ -168,6 +169,23 @@ def test_words_that_differ_stand_apart_and_are_named() -> None:
     assert "in the words of mine@1a" in page.string(theirs["conditions"])
 
 
+def test_a_pair_is_of_one_scene_told_alike_under_equal_conditions() -> None:
+    """A number of two that lacks seed, form, arm or split; a value of a filter that is not ours."""
+    first, theirs = (one for one in records() if (one.setting, one.episode) == ("direct", 0))
+    others = [
+        replace(first, policy_seed=1), replace(first, arm="silent"),
+        first.with_options(form="resolved"), replace(first, split="val", difficulty="odd"),
+    ]  # fmt: skip
+    page = Page(render([first, theirs, *others]))
+    pairs, scenes = (Counter(page.data["columns"][name]) for name in ("pair", "scene"))
+    assert sorted(pairs.values()) == [1, 1, 1, 1, 2]
+    assert sorted(scenes.values()) == [1, 5]
+    choices = {one["name"]: one["values"] for one in page.data["choices"]}
+    assert choices["difficulty"] == [first.difficulty, "odd"]
+    assert "rendered on" not in page.text  # it is not known of any
+    assert len(page.data["comparisons"]) == 3, "of the three policy runs that were told"
+
+
 def test_videos_are_in_the_page_or_next_to_it(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -175,6 +193,7 @@ def test_videos_are_in_the_page_or_next_to_it(
     filmed = replace(first, video=film(tmp_path, "a-b"))
     lost = replace(second, video="videos/gone.mp4", video_error="no room")
     run = store(tmp_path, [filmed, lost])
+    monkeypatch.setattr(report, "MAX_EMBEDDED_BYTES", 8)
 
     page = Page(write_report(run).read_text())
     key = filmed.slug.rpartition("-")[2]
@@ -204,7 +223,7 @@ def test_videos_are_in_the_page_or_next_to_it(
 def test_two_runs_are_held_against_each_other(tmp_path: Path) -> None:
     theirs = tmp_path / "our theirs"
     found = records()
-    again = replace(found[0], policy_seed=7)  # a pair of its own
+    again = replace(found[0], policy_seed=7, started_at="2026-02-02T03:04:05")  # its own pair
     runs = (
         store(tmp_path / "ours", [*found, again], PICKS),
         store(theirs, [replace(found[0], video=film(theirs)), *found[1:-4], again], PICKS),
@@ -217,6 +236,7 @@ def test_two_runs_are_held_against_each_other(tmp_path: Path) -> None:
         "listener, our theirs (privileged)", "forgetful, our theirs (privileged)",
     ]  # fmt: skip
     assert page.data["sides"] == [0, 2]
+    assert "2026-01-02 03:04 to 2026-02-02 03:04 UTC" in page.text
     # Videos and logs of the other run carry a key of their own, and are found from the page.
     key = f"{found[0].slug.rpartition('-')[2]}-2"
     assert page.scripts[f"film-{key}"].startswith("data:video")

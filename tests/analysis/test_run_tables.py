@@ -105,6 +105,8 @@ MIXED = frame_of(
     play("0110", "direct", task="BinFill", form="resolved", prompt_verdict="cut"),
     play("0001", "direct", task="VideoUnmask", prompt_verdict="heard", attribution=WRONG[1]),
     play("0111", "direct", task="VideoUnmask", form="resolved", prompt_verdict="heard"),
+    play("0", policy="other", attribution=WRONG[1]),
+    play("0", "direct", policy="other", attribution=WRONG[1]),
 )
 """Other numbers of everything in every cell."""
 
@@ -130,7 +132,7 @@ def test_the_legend_explains_only_what_occurs_and_many_failures_are_counted() ->
     assert [line.split()[1] for line in lines[-11:-1]] == [f"test/{index}" for index in range(10)]
     assert lines[-1] == "  and 3 more"
     assert "without success" not in printed(frame_of(play("1")))
-    (silent,) = play("0", arm="silent", cause="late")
+    (silent,) = play("0", arm="silent", cause="late", wordings="mine@1a")
     assert failure_text(silent) == "PickXtimes test/0 explicit (silent): late"
 
 
@@ -142,14 +144,17 @@ def test_rates_have_their_colors() -> None:
 def test_policies_and_conditions_have_tables_of_their_own_in_the_order_of_the_plan() -> None:
     results = [
         *play("1"), *play("1", split="val"), *play("1", max_steps=200),
-        *play("1", policy="random", privileged=True),
+        *play("1", policy="random", privileged=True), *play("1", robot="Panda"),
     ]  # fmt: skip
     for names in (["listener", "random"], ["random", "listener"]):
         planned = [make_result(policy=name).identity for name in names]
-        found = [table.title for table in make_run_tables(frame_of(results, planned=planned))]
+        tables = make_run_tables(frame_of(results, planned=planned))
+        assert "privileged policies" in tables[-1].notes[-1], "whichever table is the last"
+        found = [table.title for table in tables]
         assert sorted(found, key=lambda title: names.index(title.split(",")[0])) == found
         assert sorted(found) == [
             "listener, split test, max steps 1300",
+            "listener, split test, max steps 1300, on Panda",
             "listener, split test, max steps 200",
             "listener, split val, max steps 1300",
             "random, split test, max steps 1300 (privileged)",

@@ -47,7 +47,10 @@ def test_two_halves_make_the_whole(tmp_path: Path) -> None:
 
 def test_a_verdict_beats_an_error_and_the_first_verdict_a_later_one(tmp_path: Path) -> None:
     one, two, three, *_ = (replace(record, server_version="8") for record in some())
-    two, silent = replace(two, code="old"), replace(three, arm="silent", code="older")
+    two = replace(two, code="old")
+    # Another policy has versions of its own, another split seeds of its own.
+    elsewhere = {"arm": "silent", "code": "older", "split": "val", "episode": 0, "seed": 5}
+    silent = replace(with_version(three, "old"), policy="other", server_version="9", **elsewhere)
     lost = {"outcome": "error", "error": "connection", "server_version": None}
     other = {"success": "failure", "failure": "success"}[two.outcome]
     cause = None if other == "success" else "it fell"

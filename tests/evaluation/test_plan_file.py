@@ -117,7 +117,7 @@ def test_values_are_those_that_would_be_typed(
         ("", r"is of type NoneType"),
         ("tasks: [", r"is not valid YAML"),
         ("settings: &same direct\nforms: *same", r"line 2 has an alias"),
-        ("tasks: all\ntasks:\n  - real", r"line 2 has the key 'tasks' again"),
+        ("tasks: all\nsplit: val\ntasks:\n  - real", r"line 3 has the key 'tasks' again"),
     ],
 )
 def test_what_is_no_plan_is_one_sentence(tmp_path: Path, text: str, sentence: str) -> None:

@@ -83,6 +83,25 @@ def test_options_that_add_words_are_cut() -> None:
     assert other.endswith("instructions does not reach it: direct 0–50 %.")
 
 
+def test_every_job_is_counted_by_its_own_words_and_limit() -> None:
+    """What was found of another episode, task, split, form, delivery or limit would be counted."""
+    options = {"settings": "explicit,contextual", "forms": "implicit,resolved", "episodes": "0-2"}
+    options |= {"tasks": "StopCube,BinFill", "in_turns": "contextual"}
+    specs = [f"p{tokens}=openpi://localhost:1?prompt_tokens={tokens}" for tokens in (40, 60, 80)]
+    jobs = [
+        one for split in ("test", "val") for one in make_plan(specs, split=split, **options).jobs()
+    ]
+    shares = prompt_shares(jobs)
+    limits = {one.policy: one.limit for one in shares}
+    each = Counter((one.policy, one.setting, audit_job(one, limits[one.policy])[1]) for one in jobs)
+    assert each == {
+        (one.policy, setting, verdict): count
+        for one in shares
+        for setting, verdicts in one.settings.items()
+        for verdict, count in verdicts.items()
+    }
+
+
 @pytest.mark.parametrize(
     ("counts", "text"),
     [

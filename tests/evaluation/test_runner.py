@@ -122,7 +122,7 @@ def test_a_worker_that_dies_twice_costs_one_error_and_the_rest_goes_on(tmp_path:
     (error,) = (record for record in read_records(tmp_path) if record.outcome == "error")
     assert (error.episode, error.error, error.attempt) == (2, "infrastructure", 2)
     assert error.cause == "infrastructure: the process died of signal 9 in the environment"
-    assert (summary.total, len(summary.errors), summary.missing) == (4, 1, 0)
+    assert (summary.total, summary.played, len(summary.errors), summary.missing) == (4, 4, 1, 0)
     assert len(starts(tmp_path, error.identity)) == 2
     # Errors are played again unless asked not to.
     same = run_plan(plan, tmp_path, FakePlay(), InProcess(), retry_errors=False)
@@ -170,14 +170,15 @@ def test_a_folder_may_get_more_and_fewer_jobs(tmp_path: Path) -> None:
 def test_worlds_of_two_versions_are_not_mixed(
     tmp_path: Path, name: str, value: object, sentence: str
 ) -> None:
-    played = FakePlay()(small_plan(1).jobs()[0])
+    played, fine = map(FakePlay(), small_plan(1).jobs())
     is_policy = name == "policy_version"
     record = with_version(played, "old") if is_policy else replace(played, **{name: value})
     with RecordStore(tmp_path) as store:
-        store.append(record)
+        store.append(replace(fine, outcome="error", error="connection", cause="connection: x"))
+        store.append(record)  # not the first
     with pytest.raises(StoreError, match=sentence):
         run_plan(small_plan(2), tmp_path, FakePlay(), InProcess())
-    assert len(read_records(tmp_path)) == 1
+    assert len(read_records(tmp_path)) == 2
     assert read_plan(tmp_path) is None
 
 

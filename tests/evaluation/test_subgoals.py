@@ -66,17 +66,17 @@ def test_records_keep_them_and_refuse_others() -> None:
 def test_the_page_and_the_table_show_them(tmp_path: Path) -> None:
     spent = {"calls": 3.0, "answered_s": 6.5, "waited_s": 2.25}
     record = make_record(JOB, "failure", "no", subgoals=SAID, usage=spent)
-    # Costs are per episode: in another one of the cell the planner says nothing.
+    # Costs are per episode: in another one of the cell the planner named nothing.
     with RecordStore(tmp_path) as store:
         store.append(record)
-        store.append(make_record(replace(JOB, episode=1), "failure", "no"))
+        store.append(make_record(replace(JOB, episode=1), "failure", "no", usage={"calls": 1.0}))
     page = render([record])
     assert "(wrong thing; due: pick it up)" in page
     assert "sing (lost; due: nothing)" in page
     words = ["tables", str(tmp_path), "--which", "subgoals", "--format", "markdown"]
     outcome = CliRunner().invoke(app, words)
     counts = "| 3 | 1 (33 %) | 1 (33 %) | 0 (0 %) | 0 (0 %) | 1 (33 %) |"
-    assert f"{counts} 1.5 | 3.25 | 1.12 |" in outcome.output
+    assert f"{counts} 2 | 3.25 | 1.12 |" in outcome.output
 
 
 class Planning:

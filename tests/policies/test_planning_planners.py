@@ -149,6 +149,7 @@ def clip(body):
     [
         ("qwen", GO, {}, range(0, 321, 16)),
         ("qwen", GO, {"asked": "every 40 steps"}, [0, 48, 80, 128, 160, 208, 240, 288, 320]),
+        ("qwen", GO, {"asked": "every 7 steps"}, range(0, 321, 16)),  # two periods in a chunk
         ("qwen", "press the button at (3,4)", {}, [0, *range(96, 321, 16)]),
         ("qwen", "press the button at (3,4) to stop", {}, range(0, 321, 16)),
         ("qwen", "press the first button at (3,4)", {}, [0, *range(112, 321, 16)]),
@@ -226,15 +227,16 @@ def test_gemini_converses_in_clips():
 
 def test_gemini_shows_a_picture_where_there_is_no_clip():
     with fake_vlm([ANSWERS["gemini"]]) as server:
-        planner = make_planner("gemini", server, asked="every 3 steps", first_pause=0)
-        drive(planner, 6, chunk=3)
+        options = {"asked": "every 3 steps", "first_pause": 0, "observe_every": 2}
+        drive(make_planner("gemini", server, **options), 6, chunk=3)
         assert [pictures(body) for body in server.requests] == [[0], [0, 3], [0, 3, 6]]
 
 
 def test_gemini_shows_what_an_unusable_answer_missed_once_more():
     answers = [ANSWERS["gemini"], "?", "?", ANSWERS["gemini"]]
     with fake_vlm(answers) as server:
-        drive(make_planner("gemini", server, "google", first_pause=0), 96)
+        policy = drive(make_planner("gemini", server, "google", first_pause=0), 96)
+        assert "unreadable" not in policy.usage()  # the last reply was of use
         assert len(clip(server.requests[-1])[0]) == 96
         assert len(server.requests[-1]["contents"]) == 3
 
@@ -267,13 +269,15 @@ class Refusing(Follower):
         pass
 
 
-def test_a_planner_is_asked_five_times_for_what_is_refused_in_each_episode():
+@pytest.mark.parametrize("when", ["when-done", "every 99 steps"])
+def test_a_planner_is_asked_five_times_for_what_is_refused_in_each_episode(when):
     """What a subgoal meant in the world stays hidden from it."""
     with fake_vlm([GO]) as server:
-        planner = make_planner("stateless", server)
+        planner = make_planner("stateless", server, asked=when)
         policy = HierarchicalPolicy(planner, Refusing())
         for asked in (5, 10):
             policy.reset("Do it.", NO_VIDEO)
+            assert (policy.subgoal, policy.endings) == (None, [])
             for step in (0, CHUNK):
                 policy.act({**moment(step), "history": ()})
             assert len(server.requests) == asked
@@ -309,13 +313,17 @@ def test_gemini_keeps_the_last_subgoal_where_the_model_says_all_is_done(last):
 
 
 def test_memer_shows_recent_frames_and_remembers_what_it_chose():
+    """In an episode after another one, of which nothing is shown."""
+
     def choose(*positions):
         return json.dumps({"current_subtask": GO, "keyframe_positions": positions})
 
-    with fake_vlm([choose(1), choose(8, 2), choose(1), choose(), choose(8)]) as server:
+    answers = [choose(1), choose(8, 2), choose(1), choose(), choose(8)]
+    with fake_vlm([choose(1), choose(2), *answers]) as server:
         planner = make_planner("memer", server)
+        drive(planner, 16)
         policy = drive(planner, 64).policy
-        shown = [pictures(body) for body in server.requests]
+        shown = [pictures(body) for body in server.requests[2:]]
     recent = [[0], *(list(range(end - 14, end + 1, 2)) for end in (16, 32, 48, 64))]
     # 0; 0, 4, 16 make 4 and 16, where 16 and 18 make 18; then 64 besides.
     memory = [[], [0], [4, 16], [4, 18], [4, 18]]
@@ -335,12 +343,13 @@ def test_memer_refuses_positions_that_there_are_not(positions):
         assert planner.frames == {}
 
 
-def test_memer_may_be_told_to_keep_the_newest_key_frames_only():
+@pytest.mark.parametrize(("option", "kept"), [({"most": 2}, [66, 82]), ({"near": 16}, [82])])
+def test_memer_may_be_told_to_keep_the_newest_key_frames_only(option, kept):
     choose = json.dumps({"current_subtask": GO, "keyframe_positions": [1]})
     with fake_vlm([choose]) as server:
-        planner = make_planner("memer", server, most=2)
+        planner = make_planner("memer", server, **option)
         drive(planner, 96)
-        assert list(planner.frames) == [66, 82]
+        assert list(planner.frames) == kept
 
 
 @pytest.mark.parametrize("subgoals", ["simple", "grounded"])

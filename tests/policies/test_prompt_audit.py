@@ -145,6 +145,7 @@ def test_a_json_tokenizer_is_read(tmp_path):
     model.pre_tokenizer = tokenizers.pre_tokenizers.Whitespace()
     model.post_processor = tokenizers.processors.TemplateProcessing("[B] $A", None, [("[B]", 0)])
     model.enable_truncation(3)
+    model.enable_padding(length=20)
     path = tmp_path / "tokenizer.json"
     model.save(str(path))
     assert read_tokenizer(str(path))("put the cube.") == Tokens(1, (3, 7, 12, 13), 1)

@@ -7,6 +7,7 @@ import signal
 import subprocess
 import sys
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import killed_export
@@ -15,7 +16,7 @@ import pytest
 import synthetic_trajectories
 from pyarrow import parquet
 
-from roboirg.apps.demonstrations import export_run
+from roboirg.apps.demonstrations import export_plan, export_run
 from roboirg.apps.demonstrations.dataset_reading import read_dataset
 from roboirg.apps.demonstrations.export_plan import recording_jobs
 from roboirg.core.episode import ENVIRONMENT_VERSION
@@ -102,6 +103,8 @@ def test_each_trajectory_is_recorded_once(tmp_path, synthetic, make_plan, monkey
     assert len(played[4:]) == 3
     assert told[0][:3] == ("record", 3, 6)
     assert told[-1][:3] == ("write", 4, 4)
+    sizes = [size for work, _, _, size in told if work == "record"]
+    assert sizes == sorted(set(sizes))  # of all trajectories up to then
     assert not (tmp_path / "data" / export_run.WORK_FOLDER).exists()
 
 
@@ -135,6 +138,34 @@ def test_kept_trajectories_of_other_pictures_words_or_worlds_are_not_taken(
             make_plan(**changes), tmp_path / str(number), 0, quiet, kept
         )
         assert summary.recorded == recorded
+
+
+def test_a_trajectory_s_name_has_all_that_it_depends_on(make_plan):
+    """A field that the name lacked would give the trajectory of another plan."""
+    ((job, _), *_) = recording_jobs(make_plan(policy="listener"))
+    fields = {
+        "task": "StopCube", "split": "val", "number": 1, "variation": 1, "policy": "forgetful",
+    }  # fmt: skip
+    spec = {
+        "coding": "lossless-video", "video": True, "depth": True, "cameras": ("wrist",),
+        "size": 64, "actions": "waypoint", "disturbed": True,
+    }  # fmt: skip
+    assert set(spec) == set(job.spec._fields)
+    words = (replace(job.options, setting="direct"), replace(job.options, form="resolved"))
+    others = [
+        *(job._replace(**{name: value}) for name, value in fields.items()),
+        *(job._replace(spec=job.spec._replace(**{name: value})) for name, value in spec.items()),
+        *(job._replace(options=one) for one in words),
+    ]
+    assert len({one.path(Path()) for one in (job, *others)}) == 1 + len(others)
+
+
+def test_a_stopped_export_of_another_version_is_another_one(make_plan, monkeypatch):
+    found = {make_plan().fingerprint()}
+    for name in ("LANGUAGE_VERSION", "ENVIRONMENT_VERSION", "TRAJECTORY_VERSION"):
+        monkeypatch.setattr(export_plan, name, "another")
+        found.add(make_plan().fingerprint())
+    assert len(found) == 4
 
 
 def test_failures_are_exported_only_on_request(export):
@@ -242,6 +273,8 @@ def test_the_card_tells_counts_and_lines_to_train(export):
 def test_an_explicit_instruction_is_its_own_resolved_form(make_plan):
     both = make_plan(forms=("implicit", "resolved"), settings=("explicit", "direct", "spatial"))
     assert [len(said) for _, said in recording_jobs(both)] == [1 + 2 + 2] * 6
+    alone = make_plan(forms=("resolved",), settings=("explicit", "direct"))
+    assert [len(said) for _, said in recording_jobs(alone)] == [2] * 6
 
 
 def test_states_alone_need_no_pictures(export):

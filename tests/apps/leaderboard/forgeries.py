@@ -82,6 +82,11 @@ def _swap_files(lines: Lines, folder: Path, rng: random.Random) -> Lines:
     return lines
 
 
+def _other_stage(lines: Lines, _folder: Path, rng: random.Random) -> Lines:
+    rng.choice(lines)["instruction"][0]["stage"] = "cue"
+    return lines
+
+
 LATE = "timeout: the policy took more than 600 s"
 
 FORGERIES: dict[str, tuple[Forgery, str]] = {
@@ -111,6 +116,7 @@ FORGERIES: dict[str, tuple[Forgery, str]] = {
     "seed of the scene": (_changes(seed=1), "seed: the record says 1; it should be"),
     "version of the world": (_changes(environment_version=0), "environment_version: the record"),
     "version of the words": (_changes(language_version="0.9.0"), "language_version: the record"),
+    "other stage": (_other_stage, "instruction: the record says"),
     "no such episode": (_changes(episode=5_000), "There is no episode 5000"),
 }
 """By name: the change, and a part of the sentence about it."""

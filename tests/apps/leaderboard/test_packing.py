@@ -16,6 +16,7 @@ from roboirg.evaluation.records.action_log import ActionLog, write_actions
 from roboirg.evaluation.records.packs import MANIFEST, opened_run
 from roboirg.evaluation.records.record import Job
 from roboirg.evaluation.records.record_codec import StoreError
+from roboirg.evaluation.records.run_files import store_plan
 from roboirg.evaluation.records.store import RecordStore, read_records
 
 
@@ -37,6 +38,9 @@ def run(tmp_path: Path) -> Path:
     (folder / "videos").mkdir()
     (folder / "videos" / "one.mp4").write_bytes(b"video")
     (folder / "secret.txt").write_text("not packed")
+    (folder / "actions" / ".half.npz").write_text("left by a kill")
+    store_plan(b"{}", folder)
+    store_plan(b"[]", folder)  # the other one stays, as an earlier plan
     return folder
 
 
@@ -51,9 +55,10 @@ def test_the_same_run_comes_out(run: Path, tmp_path: Path) -> None:
         assert "secret.txt" not in names
         assert "one.mp4" not in names
         assert sum(name.endswith(".npz") for name in names) == 3
+        assert sum(name.endswith(".json") for name in names) == 2
     assert not folder.exists()
     with opened_run(tmp_path / "a.zip", ()) as folder:
-        assert [path.name for path in folder.iterdir()] == ["records.jsonl"]
+        assert {path.name for path in folder.iterdir()} == {"records.jsonl", "plan.json", "plans"}
         assert read_records(folder) == read_records(run)
 
 

@@ -62,6 +62,8 @@ QUICK = (
     "actions lost",
     "another file of actions",
     "explicit command",
+    "version of the world",
+    "version of the words",
 )
 
 
@@ -87,15 +89,20 @@ def test_an_episode_of_the_plan_that_was_left_out_is_named(honest: Path, tmp_pat
     found = verify_run(shorter, sample=0.0)
     assert found.holds
     assert found.notes == ("From no plan that is kept: 1 record.",)
+    # Words that were said in another part of the discourse are other words, played or not.
+    forge(shorter, FORGERIES["other stage"][0], random.Random(0))
+    (check,) = verify_run(shorter, sample=0.0).checks
+    assert FORGERIES["other stage"][1] in check.findings[0]
 
 
 def test_only_other_processors_may_end_a_little_elsewhere(honest: Path, tmp_path: Path) -> None:
-    def shift(by: float, **changes: object) -> Forgery:
+    def shift(by: float, end_state: str = "0" * 64, **changes: object) -> Forgery:
         def forgery(lines: Lines, folder: Path, rng: random.Random) -> Lines:
             for place, one in enumerate(lines, start=1):  # the first is farthest
                 log = read_actions(folder, one["action_log"])
                 moved = replace(log, end_state=log.end_state + by / place)
-                one.update(action_log=write_actions(moved, folder), end_state="0" * 64, **changes)
+                one.update(action_log=write_actions(moved, folder), **changes)
+                one.update(end_state=end_state or one["end_state"])
             return lines
 
         return forgery
@@ -106,12 +113,15 @@ def test_only_other_processors_may_end_a_little_elsewhere(honest: Path, tmp_path
         (0.001, other, True, False),
         (0.1, {**other, "steps": 1, "events": []}, False, True),  # motion decides these
         (0.1, {**other, "seed": 1}, False, False),  # no processor changes that
+        (0.1, {**other, "steps": 1}, False, True),
+        (0.001, {**other, "end_state": ""}, False, True),  # the hash is of other numbers
     ):
-        folder = tmp_path / f"{by}-{len(changes)}"
+        folder = tmp_path / "-".join([str(by), *changes])
         shutil.copytree(honest, folder)
         forge(folder, shift(by, **changes), random.Random(0))
         found = verify_run(folder)
         assert found.holds is holds
+        assert [one.slug for one in found.checks] == sorted(one.slug for one in found.checks)
         assert found.verdicts[ReplayVerdict.TOLERANT] == holds * found.records
         assert found.deviation == pytest.approx(by * holds)
         assert any("another kind of processor" in note for note in found.notes) is excused
@@ -125,7 +135,9 @@ def test_a_merged_run_holds_by_the_plans_of_its_parts(honest: Path, tmp_path: Pa
 
 
 def test_a_sample_is_drawn_again_from_its_seed(honest: Path) -> None:
-    found = verify_run(honest, sample=0.5, seed=3)
+    told: list[tuple[int, int]] = []
+    found = verify_run(honest, sample=0.5, seed=3, progress=lambda *now: told.append(now))
+    assert told == [(1, 2), (2, 2)]
     assert found.verdicts[ReplayVerdict.EXACT] == found.records // 2
     assert found.holds
 

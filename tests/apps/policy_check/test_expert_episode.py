@@ -66,7 +66,7 @@ def recorded_poses():
 
 def test_poses_of_the_expert_are_those_after_each_step():
     for one, after in itertools.pairwise(recorded_poses()):
-        assert one.actions.shape[1] == 7
+        assert one.actions.shape in {(rows, 7) for rows in range(1, 9)}
         assert np.allclose(one.actions[-1, :6], after.still)
 
 

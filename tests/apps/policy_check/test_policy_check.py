@@ -71,6 +71,7 @@ class Dice(Sound):
 
 class HonestDice(Dice):
     deterministic = False
+    version = "unknown"
 
 
 class Growing(Sound):
@@ -85,7 +86,7 @@ class Growing(Sound):
 
 class Videophobe(Sound):
     def reset(self, instruction, demonstration):
-        assert len(demonstration["joint_positions"]) == 0, "no films, please"
+        assert len(demonstration["joint_positions"]) == 0, "no films, please" + 99 * " no"
         self.memory = 0
 
 
@@ -106,8 +107,14 @@ class Unspeakable(Sound):
 
 
 class Reckless(Sound):
+    """One number of its second action is too large, two of the third, three of the last."""
+
     def act(self, observation):
-        return np.full((4, 8), 9.0)
+        return np.eye(8)[5] - np.eye(8)[3] + 9.0 * np.tri(4, 8, -1)
+
+
+class Posing(Sound):
+    metadata = property(lambda self: {"server": "mine"}, lambda *_: None)
 
 
 def found(policy, verdict):
@@ -143,13 +150,14 @@ def test_a_sound_policy_passes_everything():
     [
         (Shapeless, "acts without a video", "got shape (3, 7)"),
         (NotFinite, "acts without a video", "finite number"),
-        (Raising, "acts without a video", "act(): KeyError: 'depth'"),
+        (Raising, "acts without a video", "'depth'. Observations have end_effector, front_rgb,"),
         (Elephant, "reset forgets", "differs by up to 0.27"),
         (Dice, "deterministic", "Two equal episodes differ by up to"),
         (Growing, "deterministic", "the number of actions"),
-        (Videophobe, "acts with a video", "no films, please"),
+        (Videophobe, "acts with a video", "reset(): AssertionError: no films, please no no"),
         (Unwritable, "reports", "the policy's metadata: 'rate' is nan; it must be a text"),
         (Unspeakable, "reports", "usage() has 1 entries; it may have at most"),
+        (Posing, "reports", "the key 'server', which is reserved"),
         (Priceless, "reports", "usage() has None as 'calls'; it must be a number."),
     ],
 )
@@ -159,10 +167,11 @@ def test_what_is_wrong_is_found(kind, check, words):
 
 
 def test_what_is_allowed_is_noted():
-    notes = found(f"{__name__}:HonestDice", NOTE)
+    notes = found(HonestDice(), NOTE)
     assert "as the policy declares" in notes["deterministic"]
+    assert "set the attribute version" in notes["version"]
     assert found(f"{__name__}:HonestDice", FAIL) == {}
-    assert "12 of 12 actions" in found(f"{__name__}:Reckless", NOTE)["range without a video"]
+    assert "9 of 12 actions" in found(f"{__name__}:Reckless", NOTE)["range without a video"]
     assert "It is privileged" in found("oracle", NOTE)["loads"]
 
 
@@ -248,9 +257,11 @@ def test_warnings_and_failures_are_counted(capsys, snapshot):
 
 class Versioned(Sound):
     version = "step 3000"
+    deterministic = False  # it says so
 
 
 def test_the_version_that_records_will_have_is_printed():
     assert "step 3000" in found(f"{__name__}:Versioned", PASS)["version"]
     assert "step 3000" in found(Versioned(), PASS)["version"]
+    assert "Not checked" in found(Versioned(), NOTE)["reset forgets"]
     assert "set the attribute version" in found(Sound(), NOTE)["version"]

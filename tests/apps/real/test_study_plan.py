@@ -75,6 +75,7 @@ def test_plans_are_balanced_and_a_seed_changes_the_order_and_nothing_else(plan, 
     assert {(t.name, t.job) for t in again.trials} == {(t.name, t.job) for t in plan.trials}
     assert len({t.name for t in plan.trials}) == len(plan.trials) == len(again.trials)
     assert set(again.demonstrations) == set(plan.demonstrations)
+    assert again.twin_plans == plan.twin_plans
 
 
 def check_arrangements(plan):
@@ -146,7 +147,7 @@ def test_all_arrangements_are_there_and_neighbors_are_opposites(task):
         ("a", {"tasks": ("PickByCount",), "trials": 50}, "too many for the split 'val'; at most 2"),
         ("aa", {}, "'a' is given twice"),
         ("a", {"tasks": ("PickXtimes",)}, "PickXtimes is not a task for a real robot"),
-        ("a", {"settings": ("spatail",)}, "no setting of PutInBox 'spatail'"),
+        ("a", {"settings": ("direct", "spatail")}, "no setting of PutInBox 'spatail'"),
         ("a", {"trials": 0}, "trials is 0; it must be at least 1"),
         ("a", {"seed": -1}, "seed is -1; it must be at least 0"),
     ],

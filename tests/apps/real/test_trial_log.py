@@ -6,6 +6,7 @@ import pytest
 from made_records import make_record
 from page_text import render
 
+from roboirg.apps.real.pages.score_server import _select_trial
 from roboirg.apps.real.study.failure_choices import failure_choices
 from roboirg.apps.real.study.trial_log import VOID, TrialLog, trial_metadata
 from roboirg.core.errors import InvalidValueError
@@ -57,12 +58,16 @@ def test_the_newest_score_counts_and_all_stay_in_the_file(small):
     plan, folder = small
     trial = plan.trials[0]
     for number, choice in enumerate(("success", "misplaced", "void", "success"), 1):
-        read(plan, folder).score(trial, choice, operator="ann")
+        # The operator names the video once.
+        film, note = "a.mp4" * (number == 1), f"note {number}"
+        read(plan, folder).score(trial, choice, operator="ann", note=note, video=film)
         now = read(plan, folder)
         assert now.state(trial.name) == ("void" if choice == "void" else "scored")
         assert now.revision(trial.name) == number
     (newest,) = read_records(folder)
     assert (newest.outcome, newest.cause, newest.attribution) == ("success", None, None)
+    assert (newest.error, newest.video) == (None, "a.mp4")
+    assert trial_metadata(newest)["note"] == "note 4"
     assert len((folder / "records.jsonl").read_text().splitlines()) == 4
 
 
@@ -74,6 +79,7 @@ def test_trials_come_in_order_and_void_is_a_verdict(small):
         trial_log.score(trial, "void", operator="ann", note="the lamp fell")
     last = read(plan, folder)
     assert last.next_to_score() is None
+    assert _select_trial(last, "") == plan.trials[-1]
     assert last.state(plan.trials[0].name) == "void"
     assert last.newest(plan.trials[0].name).cause == f"{VOID}; the lamp fell"
 
