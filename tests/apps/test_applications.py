@@ -20,7 +20,6 @@ APPLICATIONS = sorted(path.parent.name for path in (layout.PACKAGE / "apps").glo
 
 RUN = "\nfrom roboirg.main import main; sys.argv[0] = 'roboirg'; main()"
 """Behind `WALK`: the command of the process's arguments."""
-KINDS_OF = {"demonstrations": {"recorded"}}
 LEARN = "roboirg_learn"
 
 WALK = """
@@ -115,4 +114,4 @@ def test_without_an_application_the_rest_works(application, everything, tmp_path
     }
     assert everything[0].keys() - commands.keys() == lost
     assert bool(lost) == (layout.PACKAGE / "apps" / application / "commands.py").exists()
-    assert everything[1] - set(kinds) == KINDS_OF.get(application, set())
+    assert everything[1] == set(kinds)
