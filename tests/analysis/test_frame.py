@@ -166,8 +166,8 @@ def test_a_run_is_opened_once_for_all_that_is_wanted_of_it(
     monkeypatch.chdir(tmp_path)
     for name in ("a", "b", "c", "c:d"):
         Path(name).mkdir()
-    given = ["a:x", "b:y", "./a", "b:z:Z", f"../{tmp_path.name}/b:y", "c:d", "c:e"]
+    given = ["a:x", "b:y", "./a", "b:z:Z", f"../{tmp_path.name}/b:y", "c:d:e", "c:e"]
     with opened_sources(given) as found:
         assert [(str(one.path), one.policies) for one in found] == [
-            ("a", None), ("b", ("y", "z:Z")), ("c:d", None), ("c", ("e",)),
+            ("a", None), ("b", ("y", "z:Z")), ("c:d", ("e",)), ("c", ("e",)),
         ]  # fmt: skip

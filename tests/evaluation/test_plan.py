@@ -263,15 +263,3 @@ def test_a_name_next_to_all_is_added_and_tasks_may_lack_it() -> None:
     assert ("VideoUnmask", "grounded") in played
     assert ("StopCube", "direct") in played
     assert ("StopCube", "grounded") not in played
-
-
-def test_what_was_said_elsewhere_can_not_be_said_of_every_episode() -> None:
-    """Results of another episode or split tell nothing of an episode that lacks a setting."""
-    plan, other = (
-        make_plan(["random"], settings="every", tasks="PickXtimes", episodes=episodes, split=split)
-        for episodes, split in (("0,2,3", "test"), ("2,3", "val"))
-    )
-    assert plan.jobs((*plan.jobs(), *other.jobs())) == plan.jobs()
-    said = [(one.split, one.episode) for one in (*plan.jobs(), *other.jobs())
-            if one.setting == "grounded"]  # fmt: skip
-    assert said == [("test", 2), ("val", 2), ("val", 3)]
