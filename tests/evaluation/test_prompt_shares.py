@@ -84,9 +84,9 @@ def test_options_that_add_words_are_cut() -> None:
 
 
 def test_every_job_is_counted_by_its_own_words_and_limit() -> None:
-    """What was found of another episode, task, split, form, delivery or limit would be counted."""
+    """Of another episode, task, split, form, delivery, arm or limit the words are others."""
     options = {"settings": "explicit,contextual", "forms": "implicit,resolved", "episodes": "0-2"}
-    options |= {"tasks": "StopCube,BinFill", "in_turns": "contextual"}
+    options |= {"tasks": "StopCube,BinFill", "in_turns": "contextual", "arms": "told,silent"}
     specs = [f"p{tokens}=openpi://localhost:1?prompt_tokens={tokens}" for tokens in (40, 60, 80)]
     jobs = [
         one for split in ("test", "val") for one in make_plan(specs, split=split, **options).jobs()

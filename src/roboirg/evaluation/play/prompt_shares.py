@@ -106,7 +106,7 @@ def prompt_shares(jobs: Iterable[Job]) -> tuple[PromptShares, ...]:
         limit = limits[job.policy]
         verdict: PromptVerdict = "unknown"
         if limit is not None:
-            key = (limit, job.task, job.split, job.episode, job.options)
+            key = (limit, job.task, job.split, job.episode, job.options, job.arm)
             if key not in verdicts:
                 verdicts[key] = audit_job(job, limit)[1]
             verdict = verdicts[key]
