@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+from collections import defaultdict
 from collections.abc import Callable
 from itertools import combinations
 from pathlib import Path
@@ -112,16 +113,21 @@ def test_figures_say_what_the_records_say(name: str, shown: list[str]) -> None:
 
 
 def widths(panel: Axes) -> dict[str, float]:
-    """The length of a panel's bars by color."""
+    """The length of a panel's bars by color; each part of a bar begins where the last one ends."""
     found: dict[str, float] = {}
+    ends: defaultdict[float, float] = defaultdict(float)
     for bar in panel.patches:
         assert isinstance(bar, Rectangle)
+        assert bar.get_x() == pytest.approx(ends[bar.get_y()])
+        ends[bar.get_y()] += bar.get_width()
         color = to_hex(bar.get_facecolor()).lower()
         found[color] = found.get(color, 0.0) + bar.get_width()
     return found
 
 
-def test_bars_are_shares_of_what_was_played() -> None:
+def test_bars_are_shares_of_what_was_played(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Also those too short for a number: would catch one that the next part covers."""
+    monkeypatch.setattr(failures, "MIN_LABELED_PERCENT", 20.0)
     found = content(planned=PLAN.jobs())
     # Everything failed in the four implicit tellings, nothing in the rest.
     listener, forgetful = (widths(panel) for panel in draw("failures", found).axes)

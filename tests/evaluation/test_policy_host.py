@@ -393,6 +393,26 @@ class It:
     assert child_of(pool)  # there is one again: nobody plays the other policy
 
 
+def test_those_who_were_asked_together_are_played_again_alone(
+    host: Callable[[str, str], HostedPolicy],
+) -> None:
+    """Would catch that each of them is to blame for a process that ends in their call."""
+    text = """
+from roboirg.evaluation.hosting import host_process
+from roboirg.evaluation.hosting.messages import Begun
+class It(hostile_policies.Hostile):
+    def reset(self, instruction, demonstration):
+        host_process.Begun = lambda together: Begun(True)
+    def act(self, observation):
+        os._exit(5)
+"""
+    world = host("joint", text)
+    world.reset("Pick it.", {})
+    with pytest.raises(EpisodeLostError, match="exit code 5") as lost:
+        world.act({})  # type: ignore[typeddict-item]
+    assert lost.value.alone
+
+
 def test_a_host_goes_on_after_worlds_that_die_or_are_interrupted(
     pool: HostPool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
