@@ -41,8 +41,8 @@ def test_a_video_is_small_playable_and_appears_when_complete(tmp_path: Path) -> 
         assert stream.codec_context.pix_fmt == "yuv420p"
         assert (stream.width, stream.height, stream.average_rate) == (512 + GAP, 256, 10)
         frames = [frame.to_ndarray(format="rgb24") for frame in container.decode(stream)]
+        assert stream.average_rate * FRAME_STEPS == 4 * CONTROL_RATE  # fourfold speed
     assert len(frames) == 21 + 8  # the page counts on it
-    assert stream.average_rate * FRAME_STEPS == 4 * CONTROL_RATE  # fourfold speed
     edges = frames[0][[1, -2, 100, 100], [100, 100, 1, -2]].astype(int)
     assert np.abs(edges - DEMONSTRATION_COLOR).max() < 40
     # Front, wrist, and the ring: 6 rows below its point in the front picture.

@@ -49,8 +49,10 @@ def run_file(folder: Path, name: str) -> Path:
 
 def _is_below(path: Path, folder: Path) -> bool:
     try:
-        return path.resolve().is_relative_to(folder.resolve())
-    except (OSError, RuntimeError):  # links in a circle
+        found = path.resolve()
+        # From Python 3.13 on, links in a circle are no error here.
+        return found.is_relative_to(folder.resolve()) and not found.is_symlink()
+    except (OSError, RuntimeError):
         return False
 
 
