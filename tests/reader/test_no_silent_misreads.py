@@ -43,6 +43,7 @@ def read(task, text, index=2):
         ("PickXtimes", "Put the red cube on the target, and again, and again.", ("red", 3)),
         ("PickXtimes", "Put the red cube on the target. Repeat it two more times.", ("red", 3)),
         ("PickXtimes", "Put the red cube on the target twice, then once more.", ("red", 3)),
+        ("PickXtimes", "Put the red cube on the target, then do it twice more.", ("red", 3)),
         ("PickXtimes", "Take the red, no, the blue cube, and put it on the target.", ("blue", 1)),
         ("PickXtimes", "Put the red cube on the target twice, I mean three times.", ("red", 3)),
         ("PickXtimes", "You're to put the red cube on the target twice, nothing else.", ("red", 2)),
