@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import random
 import shutil
 from collections import Counter
@@ -20,6 +21,7 @@ from roboirg.evaluation.plan.plan_maker import make_plan
 from roboirg.evaluation.play.rollout import EpisodeRunner
 from roboirg.evaluation.records.action_log import read_actions, write_actions
 from roboirg.evaluation.records.merging import merge_runs
+from roboirg.evaluation.records.run_files import PLAN_FILE
 from roboirg.evaluation.records.store import read_records
 from roboirg.evaluation.run.executor import InProcess
 from roboirg.evaluation.run.runner import run_plan
@@ -128,7 +130,13 @@ def test_only_other_processors_may_end_a_little_elsewhere(honest: Path, tmp_path
 
 
 def test_a_merged_run_holds_by_the_plans_of_its_parts(honest: Path, tmp_path: Path) -> None:
-    merge_runs([honest], tmp_path / "merged")
+    """By all plans: each of these has the episodes of one policy only."""
+    parts = [tmp_path / policy for policy in ("listener", "forgetful")]
+    for part in parts:
+        shutil.copytree(honest, part)
+        plan = json.loads((part / PLAN_FILE).read_bytes()) | {"policies": [part.name]}
+        (part / PLAN_FILE).write_text(json.dumps(plan), "utf-8")
+    merge_runs(parts, tmp_path / "merged")
     found = verify_run(tmp_path / "merged")
     assert found.holds, found
     assert not found.notes
