@@ -28,12 +28,14 @@ from roboirg.core.fact_traits import fact_traits
 from roboirg.core.plain_text import counted
 from roboirg.core.word_pools import words_label
 from roboirg.evaluation.analysis.page.episodes import PageEpisode
-from roboirg.evaluation.play.job_instruction import PreparedJob, instruct_job
+from roboirg.evaluation.play.job_instruction import instruct_job
 from roboirg.evaluation.records.record import EventRecord, Job, Record, SubgoalRecord
 from roboirg.judging.episode_replay import Event, completed_stages
 from roboirg.judging.judge import describe_object, plain_subgoal
 from roboirg.language import LANGUAGE_VERSION
+from roboirg.language.arms import arm_episode
 from roboirg.language.settings import EXPLICIT
+from roboirg.tasks.splits.splits import get_episode
 
 EMBEDDED = "#"
 """Stands for a video that is part of the page."""
@@ -85,11 +87,17 @@ class EpisodeDetails:
     def details_of(self, record: Record) -> Details:
         """Return the details of an episode, with texts as indices; empty ones are left out."""
         index = self._index
-        job = msgspec.structs.replace(
-            record.identity, policy="", policy_seed=0, wordings_file=record.wordings_file
-        )
+        # Of the job only what decides the words, which all policies and seeds share.
+        job = Job(
+            policy="", task=record.task, split=record.split, episode=record.episode,
+            options=record.options, arm=record.arm, wordings_file=record.wordings_file,
+        )  # fmt: skip
         is_current = record.environment_version == ENVIRONMENT_VERSION
-        scene = _played_scene(job) if is_current else _PlayedScene(None, {}, {})
+        scene = (
+            _played_scene(job.task, job.split, job.episode, job.arm)
+            if is_current
+            else _PlayedScene(None, {}, {})
+        )
         is_known = is_current and record.language_version == LANGUAGE_VERSION
         cause, audit = record.attribution, record.prompt
         found: Details = {
@@ -131,7 +139,7 @@ class EpisodeDetails:
         return None if text is None else self._index(text)
 
 
-@functools.lru_cache(maxsize=4096)
+@functools.lru_cache(maxsize=65_536)
 def _resolved_form(job: Job) -> str | None:
     """Return the same instruction with every reference resolved.
 
@@ -186,9 +194,9 @@ class _PlayedScene(NamedTuple):
 
 
 @functools.lru_cache(maxsize=4096)
-def _played_scene(job: Job) -> _PlayedScene:
+def _played_scene(task: str, split: str, number: int, arm: str) -> _PlayedScene:
     try:
-        episode = PreparedJob(job).episode
+        episode = arm_episode(get_episode(task, split, number), arm)
     except RoboIRGError:
         return _PlayedScene(None, {}, {})
     stages = (*episode.demonstration, *episode.stages)
