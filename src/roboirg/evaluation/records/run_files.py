@@ -49,8 +49,9 @@ def run_file(folder: Path, name: str) -> Path:
 
 def _is_below(path: Path, folder: Path) -> bool:
     try:
+        found = path.resolve()
         # From Python 3.13 on, links in a circle are no error, and stay what they are.
-        return path.resolve().is_relative_to(folder.resolve()) and not path.resolve().is_symlink()
+        return found.is_relative_to(folder.resolve()) and not found.is_symlink()
     except (OSError, RuntimeError):
         return False
 
