@@ -211,9 +211,9 @@ def _play_paper(plan: PolicyPlan, words: PlanWords, out: Path, workers: int) -> 
         run = MAIN if part == RESOLVED else part
         played[run] = roboirg.evaluate(**options, out=out / RUNS / run, workers=workers)
     texts = [one.table(run, "markdown", published=True) for run, one in played.items()]
-    answers = answers_text({run: one.frame for run, one in played.items()})
+    texts.append(answers_text({run: one.frame for run, one in played.items()}))
     page = out / "paper.md"
-    write_atomically(page, "\n".join([INTRODUCTION, *texts, answers, ""]))
+    write_atomically(page, "\n".join([INTRODUCTION, *texts, ""]))
     typer.echo(str(page))
 
 

@@ -72,9 +72,12 @@ class PlanWords:
         is_typed = source is not None and source.name != "DEFAULT"
         return value if is_typed else self.fields.get(name, value)
 
-    def tasks(self, typed: str = "all") -> tuple[str, ...]:
-        """Return the names of tasks that were typed, or else those of the plan."""
-        return known_tasks(self.given("tasks", typed))
+    def tasks(self, typed: str = "all", wordings: str | None = None) -> tuple[str, ...]:
+        """Return the names of tasks that were typed, or else those of the plan.
+
+        Of all, those that open wordings have commands of.
+        """
+        return known_tasks(self.given("tasks", typed), wordings)
 
     def settings(self, typed: str = "all") -> tuple[str, ...]:
         """Return the names of settings that were typed, or else those of the plan."""

@@ -186,8 +186,9 @@ def tables(
     _check_choice(which, by, runs or [], published=published, floors=floors)
     with paused_collection(), opened_sources(runs or []) as sources:
         data = RunData(read_frame(sources, words=by is not None))
-        made = _tables(which, by, sources, data, published=published, floors=floors)
-    found = with_mixtures(made, data.frame)
+        found = with_mixtures(
+            _tables(which, by, sources, data, published=published, floors=floors), data.frame
+        )
     if format in ("csv", "json"):  # without notes
         warn_of_mixtures(data.frame)
     if out is not None:

@@ -39,7 +39,7 @@ def discover(package: ModuleType, attribute: str, kind: type[Thing], group: str)
     """
     found = discover_in_modules(package, attribute, kind)
     taken = {one.name: "roboirg" for one in found}
-    for entry in _sorted_entry_points(group):
+    for entry in entry_points_of(group):
         thing = _load(entry, attribute, kind, group)
         _take_name(taken, thing, entry, group)
         found.append(thing)
@@ -51,7 +51,7 @@ def entry_names(group: str, packages: Collection[str] | None = None) -> tuple[st
 
     With packages, only of those that name something in one of them.
     """
-    entries = _sorted_entry_points(group)
+    entries = entry_points_of(group)
     return tuple(
         entry.name
         for entry in entries
@@ -64,7 +64,7 @@ def find_entry(name: str, attribute: str, kind: type[Thing], group: str) -> Thin
 
     Imports that one only. The other arguments are those of `discover`.
     """
-    chosen = [entry for entry in _sorted_entry_points(group) if entry.name == name]
+    chosen = [entry for entry in entry_points_of(group) if entry.name == name]
     return next((_load(entry, attribute, kind, group) for entry in chosen), None)
 
 
@@ -106,7 +106,7 @@ def _take_name(
     taken[thing.name] = _distribution(entry)
 
 
-def _sorted_entry_points(group: str) -> list[importlib.metadata.EntryPoint]:
+def entry_points_of(group: str) -> list[importlib.metadata.EntryPoint]:
     return sorted(importlib.metadata.entry_points(group=group), key=lambda one: one.name)
 
 

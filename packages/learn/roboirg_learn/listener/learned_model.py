@@ -95,7 +95,7 @@ def save_model(model: LearnedModel, path: Path) -> None:
     """
     content = {
         "format": FORMAT,
-        "vocabulary": {name: list(value) for name, value in model.vocabulary._asdict().items()},
+        "vocabulary": model.vocabulary.content,
         "detector": model.detector.state_dict(),
         "plane": {name: torch.from_numpy(one) for name, one in model.plane._asdict().items()},
         "encoders": model.reader.settings,
@@ -116,7 +116,7 @@ def load_model(path: Path) -> LearnedModel:
 
 
 def _read(content: Mapping[str, Any]) -> LearnedModel:
-    vocabulary = Vocabulary(**{name: tuple(own) for name, own in content["vocabulary"].items()})
+    vocabulary = Vocabulary.of(content["vocabulary"])
     plane = TablePlane(**{name: one.numpy() for name, one in content["plane"].items()})
     detector = DetectorNet(len(vocabulary.classes))
     reader = ListenerNet(vocabulary, content["encoders"])

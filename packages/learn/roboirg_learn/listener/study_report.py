@@ -88,8 +88,11 @@ def tables_text(found: Mapping[ListenerCell, TrainedRate]) -> str:
         asked = {setting for _, words, setting in found if words == pool}
         names = [one for one in all_settings() if one in asked and (one == RIVAL) == has_rival]
         if names:
-            rows = _rows(found, pool, names)
-            shown.append(markdown_table(title, names, rows, (note,), heads=("listener", "")))
+            shown.append(
+                markdown_table(
+                    title, names, _rows(found, pool, names), (note,), heads=("listener", "")
+                )
+            )
     return "\n\n".join(shown)
 
 

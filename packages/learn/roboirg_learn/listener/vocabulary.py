@@ -44,6 +44,16 @@ class Vocabulary(NamedTuple):
     tasks: tuple[str, ...]
     parts: tuple[str, ...]
 
+    @property
+    def content(self) -> dict[str, list[str]]:
+        """What a trained file has of it."""
+        return {name: list(value) for name, value in self._asdict().items()}
+
+    @classmethod
+    def of(cls, content: Mapping[str, Sequence[str]]) -> Vocabulary:
+        """Return the vocabulary of a trained file's content."""
+        return cls(**{name: tuple(value) for name, value in content.items()})
+
 
 class ListenerInput(NamedTuple):
     """One instruction with what is seen.

@@ -108,12 +108,11 @@ def _memory_questions(
         for system in others
     }
     less = "less that of the row without memory, in points"
-    own = _gaps(played, "setting", {"policy": FIRST})
     yield _table(
         "Do memory and referring come apart?",
         f"Success {less}.",
         settings,
-        own | theirs,
+        _gaps(played, "setting", {"policy": FIRST}) | theirs,
     )
     explicit = played[played["setting"] == EXPLICIT]
     filmed = explicit[explicit["demonstration_steps"] > 0].assign(suite="with a video")
@@ -147,12 +146,11 @@ def _stage_question(told: pd.DataFrame) -> str:
         system: {one: _independent(rates[system, one], rates[system, shortest]) for one in longer}
         for system in dict.fromkeys(one.model for one in rows)
     }
-    own = _gaps(told, "instruction_options", {"instruction_options": shortest})
     return _table(
         "Does success fall with each stage of the context?",
         f"Success less that in {shortest}, in points.",
         longer,
-        own | theirs,
+        _gaps(told, "instruction_options", {"instruction_options": shortest}) | theirs,
     )
 
 

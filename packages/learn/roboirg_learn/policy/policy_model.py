@@ -235,7 +235,7 @@ def save_policy(model: PolicyModel, path: Path) -> None:
         "format": FORMAT,
         "classes": list(model.sight.classes),
         "heights": torch.from_numpy(np.asarray(model.sight.heights)),
-        "vocabulary": {name: list(value) for name, value in model.vocabulary._asdict().items()},
+        "vocabulary": model.vocabulary.content,
         "corners": torch.from_numpy(model.corners),
         "moves": [list(move) for move in model.moves],
         "memory": model.memory,
@@ -262,7 +262,7 @@ def load_policy(path: Path) -> PolicyModel:
 
 
 def _read(content: Mapping[str, Any]) -> PolicyModel:
-    vocabulary = Vocabulary(**{name: tuple(own) for name, own in content["vocabulary"].items()})
+    vocabulary = Vocabulary.of(content["vocabulary"])
     moves = tuple(Move(*move) for move in content["moves"])
     sight = Sight(tuple(content["classes"]), content["heights"].numpy())
     detector = ThingDetector(len(sight.classes))

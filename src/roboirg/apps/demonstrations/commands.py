@@ -65,7 +65,6 @@ def export_demonstrations(
     Example: roboirg export demonstrations --tasks PickXtimes --out data
     """
     from roboirg.apps.demonstrations.export_plan import ExportPlan, training_words
-    from roboirg.cli.names import known_settings, known_tasks
     from roboirg.evaluation.plan.option_parsing import parse_episodes
     from roboirg.policies import find_policy
 
@@ -74,12 +73,12 @@ def export_demonstrations(
     find_policy(chosen.get("policy", ExportPlan.policy))
     split = words.given("split", split)
     # `validated` checks the names that are cast.
-    names = known_tasks(words.given("tasks", tasks))
+    names = words.tasks(tasks)
     made = ExportPlan(
         tasks=names,
         split=split,
         episodes=parse_episodes(words.given("episodes", episodes), split, names),
-        settings=known_settings(words.given("settings", settings)),
+        settings=words.settings(settings),
         forms=words.forms(),
         options=training_words(split, words.options()),
         format=cast("Any", format),

@@ -48,7 +48,6 @@ def export_grounding(
     Example: roboirg export grounding --split val --out grounding
     """
     from roboirg.apps.grounding.dataset_export import export_grounding
-    from roboirg.cli.names import known_settings, known_tasks
     from roboirg.cli.progress_bar import progress_bar
     from roboirg.evaluation.grounding_items.question_set import (
         ExportRequest,
@@ -65,11 +64,11 @@ def export_grounding(
     request = ExportRequest(
         episodes=tuple(
             (task, one, index)
-            for task in known_tasks(words.given("tasks", tasks), options.wordings)
+            for task in words.tasks(tasks, options.wordings)
             for one in parse_splits(words.given("split", split))
             for index in parse_episodes(words.fields.get("episodes", "all"), one, [task])
         ),
-        settings=known_settings(words.given("settings", settings)),
+        settings=words.settings(settings),
         forms=words.forms(),
         options=options,
         wordings_file=words.fields.get("wordings"),

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from roboirg.cli.export_commands import export_app
-from roboirg.cli.names import known_name, known_settings, known_tasks
+from roboirg.cli.names import known_name, known_tasks
 from roboirg.cli.options import (
     AnySplit,
     PlanName,
@@ -62,8 +62,8 @@ def export_instructions(
     check_export_support(kind)
     words = PlanWords(context, plan)
     options = words.options()
-    names = known_tasks(words.given("tasks", tasks), options.wordings)
-    chosen = known_settings(words.given("settings", settings))
+    names = words.tasks(tasks, options.wordings)
+    chosen = words.settings(settings)
     episodes = list(split_episodes(names, parse_splits(words.given("split", split))))
     said = instructions(episodes, chosen, words.forms(FORMS), options)
     rows = [row(episode, instruction) for episode, instruction in said]
@@ -179,8 +179,8 @@ def score_shortcuts(
                 f"{split} would test it on what it has seen; choose --split test."
             )
     options = replace(words.options(), form=words.form())
-    names = known_tasks(words.given("tasks", tasks), options.wordings)
-    chosen = known_settings(words.given("settings", settings))
+    names = words.tasks(tasks, options.wordings)
+    chosen = words.settings(settings)
     scenes = LEARNING_SCENES if learned else None
     rows = shortcut_rows(names, splits, chosen, options, seeds=seeds, by=grouping, learning=scenes)
     if not rows:

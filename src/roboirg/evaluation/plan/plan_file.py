@@ -6,7 +6,6 @@ import itertools
 import textwrap
 from collections.abc import Mapping, Sequence
 from importlib import resources
-from importlib.metadata import entry_points
 from importlib.resources.abc import Traversable
 from pathlib import Path
 from typing import Any
@@ -17,7 +16,7 @@ import yaml
 from roboirg.core.errors import InvalidValueError, UnknownNameError
 from roboirg.evaluation.plan.option_parsing import check_names
 from roboirg.evaluation.plan.plan import PLAN_KEYS, Plan, plan_options
-from roboirg.util.discovery import entry_names
+from roboirg.util.discovery import entry_names, entry_points_of
 from roboirg.util.regular_file import read_regular
 
 _PACKAGE = "roboirg.evaluation.plan"
@@ -33,9 +32,10 @@ _WIDTH = 100
 
 def named_plans() -> tuple[str, ...]:
     """Return the names of the plans that come with this package and with others."""
-    names = (Path(file.name) for file in _folder().iterdir())
-    ours = (name.stem for name in names if name.suffix in _SUFFIXES)
-    return tuple(sorted({*ours, *entry_names(GROUP)}))
+    files = (Path(file.name) for file in _folder().iterdir())
+    return tuple(
+        sorted({*(one.stem for one in files if one.suffix in _SUFFIXES), *entry_names(GROUP)})
+    )
 
 
 def read_plan_file(name: str, section: str = "") -> dict[str, Any]:
@@ -121,7 +121,7 @@ def _find(name: str) -> Path | Traversable:
         return path
     if name not in named_plans():
         raise UnknownNameError("plan", name, [*named_plans(), "FILE.yaml"])
-    others = [resources.files(one.value) for one in entry_points(group=GROUP, name=name)]
+    others = [resources.files(one.value) for one in entry_points_of(GROUP) if one.name == name]
     return (others or [_folder()])[0] / f"{name}.yaml"
 
 
