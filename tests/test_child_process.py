@@ -10,6 +10,7 @@ import time
 from collections.abc import Callable
 from multiprocessing.connection import Connection
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
@@ -72,6 +73,13 @@ def test_how_a_child_ended_is_told(message: str, words: str, was_killed: bool) -
     assert (str(ended), ended.was_killed) == (words, was_killed)
     child.send("who")
     assert isinstance(child.receive(), ChildExit)
+
+
+def test_a_child_that_the_kernel_does_not_end_is_left() -> None:
+    """Waiting for a call that hangs in a driver would end no other worker's episode."""
+    stuck = SimpleNamespace(exitcode=None, kill=str, pid=2**30, join=abs)  # has a limit
+    channel = SimpleNamespace(close=str)
+    assert ChildProcess(stuck, channel).close() == ChildExit(None)  # type: ignore[arg-type]
 
 
 def test_what_a_child_has_started_ends_with_it() -> None:

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import ctypes
+import functools
 import itertools
+import json
 import os
 import re
 import signal
@@ -13,18 +15,18 @@ from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
-from evaluation_fakes import FakePlay, changed, small_plan
+from evaluation_fakes import FakePlay, changed, small_plan, starts
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from msgspec.structs import replace
 
 from roboirg.core.errors import RoboIRGError
-from roboirg.core.waiting import Wait, waiting
+from roboirg.core.waiting import NativeCall, NativeCode, Wait, waiting
 from roboirg.evaluation.episode_errors import EpisodeError
 from roboirg.evaluation.play import watchdog
 from roboirg.evaluation.play.call_guard import CallGuard, attribute_errors
 from roboirg.evaluation.records.record import Job, Record
-from roboirg.evaluation.records.store import read_records
+from roboirg.evaluation.records.store import RECORDS_FILE, read_records
 from roboirg.evaluation.run.executor import InProcess, LocalProcesses, take_job
 from roboirg.evaluation.run.runner import UNREACHABLE_AFTER, run_plan
 from roboirg.evaluation.run.workers import Worker
@@ -63,6 +65,33 @@ def test_a_crash_in_the_simulators_native_code_is_the_worlds(tmp_path: Path) -> 
     assert record.cause == words
 
 
+def hanging(code: NativeCode, load_library: type[ctypes.CDLL], folder: Path, job: Job) -> Record:
+    """At first never return from native code, which may keep Python's lock; then play."""
+    with watchdog.watched("policy's reset()"), NativeCall(code):
+        if not starts(folder, job):
+            FakePlay(folder)(job)
+            load_library(None).sleep(3600)
+    return FakePlay()(job)
+
+
+@pytest.mark.parametrize(
+    ("code", "load_library"), [("drawing", ctypes.PyDLL), ("physics", ctypes.CDLL)]
+)
+def test_native_code_that_hangs_is_the_worlds_and_played_again_by_another(
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    code: NativeCode,
+    load_library: type[ctypes.CDLL],
+) -> None:
+    monkeypatch.setattr(watchdog, "NATIVE_LIMIT_S", 0.5)
+    play = functools.partial(hanging, code, load_library, tmp_path)
+    run_plan(changed(small_plan(1), settings="direct"), tmp_path, play, LocalProcesses(1))
+    lost, again = map(json.loads, (tmp_path / RECORDS_FILE).read_text().splitlines())
+    words = f"environment: the {code} did not return within 0.5 s"
+    assert (lost["error"], lost["cause"]) == ("environment", words)
+    assert (again["outcome"] != "error", again["attempt"]) == (True, 2)
+
+
 class Homeless:
     """Cannot be received by another process."""
 
@@ -91,21 +120,33 @@ def test_deadlines_stand_still_in_a_queue(monkeypatch: pytest.MonkeyPatch) -> No
     now[0] += 9
     board.write_wait(Wait("a free server", is_queue=True, since=now[0]))
     now[0] += 1000
-    assert not board.is_overdue
+    assert board.overdue is None
     # The queue's time is taken off.
     assert (board.queued_s, board.awaited, worker.spent_s < 0) == (1000.0, "a free server", True)
     board.write_wait(None)
-    assert (board.queued_s, board.awaited, board.is_overdue) == (1000.0, "", False)
+    assert (board.queued_s, board.awaited, board.overdue) == (1000.0, "", None)
     # What is left of the limit is as it was before; a reply counts.
     board.write_wait(Wait("the reply of a server", is_queue=False, since=now[0]))
     now[0] += 0.9
-    assert not board.is_overdue
+    assert board.overdue is None
     now[0] += 0.2
-    assert board.is_overdue
+    assert board.overdue == ("policy's reset()", 10.0)
     assert (board.queued_s, board.awaited) == (1000.0, "the reply of a server")
     board.write("environment")
     worker.assign(second)
-    assert (board.queued_s, board.awaited, board.is_overdue) == (0.0, "", False)
+    assert (board.queued_s, board.awaited, board.overdue) == (0.0, "", None)
+
+
+def test_a_policy_is_not_late_while_the_world_draws() -> None:
+    """A built-in policy and a client draw the video in the policy's own time."""
+    board = watchdog.Watchdog()
+    board.write("policy's reset()", 1e-9)
+    board.write_native("drawing", time.monotonic())
+    assert (board.phase, board.overdue) == ("drawing", None)
+    board.write_native("drawing", time.monotonic() - 121)
+    assert board.overdue == ("drawing", 120.0)
+    board.write_native("drawing", 0.0)
+    assert (board.phase, board.overdue) == ("policy's reset()", ("policy's reset()", 1e-9))
 
 
 def test_time_in_a_queue_has_a_timing_of_its_own() -> None:

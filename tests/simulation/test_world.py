@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from roboirg.core import waiting
 from roboirg.core.conditions import Fact
 from roboirg.core.episode import Scene
 from roboirg.core.errors import InvalidValueError
@@ -26,6 +27,18 @@ def rest(world: World, steps: int) -> World:
     for _ in range(steps):
         world.step(physics_settings.HOME_ACTION)
     return world
+
+
+def test_calls_that_may_hang_are_reported_while_they_run(monkeypatch: pytest.MonkeyPatch) -> None:
+    calls: list[tuple[str, float]] = []
+    world = world_of("PickXtimes", visible=True)
+    monkeypatch.setattr(waiting, "_native_listeners", [lambda *call: calls.append(call)])
+    rest(world, 1).picture("front")
+    # A picture is begun in the background, and then fetched.
+    assert [(code, since > 0.0) for code, since in calls] == [
+        *[("physics", True), ("physics", False)],
+        *[("drawing", True), ("drawing", False)] * 2,
+    ]
 
 
 def test_objects_rest_where_and_weigh_what_the_facts_say():

@@ -1,8 +1,8 @@
 """`roboirg doctor`: check that everything needed to play an episode is installed and works.
 
-This process imports nothing heavy. A child process (``python -m roboirg.cli.doctor --frame``) tries
-the renderer, because a bad graphics driver can crash Python; a crash is then a failed check and
-does not end the report.
+This process imports nothing heavy. A child process (``python -m roboirg.cli.doctor --frame``, with
+seconds to go on drawing) tries the renderer, because a bad graphics driver can crash Python or
+hang; that is then a failed check and does not end the report.
 """
 
 from __future__ import annotations
@@ -27,8 +27,8 @@ from roboirg.simulation.model_files import look_for_model_files
 from roboirg.simulation.rendering.render_device import DEVICE_VARIABLE
 from roboirg.util.processor import core_count
 
-FRAME_TIMEOUT = 120.0
-"""Time limit for the test frame, s."""
+FRAME_TIMEOUT = 120
+"""Time limit for the test frame, and then for each picture, s."""
 
 OLDEST_PYTHON = (3, 11)
 _EXTRAS = ("sim", "report")
@@ -59,14 +59,18 @@ class Check:
     remedy: str = ""
 
 
-def run_checks() -> list[Check]:
-    """Run all checks, in seconds, or half a minute where no mesh is cached yet; raises nothing."""
+def run_checks(render_s: int = 0) -> list[Check]:
+    """Run all checks, in seconds, or half a minute where no mesh is cached yet; raises nothing.
+
+    Args:
+        render_s: seconds to go on drawing after the test frame.
+    """
     return [
         _check_python(),
         *_check_packages(),
         _check_opencv(),
         _check_model_files(),
-        *_check_rendering(),
+        *_check_rendering(render_s),
         Check("processors", ok=True, found=f"{core_count()}"),
         _check_memory(),
     ]
@@ -87,9 +91,9 @@ def report(checks: Sequence[Check]) -> str:
     return "\n".join(lines)
 
 
-def run_doctor() -> int:
+def run_doctor(render_s: int = 0) -> int:
     """Print the report and return the exit code: 0 if every check passed, otherwise 1."""
-    checks = run_checks()
+    checks = run_checks(render_s)
     sys.stdout.write(report(checks) + "\n")
     return 0 if all(check.ok for check in checks) else 1
 
@@ -148,21 +152,26 @@ def _check_opencv() -> Check:
     return Check("OpenCV libraries", loads, "loaded" if loads else fault, remedy)
 
 
-def _check_rendering() -> tuple[Check, Check]:
-    """Try the renderer in a child process, whose lines are the device and then the picture."""
-    is_drawn, output, fault = _run_python("-m", "roboirg.cli.doctor", "--frame")
+def _check_rendering(render_s: int = 0) -> tuple[Check, Check]:
+    """Try the renderer in a child process, whose lines are the device and then what it drew."""
+    is_drawn, output, fault = _run_python(
+        # Without a buffer, because a line may be the last one before a crash.
+        *("-u", "-m", "roboirg.cli.doctor", "--frame", str(render_s)),
+        limit_s=2 * (FRAME_TIMEOUT + render_s),
+    )
     device, *frames = output.splitlines() or [""]
     chosen = os.environ.get(DEVICE_VARIABLE)
     remedy = f"unset {DEVICE_VARIABLE} (now {chosen!r}), or " if chosen else ""
     remedy += _RENDER_REMEDY
-    found = frames[0] if is_drawn else fault if device else "not tried: no device"
+    tried = frames[-1:] if is_drawn else [*frames[-1:], fault]
+    found = ", then ".join(tried) if device else "not tried: no device"
     return (
         Check("render device", bool(device), device or fault, remedy),
-        Check("test frame", is_drawn, found, remedy),
+        Check(f"{render_s} s of pictures" if render_s else "test frame", is_drawn, found, remedy),
     )
 
 
-def _run_python(*arguments: str) -> tuple[bool, str, str]:
+def _run_python(*arguments: str, limit_s: int = FRAME_TIMEOUT) -> tuple[bool, str, str]:
     """Run Python in a child process; return whether it succeeds, its output, and what is wrong."""
     try:
         child = subprocess.run(  # noqa: S603 - constant words in our own interpreter
@@ -170,14 +179,20 @@ def _run_python(*arguments: str) -> tuple[bool, str, str]:
             capture_output=True,
             text=True,
             check=False,
-            timeout=FRAME_TIMEOUT,
+            timeout=limit_s,
         )
     except subprocess.TimeoutExpired as error:
         output = error.stdout.decode() if isinstance(error.stdout, bytes) else error.stdout or ""
-        return False, output, f"no end within {FRAME_TIMEOUT:.0f} s"
+        return False, output, f"no end within {limit_s} s"
     code = child.returncode
     if code < 0:
-        return False, child.stdout, f"the process crashed ({signal.strsignal(-code)})"
+        return (
+            False,
+            child.stdout,
+            f"no picture within {FRAME_TIMEOUT} s"
+            if code == -signal.SIGALRM
+            else f"the process crashed ({signal.strsignal(-code)})",
+        )
     errors = child.stderr.strip().splitlines() or [f"exit code {code}"]
     return code == 0, child.stdout, errors[-1]
 
@@ -195,35 +210,48 @@ def _check_memory() -> Check:
     )
 
 
-def _draw_test_frame() -> None:
-    """Draw a scene of the benchmark; print the device, and then what was drawn.
+def _draw_test_frame(render_s: int) -> None:
+    """Draw a scene of the benchmark; print the device, and then every second what was drawn.
+
+    Args:
+        render_s: seconds to go on drawing.
 
     Raises:
         RoboIRGError: no device can render, or there is no picture.
     """
     # Imported here because only the child process may load them.
+    from roboirg.core.observations import CAMERAS
+    from roboirg.simulation.physics_settings import HOME_ACTION
     from roboirg.simulation.rendering.render_device import describe_device, find_render_device
     from roboirg.simulation.world import World
     from roboirg.tasks.splits import get_episode
 
     device = describe_device(find_render_device())
     kind = "drawn by the processor" if device.is_software else "GPU"
-    # Flushed at once, because the next lines may crash this process.
+    # The kernel ends this process if a picture hangs, even one that keeps Python's lock.
+    signal.alarm(FRAME_TIMEOUT)
     sys.stdout.write(f"{device.name} at {device.alias} ({kind})\n")
-    sys.stdout.flush()
     start = time.perf_counter()
-    picture = World(get_episode("PickXtimes", "test", 0).scene).picture("front")
+    world = World(get_episode("PickXtimes", "test", 0).scene)
+    picture = world.picture("front")
     colors = len({*map(bytes, picture.reshape(-1, 3))})
     if colors < _FEWEST_COLORS:
         raise RenderDeviceError(f"the picture of a scene has only {colors} colors.")
     sys.stdout.write(f"256 x 256 pixels in {time.perf_counter() - start:.1f} s\n")
+    start, drawn = time.perf_counter(), 0
+    for second in range(1, render_s + 1):
+        while time.perf_counter() < start + second:
+            signal.alarm(FRAME_TIMEOUT)
+            world.step(HOME_ACTION * (1.0 if drawn % 4 else 0.9))  # it moves, or nothing is drawn
+            drawn += len(world.cameras.pictures(CAMERAS))
+        sys.stdout.write(f"{drawn} pictures in {second} s\n")
 
 
 def _main() -> int:
     if "--frame" not in sys.argv[1:]:
         return run_doctor()
     try:
-        _draw_test_frame()
+        _draw_test_frame(int(sys.argv[2]) if sys.argv[2:] else 0)
     except RoboIRGError as error:
         sys.stderr.write(f"{error}\n")
         return 1

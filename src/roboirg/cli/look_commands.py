@@ -9,14 +9,21 @@ from typing import Annotated
 import typer
 
 
-def doctor() -> None:
+def doctor(
+    render: Annotated[
+        int,
+        typer.Option(
+            min=0, help="Seconds to draw pictures; a driver may draw one and hang only later."
+        ),
+    ] = 0,
+) -> None:
     """Check whether episodes can be played on this machine, and show what is missing.
 
-    Example: roboirg doctor
+    Example: roboirg doctor --render 600
     """
     from roboirg.cli.doctor import run_doctor
 
-    raise typer.Exit(run_doctor())
+    raise typer.Exit(run_doctor(render))
 
 
 def fetch_models(

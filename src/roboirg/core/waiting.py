@@ -1,6 +1,7 @@
-"""What a policy waits for, told to those who measure and limit its time.
+"""What a policy or a world waits for, reported to those who measure and limit its time.
 
-Time in a queue, as for a server that another episode uses, is not the policy's own.
+Time in a queue, as for a server that another episode uses, is not the policy's own. A call of the
+simulator's native code may never return, as a graphics driver may hang.
 """
 
 from __future__ import annotations
@@ -8,7 +9,7 @@ from __future__ import annotations
 import contextlib
 import time
 from collections.abc import Callable, Iterator
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
 
 class Wait(NamedTuple):
@@ -28,7 +29,11 @@ class Wait(NamedTuple):
 WaitListener = Callable[[Wait | None], None]
 """Called when a wait begins, and with None or the wait around it when it ends."""
 
+NativeCode = Literal["drawing", "physics"]
+"""Native code of the simulator, which has no time limit of its own."""
+
 _listeners: list[WaitListener] = []
+_native_listeners: list[Callable[[NativeCode, float], None]] = []
 _waits: list[Wait] = []
 _queued = [0.0]
 """Seconds that this process has waited for its turn."""
@@ -52,9 +57,35 @@ def waiting(what: str, *, is_queue: bool = False) -> Iterator[None]:
         _tell()
 
 
-def listen(listener: WaitListener) -> None:
-    """Report to a listener, from now on, all waits that begin and end in this process."""
+class NativeCall(NamedTuple):
+    """Context in which native code is reported to run; cheap, as every control step has one.
+
+    Not inside another of its kind, whose end would be reported too early.
+    """
+
+    code: NativeCode
+
+    def __enter__(self) -> None:
+        for listener in _native_listeners:
+            listener(self.code, time.monotonic())
+
+    def __exit__(self, *_error: object) -> None:
+        for listener in _native_listeners:
+            listener(self.code, 0.0)
+
+
+DRAWING, PHYSICS = NativeCall("drawing"), NativeCall("physics")
+
+
+def listen(listener: WaitListener, native: Callable[[NativeCode, float], None]) -> None:
+    """Report all waits, and all calls of native code, in this process from now on.
+
+    Args:
+        listener: gets the waits.
+        native: gets the time of the monotonic clock when a call begins, and 0 when it ends.
+    """
     _listeners.append(listener)
+    _native_listeners.append(native)
 
 
 def queued_seconds() -> float:

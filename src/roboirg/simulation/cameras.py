@@ -18,6 +18,7 @@ import sapien.render
 from numpy.typing import NDArray
 
 from roboirg.core.observations import CAMERAS, FRONT, WRIST
+from roboirg.core.waiting import DRAWING
 from roboirg.simulation.panda import CAMERA_LINK, Panda
 from roboirg.simulation.rendering.culling import CullableBodies
 from roboirg.simulation.rendering.render_settings import FAITHFUL, RenderSettings
@@ -127,14 +128,15 @@ class Cameras:
         stale = [camera for camera in cameras if self._last_poses.get(camera) != state]
         now = {camera: self._view_of(camera, poses) for camera in stale}
         due = [camera for camera in stale if self._is_new(camera, now[camera])]
-        if due:
-            self._scene.update_render()
-        for camera in due:
-            if self._culling:
-                self._bodies.take_picture(self._components[camera], now[camera].bodies)
-            else:
-                self._components[camera].take_picture()
-            self._last[camera] = now[camera]
+        with DRAWING:
+            if due:
+                self._scene.update_render()
+            for camera in due:
+                if self._culling:
+                    self._bodies.take_picture(self._components[camera], now[camera].bodies)
+                else:
+                    self._components[camera].take_picture()
+                self._last[camera] = now[camera]
         self._last_poses.update(dict.fromkeys(stale, state))
 
     def _view_of(self, camera: str, poses: NDArray[np.float64]) -> _DrawnState:
@@ -169,7 +171,8 @@ class Cameras:
         """Return an output of the camera's last drawing."""
         fetched = self._last[camera].fetched
         if output not in fetched:
-            fetched[output] = np.asarray(self._components[camera].get_picture(output))
+            with DRAWING:
+                fetched[output] = np.asarray(self._components[camera].get_picture(output))
         return fetched[output]
 
 

@@ -14,6 +14,7 @@ from roboirg.core.conditions import Fact
 from roboirg.core.episode import Scene
 from roboirg.core.errors import InvalidValueError, RoboIRGError, UnknownNameError
 from roboirg.core.observations import CAMERAS
+from roboirg.core.waiting import PHYSICS
 from roboirg.simulation import bodies, physics_settings
 from roboirg.simulation.cameras import Cameras
 from roboirg.simulation.fact_detection import FactDetector
@@ -85,9 +86,10 @@ class World:
 
     def advance(self, action: NDArray[np.floating[Any]]) -> None:
         """Run only the physics of one control step: no motions, no facts, no time."""
-        self.robot.set_targets(action)
-        for _ in range(physics_settings.PHYSICS_STEPS):
-            self._physics.step()
+        with PHYSICS:
+            self.robot.set_targets(action)
+            for _ in range(physics_settings.PHYSICS_STEPS):
+                self._physics.step()
 
     @property
     def absent(self) -> frozenset[str]:

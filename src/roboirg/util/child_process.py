@@ -109,13 +109,16 @@ class ChildProcess:
         self._end_group()
 
     def close(self) -> ChildExit:
-        """Let the child exit by closing its channel; kill it after `GRACE_S`."""
+        """Let the child exit by closing its channel; kill it after `GRACE_S`.
+
+        One that not even that ends, as a call of a driver may hang in the kernel, is left behind.
+        """
         self.connection.close()
         self._process.join(GRACE_S)
         code = self._process.exitcode
         if code is None:
             self._process.kill()
-            self._process.join()
+            self._process.join(GRACE_S)
         self._end_group()
         return ChildExit(code)
 

@@ -1,7 +1,8 @@
 """Shared-memory heartbeat from a worker process to its supervisor.
 
-A process that hangs in a policy's native code cannot answer messages. So before each phase it
-writes into shared memory which phase begins and its deadline.
+A process that hangs in native code cannot answer messages, nor run a thread of its own if that code
+keeps Python's lock. So before each phase it writes into shared memory which phase begins and its
+deadline, and before each picture and each control step's physics that it begins.
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ from collections.abc import Iterator
 from multiprocessing.sharedctypes import RawValue
 from typing import ClassVar, Literal, get_args
 
-from roboirg.core.waiting import Wait, listen
+from roboirg.core.waiting import NativeCode, Wait, listen
 
 Phase = Literal[
     "worker startup",
@@ -26,7 +27,11 @@ Phase = Literal[
     "policy's close()",
 ]
 PHASES: tuple[Phase, ...] = get_args(Phase)
+NATIVE: tuple[NativeCode, ...] = get_args(NativeCode)
 
+NATIVE_LIMIT_S = 120.0
+"""How long one picture, or the physics of one control step, may take: on a busy machine without a
+GPU they take seconds at most, and only a driver or a library that hangs takes this long."""
 
 MAX_WAIT_LENGTH = 200
 """Most bytes of the words for what a process waits for."""
@@ -40,6 +45,8 @@ class _Shared(ctypes.Structure):
         ("queued_s", ctypes.c_double),
         ("queued_since", ctypes.c_double),
         ("awaited", ctypes.c_char * MAX_WAIT_LENGTH),
+        # When such a call began; 0 outside. One number each, so that none is read in part.
+        *((code, ctypes.c_double) for code in NATIVE),
     ]
 
 
@@ -87,15 +94,15 @@ class Watchdog:
         words = b"" if wait is None else wait.what.encode("utf-8", "replace")
         self._shared.awaited = words[: MAX_WAIT_LENGTH - 1]
 
-    @property
-    def phase(self) -> Phase:
-        """The phase that began last."""
-        return PHASES[int(self._shared.phase)]
+    def write_native(self, code: NativeCode, since: float) -> None:
+        """Write when a call of native code begins; 0 when it ends."""
+        setattr(self._shared, code, since)
 
     @property
-    def limit_s(self) -> float:
-        """How long the phase may take; 0 without a limit."""
-        return float(self._shared.limit_s)
+    def phase(self) -> Phase | NativeCode:
+        """The native code that runs now, whatever the phase, or the phase that began last."""
+        native = (code for code in NATIVE if getattr(self._shared, code))
+        return next(native, PHASES[int(self._shared.phase)])
 
     @property
     def awaited(self) -> str:
@@ -109,9 +116,17 @@ class Watchdog:
         return float(self._shared.queued_s + (time.monotonic() - since if since else 0.0))
 
     @property
-    def is_overdue(self) -> bool:
-        """Whether the phase has exceeded its deadline."""
-        return not self._shared.queued_since and 0.0 < self._shared.deadline < time.monotonic()
+    def overdue(self) -> tuple[Phase | NativeCode, float] | None:
+        """The phase that has exceeded its limit, and the limit in seconds; None if none has.
+
+        While native code of the environment runs, only its own limit counts.
+        """
+        shared, now = self._shared, time.monotonic()
+        for code in NATIVE:
+            if since := getattr(shared, code):
+                return (code, NATIVE_LIMIT_S) if since < now - NATIVE_LIMIT_S else None
+        is_overdue = not shared.queued_since and 0.0 < shared.deadline < now
+        return (PHASES[shared.phase], float(shared.limit_s)) if is_overdue else None
 
 
 _watchdogs: list[Watchdog] = []
@@ -119,9 +134,9 @@ _watchdogs: list[Watchdog] = []
 
 
 def use_watchdog(watchdog: Watchdog) -> None:
-    """Let this process write its phases, and what it waits for, to a watchdog from now on."""
+    """Let this process write its phases, waits and native calls to a watchdog from now on."""
     _watchdogs[:] = [watchdog]
-    listen(watchdog.write_wait)
+    listen(watchdog.write_wait, watchdog.write_native)
 
 
 @contextlib.contextmanager

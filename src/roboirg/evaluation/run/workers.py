@@ -2,7 +2,8 @@
 
 The supervisor gets exactly one record for each job within bounded time: the worker's own; an error
 that names the phase in which the worker died; or, if a policy call or the whole episode exceeds its
-limit, a timeout error after the worker has been killed.
+limit, a timeout error after the worker has been killed; so, too, if a drawing or the physics of a
+control step never returns, but that is the environment's error, as a crash there is.
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ from roboirg.core.errors import EndOfRunError, RoboIRGError
 from roboirg.evaluation.hosting.host_pool import Connect
 from roboirg.evaluation.play.episode_record import lost_record, utc_now
 from roboirg.evaluation.play.rollout import EpisodeRunner, PlayJob
-from roboirg.evaluation.play.watchdog import Phase, Watchdog, use_watchdog, watched
+from roboirg.evaluation.play.watchdog import NATIVE, Watchdog, use_watchdog, watched
 from roboirg.evaluation.records.episode_log import log_path, logged_output
 from roboirg.evaluation.records.record import ErrorKind, Job, Record
 from roboirg.util.child_process import ChildExit, ChildProcess, serve
@@ -91,8 +92,8 @@ class Worker:
             if isinstance(reply, ChildExit):
                 return self._error_record(*_explain_exit(self.watchdog.phase, reply))
             return cast("Record", reply)
-        if self.watchdog.is_overdue:
-            message = f"the {self.watchdog.phase} did not return within {self.watchdog.limit_s:g} s"
+        if overdue := self.watchdog.overdue:
+            message = f"the {overdue[0]} did not return within {overdue[1]:g} s"
         elif self.spent_s > episode_timeout_s:
             message = (
                 f"the episode took longer than {episode_timeout_s:g} s "
@@ -103,7 +104,8 @@ class Worker:
         if self.watchdog.awaited:
             message += f", waiting for {self.watchdog.awaited}"
         self.child.end()
-        return self._error_record("timeout", message)
+        is_worlds = overdue is not None and overdue[0] in NATIVE
+        return self._error_record("environment" if is_worlds else "timeout", message)
 
     @property
     def is_dead(self) -> bool:
@@ -127,7 +129,7 @@ def connected(play: PlayJob, connect: Connect | None) -> Iterator[PlayJob]:
         yield cast("EpisodeRunner", play).with_hosts(line)
 
 
-def _explain_exit(phase: Phase, ended: ChildExit) -> tuple[ErrorKind, str]:
+def _explain_exit(phase: str, ended: ChildExit) -> tuple[ErrorKind, str]:
     """Return the kind of error and the message for a process that died."""
     kind: ErrorKind = "policy" if phase.startswith("policy") else "environment"
     return "infrastructure" if ended.was_killed else kind, f"{ended} in the {phase}"

@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING
 
 from roboirg.core.errors import RenderDeviceError
 from roboirg.core.extras import extra_needed
+from roboirg.core.waiting import DRAWING
 
 if TYPE_CHECKING:
     import sapien
@@ -112,7 +113,8 @@ def _engine_keeper() -> sapien.render.RenderSystem:
 
 def _new_system(device: sapien.Device) -> sapien.render.RenderSystem:
     try:
-        return _sapien().render.RenderSystem(device)
+        with DRAWING:
+            return _sapien().render.RenderSystem(device)
     except RuntimeError as error:
         found = describe_device(device)
         raise RenderDeviceError(
@@ -133,7 +135,8 @@ def _sapien() -> ModuleType:
 
 def _device(alias: str) -> sapien.Device | None:
     try:
-        return _sapien().Device(alias)
+        with DRAWING:
+            return _sapien().Device(alias)
     except (RuntimeError, ValueError, IndexError):
         # RuntimeError: no such device; the others: SAPIEN could not parse the number in the name.
         return None
