@@ -76,10 +76,9 @@ def test_how_a_child_ended_is_told(message: str, words: str, was_killed: bool) -
 
 
 def test_a_child_that_the_kernel_does_not_end_is_left() -> None:
-    """Waiting for a call that hangs in a driver would end no other worker's episode."""
-    stuck = SimpleNamespace(exitcode=None, kill=str, pid=2**30, join=abs)  # has a limit
-    channel = SimpleNamespace(close=str)
-    assert ChildProcess(stuck, channel).close() == ChildExit(None)  # type: ignore[arg-type]
+    """`join` needs a limit here, as `abs` does: waiting for a driver would stop all workers."""
+    stuck = SimpleNamespace(exitcode=None, kill=str, pid=2**30, join=abs, close=str)
+    assert ChildProcess(stuck, stuck).close() == ChildExit(None)  # type: ignore[arg-type]
 
 
 def test_what_a_child_has_started_ends_with_it() -> None:
