@@ -26,10 +26,12 @@ from roboirg.cli import (
     run_commands,
 )
 from roboirg.cli.run_commands import INTERRUPTED, USAGE_ERROR
+from roboirg.core.error_words import is_of_others, one_line
 from roboirg.core.errors import RoboIRGError
 from roboirg.core.extras import install_command
 from roboirg.core.plain_text import printable
 from roboirg.core.version import __version__
+from roboirg.util.discovery import load_entry
 
 # Heavy modules are imported inside the commands, so that --help is fast.
 
@@ -112,37 +114,43 @@ def _add_commands() -> None:
 
 def _add_outside(entry: importlib.metadata.EntryPoint) -> None:
     """Add what another package offers; one that is broken takes no other command away."""
+    own = typer.Typer()
     try:
-        found = entry.load()
-    except Exception as error:  # noqa: BLE001 - a stranger's module
-        typer.echo(f"roboirg: no command {entry.name}: {entry.value}: {error!r}", err=True)
+        found = load_entry(entry)
+        if isinstance(found, typer.Typer):
+            own.add_typer(found, name=entry.name)
+        else:
+            own.command(entry.name)(found)
+        typer.main.get_command(own)  # which reads the parameters
+    except Exception as error:  # noqa: BLE001 - a stranger's code
+        typer.echo(f"roboirg: no command {entry.name}: {one_line(error)}", err=True)
         return
-    if isinstance(found, typer.Typer):
-        app.add_typer(found, name=entry.name)
-    else:
-        app.command(entry.name)(found)
+    app.registered_groups += own.registered_groups
+    app.registered_commands += own.registered_commands
 
 
 _add_commands()
 
 
 def main() -> None:
-    """Run the command; errors are one sentence on stderr, never a traceback."""
+    """Run the command; errors are one sentence on stderr, and only bugs of ours a traceback."""
     try:
         code = app(prog_name="roboirg", standalone_mode=False)
     except RoboIRGError as error:
         typer.echo(f"roboirg: {printable(str(error))}", err=True)
         sys.exit(USAGE_ERROR)
-    except ModuleNotFoundError as error:
-        message = describe_missing(error)
-        if message is None:
-            raise
-        typer.echo(f"roboirg: {message}", err=True)
-        sys.exit(USAGE_ERROR)
     except _WrongUsage as error:
         sys.exit(_print_usage_error(error))
     except typer.Abort:
         code = INTERRUPTED
+    except Exception as error:
+        message = describe_missing(error)
+        if message is None and is_of_others(error) and not sys.flags.dev_mode:
+            message = f"{printable(one_line(error))}; PYTHONDEVMODE=1 shows the traceback."
+        if message is None:
+            raise
+        typer.echo(f"roboirg: {message}", err=True)
+        sys.exit(USAGE_ERROR)
     # The code of `typer.Exit`, as which typer hands on Ctrl-C; commands return nothing.
     if code == INTERRUPTED:
         typer.echo("roboirg: stopped.", err=True)
@@ -165,9 +173,10 @@ def _print_usage_error(error: Exception) -> int:
     return USAGE_ERROR
 
 
-def describe_missing(error: ModuleNotFoundError) -> str | None:
-    """Return one sentence that names the extra with the missing module; None if none has it."""
-    module = (error.name or "").partition(".")[0]
+def describe_missing(error: Exception) -> str | None:
+    """Return one sentence that names the extra with a missing module; None if none has it."""
+    missing = error.name if isinstance(error, ModuleNotFoundError) else None
+    module = (missing or "").partition(".")[0]
     for extra, modules in _MODULES.items():
         if module in modules:
             return (

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any, get_type_hints
 import typer
 
 from roboirg.cli.names import known_names, known_settings, known_tasks
-from roboirg.core.errors import InvalidValueError
+from roboirg.core.errors import InvalidValueError, check_names
 
 if TYPE_CHECKING:
     from roboirg.core.instruction_options import InstructionOptions
@@ -90,7 +90,6 @@ class PlanWords:
             UnknownNameError: a key is none of its own.
             InvalidValueError: a value is not of the field's type.
         """
-        from roboirg.evaluation.plan.option_parsing import check_names
         from roboirg.evaluation.plan.plan_maker import as_typed_field
 
         given = self.fields.get(self._section) or {}

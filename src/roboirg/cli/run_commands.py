@@ -12,7 +12,7 @@ import typer
 
 from roboirg.cli.declared_options import EPISODES
 from roboirg.cli.options import Workers, add_working_directory
-from roboirg.core.errors import InvalidValueError, UnknownNameError
+from roboirg.core.errors import InvalidValueError, check_names
 from roboirg.core.plain_text import counted, printable, verb_for
 
 if TYPE_CHECKING:
@@ -206,8 +206,7 @@ def _plan(name: str | None, typed: dict[str, Any], usual: Sequence[str]) -> Plan
 
 
 def _executor(plan: Plan, name: str, workers: int | None) -> Executor:
-    if name not in EXECUTORS:
-        raise UnknownNameError("executor", name, EXECUTORS)
+    check_names("executor", [name], EXECUTORS)
     if name == "ray":
         from roboirg.evaluation.run.ray_cluster import RayCluster
 

@@ -124,14 +124,15 @@ def check_chunk(actions: ArrayLike, space: ActionSpace = JOINT_ANGLE) -> NDArray
 
 
 def _numbers(action: ArrayLike, space: ActionSpace) -> NDArray[np.float64]:
+    got = type(action).__name__
     try:
         numbers = np.asarray(action)
-    except ValueError:  # rows of different lengths
-        numbers = np.asarray(None)
+    except ValueError:
+        numbers, got = np.asarray(None), "rows of different lengths"
     if numbers.dtype.kind not in "biuf":
+        dtype = f" of dtype {numbers.dtype}" if numbers.ndim else ""
         raise InvalidActionError(
-            f"An action ({space.name}) is an array of {space.size} real numbers; "
-            f"got {type(action).__name__}."
+            f"An action ({space.name}) is an array of {space.size} real numbers; got {got}{dtype}."
         )
     return numbers.astype(np.float64)
 
@@ -139,8 +140,9 @@ def _numbers(action: ArrayLike, space: ActionSpace) -> NDArray[np.float64]:
 def _finite(numbers: NDArray[np.float64]) -> NDArray[np.float64]:
     bad = np.argwhere(~np.isfinite(numbers))
     if len(bad):
+        row = f" of row {bad[0][0]}" if len(bad[0]) > 1 else ""
         raise InvalidActionError(
-            f"Action value {bad[0][-1]} is {numbers[tuple(bad[0])]}; "
+            f"Action value {bad[0][-1]}{row} is {numbers[tuple(bad[0])]}; "
             "every value must be a finite number."
         )
     return numbers

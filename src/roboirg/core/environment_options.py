@@ -6,7 +6,7 @@ from dataclasses import asdict, dataclass, field, fields
 from typing import Any, Literal, TypedDict
 
 from roboirg.core.actions import find_action_space
-from roboirg.core.errors import InvalidValueError, UnknownNameError
+from roboirg.core.errors import InvalidValueError, check_names
 from roboirg.core.field_types import Name, Whole, described
 
 MAX_STEPS = 1300
@@ -77,8 +77,7 @@ class EnvironmentOptions:
         if self.demonstration_frames is not None:
             check_demonstration_frames(self.demonstration_frames)
         check_observe_every(self.observe_every)
-        if self.meshes not in MESHES:
-            raise UnknownNameError("kind of meshes", self.meshes, MESHES)
+        check_names("kind of meshes", [self.meshes], MESHES)
 
 
 class EnvironmentKeywords(TypedDict, total=False):

@@ -51,6 +51,18 @@ class UnknownNameError(InvalidValueError):
         super().__init__(f"There is no {kind} {name!r}; known: {', '.join(names)}.{hint}")
 
 
+def check_names(kind: str, names: Iterable[object], known: Iterable[str]) -> None:
+    """Raise if one of the names is unknown.
+
+    Raises:
+        UnknownNameError: likewise; the message suggests the nearest.
+    """
+    every = list(known)
+    for name in names:
+        if name not in every:
+            raise UnknownNameError(kind, name, every)
+
+
 class InvalidActionError(RoboIRGError, ValueError):
     """An action has a wrong shape or type, or is not finite."""
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import Any, TypedDict
@@ -97,5 +97,6 @@ OPTION_NAMES = tuple(one.name for one in fields(InstructionOptions))
 
 def as_fields(given: Mapping[str, Any]) -> dict[str, Any]:
     """Return keyword arguments of options as fields, whose stages are a tuple."""
-    stages = {"stages": tuple(given["stages"])} if "stages" in given else {}
-    return {**given, **stages}
+    stages = given.get("stages", ())
+    several = tuple(stages) if isinstance(stages, Iterable) else (stages,)
+    return {**given, "stages": several} if "stages" in given else dict(given)

@@ -8,7 +8,7 @@ from typing import Any, Literal, NotRequired, TypedDict
 import numpy as np
 from numpy.typing import NDArray
 
-from roboirg.core.errors import InvalidValueError, UnknownNameError
+from roboirg.core.errors import InvalidValueError, check_names
 
 FRONT, WRIST = "front", "wrist"
 CAMERAS = (FRONT, WRIST)
@@ -32,9 +32,8 @@ def check_cameras(cameras: object) -> tuple[str, ...]:
             f"cameras is of type {type(cameras).__name__}; it must be a tuple such as "
             "('front',) or ()."
         )
+    check_names("camera", cameras, CAMERAS)
     for camera in cameras:
-        if camera not in CAMERAS:
-            raise UnknownNameError("camera", camera, CAMERAS)
         if cameras.count(camera) > 1:
             raise InvalidValueError(f"cameras names {camera!r} twice.")
     return tuple(cameras)

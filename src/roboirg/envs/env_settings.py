@@ -15,7 +15,7 @@ from roboirg.core.environment_options import (
     check_demonstration_frames,
 )
 from roboirg.core.episode import Episode
-from roboirg.core.errors import UnknownNameError
+from roboirg.core.errors import check_names
 from roboirg.core.instruction_options import (
     OPTION_NAMES,
     InstructionKeywords,
@@ -86,8 +86,7 @@ class EnvSettings:
 
     def __post_init__(self) -> None:
         self.environment.check()
-        if self.render_mode is not None and self.render_mode not in RENDER_MODES:
-            raise UnknownNameError("render mode", self.render_mode, RENDER_MODES)
+        check_names("render mode", {self.render_mode} - {None}, RENDER_MODES)
         check_arm(self.arm)
 
     @property
@@ -117,13 +116,12 @@ class EnvSettings:
         Raises:
             UnknownNameError: an option is not one that a reset may change.
         """
-        for name in options:
-            if name not in RESET_OPTIONS:
-                raise UnknownNameError("reset option", name, RESET_OPTIONS)
+        check_names("reset option", options, RESET_OPTIONS)
         return self.with_options(options)
 
     def with_options(self, options: Mapping[str, Any]) -> EnvSettings:
         """Return the settings with other values of keyword arguments; opens the wording file."""
+        check_names("option of make()", options, EnvOptions.__annotations__)
         words = as_fields({name: options[name] for name in OPTION_NAMES if name in options})
         if "wordings" in words:
             words["wordings"] = open_wordings(words["wordings"])

@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-import re
 import traceback
 from typing import Literal
 
-from roboirg.core.errors import InvalidActionError, RoboIRGError
+from roboirg.core.error_words import one_line
+from roboirg.core.errors import InvalidActionError
 from roboirg.core.plain_text import clip_text, printable
 from roboirg.evaluation.records.record import ErrorKind
 
 ErrorSource = Literal["policy", "environment"]
 
-MAX_CAUSE_LENGTH = 400
 MAX_DETAILS_LENGTH = 20_000
 """Most characters of a traceback; its end is kept."""
 
@@ -74,16 +73,3 @@ def _error_kind(source: ErrorSource, error: BaseException) -> ErrorKind:
         if isinstance(error, ConnectionError):
             return "connection"
     return source
-
-
-def one_line(error: BaseException) -> str:
-    """Return an exception as one line that is the same in every process."""
-    try:
-        text = str(error)
-    except BaseException:  # noqa: BLE001 - a policy's own exceptions may raise anything
-        text = "its text cannot be read"
-    words = text if isinstance(error, RoboIRGError) else f"{type(error).__name__}: {text}"
-    # Splitting a text of a hundred megabytes would take minutes.
-    words = " ".join(words[: 10 * MAX_CAUSE_LENGTH].split())
-    words = re.sub(r"0x[0-9a-fA-F]{6,}", "0x…", words).rstrip(": ")
-    return clip_text(words, MAX_CAUSE_LENGTH)

@@ -9,7 +9,7 @@ from typing import Unpack
 
 from roboirg.core.delivery import DELIVERIES
 from roboirg.core.episode import Episode
-from roboirg.core.errors import InvalidValueError, UnknownNameError
+from roboirg.core.errors import InvalidValueError, check_names
 from roboirg.core.instruction_options import (
     DEFAULT_FRAME,
     InstructionOptions,
@@ -194,8 +194,7 @@ def check_options(options: InstructionOptions) -> None:
         ("frame", options.frame, FRAMES),
         ("delivery", options.delivery, DELIVERIES),
     ):
-        if name not in known:
-            raise UnknownNameError(kind, name, known)
+        check_names(kind, [name], known)
 
 
 def _instruction(request: InstructionRequest, spec: InstructionSpec) -> Instruction:

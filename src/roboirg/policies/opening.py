@@ -5,9 +5,8 @@ from __future__ import annotations
 import contextlib
 from dataclasses import replace
 
+from roboirg.core.error_words import one_line
 from roboirg.core.errors import InvalidValueError, RoboIRGError
-from roboirg.core.field_types import as_name
-from roboirg.core.plain_text import clip_text
 from roboirg.core.policy_needs import PolicyNeeds
 from roboirg.core.policy_ref import UNKNOWN_VERSION, PolicyRef
 from roboirg.policies.by_name.finding import declared_by, look_up, make_policy
@@ -18,7 +17,6 @@ from roboirg.policies.contract.synthetic_episodes import SyntheticEpisodes
 
 FIRST_WORDS = "Put the red cube on the target."
 VIDEO_STEPS = 4
-_MOST_WORDS = 300
 
 
 def opened(ref: PolicyRef, seed: int = 0) -> PolicyRef:
@@ -38,21 +36,18 @@ def opened(ref: PolicyRef, seed: int = 0) -> PolicyRef:
     except RoboIRGError:
         raise
     except (Exception, SystemExit) as error:  # the policy's own code runs here
-        raise InvalidValueError(f"Policy {ref.spec!r} cannot be made: {_words(error)}.") from error
+        raise InvalidValueError(
+            f"Policy {ref.spec!r} cannot be made: {one_line(error)}."
+        ) from error
     # Of other kinds, what declares something is what was made, once.
     ref = ref if has_class else declared_by(ref, policy)
     try:
         episode = SyntheticEpisodes(needs).episode(FIRST_WORDS, VIDEO_STEPS)
         policy.reset(episode.instruction, episode.demonstration)
     except (Exception, SystemExit) as error:  # noqa: BLE001 - likewise
-        return replace(ref, version=UNKNOWN_VERSION, problem=f"reset(): {_words(error)}")
+        return replace(ref, version=UNKNOWN_VERSION, problem=f"reset(): {one_line(error)}")
     else:
         return replace(ref, needs=needs, version=read_version(policy) or ref.version)
     finally:
         with contextlib.suppress(Exception):  # how it ends does not count
             close_policy(policy)
-
-
-def _words(error: BaseException) -> str:
-    words = " ".join(f"{type(error).__name__}: {error}".split())
-    return clip_text(as_name(words), _MOST_WORDS).rstrip(".")

@@ -6,7 +6,7 @@ import functools
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
-from roboirg.core.errors import InvalidValueError, UnknownNameError
+from roboirg.core.errors import InvalidValueError, check_names
 from roboirg.core.inference_facts import inference_facts
 from roboirg.core.policy_needs import PolicyNeeds
 from roboirg.core.policy_ref import BUILT_IN, PolicyRef
@@ -56,8 +56,7 @@ def open_server(
     """
     options = options or ServerOptions()
     protocols = protocols_by_scheme()
-    if protocol not in protocols:
-        raise UnknownNameError("protocol", protocol, protocols)
+    check_names("protocol", [protocol], protocols)
     service = protocols[protocol].service
     if service is None:
         raise InvalidValueError(f"{protocol}:// is for clients only: no policy is served with it.")

@@ -11,7 +11,7 @@ from fractions import Fraction
 import numpy as np
 
 from roboirg.core.episode import Episode, Goal, SlotValue, values_in
-from roboirg.core.errors import UnknownNameError
+from roboirg.core.errors import check_names
 from roboirg.shortcuts.command_chance import is_right
 from roboirg.shortcuts.goal_vocabulary import (
     SlotVocabulary,
@@ -36,8 +36,7 @@ TextGuess = Mapping[str, tuple[Candidates, ...]]
 @functools.lru_cache(maxsize=1024)
 def guess_goal(rule: str, text: str, task: str) -> TextGuess:
     """Return what one of `SURFACE_RULES` makes of a whole prompt of a task."""
-    if rule not in SURFACE_RULES:
-        raise UnknownNameError("rule", rule, SURFACE_RULES)
+    check_names("rule", [rule], SURFACE_RULES)
     vocabulary = goal_vocabulary(task)
     parts = part_count(text, get_task(task).commands.thing, vocabulary)
     return {

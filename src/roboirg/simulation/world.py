@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from roboirg.core.conditions import Fact
 from roboirg.core.episode import Scene
-from roboirg.core.errors import InvalidValueError, RoboIRGError, UnknownNameError
+from roboirg.core.errors import InvalidValueError, RoboIRGError, check_names
 from roboirg.core.observations import CAMERAS
 from roboirg.core.waiting import PHYSICS
 from roboirg.simulation import bodies, physics_settings
@@ -102,8 +102,7 @@ class World:
 
     def picture(self, camera: str) -> NDArray[np.uint8]:
         """Return the current picture of a camera, RGB, shape (256, 256, 3)."""
-        if camera not in CAMERAS:
-            raise UnknownNameError("camera", camera, CAMERAS)
+        check_names("camera", [camera], CAMERAS)
         return self.cameras.picture(camera)
 
     @property

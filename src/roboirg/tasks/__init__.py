@@ -59,7 +59,7 @@ def get_task(name: str) -> Task:
     try:
         return every_task()[name]
     except KeyError:
-        raise _unknown_task(name, every_task()) from None
+        raise _unknown_task(str(name), every_task()) from None
 
 
 def find_tasks(words: Iterable[str]) -> tuple[str, ...]:

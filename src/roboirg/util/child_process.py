@@ -44,7 +44,7 @@ class ChildExit(NamedTuple):
         if self.code is None:
             return "the process closed its connection"
         if self.code < 0:
-            return f"the process died of signal {-self.code}"
+            return f"the process died of signal {-self.code} ({signal.strsignal(-self.code)})"
         return f"the process ended with exit code {self.code}"
 
 

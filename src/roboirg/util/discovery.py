@@ -7,8 +7,9 @@ import importlib.metadata
 import pkgutil
 from collections.abc import Collection
 from types import ModuleType
-from typing import Protocol, TypeVar
+from typing import Any, Protocol, TypeVar
 
+from roboirg.core.error_words import one_line
 from roboirg.core.errors import InvalidValueError
 
 
@@ -40,7 +41,7 @@ def discover(package: ModuleType, attribute: str, kind: type[Thing], group: str)
     found = discover_in_modules(package, attribute, kind)
     taken = {one.name: "roboirg" for one in found}
     for entry in entry_points_of(group):
-        thing = _load(entry, attribute, kind, group)
+        thing = _thing(entry, attribute, kind)
         _take_name(taken, thing, entry, group)
         found.append(thing)
     return found
@@ -65,7 +66,7 @@ def find_entry(name: str, attribute: str, kind: type[Thing], group: str) -> Thin
     Imports that one only. The other arguments are those of `discover`.
     """
     chosen = [entry for entry in entry_points_of(group) if entry.name == name]
-    return next((_load(entry, attribute, kind, group) for entry in chosen), None)
+    return next((_thing(entry, attribute, kind) for entry in chosen), None)
 
 
 def discover_in_modules(package: ModuleType, attribute: str, kind: type[Thing]) -> list[Thing]:
@@ -75,21 +76,30 @@ def discover_in_modules(package: ModuleType, attribute: str, kind: type[Thing]) 
     return [thing for thing in things if isinstance(thing, kind)]
 
 
-def _load(
-    entry: importlib.metadata.EntryPoint, attribute: str, kind: type[Thing], group: str
-) -> Thing:
-    where = f"The entry point {entry.name!r} ({entry.value}) of {_distribution(entry)}"
+def load_entry(entry: importlib.metadata.EntryPoint) -> Any:  # noqa: ANN401 - a stranger's
+    """Return what an entry point names.
+
+    Raises:
+        InvalidValueError: it cannot be loaded; the message has the place of the error.
+    """
     try:
-        thing = entry.load()
-    except Exception as error:
-        raise InvalidValueError(
-            f"{where} in the group {group!r} cannot be loaded: {type(error).__name__}: {error}"
-        ) from error
+        return entry.load()
+    except (Exception, SystemExit) as error:  # a stranger's module
+        raise InvalidValueError(f"{_where(entry)} cannot be loaded: {one_line(error)}.") from error
+
+
+def _where(entry: importlib.metadata.EntryPoint) -> str:
+    of = f"({entry.value}) of {_distribution(entry)} in the group {entry.group!r}"
+    return f"The entry point {entry.name!r} {of}"
+
+
+def _thing(entry: importlib.metadata.EntryPoint, attribute: str, kind: type[Thing]) -> Thing:
+    thing = load_entry(entry)
     if isinstance(thing, ModuleType):
         thing = getattr(thing, attribute, None)
     if not isinstance(thing, kind):
         raise InvalidValueError(
-            f"{where} in the group {group!r} is {thing!r}; it must be a {kind.__name__}, or a "
+            f"{_where(entry)} is {thing!r}; it must be a {kind.__name__}, or a "
             f"module with one as {attribute}."
         )
     return thing

@@ -60,8 +60,10 @@ def worker_count(typed: int | None = None) -> int:
     Raises:
         InvalidValueError: the number is negative, or the variable does not hold one.
     """
-    if typed is not None and typed < 0:
-        raise InvalidValueError(f"workers is {typed}; it must be at least 0 (this process only).")
+    if typed is not None and not (isinstance(typed, int) and typed >= 0):
+        raise InvalidValueError(
+            f"workers is {typed!r}; it must be a whole number of at least 0 (this process only)."
+        )
     text = os.environ.get(WORKERS_VARIABLE)
     if typed is not None or not text:
         return core_count() if typed is None else typed

@@ -13,6 +13,7 @@ from pathlib import Path
 from types import SimpleNamespace
 
 from roboirg.core.episode import COLORS, DIFFICULTIES, Goal
+from roboirg.core.error_words import one_line
 from roboirg.core.errors import InvalidValueError
 from roboirg.language.settings import EXPLICIT, plain_settings
 from roboirg.language.worded_command import (
@@ -80,9 +81,7 @@ def _load_function(root: Path) -> SentenceFunction:
     try:
         function = runpy.run_path(str(path)).get(FUNCTION)
     except Exception as error:
-        raise InvalidValueError(
-            f"{str(path)!r} cannot be loaded: {type(error).__name__}: {error}."
-        ) from error
+        raise InvalidValueError(f"{str(path)!r} cannot be loaded: {one_line(error)}.") from error
     if not callable(function):
         raise InvalidValueError(f"{str(path)!r} has no function {FUNCTION}.")
     return function  # type: ignore[no-any-return]
@@ -115,7 +114,7 @@ def _ask(function: SentenceFunction, task: str, goal: Goal, difficulty: str) -> 
     try:
         said = function(stand_in(goal, difficulty), task)
     except Exception as error:
-        raise InvalidValueError(f"{about} raised {type(error).__name__}: {error}.") from error
+        raise InvalidValueError(f"{about} raised {one_line(error)}.") from error
     first = said[0] if isinstance(said, (list, tuple)) and said else said
     if not isinstance(first, str):
         raise InvalidValueError(f"{about} returned {said!r}; it must be a list of sentences.")

@@ -4,15 +4,13 @@ from __future__ import annotations
 
 from typing import Literal, NamedTuple
 
-from roboirg.core.errors import RoboIRGError
+from roboirg.core.error_words import one_line
 
 Verdict = Literal["pass", "fail", "warn", "note"]
 PASS: Verdict = "pass"  # noqa: S105 - a verdict
 FAIL: Verdict = "fail"
 WARN: Verdict = "warn"
 NOTE: Verdict = "note"
-
-_MAX_ERROR_LENGTH = 300
 
 
 class CheckResult(NamedTuple):
@@ -35,8 +33,5 @@ class CheckAbortedError(Exception):
 
 
 def describe_error(error: Exception) -> str:
-    """Return an error as one sentence of limited length."""
-    words = " ".join(str(error).split())
-    if not isinstance(error, RoboIRGError):
-        words = f"{type(error).__name__}: {words}"
-    return words[:_MAX_ERROR_LENGTH].rstrip(": .") + "."
+    """Return an error as one sentence of limited length, with its place in the policy's code."""
+    return one_line(error).rstrip(".") + "."

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from roboirg.core.errors import InvalidValueError, UnknownNameError
+from roboirg.core.errors import InvalidValueError, check_names
 from roboirg.core.extras import extra_needed
 from roboirg.core.plain_text import counted
 from roboirg.evaluation.analysis.figures import draw_figure
@@ -152,9 +152,7 @@ class Results:
             InvalidValueError: the two cannot be compared.
         """
         names = list(dict.fromkeys(self._data.frame["policy"]))
-        for policy in (first, second):
-            if policy not in names:
-                raise UnknownNameError(f"policy in {self.folder}", policy, names)
+        check_names(f"policy in {self.folder}", (first, second), names)
         ours, theirs = (self._data.frame.where(policy=one) for one in (first, second))
         found = compare(ours, theirs)
         marked = found.first.marked_policy, found.second.marked_policy

@@ -29,12 +29,13 @@ from typing import Any
 from numpy.typing import NDArray
 
 from roboirg.core.actions import JOINT_ANGLE, ActionSpace
+from roboirg.core.error_words import one_line
 from roboirg.core.errors import MissingDependencyError
 from roboirg.core.inference_facts import inference_facts
 from roboirg.core.observations import FetchedDemonstration
 from roboirg.core.policy_needs import PolicyNeeds
 from roboirg.core.policy_ref import PolicyRef
-from roboirg.evaluation.episode_errors import describe_error, one_line
+from roboirg.evaluation.episode_errors import describe_error
 from roboirg.evaluation.hosting.messages import (
     MAX_TEXT,
     Begun,

@@ -10,7 +10,7 @@ from typing import cast
 from roboirg import language
 from roboirg.core.arms import parse_arm
 from roboirg.core.episode import DIFFICULTIES, SPLITS, Split
-from roboirg.core.errors import InvalidValueError, UnknownNameError
+from roboirg.core.errors import InvalidValueError
 from roboirg.tasks.splits import splits
 
 ALL = "all"
@@ -191,14 +191,3 @@ def _union(ranges: Sequence[range]) -> tuple[int, ...]:
 
 def _shorten(text: str) -> str:
     return text if len(text) <= _MAX_QUOTED_LENGTH else f"{text[:_MAX_QUOTED_LENGTH]}…"
-
-
-def check_names(kind: str, names: Iterable[object], known: Collection[str]) -> None:
-    """Raise if one of the names is unknown.
-
-    Raises:
-        UnknownNameError: likewise; the message suggests the nearest.
-    """
-    for name in names:
-        if name not in known:
-            raise UnknownNameError(kind, str(name), known)

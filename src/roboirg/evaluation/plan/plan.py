@@ -29,14 +29,13 @@ from roboirg import tasks
 from roboirg.core.arms import TOLD
 from roboirg.core.delivery import TURNS
 from roboirg.core.environment_options import EnvironmentOptions, check_demonstration_frames
-from roboirg.core.errors import InvalidValueError
+from roboirg.core.errors import InvalidValueError, check_names
 from roboirg.core.field_types import CONTROLS, NAME
 from roboirg.core.instruction_options import DEFAULT_FRAME, InstructionOptions
 from roboirg.core.policy_ref import PolicyRef
 from roboirg.core.word_pools import POOLS
 from roboirg.evaluation.hosting.policy_opening import open_policy
 from roboirg.evaluation.plan.option_parsing import (
-    check_names,
     name_and_spec,
     parse_arms,
     parse_episodes,

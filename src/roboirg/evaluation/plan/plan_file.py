@@ -13,10 +13,9 @@ from typing import Any
 import msgspec
 import yaml
 
-from roboirg.core.errors import InvalidValueError, UnknownNameError
-from roboirg.evaluation.plan.option_parsing import check_names
+from roboirg.core.errors import InvalidValueError, UnknownNameError, check_names
 from roboirg.evaluation.plan.plan import PLAN_KEYS, Plan, plan_options
-from roboirg.util.discovery import entry_names, entry_points_of
+from roboirg.util.discovery import entry_names, entry_points_of, load_entry
 from roboirg.util.regular_file import read_regular
 
 _PACKAGE = "roboirg.evaluation.plan"
@@ -121,7 +120,9 @@ def _find(name: str) -> Path | Traversable:
         return path
     if name not in named_plans():
         raise UnknownNameError("plan", name, [*named_plans(), "FILE.yaml"])
-    others = [resources.files(one.value) for one in entry_points_of(GROUP) if one.name == name]
+    others = [
+        resources.files(load_entry(one)) for one in entry_points_of(GROUP) if one.name == name
+    ]
     return (others or [_folder()])[0] / f"{name}.yaml"
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterable
 from dataclasses import replace
 from typing import Any
@@ -13,6 +12,7 @@ from roboirg.core.errors import InvalidValueError
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.core.policy_ref import PolicyRef
 from roboirg.evaluation.plan.plan import FLAT, Plan
+from roboirg.policies.contract.option_checking import plain_complaint
 
 
 def make_plan(policies: str | Iterable[str | PolicyRef], **options: object) -> Plan:
@@ -69,13 +69,4 @@ def _unchecked(**options: object) -> Plan:
 
 def _refusal(name: str, value: object, message: str) -> InvalidValueError:
     """Return pydantic's complaint about a value in one plain sentence."""
-    words = (
-        re.sub(", (unable|got) .*| or an instance of .*", "", message)
-        .replace("Input should", "it must")
-        .replace("greater than or equal to", "at least")
-        .replace("less than or equal to", "at most")
-        .replace("valid integer", "whole number")
-        .replace("valid tuple", "list")
-        .replace("valid ", "")
-    )
-    return InvalidValueError(f"{name} is {value!r}; {words}.")
+    return InvalidValueError(f"{name} is {value!r}; {plain_complaint(message)}.")

@@ -8,9 +8,10 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field
 
+from roboirg.core.errors import check_names
 from roboirg.core.field_types import described
 from roboirg.evaluation.hosting.host_pool import DEFAULT_BATCH, HostSettings
-from roboirg.evaluation.plan.option_parsing import check_names, parse_names
+from roboirg.evaluation.plan.option_parsing import parse_names
 from roboirg.evaluation.records.record import ERROR_KINDS, ErrorKind
 from roboirg.policies.contract.option_checking import Seconds
 

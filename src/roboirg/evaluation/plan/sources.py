@@ -9,7 +9,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import TypeVar
 
-from roboirg.core.errors import InvalidValueError, UnknownNameError
+from roboirg.core.errors import InvalidValueError, check_names
 from roboirg.evaluation.plan.stored_plans import read_plan
 from roboirg.evaluation.records.packs import PACK_SUFFIX, opened_run
 from roboirg.evaluation.records.record import Job, Record, Summary
@@ -70,9 +70,7 @@ class Source:
         if self.policies is None:
             return found
         known = list(dict.fromkeys(one.policy for one in (*self.planned, *found)))
-        for policy in self.policies:
-            if policy not in known:
-                raise UnknownNameError(f"policy in {self.path}", policy, known)
+        check_names(f"policy in {self.path}", self.policies, known)
         return tuple(self.wanted(found))
 
     @cached_property

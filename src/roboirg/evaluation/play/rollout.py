@@ -21,10 +21,11 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from socket import socket
 
+from roboirg.core.error_words import one_line
 from roboirg.core.errors import InvalidValueError
 from roboirg.core.policy_needs import PolicyNeeds
 from roboirg.core.policy_ref import SCRIPTED, PolicyRef
-from roboirg.evaluation.episode_errors import EpisodeError, EpisodeLostError, one_line
+from roboirg.evaluation.episode_errors import EpisodeError, EpisodeLostError
 from roboirg.evaluation.hosting.host_pool import HostSettings
 from roboirg.evaluation.hosting.hosted_policy import HostedPlanner, HostedPolicy
 from roboirg.evaluation.play.call_guard import CallGuard

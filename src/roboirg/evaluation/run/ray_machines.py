@@ -23,10 +23,10 @@ from pathlib import Path
 from typing import NamedTuple
 
 from roboirg.core.episode import ENVIRONMENT_VERSION
+from roboirg.core.error_words import one_line
 from roboirg.core.errors import RoboIRGError
 from roboirg.core.policy_ref import UNKNOWN_VERSION, PolicyRef
 from roboirg.core.version import __version__
-from roboirg.evaluation.episode_errors import one_line
 from roboirg.evaluation.hosting.host_pool import HostPool, HostSettings
 from roboirg.evaluation.hosting.policy_opening import open_policy
 from roboirg.evaluation.play.rollout import PlayJob

@@ -13,10 +13,11 @@ from types import FrameType
 from typing import NamedTuple
 
 from roboirg.core.episode import ENVIRONMENT_VERSION
+from roboirg.core.error_words import MAX_CAUSE_LENGTH
 from roboirg.core.errors import InvalidValueError
 from roboirg.core.plain_text import counted
 from roboirg.core.policy_ref import UNKNOWN_VERSION
-from roboirg.evaluation.episode_errors import MAX_CAUSE_LENGTH, Terminated, format_cause
+from roboirg.evaluation.episode_errors import Terminated, format_cause
 from roboirg.evaluation.plan.plan import Plan
 from roboirg.evaluation.plan.stored_plans import write_plan
 from roboirg.evaluation.play.rollout import EpisodeRunner, PlayJob

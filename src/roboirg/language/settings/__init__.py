@@ -6,7 +6,8 @@ import functools
 import sys
 from collections.abc import Iterable, Mapping
 
-from roboirg.core.errors import InvalidValueError, UnknownNameError
+from roboirg.core.errors import InvalidValueError, check_names
+from roboirg.language.instruction import FORMS
 from roboirg.language.settings.setting import Setting
 from roboirg.tasks import Task
 from roboirg.util.discovery import discover
@@ -72,8 +73,7 @@ def find_settings(words: Iterable[str]) -> tuple[str, ...]:
     """
     names = expand_settings(words)
     for name in names:
-        if name not in all_settings():
-            raise UnknownNameError("setting", name, (*all_settings(), *SETTING_GROUPS))
+        _check(name, *SETTING_GROUPS)
     return names
 
 
@@ -84,10 +84,20 @@ def settings_of(task: Task) -> tuple[str, ...]:
 
 def get_setting(name: str, task: Task) -> Setting:
     """Return a setting of a task by name."""
-    if name not in all_settings():
-        raise UnknownNameError("setting", name, all_settings())
+    _check(name)
     if not all_settings()[name].applies_to(task):
         raise InvalidValueError(
             f"{task.name} has no {name} setting; its settings are {', '.join(settings_of(task))}."
         )
     return all_settings()[name]
+
+
+def _check(name: str, *more: str) -> None:
+    """Raise if there is no setting of that name; `more` could stand in its place."""
+    if name in FORMS:
+        implicit = (one for one, rule in all_settings().items() if rule.implicit)
+        raise InvalidValueError(
+            f"{name!r} is a form of the instruction, not a setting; settings that leave the goal "
+            f"implicit are {', '.join(implicit)}."
+        )
+    check_names("setting", [name], (*all_settings(), *more))

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from roboirg.core.errors import UnknownNameError
+from roboirg.core.errors import check_names
 from roboirg.core.instruction_options import OPTION_NAMES, InstructionOptions
 from roboirg.language.instruction import Instruction
 from roboirg.language.request import InstructionRequest, InstructionSpec
@@ -69,9 +69,7 @@ class Setting:
     plain: str | None = None
 
     def __post_init__(self) -> None:
-        for name in self.reads:
-            if name not in OPTION_NAMES:
-                raise UnknownNameError("option of instructions", name, OPTION_NAMES)
+        check_names("option of instructions", self.reads, OPTION_NAMES)
 
     @property
     def may_refuse(self) -> bool:

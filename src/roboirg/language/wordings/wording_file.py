@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 from roboirg.core.episode import SlotValue
-from roboirg.core.errors import InvalidValueError, UnknownNameError
+from roboirg.core.errors import InvalidValueError, UnknownNameError, check_names
 from roboirg.language.settings import all_settings
 from roboirg.language.worded_command import (
     FIELD,
@@ -73,9 +73,7 @@ def parse_wordings(text: str, where: str) -> Wordings:
     name = check_name(name, where)
     if not isinstance(source, str):
         raise InvalidValueError(f"The {where} has the source {source!r}; it must be a text.")
-    for task in data:
-        if task not in every_task():
-            raise UnknownNameError(f"task (in the {where})", task, every_task())
+    check_names(f"task (in the {where})", data, every_task())
     tasks = {task: _TaskReader(where, task).read(content) for task, content in data.items()}
     if not tasks:
         raise InvalidValueError(f"The {where} has no task; add one such as [PickXtimes].")
@@ -111,9 +109,7 @@ class _TaskReader:
         if not isinstance(own, list) or not isinstance(commands, list) or not commands:
             self._fail("needs [[TASK.commands]], and own, if given, must be a list")
         implicit = [name for name, rule in all_settings().items() if rule.implicit]
-        for setting in own:
-            if setting not in implicit:
-                raise UnknownNameError(f"implicit setting ({self._where})", setting, implicit)
+        check_names(f"implicit setting ({self._where})", own, implicit)
         shared = self._phrases(table.get("phrases", {}))
         return TaskWordings(tuple(self._command(one, shared) for one in commands), frozenset(own))
 
@@ -143,9 +139,7 @@ class _TaskReader:
     def _pointed(self, content: object, names: list[str]) -> frozenset[str]:
         if not isinstance(content, list) or not all(isinstance(one, str) for one in content):
             self._fail(f"has pointed = {content!r}; it must be a list of fields of the command")
-        for name in content:
-            if name not in names:
-                raise UnknownNameError(f"field in pointed ({self._where})", name, names)
+        check_names(f"field in pointed ({self._where})", content, names)
         return frozenset(content)
 
     def _condition(self, slot: str, value: object) -> SlotValue:
@@ -192,9 +186,7 @@ class _TaskReader:
     ) -> dict[str, object]:
         if not isinstance(content, dict):
             self._fail(f"has {content!r} for {what}; it must be a table")
-        for key in content:
-            if key not in known:
-                raise UnknownNameError(f"key of {what} ({self._where})", key, known)
+        check_names(f"key of {what} ({self._where})", content, known)
         return content
 
     def _fail(self, complaint: str) -> NoReturn:

@@ -9,6 +9,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
+from roboirg.core.error_words import one_line
 from roboirg.core.errors import InvalidValueError, MissingDependencyError, UnknownNameError
 from roboirg.policies.builtin import BUILTIN
 from roboirg.policies.contract.base import Policy
@@ -100,10 +101,10 @@ def _module(spec: str, name: str) -> ModuleType:
     except MissingDependencyError:
         raise
     except (Exception, SystemExit) as error:
-        words, hint = " ".join(f"{type(error).__name__}: {error}".split()), ""
+        hint = ""
         if isinstance(error, ModuleNotFoundError) and error.name == name.partition(".")[0]:
             here = ", ".join(sorted(path.stem for path in Path.cwd().glob("*.py"))) or "none"
             hint = f"; modules in {str(Path.cwd())!r}: {here}"
         raise InvalidValueError(
-            f"Policy {spec!r}: module {name!r} cannot be imported ({words}){hint}."
+            f"Policy {spec!r}: module {name!r} cannot be imported: {one_line(error)}{hint}."
         ) from error

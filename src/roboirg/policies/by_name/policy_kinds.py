@@ -23,6 +23,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import Any, NamedTuple, cast
 
+from roboirg.core.error_words import OUR_PACKAGES
 from roboirg.core.errors import UnknownNameError
 from roboirg.core.policy_ref import BUILT_IN, ELSEWHERE, HANDS, PRIVILEGED, SCRIPTED, PolicyRef
 from roboirg.policies.builtin import BUILTIN
@@ -44,8 +45,6 @@ from roboirg.policies.planners.systems import System, find_system, with_options
 from roboirg.policies.vlm.vlm_listener import ListenerOptions, VLMListener
 from roboirg.util.discovery import entry_names, find_entry
 
-OUR_PACKAGES = "roboirg", "roboirg_learn"
-"""Their kinds may read the simulator's state, as built-in policies do."""
 CLASS, LIVE, LISTENER, PLANNER, SYSTEM = "class", "live", "vlm-listener", "planner", "system"
 PolicyMaker = Callable[[int], Policy]
 """Makes a policy from a seed, without network or the libraries of providers."""

@@ -31,16 +31,31 @@ def check_options(kind: type[Options], values: Mapping[str, Any], origin: str) -
     try:
         return kind.model_validate(dict(values))
     except ValidationError as error:
-        first = error.errors()[0]
+        # What stands there and means nothing explains best what is missing.
+        first = min(error.errors(), key=lambda one: one["type"] != "extra_forbidden")
         name = str(first["loc"][-1]) if first["loc"] else "options"
         if first["type"] == "extra_forbidden":
             raise UnknownNameError(f"option of {origin} named", name, _names(kind)) from None
         if first["type"] == "missing":
             raise InvalidValueError(f"{origin}: option {name} is missing.") from None
-        message = first["msg"].removeprefix("Value error, ")
+        message = plain_complaint(first["msg"])
         given = re.sub(r"//[^/@]*@", "//…@", repr(first["input"]))  # no password of a URL
         end = "" if message.endswith((".", "?")) else "."
-        raise InvalidValueError(f"{origin}: option {name} is {given}: {message}{end}") from None
+        raise InvalidValueError(f"{origin}: option {name} is {given}; {message}{end}") from None
+
+
+def plain_complaint(message: str) -> str:
+    """Return pydantic's complaint about a value in plain words, to stand behind the value."""
+    return (
+        re.sub("^Value error, |, (unable|got) .*| or an instance of .*", "", message)
+        .replace("Input should", "it must")
+        .replace("String should", "it must")
+        .replace("greater than or equal to", "at least")
+        .replace("less than or equal to", "at most")
+        .replace("valid integer", "whole number")
+        .replace("valid tuple", "list")
+        .replace("valid ", "")
+    )
 
 
 def _names(kind: type[BaseModel]) -> list[str]:

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from roboirg.core.error_words import one_line
 from roboirg.core.errors import InvalidValueError
 from roboirg.core.field_types import as_name
 from roboirg.util.short_hash import short_hash
@@ -32,8 +33,7 @@ def read_version(policy: object) -> str | None:
         missing = isinstance(error, AttributeError) and error.name in ("version", None)
         if missing and not hasattr(kind, "version"):
             return None
-        words = f"{type(error).__name__}: {error}"
-        raise InvalidValueError(f"{subject} cannot be read ({words:.300}).") from error
+        raise InvalidValueError(f"{subject} cannot be read: {one_line(error)}.") from error
     if isinstance(value, np.generic | np.ndarray) and value.ndim == 0:
         value = value.item()
     if isinstance(value, os.PathLike):

@@ -22,6 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
+from roboirg.core.error_words import one_line
 from roboirg.core.errors import InvalidValueError, MissingDependencyError
 from roboirg.core.observations import Demonstration, Observation
 from roboirg.core.policy_ref import UNKNOWN_VERSION
@@ -31,7 +32,6 @@ from roboirg.util.media import scaled_square
 
 _MAX_BRIGHTNESS = 255.0
 _BATCH = 8
-_MAX_WORDS = 300
 _WORDLESS = frozenset({"act", "diffusion", "tdmpc", "vqbet"})
 """Types of checkpoints that have no input for text."""
 _QUEUED = frozenset({
@@ -219,9 +219,8 @@ class LeRobotPolicy:
         except InvalidValueError:
             raise
         except (OSError, ValueError, TypeError) as error:
-            words = " ".join(f"{type(error).__name__}: {error}".split())
             raise InvalidValueError(
-                f"The checkpoint {self.place!r}{place} cannot be loaded: {words[:_MAX_WORDS]}"
+                f"The checkpoint {self.place!r}{place} cannot be loaded: {one_line(error)}"
             ) from error
 
     def _load_model(self) -> None:

@@ -6,7 +6,7 @@ import pkgutil
 from collections.abc import Mapping
 from typing import Any
 
-from roboirg.core.errors import UnknownNameError
+from roboirg.core.errors import check_names
 from roboirg.policies.contract.option_checking import check_options
 from roboirg.policies.planners.planner import Planner
 
@@ -39,8 +39,7 @@ def make_planner(kind: str, options: Mapping[str, Any], origin: str, seed: int =
         UnknownNameError: there is no such planner, or it has no such option.
         InvalidValueError: an option has an invalid value.
     """
-    if kind not in PLANNERS:
-        raise UnknownNameError("planner", kind, PLANNERS)
+    check_names("planner", [kind], PLANNERS)
     planner_class = pkgutil.resolve_name(PLANNERS[kind])
     checked = check_options(planner_class.options_type, options, origin)
     planner: Planner = planner_class(checked, kind, seed)

@@ -16,6 +16,7 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
+from roboirg.core.error_words import one_line
 from roboirg.core.extras import extra_needed
 from roboirg.policies.remote.message_codec import pack, unpack
 from roboirg.policies.remote.service import Service
@@ -139,5 +140,5 @@ def _answer(service: Service, data: bytes | str) -> bytes | str:
         if isinstance(data, str):
             raise TypeError("Messages must be binary, not text.")
         return pack(service.handle(unpack(data)))
-    except Exception:  # noqa: BLE001 - the boundary: the policy's author needs the traceback
-        return traceback.format_exc()
+    except Exception as error:  # noqa: BLE001 - the boundary: the policy's author needs the traceback
+        return traceback.format_exc() + one_line(error)  # clients show the last line

@@ -18,7 +18,7 @@ import numpy as np
 
 from roboirg.apps.real.study.counterbalancing import counterbalanced_episodes, target_kind
 from roboirg.core.episode import Episode
-from roboirg.core.errors import InvalidValueError, RoboIRGError, UnknownNameError
+from roboirg.core.errors import InvalidValueError, RoboIRGError, UnknownNameError, check_names
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.core.policy_ref import unknown_policy
 from roboirg.evaluation.plan.option_parsing import name_and_spec
@@ -297,6 +297,4 @@ def _check(
     for task in tasks:
         target_kind(task)
         available = settings_of(get_task(task))
-        for setting in settings:
-            if setting not in available:
-                raise UnknownNameError(f"setting of {task}", setting, available)
+        check_names(f"setting of {task}", settings, available)

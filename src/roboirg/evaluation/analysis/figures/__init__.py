@@ -7,7 +7,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
-from roboirg.core.errors import InvalidValueError, UnknownNameError
+from roboirg.core.errors import InvalidValueError, check_names
 from roboirg.evaluation.analysis.figures.failures import draw_failures
 from roboirg.evaluation.analysis.figures.figure_style import STYLE, check_figure_support, save
 from roboirg.evaluation.analysis.figures.gaps import draw_next_to_reference
@@ -56,8 +56,7 @@ def draw_figure(name: str, content: RunData, *, published: bool = False) -> Figu
     Raises:
         UnknownNameError: there is no such figure.
     """
-    if name not in FIGURES:
-        raise UnknownNameError("figure", name, FIGURES)
+    check_names("figure", [name], FIGURES)
     check_figure_support()
     import matplotlib as mpl
 

@@ -10,7 +10,7 @@ from typing import Any, Generic, NamedTuple, TypeVar
 
 import numpy as np
 
-from roboirg.core.errors import InvalidValueError, UnknownNameError
+from roboirg.core.errors import InvalidValueError, UnknownNameError, check_names
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.evaluation.analysis.results.frame import suite
 from roboirg.evaluation.analysis.results.option_labels import REFERENCE
@@ -139,9 +139,8 @@ def _known(value: object) -> object:
 def _check(
     frame: Columns, by: Sequence[str], against: Mapping[str, object], family: Sequence[str]
 ) -> None:
-    for name in (*by, *family, *against, *TRIAL_OF, "policy_seed"):
-        if name not in frame:
-            raise UnknownNameError("column", name, map(str, frame))
+    columns = (*by, *family, *against, *TRIAL_OF, "policy_seed")
+    check_names("column", columns, map(str, frame))
     for name in (*family, *against):
         if name not in by:
             raise InvalidValueError(f"The column {name!r} is not in by: {', '.join(by)}.")

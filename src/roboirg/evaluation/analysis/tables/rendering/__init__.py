@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import NamedTuple
 
-from roboirg.core.errors import UnknownNameError
+from roboirg.core.errors import check_names
 from roboirg.evaluation.analysis.tables.rendering.csv_lines import csv_text, json_text
 from roboirg.evaluation.analysis.tables.rendering.latex import latex
 from roboirg.evaluation.analysis.tables.rendering.markdown import markdown
@@ -35,6 +35,5 @@ FORMATS: Mapping[str, Format] = {
 
 
 def get_format(name: str) -> Format:
-    if name not in FORMATS:
-        raise UnknownNameError("format", name, FORMATS)
+    check_names("format", [name], FORMATS)
     return FORMATS[name]
