@@ -51,8 +51,13 @@ def test_values_that_are_not_finite_are_named(bad, column):
         check_action(action)
     chunk = np.zeros((3, 8))
     chunk[2, column] = bad
-    with pytest.raises(InvalidActionError, match=f"value {column} is {bad}"):
+    with pytest.raises(InvalidActionError, match=f"value {column} of row 2 is {bad}"):
         check_chunk(chunk)
+
+
+def test_an_array_of_objects_is_named() -> None:
+    with pytest.raises(InvalidActionError, match=r"8 real numbers; got ndarray of dtype object\."):
+        check_chunk(np.full((2, 8), None))
 
 
 @pytest.mark.parametrize(

@@ -59,7 +59,7 @@ def test_a_child_answers_and_exits_when_its_channel_is_closed() -> None:
     ("message", "words", "was_killed"),
     [
         ("leave", "the process ended with exit code 3", False),
-        ("kill", "the process died of signal 9", True),
+        ("kill", "the process died of signal 9 (Killed)", True),
     ],
 )
 def test_how_a_child_ended_is_told(message: str, words: str, was_killed: bool) -> None:

@@ -83,6 +83,7 @@ def planned(**fields: object) -> tuple[str, ...]:
     ("words", "sentence"),
     [
         ((*RUN, "--tasks", "PickXtime"), "There is no task 'PickXtime'"),
+        ((*RUN, "--settings", "implicit"), "'implicit' is a form of the instruction"),
         ((*RUN, "--settings", "spatail"), "Did you mean 'spatial'?"),
         ((*RUN, "--episodes", "9" * 5000), "…' is not a valid episode; write numbers and ranges"),
         ((*RUN, "--stages", "5-1"), "the possible lists are 1,5;"),
@@ -90,7 +91,7 @@ def planned(**fields: object) -> tuple[str, ...]:
         ((*RUN, "--out", "o", "--max-steps", "0"), "max_steps is 0"),
         ((*RUN, "--episodes", "50,"), "no episode 50: split 'test' has episodes 0 to 49."),
         ((*RUN, "--policy", "../../x=random"), "is '../../x' (in '../../x=random')"),
-        ((*RUN, "--out", "o", "--workers", "-1"), "workers is -1; it must be at least 0 (this"),
+        ((*RUN, "--out", "o", "--workers", "-1"), "workers is -1; it must be a whole number"),
         ((*RUN, "--out", "o", "--executor", "slurm"), "There is no executor 'slurm'; known: local"),
         (planned(actions="joints"), "known: joint_angle, ee_pose, waypoint, choice."),
         (planned(tries="many"), "tries is 'many'"),

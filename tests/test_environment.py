@@ -17,7 +17,7 @@ from gymnasium.utils.env_checker import check_env
 import roboirg
 from roboirg.core.actions import ACTION_SPACES
 from roboirg.core.environment_options import ENVIRONMENT_OPTIONS
-from roboirg.core.errors import InvalidValueError, RoboIRGError
+from roboirg.core.errors import InvalidValueError, RoboIRGError, UnknownNameError
 from roboirg.core.instruction_options import OPTION_NAMES, InstructionOptions
 from roboirg.core.policy_needs import PolicyNeeds
 from roboirg.envs.env_settings import EnvOptions, EnvSettings
@@ -154,7 +154,7 @@ def test_make_is_typed_with_the_options_of_the_environment():
     for made in (roboirg.make, RoboIRGEnv):
         annotation = inspect.signature(made).parameters["options"].annotation
         assert annotation == "Unpack[EnvOptions]"
-    with pytest.raises(TypeError, match="camera"):
+    with pytest.raises(UnknownNameError, match=r"option of make\(\) 'camera'.*mean 'cameras'"):
         roboirg.make("PickXtimes", camera=("front",))
 
 

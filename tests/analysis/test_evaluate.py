@@ -160,8 +160,11 @@ def test_options_are_those_of_a_plan(unplayed: None, tmp_path: Path) -> None:
     assert python_run.python_plan("oracle", tasks="all", episodes=3).episodes == (0, 1, 2)
     with pytest.raises(UnknownNameError, match="PickXtimes"):
         roboirg.evaluate("oracle", **{**QUICK, "tasks": "PickXtime"})
-    with pytest.raises(InvalidValueError, match="max_stps"):
-        roboirg.evaluate("oracle", max_stps=3, **QUICK)
+    for wrong, right in {"max_stps": "max_steps", "worker": "workers", "task": "tasks"}.items():
+        with pytest.raises(UnknownNameError, match=f"{wrong}.*mean '{right}'"):
+            roboirg.evaluate("oracle", **{wrong: 3}, **QUICK)
+    with pytest.raises(InvalidValueError, match="workers is '2'; it must be a whole number"):
+        roboirg.evaluate("oracle", **{**QUICK, "workers": "2"})
 
 
 def test_without_pandas_the_rest_works(

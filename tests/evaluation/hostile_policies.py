@@ -336,7 +336,7 @@ FORGED = {
     "Pesterer": "policy: the process sent no valid reply (it asked for the video again and again)",
     "Deep": "policy: the policy's metadata are nested more than 16 deep; make them flat.",
     "NamesServer": "policy: the policy's metadata have the key 'server', which is reserved; ",
-    "Aborter": "policy: the process died of signal 6 in the policy's act()",
+    "Aborter": "policy: the process died of signal 6 (Aborted) in the policy's act()",
     "LateTurncoat": "policy: Policy 'hostile_policies:LateTurncoat' has attach(), with which",
     "Turncoat": "policy: Policy 'hostile_policies:Turncoat' has attach(), with which",
 }

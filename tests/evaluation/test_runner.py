@@ -121,7 +121,7 @@ def test_a_worker_that_dies_twice_costs_one_error_and_the_rest_goes_on(tmp_path:
     summary = run_plan(plan, tmp_path, FakePlay(tmp_path, deadly=2), LocalProcesses(1))
     (error,) = (record for record in read_records(tmp_path) if record.outcome == "error")
     assert (error.episode, error.error, error.attempt) == (2, "infrastructure", 2)
-    assert error.cause == "infrastructure: the process died of signal 9 in the environment"
+    assert error.cause == "infrastructure: the process died of signal 9 (Killed) in the environment"
     assert (summary.total, summary.played, len(summary.errors), summary.missing) == (4, 4, 1, 0)
     assert len(starts(tmp_path, error.identity)) == 2
     # Errors are played again unless asked not to.

@@ -118,7 +118,10 @@ def test_another_action_space_or_protocol_is_refused():
         ({"actions": np.zeros(7)}, r"got shape \(7,\)"),
         ({"actions": [float("nan")] * 8}, "finite"),
         ({"actions": "left"}, "array of 8 real numbers; got str"),
-        ({"actions": [[1.0], [2.0, 3.0]]}, "array of 8 real numbers; got list"),
+        (
+            {"actions": [[1.0], [2.0, 3.0]]},
+            "numbers; got rows of different lengths",
+        ),
         ({"other": 1}, "without 'actions'; it holds 'other'"),
     ],
 )

@@ -84,6 +84,13 @@ class Growing(Sound):
         return np.zeros((self.total, 8))
 
 
+class Waypoints(Sound):
+    actions, depth = "waypoint", True
+
+    def act(self, observation):
+        return super().act(observation)[:, :7]
+
+
 class Videophobe(Sound):
     def reset(self, instruction, demonstration):
         assert len(demonstration["joint_positions"]) == 0, "no films, please" + 99 * " no"
@@ -126,6 +133,11 @@ def test_depth_and_matrices_are_named_if_a_policy_wants_them():
     assert requirements.endswith("observations every 1, depth, calibration.")
 
 
+def test_what_is_not_compared_with_the_expert_is_named():
+    told = check_policy(f"{__name__}:Waypoints", record_expert=print)[-1]
+    assert told == ("expert", NOTE, "Not checked: a waypoint takes many control steps.")
+
+
 def test_a_sound_policy_passes_everything():
     results = check_policy(f"{__name__}:Sound", seed=3)
     assert {result.verdict for result in results} == {PASS}
@@ -150,7 +162,7 @@ def test_a_sound_policy_passes_everything():
     [
         (Shapeless, "acts without a video", "got shape (3, 7)"),
         (NotFinite, "acts without a video", "finite number"),
-        (Raising, "acts without a video", "'depth'. Observations have end_effector, front_rgb,"),
+        (Raising, "acts without a video", "'depth'; the observation has end_effector, front_rgb,"),
         (Elephant, "reset forgets", "differs by up to 0.27"),
         (Dice, "deterministic", "Two equal episodes differ by up to"),
         (Growing, "deterministic", "the number of actions"),

@@ -42,8 +42,8 @@ def check_expert(player: PolicyPlayer, record: RecordExpert | None) -> Iterator[
     if record is None:
         return
     if player.space.takes_many_steps:
-        chosen = f"an action of {player.space.name} takes many control steps of the expert"
-        yield CheckResult(_NAME, NOTE, f"Not checked: {chosen}.")
+        message = f"Not checked: a {player.space.name} takes many control steps."
+        yield CheckResult(_NAME, NOTE, message)
         return
     rows = max(map(len, player.first_rollout.chunks))
     try:

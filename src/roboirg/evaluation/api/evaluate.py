@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import inspect
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
+
+from roboirg.core.errors import check_names
 
 if TYPE_CHECKING:
     from roboirg.evaluation.api.python_run import AnyPolicy
@@ -60,7 +63,10 @@ def evaluate(
     """
     from roboirg.evaluation.api.python_run import play_plan, python_plan
     from roboirg.evaluation.api.results import Results
+    from roboirg.evaluation.plan.plan import PLAN_KEYS
 
+    own = inspect.signature(evaluate).parameters
+    check_names("option of evaluate()", options, (*own, *PLAN_KEYS))
     plan = python_plan(
         policy,
         tasks=tasks,
