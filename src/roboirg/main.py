@@ -31,7 +31,6 @@ from roboirg.core.errors import RoboIRGError
 from roboirg.core.extras import install_command
 from roboirg.core.plain_text import printable
 from roboirg.core.version import __version__
-from roboirg.util.discovery import load_entry
 
 # Heavy modules are imported inside the commands, so that --help is fast.
 
@@ -116,14 +115,15 @@ def _add_outside(entry: importlib.metadata.EntryPoint) -> None:
     """Add what another package offers; one that is broken takes no other command away."""
     own = typer.Typer()
     try:
-        found = load_entry(entry)
+        found = entry.load()
         if isinstance(found, typer.Typer):
             own.add_typer(found, name=entry.name)
         else:
             own.command(entry.name)(found)
         typer.main.get_command(own)  # which reads the parameters
-    except Exception as error:  # noqa: BLE001 - a stranger's code
-        typer.echo(f"roboirg: no command {entry.name}: {one_line(error)}", err=True)
+    except (Exception, SystemExit) as error:  # noqa: BLE001 - a stranger's code
+        words = printable(one_line(error))
+        typer.echo(f"roboirg: no command {entry.name}: {entry.value}: {words}", err=True)
         return
     app.registered_groups += own.registered_groups
     app.registered_commands += own.registered_commands

@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 from importlib.metadata import EntryPoint
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import hosting_fakes
@@ -19,15 +20,16 @@ from roboirg.evaluation.run.executor import InProcess
 from roboirg.evaluation.run.runner import run_plan
 
 IT, BOTH = "throwing:It", "planner:throwing:Planner?hands=throwing:It"
-RAISED = "(throwing.py, line 10)"
-OPENED = ("import", "class body", "__init__", "needs", "version")
-PLAYED = ("reset", "act", "hear", "metadata", "subgoal")
-PLANNED = ("planner's reset", "planner's plan", "follow")
+RAISED = "(throwing.py, line 12)"
+HOOKS = ("import", "class body", "__init__", "needs", "version", "reset", "act", "hear",
+         "metadata", "subgoal")  # fmt: skip
+PLANNED = ("planner's __init__", "planner's reset", "planner's plan", "follow")
+KEYS = {"act": "observation has front_rgb, instruction", "reset": "demonstration has front_rgb"}
 
 
 @pytest.fixture
 def told(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Any:
-    """Return what a run says when something of `throwing` raises: the refusal, or the record."""
+    """Return what plays an episode in which something of `throwing` raises: the record, or why."""
     monkeypatch.syspath_prepend(Path(__file__).parent)
     step = hosting_fakes.PaperWorld.step_chunk
 
@@ -39,35 +41,27 @@ def told(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Any:
 
     def play(hook: str, spec: str = IT, process: str = "shared") -> Any:
         monkeypatch.setenv("HOOK", hook)
-        sys.modules.pop("throwing", None)
+        monkeypatch.delitem(sys.modules, "throwing", raising=False)
         plan = paper_plan(spec, 1, policy_process=process)
         try:
-            refs = tuple(map(open_policy, plan.policies))
+            opened = plan.model_copy(update={"policies": tuple(map(open_policy, plan.policies))})
         except InvalidValueError as error:
-            return str(error)
-        plan = plan.model_copy(update={"policies": refs})
-        run_plan(plan, tmp_path, paper_runner(plan, tmp_path), InProcess())
+            return SimpleNamespace(cause=str(error).rstrip("."), details="Traceback")
+        run_plan(opened, tmp_path, paper_runner(opened, tmp_path), InProcess())
         return read_records(tmp_path)[0]
 
     return play
 
 
 @pytest.mark.parametrize(
-    ("hook", "spec"), [*((hook, IT) for hook in OPENED), ("planner's __init__", BOTH)]
-)
-def test_what_cannot_be_opened_has_its_place(told: Any, hook: str, spec: str) -> None:
-    assert f": ValueError: from {hook} {RAISED}" in told(hook, spec)
-
-
-@pytest.mark.parametrize(
     ("hook", "spec", "process"),
-    [*((hook, IT, "shared") for hook in PLAYED), ("act", IT, "own"),
-     *((hook, BOTH, "shared") for hook in PLANNED), (PLANNED[-1], BOTH, "own")],
+    [*((hook, IT, "shared") for hook in HOOKS), *((hook, BOTH, "shared") for hook in PLANNED),
+     ("act", IT, "own"), ("planner's plan", BOTH, "own")],
 )  # fmt: skip
-def test_what_a_call_raises_has_its_place(told: Any, hook: str, spec: str, process: str) -> None:
-    record = told(hook, spec, process)
-    assert record.cause == f"policy: ValueError: from {hook} {RAISED}"
-    assert "Traceback" in record.details
+def test_what_a_user_wrote_has_its_place(told: Any, hook: str, spec: str, process: str) -> None:
+    found, kind = told(hook, spec, process), "SystemExit" if hook == "class body" else "ValueError"
+    assert found.cause.endswith(f": {kind}: from {hook} {RAISED}")
+    assert "Traceback" in found.details
 
 
 @pytest.mark.parametrize("hook", ["usage", "close"])
@@ -77,17 +71,12 @@ def test_what_comes_after_the_verdict_stays_in_the_record(told: Any, hook: str) 
     assert f"from {hook}" in record.details
 
 
-@pytest.mark.parametrize(
-    ("hook", "keys"),
-    [("a key of the observation", "the observation has front_rgb, instruction, joint_positions"),
-     ("a key of the video", "the demonstration has front_rgb, joint_positions")],
-)  # fmt: skip
+@pytest.mark.parametrize("hook", KEYS)
 @pytest.mark.parametrize("process", ["shared", "own"])
-def test_a_missing_key_comes_with_those_that_are_there(
-    told: Any, hook: str, keys: str, process: str
-) -> None:
-    cause = told(hook, process=process).cause
-    assert cause.startswith(f"policy: KeyError: 'front'; {keys} (throwing.py, line ")
+def test_a_missing_key_comes_with_those_that_are_there(told: Any, hook: str, process: str) -> None:
+    assert told(f"a key in {hook}", process=process).cause == (
+        f"policy: KeyError: 'front'; the {KEYS[hook]}, joint_positions (throwing.py, line 15)"
+    )
 
 
 def test_a_command_of_another_package_is_one_sentence(
@@ -95,6 +84,7 @@ def test_a_command_of_another_package_is_one_sentence(
 ) -> None:
     monkeypatch.syspath_prepend(Path(__file__).parent)
     monkeypatch.setenv("HOOK", "command")
+    monkeypatch.delitem(sys.modules, "throwing", raising=False)
     monkeypatch.setattr(sys, "argv", ["roboirg", "theirs"])
     monkeypatch.setattr(cli.app, "registered_commands", list(cli.app.registered_commands))
     for name, value in (("theirs", "throwing:command"), ("none", "throwing:__doc__")):
@@ -102,7 +92,7 @@ def test_a_command_of_another_package_is_one_sentence(
     with pytest.raises(SystemExit):
         cli.main()
     refused, raised = capsys.readouterr().err.splitlines()
-    assert refused.startswith("roboirg: no command none: TypeError: ")
+    assert refused.startswith("roboirg: no command none: throwing:__doc__: TypeError: ")
     assert raised == (
         f"roboirg: ValueError: from command {RAISED}; PYTHONDEVMODE=1 shows the traceback."
     )

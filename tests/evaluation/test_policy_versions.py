@@ -123,8 +123,6 @@ def test_one_that_differs_in_each_process_gives_no_verdict(write, tmp_path: Path
 def test_a_policy_that_cannot_begin_has_a_problem() -> None:
     ref = found_here(made="self.version = 'b'", reset="raise KeyError('front')")
     assert (ref.version, ref.problem) == ("unknown", "reset(): KeyError: 'front'")
-    with pytest.raises(InvalidValueError, match=r"cannot be made: ValueError: no GPU"):
-        found_here(made="raise ValueError('no GPU')")
 
 
 def test_a_command_opens_each_policy_once(write, tmp_path: Path) -> None:

@@ -4,15 +4,20 @@ import os
 
 import numpy as np
 
+HOOK = os.environ.get("HOOK", "")
 
-def throw(hook, value=None):
-    if os.environ.get("HOOK") == hook:
-        raise ValueError(f"from {hook}")
+
+def throw(hook, value=None, given=()):
+    if hook == HOOK:
+        raise (SystemExit if hook == "class body" else ValueError)(f"from {hook}")
+    if f"a key in {hook}" == HOOK:
+        (*_, seen) = given
+        seen["front"]
     return value
 
 
 def method(hook, value=None):
-    return lambda *_: throw(hook, value)
+    return lambda *given: throw(hook, value, given)
 
 
 throw("import")
@@ -20,25 +25,15 @@ throw("import")
 
 class It:
     throw("class body")
-    cameras = ("front",)
-    demonstration_frames = "none"
+    cameras, demonstration_frames = ("front",), "none"
     depth = property(method("needs", value=False))
     version = property(method("version", value="1"))
     metadata = property(method("metadata", value={}))
     subgoal = property(method("subgoal"))
-    __init__, follow, hear, close = map(method, ("__init__", "follow", "hear", "close"))
-    usage = method("usage", value={})
-
-    def reset(self, instruction, demonstration):
-        throw("reset")
-        if os.environ.get("HOOK") == "a key of the video":
-            demonstration["front"]
-
-    def act(self, observation):
-        throw("act")
-        if os.environ.get("HOOK") == "a key of the observation":
-            observation["front"]
-        return np.ones((24, 8))
+    usage, act = method("usage", value={}), method("act", value=np.ones((24, 8)))
+    __init__, reset, follow, hear, close = map(
+        method, ("__init__", "reset", "follow", "hear", "close")
+    )
 
 
 class Planner:

@@ -154,20 +154,6 @@ def test_a_wrong_need_is_told_before_anything_starts(monkeypatch, attribute, wis
         find_policy(f"{__name__}:Silent")
 
 
-def test_a_module_that_exits_or_complains_at_length_is_one_sentence(tmp_path, monkeypatch):
-    (tmp_path / "exiting_policy.py").write_text("raise SystemExit('no GPU')\n")
-    (tmp_path / "wordy_policy.py").write_text("raise RuntimeError('one\\n  two\\n\\nthree')\n")
-    monkeypatch.syspath_prepend(tmp_path)
-    with pytest.raises(
-        InvalidValueError, match=r"SystemExit: no GPU \(exiting_policy.py, line 1\)\."
-    ):
-        find_policy("exiting_policy:It")
-    with pytest.raises(
-        InvalidValueError, match=r"RuntimeError: one two three \(wordy_policy.py, line 1\)\."
-    ):
-        find_policy("wordy_policy:It")
-
-
 def world_of(task, setting, episode):
     return roboirg.make(task, setting=setting, episode=episode, cameras=())
 

@@ -91,12 +91,6 @@ class Waypoints(Sound):
         return super().act(observation)[:, :7]
 
 
-class Videophobe(Sound):
-    def reset(self, instruction, demonstration):
-        assert len(demonstration["joint_positions"]) == 0, "no films, please" + 99 * " no"
-        self.memory = 0
-
-
 class Unwritable(Sound):
     def reset(self, instruction, demonstration):
         super().reset(instruction, demonstration)
@@ -166,7 +160,6 @@ def test_a_sound_policy_passes_everything():
         (Elephant, "reset forgets", "differs by up to 0.27"),
         (Dice, "deterministic", "Two equal episodes differ by up to"),
         (Growing, "deterministic", "the number of actions"),
-        (Videophobe, "acts with a video", "reset(): AssertionError: no films, please no no"),
         (Unwritable, "reports", "the policy's metadata: 'rate' is nan; it must be a text"),
         (Unspeakable, "reports", "usage() has 1 entries; it may have at most"),
         (Posing, "reports", "the key 'server', which is reserved"),
