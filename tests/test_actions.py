@@ -1,5 +1,7 @@
 """Actions are checked once, with one sentence for each fault."""
 
+from unittest.mock import MagicMock
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -33,6 +35,9 @@ def test_good_actions_pass_unchanged(action):
 )
 def test_good_chunks_pass_unchanged(chunk):
     assert np.array_equal(check_chunk(chunk), chunk)
+    # NumPy takes no tensor in bfloat16, with a gradient, or on a GPU.
+    made = "detach.return_value.cpu.return_value.double.return_value.numpy.return_value"
+    assert np.array_equal(check_chunk(MagicMock(**{made: chunk})), chunk)
 
 
 @given(hnp.arrays(np.float64, hnp.array_shapes(min_dims=0, max_dims=3), elements=finite))

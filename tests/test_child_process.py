@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+import errno
 import os
+import resource
 import signal
 import subprocess
 import sys
 import time
 from collections.abc import Callable
 from multiprocessing.connection import Connection
+from multiprocessing.context import SpawnProcess
 from pathlib import Path
 from types import SimpleNamespace
+from unittest.mock import patch
 
 import pytest
 
@@ -79,6 +83,18 @@ def test_a_child_that_the_kernel_does_not_end_is_left() -> None:
     """`join` needs a limit here, as `abs` does: waiting for a driver would stop all workers."""
     stuck = SimpleNamespace(exitcode=None, kill=str, pid=2**30, join=abs, close=str)
     assert ChildProcess(stuck, stuck).close() == ChildExit(None)  # type: ignore[arg-type]
+
+
+def test_where_no_process_can_start_one_sentence_says_what_would_help() -> None:
+    """The usual limit of open files is raised before that."""
+    _, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
+    resource.setrlimit(resource.RLIMIT_NOFILE, (64, hard))
+    with (
+        patch.object(SpawnProcess, "start", side_effect=OSError(errno.EMFILE, "Too many files")),
+        pytest.raises(RoboIRGError, match=r"be started: Too many files; use fewer workers, or"),
+    ):
+        ChildProcess.spawn(answer)
+    assert resource.getrlimit(resource.RLIMIT_NOFILE) == (min(hard, 65_536), hard)
 
 
 def test_what_a_child_has_started_ends_with_it() -> None:

@@ -1,12 +1,16 @@
 from __future__ import annotations
 
+import errno
 import functools
 import os
 import resource
 import subprocess
 import sys
 import tempfile
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
+from unittest.mock import patch
 
 import pytest
 from evaluation_fakes import FakePlay, fake_record, small_plan
@@ -14,6 +18,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from msgspec.structs import replace
 
+from roboirg.core.errors import RoboIRGError
 from roboirg.evaluation.records.line_file import LOCK_FILE
 from roboirg.evaluation.records.record import EventRecord, Record
 from roboirg.evaluation.records.record_codec import StoreError, encode, identity_key
@@ -28,7 +33,9 @@ from roboirg.evaluation.records.store import (
 )
 from roboirg.evaluation.run.executor import InProcess
 from roboirg.evaluation.run.runner import run_plan
-from roboirg.util.atomic_write import write_atomically
+from roboirg.policies.remote.endpoints import Endpoint
+from roboirg.policies.remote.server_lock import lock_server
+from roboirg.util.atomic_write import locked, write_atomically
 
 
 @functools.cache
@@ -123,6 +130,22 @@ def test_a_second_writer_is_told_who_writes(tmp_path: Path) -> None:
     ):
         RecordStore(tmp_path)
     RecordStore(tmp_path).close()
+
+
+@pytest.mark.parametrize(
+    "take",
+    [
+        RecordStore,
+        lambda folder: locked(folder / ".lock", "").__enter__(),
+        lambda folder: lock_server([Endpoint("h", 1)], wait=0, folder=folder),
+    ],
+)
+def test_a_file_system_without_locks_is_named(tmp_path: Path, take: Callable[[Path], Any]) -> None:
+    with (
+        patch("fcntl.flock", side_effect=OSError(errno.ENOLCK, "No locks available")),
+        pytest.raises(RoboIRGError, match=r"Cannot lock .*lock \(No locks .* local disk\.$"),
+    ):
+        take(tmp_path)
 
 
 def test_a_killed_writer_leaves_no_lock(tmp_path: Path) -> None:

@@ -113,7 +113,7 @@ def test_a_served_policy_gets_what_the_client_was_given(protocol):
             }  # fmt: skip
             assert expected.items() <= client.metadata.items()
     _opened, one, two = Recorder.episodes
-    assert (one.seed, two.seed, one.closed) == (7, 7, protocol != "openpi")
+    assert (one.seed, two.seed, one.closed, two.closed) == (7, 7, True, True)
     for policy in (one, two):
         assert policy.instruction == (INSTRUCTION.lower() if protocol == "mme-vla" else INSTRUCTION)
         for given, observation in zip((first, later), policy.calls, strict=True):

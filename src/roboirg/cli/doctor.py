@@ -24,7 +24,11 @@ from packaging.specifiers import SpecifierSet
 from roboirg.core.errors import MissingDependencyError, RenderDeviceError, RoboIRGError
 from roboirg.core.extras import DISTRIBUTION, install_command
 from roboirg.simulation.model_files import look_for_model_files
-from roboirg.simulation.rendering.render_device import DEVICE_VARIABLE
+from roboirg.simulation.rendering.render_device import (
+    DEVICE_VARIABLE,
+    DRIVER_VARIABLES,
+    to_unset,
+)
 from roboirg.util.processor import core_count
 
 FRAME_TIMEOUT = 120
@@ -160,9 +164,7 @@ def _check_rendering(render_s: int = 0) -> tuple[Check, Check]:
         limit_s=2 * (FRAME_TIMEOUT + render_s),
     )
     device, *frames = output.splitlines() or [""]
-    chosen = os.environ.get(DEVICE_VARIABLE)
-    remedy = f"unset {DEVICE_VARIABLE} (now {chosen!r}), or " if chosen else ""
-    remedy += _RENDER_REMEDY
+    remedy = f"{to_unset(DEVICE_VARIABLE, *DRIVER_VARIABLES)}{_RENDER_REMEDY}"
     tried = frames[-1:] if is_drawn else [*frames[-1:], fault]
     found = ", then ".join(tried) if device else "not tried: no device"
     return (

@@ -125,11 +125,14 @@ def check_chunk(actions: ArrayLike, space: ActionSpace = JOINT_ANGLE) -> NDArray
 
 def _numbers(action: ArrayLike, space: ActionSpace) -> NDArray[np.float64]:
     got = type(action).__name__
+    if hasattr(action, "detach"):
+        # NumPy takes no tensor of PyTorch in bfloat16, with a gradient, or on a GPU.
+        action = action.detach().cpu().double().numpy()
     try:
         numbers = np.asarray(action)
     except ValueError:
         numbers, got = np.asarray(None), "rows of different lengths"
-    if numbers.dtype.kind not in "biuf":
+    if numbers.dtype.kind not in "biuf" and numbers.dtype.name != "bfloat16":  # JAX's
         dtype = f" of dtype {numbers.dtype}" if numbers.ndim else ""
         raise InvalidActionError(
             f"An action ({space.name}) is an array of {space.size} real numbers; got {got}{dtype}."

@@ -62,13 +62,29 @@ def locked(path: Path, taken: str) -> Iterator[None]:
     except OSError as error:
         raise InvalidValueError(f"Cannot write {path}: {error.strerror}.") from error
     try:
-        try:
-            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError:
-            raise InvalidValueError(taken) from None
+        if not take_lock(descriptor, path):
+            raise InvalidValueError(taken)
         yield
     finally:
         os.close(descriptor)
+
+
+def take_lock(descriptor: int, path: Path, *, shared: bool = False) -> bool:
+    """Lock an open file if no other process holds its lock. Returns whether it is locked now.
+
+    Raises:
+        InvalidValueError: its file system has no locks, as some network file systems.
+    """
+    try:
+        fcntl.flock(descriptor, fcntl.LOCK_NB | (fcntl.LOCK_SH if shared else fcntl.LOCK_EX))
+    except BlockingIOError:
+        return False
+    except OSError as error:
+        raise InvalidValueError(
+            f"Cannot lock {path} ({error.strerror}): its file system has no locks, as some network "
+            "file systems; use a folder on a local disk."
+        ) from error
+    return True
 
 
 def sync_to_disk(path: Path) -> None:

@@ -8,6 +8,7 @@ from __future__ import annotations
 import contextlib
 import multiprocessing
 import os
+import resource
 import signal
 import threading
 from collections.abc import Callable, Iterator
@@ -16,6 +17,7 @@ from multiprocessing.connection import Connection
 from multiprocessing.process import BaseProcess
 from typing import Any, NamedTuple, Self, cast
 
+from roboirg.core.errors import RoboIRGError
 from roboirg.util.process_guard import begin
 
 GRACE_S = 30.0
@@ -65,17 +67,29 @@ class ChildProcess:
         Args:
             work: runs in the child.
             *args: its arguments.
+
+        Raises:
+            RoboIRGError: there is no room for another process or its files.
         """
+        # 1,024 open files are usual, and few for many workers with policies.
+        soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
+        resource.setrlimit(resource.RLIMIT_NOFILE, (max(soft, min(hard, 65_536)), hard))
         # Spawned, not forked: a forked Vulkan driver or thread pool is undefined behavior.
         context = multiprocessing.get_context("spawn")
-        ours, theirs = context.Pipe()
-        process = context.Process(
-            target=_begin_work, args=(os.getpid(), work, theirs, args), daemon=False
-        )
-        with _safe_path():
-            resource_tracker.ensure_running()  # which would unblock what is blocked below
-            with without_interrupts():
-                process.start()
+        try:
+            ours, theirs = context.Pipe()
+            process = context.Process(
+                target=_begin_work, args=(os.getpid(), work, theirs, args), daemon=False
+            )
+            with _safe_path():
+                resource_tracker.ensure_running()  # which would unblock what is blocked below
+                with without_interrupts():
+                    process.start()
+        except OSError as error:
+            raise RoboIRGError(
+                f"A process cannot be started: {error.strerror}; use fewer workers, or allow more "
+                "open files and processes (ulimit -n, ulimit -u)."
+            ) from error
         # Only the child may keep this end open: then its death reads as end of file.
         theirs.close()
         return cls(process, ours)

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import contextlib
 import functools
+import math
 import os
 import platform
+from collections.abc import Iterator
 from pathlib import Path
 
 from roboirg.core.errors import InvalidValueError
@@ -12,6 +15,11 @@ from roboirg.core.errors import InvalidValueError
 WORKERS_VARIABLE = "ROBOIRG_WORKERS"
 """Environment variable with the number of worker processes of commands."""
 
+_CPU_QUOTAS = (
+    ("/sys/fs/cgroup/cpu.max",),
+    ("/sys/fs/cgroup/cpu/cpu.cfs_quota_us", "/sys/fs/cgroup/cpu/cpu.cfs_period_us"),
+)
+"""Files with the microseconds of processor time in a period, and those of the period."""
 _FAMILY = ("vendor_id", "cpu family", "CPU implementer", "CPU architecture")
 """Of x86 the first two, of ARM the others."""
 
@@ -45,10 +53,19 @@ def _fields() -> dict[str, str]:
 
 
 def core_count() -> int:
-    """Return the number of cores that this process may use; a container may use fewer."""
+    """Return how many cores this process may use, within the limit of its container."""
     if hasattr(os, "sched_getaffinity"):
-        return len(os.sched_getaffinity(0))
+        return math.ceil(min([len(os.sched_getaffinity(0)), *_quotas()]))
     return os.cpu_count() or 1
+
+
+def _quotas() -> Iterator[float]:
+    """Yield the limit of a container's processor time, in cores, in both versions of cgroups."""
+    for names in _CPU_QUOTAS:
+        with contextlib.suppress(OSError, ValueError):  # no such file, or no number
+            quota, period = " ".join(Path(name).read_text() for name in names).split()
+            # Without a limit, the quota is "max", or -1.
+            yield float(quota) / float(period) if float(quota) > 0 else math.inf
 
 
 def worker_count(typed: int | None = None) -> int:

@@ -14,6 +14,7 @@ import killed_export
 import numpy as np
 import pytest
 import synthetic_trajectories
+import yaml
 from pyarrow import parquet
 
 from roboirg.apps.demonstrations import export_plan, export_run
@@ -279,7 +280,11 @@ def test_an_explicit_instruction_is_its_own_resolved_form(make_plan):
 
 def test_states_alone_need_no_pictures(export):
     root = export(pictures="none", video=True)
-    assert "There are no pictures." in (root / "README.md").read_text()
+    card = (root / "README.md").read_text()
+    assert "There are no pictures." in card
+    # What `datasets.load_dataset` and the Hub's viewer read: frames, and no table of facts.
+    (head,) = yaml.safe_load(card.split("---")[1])["configs"]
+    assert {*root.glob(head["data_files"])} == {*(root / "data").rglob("*.parquet")}
     assert [one.task for one in read_dataset(root)] == ["PickXtimes"] * 2 + ["VideoUnmask"] * 2
     info = json.loads((root / "meta/info.json").read_text())
     assert not [name for name in info["features"] if "image" in name]

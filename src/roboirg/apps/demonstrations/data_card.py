@@ -46,6 +46,12 @@ def card_text(
         "license: apache-2.0",
         "task_categories: [robotics]",
         "tags: [LeRobot, RoboIRGBench]",
+        # Without them, Hugging Face takes the tables of facts for frames.
+        *(
+            ()
+            if plan.format == "robomme-hdf5"
+            else ("configs: [{config_name: default, data_files: data/*/*.parquet}]",)
+        ),
         "---",
         "",
         "# Demonstrations of RoboIRGBench",

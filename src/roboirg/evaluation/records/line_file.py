@@ -11,7 +11,6 @@
 from __future__ import annotations
 
 import contextlib
-import fcntl
 import json
 import os
 from collections.abc import Callable, Iterable, Iterator
@@ -21,7 +20,7 @@ from typing import NamedTuple, TypeVar
 
 from roboirg.core.errors import InvalidValueError
 from roboirg.evaluation.records.record_codec import DamagedLineError, StoreError
-from roboirg.util.atomic_write import sync_to_disk
+from roboirg.util.atomic_write import sync_to_disk, take_lock
 from roboirg.util.regular_file import open_regular
 
 LOCK_FILE = ".lock"
@@ -147,14 +146,12 @@ class AppendFile:
         os.close(self._lock)
 
     def _take_lock(self) -> None:
-        try:
-            fcntl.flock(self._lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError:
+        if not take_lock(self._lock, self._folder / LOCK_FILE):
             owner = os.pread(self._lock, 32, 0).decode().strip() or "unknown"
             raise StoreError(
                 f"{self._folder} is being written by another run (process {owner}); "
                 f"wait for it, stop it, or choose another --out."
-            ) from None
+            )
         os.ftruncate(self._lock, 0)
         os.pwrite(self._lock, f"{os.getpid()}\n".encode(), 0)
 

@@ -9,7 +9,6 @@ computer.
 from __future__ import annotations
 
 import contextlib
-import fcntl
 import os
 import tempfile
 import threading
@@ -24,6 +23,7 @@ import platformdirs
 from roboirg.core.errors import PolicyConnectionError, PolicyTimeoutError
 from roboirg.core.waiting import waiting
 from roboirg.policies.remote.endpoints import Endpoint
+from roboirg.util.atomic_write import take_lock
 
 _PAUSE = 0.05
 """Seconds between two attempts to lock a server."""
@@ -94,12 +94,11 @@ def lock_folder() -> Path:
 
 def _lock_any(endpoints: Sequence[Endpoint], folder: Path, *, shared: bool) -> ServerLock | None:
     """Return a lock on the first server that is free."""
-    kind = fcntl.LOCK_SH if shared else fcntl.LOCK_EX
     for endpoint in endpoints:
+        path = folder / f"{endpoint.identity}.lock"
         with contextlib.ExitStack() as stack:
-            file = stack.enter_context((folder / f"{endpoint.identity}.lock").open("a"))
-            with contextlib.suppress(BlockingIOError):
-                fcntl.flock(file, kind | fcntl.LOCK_NB)
+            file = stack.enter_context(path.open("a"))
+            if take_lock(file.fileno(), path, shared=shared):
                 stack.pop_all()
                 _held[threading.get_ident(), endpoint.identity] = file
                 return ServerLock(endpoint, file)

@@ -74,8 +74,9 @@ class WebsocketServer:
         self._loop, self._stop = self._runner.get_loop(), asyncio.Event()
 
     def serve_forever(self) -> None:
-        """Answer until `shutdown` is called by another thread."""
-        with self._runner:
+        """Answer until `shutdown` is called by another thread; policies are closed at the end."""
+        with self._policy, contextlib.ExitStack() as ends, self._runner:
+            ends.callback(self._policy.submit, self._service.forget)
             self._runner.run(self._serve())
 
     def shutdown(self) -> None:
@@ -95,7 +96,6 @@ class WebsocketServer:
             ping_interval=None,  # a pong would wait behind a large message
         ):
             await self._stop.wait()
-        self._policy.shutdown(wait=False, cancel_futures=True)
 
     def _check_request(self, connection: ServerConnection, request: Request) -> Response | None:
         """Return the response to a request that opens no connection."""
@@ -120,7 +120,9 @@ class WebsocketServer:
 
     async def _converse(self, connection: ServerConnection) -> None:
         service, timeout_s = self._service.connection(), self._options.timeout_s
-        with contextlib.suppress(ConnectionClosed, TimeoutError):
+        with contextlib.ExitStack() as ends, contextlib.suppress(ConnectionClosed, TimeoutError):
+            if service is not self._service:  # no other connection has its policy
+                ends.callback(self._policy.submit, service.forget)
             await connection.send(self._metadata)
             while True:
                 async with asyncio.timeout(timeout_s):

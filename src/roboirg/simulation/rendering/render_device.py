@@ -23,6 +23,8 @@ if TYPE_CHECKING:
     import sapien
 
 DEVICE_VARIABLE = "ROBOIRG_RENDER_DEVICE"
+DRIVER_VARIABLES = ("VK_ICD_FILENAMES", "VK_DRIVER_FILES")
+"""Environment variables that hide all drivers of Vulkan but those that they name."""
 
 REMEDY = (
     "install Mesa >= 23.2 (mesa-vulkan-drivers, libvulkan1, libegl1; `make setup` does it) "
@@ -82,7 +84,9 @@ def find_render_device() -> sapien.Device:
             return device
         software = software or device
     if software is None:
-        raise RenderDeviceError(f"No Vulkan device can render; {REMEDY}.")
+        raise RenderDeviceError(
+            f"No Vulkan device can render; {to_unset(*DRIVER_VARIABLES)}{REMEDY}."
+        )
     return software
 
 
@@ -122,6 +126,12 @@ def _new_system(device: sapien.Device) -> sapien.render.RenderSystem:
         ) from error
 
 
+def to_unset(*names: str) -> str:
+    """Return advice to unset those of some environment variables that are set, as a beginning."""
+    found = [f"{name} (now {os.environ[name]!r})" for name in names if os.environ.get(name)]
+    return f"unset {' and '.join(found)}, or " if found else ""
+
+
 @functools.cache
 def _sapien() -> ModuleType:
     with extra_needed("Playing episodes needs the simulator", "sim"):
@@ -149,7 +159,9 @@ def _named_device(name: str) -> sapien.Device:
     known = [found for found in map(_device, _aliases()) if found is not None]
     names = [describe_device(found).alias for found in known if found.can_render()]
     if not names:
-        raise RenderDeviceError(f"The render device {name!r} cannot be used; {REMEDY}.")
+        raise RenderDeviceError(
+            f"The render device {name!r} cannot be used; {to_unset(*DRIVER_VARIABLES)}{REMEDY}."
+        )
     fault = "does not exist" if device is None else "cannot render"
     raise RenderDeviceError(
         f"The render device {name!r} {fault}; set {DEVICE_VARIABLE} to one of "
