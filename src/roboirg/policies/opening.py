@@ -49,5 +49,5 @@ def opened(ref: PolicyRef, seed: int = 0) -> PolicyRef:
     else:
         return replace(ref, needs=needs, version=read_version(policy) or ref.version)
     finally:
-        with contextlib.suppress(Exception):  # how it ends does not count
+        with contextlib.suppress(Exception, SystemExit):  # how it ends does not count
             close_policy(policy)

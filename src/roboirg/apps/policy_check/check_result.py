@@ -32,6 +32,6 @@ class CheckAbortedError(Exception):
     """The checks cannot go on; the arguments are those of the last `CheckResult`."""
 
 
-def describe_error(error: Exception) -> str:
+def describe_error(error: BaseException) -> str:
     """Return an error as one sentence of limited length, with its place in the policy's code."""
     return one_line(error).rstrip(".") + "."

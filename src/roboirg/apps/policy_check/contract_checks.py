@@ -41,7 +41,7 @@ def check_loading(player: PolicyPlayer) -> Iterator[CheckResult]:
         missing = [name for name in ("reset", "act") if not callable(getattr(policy, name, 0))]
     except MissingDependencyError:
         raise
-    except Exception as error:  # the policy's own code runs here
+    except (Exception, SystemExit) as error:  # the policy's own code runs here
         raise CheckAbortedError("loads", FAIL, describe_error(error)) from error
     if missing:
         raise CheckAbortedError("loads", FAIL, f"It has no {missing[0]}().")
@@ -78,7 +78,7 @@ def check_version(player: PolicyPlayer) -> Iterator[CheckResult]:
         own = read_version(player.policy)
     except InvalidValueError as error:
         raise CheckAbortedError("version", FAIL, str(error)) from error
-    except Exception as error:  # the policy's own code runs here
+    except (Exception, SystemExit) as error:  # the policy's own code runs here
         raise CheckAbortedError("version", FAIL, f"reset(): {describe_error(error)}") from error
     known = look_up(read_policy(source)).version if isinstance(source, str) else UNKNOWN_VERSION
     if own is not None and own != UNKNOWN_VERSION:
@@ -141,7 +141,7 @@ def check_reports(player: PolicyPlayer) -> Iterator[CheckResult]:
         metadata = policy_metadata(policy, is_ours=is_ours)
         policy_subgoal(policy)
         policy_usage(policy)
-    except Exception as error:  # noqa: BLE001 - a property may raise anything
+    except (Exception, SystemExit) as error:  # noqa: BLE001 - a property may raise anything
         yield CheckResult("reports", FAIL, describe_error(error))
         return
     if metadata:

@@ -54,7 +54,7 @@ def check_expert(player: PolicyPlayer, record: RecordExpert | None) -> Iterator[
     moments = episode.moments
     try:
         answers = player.ask(episode)
-    except Exception as error:
+    except (Exception, SystemExit) as error:
         raise CheckAbortedError(_NAME, FAIL, f"act(): {describe_error(error)}") from error
     yield from _check_gripper(answers, moments)
     still = _error([np.tile(moment.still, (len(moment.actions), 1)) for moment in moments], moments)

@@ -105,7 +105,7 @@ class PolicyPlayer:
         try:
             policy = self.make_fresh() if fresh or self._policy is None else self._policy
             policy.reset(episode.instruction, episode.demonstration)
-        except Exception as error:
+        except (Exception, SystemExit) as error:
             raise CheckAbortedError(check, FAIL, f"reset(): {describe_error(error)}") from error
         episodes, observation = SyntheticEpisodes(self.needs, self.seed), episode.first
         rollout = SyntheticRollout([], "")
@@ -113,7 +113,7 @@ class PolicyPlayer:
             try:
                 actions = policy.act(observation)
                 chunk = check_chunk(actions, self.space)
-            except Exception as error:
+            except (Exception, SystemExit) as error:
                 raise CheckAbortedError(check, FAIL, f"act(): {describe_error(error)}") from error
             # A copy: a policy may reuse its array.
             rollout.chunks.append(chunk.copy())

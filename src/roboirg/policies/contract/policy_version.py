@@ -29,7 +29,7 @@ def read_version(policy: object) -> str | None:
     kind, subject = type(policy), f"version of {type(policy).__name__}"
     try:
         value: Any = policy.version  # type: ignore[attr-defined]
-    except Exception as error:
+    except (Exception, SystemExit) as error:
         missing = isinstance(error, AttributeError) and error.name in ("version", None)
         if missing and not hasattr(kind, "version"):
             return None

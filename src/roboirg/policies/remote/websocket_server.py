@@ -142,5 +142,5 @@ def _answer(service: Service, data: bytes | str) -> bytes | str:
         if isinstance(data, str):
             raise TypeError("Messages must be binary, not text.")
         return pack(service.handle(unpack(data)))
-    except Exception as error:  # noqa: BLE001 - the boundary: the policy's author needs the traceback
+    except (Exception, SystemExit) as error:  # noqa: BLE001 - the boundary: the policy's author needs the traceback
         return traceback.format_exc() + one_line(error)  # clients show the last line
