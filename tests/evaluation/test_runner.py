@@ -26,6 +26,7 @@ from flat_jobs import with_version
 from msgspec.structs import replace
 
 from roboirg.core.errors import InvalidValueError, RenderDeviceError
+from roboirg.core.policy_needs import PolicyNeeds
 from roboirg.core.policy_ref import unknown_policy
 from roboirg.evaluation.plan.stored_plans import read_plan, read_plans
 from roboirg.evaluation.records.record import ErrorKind, Job, Record
@@ -191,6 +192,31 @@ def test_a_torn_line_is_told_before_anything_is_played(tmp_path: Path) -> None:
     ((notice,), _) = ears.warn.call_args
     assert "(22 bytes) to" in notice
     assert "again" not in notice
+
+
+@pytest.mark.parametrize(
+    ("trained", "warned"),
+    [
+        (None, []),
+        (("PickXtimes", "BinFill"), []),
+        (
+            ("BinFill", "StopCube"),
+            [
+                "random plays PickXtimes, which it was not trained on: it was trained on BinFill, "
+                "StopCube."
+            ],
+        ),
+    ],
+)
+def test_tasks_that_a_policy_was_not_trained_on_are_named_once(
+    tmp_path: Path, trained: tuple[str, ...] | None, warned: list[str]
+) -> None:
+    ears = mock.Mock(spec=Reporter)
+    needs = PolicyNeeds(trained_tasks=trained)
+    policy = dataclasses.replace(read_policy("random"), needs=needs)
+    plan = small_plan(2).model_copy(update={"policies": (policy,)})
+    run_plan(plan, tmp_path, FakePlay(), InProcess(), reporter=ears)
+    assert [one.args[0] for one in ears.warn.call_args_list] == warned
 
 
 def test_lost_videos_are_counted(tmp_path: Path) -> None:

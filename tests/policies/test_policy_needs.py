@@ -21,6 +21,7 @@ class Demanding:
     history_cameras = ("wrist",)
     depth = calibration = grounded = lowers_prompt = True
     prompt_tokens, prompt_added, tokenizer = 64, 3, "words.model"
+    trained_tasks = "PickXtimes", "BinFill"
 
     def reset(self, instruction, demonstration): ...
     def act(self, observation): ...
@@ -30,6 +31,7 @@ class Demanding:
 class Guide:
     cameras = ("front",)
     demonstration_frames = 4
+    trained_tasks = ("BinFill",)
 
     def reset(self, instruction, demonstration): ...
     def plan(self, observation, step): ...
@@ -54,6 +56,7 @@ def test_every_need_is_read_and_survives_a_message():
         ({"cameras": (), "depth": True}, InvalidValueError, "depth is True, but cameras is"),
         ({"prompt_tokens": 0}, InvalidValueError, "prompt_tokens is 0; it must be a number from 1"),
         ({"prompt_added": None}, InvalidValueError, "prompt_added is None"),
+        ({"trained_tasks": "BinFill"}, InvalidValueError, "trained_tasks is 'BinFill'; it must"),
         ({"touch": True}, TypeError, "touch"),
     ],
 )
@@ -85,6 +88,8 @@ def test_a_planner_needs_what_it_declares_and_its_model_is_its_own():
     assert (both.cameras, both.history_cameras) == (("front", "wrist"), ("front", "wrist"))
     assert (both.demonstration_frames, both.observe_every, both.depth) == (2, 4, True)
     assert (both.actions, both.prompt_tokens, both.tokenizer) == ("ee_pose", 64, "words.model")
+    assert both.trained_tasks == ("BinFill",)
+    assert both.merge(PolicyNeeds()).trained_tasks == ("BinFill",)
 
 
 def test_a_tokenizer_that_is_no_path_matters_where_prompts_are_counted():

@@ -169,7 +169,7 @@ def learn_policy(
     heard = ",".join(training.settings) or "explicit"
     options = f"--tasks {quote(','.join(training.tasks))} --split val --settings {quote(heard)}"
     command = f"roboirg run --policy {quote(f'trained:{path}')} {options} --wordings test"
-    typer.echo(f"Play it with: {command} --out runs")
+    typer.echo(f"Play it with: {command} --out {quote(f'runs/{path.stem}')}")
 
 
 def _policy_plan(words: PlanWords, tasks: str, settings: str, memory: str) -> PolicyPlan:

@@ -252,6 +252,7 @@ def folder(tmp_path_factory):
     call = ["learn", "policy", "--tasks", "ButtonUnmask", "--out", str(folder), "--plan", plan]
     done = CliRunner().invoke(app, [*call, "--workers", "0"])
     assert done.exit_code == 0, done.output
+    assert done.output.endswith(" --wordings test --out runs/recurrent-explicit-0\n")
     return folder, call
 
 
@@ -261,6 +262,7 @@ def test_the_command_makes_a_policy_that_plays_by_pictures_alone(folder, tmp_pat
     path = folder[0] / "recurrent-explicit-0.pt"
     spec = f"trained:{path}"
     assert (read_policy(spec).is_privileged, read_policy(spec).is_hosted) == (False, True)
+    assert read_policy(spec).needs.trained_tasks == ("ButtonUnmask",)
     assert not hasattr(make_policy(spec, 0), "attach")
     out = tmp_path / "runs"
     call = ["run", "--policy", spec, "--tasks", "ButtonUnmask", "--settings", "explicit,direct"]

@@ -48,6 +48,23 @@ def merge_observe_every(one: int | None, other: int | None) -> int | None:
     return math.gcd(*periods) if periods else None
 
 
+def merge_trained_tasks(
+    one: tuple[str, ...] | None, other: tuple[str, ...] | None
+) -> tuple[str, ...] | None:
+    """Return the tasks that both were trained on; None names none and leaves out none."""
+    known = [tasks for tasks in (one, other) if tasks is not None]
+    return tuple(task for task in known[0] if task in known[-1]) if known else None
+
+
+def _check_trained_tasks(tasks: object) -> tuple[str, ...]:
+    if not (isinstance(tasks, tuple | list) and all(isinstance(one, str) for one in tasks)):
+        raise InvalidValueError(
+            f"trained_tasks is {tasks!r}; it must be a tuple of names such as ('PickXtimes',), or "
+            "None."
+        )
+    return tuple(tasks)
+
+
 def _check_flag(name: str, value: object) -> bool:
     if not isinstance(value, bool):
         raise InvalidValueError(f"{name} is {value!r}; it must be True or False.")
@@ -100,6 +117,8 @@ class PolicyNeeds:
         prompt_added: most tokens of a state or subgoal that share this budget.
         tokenizer: file of the model's tokenizer; None if it is not declared.
         lowers_prompt: whether prompts are sent in lower case.
+        trained_tasks: on which it was trained, the only ones that it knows; None if it is not
+            declared.
 
     Raises:
         InvalidValueError: a value is invalid, or there is no camera for depth or calibration.
@@ -140,6 +159,9 @@ class PolicyNeeds:
     )
     tokenizer: str | None = field(default=None, metadata=need_rules(_check_tokenizer))
     lowers_prompt: bool = field(default=False, metadata=need_rules(bool))
+    trained_tasks: tuple[str, ...] | None = field(
+        default=None, metadata=need_rules(_check_trained_tasks, merge_trained_tasks)
+    )
 
     def __post_init__(self) -> None:
         for one in fields(self):

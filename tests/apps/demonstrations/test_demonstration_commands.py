@@ -80,11 +80,17 @@ def test_robomme_s_format_has_the_video(roboirg, tmp_path, synthetic, format, fr
 @pytest.mark.parametrize(
     ("more", "pool", "warns"),
     [
-        (("--split", "train"), "train", False),
-        (("--split", "random"), "train", False),
-        (("--split", "test"), "train", False),
-        (("--split", "random", "--plan", plan_file(wordings="test")), "test", True),
-        (("--split", "train", "--plan", plan_file(wordings="test")), "test", True),
+        (("--split", "train"), "train", ()),
+        (("--split", "random"), "train", ()),
+        (("--split", "val"), "train", ()),
+        (("--split", "test"), "train", ("episodes that it has seen",)),
+        (("--plan", plan_file(split="test")), "train", ("episodes that it has seen",)),
+        (("--split", "random", "--plan", plan_file(wordings="test")), "test", ("words held out",)),
+        (
+            ("--split", "test", "--plan", plan_file(wordings="test")),
+            "test",
+            ("episodes that it has seen", "words held out"),
+        ),
     ],
 )
 def test_recordings_speak_the_words_for_training(roboirg, tmp_path, synthetic, more, pool, warns):
@@ -92,7 +98,8 @@ def test_recordings_speak_the_words_for_training(roboirg, tmp_path, synthetic, m
     words = ("--tasks", "PickXtimes", "--episodes", "1", "--settings", "all", "--workers", "0")
     code, _, err = roboirg("export", "demonstrations", *words, *more, "--out", root)
     assert code == 0
-    assert ("words held out for tests" in err) == warns
+    held_out = "episodes that it has seen", "words held out"
+    assert tuple(words for words in held_out if words in err) == warns
     table = parquet.read_table(root / "meta/demonstrations.parquet").to_pylist()
     for row in table:
         episode = get_episode(row["task"], row["split"], row["episode"])

@@ -35,6 +35,7 @@ class LearnedListener(ScriptedPolicy):
         self.version = file_version(path, "listener")
         self.understood: Goal | None = None
         self._model: LearnedModel = load_model(path)
+        self.trained_tasks = self._model.vocabulary.tasks
         self._demonstration: Demonstration = {}
 
     @property

@@ -35,6 +35,7 @@ class JointChunks:
 
     def __init__(self, policy: LearnedPolicy) -> None:
         self.policy, self.version = policy, policy.version
+        self.trained_tasks = policy.trained_tasks
 
     @property
     def metadata(self) -> dict[str, Any]:

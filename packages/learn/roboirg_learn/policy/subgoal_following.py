@@ -116,6 +116,7 @@ class LearnedPlanner:
     def __init__(self, model: PolicyModel, version: str) -> None:
         self.version = version
         self._eyes = LearnedPolicy(model, version)
+        self.trained_tasks = self._eyes.trained_tasks
 
     @property
     def metadata(self) -> dict[str, Any]:

@@ -26,6 +26,10 @@ OWN_OPTIONS = (
     "cameras", "size", "video", "variations", "policy", "outcomes", "actions", "disturbed",
 )  # fmt: skip
 """What is rare in an export: keys of a plan's section ``demonstrations``."""
+_TEST_EPISODES = (
+    "roboirg: These demonstrations are of the test split; a policy that is trained on them is "
+    "tested in episodes that it has seen. Train on --split train or random."
+)
 _TEST_WORDS = (
     "roboirg: These demonstrations speak the words held out for tests; a policy that is trained on "
     "them is tested in words that it knows."
@@ -93,8 +97,12 @@ def export_demonstrations(
 def _print_size(plan: ExportPlan) -> None:
     from roboirg.apps.demonstrations.export_plan import recording_jobs
 
-    if plan.options.wordings == "test":
-        typer.echo(_TEST_WORDS, err=True)
+    for is_held_out, warning in (
+        (plan.split == "test", _TEST_EPISODES),
+        (plan.options.wordings == "test", _TEST_WORDS),
+    ):
+        if is_held_out:
+            typer.echo(warning, err=True)
     jobs = recording_jobs(plan)
     episodes = sum(len(said) for _, said in jobs)
     recorded = counted(len(jobs), "trajectory", "trajectories")

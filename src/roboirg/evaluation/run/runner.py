@@ -98,6 +98,7 @@ def run_plan(
     with _sigterm_interrupts(), RecordStore(folder) as store, films:
         _report_damage(store, reporter)
         _check_versions(plan, store.stored.values(), folder)
+        _warn_of_untrained(plan, reporter)
         write_plan(plan, folder)
         keys = [identity_key(job) for job in jobs]
         todo = [
@@ -245,6 +246,18 @@ def _report_damage(store: RecordStore, reporter: Reporter) -> None:
             f"{store.path} has {counted(len(store.damaged), 'damaged line')}, first line "
             f"{store.damaged[0]}; their episodes are played again."
         )
+
+
+def _warn_of_untrained(plan: Plan, reporter: Reporter) -> None:
+    """Name the tasks that a policy plays without having been trained on them, if that is known."""
+    for one in plan.policies:
+        trained = None if one.needs is None else one.needs.trained_tasks
+        untrained = [task for task in plan.tasks if trained is not None and task not in trained]
+        if untrained:
+            reporter.warn(
+                f"{one.name} plays {', '.join(untrained)}, which it was not trained on: it was "
+                f"trained on {', '.join(trained or ())}."
+            )
 
 
 def _check_versions(plan: Plan, records: Collection[Summary], folder: Path) -> None:
