@@ -3,7 +3,7 @@
 PYTHON := .venv/bin/python
 
 .DEFAULT_GOAL := help
-.PHONY: help setup dev learn style types test fast-tests test-slow test-all test-learn every-test net integrations lint docs demo card clean
+.PHONY: help setup dev learn style types test fast-tests test-slow test-all test-learn every-test net integrations lint docs demo play card clean
 
 help: ## list the targets
 	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):.*## /  make \1\t/' | expand -t 21
@@ -61,6 +61,10 @@ docs: dev ## the documentation site, in build/site; a warning or dead link is an
 demo: setup ## the main job: three policies, every task and setting; ends with a table and a page
 	.venv/bin/roboirg run --plan demo --out runs/demo
 	@.venv/bin/roboirg report runs/demo >/dev/null && echo runs/demo/report.html
+
+play: learn ## a policy that learned, from a checkpoint in results/; ends with a table and a page
+	.venv/bin/roboirg run --policy small=trained:results/recurrent-all-0.pt --tasks PickXtimes,VideoRepick --episodes 2 --video all --out runs/small
+	@.venv/bin/roboirg report runs/small >/dev/null && echo runs/small/report.html
 
 card: dev ## write docs/language-card.md anew, after a change of words or episodes
 	$(PYTHON) scripts/write_language_card.py

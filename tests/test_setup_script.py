@@ -200,7 +200,7 @@ def test_an_unknown_argument_of_set_up_is_refused() -> None:
 
 def test_every_target_that_checks_or_writes_documents_sets_up_for_developers() -> None:
     targets = ["lint", "test", "test-slow", "test-all", "docs", "card"]
-    for target in [*targets, "demo", "setup"]:
+    for target in [*targets, "demo", "play", "setup"]:
         dry = subprocess.run(
             ["make", "--dry-run", target], cwd=SETUP.parents[1], capture_output=True, text=True,
             check=True,

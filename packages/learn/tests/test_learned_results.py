@@ -31,19 +31,14 @@ def test_the_documentation_has_the_tables_of_the_pack():
 
 
 def test_the_readme_has_the_rates_of_the_pack():
-    last = tables.memory_table(tables.played()).splitlines()[-1]
-    with_memory, without = re.findall(r"(\d+) \(", last)
-    words = words_of(tables.ROOT / "README.md")
-    assert f"solves {with_memory} % of the validation episodes" in words
-    assert f"and {without} % without memory" in words
-    of_explicit, of_all = tables.words_table(tables.played()).splitlines()[2:4]
-    explicit, direct, reasoning, contextual, spatial = re.findall(r"(\d+) \(", of_explicit)
-    assert f"solves {direct} % with direct references, {contextual} % in context" in words
-    assert f"{spatial} % with places and {reasoning} % with reasoning" in words
-    _, direct, reasoning, contextual, spatial = re.findall(r"(\d+) \(", of_all)
-    rates = f"{direct} %, {contextual} %, {spatial} % and {reasoning} %"
-    assert f"Trained on the words of all settings, it solves {rates}." in words
-    assert explicit == with_memory
+    readme = (tables.ROOT / "README.md").read_text(encoding="utf-8").splitlines()
+    found = [row.split(" | ")[1:] for row in readme if row.startswith("| `recurrent`")]
+    rows = tables.words_table(tables.played()).replace(" to ", "–").splitlines()[2:4]
+    seeds = tables.memory_table(tables.played()).splitlines()[-1].split(" | ")[2].count(",") + 1
+    assert found == [
+        [words, "val", str(seeds), *row.split(" | ")[1:]]
+        for words, row in zip(("explicit", "all five settings"), rows, strict=True)
+    ]
 
 
 def test_the_pack_has_whole_rows_without_errors():
@@ -109,6 +104,9 @@ def test_the_page_has_what_policies_of_one_task_and_act_solve():
     assert f"{each}, **{mean} % on average** ({low} to {high} %" in page
     assert f"It solves **{sum(act)} of {len(act)}**" in page
     assert "also none if 20" in page
+    training = words_of(tables.ROOT / "docs" / "training.md")
+    assert f"solved [{sum(act)} of {len(act)}]" in training
+    assert f"solves {mean} % of the same episodes" in training
     assert (sum(act20), len(act20)) == (0, 50)
 
 
