@@ -3,6 +3,7 @@
 The captures were written with the codec of openpi itself: see captures/make.py.
 """
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -15,6 +16,7 @@ from roboirg.policies import make_policy
 from roboirg.policies.contract.base import SubgoalFollower
 
 CAPTURES = Path(__file__).with_name("captures")
+PAGE = (Path(__file__).parents[2] / "docs" / "servers.md").read_text()
 NOW, LATEST = moment(3, history=()), moment(5, history=(moment(4), moment(5)))
 
 
@@ -22,6 +24,18 @@ def captured(protocol):
     found = sorted(CAPTURES.glob(f"{protocol}-[0-9]*.msgpack"))
     assert found
     return [path.read_bytes() for path in found]
+
+
+@pytest.mark.parametrize("protocol", ["openpi", "mme-vla", "challenge", "challenge-sensors"])
+def test_the_page_has_type_and_shape_of_every_key_that_is_sent(protocol):
+    for key, value in (pair for data in captured(protocol) for pair in unpack(data).items()):
+        (one, head) = (value[0], "list of ") if isinstance(value, list) else (value, "")
+        kind = getattr(one, "dtype", type(one).__name__)
+        # The page has T frames, and pictures of 256 pixels.
+        shape = re.sub(r"^\(\d, (?=1, |8\))", "(T, ", str(np.shape(one) or "")).replace(
+            "8, 8, ", "256, 256, "
+        )
+        assert re.search(rf"`{key}`.* \| {head}{kind} ?{re.escape(shape)}[: ]", PAGE)
 
 
 def test_openpi_sends_these_bytes():

@@ -1,7 +1,5 @@
 """The tables of the learned policy are those of its episodes, and they can be played again."""
 
-import re
-
 import numpy as np
 import pytest
 import write_learned_table as tables

@@ -66,5 +66,6 @@ def test_the_readme_has_the_rates_of_the_rows_that_were_played():
     assert own
     for name, row in own.items():
         (line,) = [one for one in readme if f"`{name}`" in one and one.startswith("|")]
-        rates = row.split(" | ", 1)[1].replace(" to ", "–")
-        assert line.split(" | ", 1)[1] == f"explicit | test | 1 | {rates}"
+        assert line.endswith(
+            f" | explicit | test | 1 | {row.split(' | ', 1)[1].replace(' to ', '–')}"
+        )

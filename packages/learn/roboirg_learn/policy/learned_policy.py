@@ -37,8 +37,7 @@ class LearnedPolicy:
 
     def __init__(self, model: PolicyModel, version: str, seed: int = 0) -> None:
         self.seed, self.version = seed, version
-        self.model = model
-        self.trained_tasks = model.vocabulary.tasks
+        self.model, self.trained_tasks = model, model.vocabulary.tasks
         self._heard: list[str] = []
         self._goal: NDArray[np.float32] | None = None
 
