@@ -21,8 +21,8 @@ time. With `null`, they begin without the weights of ImageNet, and nothing is do
 
 Expect little of these lines: ACT, trained like this for three minutes (one H100, a narrower
 network, 100 demonstrations of PickXtimes), solved 0 of 50 episodes of `val`. All 20,000 steps have
-not been trained here. `roboirg learn policy --tasks PickXtimes` makes a policy that solves 95 % of
-the same episodes.
+not been trained here. `roboirg learn policy --tasks PickXtimes`, with 400 scenes, made a policy
+that solves 95 % of the same episodes.
 """
 _LEROBOT_RUN = """\
 roboirg run --policy 'act=lerobot://outputs/act/checkpoints/last/pretrained_model?device=cuda' \\
