@@ -36,7 +36,6 @@ def test_a_healthy_machine_passes() -> None:
 def test_without_vulkan_the_remedy_is_named() -> None:
     result = run_module(VK_DRIVER_FILES="/nonexistent", VK_ICD_FILENAMES="/nonexistent")
     assert result.returncode == 1
-    assert "FAIL  render device" in result.stdout
     assert "not tried: no device" in result.stdout
     assert (
         "unset VK_ICD_FILENAMES (now '/nonexistent') and VK_DRIVER_FILES (now '/nonexistent'), or "

@@ -43,9 +43,15 @@ def roboirg(monkeypatch, capsys):
         ({}, "2 trajectories, 4 episodes\n"),
         ({"variations": 3, "disturbed": True}, "6 trajectories, 12 episodes\n"),
         ({"policy": "random"}, "4 trajectories, 4 episodes\n"),
+        ({"policy": "policy_lying_here:Own"}, "4 trajectories, 4 episodes\n"),
     ],
 )
-def test_a_dry_run_says_how_big_it_gets_and_writes_nothing(roboirg, tmp_path, choices, size):
+def test_a_dry_run_says_how_big_it_gets_and_writes_nothing(
+    roboirg, tmp_path, monkeypatch, choices, size
+):
+    own = "from roboirg.policies.builtin.random_policy import RandomPolicy as Own\n"
+    (tmp_path / "policy_lying_here.py").write_text(own)
+    monkeypatch.chdir(tmp_path)
     words = ("export", "demonstrations", *FEW, *within(**choices), "--dry-run", "--out")
     code, out, err = roboirg(*words, tmp_path / "data")
     assert (code, out) == (0, "")

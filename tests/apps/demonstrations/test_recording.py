@@ -33,6 +33,9 @@ class Impatient:
             raise MotionPlanningError("It is too far.")
         return rows
 
+    def close(self):
+        self.rows = "closed"
+
 
 @pytest.mark.parametrize(
     ("task", "spec"),
@@ -44,8 +47,9 @@ class Impatient:
 def test_pictures_are_the_simulators_bit_for_bit_and_actions_replay(tmp_path, task, spec):
     """The same actions in a new world lead to the same pictures and states."""
     path, episode = tmp_path / "one.zip", get_episode(task, "train", 0)
-    facts = record_trajectory(episode, Impatient(), path, spec, only_successes=False)
-    assert (facts.status, facts.cause, facts.steps) == ("failure", "It is too far.", 13)
+    facts = record_trajectory(episode, policy := Impatient(), path, spec, only_successes=False)
+    ended = (facts.status, facts.cause, facts.steps, policy.rows)
+    assert ended == ("failure", "It is too far.", 13, "closed")
     recorded = load_trajectory(path)
     every = {"observe_every": 1, "demonstration_frames": 9}
     env = make(episode, cameras=spec.cameras, depth=spec.depth, grounded=True, **every)

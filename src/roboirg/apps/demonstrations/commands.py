@@ -15,6 +15,7 @@ from roboirg.cli.options import (
     Split,
     Tasks,
     Workers,
+    add_working_directory,
 )
 from roboirg.core.plain_text import counted
 
@@ -72,6 +73,7 @@ def export_demonstrations(
     from roboirg.evaluation.plan.option_parsing import parse_episodes
     from roboirg.policies import find_policy
 
+    add_working_directory(last=True)
     words = PlanWords(context, plan, "demonstrations", OWN_OPTIONS)
     chosen = {"video": format == "robomme-hdf5", **words.choices(ExportPlan)}
     find_policy(chosen.get("policy", ExportPlan.policy))

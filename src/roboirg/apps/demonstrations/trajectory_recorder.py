@@ -39,7 +39,7 @@ from roboirg.core.observations import CAMERAS
 from roboirg.core.policy_needs import PolicyNeeds
 from roboirg.core.subgoal_text import split_point
 from roboirg.envs.factory import make
-from roboirg.policies.contract.base import Policy
+from roboirg.policies.contract.base import Policy, close_policy
 from roboirg.policies.contract.play import EpisodeLoop
 from roboirg.util.atomic_write import replacing
 from roboirg.util.media import PICTURE_SIZE, Pixels, scaled_square
@@ -179,6 +179,7 @@ def record_trajectory(
                     write_arrays(archive, facts, {})
     finally:
         env.close()
+        close_policy(policy)
     return facts
 
 

@@ -95,10 +95,9 @@ def lock_folder() -> Path:
 def _lock_any(endpoints: Sequence[Endpoint], folder: Path, *, shared: bool) -> ServerLock | None:
     """Return a lock on the first server that is free."""
     for endpoint in endpoints:
-        path = folder / f"{endpoint.identity}.lock"
         with contextlib.ExitStack() as stack:
-            file = stack.enter_context(path.open("a"))
-            if take_lock(file.fileno(), path, shared=shared):
+            file = stack.enter_context((folder / f"{endpoint.identity}.lock").open("a"))
+            if take_lock(file.fileno(), Path(file.name), shared=shared):
                 stack.pop_all()
                 _held[threading.get_ident(), endpoint.identity] = file
                 return ServerLock(endpoint, file)
