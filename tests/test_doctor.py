@@ -51,7 +51,9 @@ def test_an_unknown_render_device_is_named_with_the_known_ones() -> None:
 
 
 def test_a_missing_package_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    headless = "opencv-contrib-python-headless"
     versions = {"roboirgbench": "0.1.0", "av": "9.2", "sapien": "3.0.3", "jinja2": "3.2rc1"}
+    versions[headless] = "5.0"
 
     def version(name: str) -> str:
         if name not in versions:
@@ -62,23 +64,26 @@ def test_a_missing_package_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
         "numpy>=1.26",
         "av>=12; extra == 'sim'",
         "sapien==3.0.3; extra == 'sim'",
+        "opencv-python>=4.9; extra == 'sim'",
         "jinja2>=3; extra == 'report'",
         "ruff>=0.6; extra == 'dev'",
     ]
     monkeypatch.setattr(metadata, "version", version)
+    monkeypatch.setattr(metadata, "packages_distributions", lambda: {"cv2": [headless]})
     monkeypatch.setattr(metadata, "requires", lambda _: requirements)
     assert list(doctor._check_packages()) == [
         Check("roboirgbench", True, "0.1.0"),
         Check("numpy", False, "not installed; needs >=1.26", "pip install 'numpy>=1.26'"),
         Check("av", False, "9.2; needs >=12", "pip install 'av>=12'"),
         Check("sapien", True, "3.0.3"),
+        Check(headless, True, "5.0"),
         Check("jinja2", True, "3.2rc1"),
     ]
 
 
 def test_missing_model_files_are_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("ROBOIRG_MODEL_FILES", str(tmp_path))
-    check = doctor._check_model_files()
+    check = doctor._check_files()[0]
     assert not check.ok
     assert str(tmp_path) in check.found
     assert check.remedy.startswith("run: roboirg fetch-models")

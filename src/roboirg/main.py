@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import importlib.metadata
 import importlib.util
+import io
 import pkgutil
 import sys
 from collections.abc import Mapping
@@ -133,7 +134,12 @@ _add_commands()
 
 
 def main() -> None:
-    """Run the command; errors are one sentence on stderr, and only bugs of ours a traceback."""
+    """Run the command; errors are one sentence on stderr, and only bugs of ours a traceback.
+
+    Characters that the output's encoding lacks become question marks.
+    """
+    if isinstance(sys.stdout, io.TextIOWrapper):
+        sys.stdout.reconfigure(errors="replace")  # stderr replaces them anyway
     try:
         code = app(prog_name="roboirg", standalone_mode=False)
     except RoboIRGError as error:

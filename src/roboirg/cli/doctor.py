@@ -7,13 +7,15 @@ hang; that is then a failed check and does not end the report.
 
 from __future__ import annotations
 
+import mmap
 import os
 import platform
 import signal
 import subprocess
 import sys
+import tempfile
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from importlib import metadata
 from pathlib import Path
@@ -21,7 +23,7 @@ from pathlib import Path
 from packaging.requirements import Requirement
 from packaging.specifiers import SpecifierSet
 
-from roboirg.core.errors import MissingDependencyError, RenderDeviceError, RoboIRGError
+from roboirg.core.errors import RenderDeviceError, RoboIRGError
 from roboirg.core.extras import DISTRIBUTION, install_command
 from roboirg.simulation.model_files import look_for_model_files
 from roboirg.simulation.rendering.render_device import (
@@ -29,13 +31,17 @@ from roboirg.simulation.rendering.render_device import (
     DRIVER_VARIABLES,
     to_unset,
 )
+from roboirg.util.cache import cache_folder
 from roboirg.util.processor import core_count
+from roboirg.util.proxies import proxy_of
 
 FRAME_TIMEOUT = 120
 """Time limit for the test frame, and then for each picture, s."""
 
 OLDEST_PYTHON = (3, 11)
 _EXTRAS = ("sim", "report")
+_MODULES = {"opencv-python": "cv2"}
+"""Modules of packages that others bring as well, such as opencv-python-headless."""
 _GIB = 1024**3
 _MIN_MEMORY = 2 * _GIB
 _RENDER_REMEDY = (
@@ -73,7 +79,7 @@ def run_checks(render_s: int = 0) -> list[Check]:
         _check_python(),
         *_check_packages(),
         _check_opencv(),
-        _check_model_files(),
+        *_check_files(),
         *_check_rendering(render_s),
         Check("processors", ok=True, found=f"{core_count()}"),
         _check_memory(),
@@ -126,7 +132,8 @@ def _check_packages() -> Iterator[Check]:
         if needed and one.name != DISTRIBUTION:
             wanted[one.name] = one.specifier
     for name, specifier in wanted.items():
-        yield _check_package(name, specifier)
+        brought = metadata.packages_distributions().get(_MODULES.get(name, ""), [name])
+        yield _check_package(name if name in brought else brought[0], specifier)
 
 
 def _check_package(name: str, specifier: SpecifierSet) -> Check:
@@ -140,11 +147,25 @@ def _check_package(name: str, specifier: SpecifierSet) -> Check:
     return Check(name, True, version)
 
 
-def _check_model_files() -> Check:
-    name = "model files"
+def _check_files() -> tuple[Check, ...]:
+    """Check what lies outside the packages: files, folders and proxies."""
+    return (
+        _try("model files", lambda: str(look_for_model_files().root)),
+        _try("temporary files", lambda: _write_to(tempfile.gettempdir())),
+        _try("cache", lambda: _write_to(str(cache_folder() or "")), "all is made anew"),
+        _try("shared memory", lambda: _write_to("/dev/shm"), "runs do without it"),  # noqa: S108
+        _try("proxies", _name_proxies),
+    )
+
+
+def _try(name: str, find: Callable[[], str], without: str = "") -> Check:
+    """Check that something can be found; `without`: what happens otherwise, if that is no fault."""
     try:
-        return Check(name, True, str(look_for_model_files().root))
-    except MissingDependencyError as error:
+        return Check(name, True, find() or "off")
+    except OSError as error:
+        found = f"{error.strerror or error}{without and f': {without}'}"
+        return Check(name, bool(without), found, "let TMPDIR name a folder to write to")
+    except RoboIRGError as error:
         problem, _, remedy = str(error).partition("; ")
         return Check(name, False, problem, remedy)
 
@@ -180,6 +201,7 @@ def _run_python(*arguments: str, limit_s: int = FRAME_TIMEOUT) -> tuple[bool, st
             [sys.executable, *arguments],
             capture_output=True,
             text=True,
+            errors="replace",
             check=False,
             timeout=limit_s,
         )
@@ -210,6 +232,19 @@ def _check_memory() -> Check:
         f"{total / _GIB:.1f} GiB",
         f"provide at least {_MIN_MEMORY // _GIB} GiB; each worker process takes about 0.5 GiB",
     )
+
+
+def _write_to(folder: str) -> str:
+    """Write a page of memory to a folder, and return it."""
+    with tempfile.TemporaryFile(dir=folder) as file:
+        file.write(bytes(mmap.PAGESIZE))
+    return folder
+
+
+def _name_proxies() -> str:
+    """Name the proxies of addresses outside; models use them, and the fetch of model files."""
+    used = {proxy_of(f"{scheme}://example.org").words for scheme in ("http", "https")}
+    return ", ".join(sorted(used)).strip(" ,") or "none"
 
 
 def _draw_test_frame(render_s: int) -> None:

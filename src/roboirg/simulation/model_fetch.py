@@ -26,6 +26,7 @@ from roboirg.simulation.model_files import (
     look_for_model_files,
 )
 from roboirg.util.atomic_write import write_atomically
+from roboirg.util.proxies import proxy_of
 
 WHEEL = "mani_skill-3.0.1-py3-none-any.whl"
 WHEEL_SHA256 = "685de2f03c300b1ede49881a1bf6306ad062082d39c8d3be8b8e85603f32e33a"
@@ -95,7 +96,8 @@ def _download(folder: Path, say: Callable[[str], None]) -> Path:
                 shutil.copyfileobj(reply, file)
         except (OSError, http.client.HTTPException) as error:
             raise MissingDependencyError(
-                f"Cannot download {WHEEL_URL} ({error}); try again, {_BY_HAND}."
+                f"Cannot download {WHEEL_URL}{proxy_of(WHEEL_URL).words} ({error}); try again, "
+                f"{_BY_HAND}."
             ) from error
     if not _is_right(wheel):
         wheel.unlink(missing_ok=True)
@@ -110,13 +112,19 @@ def _download_with_pip(folder: Path) -> None:
     options = ("--quiet", "--disable-pip-version-check", "--no-deps", "--only-binary=:all:")
     command = [sys.executable, "-m", "pip", "download", *options, "--dest", str(folder)]
     done = subprocess.run(  # noqa: S603 - pip of our own interpreter with constant words
-        [*command, "mani_skill==3.0.1"], capture_output=True, text=True, check=False
+        [*command, "mani_skill==3.0.1"],
+        capture_output=True,
+        text=True,
+        errors="replace",
+        check=False,
     )
     if done.returncode:
-        errors = [line for line in done.stderr.splitlines() if line.startswith("ERROR:")]
-        problem = errors[-1].removeprefix("ERROR:").strip() if errors else "no reason given"
+        lines = done.stderr.strip().splitlines() or ["no reason given"]
+        named = [line for line in lines if line.startswith("ERROR:") and line[-1] != ":"]
+        problem = (named or lines)[-1].removeprefix("ERROR:").strip()
         raise MissingDependencyError(
-            f"pip could not download {WHEEL} ({problem}); try again with a connection, {_BY_HAND}."
+            f"pip could not download {WHEEL}{proxy_of(WHEEL_URL).words} ({problem}); try again "
+            f"with a connection, {_BY_HAND}."
         )
 
 

@@ -9,11 +9,11 @@ from __future__ import annotations
 
 import functools
 import hashlib
-import os
 from dataclasses import dataclass
 from pathlib import Path
 
 from roboirg.core.errors import MissingDependencyError
+from roboirg.util.user_folders import user_folder
 
 FOLDER_VARIABLE = "ROBOIRG_MODEL_FILES"
 REMEDY = "run: roboirg fetch-models (in a checkout: make setup)"
@@ -76,13 +76,7 @@ def look_for_model_files() -> ModelFiles:
 
 def fetched_folder() -> Path:
     """Return the folder of the model files, which may not exist."""
-    if chosen := os.environ.get(FOLDER_VARIABLE):
-        return Path(chosen).expanduser()
-    try:
-        import platformdirs  # here, because the doctor must run without it
-    except ImportError as error:
-        raise MissingDependencyError(f"platformdirs is not installed ({error})") from error
-    return platformdirs.user_data_path("roboirgbench") / "mani_skill-3.0.1"
+    return user_folder("data", FOLDER_VARIABLE, below="mani_skill-3.0.1")
 
 
 def _problem_of(root: Path) -> str | None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 import math
+from pathlib import Path
 
 import numpy as np
 import sapien
@@ -64,7 +65,9 @@ def apply_physics_settings() -> None:
 @functools.cache
 def apply_render_settings() -> None:
     """Set the default camera shader and the picture formats."""
-    sapien.render.set_camera_shader_dir("minimal")
+    # By its whole path: where there is no home, SAPIEN has not set where it looks for names.
+    shader = Path(sapien.__file__).parent / "vulkan_shader" / "minimal"
+    sapien.render.set_camera_shader_dir(str(shader))
     sapien.render.set_picture_format("Color", "r8g8b8a8unorm")
     sapien.render.set_picture_format("ColorRaw", "r8g8b8a8unorm")
     sapien.render.set_picture_format("PositionSegmentation", "r16g16b16a16sint")

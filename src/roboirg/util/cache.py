@@ -17,10 +17,9 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Literal
 
-import platformdirs
-
 from roboirg.core.errors import InvalidValueError
 from roboirg.util.atomic_write import PART, replacing
+from roboirg.util.user_folders import user_folder
 
 FOLDER_VARIABLE = "ROBOIRG_CACHE"
 SIZE_VARIABLE = "ROBOIRG_CACHE_GIB"
@@ -123,10 +122,9 @@ def open_cache(kind: Kind) -> Cache:
 
 def cache_folder() -> Path | None:
     """Return the folder of all caches; None if the environment variable disables them."""
-    folder = os.environ.get(FOLDER_VARIABLE, "")
-    if folder == OFF:
+    if os.environ.get(FOLDER_VARIABLE) == OFF:
         return None
-    return Path(folder).expanduser() if folder else platformdirs.user_cache_path("roboirgbench")
+    return user_folder("cache", FOLDER_VARIABLE)
 
 
 def _size() -> float:

@@ -330,7 +330,7 @@ def _failure(error: BaseException) -> Outcome:
 def main(supervisor: socket.socket) -> None:
     """Serve worlds; runs in a process of its own."""
     if isinstance(sys.stdout, io.TextIOWrapper):
-        sys.stdout.reconfigure(line_buffering=True)
+        sys.stdout.reconfigure(line_buffering=True, errors="replace")
     if sys.path[-1] == str(Path.cwd()):  # where a command puts it: its policy's files come first
         sys.path.insert(0, sys.path.pop())
     HostProcess(supervisor).serve()

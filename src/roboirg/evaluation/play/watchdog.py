@@ -9,10 +9,13 @@ from __future__ import annotations
 
 import contextlib
 import ctypes
+import mmap
+import os
 import time
 from collections.abc import Iterator
-from multiprocessing.sharedctypes import RawValue
-from typing import ClassVar, Literal, get_args
+from multiprocessing.reduction import DupFd
+from tempfile import TemporaryFile
+from typing import IO, Any, ClassVar, Literal, get_args
 
 from roboirg.core.waiting import NativeCode, Wait, listen
 
@@ -57,10 +60,26 @@ class Watchdog:
     still while the process waits for its turn, as for a server that another episode uses.
 
     Pass it to a process when that is started.
+
+    Args:
+        file: of the memory, which another process made; None makes it.
     """
 
-    def __init__(self) -> None:
-        self._shared = RawValue(_Shared)
+    def __init__(self, file: IO[bytes] | None = None) -> None:
+        if file is None:
+            # Not multiprocessing's memory, which is in /dev/shm: containers lack that, or it is
+            # full. Not every build of Python has memfd_create.
+            file = (
+                os.fdopen(os.memfd_create("roboirg"), "r+b", 0)
+                if hasattr(os, "memfd_create")
+                else TemporaryFile(buffering=0)  # noqa: SIM115 - is closed with this object
+            )
+            file.write(bytes(_Shared()))  # where a disk is full, this fails, and not a later look
+        self._file = file
+        self._shared = _Shared.from_buffer(mmap.mmap(file.fileno(), ctypes.sizeof(_Shared)))
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return _attach, (DupFd(self._file.fileno()),)
 
     def begin_job(self) -> None:
         """Forget how long the last job waited for its turn."""
@@ -127,6 +146,10 @@ class Watchdog:
                 return (code, NATIVE_LIMIT_S) if since < now - NATIVE_LIMIT_S else None
         is_overdue = not shared.queued_since and 0.0 < shared.deadline < now
         return (PHASES[shared.phase], float(shared.limit_s)) if is_overdue else None
+
+
+def _attach(descriptor: Any) -> Watchdog:  # noqa: ANN401 - multiprocessing's, of no public type
+    return Watchdog(os.fdopen(descriptor.detach(), "r+b", 0))
 
 
 _watchdogs: list[Watchdog] = []

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import contextlib
 import os
-import tempfile
 import threading
 import time
 from collections.abc import Sequence
@@ -18,12 +17,11 @@ from pathlib import Path
 from typing import IO, NamedTuple
 from weakref import WeakValueDictionary
 
-import platformdirs
-
 from roboirg.core.errors import PolicyConnectionError, PolicyTimeoutError
 from roboirg.core.waiting import waiting
 from roboirg.policies.remote.endpoints import Endpoint
 from roboirg.util.atomic_write import take_lock
+from roboirg.util.user_folders import temporary_folder, user_folder
 
 _PAUSE = 0.05
 """Seconds between two attempts to lock a server."""
@@ -83,11 +81,11 @@ def lock_folder() -> Path:
 
     It is the same for all of a user's processes, so it is not the folder of a login session.
     """
-    folder = platformdirs.user_cache_path("roboirgbench") / "servers"
+    folder = user_folder("cache", below="servers")
     try:
         folder.mkdir(parents=True, exist_ok=True, mode=0o700)
-    except OSError:  # no home, or not writable
-        folder = Path(tempfile.gettempdir()) / f"roboirgbench-{os.getuid()}" / "servers"
+    except OSError:  # not writable
+        folder = temporary_folder() / "servers"
         folder.mkdir(parents=True, exist_ok=True, mode=0o700)
     return folder
 

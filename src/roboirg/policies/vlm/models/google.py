@@ -13,8 +13,6 @@ from roboirg.policies.vlm.models.http_model import HttpModel, given
 from roboirg.policies.vlm.models.model import ModelQuery, ModelReply
 from roboirg.util.media import Picture, encode_png
 
-GOOGLE = "https://generativelanguage.googleapis.com"
-
 
 class GoogleModel(HttpModel):
     """Sends pictures and clips inside the request.
@@ -22,12 +20,14 @@ class GoogleModel(HttpModel):
     Nothing is uploaded to the file service, so nothing remains there when an episode ends early.
     """
 
+    home = "https://generativelanguage.googleapis.com"
+
     def write(self, query: ModelQuery) -> tuple[str, dict[str, str], bytes]:
         """Return the request for a query."""
         options = self.options
         named = options.model.startswith(("models/", "tunedModels/"))
         name = quote(options.model if named else f"models/{options.model}", safe="/:")
-        url = f"{(options.base_url or GOOGLE).rstrip('/')}/v1/{name}"
+        url = f"{(options.base_url or self.home).rstrip('/')}/v1/{name}"
         headers = {
             "x-goog-api-key": self.key,
             "X-Server-Timeout": str(math.ceil(options.timeout_s)),

@@ -10,7 +10,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from concurrent.futures import Future
 from http import HTTPStatus
-from typing import Any
+from typing import Any, ClassVar
 
 from roboirg.core.errors import (
     ModelBusyError,
@@ -21,6 +21,7 @@ from roboirg.core.errors import (
 from roboirg.core.extras import extra_needed
 from roboirg.core.waiting import waiting
 from roboirg.policies.vlm.models.model import ModelOptions, ModelQuery, ModelReply
+from roboirg.util.proxies import proxy_of
 
 with extra_needed("Models need httpx", "vlm"):
     import httpx
@@ -38,12 +39,24 @@ Fetched = tuple[httpx.Response, bytes]
 
 
 class HttpModel(ABC):
-    """Posts queries; a subclass writes them as its provider's API wants, and reads the replies."""
+    """Posts queries; a subclass writes them as its provider's API wants, and reads the replies.
+
+    Attributes:
+        home: URL of the provider's own service.
+
+    Raises:
+        MissingDependencyError: the environment names a proxy that cannot be used; a run stops.
+    """
+
+    home: ClassVar[str]
 
     def __init__(self, options: ModelOptions) -> None:
         self.options, self.key = options, options.key()
-        self._name = f"Model {options.model!r} at {options.address()}"
-        self._client = httpx.Client(timeout=options.timeout_s)
+        proxy = proxy_of(options.base_url or self.home)
+        self._name = f"Model {options.model!r} at {options.address()}{proxy.words}"
+        # The library itself takes a proxy for this machine, too, and does not name it.
+        transport = httpx.HTTPTransport(proxy=proxy.url)
+        self._client = httpx.Client(transport=transport, timeout=options.timeout_s)
         weakref.finalize(self, self._client.close)  # the connection ends with this object
 
     @abstractmethod

@@ -12,11 +12,11 @@ from roboirg.policies.vlm.models.http_model import HttpModel, given
 from roboirg.policies.vlm.models.model import ModelOptions, ModelQuery, ModelReply
 from roboirg.util.media import Picture, encode_png, sample_evenly
 
-OPENAI = "https://api.openai.com/v1"
-
 
 class OpenAIModel(HttpModel):
     """Sends queries as chat completions."""
+
+    home = "https://api.openai.com/v1"
 
     def write(self, query: ModelQuery) -> tuple[str, dict[str, str], bytes]:
         """Return the request for a query."""
@@ -30,7 +30,7 @@ class OpenAIModel(HttpModel):
             temperature=options.temperature,
         )
         text = json.dumps(body, ensure_ascii=False, separators=(",", ":"))
-        url = f"{(options.base_url or OPENAI).rstrip('/')}/chat/completions"
+        url = f"{(options.base_url or self.home).rstrip('/')}/chat/completions"
         return url, {"Authorization": f"Bearer {self.key}"}, text.encode()
 
     def read(self, reply: Any) -> ModelReply:  # noqa: ANN401 - depends on what the server sends

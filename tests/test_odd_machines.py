@@ -1,0 +1,112 @@
+"""What is odd about some machines: no home, no /dev/shm, proxies, narrow encodings."""
+
+import io
+import os
+import sys
+
+import pytest
+
+from roboirg import main as cli
+from roboirg.cli import doctor
+from roboirg.cli.doctor import Check
+from roboirg.core.errors import MissingDependencyError
+from roboirg.evaluation.play.watchdog import Watchdog
+from roboirg.policies.vlm.models import ModelOptions, make_model
+from roboirg.util.child_process import ChildProcess
+from roboirg.util.proxies import proxy_of
+from roboirg.util.user_folders import user_folder
+
+PROXIES = {
+    "http_proxy": "http://user:secret@proxy:9",
+    "HTTPS_PROXY": "proxy:8",
+    "ALL_PROXY": "https://[::1]:7",
+    "NO_PROXY": ".lab,10.0.0.1",
+}
+
+
+@pytest.fixture
+def bare(monkeypatch):
+    """The environment, without proxies."""
+    for name in [name for name in os.environ if name.lower().endswith("_proxy")]:
+        monkeypatch.delenv(name)
+    return monkeypatch
+
+
+@pytest.mark.parametrize(
+    ("url", "named"),
+    [
+        ("http://models.org/v1", " through the proxy http://proxy:9 of http_proxy"),
+        ("https://models.org", " through the proxy http://proxy:8 of HTTPS_PROXY"),
+        ("ftp://models.org", " through the proxy https://[::1]:7 of ALL_PROXY"),
+        ("http://localhost.org", " through the proxy http://proxy:9 of http_proxy"),
+        *((f"http://{it}:1/v1", "") for it in ("localhost", "127.0.0.1", "127.1.2.3", "[::1]")),
+        *((f"http://{it}", "") for it in ("a.lab:80", "10.0.0.1")),
+    ],
+)
+def test_a_proxy_is_named_and_this_machine_needs_none(bare, url, named):
+    for name, value in PROXIES.items():
+        bare.setenv(name, value)
+    assert proxy_of(url).words == named
+
+
+@pytest.mark.parametrize("proxy", ["socks5://h:1", "socks://h:1", "http://h:1x"])
+def test_a_proxy_that_cannot_be_used_is_one_sentence(bare, proxy):
+    bare.setenv("ALL_PROXY", proxy.replace("h:", "u:secret@h:"))
+    bare.setitem(sys.modules, "socksio", None)
+    with pytest.raises(MissingDependencyError, match=f"proxy {proxy} of ALL_PROXY cannot be used"):
+        make_model(ModelOptions(model="m", base_url="http://models.org/v1"))
+    make_model(ModelOptions(model="m", base_url="http://127.0.0.1:8/v1"))
+
+
+def test_without_a_home_folders_are_temporary(monkeypatch, tmp_path):
+    monkeypatch.setenv("HOME", "")
+    monkeypatch.setattr("pwd.getpwuid", {}.__getitem__)
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
+    monkeypatch.setattr("os.getuid", lambda: tmp_path.stat().st_uid)
+    folder = tmp_path / f"roboirgbench-{os.getuid()}"
+    assert user_folder("data", below="servers") == folder / "servers"
+    assert folder.stat().st_mode & 0o777 == 0o700
+
+
+def hang(connection, watchdog):
+    """Begin a phase, and wait."""
+    watchdog.write("policy's act()", 1e9)
+    connection.send(None)
+    connection.recv()
+
+
+@pytest.mark.parametrize("has_memory", [True, False])
+def test_a_worker_is_watched_without_shared_memory(monkeypatch, has_memory):
+    monkeypatch.setattr("multiprocessing.heap.Arena", None)  # what is in /dev/shm
+    if not has_memory:  # as in Pythons that are built for old systems
+        monkeypatch.delattr(os, "memfd_create")
+    watchdog = Watchdog()
+    child = ChildProcess.spawn(hang, watchdog)
+    child.receive()
+    assert watchdog.phase == "policy's act()"
+    child.end()
+
+
+@pytest.mark.parametrize(
+    ("encoding", "shown"), [("ascii", b"?"), ("latin-1", b"?"), ("utf-8", "≠".encode())]
+)
+def test_what_the_output_cannot_show_is_replaced(monkeypatch, encoding, shown):
+    monkeypatch.setattr(sys, "stdout", out := io.TextIOWrapper(io.BytesIO(), encoding))
+    monkeypatch.setattr(cli, "app", lambda **_: out.write("≠"))
+    with pytest.raises(SystemExit):
+        cli.main()
+    out.flush()
+    assert out.buffer.getvalue() == shown
+
+
+def test_the_doctor_names_what_is_odd(bare, tmp_path):
+    bare.setattr("tempfile.tempdir", str(tmp_path / "gone"))
+    bare.setenv("ROBOIRG_CACHE", "~nobody-here/x")
+    bare.setenv("http_proxy", "http://a:b@h:1")
+    _, files, cache, _, proxies = doctor._check_files()
+    assert (files.ok, files.found, cache.ok) == (False, "No such file or directory", False)
+    assert (cache.found, cache.remedy) == (
+        "ROBOIRG_CACHE is '~nobody-here/x', but there is no such home",
+        "write the whole path.",
+    )
+    assert proxies == Check("proxies", True, "through the proxy http://h:1 of http_proxy")
