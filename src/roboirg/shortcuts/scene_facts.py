@@ -33,7 +33,8 @@ def _standing(scene: Scene) -> Iterator[tuple[str, float]]:
         yield f"x of {look}", one.position.x
         yield f"y of {look}", one.position.y
         if others := [other for other in alone if other != look and alone[other].color]:
-            nearest = min(others, key=lambda other: _distance(one, alone[other]))
+            spots = {other: alone[other].position[:2] for other in others}
+            nearest = min(spots, key=lambda other: math.dist(one.position[:2], spots[other]))
             yield f"nearest to {look}: {nearest}", 1.0
 
 
@@ -73,7 +74,3 @@ def _seen_as(scene: Scene, name: str | None) -> str:
 
 def _look(one: SceneObject) -> str:
     return one.kind if one.color is None else f"{one.color} {one.kind}"
-
-
-def _distance(one: SceneObject, other: SceneObject) -> float:
-    return math.dist(one.position[:2], other.position[:2])

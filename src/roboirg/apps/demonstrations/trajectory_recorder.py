@@ -360,11 +360,6 @@ def without_pixel(subgoal: str) -> str:
     return split_point(subgoal)[0]
 
 
-def _without_place(template: str) -> str:
-    """Return the simple form of a subgoal, such as ``pick up {at} the cube``."""
-    return template.replace("{at} ", "").replace(" {at}", "")
-
-
 def _with_pixels(templates: list[str], online: list[str]) -> list[str]:
     """Fill the pixels into subgoals, as the judge's view of the same subgoal found them.
 
@@ -376,6 +371,7 @@ def _with_pixels(templates: list[str], online: list[str]) -> list[str]:
     filled = []
     for template, due in zip(templates, online, strict=True):
         latest[without_pixel(due)] = due
-        simple = without_pixel(_without_place(template))
+        # A subgoal such as ``pick up {at} the cube``.
+        simple = without_pixel(template.replace("{at} ", "").replace(" {at}", ""))
         filled.append(latest.get(simple, simple))
     return filled

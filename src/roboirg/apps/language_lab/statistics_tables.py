@@ -30,7 +30,8 @@ def overview_tables(instructions: Sequence[Instruction]) -> Iterator[Table]:
     )
     for title, name, order in by_task:
         if counts := corpus_statistics.metadata_counts(instructions, name):
-            yield _count_table(title, "task", counts, [*every_task()], order or _found(counts))
+            names = {name for one in counts.values() for name in one}
+            yield _count_table(title, "task", counts, [*every_task()], order or sorted(names))
 
 
 _RELATIONS = [*(one.name for one in (*RELATIONS, *COUNTED_STEPS, *STEPS)), "neighbor"]
@@ -82,10 +83,6 @@ def _count_table(
         if name in counts:
             table.add_row(name, *(str(counts[name].get(column, "")) for column in used))
     return table
-
-
-def _found(counts: ClassCounts) -> list[str]:
-    return sorted({name for one in counts.values() for name in one})
 
 
 def _table(title: str, first: str, numbers: Sequence[str]) -> Table:

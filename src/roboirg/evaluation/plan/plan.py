@@ -405,7 +405,9 @@ class Plan(BaseModel):
     ) -> Iterator[Job]:
         said = [options for setting in settings for options in self._options_of(setting)]
         file, wordings = self.wordings or (None, None)
-        for options in sorted(said, key=_names_the_goal):
+        for options in sorted(
+            said, key=lambda one: one.setting == EXPLICIT or one.form == "resolved"
+        ):
             if self._is_left_out(task, episode, options):
                 continue
             job = Job(
@@ -527,10 +529,6 @@ def _has_arm(job: Job, arm: str) -> bool:
     except InvalidValueError:
         return False
     return True
-
-
-def _names_the_goal(options: InstructionOptions) -> bool:
-    return options.setting == EXPLICIT or options.form == "resolved"
 
 
 def _texts(value: object) -> list[str]:
