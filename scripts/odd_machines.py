@@ -160,7 +160,7 @@ MACHINES = (
         "",
         "! timeout 5 bash -c 'echo >/dev/tcp/127.0.0.1/9'",
         f"http_proxy={PROXY} https_proxy={PROXY} HTTP_PROXY={PROXY} HTTPS_PROXY={PROXY} "
-        f"ALL_PROXY={SOCKS} all_proxy={SOCKS} NO_PROXY=example.org",
+        f"ALL_PROXY={SOCKS} all_proxy={SOCKS} NO_PROXY=models.lab",
     ),
     Machine(
         "only a SOCKS proxy",
