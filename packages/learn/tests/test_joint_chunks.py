@@ -1,5 +1,7 @@
 """A policy that acts in waypoints as one that acts in joint angles."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
@@ -17,7 +19,8 @@ class Rehearsed(LearnedPolicy):
     """Returns waypoints in order, and keeps what it sees."""
 
     def __init__(self, waypoints):
-        super().__init__(None, "rehearsed")
+        words = SimpleNamespace(tasks=("ButtonUnmask",))
+        super().__init__(SimpleNamespace(vocabulary=words), "rehearsed")
         self.waypoints, self.pictures, self.tools = waypoints, [], []
 
     def reset(self, instruction, demonstration):
