@@ -154,7 +154,7 @@ def _check_files() -> tuple[Check, ...]:
         _try("temporary files", lambda: _write_to(tempfile.gettempdir())),
         _try("cache", lambda: _write_to(str(cache_folder() or "")), "all is made anew"),
         _try("shared memory", lambda: _write_to("/dev/shm"), "runs do without it"),  # noqa: S108
-        _try("proxies", _name_proxies),
+        _try("proxies", _name_proxies, "models on other machines are out of reach"),
     )
 
 
@@ -167,7 +167,7 @@ def _try(name: str, find: Callable[[], str], without: str = "") -> Check:
         return Check(name, bool(without), found, "let TMPDIR name a folder to write to")
     except RoboIRGError as error:
         problem, _, remedy = str(error).partition("; ")
-        return Check(name, False, problem, remedy)
+        return Check(name, bool(without), f"{problem}{without and f': {without}'}", remedy)
 
 
 def _check_opencv() -> Check:
