@@ -110,3 +110,5 @@ def test_the_doctor_names_what_is_odd(bare, tmp_path):
         "write the whole path.",
     )
     assert proxies == Check("proxies", True, "through the proxy http://h:1 of http_proxy")
+    bare.setenv("http_proxy", "socks://h:1")
+    assert doctor._check_files()[-1].ok

@@ -23,7 +23,7 @@ from pathlib import Path
 from packaging.requirements import Requirement
 from packaging.specifiers import SpecifierSet
 
-from roboirg.core.errors import RenderDeviceError, RoboIRGError
+from roboirg.core.errors import MissingDependencyError, RenderDeviceError, RoboIRGError
 from roboirg.core.extras import DISTRIBUTION, install_command
 from roboirg.simulation.model_files import look_for_model_files
 from roboirg.simulation.rendering.render_device import (
@@ -154,7 +154,7 @@ def _check_files() -> tuple[Check, ...]:
         _try("temporary files", lambda: _write_to(tempfile.gettempdir())),
         _try("cache", lambda: _write_to(str(cache_folder() or "")), "all is made anew"),
         _try("shared memory", lambda: _write_to("/dev/shm"), "runs do without it"),  # noqa: S108
-        _try("proxies", _name_proxies, "models on other machines are out of reach"),
+        _try("proxies", _name_proxies, "models elsewhere are out of reach"),
     )
 
 
@@ -167,7 +167,10 @@ def _try(name: str, find: Callable[[], str], without: str = "") -> Check:
         return Check(name, bool(without), found, "let TMPDIR name a folder to write to")
     except RoboIRGError as error:
         problem, _, remedy = str(error).partition("; ")
-        return Check(name, bool(without), f"{problem}{without and f': {without}'}", remedy)
+        # Only what is missing can be done without; a wrong value stops runs.
+        return Check(
+            name, bool(without) and isinstance(error, MissingDependencyError), problem, remedy
+        )
 
 
 def _check_opencv() -> Check:
